@@ -1,0 +1,31 @@
+# rr::options carries the language level, warnings and sanitizers; every target of ours links it.
+add_library(rr_options INTERFACE)
+add_library(rr::options ALIAS rr_options)
+target_compile_features(rr_options INTERFACE cxx_std_20)
+target_include_directories(rr_options INTERFACE "${PROJECT_SOURCE_DIR}")
+target_compile_options(rr_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
+                                            -Wno-missing-field-initializers)
+
+set(RR_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize= (address,undefined or thread)")
+if(RR_SANITIZE)
+  target_compile_options(rr_options INTERFACE -fsanitize=${RR_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  target_link_options(rr_options INTERFACE -fsanitize=${RR_SANITIZE})
+endif()
+option(RR_FUZZ "Build the libFuzzer targets (clang only)" OFF)
+if(RR_FUZZ)
+  target_compile_options(rr_options INTERFACE -fsanitize=fuzzer-no-link)
+endif()
+
+if(EMSCRIPTEN)
+  # Boost gets an include directory of its own: /usr/include itself would shadow the sysroot.
+  set(RR_BOOST_ROOT "/usr/include" CACHE PATH "Directory that holds boost/ (for the wasm build)")
+  file(MAKE_DIRECTORY "${PROJECT_BINARY_DIR}/boost-include")
+  file(CREATE_LINK "${RR_BOOST_ROOT}/boost" "${PROJECT_BINARY_DIR}/boost-include/boost" SYMBOLIC)
+  add_library(rr_boost INTERFACE)
+  target_include_directories(rr_boost SYSTEM INTERFACE "${PROJECT_BINARY_DIR}/boost-include")
+else()
+  find_package(Boost 1.81 REQUIRED)
+  add_library(rr_boost INTERFACE)
+  target_link_libraries(rr_boost INTERFACE Boost::headers)
+endif()
+add_library(rr::boost ALIAS rr_boost)

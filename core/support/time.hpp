@@ -1,0 +1,29 @@
+// Time as a parameter: one reading of both clocks. Layer: support. Source: messages spec section 13.
+#pragma once
+
+#include <chrono>
+#include <compare>
+#include <cstdint>
+
+namespace rr {
+
+/// Seconds and nanoseconds since 1970-01-01T00:00:00 UTC; both have the same sign after normalized().
+struct TimeSpec {
+  std::int64_t seconds = 0;
+  std::int32_t nanoseconds = 0;
+
+  TimeSpec normalized() const;
+  TimeSpec plus_one_nanosecond() const;
+  auto operator<=>(const TimeSpec&) const = default;
+};
+
+/// One reading of the clocks, taken by the driver and handed to every call that depends on time.
+/// `steady` drives deadlines; `utc` stamps wire packets.
+struct Now {
+  std::chrono::steady_clock::time_point steady;
+  TimeSpec utc;
+};
+
+using TimePoint = std::chrono::steady_clock::time_point;
+
+}  // namespace rr

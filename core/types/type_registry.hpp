@@ -1,0 +1,48 @@
+// The verified definitions that values and objects are checked against. Layer: types.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/robdef/robdef.hpp"
+
+namespace rr {
+
+/// A set of definitions that grows: definitions arrive at connect and, for varobject types, later.
+/// Definitions that were added never move or change.
+class TypeRegistry {
+ public:
+  /// Parses, verifies together with what is there, and adds all or none. Texts may come in any order but must bring
+  /// every import that is not there yet. A definition that is already there (same name) is skipped.
+  /// Errors   service_definition_error, with the first diagnostic.
+  Result<> add(const std::vector<std::string>& texts, RobdefMode mode);
+
+  /// Names imported by added definitions or by `text` that are not in the registry.
+  static std::vector<std::string> imports_of(std::string_view text);
+
+  const ServiceDefinition* find_service(std::string_view name) const;
+  /// Qualified names, "com.x.Pose".
+  const EntityDefinition* find_entity(std::string_view qualified_name) const;
+  const EnumDefinition* find_enum(std::string_view qualified_name) const;
+  bool has_exception(std::string_view qualified_name) const;
+  /// All definitions, imports before importers.
+  const std::vector<std::unique_ptr<ServiceDefinition>>& definitions() const { return definitions_; }
+  /// Warnings collected by add().
+  const std::vector<Diagnostic>& warnings() const { return warnings_; }
+
+ private:
+  std::vector<std::unique_ptr<ServiceDefinition>> definitions_;
+  std::map<std::string, const EntityDefinition*, std::less<>> entities_;
+  std::map<std::string, const EnumDefinition*, std::less<>> enums_;
+  std::vector<Diagnostic> warnings_;
+};
+
+/// Splits "com.x.Pose" into "com.x" and "Pose".
+std::pair<std::string_view, std::string_view> split_qualified_name(std::string_view name);
+
+}  // namespace rr

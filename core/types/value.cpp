@@ -1,0 +1,3 @@
+#include "core/types/value.hpp"
+
+namespace rr {}

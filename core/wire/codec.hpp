@@ -1,0 +1,63 @@
+// Bytes of one message <-> Message, for versions 2 and 4. Layer: wire. Source: messages spec sections 1..8, 11, 14.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "core/support/bytes.hpp"
+#include "core/support/error.hpp"
+#include "core/wire/message.hpp"
+
+namespace rr {
+
+/// What the two sides agreed on in CreateConnection (page 0x04100000).
+struct StringTableMode {
+  bool local = false;     ///< per-message table in the header
+  bool standard = false;  ///< the standard table
+  bool is_active() const { return local || standard; }
+  bool operator==(const StringTableMode&) const = default;
+};
+
+struct DecodeOptions {
+  StringTableMode string_table = {};
+  std::uint32_t max_depth = 128;  ///< nested elements; a top-level element has depth 1
+};
+
+/// Decodes exactly one message. `bytes` must hold the whole message and outlive `message`, which borrows from it.
+/// Clears `message` first. Allocates no more than the bytes in hand can justify.
+/// Errors   the classes of the messages spec, section 14; the text names field and byte offset.
+[[nodiscard]] Result<> decode(ByteSpan bytes, const DecodeOptions& options, Message& message);
+
+/// Encoded bytes as slices to be written in order. Small fields lie in one owned buffer; payloads of at least
+/// `gather_threshold` bytes are referenced in place and kept alive by the owners of the Message that they came from.
+class EncodedMessage {
+ public:
+  static constexpr std::size_t gather_threshold = 4096;
+
+  std::size_t size() const { return size_; }
+  /// Slices in write order; valid until the next encode() into this object or its destruction (moves keep them valid).
+  const std::vector<ByteSpan>& slices() const { return slices_; }
+  /// All bytes in one piece (a copy), for tests and small messages.
+  Bytes to_bytes() const;
+  void clear();
+
+ private:
+  friend class GatherWriter;
+  std::size_t size_ = 0;
+  Bytes scratch_;
+  std::vector<ByteSpan> slices_;
+  std::vector<std::shared_ptr<const void>> owners_;
+};
+
+struct EncodeOptions {
+  StringTableMode string_table = {};                    ///< applied to version 4 only
+  std::size_t max_message_size = 12u * 1024 * 1024;     ///< bytes; larger gives protocol_error, nothing is written
+};
+
+/// Encodes `message` in the version of its header. `out` is overwritten and its capacity reused.
+/// Errors   protocol_error: a limit of section 11, or version-4 features in a version-2 message.
+[[nodiscard]] Result<> encode(const Message& message, const EncodeOptions& options, EncodedMessage& out);
+
+}  // namespace rr
