@@ -1,0 +1,44 @@
+// Wire: the newest value wins, in both directions. Layer: member. Source: sessions spec section 2.12.
+#pragma once
+
+#include <optional>
+
+#include "core/support/time.hpp"
+#include "core/types/pack.hpp"
+
+namespace rr {
+
+/// The token that marks messages and entries of wire packets.
+inline constexpr std::string_view unreliable_metadata = "unreliable\n";
+
+/// Adds `packettime` and `packet` to the last entry.
+Result<> write_wire_value(Message& message, const Value& value, TimeSpec time, const MemberDefinition& member,
+                          const TypeRegistry& types);
+
+struct WireValue {
+  TimeSpec time;
+  Value value;
+};
+
+/// Reads `packettime` and `packet`.
+Result<WireValue> read_wire_value(const Message& message, const MessageEntry& entry, const MemberDefinition& member,
+                                  const TypeRegistry& types);
+
+enum class WireState : std::uint8_t { connecting, connected };
+
+/// One side of one wire connection. State starts afresh with each connect.
+struct WireConnection {
+  WireState state = WireState::connecting;
+  const MemberDefinition* member = nullptr;
+  std::optional<TimeSpec> last_received = {};
+  std::optional<TimeSpec> last_sent = {};
+  std::optional<WireValue> early = {};    ///< came before the connect reply; newest only
+  std::optional<Value> waiting = {};      ///< to be sent when the stream has room; newest only
+
+  /// Whether a packet of this time is newer than all before; remembers it.
+  bool accept(TimeSpec time);
+  /// The stamp for a value sent now: the clock, but strictly later than the stamp before.
+  TimeSpec stamp(TimeSpec utc);
+};
+
+}  // namespace rr

@@ -1,0 +1,211 @@
+// The client's half of a session: one service over one connection. Layer: session.
+// Source: sessions spec sections 2.3..2.9, 2.12, 2.13. The sans-IO contract stands in connection.hpp.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <variant>
+#include <vector>
+
+#include "core/member/wire.hpp"
+#include "core/session/connection.hpp"
+#include "core/types/pack.hpp"
+
+namespace rr {
+
+struct ClientOptions {
+  ConnectionOptions connection;
+  std::string service;           ///< service name, e.g. "Create"
+  std::string username = {};     ///< with credentials: logs in
+  Value credentials = {};        ///< MapString, e.g. {"password": ...}; null for none
+  std::string object_type = {};  ///< the type to use the root object as; empty: the service's own
+  std::chrono::milliseconds request_timeout{15'000};
+  std::chrono::milliseconds connect_timeout{30'000};  ///< from construction to the event Connected
+  std::size_t max_events = 65'536;                    ///< not polled; more close the session: nothing is dropped silently
+};
+
+using RequestId = std::uint32_t;
+
+/// The session is up: root object and definitions are known.
+struct Connected {
+  std::string object_type;  ///< qualified type of the root object
+};
+/// A request ended. What the value is depends on the request (see ClientSession).
+struct Completed {
+  RequestId id = 0;
+  Result<Value> result;
+};
+struct EventReceived {
+  std::string path;
+  std::string member;
+  std::vector<Value> arguments;
+};
+/// A newer InValue of a connected wire.
+struct WireValueReceived {
+  std::string path;
+  std::string member;
+  TimeSpec time;
+  Value value;
+};
+struct WireClosedByService {
+  std::string path;
+  std::string member;
+};
+/// The service replaced the object: every object at or below `path` must be looked up again.
+struct PathReleased {
+  std::string path;
+};
+/// The last event. Every pending request was completed with the reason before it.
+struct SessionClosed {
+  Error reason;
+};
+using ClientEvent = std::variant<Connected, Completed, EventReceived, WireValueReceived, WireClosedByService,
+                                 PathReleased, SessionClosed>;
+
+enum class ClientState : std::uint8_t { connecting, connected, closing, closed };
+
+/// One client session. Every request returns an id at once and ends in exactly one Completed event with that id, in
+/// success and in failure; a request that cannot be sent fails the same way. Ids are never 0.
+class ClientSession {
+ public:
+  ClientSession(ClientOptions options, Now now);
+  ClientSession(const ClientSession&) = delete;
+  ClientSession& operator=(const ClientSession&) = delete;
+
+  // --- told ---
+
+  void handle_bytes(ByteSpan input, Now now);
+  void handle_transmitted(std::size_t bytes, Now now) { connection_.handle_transmitted(bytes, now); }
+  void handle_timeout(Now now);
+  /// The stream is gone.
+  void handle_closed(Error reason, Now now);
+
+  // --- asked ---
+
+  RequestId get_property(std::string_view path, std::string_view member, Now now);         ///< completes with the value
+  RequestId set_property(std::string_view path, std::string_view member, const Value& value, Now now);  ///< null
+  /// Completes with the return value; null for void functions.
+  RequestId call_function(std::string_view path, std::string_view member, std::span<const Value> arguments, Now now);
+  /// Looks up the object at `path` (see child_path()); completes with its qualified type as text. Its definition is
+  /// fetched if it is not known yet. Members of an object can be used from then on.
+  RequestId find_object(std::string_view path, Now now);
+  /// Completes with null; values follow as WireValueReceived. One connection a wire.
+  RequestId connect_wire(std::string_view path, std::string_view member, Now now);
+  RequestId disconnect_wire(std::string_view path, std::string_view member, Now now);      ///< completes with null
+  RequestId peek_in_value(std::string_view path, std::string_view member, Now now);        ///< completes with the value
+  RequestId peek_out_value(std::string_view path, std::string_view member, Now now);       ///< completes with the value
+  RequestId poke_out_value(std::string_view path, std::string_view member, const Value& value, Now now);  ///< null
+  /// Sends OutValue on a connected wire. A value that still waits for a slow stream is replaced by a newer one.
+  Result<> send_wire(std::string_view path, std::string_view member, const Value& value, Now now);
+  /// Forgets a request: its late reply is ignored, no event follows. Nothing is sent: the service still runs it.
+  void cancel(RequestId id) { pending_.erase(id); }
+  /// Orderly: tells the service, then closes (after its answer or 500 ms). SessionClosed follows.
+  void disconnect(Now now);
+
+  // --- answers ---
+
+  std::span<const ByteSpan> poll_transmit() { return connection_.poll_transmit(); }
+  /// Whether the stream should be closed now: everything that could be sent was sent.
+  bool wants_close() const;
+  TimePoint poll_timeout() const;
+  std::optional<ClientEvent> poll_event();
+
+  // --- looked at ---
+
+  ClientState state() const { return state_; }
+  const Connection& connection() const { return connection_; }
+  const TypeRegistry& types() const { return types_; }
+  const MapString& attributes() const { return attributes_; }
+  const std::string& service() const { return options_.service; }
+  /// The type of an object that was looked up; nullptr if it was not. The root's path is the service name.
+  const EntityDefinition* object_type(std::string_view path) const;
+  std::size_t pending_requests() const { return pending_.size(); }
+
+ private:
+  struct Pending {
+    EntryType type = EntryType::null;
+    const MemberDefinition* member = nullptr;
+    std::string path;  ///< find_object, wires
+    TimePoint deadline;
+  };
+  /// A definition that is being fetched, with all its imports, before something else can go on.
+  struct Fetch {
+    std::string object_type;        ///< the type that needs it
+    std::vector<std::string> texts;
+    std::set<std::string> missing;  ///< names still to ask for
+    std::set<std::string> asked;
+    RequestId lookup = 0;           ///< find_object that waits; 0: the connect sequence
+    std::string path;
+  };
+  using WireKey = std::pair<std::string, std::string>;
+
+  // connecting
+  void start_session(Now now);
+  void request_combined(Now now);
+  void request_service_desc(std::string_view definition, RequestId id, Now now);
+  void handle_connect_reply(const MessageEntry& entry, const Pending& pending, Now now);
+  void handle_combined_reply(const MessageEntry& entry, Now now);
+  void continue_fetch(RequestId id, const MessageEntry& entry, Now now);
+  void advance_fetch(Fetch fetch, Now now);
+  void finish_fetch(Fetch fetch, Now now);
+  void become_connected(Now now);
+  Result<std::string> choose_root_type() const;
+  std::vector<std::string> read_texts(const MessageElement* list) const;
+
+  // requests
+  Result<const MemberDefinition*> find_member(std::string_view path, std::string_view member, MemberKind kind) const;
+  RequestId next_request_id();
+  RequestId fail_request(Error error);
+  RequestId begin_request(EntryType type, std::string_view path, std::string_view member);
+  RequestId finish_request(Result<> packed, RequestId id, EntryType type, const MemberDefinition* member,
+                           std::string_view path, Now now);
+  RequestId simple_request(EntryType type, MemberKind kind, std::string_view path, std::string_view member, Now now,
+                           const Value* value = nullptr);
+
+  // received
+  void handle_message(const Message& message, Now now);
+  void handle_entry(const MessageEntry& entry, Now now);
+  void handle_reply(const MessageEntry& entry, Now now);
+  Result<Value> read_reply(const MessageEntry& entry, const Pending& pending, Now now);
+  void handle_event(const MessageEntry& entry);
+  void handle_wire_packet(const MessageEntry& entry, Now now);
+  void handle_path_released(std::string_view path);
+
+  void emit(ClientEvent event);
+  void fail(Error reason);
+  void flush_wires(Now now);
+  void scan_deadlines(Now now);
+
+  ClientOptions options_;
+  Connection connection_;
+  TypeRegistry types_;
+  ClientState state_ = ClientState::connecting;
+  TimePoint opened_;
+  TimePoint last_sent_;  ///< for the keep-alive
+  bool has_started_ = false;
+  std::string root_type_;
+  std::vector<std::string> root_implements_;
+  MapString attributes_;
+  std::uint32_t endpoint_;
+
+  Message outgoing_;
+  std::unordered_map<RequestId, Pending> pending_;
+  std::unordered_map<RequestId, Fetch> fetches_;
+  RequestId last_request_id_ = 0;
+  TimePoint earliest_deadline_ = TimePoint::max();  ///< no pending request is due before
+  TimePoint closing_deadline_ = TimePoint::max();
+
+  std::map<std::string, const EntityDefinition*, std::less<>> objects_;
+  std::map<WireKey, WireConnection> wires_;
+  std::deque<ClientEvent> events_;
+};
+
+}  // namespace rr

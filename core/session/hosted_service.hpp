@@ -1,0 +1,101 @@
+// The services of a node, as sessions see them. Layer: session. Source: sessions spec sections 2.3, 2.4, 2.5, 2.16.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/session/connection.hpp"
+#include "core/types/type_registry.hpp"
+#include "core/types/value.hpp"
+
+namespace rr {
+
+/// One object of a service: its type and the way to its children. What its members do is the application's business:
+/// a session hands requests out as events that name the object.
+class ServiceObject {
+ public:
+  virtual ~ServiceObject() = default;
+
+  /// The qualified object type, "com.x.Robot"; the same for the object's whole life.
+  virtual const std::string& type_name() const = 0;
+  /// The object behind an objref. Sessions cache it by path until the path is released.
+  /// `index`  the decoded index where the objref is indexed (for int32 checked to be a decimal number).
+  /// Errors   object_not_found; service_error "Requested object is null".
+  virtual Result<std::shared_ptr<ServiceObject>> find_child(const MemberDefinition& objref,
+                                                            const std::optional<std::string>& index) = 0;
+};
+
+/// One service of a node.
+class HostedService {
+ public:
+  /// `types` holds the root type's definition and everything that it imports.
+  /// Errors   service_definition_error: the root type is not an object in `types`; invalid_argument: a bad name.
+  static Result<std::shared_ptr<HostedService>> make(std::string name, std::shared_ptr<ServiceObject> root,
+                                                     std::shared_ptr<const TypeRegistry> types,
+                                                     MapString attributes = {},
+                                                     std::vector<std::string> extra_imports = {});
+
+  const std::string& name() const { return name_; }
+  const TypeRegistry& types() const { return *types_; }
+  const EntityDefinition& root_type() const { return *root_type_; }
+  const std::string& root_type_name() const { return root_->type_name(); }
+  const MapString& attributes() const { return attributes_; }
+  const std::vector<std::string>& extra_imports() const { return extra_imports_; }
+  /// The definition that holds the root type.
+  const ServiceDefinition& root_definition() const;
+
+  struct Found {
+    std::shared_ptr<ServiceObject> object;
+    const EntityDefinition* type = nullptr;
+  };
+  /// Walks the path from the root and caches what it finds.
+  /// Errors   those of parse_service_path; object_not_found (not this service, null object); member_not_found;
+  ///          invalid_argument (a missing or malformed index).
+  Result<Found> find_object(std::string_view path);
+  /// Forgets `path` and everything below it. Returns whether anything was there.
+  bool forget_path(std::string_view path);
+  /// All paths under which `object` is known.
+  std::vector<std::string> paths_of(const ServiceObject& object) const;
+
+ private:
+  HostedService() = default;
+
+  std::string name_;
+  std::shared_ptr<ServiceObject> root_;
+  std::shared_ptr<const TypeRegistry> types_;
+  const EntityDefinition* root_type_ = nullptr;
+  MapString attributes_;
+  std::vector<std::string> extra_imports_;
+  std::map<std::string, Found, std::less<>> objects_;
+  static constexpr std::size_t max_cached_objects = 4096;  ///< hostile paths may not grow it; the root always stays
+};
+
+/// Identity and services of one node; outlives its sessions.
+class ServiceDirectory {
+ public:
+  explicit ServiceDirectory(NodeIdentity identity);
+
+  const NodeIdentity& identity() const { return identity_; }
+  /// Errors   invalid_argument: the name is taken.
+  Result<> add(std::shared_ptr<HostedService> service);
+  bool remove(std::string_view name);
+  HostedService* find(std::string_view name) const;
+  /// In order of names; the service index is one of them.
+  const std::map<std::string, std::shared_ptr<HostedService>, std::less<>>& services() const { return services_; }
+  /// A definition by name, from any service.
+  const ServiceDefinition* find_definition(std::string_view name) const;
+  /// A random endpoint that no session of this node has; never 0.
+  std::uint32_t allocate_endpoint();
+
+ private:
+  NodeIdentity identity_;
+  std::map<std::string, std::shared_ptr<HostedService>, std::less<>> services_;
+  std::uint64_t random_state_;
+};
+
+}  // namespace rr

@@ -1,0 +1,105 @@
+#include "core/session/service_path.hpp"
+
+namespace rr {
+
+namespace {
+
+bool is_alnum(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9'); }
+
+int hex_value(char digit) {
+  if (digit >= '0' && digit <= '9') return digit - '0';
+  if (digit >= 'a' && digit <= 'f') return digit - 'a' + 10;
+  if (digit >= 'A' && digit <= 'F') return digit - 'A' + 10;
+  return -1;
+}
+
+/// The byte at the start of `text` behind a '%', or -1.
+int hex_byte(std::string_view text) {
+  if (text.size() < 2 || hex_value(text[0]) < 0 || hex_value(text[1]) < 0) return -1;
+  return hex_value(text[0]) << 4 | hex_value(text[1]);
+}
+
+bool is_name(std::string_view name) {
+  if (name.empty() || !is_alnum(name.front()) || (name.front() >= '0' && name.front() <= '9')) return false;
+  for (const char c : name)
+    if (!is_alnum(c) && c != '_') return false;
+  return name.back() != '_';
+}
+
+std::optional<std::string> decode_index(std::string_view text) {
+  if (text.empty()) return std::nullopt;
+  std::string out;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (is_alnum(c) || c == '-' || c == '_' || c == '~') {
+      out += c;
+      continue;
+    }
+    if (c != '%') return std::nullopt;
+    // 1.2.8 writes a byte above 0x7f sign-extended, "%ffffffc3"; 0xff itself never occurs in UTF-8.
+    const auto rest = text.substr(i + 1);
+    const bool is_sign_extended = rest.substr(0, 6) == "ffffff" && hex_byte(rest.substr(6 > rest.size() ? rest.size() : 6)) >= 0x80;
+    const int byte = is_sign_extended ? hex_byte(rest.substr(6)) : hex_byte(rest);
+    if (byte < 0) return std::nullopt;
+    out += static_cast<char>(byte);
+    i += is_sign_extended ? 8 : 2;
+  }
+  return out;
+}
+
+}  // namespace
+
+Result<std::vector<PathSegment>> parse_service_path(std::string_view path) {
+  const auto fail = [path] {
+    return make_error(ErrorCode::service_error, "Invalid service path specified: " + quoted(path));
+  };
+  std::vector<PathSegment> segments;
+  while (true) {
+    // An index never holds a bare dot: it would be %2e.
+    const auto dot = path.find('.');
+    auto part = path.substr(0, dot);
+    PathSegment segment;
+    if (const auto bracket = part.find('['); bracket != std::string_view::npos) {
+      if (part.back() != ']' || segments.empty()) return fail();
+      segment.index = decode_index(part.substr(bracket + 1, part.size() - bracket - 2));
+      if (!segment.index) return fail();
+      part = part.substr(0, bracket);
+    }
+    if (!is_name(part)) return fail();
+    segment.name = part;
+    segments.push_back(std::move(segment));
+    if (dot == std::string_view::npos) return segments;
+    path.remove_prefix(dot + 1);
+  }
+}
+
+std::string encode_path_index(std::string_view index) {
+  constexpr std::string_view digits = "0123456789abcdef";
+  std::string out;
+  for (const char c : index) {
+    if (is_alnum(c)) {
+      out += c;
+    } else {
+      const auto byte = static_cast<unsigned char>(c);
+      out += '%';
+      out += digits[byte >> 4];
+      out += digits[byte & 15];
+    }
+  }
+  return out;
+}
+
+std::string child_path(std::string_view parent, std::string_view member, std::optional<std::string_view> index) {
+  std::string path(parent);
+  path += '.';
+  path += member;
+  if (index) path += '[' + encode_path_index(*index) + ']';
+  return path;
+}
+
+bool is_within(std::string_view path, std::string_view ancestor) {
+  return path.substr(0, ancestor.size()) == ancestor &&
+         (path.size() == ancestor.size() || path[ancestor.size()] == '.');
+}
+
+}  // namespace rr

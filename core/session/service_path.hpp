@@ -1,0 +1,35 @@
+// Service paths: "service.member[index].member". Layer: session. Source: sessions spec section 2.5.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/support/error.hpp"
+
+namespace rr {
+
+struct PathSegment {
+  std::string name;
+  std::optional<std::string> index = {};  ///< decoded: the number's text, or the string key
+  bool operator==(const PathSegment&) const = default;
+};
+
+/// Splits and decodes a path. Paths are opaque for identity: two spellings of one index are two paths.
+/// Accepts the percent forms of all known peers, "%ffffffc3" included.
+/// Errors   service_error "Invalid service path specified".
+Result<std::vector<PathSegment>> parse_service_path(std::string_view path);
+
+/// Every byte that is not an ASCII letter or digit becomes %xx.
+std::string encode_path_index(std::string_view index);
+
+/// `parent.member` or `parent.member[index]`.
+std::string child_path(std::string_view parent, std::string_view member,
+                       std::optional<std::string_view> index = std::nullopt);
+
+/// Whether `path` is `ancestor` or lies below it.
+bool is_within(std::string_view path, std::string_view ancestor);
+
+}  // namespace rr

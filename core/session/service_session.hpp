@@ -1,0 +1,157 @@
+// The service's half of a session: one client on one connection. Layer: session.
+// Source: sessions spec sections 2.2..2.9, 2.12. The sans-IO contract stands in connection.hpp.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <variant>
+#include <vector>
+
+#include "core/member/wire.hpp"
+#include "core/session/connection.hpp"
+#include "core/session/hosted_service.hpp"
+
+namespace rr {
+
+struct ServiceSessionOptions {
+  ConnectionOptions connection;  ///< `self` is taken from the directory
+  std::string base_url = {};     ///< "rr+tcp://127.0.0.1:52222/": what the service index says of this connection
+  std::chrono::milliseconds connect_timeout{30'000};    ///< a connection that opens no session is closed
+  std::chrono::milliseconds endpoint_timeout{600'000};  ///< without a session message
+  std::size_t max_open_calls = 1024;                    ///< not answered yet; above: out_of_system_resource
+};
+
+using CallId = std::uint64_t;
+
+enum class CallKind : std::uint8_t { property_get, property_set, function, peek_in, peek_out, poke_out };
+
+/// A request for the application, to be answered exactly once with reply().
+struct Called {
+  CallId id = 0;
+  CallKind kind = CallKind::function;
+  std::shared_ptr<ServiceObject> object;
+  const MemberDefinition* member = nullptr;
+  std::vector<Value> arguments;  ///< function: parameters; property_set, poke_out: the value
+  TimeSpec time = {};            ///< poke_out
+};
+struct ClientConnected {
+  HostedService* service = nullptr;
+};
+/// A wire was connected: send the current value, if there is one.
+struct WireConnected {
+  std::string path;
+  std::shared_ptr<ServiceObject> object;
+  const MemberDefinition* member = nullptr;
+};
+/// A newer OutValue of the client.
+struct WireReceived {
+  std::shared_ptr<ServiceObject> object;
+  const MemberDefinition* member = nullptr;
+  TimeSpec time;
+  Value value;
+};
+/// The last event.
+struct ClientGone {
+  Error reason;
+};
+using ServiceEvent = std::variant<Called, ClientConnected, WireConnected, WireReceived, ClientGone>;
+
+/// One client of a node. Node-level requests (definitions, attributes, the service index) are answered in here.
+class ServiceSession {
+ public:
+  ServiceSession(ServiceDirectory& directory, ServiceSessionOptions options, Now now);
+  ServiceSession(const ServiceSession&) = delete;
+  ServiceSession& operator=(const ServiceSession&) = delete;
+
+  // --- told ---
+
+  void handle_bytes(ByteSpan input, Now now);
+  void handle_transmitted(std::size_t bytes, Now now);
+  void handle_timeout(Now now);
+  void handle_closed(Error reason, Now now);
+
+  // --- asked ---
+
+  /// Answers a call. Property set, poke and void functions ignore the value. A value that does not fit the definition
+  /// becomes an error reply that says so. Unknown ids (the client is gone) are ignored.
+  void reply(CallId id, const Result<Value>& result, Now now);
+  /// Errors   those of packing; connection_error.
+  Result<> send_event(std::string_view path, const MemberDefinition& member, std::span<const Value> arguments, Now now);
+  /// Sends InValue if the client has connected this wire; a value that waits for a slow stream is replaced.
+  Result<> send_wire(std::string_view path, const MemberDefinition& member, const Value& value, Now now);
+  /// Tells the client to look up `path` again.
+  void release_path(std::string_view path, Now now);
+  /// Tells the client that its service is gone (ServiceClosed), then closes.
+  void close_service(Now now);
+
+  // --- answers ---
+
+  std::span<const ByteSpan> poll_transmit() { return connection_.poll_transmit(); }
+  /// Whether the stream should be closed now: everything that could be sent was sent.
+  bool wants_close() const;
+  TimePoint poll_timeout() const;
+  std::optional<ServiceEvent> poll_event();
+
+  // --- looked at ---
+
+  const Connection& connection() const { return connection_; }
+  /// The service that the client is connected to; nullptr before and after.
+  HostedService* service() const { return service_.get(); }
+  bool has_wire(std::string_view path, std::string_view member) const;
+
+ private:
+  struct OpenCall {
+    EntryType reply_type = EntryType::null;
+    std::uint32_t request_id = 0;
+    std::string path;
+    const MemberDefinition* member = nullptr;
+  };
+  using WireKey = std::pair<std::string, std::string>;
+
+  void handle_message(const Message& message, Now now);
+  void handle_special(const Message& message, Now now);
+  void answer_special(const Message& message, const MessageEntry& entry, Now now);
+  Result<> write_service_desc(const Message& message, const MessageEntry& entry);
+  Result<> write_object_type_name(const Message& message, const MessageEntry& entry, bool in_session);
+  Result<> write_combined(const Message& message, const MessageEntry& entry);
+  Result<> connect(std::string_view service, const Message& message, Now now);
+  Result<> disconnect(const Message& message, const MessageEntry& entry, Now now);
+
+  void handle_session_entry(const Message& message, const MessageEntry& entry, Now now);
+  Result<> dispatch(const Message& message, const MessageEntry& entry, Now now);
+  Result<> dispatch_member(const Message& message, const MessageEntry& entry, Now now);
+  Result<> call_service_index(const MessageEntry& entry, const MemberDefinition& member, Now now);
+  Result<> handle_session_op(const MessageEntry& entry);
+  void handle_wire_packet(const Message& message, const MessageEntry& entry);
+
+  MessageEntry& begin_reply(const MessageEntry& request);
+  void send_error(const MessageEntry& request, const Error& error, Now now);
+  void send_outgoing(Now now);
+  void flush_wires(Now now);
+  void leave(Error reason);
+  bool is_addressed_to_session(const MessageHeader& header) const;
+
+  ServiceDirectory& directory_;
+  ServiceSessionOptions options_;
+  Connection connection_;
+  std::shared_ptr<HostedService> service_;
+  std::uint32_t endpoint_ = 0;
+  TimePoint opened_;
+  TimePoint last_session_message_;
+  std::optional<TimePoint> closing_deadline_;
+  bool is_gone_ = false;
+
+  Message outgoing_;
+  CallId last_call_id_ = 0;
+  std::unordered_map<CallId, OpenCall> calls_;
+  std::map<WireKey, WireConnection> wires_;
+  std::deque<ServiceEvent> events_;
+};
+
+}  // namespace rr

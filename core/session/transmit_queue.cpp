@@ -1,0 +1,68 @@
+#include "core/session/transmit_queue.hpp"
+
+#include <algorithm>
+
+namespace rr {
+
+namespace {
+constexpr std::size_t max_spare_messages = 16;
+}
+
+Result<> TransmitQueue::push(const Message& message, const EncodeOptions& options, bool is_urgent) {
+  EncodedMessage encoded;
+  if (!spare_.empty()) {
+    encoded = std::move(spare_.back());
+    spare_.pop_back();
+  }
+  if (auto done = encode(message, options, encoded); !done) return done;
+  size_ += encoded.size();
+  if (is_urgent)
+    messages_.insert(messages_.begin() + static_cast<std::ptrdiff_t>(in_flight_), std::move(encoded));
+  else
+    messages_.push_back(std::move(encoded));
+  return {};
+}
+
+std::span<const ByteSpan> TransmitQueue::slices(std::size_t max_slices) {
+  slices_.clear();
+  in_flight_ = 0;
+  std::size_t skip = front_consumed_;
+  for (const auto& message : messages_) {
+    if (slices_.size() >= max_slices) break;
+    ++in_flight_;
+    for (const auto& slice : message.slices()) {
+      if (skip >= slice.size()) {
+        skip -= slice.size();
+        continue;
+      }
+      if (slices_.size() >= max_slices) break;
+      slices_.push_back(slice.subspan(skip));
+      skip = 0;
+    }
+  }
+  return slices_;
+}
+
+void TransmitQueue::consume(std::size_t bytes) {
+  size_ -= bytes;
+  front_consumed_ += bytes;
+  while (!messages_.empty() && front_consumed_ >= messages_.front().size()) {
+    front_consumed_ -= messages_.front().size();
+    if (spare_.size() < max_spare_messages) {
+      messages_.front().clear();
+      spare_.push_back(std::move(messages_.front()));
+    }
+    messages_.pop_front();
+    if (in_flight_ > 0) --in_flight_;
+  }
+  // A message that is written in part stays in flight: nothing may be put before its rest.
+  in_flight_ = std::max<std::size_t>(in_flight_, front_consumed_ > 0 ? 1 : 0);
+}
+
+void TransmitQueue::clear() {
+  messages_.clear();
+  slices_.clear();
+  size_ = front_consumed_ = in_flight_ = 0;
+}
+
+}  // namespace rr

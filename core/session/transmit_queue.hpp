@@ -1,0 +1,41 @@
+// Encoded messages waiting for the stream: in order, bounded, with a lane for urgent ones. Layer: session.
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <span>
+#include <vector>
+
+#include "core/wire/codec.hpp"
+
+namespace rr {
+
+/// Encoded messages that wait to be written. A driver takes slices(), writes any number of their bytes and reports them
+/// with consume(). Messages whose slices were handed out stay where they are until they are consumed; urgent messages
+/// go ahead of all others.
+class TransmitQueue {
+ public:
+  /// Encodes `message` behind everything (or, if urgent, behind what is being written).
+  Result<> push(const Message& message, const EncodeOptions& options, bool is_urgent = false);
+
+  bool empty() const { return size_ == 0; }
+  /// Bytes not yet consumed.
+  std::size_t size() const { return size_; }
+
+  /// Up to `max_slices` slices to write next, in order. They stay valid until consume() or clear().
+  std::span<const ByteSpan> slices(std::size_t max_slices = 32);
+
+  /// `bytes` of the slices handed out were written.
+  void consume(std::size_t bytes);
+  void clear();
+
+ private:
+  std::deque<EncodedMessage> messages_;
+  std::vector<EncodedMessage> spare_;  ///< buffers to reuse
+  std::vector<ByteSpan> slices_;
+  std::size_t size_ = 0;
+  std::size_t front_consumed_ = 0;  ///< bytes of the first message that are written already
+  std::size_t in_flight_ = 0;       ///< messages whose slices were handed out
+};
+
+}  // namespace rr

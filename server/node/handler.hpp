@@ -1,0 +1,136 @@
+// C++ callables as handlers of members: types deduced, arguments converted. Layer: node.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "core/types/value.hpp"
+
+namespace rr {
+
+enum class HandlerSlot : std::uint8_t { call, get, set, wire_received };
+
+/// What a parameter or return type of a handler accepts.
+struct HandlerType {
+  DataType type = DataType::void_t;  ///< varvalue_t: any Value
+  bool is_array = false;
+};
+
+/// A callable with its deduced signature.
+struct Handler {
+  std::vector<HandlerType> parameters;
+  HandlerType result;
+  std::function<Result<Value>(std::span<const Value>)> call;
+};
+
+namespace detail {
+
+template <class T>
+struct IsVector : std::false_type {};
+template <class T>
+struct IsVector<std::vector<T>> : std::true_type {
+  using Item = T;
+};
+
+template <class T>
+constexpr HandlerType handler_type() {
+  using Plain = std::remove_cvref_t<T>;
+  if constexpr (std::is_void_v<Plain>) return {};
+  else if constexpr (Number<Plain>) return {data_type_of<Plain>(), false};
+  else if constexpr (std::is_enum_v<Plain>) return {DataType::int32_t, false};
+  else if constexpr (std::is_same_v<Plain, std::string> || std::is_same_v<Plain, std::string_view> ||
+                     std::is_same_v<Plain, const char*>)
+    return {DataType::string_t, false};
+  else if constexpr (IsVector<Plain>::value) return {data_type_of<typename IsVector<Plain>::Item>(), true};
+  else return {DataType::varvalue_t, false};
+}
+
+template <class T>
+Result<T> from_value(const Value& value) {
+  if constexpr (std::is_same_v<T, Value>) {
+    return value;
+  } else if constexpr (Number<T>) {
+    return value.to<T>();
+  } else if constexpr (std::is_enum_v<T>) {
+    auto number = value.to<std::int32_t>();
+    if (!number) return number.error();
+    return static_cast<T>(*number);
+  } else if constexpr (std::is_same_v<T, std::string> || std::is_same_v<T, std::string_view>) {
+    auto text = value.to_text();
+    if (!text) return text.error();
+    return T(*text);
+  } else {
+    static_assert(IsVector<T>::value, "a handler takes numbers, strings, vectors of numbers, or rr::Value");
+    auto items = value.to_items<typename IsVector<T>::Item>();
+    if (!items) return items.error();
+    return T(items->begin(), items->end());
+  }
+}
+
+template <class... Args, std::size_t... Index, class F>
+Result<Value> invoke(F& function, std::span<const Value> arguments, std::index_sequence<Index...>);
+
+}  // namespace detail
+
+template <class T>
+Value to_value(T&& value) {
+  using Plain = std::remove_cvref_t<T>;
+  if constexpr (std::is_enum_v<Plain>) return Value(static_cast<std::int32_t>(value));
+  else return Value(std::forward<T>(value));
+}
+
+namespace detail {
+
+template <class R, class... Args, class F, std::size_t... Index>
+Handler make_typed_handler(F function, std::index_sequence<Index...>) {
+  Handler handler;
+  handler.parameters = {handler_type<Args>()...};
+  handler.result = handler_type<R>();
+  handler.call = [function = std::move(function)](std::span<const Value> arguments) mutable -> Result<Value> {
+    if (arguments.size() != sizeof...(Args))
+      return make_error(ErrorCode::invalid_argument, "wrong number of arguments for the handler");
+    auto converted = std::make_tuple(from_value<std::remove_cvref_t<Args>>(arguments[Index])...);
+    Error failure{ErrorCode::none, {}};
+    ((void)(std::get<Index>(converted) || (failure = std::get<Index>(converted).error(), false)), ...);
+    if (failure.code != ErrorCode::none) return failure;
+    if constexpr (std::is_void_v<R>) {
+      function(std::move(*std::get<Index>(converted))...);
+      return Value{};
+    } else {
+      return to_value(function(std::move(*std::get<Index>(converted))...));
+    }
+  };
+  return handler;
+}
+
+template <class F>
+struct Signature : Signature<decltype(&F::operator())> {};
+template <class R, class... Args>
+struct Signature<R (*)(Args...)> {
+  template <class F>
+  static Handler make(F function) {
+    return make_typed_handler<R, Args...>(std::move(function), std::index_sequence_for<Args...>{});
+  }
+};
+template <class R, class... Args>
+struct Signature<R(Args...)> : Signature<R (*)(Args...)> {};
+template <class C, class R, class... Args>
+struct Signature<R (C::*)(Args...)> : Signature<R (*)(Args...)> {};
+template <class C, class R, class... Args>
+struct Signature<R (C::*)(Args...) const> : Signature<R (*)(Args...)> {};
+
+}  // namespace detail
+
+/// Wraps a callable whose operator() is not overloaded.
+template <class F>
+Handler make_handler(F&& function) {
+  return detail::Signature<std::remove_cvref_t<F>>::make(std::forward<F>(function));
+}
+
+}  // namespace rr
