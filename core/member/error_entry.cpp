@@ -9,9 +9,9 @@ void write_error(Message& message, const Error& error) {
   entry.end_element = entry.first_element;
   entry.element_count = 0;
   entry.error = error.code == ErrorCode::none ? ErrorCode::internal_error : error.code;
-  message.add_text("errorname", message.store(error.qualified_name()));
-  message.add_text("errorstring", error.message);
-  if (!error.sub_name.empty()) message.add_text("errorsubname", error.sub_name);
+  message.add_text("errorname", message.store(std::string_view(error.qualified_name())));
+  message.add_text("errorstring", message.store(std::string_view(error.message)));
+  if (!error.sub_name.empty()) message.add_text("errorsubname", message.store(std::string_view(error.sub_name)));
   if (error.param) {
     const auto elements = message.elements.size();
     const auto kept = message.entries.back();

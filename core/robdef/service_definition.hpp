@@ -146,6 +146,7 @@ enum class EntityKind : std::uint8_t { structure, pod, namedarray, object };
 struct EntityDefinition {
   EntityKind kind = EntityKind::structure;
   std::string name;
+  std::string qualified_name = {};  ///< "service.Name", after verification
   std::vector<ImplementsDefinition> implements = {};
   std::vector<OptionDefinition> options = {};
   std::vector<ConstantDefinition> constants = {};

@@ -17,6 +17,8 @@
 
 #include "core/member/wire.hpp"
 #include "core/session/connection.hpp"
+#include "core/session/protocol_level.hpp"
+#include "core/session/service_path.hpp"
 #include "core/types/pack.hpp"
 
 namespace rr {
@@ -83,7 +85,7 @@ class ClientSession {
   // --- told ---
 
   void handle_bytes(ByteSpan input, Now now);
-  void handle_transmitted(std::size_t bytes, Now now) { connection_.handle_transmitted(bytes, now); }
+  void handle_transmitted(std::size_t bytes, Now now);
   void handle_timeout(Now now);
   /// The stream is gone.
   void handle_closed(Error reason, Now now);
@@ -106,15 +108,15 @@ class ClientSession {
   /// Sends OutValue on a connected wire. A value that still waits for a slow stream is replaced by a newer one.
   Result<> send_wire(std::string_view path, std::string_view member, const Value& value, Now now);
   /// Forgets a request: its late reply is ignored, no event follows. Nothing is sent: the service still runs it.
-  void cancel(RequestId id) { pending_.erase(id); }
+  void cancel(RequestId id);
   /// Orderly: tells the service, then closes (after its answer or 500 ms). SessionClosed follows.
   void disconnect(Now now);
 
   // --- answers ---
 
   std::span<const ByteSpan> poll_transmit() { return connection_.poll_transmit(); }
-  /// Whether the stream should be closed now: everything that could be sent was sent.
-  bool wants_close() const;
+  /// Whether the stream should be closed now.
+  bool wants_close() const { return state_ == ClientState::closed; }
   TimePoint poll_timeout() const;
   std::optional<ClientEvent> poll_event();
 
@@ -133,51 +135,63 @@ class ClientSession {
   struct Pending {
     EntryType type = EntryType::null;
     const MemberDefinition* member = nullptr;
-    std::string path;  ///< find_object, wires
+    std::string path;  ///< find_object and wires only: calls and properties allocate nothing here
     TimePoint deadline;
   };
-  /// A definition that is being fetched, with all its imports, before something else can go on.
+  /// Definitions that are fetched, with all their imports, before the connect sequence or a lookup can go on.
   struct Fetch {
-    std::string object_type;        ///< the type that needs it
-    std::vector<std::string> texts;
-    std::set<std::string> missing;  ///< names still to ask for
-    std::set<std::string> asked;
-    RequestId lookup = 0;           ///< find_object that waits; 0: the connect sequence
-    std::string path;
-  };
-  using WireKey = std::pair<std::string, std::string>;
+    std::vector<std::string> texts = {};
+    std::set<std::string> names = {};   ///< of `texts`
+    std::set<std::string> wanted = {};  ///< imported or asked for
+    std::set<std::string> asked = {};
+    RequestId lookup = 0;               ///< the find_object() that waits; 0: the connect sequence
+    std::string path = {};
+    std::string object_type = {};
 
-  // connecting
+    void add(std::string text);
+  };
+
+  // connecting (client_connect.cpp)
   void start_session(Now now);
+  void handle_connect_reply(const MessageEntry& entry, EntryType request, Now now);
+  void handle_session_granted(Now now);
+  void request_special(EntryType type, std::string_view path, Now now);
   void request_combined(Now now);
-  void request_service_desc(std::string_view definition, RequestId id, Now now);
-  void handle_connect_reply(const MessageEntry& entry, const Pending& pending, Now now);
-  void handle_combined_reply(const MessageEntry& entry, Now now);
-  void continue_fetch(RequestId id, const MessageEntry& entry, Now now);
+  void add_login();
+  void read_object_type(const MessageEntry& entry);
+  void read_attributes(const MessageEntry& entry);
   void advance_fetch(Fetch fetch, Now now);
+  void handle_fetch_reply(const MessageEntry& entry, Fetch fetch, Now now);
   void finish_fetch(Fetch fetch, Now now);
+  void fail_fetch(const Fetch& fetch, Error error);
   void become_connected(Now now);
   Result<std::string> choose_root_type() const;
-  std::vector<std::string> read_texts(const MessageElement* list) const;
 
   // requests
   Result<const MemberDefinition*> find_member(std::string_view path, std::string_view member, MemberKind kind) const;
   RequestId next_request_id();
-  RequestId fail_request(Error error);
   RequestId begin_request(EntryType type, std::string_view path, std::string_view member);
-  RequestId finish_request(Result<> packed, RequestId id, EntryType type, const MemberDefinition* member,
-                           std::string_view path, Now now);
-  RequestId simple_request(EntryType type, MemberKind kind, std::string_view path, std::string_view member, Now now,
-                           const Value* value = nullptr);
+  void add_pending(RequestId id, EntryType type, const MemberDefinition* member, std::string_view path, Now now);
+  /// The common course of a member request: look up, write elements by `write`, send, remember.
+  template <class Write>
+  RequestId request(EntryType type, MemberKind kind, std::string_view path, std::string_view member, Now now,
+                    Write&& write);
+  RequestId fail_request(RequestId id, Error error);
+  Result<> send_outgoing(Now now);
+  Result<> send_wire_packet(const PathMember& key, WireConnection& wire, const Value& value, Now now);
 
   // received
   void handle_message(const Message& message, Now now);
-  void handle_entry(const MessageEntry& entry, Now now);
-  void handle_reply(const MessageEntry& entry, Now now);
-  Result<Value> read_reply(const MessageEntry& entry, const Pending& pending, Now now);
-  void handle_event(const MessageEntry& entry);
-  void handle_wire_packet(const MessageEntry& entry, Now now);
+  void handle_entry(const Message& message, const MessageEntry& entry, Now now);
+  void handle_reply(const Message& message, const MessageEntry& entry, Now now);
+  Result<Value> read_reply(const Message& message, const MessageEntry& entry, const Pending& pending) const;
+  void handle_type_name_reply(const MessageEntry& entry, RequestId id, std::string path, Now now);
+  void handle_wire_connected(const Pending& pending);
+  void handle_event(const Message& message, const MessageEntry& entry);
+  void handle_wire_packet(const Message& message, const MessageEntry& entry);
+  void handle_wire_closed(const MessageEntry& entry);
   void handle_path_released(std::string_view path);
+  void answer_error(const MessageEntry& entry, const Error& error, Now now);
 
   void emit(ClientEvent event);
   void fail(Error reason);
@@ -204,7 +218,7 @@ class ClientSession {
   TimePoint closing_deadline_ = TimePoint::max();
 
   std::map<std::string, const EntityDefinition*, std::less<>> objects_;
-  std::map<WireKey, WireConnection> wires_;
+  std::map<PathMember, WireConnection, PathMemberLess> wires_;
   std::deque<ClientEvent> events_;
 };
 

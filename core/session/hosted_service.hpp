@@ -44,10 +44,13 @@ class HostedService {
   const TypeRegistry& types() const { return *types_; }
   const EntityDefinition& root_type() const { return *root_type_; }
   const std::string& root_type_name() const { return root_->type_name(); }
-  const MapString& attributes() const { return attributes_; }
+  /// A MapString of numbers and texts.
+  const Value& attributes() const { return attributes_; }
   const std::vector<std::string>& extra_imports() const { return extra_imports_; }
   /// The definition that holds the root type.
   const ServiceDefinition& root_definition() const;
+  /// What a client needs: the root's definition, the extra imports and all that these import; in order of names.
+  std::vector<const ServiceDefinition*> definitions_for_client() const;
 
   struct Found {
     std::shared_ptr<ServiceObject> object;
@@ -69,7 +72,7 @@ class HostedService {
   std::shared_ptr<ServiceObject> root_;
   std::shared_ptr<const TypeRegistry> types_;
   const EntityDefinition* root_type_ = nullptr;
-  MapString attributes_;
+  Value attributes_;
   std::vector<std::string> extra_imports_;
   std::map<std::string, Found, std::less<>> objects_;
   static constexpr std::size_t max_cached_objects = 4096;  ///< hostile paths may not grow it; the root always stays
@@ -84,18 +87,15 @@ class ServiceDirectory {
   /// Errors   invalid_argument: the name is taken.
   Result<> add(std::shared_ptr<HostedService> service);
   bool remove(std::string_view name);
-  HostedService* find(std::string_view name) const;
+  std::shared_ptr<HostedService> find(std::string_view name) const;  ///< nullptr where there is none
   /// In order of names; the service index is one of them.
   const std::map<std::string, std::shared_ptr<HostedService>, std::less<>>& services() const { return services_; }
   /// A definition by name, from any service.
   const ServiceDefinition* find_definition(std::string_view name) const;
-  /// A random endpoint that no session of this node has; never 0.
-  std::uint32_t allocate_endpoint();
 
  private:
   NodeIdentity identity_;
   std::map<std::string, std::shared_ptr<HostedService>, std::less<>> services_;
-  std::uint64_t random_state_;
 };
 
 }  // namespace rr

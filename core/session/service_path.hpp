@@ -32,4 +32,22 @@ std::string child_path(std::string_view parent, std::string_view member,
 /// Whether `path` is `ancestor` or lies below it.
 bool is_within(std::string_view path, std::string_view ancestor);
 
+/// A member of an object, as a key of ordered maps; look-ups by PathMemberView allocate nothing.
+struct PathMember {
+  std::string path;
+  std::string member;
+};
+struct PathMemberView {
+  std::string_view path;
+  std::string_view member;
+};
+struct PathMemberLess {
+  using is_transparent = void;
+  template <class Left, class Right>
+  bool operator()(const Left& left, const Right& right) const {
+    if (const int order = std::string_view(left.path).compare(right.path); order != 0) return order < 0;
+    return std::string_view(left.member) < std::string_view(right.member);
+  }
+};
+
 }  // namespace rr

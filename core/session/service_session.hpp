@@ -9,13 +9,13 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <unordered_map>
 #include <variant>
 #include <vector>
 
 #include "core/member/wire.hpp"
 #include "core/session/connection.hpp"
 #include "core/session/hosted_service.hpp"
+#include "core/session/service_path.hpp"
 
 namespace rr {
 
@@ -93,8 +93,8 @@ class ServiceSession {
   // --- answers ---
 
   std::span<const ByteSpan> poll_transmit() { return connection_.poll_transmit(); }
-  /// Whether the stream should be closed now: everything that could be sent was sent.
-  bool wants_close() const;
+  /// Whether the stream should be closed now.
+  bool wants_close() const { return connection_.state() == ConnectionState::closed; }
   TimePoint poll_timeout() const;
   std::optional<ServiceEvent> poll_event();
 
@@ -107,35 +107,40 @@ class ServiceSession {
 
  private:
   struct OpenCall {
-    EntryType reply_type = EntryType::null;
+    CallId id = 0;
+    EntryType type = EntryType::null;  ///< of the request
     std::uint32_t request_id = 0;
     std::string path;
     const MemberDefinition* member = nullptr;
   };
-  using WireKey = std::pair<std::string, std::string>;
 
   void handle_message(const Message& message, Now now);
+  void send_outgoing(Now now);
+  void leave(Error reason, Now now);
+
+  // node-level requests (service_special.cpp)
   void handle_special(const Message& message, Now now);
-  void answer_special(const Message& message, const MessageEntry& entry, Now now);
+  Result<> answer_special(const Message& message, const MessageEntry& entry, Now now);
   Result<> write_service_desc(const Message& message, const MessageEntry& entry);
-  Result<> write_object_type_name(const Message& message, const MessageEntry& entry, bool in_session);
-  Result<> write_combined(const Message& message, const MessageEntry& entry);
-  Result<> connect(std::string_view service, const Message& message, Now now);
+  Result<> write_root_type(const Message& message, const MessageEntry& entry);
+  Result<> write_combined(const Message& message, const MessageEntry& entry, Now now);
+  Result<> connect(const MessageEntry& entry, const MessageHeader& header, Now now);
   Result<> disconnect(const Message& message, const MessageEntry& entry, Now now);
 
-  void handle_session_entry(const Message& message, const MessageEntry& entry, Now now);
-  Result<> dispatch(const Message& message, const MessageEntry& entry, Now now);
+  // requests of the session
+  void handle_entry(const Message& message, const MessageEntry& entry, Now now);
+  Result<> answer_session_request(const Message& message, const MessageEntry& entry);
   Result<> dispatch_member(const Message& message, const MessageEntry& entry, Now now);
-  Result<> call_service_index(const MessageEntry& entry, const MemberDefinition& member, Now now);
-  Result<> handle_session_op(const MessageEntry& entry);
+  Result<> add_call(const Message& message, const MessageEntry& entry, CallKind kind, HostedService::Found found,
+                    const MemberDefinition& member);
+  Result<> answer_wire(const MessageEntry& entry, const HostedService::Found& found, const MemberDefinition& member,
+                       Now now);
+  Result<> answer_service_index(const MessageEntry& entry, const MemberDefinition& member, Now now);
   void handle_wire_packet(const Message& message, const MessageEntry& entry);
-
-  MessageEntry& begin_reply(const MessageEntry& request);
+  void begin_reply(const MessageEntry& request);
   void send_error(const MessageEntry& request, const Error& error, Now now);
-  void send_outgoing(Now now);
+  Result<> send_wire_packet(const PathMember& key, WireConnection& wire, const Value& value, Now now);
   void flush_wires(Now now);
-  void leave(Error reason);
-  bool is_addressed_to_session(const MessageHeader& header) const;
 
   ServiceDirectory& directory_;
   ServiceSessionOptions options_;
@@ -149,8 +154,8 @@ class ServiceSession {
 
   Message outgoing_;
   CallId last_call_id_ = 0;
-  std::unordered_map<CallId, OpenCall> calls_;
-  std::map<WireKey, WireConnection> wires_;
+  std::vector<OpenCall> calls_;
+  std::map<PathMember, WireConnection, PathMemberLess> wires_;
   std::deque<ServiceEvent> events_;
 };
 

@@ -1,0 +1,207 @@
+// Node-level requests: definitions, types, connect and disconnect. They need no session. Layer: session.
+// Source: sessions spec sections 2.2, 2.3, 2.4.
+#include <set>
+#include <utility>
+
+#include "core/member/error_entry.hpp"
+#include "core/session/service_session.hpp"
+#include "core/support/random.hpp"
+
+namespace rr {
+
+namespace {
+
+Error service_not_found() { return {ErrorCode::service_not_found, "Service not found"}; }
+
+const MessageElement* find_text(const Message& message, const MessageEntry& entry, std::string_view name) {
+  const auto* element = message.elements_of(entry).find(name);
+  return element && element->type == DataType::string_t ? element : nullptr;
+}
+
+/// The client's level from `clientversion`; unspecified where it is absent.
+Result<Version> read_client_version(const Message& message, const MessageEntry& entry) {
+  const auto* element = message.elements_of(entry).find("clientversion");
+  if (!element) return Version{};
+  auto version = element->type == DataType::string_t
+                     ? parse_version(element->text())
+                     : Result<Version>(make_error(ErrorCode::data_type_mismatch, "not a string"));
+  if (!version) return make_error(ErrorCode::invalid_argument, "clientversion: " + version.error().message);
+  return version;
+}
+
+/// The newest type, of this one and what it implements, that a client of this level knows; empty if there is none.
+std::string type_for_client(const HostedService& service, const Version& client) {
+  const auto& types = service.types();
+  const auto& type = service.root_type();
+  const auto& home = service.root_definition();
+  if (client.is_unspecified() || home.version.is_unspecified() || home.version <= client) return type.qualified_name;
+  std::set<std::string_view> seen_definitions;
+  for (const auto& base : type.implements) {
+    const auto* definition = types.find_service(split_qualified_name(base.qualified_name).first);
+    if (!definition || definition == &home || !seen_definitions.insert(definition->name).second) continue;
+    if (definition->version.is_unspecified() || definition->version <= client) return base.qualified_name;
+  }
+  return {};
+}
+
+/// Direct implements as a definition writes them: local names without, others with their definition.
+void add_implements(Message& message, const EntityDefinition& type) {
+  if (type.implements.empty()) return;
+  const auto home = split_qualified_name(type.qualified_name).first;
+  message.begin_nested("objectimplements", DataType::list_t);
+  std::int32_t number = 0;
+  for (const auto& base : type.implements) {
+    const auto [definition, name] = split_qualified_name(base.qualified_name);
+    const std::string_view shown = definition == home ? name : std::string_view(base.qualified_name);
+    message.add_numbered(number++, DataType::string_t, static_cast<std::uint32_t>(shown.size()), as_bytes(shown));
+  }
+  message.end_nested();
+}
+
+void add_text_list(Message& message, std::string_view name, const std::vector<std::string_view>& texts) {
+  message.begin_nested(name, DataType::list_t);
+  std::int32_t number = 0;
+  for (const auto text : texts)
+    message.add_numbered(number++, DataType::string_t, static_cast<std::uint32_t>(text.size()), as_bytes(text));
+  message.end_nested();
+}
+
+}  // namespace
+
+void ServiceSession::handle_special(const Message& message, Now now) {
+  const auto& header = message.header;
+  const auto& self = directory_.identity();
+  const bool is_for_us =
+      header.receiver_node_id == self.id ||
+      (header.receiver_node_id.is_any() &&
+       (header.receiver_node_name.empty() || header.receiver_node_name == self.name));
+  outgoing_.clear();
+  outgoing_.header.receiver_node_id = header.sender_node_id;
+  outgoing_.header.receiver_node_name = header.sender_node_name;
+  outgoing_.header.sender_endpoint = header.receiver_endpoint;
+  outgoing_.header.receiver_endpoint = header.sender_endpoint;
+  for (const auto& entry : message.entries) {
+    if (static_cast<std::uint16_t>(entry.type) % 2 == 0) continue;  // replies are not for a service
+    outgoing_.begin_entry(reply_type(entry.type), entry.service_path, entry.member_name, entry.request_id);
+    const Result<> done = is_for_us ? answer_special(message, entry, now)
+                                    : make_error(ErrorCode::node_not_found, "Could not find route to remote node");
+    if (!done) {
+      // A failure may leave a half-built entry behind: it starts anew.
+      outgoing_.elements.resize(outgoing_.entries.back().first_element);
+      outgoing_.entries.pop_back();
+      outgoing_.begin_entry(reply_type(entry.type), entry.service_path, entry.member_name, entry.request_id);
+      write_error(outgoing_, done.error());
+    }
+  }
+  if (!outgoing_.entries.empty()) send_outgoing(now);
+}
+
+Result<> ServiceSession::answer_special(const Message& message, const MessageEntry& entry, Now now) {
+  switch (entry.type) {
+    case EntryType::get_service_desc: return write_service_desc(message, entry);
+    case EntryType::object_type_name: return write_root_type(message, entry);
+    case EntryType::connect_client: return connect(entry, message.header, now);
+    case EntryType::connect_client_combined: return write_combined(message, entry, now);
+    case EntryType::disconnect_client: return disconnect(message, entry, now);
+    case EntryType::get_node_info: return {};  // the header says it all
+    case EntryType::node_check_capability:
+      outgoing_.add_scalar("return", DataType::uint32_t, std::uint32_t{0});
+      return {};
+    case EntryType::get_service_attributes: {
+      const auto service = directory_.find(entry.service_path);
+      if (!service) return make_error(ErrorCode::service_error, "Service not found");
+      return pack_varvalue(outgoing_, "return", service->attributes(), service->types());
+    }
+    default: return protocol_error("Invalid Special Operation");
+  }
+}
+
+Result<> ServiceSession::write_service_desc(const Message& message, const MessageEntry& entry) {
+  if (auto version = read_client_version(message, entry); !version) return version.error();
+  const auto* type = find_text(message, entry, "ServiceType");
+  if (!type) type = find_text(message, entry, "servicetype");
+  if (type) {
+    const auto* definition = directory_.find_definition(type->text());
+    if (!definition) return service_not_found();
+    outgoing_.add_text("servicedef", definition->text);
+    return {};
+  }
+  const auto service = directory_.find(entry.service_path);
+  if (!service) return service_not_found();
+  if (auto packed = pack_varvalue(outgoing_, "attributes", service->attributes(), service->types()); !packed)
+    return packed;
+  if (!service->extra_imports().empty())
+    add_text_list(outgoing_, "extraimports", {service->extra_imports().begin(), service->extra_imports().end()});
+  outgoing_.add_text("servicedef", service->root_definition().text);
+  return {};
+}
+
+/// ObjectTypeName without a session: every failure is "Object not found".
+Result<> ServiceSession::write_root_type(const Message& message, const MessageEntry& entry) {
+  const auto not_found = make_error(ErrorCode::object_not_found, "Object not found");
+  const auto version = read_client_version(message, entry);
+  if (!version) return version.error();
+  const auto service = directory_.find(entry.service_path.substr(0, entry.service_path.find('.')));
+  if (!service) return not_found;
+  const auto found = service->find_object(entry.service_path);
+  if (!found) return not_found;
+  const bool is_root = found->type == &service->root_type();
+  const auto name = is_root ? type_for_client(*service, *version) : found->type->qualified_name;
+  const auto* type = service->types().find_entity(name);
+  if (!type) return not_found;
+  outgoing_.add_text("objecttype", outgoing_.store(std::string_view(name)));
+  add_implements(outgoing_, *type);
+  return {};
+}
+
+Result<> ServiceSession::write_combined(const Message& message, const MessageEntry& entry, Now now) {
+  const auto version = read_client_version(message, entry);
+  if (!version) return version.error();
+  const auto service = directory_.find(entry.service_path);
+  if (!service) return service_not_found();
+  const auto type_name = type_for_client(*service, *version);
+  const auto* type = service->types().find_entity(type_name);
+  if (!type) return service_not_found();
+  // No service has an authenticator yet: a login cannot succeed.
+  const auto elements = message.elements_of(entry);
+  if (elements.find("username") && elements.find("credentials"))
+    return make_error(ErrorCode::authentication_error, "Authentication Failed");
+  if (auto connected = connect(entry, message.header, now); !connected) return connected;
+
+  outgoing_.add_text("objecttype", type->qualified_name);
+  add_implements(outgoing_, *type);
+  const auto* flag = find_text(message, entry, "returnservicedefs");
+  if (!flag || (flag->text() != "0" && flag->text() != "false" && flag->text() != "False" && flag->text() != "FALSE")) {
+    std::vector<std::string_view> texts;
+    for (const auto* definition : service->definitions_for_client()) texts.push_back(definition->text);
+    add_text_list(outgoing_, "servicedefs", texts);
+  }
+  return pack_varvalue(outgoing_, "attributes", service->attributes(), service->types());
+}
+
+Result<> ServiceSession::connect(const MessageEntry& entry, const MessageHeader& header, Now now) {
+  auto service = directory_.find(entry.service_path);
+  if (!service) return service_not_found();
+  if (service_) {
+    connection_.close(protocol_error("a second session was asked for on one connection"));
+    return protocol_error("this connection has a session already");
+  }
+  service_ = std::move(service);
+  endpoint_ = random_endpoint();
+  last_session_message_ = now.steady;
+  connection_.set_endpoints(endpoint_, header.sender_endpoint);
+  if (header.sender_endpoint != 0) connection_.authorise();
+  outgoing_.header.sender_endpoint = endpoint_;
+  events_.push_back(ClientConnected{service_.get()});
+  return {};
+}
+
+Result<> ServiceSession::disconnect(const Message& message, const MessageEntry& entry, Now now) {
+  const auto* name = find_text(message, entry, "servicename");
+  if (!service_ || message.header.receiver_endpoint != endpoint_ || !name || name->text() != service_->name())
+    return service_not_found();
+  leave({ErrorCode::none, "the client disconnected"}, now);
+  return {};
+}
+
+}  // namespace rr
