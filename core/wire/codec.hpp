@@ -30,11 +30,27 @@ struct DecodeOptions {
 /// Errors   the classes of the messages spec, section 14; the text names field and byte offset.
 [[nodiscard]] Result<> decode(ByteSpan bytes, const DecodeOptions& options, Message& message);
 
+/// Sizes and string codes, found before the first byte is written. Items lie as in Message::entries and ::elements.
+struct EncodePlan {
+  static constexpr std::uint32_t inline_text = 0xffffffff;  ///< instead of a code: the text itself is written
+  struct Item {
+    std::uint32_t size = 0;                      ///< bytes on the wire, descendants included
+    std::uint32_t name_code = inline_text;       ///< ElementName; MemberName of an entry
+    std::uint32_t qualifier_code = inline_text;  ///< ElementTypeName; ServicePath of an entry
+  };
+  std::vector<Item> entries;
+  std::vector<Item> elements;
+};
+
 /// Encoded bytes as slices to be written in order. Small fields lie in one owned buffer; payloads of at least
 /// `gather_threshold` bytes are referenced in place and kept alive by the owners of the Message that they came from.
 class EncodedMessage {
  public:
   static constexpr std::size_t gather_threshold = 4096;
+
+  EncodedMessage() = default;
+  EncodedMessage(EncodedMessage&&) = default;
+  EncodedMessage& operator=(EncodedMessage&&) = default;
 
   std::size_t size() const { return size_; }
   /// Slices in write order; valid until the next encode() into this object or its destruction (moves keep them valid).
@@ -49,15 +65,19 @@ class EncodedMessage {
   Bytes scratch_;
   std::vector<ByteSpan> slices_;
   std::vector<std::shared_ptr<const void>> owners_;
+  EncodePlan plan_;  ///< kept for its capacity only
 };
 
 struct EncodeOptions {
-  StringTableMode string_table = {};                    ///< applied to version 4 only
-  std::size_t max_message_size = 12u * 1024 * 1024;     ///< bytes; larger gives protocol_error, nothing is written
+  StringTableMode string_table = {};  ///< applied to version 4 only
+  /// Bytes; a larger message gives protocol_error and nothing is written. A receiver's default limit less 100.
+  std::size_t max_message_size = 12u * 1024 * 1024 - 100;
 };
 
 /// Encodes `message` in the version of its header. `out` is overwritten and its capacity reused.
-/// Errors   protocol_error: a limit of section 11, or version-4 features in a version-2 message.
+/// Errors   protocol_error: a limit of section 11, version-4 features in a version-2 message, an unknown version;
+///          data_type_error: a type that never travels; data_serialization_error: count and data of an element
+///          disagree.
 [[nodiscard]] Result<> encode(const Message& message, const EncodeOptions& options, EncodedMessage& out);
 
 }  // namespace rr

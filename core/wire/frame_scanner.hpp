@@ -17,7 +17,8 @@ class FrameScanner {
   /// `input`  borrowed for this call and, when message() then returns a value, until the next feed(); any length, may
   ///          begin or end mid-message.
   /// Returns  bytes consumed (0..input.size()); stops behind the first complete message, which message() then holds.
-  /// Errors   protocol_error: bad magic, version not 2 or 4, size below 16 or above the limit (nothing allocated).
+  /// Errors   protocol_error: bad magic, version not 2 or 4, size below 16 or above the limit (nothing allocated). The
+  ///          stream is lost then: drop the scanner with its connection.
   [[nodiscard]] Result<std::size_t> feed(ByteSpan input);
 
   /// The complete message found by the last feed(): a view of its input where it lay there in one piece, else of the
@@ -30,6 +31,8 @@ class FrameScanner {
   bool is_at_boundary() const { return buffer_.empty() || message_.has_value(); }
 
  private:
+  void append(ByteSpan bytes);
+
   std::size_t limit_;
   std::size_t expected_ = 0;  ///< size of the message being buffered; 0 while its first 10 bytes are incomplete
   Bytes buffer_;

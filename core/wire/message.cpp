@@ -6,7 +6,8 @@ namespace rr {
 
 namespace {
 constexpr std::size_t block_size = 4096;
-}
+constexpr std::size_t max_kept_elements = 1 << 14;  // clear() gives back more: one huge message must not cost for ever
+}  // namespace
 
 MessageEntry& Message::begin_entry(EntryType type, std::string_view service_path, std::string_view member_name,
                                    std::uint32_t request_id) {
@@ -77,13 +78,18 @@ MessageElement& Message::begin_nested_numbered(std::int32_t number, DataType typ
   return added;
 }
 
-void Message::end_nested() { open_.pop_back(); }
+void Message::end_nested() {
+  open_.pop_back();
+}
 
 ByteSpan Message::store(ByteSpan bytes) {
   if (bytes.empty()) return {};
   std::uint8_t* to = nullptr;
   if (bytes.size() > block_size / 4) {
-    to = large_.emplace_back(new std::uint8_t[bytes.size()]).get();
+    // An owner, not a block: an encoded message that references the bytes keeps them after clear().
+    std::shared_ptr<std::uint8_t> large(new std::uint8_t[bytes.size()], std::default_delete<std::uint8_t[]>());
+    to = large.get();
+    owners_.push_back(std::move(large));
   } else {
     if (block_index_ < blocks_.size() && block_used_ + bytes.size() > block_size) {
       ++block_index_;
@@ -101,10 +107,10 @@ void Message::clear() {
   header = {};
   entries.clear();
   elements.clear();
+  if (elements.capacity() > max_kept_elements) elements = {};
   open_.clear();
   block_index_ = 0;
   block_used_ = 0;
-  large_.clear();
   owners_.clear();
 }
 

@@ -68,10 +68,8 @@ constexpr bool is_nested(DataType type) {
     case DataType::pod_multidimarray_t:
     case DataType::namedarray_array_t:
     case DataType::namedarray_multidimarray_t:
-    case DataType::multidimarray_t:
-      return true;
-    default:
-      return false;
+    case DataType::multidimarray_t: return true;
+    default: return false;
   }
 }
 
@@ -322,7 +320,6 @@ class Message {
   std::vector<std::unique_ptr<std::uint8_t[]>> blocks_;
   std::size_t block_index_ = 0;
   std::size_t block_used_ = 0;
-  std::vector<std::unique_ptr<std::uint8_t[]>> large_;
   std::vector<std::shared_ptr<const void>> owners_;
 };
 
