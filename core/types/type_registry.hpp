@@ -2,11 +2,11 @@
 #pragma once
 
 #include <functional>
-#include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
+#include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "core/robdef/robdef.hpp"
@@ -14,15 +14,15 @@
 namespace rr {
 
 /// A set of definitions that grows: definitions arrive at connect and, for varobject types, later.
-/// Definitions that were added never move or change.
+/// Definitions that were added never move or change, so pointers to them hold as long as the registry.
 class TypeRegistry {
  public:
   /// Parses, verifies together with what is there, and adds all or none. Texts may come in any order but must bring
   /// every import that is not there yet. A definition that is already there (same name) is skipped.
-  /// Errors   service_definition_error, with the first diagnostic.
+  /// Errors   service_definition_error, with the first diagnostic; the registry is then unchanged.
   Result<> add(const std::vector<std::string>& texts, RobdefMode mode);
 
-  /// Names imported by added definitions or by `text` that are not in the registry.
+  /// Names that `text` imports, each once. Read leniently: errors in `text` are add()'s business.
   static std::vector<std::string> imports_of(std::string_view text);
 
   const ServiceDefinition* find_service(std::string_view name) const;
@@ -36,9 +36,18 @@ class TypeRegistry {
   const std::vector<Diagnostic>& warnings() const { return warnings_; }
 
  private:
+  /// Hashes text of any kind, so that look-ups need no std::string.
+  struct TextHash {
+    using is_transparent = void;
+    std::size_t operator()(std::string_view text) const { return std::hash<std::string_view>{}(text); }
+  };
+  template <class Definition>
+  using Index = std::unordered_map<std::string, const Definition*, TextHash, std::equal_to<>>;
+
   std::vector<std::unique_ptr<ServiceDefinition>> definitions_;
-  std::map<std::string, const EntityDefinition*, std::less<>> entities_;
-  std::map<std::string, const EnumDefinition*, std::less<>> enums_;
+  Index<ServiceDefinition> services_;
+  Index<EntityDefinition> entities_;
+  Index<EnumDefinition> enums_;
   std::vector<Diagnostic> warnings_;
 };
 

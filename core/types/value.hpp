@@ -56,6 +56,8 @@ struct Scalar {
     std::memcpy(scalar.storage.data(), &value, sizeof(T));
     return scalar;
   }
+  /// From the first item_size(type) bytes of `bytes`, which must be there. A bool becomes 0 or 1.
+  static Scalar from_bytes(DataType type, ByteSpan bytes);
   ByteSpan bytes() const { return {storage.data(), item_size(type)}; }
   bool operator==(const Scalar& other) const;  ///< same type, same bytes
 };
@@ -65,17 +67,17 @@ struct Scalar {
 class Array {
  public:
   Array() = default;
-  /// Copies `bytes`, whose size must be a multiple of item_size(type).
+  /// Copies `bytes`, whose size must be a multiple of item_size(type). Bools become 0 or 1.
   static Array copy(DataType type, ByteSpan bytes);
-  /// Takes over the vector without copying.
+  /// Takes over the vector without copying (std::vector<bool>, which has no items to borrow, is copied).
   template <Number T>
   static Array take(std::vector<T> items) {
-    auto owner = std::make_shared<const std::vector<T>>(std::move(items));
-    Array array;
-    array.type_ = data_type_of<T>();
-    array.bytes_ = {reinterpret_cast<const std::uint8_t*>(owner->data()), owner->size() * sizeof(T)};
-    array.owner_ = std::move(owner);
-    return array;
+    if constexpr (std::is_same_v<T, bool>) {
+      const Bytes bytes(items.begin(), items.end());
+      return copy(DataType::bool_t, bytes);
+    } else {
+      return take_items(std::move(items));
+    }
   }
   template <Number T>
   static Array copy(std::span<const T> items) {
@@ -96,6 +98,16 @@ class Array {
   bool operator==(const Array& other) const;  ///< same type, same bytes
 
  private:
+  template <Number T>
+  static Array take_items(std::vector<T> items) {
+    auto owner = std::make_shared<const std::vector<T>>(std::move(items));
+    Array array;
+    array.type_ = data_type_of<T>();
+    array.bytes_ = {reinterpret_cast<const std::uint8_t*>(owner->data()), owner->size() * sizeof(T)};
+    array.owner_ = std::move(owner);
+    return array;
+  }
+
   DataType type_ = DataType::void_t;
   ByteSpan bytes_;
   std::shared_ptr<const void> owner_;
@@ -129,7 +141,7 @@ struct Structure {
 /// Pods: a scalar, an array, or a multi-dim array (dims not empty, column-major).
 struct PodArray {
   std::string type_name;
-  std::vector<Structure> items;
+  std::vector<Structure> items;  ///< their type_name is empty as read, and may be when packed: the pods' is above
   std::vector<std::uint32_t> dims = {};
   bool is_scalar = false;     ///< declared as a scalar: one item
   bool is_multidim = false;
@@ -152,12 +164,12 @@ struct List {
 };
 
 struct MapInt32 {
-  std::vector<std::pair<std::int32_t, Value>> items;  ///< keys unique; written in ascending order
+  std::vector<std::pair<std::int32_t, Value>> items;  ///< keys unique; read and written in ascending order
   bool operator==(const MapInt32&) const;
 };
 
 struct MapString {
-  std::vector<std::pair<std::string, Value>> items;  ///< keys unique; written in order of unsigned bytes
+  std::vector<std::pair<std::string, Value>> items;  ///< keys unique; read and written in order of unsigned bytes
   const Value* find(std::string_view key) const;
   bool operator==(const MapString&) const;
 };
@@ -193,8 +205,7 @@ class Value {
   }
   const Storage& storage() const { return storage_; }
 
-  /// A number as T: from a scalar or an array of length 1, converted where the value fits exactly (integers) or
-  /// between floating types.
+  /// A number as T: from a scalar or an array of length 1, converted by the rules of convert_number().
   /// Errors   data_type_mismatch, out_of_range.
   template <Number T>
   Result<T> to() const;
@@ -203,7 +214,7 @@ class Value {
   /// Items of an array, or of a scalar as an array of one, whose type is exactly T. Borrows from this value.
   template <Number T>
   Result<std::span<const T>> to_items() const;
-  /// "double", "int32[]", "string", "com.x.Pose", "list", "null", ...: for messages.
+  /// "double", "int32[]", "string", "com.x.Pose", "list", "map{string}", "null", ...: for messages.
   std::string type_text() const;
 
   bool operator==(const Value& other) const { return storage_ == other.storage_; }

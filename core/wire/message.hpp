@@ -303,6 +303,8 @@ class Message {
   MessageElement& begin_nested(std::string_view name, DataType type, std::string_view type_name = {});
   MessageElement& begin_nested_numbered(std::int32_t number, DataType type, std::string_view type_name = {});
   void end_nested();
+  /// How many nested elements are open.
+  std::size_t open_depth() const { return open_.size(); }
 
   /// Copies bytes into the message's own storage; valid until clear().
   ByteSpan store(ByteSpan bytes);
