@@ -25,20 +25,22 @@ struct DiagnosticNote {
   std::string message;
 };
 
-/// One finding. Lines and columns are 1-based, of physical lines; column 0 means "the whole line".
+/// One finding. Lines and columns are 1-based, of physical lines; column 0 means "the whole line". A statement that
+/// spans several lines is named by its first; its columns may lie on a later one.
 struct Diagnostic {
   Severity severity = Severity::error;
   std::string code;     ///< of the spec's list, e.g. "name-reserved"
   std::string message;  ///< what was found and what was expected
   std::string file;     ///< as given by the caller; may be empty
   std::string service;  ///< service name where known
-  std::uint32_t line = 0;
+  std::uint32_t line = 0;         ///< the first line of the statement
+  std::uint32_t column_line = 0;  ///< the line that the columns belong to; 0 where they are unknown
   std::uint32_t column = 0;
-  std::uint32_t end_column = 0;
+  std::uint32_t end_column = 0;  ///< one past the last character
   std::vector<DiagnosticNote> notes = {};
 };
 
-/// "file:line:column: error: message [code]".
+/// "file:line:column: error: message [code]", a note on a line of its own each; without final line end.
 std::string format_diagnostic(const Diagnostic& diagnostic);
 
 struct ParseResult {
@@ -47,12 +49,17 @@ struct ParseResult {
   bool ok() const;
 };
 
+/// Most errors, and most warnings, that are kept for one definition: hostile text must not fill memory with findings.
+inline constexpr std::size_t max_diagnostics = 500;
+
 /// Parses one definition; reports all errors, not only the first. Types are not resolved yet: verify() does that.
+/// Time and memory are linear in the length of the text, whatever it holds.
 ParseResult parse_service_definition(std::string_view text, RobdefMode mode, std::string_view file = {});
 
 /// Verifies a set that holds all imports transitively and fills in resolved types (TypeDefinition::type and
 /// qualified_name, ImplementsDefinition::qualified_name, namedarray_type/_count).
-/// Returns  every finding; the set is usable where none is an error.
+/// Definitions that were verified before may be in the set again.
+/// Returns  every finding, by definition and line; the set is usable where none is an error.
 std::vector<Diagnostic> verify_service_definitions(std::span<ServiceDefinition* const> set, RobdefMode mode);
 
 /// The canonical text (spec section 5.9).

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/robdef/names.hpp"
+
 namespace rr {
 
 namespace {
@@ -45,6 +47,14 @@ bool MemberDefinition::is_generator() const {
 
 const MemberDefinition* EntityDefinition::find_member(std::string_view member) const {
   return find_named(members, member);
+}
+
+bool EntityDefinition::is_unreliable_pipe(const MemberDefinition& pipe) const {
+  if (pipe.kind != MemberKind::pipe) return false;
+  if (pipe.has_modifier("unreliable")) return true;
+  return std::any_of(options.begin(), options.end(), [&pipe](const OptionDefinition& option) {
+    return split_words(option.text) == std::vector<std::string_view>{"pipe", pipe.name, "unreliable"};
+  });
 }
 
 const EntityDefinition* ServiceDefinition::find_entity(std::string_view entity) const {

@@ -158,6 +158,8 @@ struct EntityDefinition {
   std::uint32_t namedarray_count = 0;
 
   const MemberDefinition* find_member(std::string_view name) const;
+  /// By the modifier or the old `option pipe NAME unreliable`.
+  bool is_unreliable_pipe(const MemberDefinition& pipe) const;
 };
 
 struct ServiceDefinition {
@@ -173,6 +175,9 @@ struct ServiceDefinition {
   std::vector<EntityDefinition> entities = {};  ///< structs, pods, namedarrays, objects in source order
   std::string documentation = {};
   std::string text = {};  ///< the source as received: what a node sends on
+  std::string file = {};  ///< where the text came from, for diagnostics; may be empty
+  std::uint32_t line = 0;          ///< of the `service` statement
+  std::uint32_t version_line = 0;  ///< of `stdver` or `option version`; 0 where there is none
 
   const EntityDefinition* find_entity(std::string_view name) const;
   const EnumDefinition* find_enum(std::string_view name) const;
