@@ -20,12 +20,14 @@ inline bool is_multidim(const TypeDefinition& type) {
 template <class Size>
 std::optional<std::uint64_t> product_of(std::span<const Size> dims) {
   std::uint64_t product = 1;
+  bool fits = true;
   for (const auto dim : dims) {
     const auto size = static_cast<std::uint64_t>(dim);
-    if (size != 0 && product > std::numeric_limits<std::uint64_t>::max() / size) return std::nullopt;
-    product *= size;
+    if (size == 0) return 0;
+    fits = fits && product <= std::numeric_limits<std::uint64_t>::max() / size;
+    if (fits) product *= size;
   }
-  return product;
+  return fits ? std::optional(product) : std::nullopt;
 }
 
 /// Whether `dims` are those that a fixed_multidim type declares. Any other type takes every shape.

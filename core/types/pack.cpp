@@ -109,13 +109,7 @@ bool Packer::pack_scalar(const FieldPath& path, const Value& value, DataType typ
 }
 
 bool Packer::pack_text(const FieldPath& path, std::string_view text) {
-  if (text.size() < EncodedMessage::gather_threshold)
-    return add_leaf(path, DataType::string_t, text.size(), as_bytes(text));
-  // The encoder references payloads of this size until they are sent, and a std::string has no shared owner.
-  auto owner = std::make_shared<const std::string>(text);
-  const auto bytes = as_bytes(*owner);
-  message_.keep_alive(std::move(owner));
-  return add_leaf(path, DataType::string_t, bytes.size(), bytes);
+  return add_leaf(path, DataType::string_t, text.size(), borrow(as_bytes(text)));
 }
 
 bool Packer::pack_array(const FieldPath& path, const Array& array) {
@@ -156,7 +150,7 @@ bool Packer::pack_dims(const FieldPath& path, const std::vector<std::uint32_t>& 
   if (!product || *product != count)
     return fail(ErrorCode::data_type_error, path,
                 "dims " + dims_text(dims) + " do not match " + std::to_string(count) + " items");
-  return add_leaf(path.field("dims", {}), DataType::uint32_t, dims.size(), dims_bytes(dims));
+  return add_leaf(path.field("dims", {}), DataType::uint32_t, dims.size(), borrow(dims_bytes(dims)));
 }
 
 template <class PackOne>
@@ -212,6 +206,11 @@ bool Packer::add_leaf(const FieldPath& key, DataType type, std::size_t count, By
   else
     message_.add(key.name, type, static_cast<std::uint32_t>(count), data);
   return true;
+}
+
+ByteSpan Packer::borrow(ByteSpan bytes) {
+  // The encoder references what is large until it is sent; these bytes have no owner that could be kept alive.
+  return bytes.size() < EncodedMessage::gather_threshold ? bytes : message_.store(bytes);
 }
 
 bool Packer::add_payload(const FieldPath& key, DataType type, const Array& array) {

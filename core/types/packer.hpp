@@ -62,6 +62,7 @@ class Packer {
 
   // elements, in pack.cpp
   bool add_leaf(const FieldPath& key, DataType type, std::size_t count, ByteSpan data);
+  ByteSpan borrow(ByteSpan bytes);  ///< of the value being packed; not of an Array
   bool add_payload(const FieldPath& key, DataType type, const Array& array);
   bool begin_nested(const FieldPath& key, DataType type, std::string_view type_name = {});
   bool end_nested();  ///< true, always
