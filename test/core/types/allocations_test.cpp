@@ -1,0 +1,66 @@
+// Packing scalars, arrays, strings and structures of them allocates nothing once the message has its capacity.
+// Counts calls of operator new, so it is a program of its own.
+#include <catch2/catch.hpp>
+#include <cstdlib>
+#include <new>
+
+#include "test/core/types/fixture.hpp"
+
+namespace {
+std::size_t allocations = 0;
+}
+
+void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* memory = std::malloc(size)) return memory;
+  throw std::bad_alloc();
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+
+using namespace rr;
+using namespace rr::test;
+
+namespace {
+
+std::size_t count_while_packing(const Value& value, const TypeDefinition& type) {
+  Message message;
+  bool ok = true;
+  const auto pack_once = [&] {
+    message.clear();
+    message.begin_entry(EntryType::property_get_res, "svc", "d1", 5);
+    ok = ok && pack(message, "value", value, type, test_types());
+  };
+  pack_once();
+  const auto before = allocations;
+  for (int i = 0; i < 100; ++i) pack_once();
+  const auto counted = allocations - before;
+  REQUIRE(ok);
+  return counted;
+}
+
+std::size_t count_field(const Value& value, std::string_view field) {
+  return count_while_packing(value, field_type("test.types.every", field));
+}
+
+}  // namespace
+
+TEST_CASE("the counter counts") {
+  const auto before = allocations;
+  delete new int(1);
+  CHECK(allocations == before + 1);
+}
+
+TEST_CASE("steady packing allocates nothing") {
+  CHECK(count_field(1.5, "d") == 0);
+  CHECK(count_field(std::int32_t{5}, "i16") == 0);
+  CHECK(count_field("a text that is longer than a short string", "text") == 0);
+  CHECK(count_field(std::vector<double>(10, 1.5), "ds") == 0);
+  CHECK(count_field(std::vector<double>(100000, 1.5), "ds") == 0);
+  CHECK(count_field(MultiDimArray{{2, 1}, Array::take(std::vector<double>{1, 2})}, "grid") == 0);
+  CHECK(count_field(Structure{"test.types.point3", {{"z", 1.0}, {"y", 2.0}, {"x", 3.0}}}, "p3") == 0);
+  CHECK(count_field(MapString{{{"a", {}}, {"b", {}}}}, "p3_by_name") == 0);
+  CHECK(count_field(NamedArray{"", Array::take(std::vector<double>(30))}, "vs") == 0);
+  const Structure point{"", {{"id", std::int16_t{1}}, {"value", 1.0f}}};
+  CHECK(count_field(PodArray{"", std::vector<Structure>(50, point)}, "ps") == 0);
+}
