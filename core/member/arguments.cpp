@@ -8,15 +8,17 @@ bool is_generator(const ParameterDefinition& parameter) {
   return parameter.type.container == ContainerKind::generator;
 }
 
-bool returns_nothing(const MemberDefinition& member) { return member.type.type == DataType::void_t; }
+bool returns_nothing(const MemberDefinition& member) {
+  return member.type.type == DataType::void_t;
+}
 
 Result<Value> read_element(const Message& message, const MessageEntry& entry, std::string_view name,
                            const MemberDefinition& member, const TypeDefinition& type, const TypeRegistry& types) {
   const auto* element = message.elements_of(entry).find(name);
   if (!element)
-    return make_error(ErrorCode::message_element_not_found,
-                      std::string(member_kind_name(member.kind)) + " '" + member.name + "': element '" +
-                          std::string(name) + "' not found");
+    return make_error(ErrorCode::message_element_not_found, std::string(member_kind_name(member.kind)) + " '" +
+                                                                member.name + "': element '" + std::string(name) +
+                                                                "' not found");
   auto value = unpack(message, *element, type, types);
   if (value) return value;
   auto error = value.error();
@@ -31,10 +33,9 @@ Result<> write_arguments(Message& message, std::span<const Value> arguments, con
   const auto& parameters = member.parameters;
   const std::size_t expected = parameters.size() - (!parameters.empty() && is_generator(parameters.back()) ? 1 : 0);
   if (arguments.size() != expected)
-    return make_error(ErrorCode::invalid_argument,
-                      std::string(member_kind_name(member.kind)) + " '" + member.name + "': " +
-                          std::to_string(arguments.size()) + " arguments given, " + std::to_string(expected) +
-                          " expected");
+    return make_error(ErrorCode::invalid_argument, std::string(member_kind_name(member.kind)) + " '" + member.name +
+                                                       "': " + std::to_string(arguments.size()) + " arguments given, " +
+                                                       std::to_string(expected) + " expected");
   for (std::size_t i = 0; i < expected; ++i)
     if (auto done = pack(message, std::string_view(parameters[i].name), arguments[i], parameters[i].type, types); !done)
       return done;
@@ -66,7 +67,8 @@ Result<Value> read_return(const Message& message, const MessageEntry& entry, con
   return read_element(message, entry, "return", member, member.type, types);
 }
 
-Result<> write_property(Message& message, const Value& value, const MemberDefinition& member, const TypeRegistry& types) {
+Result<> write_property(Message& message, const Value& value, const MemberDefinition& member,
+                        const TypeRegistry& types) {
   return pack(message, "value", value, member.type, types);
 }
 

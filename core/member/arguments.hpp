@@ -27,7 +27,8 @@ Result<Value> read_return(const Message& message, const MessageEntry& entry, con
                           const TypeRegistry& types);
 
 /// Adds / reads `value` of a property.
-Result<> write_property(Message& message, const Value& value, const MemberDefinition& member, const TypeRegistry& types);
+Result<> write_property(Message& message, const Value& value, const MemberDefinition& member,
+                        const TypeRegistry& types);
 Result<Value> read_property(const Message& message, const MessageEntry& entry, const MemberDefinition& member,
                             const TypeRegistry& types);
 

@@ -27,7 +27,8 @@ Result<WireValue> read_wire_value(const Message& message, const MessageEntry& en
       nanoseconds->type != DataType::int32_t || nanoseconds->count == 0)
     return make_error(ErrorCode::data_type_mismatch,
                       "wire '" + member.name + "': packettime is not a RobotRaconteur.TimeSpec");
-  out.time = TimeSpec{load<std::int64_t>(seconds->data.data()), load<std::int32_t>(nanoseconds->data.data())}.normalized();
+  out.time =
+      TimeSpec{load<std::int64_t>(seconds->data.data()), load<std::int32_t>(nanoseconds->data.data())}.normalized();
   auto value = unpack(message, *packet, member.type, types);
   if (!value) return value.error();
   out.value = std::move(*value);

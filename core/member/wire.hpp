@@ -32,8 +32,8 @@ struct WireConnection {
   const MemberDefinition* member = nullptr;
   std::optional<TimeSpec> last_received = {};
   std::optional<TimeSpec> last_sent = {};
-  std::optional<WireValue> early = {};    ///< came before the connect reply; newest only
-  std::optional<Value> waiting = {};      ///< to be sent when the stream has room; newest only
+  std::optional<WireValue> early = {};  ///< came before the connect reply; newest only
+  std::optional<Value> waiting = {};    ///< to be sent when the stream has room; newest only
 
   /// Whether a packet of this time is newer than all before; remembers it.
   bool accept(TimeSpec time);

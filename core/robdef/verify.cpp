@@ -120,7 +120,10 @@ bool resolve_type(VerifyScope& scope, TypeDefinition& type, std::uint32_t line) 
 
 std::vector<Diagnostic> verify_service_definitions(std::span<ServiceDefinition* const> definitions, RobdefMode mode) {
   VerifySet set;
-  for (auto* definition : definitions) set.emplace_back(*definition, mode);
+  for (auto* definition : definitions) {
+    for (auto& entity : definition->entities) entity.qualified_name = definition->name + "." + entity.name;
+    set.emplace_back(*definition, mode);
+  }
   for (auto& scope : set) collect_names(scope);
   for (auto& scope : set) verify_versions(scope);
   for (auto& scope : set) verify_names(scope);

@@ -25,10 +25,17 @@ Words sort_pages(std::span<const std::uint32_t> words) {
   for (const auto word : words) {
     const auto flags = word & ~page_mask;
     switch (word & page_mask) {
-      case page_v2: pages.v2 = flags; break;
-      case page_v4: pages.v4 = flags; break;
-      case page_string_table: pages.string_table = flags; break;
-      default: break;
+      case page_v2:
+        pages.v2 = flags;
+        break;
+      case page_v4:
+        pages.v4 = flags;
+        break;
+      case page_string_table:
+        pages.string_table = flags;
+        break;
+      default:
+        break;
     }
   }
   return pages;

@@ -28,8 +28,8 @@ inline constexpr Features legacy_features{
 
 std::vector<std::uint32_t> format_capabilities(const Features& features);
 
-/// Service side: what is agreed on when a client offers `words`. Unknown pages are ignored, the last word of a page wins.
-/// Errors   protocol_error: a version-2 word without its enable flag.
+/// Service side: what is agreed on when a client offers `words`. Unknown pages are ignored, the last word of a page
+/// wins. Errors   protocol_error: a version-2 word without its enable flag.
 Result<Features> negotiate(std::span<const std::uint32_t> words, const Features& own);
 
 /// Client side: what a service's reply to our offer means.

@@ -1,5 +1,5 @@
-// How a client session comes to be: the combined request, or the older sequence; and how missing definitions are fetched.
-// Layer: session. Source: sessions spec sections 2.3 and 2.4.
+// How a client session comes to be: the combined request, or the older sequence; and how missing definitions are
+// fetched. Layer: session. Source: sessions spec sections 2.3 and 2.4.
 #include <algorithm>
 #include <utility>
 
@@ -54,7 +54,8 @@ void ClientSession::request_special(EntryType type, std::string_view path, Now n
 void ClientSession::add_login() {
   outgoing_.add_text("username", options_.username);
   // Credentials hold what the application gave: a value that cannot be packed is refused by the service's login.
-  if (!pack_varvalue(outgoing_, "credentials", options_.credentials, types_)) outgoing_.add("credentials", DataType::void_t, 0, {});
+  if (!pack_varvalue(outgoing_, "credentials", options_.credentials, types_))
+    outgoing_.add("credentials", DataType::void_t, 0, {});
 }
 
 void ClientSession::request_combined(Now now) {
@@ -102,8 +103,10 @@ void ClientSession::handle_connect_reply(const MessageEntry& entry, EntryType re
       if (auto sent = send_outgoing(now); !sent) return fail(sent.error());
       return add_pending(id, EntryType::client_session_op_req, nullptr, {}, now);
     }
-    case EntryType::client_session_op_req: return become_connected(now);
-    default: return;
+    case EntryType::client_session_op_req:
+      return become_connected(now);
+    default:
+      return;
   }
 }
 
@@ -132,9 +135,9 @@ void ClientSession::advance_fetch(Fetch fetch, Now now) {
     return fail_fetch(fetch, make_error(ErrorCode::service_definition_error,
                                         "the node answered with another definition than " + quoted(*missing)));
   if (fetch.asked.size() > max_fetched_definitions)
-    return fail_fetch(fetch, make_error(ErrorCode::service_definition_error,
-                                        "the definitions import more than " +
-                                            std::to_string(max_fetched_definitions) + " others"));
+    return fail_fetch(
+        fetch, make_error(ErrorCode::service_definition_error,
+                          "the definitions import more than " + std::to_string(max_fetched_definitions) + " others"));
   const auto id = begin_request(EntryType::get_service_desc, options_.service, {});
   outgoing_.add_text("ServiceType", *missing);
   outgoing_.add_text("clientversion", protocol_level);
@@ -159,9 +162,9 @@ void ClientSession::finish_fetch(Fetch fetch, Now now) {
   }
   const auto* type = types_.find_entity(fetch.object_type);
   if (!type || type->kind != EntityKind::object)
-    return fail_fetch(fetch, make_error(ErrorCode::service_error,
-                                        "object " + quoted(fetch.path) + " has the unknown type " +
-                                            quoted(fetch.object_type)));
+    return fail_fetch(
+        fetch, make_error(ErrorCode::service_error,
+                          "object " + quoted(fetch.path) + " has the unknown type " + quoted(fetch.object_type)));
   objects_.insert_or_assign(fetch.path, type);
   emit(Completed{fetch.lookup, Value(fetch.object_type)});
 }

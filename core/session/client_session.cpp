@@ -22,7 +22,9 @@ bool is_reply(EntryType type) {
   return code % 2 == 0 && code > 100 && type != EntryType::pipe_packet_ret && type != EntryType::wire_packet_ret;
 }
 
-Error connection_error(std::string message) { return {ErrorCode::connection_error, std::move(message)}; }
+Error connection_error(std::string message) {
+  return {ErrorCode::connection_error, std::move(message)};
+}
 
 }  // namespace
 
@@ -52,7 +54,9 @@ void ClientSession::handle_transmitted(std::size_t bytes, Now now) {
   if (connection_.queued_bytes() < wire_high_mark) flush_wires(now);
 }
 
-void ClientSession::handle_closed(Error reason, Now) { fail(std::move(reason)); }
+void ClientSession::handle_closed(Error reason, Now) {
+  fail(std::move(reason));
+}
 
 void ClientSession::handle_timeout(Now now) {
   if (state_ == ClientState::closed) return;
@@ -118,8 +122,7 @@ Result<const MemberDefinition*> ClientSession::find_member(std::string_view path
     return connection_error(state_ == ClientState::connecting ? "the session is not connected yet"
                                                               : connection_.close_reason().message);
   const auto* type = object_type(path);
-  if (!type)
-    return make_error(ErrorCode::object_not_found, "object " + quoted(path) + " was not looked up");
+  if (!type) return make_error(ErrorCode::object_not_found, "object " + quoted(path) + " was not looked up");
   const auto* definition = type->find_member(member);
   if (!definition)
     return make_error(ErrorCode::member_not_found, "object type " + type->name + " has no member " + quoted(member));
@@ -184,8 +187,9 @@ RequestId ClientSession::get_property(std::string_view path, std::string_view me
 }
 
 RequestId ClientSession::set_property(std::string_view path, std::string_view member, const Value& value, Now now) {
-  return request(EntryType::property_set_req, MemberKind::property, path, member, now,
-                 [&](const MemberDefinition& definition) { return write_property(outgoing_, value, definition, types_); });
+  return request(
+      EntryType::property_set_req, MemberKind::property, path, member, now,
+      [&](const MemberDefinition& definition) { return write_property(outgoing_, value, definition, types_); });
 }
 
 RequestId ClientSession::call_function(std::string_view path, std::string_view member, std::span<const Value> arguments,
@@ -308,11 +312,16 @@ void ClientSession::handle_entry(const Message& message, const MessageEntry& ent
   if (is_reply(entry.type)) return handle_reply(message, entry, now);
   if (!is_for_session) return;
   switch (entry.type) {
-    case EntryType::event_req: return handle_event(message, entry);
-    case EntryType::wire_packet: return handle_wire_packet(message, entry);
-    case EntryType::wire_closed: return handle_wire_closed(entry);
-    case EntryType::service_path_released_req: return handle_path_released(entry.service_path);
-    case EntryType::service_closed: return fail(connection_error("the service was closed"));
+    case EntryType::event_req:
+      return handle_event(message, entry);
+    case EntryType::wire_packet:
+      return handle_wire_packet(message, entry);
+    case EntryType::wire_closed:
+      return handle_wire_closed(entry);
+    case EntryType::service_path_released_req:
+      return handle_path_released(entry.service_path);
+    case EntryType::service_closed:
+      return fail(connection_error("the service was closed"));
     case EntryType::callback_call_req:
       return answer_error(entry, {ErrorCode::invalid_operation, "Callback function not set"}, now);
     case EntryType::endpoint_check_capability:
@@ -321,7 +330,8 @@ void ClientSession::handle_entry(const Message& message, const MessageEntry& ent
       outgoing_.add_scalar("return", DataType::uint32_t, std::uint32_t{0});
       if (auto sent = send_outgoing(now); !sent) fail(sent.error());
       return;
-    default: return;  // packets of members that are not connected
+    default:
+      return;  // packets of members that are not connected
   }
 }
 
@@ -356,15 +366,18 @@ void ClientSession::handle_reply(const Message& message, const MessageEntry& ent
 Result<Value> ClientSession::read_reply(const Message& message, const MessageEntry& entry,
                                         const Pending& pending) const {
   switch (pending.type) {
-    case EntryType::property_get_req: return read_property(message, entry, *pending.member, types_);
-    case EntryType::function_call_req: return read_return(message, entry, *pending.member, types_);
+    case EntryType::property_get_req:
+      return read_property(message, entry, *pending.member, types_);
+    case EntryType::function_call_req:
+      return read_return(message, entry, *pending.member, types_);
     case EntryType::wire_peek_in_value_req:
     case EntryType::wire_peek_out_value_req: {
       auto read = read_wire_value(message, entry, *pending.member, types_);
       if (!read) return read.error();
       return std::move(read->value);
     }
-    default: return Value{};
+    default:
+      return Value{};
   }
 }
 

@@ -31,7 +31,7 @@ struct ClientOptions {
   std::string object_type = {};  ///< the type to use the root object as; empty: the service's own
   std::chrono::milliseconds request_timeout{15'000};
   std::chrono::milliseconds connect_timeout{30'000};  ///< from construction to the event Connected
-  std::size_t max_events = 65'536;                    ///< not polled; more close the session: nothing is dropped silently
+  std::size_t max_events = 65'536;  ///< not polled; more close the session: nothing is dropped silently
 };
 
 using RequestId = std::uint32_t;
@@ -92,7 +92,7 @@ class ClientSession {
 
   // --- asked ---
 
-  RequestId get_property(std::string_view path, std::string_view member, Now now);         ///< completes with the value
+  RequestId get_property(std::string_view path, std::string_view member, Now now);  ///< completes with the value
   RequestId set_property(std::string_view path, std::string_view member, const Value& value, Now now);  ///< null
   /// Completes with the return value; null for void functions.
   RequestId call_function(std::string_view path, std::string_view member, std::span<const Value> arguments, Now now);
@@ -101,9 +101,9 @@ class ClientSession {
   RequestId find_object(std::string_view path, Now now);
   /// Completes with null; values follow as WireValueReceived. One connection a wire.
   RequestId connect_wire(std::string_view path, std::string_view member, Now now);
-  RequestId disconnect_wire(std::string_view path, std::string_view member, Now now);      ///< completes with null
-  RequestId peek_in_value(std::string_view path, std::string_view member, Now now);        ///< completes with the value
-  RequestId peek_out_value(std::string_view path, std::string_view member, Now now);       ///< completes with the value
+  RequestId disconnect_wire(std::string_view path, std::string_view member, Now now);  ///< completes with null
+  RequestId peek_in_value(std::string_view path, std::string_view member, Now now);    ///< completes with the value
+  RequestId peek_out_value(std::string_view path, std::string_view member, Now now);   ///< completes with the value
   RequestId poke_out_value(std::string_view path, std::string_view member, const Value& value, Now now);  ///< null
   /// Sends OutValue on a connected wire. A value that still waits for a slow stream is replaced by a newer one.
   Result<> send_wire(std::string_view path, std::string_view member, const Value& value, Now now);
@@ -144,7 +144,7 @@ class ClientSession {
     std::set<std::string> names = {};   ///< of `texts`
     std::set<std::string> wanted = {};  ///< imported or asked for
     std::set<std::string> asked = {};
-    RequestId lookup = 0;               ///< the find_object() that waits; 0: the connect sequence
+    RequestId lookup = 0;  ///< the find_object() that waits; 0: the connect sequence
     std::string path = {};
     std::string object_type = {};
 

@@ -14,7 +14,9 @@ constexpr std::string_view create_connection = "CreateConnection";
 constexpr std::string_view get_remote_node_id = "GetRemoteNodeID";
 constexpr std::size_t send_headroom = 100;  // the reference sends at most its receive limit less 100 bytes
 
-bool is_special(EntryType type) { return static_cast<std::uint16_t>(type) < 500; }
+bool is_special(EntryType type) {
+  return static_cast<std::uint16_t>(type) < 500;
+}
 
 /// StreamOp, StreamCheckCapability, ConnectionTest and their replies never reach the session.
 bool is_stream_entry(EntryType type) {
@@ -25,9 +27,9 @@ bool is_stream_entry(EntryType type) {
 /// The capabilities that this version of the stream layer answers with something other than 0.
 std::uint32_t capability_value(std::string_view name) {
   constexpr std::pair<std::string_view, std::uint32_t> values[] = {
-      {"com.robotraconteur.message.v_max", 4}, {"com.robotraconteur.v2", 1},
-      {"com.robotraconteur.v2.0", 1},          {"com.robotraconteur.message.v4", 1},
-      {"com.robotraconteur.message.v4.0", 1},  {"com.robotraconteur.stringtable", 4},
+      {"com.robotraconteur.message.v_max", 4},  {"com.robotraconteur.v2", 1},
+      {"com.robotraconteur.v2.0", 1},           {"com.robotraconteur.message.v4", 1},
+      {"com.robotraconteur.message.v4.0", 1},   {"com.robotraconteur.stringtable", 4},
       {"com.robotraconteur.stringtable.v4", 1}, {"com.robotraconteur.stringtable.v4.0", 1},
   };
   for (const auto& [known, value] : values)
@@ -130,11 +132,20 @@ Result<bool> Connection::handle_stream_entry(Now now) {
   if (!is_stream_entry(entry.type)) return false;
   Result<> done;
   switch (entry.type) {
-    case EntryType::stream_op: done = answer_stream_op(entry, now); break;
-    case EntryType::stream_op_ret: done = handle_stream_op_reply(entry, now); break;
-    case EntryType::stream_check_capability: done = answer_capability(entry, now); break;
-    case EntryType::connection_test: done = answer_heartbeat(entry, now); break;
-    default: break;
+    case EntryType::stream_op:
+      done = answer_stream_op(entry, now);
+      break;
+    case EntryType::stream_op_ret:
+      done = handle_stream_op_reply(entry, now);
+      break;
+    case EntryType::stream_check_capability:
+      done = answer_capability(entry, now);
+      break;
+    case EntryType::connection_test:
+      done = answer_heartbeat(entry, now);
+      break;
+    default:
+      break;
   }
   if (!done) return done.error();
   return true;
@@ -159,8 +170,7 @@ void Connection::begin_stream_reply(const MessageEntry& request) {
 Result<> Connection::answer_stream_op(const MessageEntry& entry, Now now) {
   if (entry.member_name == create_connection) return answer_create_connection(entry, now);
   begin_stream_reply(entry);
-  if (entry.member_name != get_remote_node_id)
-    write_error(reply_, protocol_error("Invalid Stream Operation"));
+  if (entry.member_name != get_remote_node_id) write_error(reply_, protocol_error("Invalid Stream Operation"));
   return send(reply_, now);
 }
 
@@ -278,7 +288,8 @@ Result<> Connection::send(Message& message, Now now, bool is_urgent) {
     header.has_routing = header.has_endpoints = !is_elided;
   }
   if (header.version == 2) header.has_routing = header.has_endpoints = true;
-  const auto limit = is_authorised_ ? options_.max_message_size - send_headroom : options_.max_unauthorised_message_size;
+  const auto limit =
+      is_authorised_ ? options_.max_message_size - send_headroom : options_.max_unauthorised_message_size;
   if (auto queued = queue_.push(message, {.string_table = agreed_.string_table, .max_message_size = limit}, is_urgent);
       !queued)
     return queued;
@@ -310,10 +321,9 @@ Result<> Connection::handle_timeout(Now now) {
   if (state_ == ConnectionState::closed) return close_reason_;
   if (state_ == ConnectionState::handshaking) {
     if (now.steady - opened_ >= options_.handshake_timeout)
-      return closed_by(make_error(ErrorCode::connection_error,
-                                  role_ == ConnectionRole::client
-                                      ? "the node did not answer CreateConnection in time"
-                                      : "the client sent no message in time"));
+      return closed_by(make_error(ErrorCode::connection_error, role_ == ConnectionRole::client
+                                                                   ? "the node did not answer CreateConnection in time"
+                                                                   : "the client sent no message in time"));
     return {};
   }
   if (heartbeat_sent_) {

@@ -53,8 +53,8 @@ struct ConnectionStats {
   std::uint64_t bytes_sent = 0;
 };
 
-/// The stream layer of a connection, for both roles. Its owner feeds bytes with receive(), looks at message() after each
-/// call, and sends with send().
+/// The stream layer of a connection, for both roles. Its owner feeds bytes with receive(), looks at message() after
+/// each call, and sends with send().
 class Connection {
  public:
   Connection(ConnectionRole role, ConnectionOptions options, Now now);

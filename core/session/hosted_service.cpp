@@ -102,8 +102,8 @@ Result<HostedService::Found> HostedService::find_object(std::string_view path) {
     found.object = std::move(*child);
     found.type = types_->find_entity(found.object->type_name());
     if (!found.type || found.type->kind != EntityKind::object)
-      return make_error(ErrorCode::internal_error, "object " + quoted(prefix) + " has the unknown type " +
-                                                       quoted(found.object->type_name()));
+      return make_error(ErrorCode::internal_error,
+                        "object " + quoted(prefix) + " has the unknown type " + quoted(found.object->type_name()));
     if (objects_.size() < max_cached_objects) objects_.emplace(prefix, found);
   }
   return found;

@@ -33,7 +33,8 @@ class ServiceIndexObject : public ServiceObject {
     static const std::string name = "RobotRaconteurServiceIndex.ServiceIndex";
     return name;
   }
-  Result<std::shared_ptr<ServiceObject>> find_child(const MemberDefinition&, const std::optional<std::string>&) override {
+  Result<std::shared_ptr<ServiceObject>> find_child(const MemberDefinition&,
+                                                    const std::optional<std::string>&) override {
     return make_error(ErrorCode::object_not_found, "the service index has no other objects");
   }
 };

@@ -4,7 +4,9 @@ namespace rr {
 
 namespace {
 
-bool is_alnum(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9'); }
+bool is_alnum(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+}
 
 int hex_value(char digit) {
   if (digit >= '0' && digit <= '9') return digit - '0';
@@ -38,7 +40,8 @@ std::optional<std::string> decode_index(std::string_view text) {
     if (c != '%') return std::nullopt;
     // 1.2.8 writes a byte above 0x7f sign-extended, "%ffffffc3"; 0xff itself never occurs in UTF-8.
     const auto rest = text.substr(i + 1);
-    const bool is_sign_extended = rest.substr(0, 6) == "ffffff" && hex_byte(rest.substr(6 > rest.size() ? rest.size() : 6)) >= 0x80;
+    const bool is_sign_extended =
+        rest.substr(0, 6) == "ffffff" && hex_byte(rest.substr(6 > rest.size() ? rest.size() : 6)) >= 0x80;
     const int byte = is_sign_extended ? hex_byte(rest.substr(6)) : hex_byte(rest);
     if (byte < 0) return std::nullopt;
     out += static_cast<char>(byte);

@@ -17,7 +17,9 @@ constexpr std::chrono::milliseconds linger{100};
 /// Above this many bytes waiting for the stream, wire values are replaced instead of queued.
 constexpr std::size_t wire_high_mark = 64 * 1024;
 
-bool is_request(EntryType type) { return static_cast<std::uint16_t>(type) % 2 == 1; }
+bool is_request(EntryType type) {
+  return static_cast<std::uint16_t>(type) % 2 == 1;
+}
 
 /// Odd entry types that are packets or notices: nothing ever answers them.
 bool is_packet(EntryType type) {
@@ -78,8 +80,8 @@ void ServiceSession::handle_timeout(Now now) {
   const bool is_late = service_ ? now.steady - last_session_message_ >= options_.endpoint_timeout
                                 : now.steady - opened_ >= options_.connect_timeout;
   if (!is_late) return;
-  const Error reason{ErrorCode::connection_error, service_ ? "the client sent nothing for too long"
-                                                           : "the client connected to no service in time"};
+  const Error reason{ErrorCode::connection_error,
+                     service_ ? "the client sent nothing for too long" : "the client connected to no service in time"};
   connection_.close(reason);
   leave(reason, now);
 }
@@ -87,8 +89,8 @@ void ServiceSession::handle_timeout(Now now) {
 TimePoint ServiceSession::poll_timeout() const {
   if (wants_close()) return TimePoint::max();
   if (closing_deadline_) return *closing_deadline_;
-  return std::min(connection_.poll_timeout(), service_ ? last_session_message_ + options_.endpoint_timeout
-                                                       : opened_ + options_.connect_timeout);
+  return std::min(connection_.poll_timeout(),
+                  service_ ? last_session_message_ + options_.endpoint_timeout : opened_ + options_.connect_timeout);
 }
 
 std::optional<ServiceEvent> ServiceSession::poll_event() {
@@ -128,13 +130,18 @@ void ServiceSession::reply(CallId id, const Result<Value>& result, Now now) {
     written = result.error();
   } else {
     switch (call.type) {
-      case EntryType::property_get_req: written = write_property(outgoing_, *result, *call.member, types); break;
-      case EntryType::function_call_req: written = write_return(outgoing_, *result, *call.member, types); break;
+      case EntryType::property_get_req:
+        written = write_property(outgoing_, *result, *call.member, types);
+        break;
+      case EntryType::function_call_req:
+        written = write_return(outgoing_, *result, *call.member, types);
+        break;
       case EntryType::wire_peek_in_value_req:
       case EntryType::wire_peek_out_value_req:
         written = write_wire_value(outgoing_, *result, now.utc, *call.member, types);
         break;
-      default: break;  // property set, poke: the reply has no elements
+      default:
+        break;  // property set, poke: the reply has no elements
     }
   }
   if (!written) {
@@ -205,8 +212,10 @@ bool ServiceSession::has_wire(std::string_view path, std::string_view member) co
 }
 
 void ServiceSession::send_outgoing(Now now) {
-  if (auto sent = connection_.send(outgoing_, now); sent) return;
-  else if (connection_.state() == ConnectionState::closed) leave(sent.error(), now);
+  if (auto sent = connection_.send(outgoing_, now); sent)
+    return;
+  else if (connection_.state() == ConnectionState::closed)
+    leave(sent.error(), now);
   else if (!outgoing_.entries.empty() && outgoing_.entries.front().error == ErrorCode::none &&
            outgoing_.entries.front().request_id != 0) {
     // A reply that cannot be sent (above the size limit) becomes an error, so that the client does not wait in vain.
@@ -225,8 +234,8 @@ void ServiceSession::send_outgoing(Now now) {
 void ServiceSession::handle_message(const Message& message, Now now) {
   const auto& first = message.entries.front();
   const bool is_special = static_cast<std::uint16_t>(first.type) < 500;
-  const bool is_session_lookup = first.type == EntryType::object_type_name && message.entries.size() == 1 &&
-                                 message.header.receiver_endpoint != 0;
+  const bool is_session_lookup =
+      first.type == EntryType::object_type_name && message.entries.size() == 1 && message.header.receiver_endpoint != 0;
   if (is_special && !is_session_lookup) {
     if (is_request(first.type)) handle_special(message, now);
     return;
@@ -268,7 +277,8 @@ void ServiceSession::handle_entry(const Message& message, const MessageEntry& en
 /// Requests to the session itself; the reply is begun.
 Result<> ServiceSession::answer_session_request(const Message& message, const MessageEntry& entry) {
   switch (entry.type) {
-    case EntryType::client_keep_alive_req: return {};
+    case EntryType::client_keep_alive_req:
+      return {};
     case EntryType::endpoint_check_capability:
     case EntryType::service_check_capability_req:
       outgoing_.add_scalar("return", DataType::uint32_t, std::uint32_t{0});
@@ -286,7 +296,9 @@ Result<> ServiceSession::answer_session_request(const Message& message, const Me
           entry.member_name == "MonitorExit")
         return make_error(ErrorCode::invalid_argument, "Object is not monitor lockable");
       return protocol_error("Invalid ClientSessionOp command");
-    default: (void)message; return protocol_error("Unknown request type");
+    default:
+      (void)message;
+      return protocol_error("Unknown request type");
   }
 }
 
@@ -301,18 +313,25 @@ Result<> ServiceSession::dispatch_member(const Message& message, const MessageEn
                           quoted(entry.member_name));
   if (auto allowed = check_direction(entry.type, *member); !allowed) return allowed;
   switch (entry.type) {
-    case EntryType::property_get_req: return add_call(message, entry, CallKind::property_get, std::move(*found), *member);
-    case EntryType::property_set_req: return add_call(message, entry, CallKind::property_set, std::move(*found), *member);
+    case EntryType::property_get_req:
+      return add_call(message, entry, CallKind::property_get, std::move(*found), *member);
+    case EntryType::property_set_req:
+      return add_call(message, entry, CallKind::property_set, std::move(*found), *member);
     case EntryType::function_call_req:
       if (service_->name() == service_index_name) return answer_service_index(entry, *member, now);
       if (member->is_generator()) return not_available_yet(*member);
       return add_call(message, entry, CallKind::function, std::move(*found), *member);
-    case EntryType::wire_peek_in_value_req: return add_call(message, entry, CallKind::peek_in, std::move(*found), *member);
-    case EntryType::wire_peek_out_value_req: return add_call(message, entry, CallKind::peek_out, std::move(*found), *member);
-    case EntryType::wire_poke_out_value_req: return add_call(message, entry, CallKind::poke_out, std::move(*found), *member);
+    case EntryType::wire_peek_in_value_req:
+      return add_call(message, entry, CallKind::peek_in, std::move(*found), *member);
+    case EntryType::wire_peek_out_value_req:
+      return add_call(message, entry, CallKind::peek_out, std::move(*found), *member);
+    case EntryType::wire_poke_out_value_req:
+      return add_call(message, entry, CallKind::poke_out, std::move(*found), *member);
     case EntryType::wire_connect_req:
-    case EntryType::wire_disconnect_req: return answer_wire(entry, *found, *member, now);
-    default: return not_available_yet(*member);
+    case EntryType::wire_disconnect_req:
+      return answer_wire(entry, *found, *member, now);
+    default:
+      return not_available_yet(*member);
   }
 }
 

@@ -11,7 +11,9 @@ namespace rr {
 
 namespace {
 
-Error service_not_found() { return {ErrorCode::service_not_found, "Service not found"}; }
+Error service_not_found() {
+  return {ErrorCode::service_not_found, "Service not found"};
+}
 
 const MessageElement* find_text(const Message& message, const MessageEntry& entry, std::string_view name) {
   const auto* element = message.elements_of(entry).find(name);
@@ -71,10 +73,9 @@ void add_text_list(Message& message, std::string_view name, const std::vector<st
 void ServiceSession::handle_special(const Message& message, Now now) {
   const auto& header = message.header;
   const auto& self = directory_.identity();
-  const bool is_for_us =
-      header.receiver_node_id == self.id ||
-      (header.receiver_node_id.is_any() &&
-       (header.receiver_node_name.empty() || header.receiver_node_name == self.name));
+  const bool is_for_us = header.receiver_node_id == self.id ||
+                         (header.receiver_node_id.is_any() &&
+                          (header.receiver_node_name.empty() || header.receiver_node_name == self.name));
   outgoing_.clear();
   outgoing_.header.receiver_node_id = header.sender_node_id;
   outgoing_.header.receiver_node_name = header.sender_node_name;
@@ -98,12 +99,18 @@ void ServiceSession::handle_special(const Message& message, Now now) {
 
 Result<> ServiceSession::answer_special(const Message& message, const MessageEntry& entry, Now now) {
   switch (entry.type) {
-    case EntryType::get_service_desc: return write_service_desc(message, entry);
-    case EntryType::object_type_name: return write_root_type(message, entry);
-    case EntryType::connect_client: return connect(entry, message.header, now);
-    case EntryType::connect_client_combined: return write_combined(message, entry, now);
-    case EntryType::disconnect_client: return disconnect(message, entry, now);
-    case EntryType::get_node_info: return {};  // the header says it all
+    case EntryType::get_service_desc:
+      return write_service_desc(message, entry);
+    case EntryType::object_type_name:
+      return write_root_type(message, entry);
+    case EntryType::connect_client:
+      return connect(entry, message.header, now);
+    case EntryType::connect_client_combined:
+      return write_combined(message, entry, now);
+    case EntryType::disconnect_client:
+      return disconnect(message, entry, now);
+    case EntryType::get_node_info:
+      return {};  // the header says it all
     case EntryType::node_check_capability:
       outgoing_.add_scalar("return", DataType::uint32_t, std::uint32_t{0});
       return {};
@@ -112,7 +119,8 @@ Result<> ServiceSession::answer_special(const Message& message, const MessageEnt
       if (!service) return make_error(ErrorCode::service_error, "Service not found");
       return pack_varvalue(outgoing_, "return", service->attributes(), service->types());
     }
-    default: return protocol_error("Invalid Special Operation");
+    default:
+      return protocol_error("Invalid Special Operation");
   }
 }
 

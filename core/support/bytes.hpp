@@ -29,8 +29,7 @@ inline std::string_view as_text(ByteSpan bytes) {
 
 /// Reads one little-endian number; `from` need not be aligned but must hold sizeof(T) bytes.
 template <class T>
-  requires std::is_trivially_copyable_v<T>
-T load(const std::uint8_t* from) {
+requires std::is_trivially_copyable_v<T> T load(const std::uint8_t* from) {
   T value;
   std::memcpy(&value, from, sizeof(T));
   return value;

@@ -10,54 +10,102 @@ namespace rr {
 
 std::string_view error_code_name(ErrorCode code) {
   switch (code) {
-    case ErrorCode::none: return "None";
-    case ErrorCode::connection_error: return "ConnectionError";
-    case ErrorCode::protocol_error: return "ProtocolError";
-    case ErrorCode::service_not_found: return "ServiceNotFound";
-    case ErrorCode::object_not_found: return "ObjectNotFound";
-    case ErrorCode::invalid_endpoint: return "InvalidEndpoint";
-    case ErrorCode::endpoint_communication_fatal_error: return "EndpointCommunicationFatalError";
-    case ErrorCode::node_not_found: return "NodeNotFound";
-    case ErrorCode::service_error: return "ServiceError";
-    case ErrorCode::member_not_found: return "MemberNotFound";
-    case ErrorCode::member_format_mismatch: return "MemberFormatMismatch";
-    case ErrorCode::data_type_mismatch: return "DataTypeMismatch";
-    case ErrorCode::data_type_error: return "DataTypeError";
-    case ErrorCode::data_serialization_error: return "DataSerializationError";
-    case ErrorCode::message_entry_not_found: return "MessageEntryNotFound";
-    case ErrorCode::message_element_not_found: return "MessageElementNotFound";
-    case ErrorCode::unknown_error: return "UnknownError";
-    case ErrorCode::invalid_operation: return "InvalidOperation";
-    case ErrorCode::invalid_argument: return "InvalidArgument";
-    case ErrorCode::operation_failed: return "OperationFailed";
-    case ErrorCode::null_value: return "NullValue";
-    case ErrorCode::internal_error: return "InternalError";
-    case ErrorCode::system_resource_permission_denied: return "SystemResourcePermissionDenied";
-    case ErrorCode::out_of_system_resource: return "OutOfSystemResource";
-    case ErrorCode::system_resource_error: return "SystemResourceError";
-    case ErrorCode::resource_not_found: return "ResourceNotFound";
-    case ErrorCode::io_error: return "IOError";
-    case ErrorCode::buffer_limit_violation: return "BufferLimitViolation";
-    case ErrorCode::service_definition_error: return "ServiceDefinitionError";
-    case ErrorCode::out_of_range: return "OutOfRange";
-    case ErrorCode::key_not_found: return "KeyNotFound";
-    case ErrorCode::invalid_configuration: return "InvalidConfiguration";
-    case ErrorCode::invalid_state: return "InvalidState";
-    case ErrorCode::remote_error: return "RemoteError";
-    case ErrorCode::request_timeout: return "RequestTimeout";
-    case ErrorCode::read_only_member: return "ReadOnlyMember";
-    case ErrorCode::write_only_member: return "WriteOnlyMember";
-    case ErrorCode::not_implemented_error: return "NotImplementedError";
-    case ErrorCode::member_busy: return "MemberBusy";
-    case ErrorCode::value_not_set: return "ValueNotSet";
-    case ErrorCode::abort_operation: return "AbortOperation";
-    case ErrorCode::operation_aborted: return "OperationAborted";
-    case ErrorCode::stop_iteration: return "StopIteration";
-    case ErrorCode::operation_timeout: return "OperationTimeout";
-    case ErrorCode::operation_cancelled: return "OperationCancelled";
-    case ErrorCode::authentication_error: return "AuthenticationError";
-    case ErrorCode::object_locked_error: return "ObjectLockedError";
-    case ErrorCode::permission_denied: return "PermissionDenied";
+    case ErrorCode::none:
+      return "None";
+    case ErrorCode::connection_error:
+      return "ConnectionError";
+    case ErrorCode::protocol_error:
+      return "ProtocolError";
+    case ErrorCode::service_not_found:
+      return "ServiceNotFound";
+    case ErrorCode::object_not_found:
+      return "ObjectNotFound";
+    case ErrorCode::invalid_endpoint:
+      return "InvalidEndpoint";
+    case ErrorCode::endpoint_communication_fatal_error:
+      return "EndpointCommunicationFatalError";
+    case ErrorCode::node_not_found:
+      return "NodeNotFound";
+    case ErrorCode::service_error:
+      return "ServiceError";
+    case ErrorCode::member_not_found:
+      return "MemberNotFound";
+    case ErrorCode::member_format_mismatch:
+      return "MemberFormatMismatch";
+    case ErrorCode::data_type_mismatch:
+      return "DataTypeMismatch";
+    case ErrorCode::data_type_error:
+      return "DataTypeError";
+    case ErrorCode::data_serialization_error:
+      return "DataSerializationError";
+    case ErrorCode::message_entry_not_found:
+      return "MessageEntryNotFound";
+    case ErrorCode::message_element_not_found:
+      return "MessageElementNotFound";
+    case ErrorCode::unknown_error:
+      return "UnknownError";
+    case ErrorCode::invalid_operation:
+      return "InvalidOperation";
+    case ErrorCode::invalid_argument:
+      return "InvalidArgument";
+    case ErrorCode::operation_failed:
+      return "OperationFailed";
+    case ErrorCode::null_value:
+      return "NullValue";
+    case ErrorCode::internal_error:
+      return "InternalError";
+    case ErrorCode::system_resource_permission_denied:
+      return "SystemResourcePermissionDenied";
+    case ErrorCode::out_of_system_resource:
+      return "OutOfSystemResource";
+    case ErrorCode::system_resource_error:
+      return "SystemResourceError";
+    case ErrorCode::resource_not_found:
+      return "ResourceNotFound";
+    case ErrorCode::io_error:
+      return "IOError";
+    case ErrorCode::buffer_limit_violation:
+      return "BufferLimitViolation";
+    case ErrorCode::service_definition_error:
+      return "ServiceDefinitionError";
+    case ErrorCode::out_of_range:
+      return "OutOfRange";
+    case ErrorCode::key_not_found:
+      return "KeyNotFound";
+    case ErrorCode::invalid_configuration:
+      return "InvalidConfiguration";
+    case ErrorCode::invalid_state:
+      return "InvalidState";
+    case ErrorCode::remote_error:
+      return "RemoteError";
+    case ErrorCode::request_timeout:
+      return "RequestTimeout";
+    case ErrorCode::read_only_member:
+      return "ReadOnlyMember";
+    case ErrorCode::write_only_member:
+      return "WriteOnlyMember";
+    case ErrorCode::not_implemented_error:
+      return "NotImplementedError";
+    case ErrorCode::member_busy:
+      return "MemberBusy";
+    case ErrorCode::value_not_set:
+      return "ValueNotSet";
+    case ErrorCode::abort_operation:
+      return "AbortOperation";
+    case ErrorCode::operation_aborted:
+      return "OperationAborted";
+    case ErrorCode::stop_iteration:
+      return "StopIteration";
+    case ErrorCode::operation_timeout:
+      return "OperationTimeout";
+    case ErrorCode::operation_cancelled:
+      return "OperationCancelled";
+    case ErrorCode::authentication_error:
+      return "AuthenticationError";
+    case ErrorCode::object_locked_error:
+      return "ObjectLockedError";
+    case ErrorCode::permission_denied:
+      return "PermissionDenied";
   }
   return {};
 }

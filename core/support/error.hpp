@@ -91,7 +91,11 @@ using Result = boost::system::result<T, Error>;
 /// Untrusted text for a message: quoted, control characters escaped, cut after `limit` bytes.
 std::string quoted(std::string_view text, std::size_t limit = 60);
 
-inline Error make_error(ErrorCode code, std::string message) { return Error{code, std::move(message)}; }
-inline Error protocol_error(std::string message) { return {ErrorCode::protocol_error, std::move(message)}; }
+inline Error make_error(ErrorCode code, std::string message) {
+  return Error{code, std::move(message)};
+}
+inline Error protocol_error(std::string message) {
+  return {ErrorCode::protocol_error, std::move(message)};
+}
 
 }  // namespace rr

@@ -5,7 +5,8 @@
 namespace rr {
 
 std::uint32_t random_u32() {
-  // Opened once: on Linux every std::random_device opens its source anew. It is stateless, so sharing it shares nothing.
+  // Opened once: on Linux every std::random_device opens its source anew. It is stateless, so sharing it shares
+  // nothing.
   thread_local std::random_device source;
   return source();
 }

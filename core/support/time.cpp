@@ -10,6 +10,8 @@ TimeSpec TimeSpec::normalized() const {
   return out;
 }
 
-TimeSpec TimeSpec::plus_one_nanosecond() const { return TimeSpec{seconds, nanoseconds + 1}.normalized(); }
+TimeSpec TimeSpec::plus_one_nanosecond() const {
+  return TimeSpec{seconds, nanoseconds + 1}.normalized();
+}
 
 }  // namespace rr

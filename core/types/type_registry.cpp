@@ -101,7 +101,7 @@ Result<> TypeRegistry::add(const std::vector<std::string>& texts, RobdefMode mod
 
   for (auto& definition : ImportOrder(added).take()) {
     services_.emplace(definition->name, definition.get());
-    for (const auto& entity : definition->entities) entities_.emplace(definition->name + "." + entity.name, &entity);
+    for (const auto& entity : definition->entities) entities_.emplace(entity.qualified_name, &entity);
     for (const auto& enumeration : definition->enums)
       enums_.emplace(definition->name + "." + enumeration.name, &enumeration);
     definitions_.push_back(std::move(definition));

@@ -41,14 +41,19 @@ struct IsVector<std::vector<T>> : std::true_type {
 template <class T>
 constexpr HandlerType handler_type() {
   using Plain = std::remove_cvref_t<T>;
-  if constexpr (std::is_void_v<Plain>) return {};
-  else if constexpr (Number<Plain>) return {data_type_of<Plain>(), false};
-  else if constexpr (std::is_enum_v<Plain>) return {DataType::int32_t, false};
+  if constexpr (std::is_void_v<Plain>)
+    return {};
+  else if constexpr (Number<Plain>)
+    return {data_type_of<Plain>(), false};
+  else if constexpr (std::is_enum_v<Plain>)
+    return {DataType::int32_t, false};
   else if constexpr (std::is_same_v<Plain, std::string> || std::is_same_v<Plain, std::string_view> ||
                      std::is_same_v<Plain, const char*>)
     return {DataType::string_t, false};
-  else if constexpr (IsVector<Plain>::value) return {data_type_of<typename IsVector<Plain>::Item>(), true};
-  else return {DataType::varvalue_t, false};
+  else if constexpr (IsVector<Plain>::value)
+    return {data_type_of<typename IsVector<Plain>::Item>(), true};
+  else
+    return {DataType::varvalue_t, false};
 }
 
 template <class T>
@@ -81,8 +86,10 @@ Result<Value> invoke(F& function, std::span<const Value> arguments, std::index_s
 template <class T>
 Value to_value(T&& value) {
   using Plain = std::remove_cvref_t<T>;
-  if constexpr (std::is_enum_v<Plain>) return Value(static_cast<std::int32_t>(value));
-  else return Value(std::forward<T>(value));
+  if constexpr (std::is_enum_v<Plain>)
+    return Value(static_cast<std::int32_t>(value));
+  else
+    return Value(std::forward<T>(value));
 }
 
 namespace detail {

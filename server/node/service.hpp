@@ -8,10 +8,10 @@
 //   node.listen("rr+tcp://0.0.0.0:52222");
 //   node.run();
 //
-// Handlers take and return C++ numbers, bool, std::string, std::vector of numbers, or rr::Value for anything else (Value
-// accepts all of them). They run on the node's thread and may throw rr::ServiceException to send an error to the client.
-// Node::add() checks every handler against the definition: a missing member, a wrong parameter type or count is a
-// std::invalid_argument that names it, before anything listens.
+// Handlers take and return C++ numbers, bool, std::string, std::vector of numbers, or rr::Value for anything else
+// (Value accepts all of them). They run on the node's thread and may throw rr::ServiceException to send an error to the
+// client. Node::add() checks every handler against the definition: a missing member, a wrong parameter type or count is
+// a std::invalid_argument that names it, before anything listens.
 #pragma once
 
 #include <functional>

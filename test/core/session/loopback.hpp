@@ -1,0 +1,153 @@
+// A client and a service session joined in memory: every byte, no socket, time by hand.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "core/session/client_session.hpp"
+#include "core/session/service_session.hpp"
+
+namespace rr::test {
+
+inline constexpr NodeId client_id{{0xaa, 0xaa, 0xaa, 0xaa, 1}};
+inline constexpr NodeId service_id{{0x11, 0x11, 0x11, 0x11, 2}};
+
+inline const std::string definition = R"(service experimental.loopback
+stdver 0.10
+
+exception ArmJammed
+
+struct Pose
+  field double x
+  field double[] joints
+end
+
+object Tool
+  property string name
+end
+
+object Arm
+  property double speed
+  property int32 serial [readonly]
+  property int32 secret [writeonly]
+  property Pose pose
+  function double add(double a, double b)
+  function void stop()
+  function void jam()
+  function int32{generator} count()
+  event bumped(int32 side, string what)
+  objref Tool tool
+  objref Tool{string} tools
+  objref Tool[] slots
+  objref varobject anything
+  wire double torque
+  wire Pose state [readonly]
+  pipe double samples
+end
+)";
+
+/// An object without behaviour: the tests answer the calls.
+class PlainObject : public ServiceObject {
+ public:
+  explicit PlainObject(std::string type) : type_(std::move(type)) {}
+  const std::string& type_name() const override { return type_; }
+  Result<std::shared_ptr<ServiceObject>> find_child(const MemberDefinition& objref,
+                                                    const std::optional<std::string>& index) override {
+    asked.push_back(objref.name + (index ? "[" + *index + "]" : ""));
+    if (index == "none") return std::shared_ptr<ServiceObject>();
+    return std::shared_ptr<ServiceObject>(std::make_shared<PlainObject>("experimental.loopback.Tool"));
+  }
+  std::vector<std::string> asked;
+
+ private:
+  std::string type_;
+};
+
+/// One client, one service `arm`, one connection.
+class Loopback {
+ public:
+  explicit Loopback(Features client_features = {}, Features service_features = {}) {
+    auto types = std::make_shared<TypeRegistry>();
+    types->add({definition}, RobdefMode::strict).value();
+    MapString attributes;
+    attributes.items.emplace_back("location", Value("bench"));
+    directory.add(HostedService::make("arm", root, types, attributes).value()).value();
+    ClientOptions options;
+    options.connection.self = {client_id, "test.client"};
+    options.connection.features = client_features;
+    options.service = "arm";
+    client = std::make_unique<ClientSession>(options, now);
+    ServiceSessionOptions service_options;
+    service_options.connection.features = service_features;
+    service_options.base_url = "rr+tcp://127.0.0.1:1/";
+    service = std::make_unique<ServiceSession>(directory, service_options, now);
+  }
+
+  /// Carries bytes both ways until neither side has any, `step` bytes at a time.
+  void pump(std::size_t step = 1u << 20) {
+    while (carry(*client, *service, step) || carry(*service, *client, step)) {
+    }
+  }
+  void advance(std::chrono::milliseconds time) {
+    now.steady += time;
+    now.utc =
+        TimeSpec{now.utc.seconds, now.utc.nanoseconds + static_cast<std::int32_t>(time.count() % 1000) * 1'000'000}
+            .normalized();
+    now.utc.seconds += time.count() / 1000;
+  }
+  void connect() {
+    pump();
+    next_client<Connected>();
+    next_service<ClientConnected>();
+  }
+
+  template <class Event>
+  Event next_client() {
+    return take<Event>(client->poll_event());
+  }
+  template <class Event>
+  Event next_service() {
+    return take<Event>(service->poll_event());
+  }
+  /// The completion of a request, after pumping.
+  Result<Value> completion(RequestId id) {
+    pump();
+    auto done = next_client<Completed>();
+    if (done.id != id) throw std::runtime_error("completed another request");
+    return done.result;
+  }
+
+  template <class From, class To>
+  bool carry(From& from, To& to, std::size_t step) {
+    Bytes bytes;
+    for (const auto slice : from.poll_transmit()) bytes.insert(bytes.end(), slice.begin(), slice.end());
+    if (bytes.empty()) return false;
+    from.handle_transmitted(bytes.size(), now);
+    for (std::size_t at = 0; at < bytes.size(); at += step)
+      to.handle_bytes(ByteSpan(bytes).subspan(at, std::min(step, bytes.size() - at)), now);
+    return true;
+  }
+
+  Now now{TimePoint{} + std::chrono::hours(1), {1'700'000'000, 0}};
+  std::shared_ptr<PlainObject> root = std::make_shared<PlainObject>("experimental.loopback.Arm");
+  ServiceDirectory directory{{service_id, "test.service"}};
+  std::unique_ptr<ClientSession> client;
+  std::unique_ptr<ServiceSession> service;
+
+ private:
+  template <class Event, class Any>
+  Event take(std::optional<Any> event) {
+    if (!event) throw std::runtime_error("no event");
+    if (!std::holds_alternative<Event>(*event)) {
+      if constexpr (std::is_same_v<Any, ClientEvent>)
+        if (const auto* closed = std::get_if<SessionClosed>(&*event))
+          throw std::runtime_error("closed: " + closed->reason.message);
+      throw std::runtime_error("another event: index " + std::to_string(event->index()));
+    }
+    return std::get<Event>(std::move(*event));
+  }
+};
+
+}  // namespace rr::test

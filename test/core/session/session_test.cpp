@@ -1,0 +1,446 @@
+// Client and service sessions against each other: what a request becomes on the other side, and its answer back.
+#include <catch2/catch.hpp>
+
+#include "test/core/session/loopback.hpp"
+#include "test/support/print.hpp"
+
+using namespace rr;
+using namespace rr::test;
+
+namespace {
+
+const Features v2_only = [] {
+  Features features;
+  features.v4 = false;
+  return features;
+}();
+const Features v4_plain = [] {
+  Features features;
+  features.string_table = {.local = false, .standard = false};
+  return features;
+}();
+const Features no_combined = [] {
+  Features features;
+  features.combined_v2 = features.combined_v4 = false;
+  return features;
+}();
+
+Value pose(double x) {
+  return Structure{"experimental.loopback.Pose", {{"x", Value(x)}, {"joints", Value(std::vector<double>{1, 2, 3})}}};
+}
+
+}  // namespace
+
+TEST_CASE("a session is set up in every combination of features, fed byte by byte") {
+  const Features each[] = {{}, v4_plain, v2_only, no_combined};
+  for (const auto& own : each)
+    for (const auto& theirs : each) {
+      Loopback pair(own, theirs);
+      pair.pump(1);
+      REQUIRE(pair.next_client<Connected>().object_type == "experimental.loopback.Arm");
+      REQUIRE(pair.next_service<ClientConnected>().service->name() == "arm");
+      CHECK(pair.client->connection().features() == pair.service->connection().features());
+      CHECK(pair.client->connection().features().v4 == (own.v4 && theirs.v4));
+      CHECK(pair.client->connection().peer() == NodeIdentity{service_id, "test.service"});
+      CHECK(pair.client->attributes().find("location")->to_text().value() == "bench");
+      REQUIRE(pair.client->object_type("arm") != nullptr);
+    }
+}
+
+TEST_CASE("an unknown service is refused with its name") {
+  Loopback pair;
+  ClientOptions options;
+  options.connection.self = {client_id, ""};
+  options.service = "leg";
+  pair.client = std::make_unique<ClientSession>(options, pair.now);
+  pair.pump();
+  const auto closed = pair.next_client<SessionClosed>();
+  CHECK(closed.reason.code == ErrorCode::service_not_found);
+  CHECK(closed.reason.message == "connect to 'leg': Service not found");
+  CHECK(pair.client->wants_close());
+}
+
+TEST_CASE("the wrong node is refused by the service") {
+  Loopback pair;
+  ClientOptions options;
+  options.connection.self = {client_id, ""};
+  options.connection.target = {NodeId{{9}}, ""};
+  options.service = "arm";
+  pair.client = std::make_unique<ClientSession>(options, pair.now);
+  pair.pump();
+  CHECK(pair.next_client<SessionClosed>().reason.code == ErrorCode::node_not_found);
+}
+
+TEST_CASE("properties are read and written, directions hold on both sides") {
+  Loopback pair;
+  pair.connect();
+  auto id = pair.client->set_property("arm", "speed", Value(2.5), pair.now);
+  pair.pump();
+  auto called = pair.next_service<Called>();
+  CHECK(called.kind == CallKind::property_set);
+  CHECK(called.member->name == "speed");
+  CHECK(called.object == pair.root);
+  CHECK(called.arguments == std::vector<Value>{Value(2.5)});
+  pair.service->reply(called.id, Value{}, pair.now);
+  CHECK(pair.completion(id).value().is_null());
+
+  id = pair.client->get_property("arm", "pose", pair.now);
+  pair.pump();
+  called = pair.next_service<Called>();
+  CHECK(called.kind == CallKind::property_get);
+  pair.service->reply(called.id, pose(4), pair.now);
+  CHECK(pair.completion(id).value() == pose(4));
+
+  CHECK(pair.completion(pair.client->set_property("arm", "serial", Value(1), pair.now)).error().code ==
+        ErrorCode::read_only_member);
+  CHECK(pair.completion(pair.client->get_property("arm", "secret", pair.now)).error().code ==
+        ErrorCode::write_only_member);
+  CHECK(pair.completion(pair.client->get_property("arm", "nothing", pair.now)).error().code ==
+        ErrorCode::member_not_found);
+  CHECK(pair.completion(pair.client->get_property("arm", "add", pair.now)).error().code == ErrorCode::member_not_found);
+}
+
+TEST_CASE("functions take arguments and return values or errors") {
+  Loopback pair;
+  pair.connect();
+  const std::vector<Value> arguments{Value(2.0), Value(3.0)};
+  auto id = pair.client->call_function("arm", "add", arguments, pair.now);
+  pair.pump();
+  auto called = pair.next_service<Called>();
+  CHECK(called.arguments == arguments);
+  pair.service->reply(called.id, Value(5.0), pair.now);
+  CHECK(pair.completion(id).value() == Value(5.0));
+
+  id = pair.client->call_function("arm", "jam", {}, pair.now);
+  pair.pump();
+  called = pair.next_service<Called>();
+  Error jammed{ErrorCode::remote_error, "joint 3", "experimental.loopback.ArmJammed", "elbow"};
+  jammed.param = std::make_shared<const Value>(Array::take(std::vector<std::int32_t>{3}));
+  pair.service->reply(called.id, jammed, pair.now);
+  const auto failed = pair.completion(id).error();
+  CHECK(failed.code == ErrorCode::remote_error);
+  CHECK(failed.qualified_name() == "experimental.loopback.ArmJammed");
+  CHECK(failed.message == "joint 3");
+  CHECK(failed.sub_name == "elbow");
+  REQUIRE(failed.param);
+  CHECK(failed.param->to<std::int32_t>().value() == 3);
+
+  SECTION("a handler's value that does not fit the definition is the caller's error, not silence") {
+    id = pair.client->call_function("arm", "add", arguments, pair.now);
+    pair.pump();
+    pair.service->reply(pair.next_service<Called>().id, Value("five"), pair.now);
+    CHECK(pair.completion(id).error().code == ErrorCode::data_type_mismatch);
+  }
+  SECTION("the number of arguments is checked before anything is sent") {
+    CHECK(pair.completion(pair.client->call_function("arm", "add", {}, pair.now)).error().message ==
+          "function 'add': 0 arguments given, 2 expected");
+  }
+  SECTION("kinds that are not there yet say so") {
+    CHECK(pair.completion(pair.client->call_function("arm", "count", {}, pair.now)).error().code ==
+          ErrorCode::not_implemented_error);
+  }
+}
+
+TEST_CASE("a reply without a call, a late one and a repeated one are ignored") {
+  Loopback pair;
+  pair.connect();
+  const auto id = pair.client->get_property("arm", "speed", pair.now);
+  pair.pump();
+  const auto called = pair.next_service<Called>();
+  pair.advance(std::chrono::seconds(16));
+  pair.client->handle_timeout(pair.now);
+  const auto done = pair.next_client<Completed>();
+  CHECK(done.id == id);
+  CHECK(done.result.error().code == ErrorCode::request_timeout);
+  CHECK(done.result.error().message == "no answer from 'speed' in time");
+  pair.service->reply(called.id, Value(1.0), pair.now);
+  pair.service->reply(called.id, Value(1.0), pair.now);
+  pair.service->reply(12345, Value(1.0), pair.now);
+  pair.pump();
+  CHECK_FALSE(pair.client->poll_event());
+  CHECK(pair.client->state() == ClientState::connected);
+}
+
+TEST_CASE("events reach the client with their arguments") {
+  Loopback pair;
+  pair.connect();
+  const auto& bumped = *pair.service->service()->root_type().find_member("bumped");
+  const std::vector<Value> arguments{Value(std::int32_t{-1}), Value("wall")};
+  REQUIRE(pair.service->send_event("arm", bumped, arguments, pair.now));
+  pair.pump();
+  const auto event = pair.next_client<EventReceived>();
+  CHECK(event.path == "arm");
+  CHECK(event.member == "bumped");
+  CHECK(event.arguments == arguments);
+}
+
+TEST_CASE("objrefs are looked up once, with their index escaped") {
+  Loopback pair;
+  pair.connect();
+  const std::string path = child_path("arm", "tools", "left-claw");
+  CHECK(path == "arm.tools[left%2dclaw]");
+  CHECK(pair.completion(pair.client->find_object(path, pair.now)).value() == Value("experimental.loopback.Tool"));
+  CHECK(pair.root->asked == std::vector<std::string>{"tools[left-claw]"});
+  CHECK(pair.client->object_type(path)->name == "Tool");
+  CHECK(pair.completion(pair.client->find_object(path, pair.now)).value() == Value("experimental.loopback.Tool"));
+  CHECK(pair.root->asked.size() == 1);
+
+  const auto id = pair.client->get_property(path, "name", pair.now);
+  pair.pump();
+  pair.service->reply(pair.next_service<Called>().id, Value("claw"), pair.now);
+  CHECK(pair.completion(id).value() == Value("claw"));
+
+  CHECK(pair.completion(pair.client->find_object("arm.nothing", pair.now)).error().code == ErrorCode::member_not_found);
+  CHECK(pair.completion(pair.client->find_object("arm.tools[none]", pair.now)).error().code ==
+        ErrorCode::service_error);
+  CHECK(pair.completion(pair.client->find_object("arm.slots[x]", pair.now)).error().code ==
+        ErrorCode::invalid_argument);
+  CHECK(pair.completion(pair.client->find_object("leg.tool", pair.now)).error().code == ErrorCode::object_not_found);
+  CHECK(pair.completion(pair.client->find_object("arm..tool", pair.now)).error().code == ErrorCode::service_error);
+
+  SECTION("a released path must be looked up again") {
+    pair.service->service()->forget_path("arm.tools[left%2dclaw]");
+    pair.service->release_path(path, pair.now);
+    pair.pump();
+    CHECK(pair.next_client<PathReleased>().path == path);
+    CHECK(pair.client->object_type(path) == nullptr);
+    CHECK(pair.client->object_type("arm") != nullptr);
+    CHECK(pair.completion(pair.client->get_property(path, "name", pair.now)).error().code ==
+          ErrorCode::object_not_found);
+  }
+}
+
+TEST_CASE("wires carry the newest value both ways") {
+  Loopback pair;
+  pair.connect();
+  const auto& torque = *pair.service->service()->root_type().find_member("torque");
+  auto id = pair.client->connect_wire("arm", "torque", pair.now);
+  CHECK(pair.completion(id).value().is_null());
+  const auto connected = pair.next_service<WireConnected>();
+  CHECK(connected.path == "arm");
+  CHECK(pair.service->has_wire("arm", "torque"));
+
+  REQUIRE(pair.service->send_wire("arm", torque, Value(1.5), pair.now));
+  REQUIRE(pair.service->send_wire("arm", torque, Value(2.5), pair.now));
+  pair.pump();
+  const auto first = pair.next_client<WireValueReceived>();
+  const auto second = pair.next_client<WireValueReceived>();
+  CHECK(first.value == Value(1.5));
+  CHECK(second.value == Value(2.5));
+  CHECK(first.time < second.time);  // same clock reading, strictly later stamp
+
+  REQUIRE(pair.client->send_wire("arm", "torque", Value(-1.0), pair.now));
+  pair.pump();
+  CHECK(pair.next_service<WireReceived>().value == Value(-1.0));
+
+  id = pair.client->peek_in_value("arm", "torque", pair.now);
+  pair.pump();
+  auto called = pair.next_service<Called>();
+  CHECK(called.kind == CallKind::peek_in);
+  pair.service->reply(called.id, Value(9.0), pair.now);
+  CHECK(pair.completion(id).value() == Value(9.0));
+
+  id = pair.client->poke_out_value("arm", "torque", Value(7.0), pair.now);
+  pair.pump();
+  called = pair.next_service<Called>();
+  CHECK(called.kind == CallKind::poke_out);
+  CHECK(called.arguments.front() == Value(7.0));
+  pair.service->reply(called.id, Value{}, pair.now);
+  CHECK(pair.completion(id).value().is_null());
+
+  CHECK_FALSE(pair.client->send_wire("arm", "state", pose(1), pair.now));
+  CHECK(pair.completion(pair.client->poke_out_value("arm", "state", pose(1), pair.now)).error().code ==
+        ErrorCode::read_only_member);
+  CHECK(pair.completion(pair.client->disconnect_wire("arm", "torque", pair.now)).value().is_null());
+  CHECK(pair.completion(pair.client->disconnect_wire("arm", "torque", pair.now)).error().code ==
+        ErrorCode::service_error);
+  CHECK_FALSE(pair.service->has_wire("arm", "torque"));
+}
+
+TEST_CASE("a slow stream replaces wire values instead of queueing them") {
+  Loopback pair;
+  pair.connect();
+  const auto& state = *pair.service->service()->root_type().find_member("state");
+  pair.completion(pair.client->connect_wire("arm", "state", pair.now)).value();
+  pair.next_service<WireConnected>();
+  const auto big = [](double x) {
+    return Value(
+        Structure{"experimental.loopback.Pose", {{"x", Value(x)}, {"joints", Value(std::vector<double>(10'000))}}});
+  };
+  for (int i = 0; i < 100; ++i) REQUIRE(pair.service->send_wire("arm", state, big(i), pair.now));
+  CHECK(pair.service->connection().queued_bytes() < 200'000);
+  pair.pump();
+  Value last;
+  int received = 0;
+  while (auto event = pair.client->poll_event()) {
+    last = std::get<WireValueReceived>(*event).value;
+    ++received;
+  }
+  CHECK(received == 2);
+  CHECK(last == big(99));
+}
+
+TEST_CASE("members that are not there yet answer NotImplemented") {
+  Loopback pair;
+  pair.connect();
+  Message message;
+  // What a client of the reference sends for a pipe.
+  auto& connection = const_cast<Connection&>(pair.client->connection());
+  connection.begin_message(message);
+  message.begin_entry(EntryType::pipe_connect_req, "arm", "samples", 77);
+  message.add_scalar("index", DataType::int32_t, std::int32_t{-1});
+  REQUIRE(connection.send(message, pair.now));
+  pair.carry(*pair.client, *pair.service, 1000);
+  Bytes bytes;
+  for (const auto slice : pair.service->poll_transmit()) bytes.insert(bytes.end(), slice.begin(), slice.end());
+  Message reply;
+  REQUIRE(decode(bytes, {.string_table = {true, true}}, reply));
+  CHECK(reply.entries.front().type == EntryType::pipe_connect_ret);
+  CHECK(reply.entries.front().error == ErrorCode::not_implemented_error);
+  CHECK(reply.entries.front().request_id == 77);
+}
+
+TEST_CASE("an endpoint is bound to its connection") {
+  Loopback pair;
+  pair.connect();
+  // Another connection learns the endpoint's number and tries to act in the session.
+  Loopback other;
+  other.connect();
+  auto& intruder = const_cast<Connection&>(other.client->connection());
+  Message message;
+  intruder.begin_message(message);
+  message.header.receiver_endpoint = pair.client->connection().remote_endpoint();
+  message.begin_entry(EntryType::function_call_req, "arm", "stop", 5);
+  REQUIRE(intruder.send(message, other.now));
+  Bytes bytes;
+  for (const auto slice : other.client->poll_transmit()) bytes.insert(bytes.end(), slice.begin(), slice.end());
+  other.service->handle_bytes(bytes, other.now);
+  CHECK_FALSE(other.service->poll_event());
+  Bytes answer;
+  for (const auto slice : other.service->poll_transmit()) answer.insert(answer.end(), slice.begin(), slice.end());
+  Message reply;
+  REQUIRE(decode(answer, {.string_table = {true, true}}, reply));
+  CHECK(reply.entries.front().error == ErrorCode::invalid_endpoint);
+}
+
+TEST_CASE("an orderly goodbye, and a service that is closed") {
+  Loopback pair;
+  pair.connect();
+  SECTION("the client disconnects") {
+    pair.client->disconnect(pair.now);
+    pair.pump();
+    CHECK(pair.next_client<SessionClosed>().reason.message == "closed by this side");
+    pair.next_service<ClientGone>();
+    CHECK(pair.client->wants_close());
+    CHECK_FALSE(pair.service->wants_close());  // lingers for its last reply
+    pair.advance(std::chrono::milliseconds(101));
+    pair.service->handle_timeout(pair.now);
+    CHECK(pair.service->wants_close());
+  }
+  SECTION("the service closes: pending requests fail with ConnectionError") {
+    const auto id = pair.client->get_property("arm", "speed", pair.now);
+    pair.pump();
+    pair.service->close_service(pair.now);
+    pair.pump();
+    const auto done = pair.next_client<Completed>();
+    CHECK(done.id == id);
+    CHECK(done.result.error().code == ErrorCode::connection_error);
+    CHECK(pair.next_client<SessionClosed>().reason.message == "the service was closed");
+  }
+  SECTION("the stream is cut") {
+    pair.client->handle_closed({ErrorCode::connection_error, "reset by peer"}, pair.now);
+    CHECK(pair.next_client<SessionClosed>().reason.message == "reset by peer");
+    CHECK(pair.completion(pair.client->get_property("arm", "speed", pair.now)).error().message == "reset by peer");
+    pair.service->handle_closed({ErrorCode::connection_error, "reset by peer"}, pair.now);
+    pair.next_service<ClientGone>();
+    CHECK_FALSE(pair.service->poll_event());
+  }
+}
+
+TEST_CASE("heartbeats keep an idle connection and end a dead one") {
+  Loopback pair;
+  pair.connect();
+  for (int minute = 0; minute < 20; ++minute) {
+    pair.advance(std::chrono::seconds(11));
+    pair.client->handle_timeout(pair.now);
+    pair.service->handle_timeout(pair.now);
+    pair.pump();
+  }
+  CHECK(pair.client->state() == ClientState::connected);
+  CHECK(pair.service->service() != nullptr);
+  pair.advance(std::chrono::seconds(11));
+  pair.client->handle_timeout(pair.now);  // sends a heartbeat that nobody answers
+  pair.advance(std::chrono::seconds(14));
+  pair.client->handle_timeout(pair.now);
+  CHECK(pair.client->state() == ClientState::connected);
+  pair.advance(std::chrono::seconds(1));
+  pair.client->handle_timeout(pair.now);
+  CHECK(pair.client->state() == ClientState::closed);
+  CHECK(pair.next_client<SessionClosed>().reason.message == "the peer is silent: a heartbeat was not answered");
+}
+
+TEST_CASE("silence during set-up ends in time, on both sides") {
+  Loopback pair;
+  CHECK(pair.client->poll_timeout() - pair.now.steady == std::chrono::seconds(5));
+  pair.advance(std::chrono::seconds(5));
+  pair.client->handle_timeout(pair.now);
+  CHECK(pair.next_client<SessionClosed>().reason.message == "the node did not answer CreateConnection in time");
+  pair.service->handle_timeout(pair.now);
+  CHECK(pair.next_service<ClientGone>().reason.message == "the client sent no message in time");
+  CHECK(pair.service->wants_close());
+}
+
+TEST_CASE("garbage closes a service session and names the byte") {
+  Loopback pair;
+  const std::string garbage = "GARBAGE in, nothing out";
+  pair.service->handle_bytes(as_bytes(garbage), pair.now);
+  CHECK(pair.service->wants_close());
+  CHECK(pair.next_service<ClientGone>().reason.code == ErrorCode::protocol_error);
+}
+
+TEST_CASE("the service index lists services with their URLs") {
+  Loopback pair;
+  ClientOptions options;
+  options.connection.self = {client_id, ""};
+  options.service = "RobotRaconteurServiceIndex";
+  pair.client = std::make_unique<ClientSession>(options, pair.now);
+  pair.pump();
+  CHECK(pair.next_client<Connected>().object_type == "RobotRaconteurServiceIndex.ServiceIndex");
+  const auto id = pair.client->call_function("RobotRaconteurServiceIndex", "GetLocalNodeServices", {}, pair.now);
+  const auto answer = pair.completion(id).value();
+  const auto* services = answer.get_if<MapInt32>();
+  REQUIRE(services);
+  REQUIRE(services->items.size() == 2);
+  std::vector<std::string> names;
+  for (const auto& [key, info] : services->items)
+    names.emplace_back(info.get_if<Structure>()->find("Name")->to_text().value());
+  CHECK(names == std::vector<std::string>{"RobotRaconteurServiceIndex", "arm"});
+  const auto* arm = services->items[1].second.get_if<Structure>();
+  CHECK(arm->find("RootObjectType")->to_text().value() == "experimental.loopback.Arm");
+  const auto* urls = arm->find("ConnectionURL")->get_if<MapInt32>();
+  CHECK(urls->items.front().first == 1);
+  CHECK(urls->items.front().second.to_text().value() ==
+        "rr+tcp://127.0.0.1:1/?nodeid=11111111-0200-0000-0000-000000000000&service=arm");
+  const auto routed = pair.client->call_function("RobotRaconteurServiceIndex", "GetRoutedNodes", {}, pair.now);
+  CHECK(pair.completion(routed).value().get_if<MapInt32>()->items.empty());
+}
+
+TEST_CASE("messages above the limit are refused: before login 512 KiB, then the configured size") {
+  Loopback pair;
+  pair.connect();
+  const auto big = [](std::size_t doubles) {
+    return Value(
+        Structure{"experimental.loopback.Pose", {{"x", Value(0.0)}, {"joints", Value(std::vector<double>(doubles))}}});
+  };
+  auto id = pair.client->set_property("arm", "pose", big(1'000'000), pair.now);
+  pair.pump();
+  pair.service->reply(pair.next_service<Called>().id, Value{}, pair.now);
+  CHECK(pair.completion(id));
+  CHECK(pair.completion(pair.client->set_property("arm", "pose", big(1'600'000), pair.now)).error().code ==
+        ErrorCode::protocol_error);
+  id = pair.client->get_property("arm", "pose", pair.now);
+  pair.pump();
+  pair.service->reply(pair.next_service<Called>().id, big(1'600'000), pair.now);
+  CHECK(pair.completion(id).error().code == ErrorCode::protocol_error);
+  CHECK(pair.client->state() == ClientState::connected);
+}
