@@ -64,7 +64,8 @@ class SizePass {
           !add_children(index + 1, element.end, element.count, body) || !element.data.empty())
         return element_error(ErrorCode::protocol_error, message_, index, "its children do not match its count");
     } else if (element.end != index + 1 ||
-               std::uint64_t{element.count} * item_size(element.type) != element.data.size()) {
+               std::uint64_t{element.count} * item_size(element.type) != element.data.size() ||
+               (element.type == DataType::void_t && element.count != 0)) {
       return element_error(ErrorCode::data_serialization_error, message_, index,
                            std::to_string(element.count) + " items of " + std::string(data_type_name(element.type)) +
                                " but " + std::to_string(element.data.size()) + " data bytes");

@@ -1,6 +1,6 @@
 #include "core/wire/format_message.hpp"
 
-#include <cinttypes>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -17,13 +17,16 @@ std::string format_float(Float value, int max_digits) {
   if (std::isnan(value)) return "NaN";
   if (std::isinf(value)) return value > 0 ? "Infinity" : "-Infinity";
   char text[40];
-  for (int digits = 1; digits <= max_digits; ++digits) {
-    std::snprintf(text, sizeof(text), "%.*g", digits, static_cast<double>(value));
+  int digits = 1;
+  for (; digits <= max_digits; ++digits) {
+    std::snprintf(text, sizeof(text), "%.*e", digits - 1, static_cast<double>(value));
     if (static_cast<Float>(std::strtod(text, nullptr)) == value) break;
   }
-  std::string out = text;
-  if (out.find_first_of(".e") == std::string::npos) out += ".0";
-  return out;
+  const std::string scientific = text;
+  const int exponent = std::atoi(scientific.c_str() + scientific.find('e') + 1);
+  if (exponent < -5 || exponent > 15) return scientific;
+  std::snprintf(text, sizeof(text), "%.*f", std::max(1, digits - 1 - exponent), static_cast<double>(value));
+  return text;
 }
 
 std::string format_item(DataType type, const std::uint8_t* item) {
@@ -61,7 +64,7 @@ class Formatter {
   void add_entry(const MessageEntry& entry);
   void add_key(const MessageElement& element);
   void add_leaf(const MessageElement& element);
-  void add_text(std::string_view text);
+  std::string cut(std::string_view text) const;
 
   const Message& message_;
   const FormatOptions& options_;
@@ -85,19 +88,18 @@ void Formatter::add_entry(const MessageEntry& entry) {
   out_ += " | ";
   const auto type_name = entry_type_name(entry.type);
   if (type_name == "unknown")
-    out_ += "type " + std::to_string(static_cast<std::uint16_t>(entry.type));
+    out_ += std::to_string(static_cast<std::uint16_t>(entry.type));
   else
     out_ += type_name;
-  if (!entry.service_path.empty()) out_ += " path=" + std::string(entry.service_path.substr(0, options_.max_text));
-  if (!entry.member_name.empty()) out_ += " member=" + std::string(entry.member_name.substr(0, options_.max_text));
+  if (!entry.service_path.empty()) out_ += " path=" + cut(entry.service_path);
+  if (!entry.member_name.empty()) out_ += " member=" + cut(entry.member_name);
   if (entry.request_id != 0) out_ += " req=" + std::to_string(entry.request_id);
   if (entry.error != ErrorCode::none) {
     out_ += " ERROR " + std::to_string(static_cast<std::uint16_t>(entry.error));
     if (const auto name = error_code_name(entry.error); !name.empty()) out_ += " " + std::string(name);
   }
   if (!entry.metadata.empty()) {
-    out_ += " meta=";
-    add_text(entry.metadata);
+    out_ += " meta=\"" + cut(entry.metadata) + "\"";
   }
   if (entry.first_element != entry.end_element) {
     out_ += " {";
@@ -110,8 +112,9 @@ void Formatter::add_elements(std::uint32_t first, std::uint32_t end) {
   struct Level {
     std::uint32_t end;
     std::size_t shown;
+    bool is_secret;
   };
-  std::vector<Level> levels{{end, 0}};
+  std::vector<Level> levels{{end, 0, false}};
   for (std::uint32_t index = first; !levels.empty();) {
     auto& level = levels.back();
     const bool is_cut = level.shown == options_.max_items || is_full();
@@ -124,11 +127,14 @@ void Formatter::add_elements(std::uint32_t first, std::uint32_t end) {
     }
     if (level.shown++ != 0) out_ += ", ";
     const auto& element = message_.elements[index];
+    const bool is_secret = level.is_secret || element.name == "credentials" || element.name == "password";
     add_key(element);
     if (is_nested(element.type)) {
-      if (!element.type_name.empty()) out_ += "<" + std::string(element.type_name.substr(0, options_.max_text)) + ">";
+      if (!element.type_name.empty()) out_ += "<" + cut(element.type_name) + ">";
       out_ += "{";
-      levels.push_back({element.end, 0});
+      levels.push_back({element.end, 0, is_secret});
+    } else if (is_secret) {
+      out_ += "=***";
     } else {
       add_leaf(element);
     }
@@ -140,7 +146,7 @@ void Formatter::add_key(const MessageElement& element) {
   if (element.key_kind == KeyKind::number)
     out_ += "#" + std::to_string(element.number);
   else
-    out_ += element.name.substr(0, options_.max_text);
+    out_ += cut(element.name);
   out_ += ":";
   out_ += data_type_name(element.type);
 }
@@ -150,7 +156,7 @@ void Formatter::add_leaf(const MessageElement& element) {
   if (element.type == DataType::void_t) {
     out_ += "null";
   } else if (element.type == DataType::string_t) {
-    add_text(element.text());
+    out_ += "\"" + cut(element.text()) + "\"";
   } else {
     const auto size = item_size(element.type);
     out_ += "[";
@@ -166,23 +172,24 @@ void Formatter::add_leaf(const MessageElement& element) {
   }
 }
 
-void Formatter::add_text(std::string_view text) {
-  out_ += '"';
+/// Untrusted text, shortened, and such that it cannot break the line.
+std::string Formatter::cut(std::string_view text) const {
+  std::string out;
   for (const char c : text.substr(0, options_.max_text)) {
     const auto byte = static_cast<unsigned char>(c);
     if (c == '\n') {
-      out_ += "\\n";
+      out += "\\n";
     } else if (byte < 0x20 || byte == 0x7f) {
       char escape[8];
       std::snprintf(escape, sizeof(escape), "\\u%04x", byte);
-      out_ += escape;
+      out += escape;
     } else {
-      if (c == '"' || c == '\\') out_ += '\\';
-      out_ += c;
+      if (c == '"' || c == '\\') out += '\\';
+      out += c;
     }
   }
-  if (text.size() > options_.max_text) out_ += "...";
-  out_ += '"';
+  if (text.size() > options_.max_text) out += "...";
+  return out;
 }
 
 std::string Formatter::take() {

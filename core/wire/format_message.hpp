@@ -15,7 +15,8 @@ struct FormatOptions {
 };
 
 /// "v4 | ep 1>2000 | PropertyGetRes path=svc member=d1 req=5 {value:double=[3.5]}". Entries are separated by " | ".
-/// What is cut shows as "..."; control characters and quotes of texts are escaped, other bytes pass through.
+/// What is cut shows as "..."; control characters and quotes of texts are escaped, other bytes pass through. Values of
+/// elements named `credentials` or `password`, and all inside them, show as "***": the line may go into a log.
 std::string format_message(const Message& message, const FormatOptions& options = {});
 
 /// One element with its descendants: "packettime:structure<RobotRaconteur.TimeSpec>{seconds:int64=[1], ...}".

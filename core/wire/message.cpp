@@ -107,7 +107,7 @@ void Message::clear() {
   header = {};
   entries.clear();
   elements.clear();
-  if (elements.capacity() > max_kept_elements) elements = {};
+  if (elements.capacity() > max_kept_elements) elements = std::vector<MessageElement>();
   open_.clear();
   block_index_ = 0;
   block_used_ = 0;
