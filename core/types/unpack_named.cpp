@@ -173,7 +173,7 @@ bool Unpacker::unpack_named_numbers(const FieldPath& path, const MessageElement&
                                     const EntityDefinition& entity, std::string_view type_name, NamedArray& out) {
   if (!check_element(path, element, DataType::namedarray_array_t, type_name)) return false;
   const auto* array = find_child(path, element, "array");
-  if (!array || !unpack_array(path, *array, entity.namedarray_type, out.array)) return false;
+  if (!array || !unpack_array(path.field("array", {}), *array, entity.namedarray_type, out.array)) return false;
   const auto each = entity.namedarray_count;
   if (each != 0 && out.array.size() % each == 0) return true;
   return fail(ErrorCode::data_type_error, path,

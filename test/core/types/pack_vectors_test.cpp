@@ -25,7 +25,7 @@ TypeDefinition type_behind(const std::string& name) {
   if (begins("pack_named_vec3")) return named_type(service + "vec3");
   if (begins("pack_named_transform_array")) return named_type(service + "transform", ArrayKind::variable);
   if (begins("pack_named_transform")) return named_type(service + "transform");
-  if (begins("pack_named_uint8")) return named_type(service + "bytes6");
+  if (begins("pack_named_uint8")) return named_type(service + "bytes6", ArrayKind::variable);
   if (begins("pack_named_multidim")) return named_type(service + "vec3", ArrayKind::multidim);
   if (begins("pack_varvalue")) return type_of(DataType::varvalue_t);
   if (begins("pack_multidim_int16")) return type_of(DataType::int16_t, ArrayKind::multidim);

@@ -2,6 +2,8 @@
 
 #include <catch2/catch.hpp>
 
+#include "test/core/types/fixture.hpp"
+
 using namespace rr;
 
 namespace {

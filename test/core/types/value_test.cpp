@@ -2,6 +2,8 @@
 
 #include <catch2/catch.hpp>
 
+#include "test/core/types/fixture.hpp"
+
 using namespace rr;
 
 TEST_CASE("a scalar compares by type and bytes") {
