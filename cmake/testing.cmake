@@ -1,0 +1,37 @@
+# rr_add_test(NAME LIBRARIES target... SOURCES file...)
+#
+# One Catch2 program whose test cases become ctest tests, native and, through Node, as WebAssembly. Catch2's main is
+# compiled once for all.
+include(Catch)
+
+if(EMSCRIPTEN)
+  # Header-only packages get an include directory of their own: /usr/include itself would shadow the sysroot.
+  set(RR_TEST_INCLUDE "/usr/include" CACHE PATH "Directory that holds catch2/ and nlohmann/ (for the wasm build)")
+  file(MAKE_DIRECTORY "${PROJECT_BINARY_DIR}/test-include")
+  foreach(package catch2 nlohmann)
+    file(CREATE_LINK "${RR_TEST_INCLUDE}/${package}" "${PROJECT_BINARY_DIR}/test-include/${package}" SYMBOLIC)
+  endforeach()
+  add_library(rr_test_headers INTERFACE)
+  target_include_directories(rr_test_headers SYSTEM INTERFACE "${PROJECT_BINARY_DIR}/test-include")
+  # Catch2 reports by exceptions; the core below it stays built without them.
+  target_compile_options(rr_test_headers INTERFACE -fexceptions)
+  target_compile_definitions(rr_test_headers INTERFACE CATCH_CONFIG_NO_POSIX_SIGNALS)
+  target_link_options(rr_test_headers INTERFACE -fexceptions -sNODERAWFS=1 -sEXIT_RUNTIME=1 -sALLOW_MEMORY_GROWTH=1
+                                                -sSTACK_SIZE=1048576 -sENVIRONMENT=node)
+else()
+  find_package(Catch2 2.13 REQUIRED)
+  find_package(nlohmann_json 3.11 REQUIRED)
+  add_library(rr_test_headers INTERFACE)
+  target_link_libraries(rr_test_headers INTERFACE Catch2::Catch2 nlohmann_json::nlohmann_json)
+endif()
+
+add_library(rr_test_main STATIC "${PROJECT_SOURCE_DIR}/test/support/golden.cpp" "${PROJECT_SOURCE_DIR}/test/support/main.cpp")
+target_link_libraries(rr_test_main PUBLIC rr::options rr::support rr_test_headers)
+target_compile_definitions(rr_test_main PRIVATE "RR_GOLDEN_DIR=\"${PROJECT_SOURCE_DIR}/test/golden\"")
+
+function(rr_add_test name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "LIBRARIES;SOURCES")
+  add_executable(${name} ${arg_SOURCES})
+  target_link_libraries(${name} PRIVATE rr_test_main ${arg_LIBRARIES})
+  catch_discover_tests(${name} TEST_PREFIX "${name}/" EXTRA_ARGS --use-colour no PROPERTIES TIMEOUT 300)
+endfunction()
