@@ -2,9 +2,8 @@
 #
 # One Catch2 program whose test cases become ctest tests, native and, through Node, as WebAssembly. Catch2's main is
 # compiled once for all.
-include(Catch)
-
 if(EMSCRIPTEN)
+  include(/usr/lib/cmake/Catch2/Catch.cmake)
   # Header-only packages get an include directory of their own: /usr/include itself would shadow the sysroot.
   set(RR_TEST_INCLUDE "/usr/include" CACHE PATH "Directory that holds catch2/ and nlohmann/ (for the wasm build)")
   file(MAKE_DIRECTORY "${PROJECT_BINARY_DIR}/test-include")
@@ -13,13 +12,16 @@ if(EMSCRIPTEN)
   endforeach()
   add_library(rr_test_headers INTERFACE)
   target_include_directories(rr_test_headers SYSTEM INTERFACE "${PROJECT_BINARY_DIR}/test-include")
+  # Emscripten 3.1.6 takes a Node that has fetch() for a browser and asks it for the file: hide fetch.
+  set(CMAKE_CROSSCOMPILING_EMULATOR "${NODE_JS_EXECUTABLE};--no-experimental-fetch")
   # Catch2 reports by exceptions; the core below it stays built without them.
   target_compile_options(rr_test_headers INTERFACE -fexceptions)
   target_compile_definitions(rr_test_headers INTERFACE CATCH_CONFIG_NO_POSIX_SIGNALS)
   target_link_options(rr_test_headers INTERFACE -fexceptions -sNODERAWFS=1 -sEXIT_RUNTIME=1 -sALLOW_MEMORY_GROWTH=1
-                                                -sSTACK_SIZE=1048576 -sENVIRONMENT=node)
+                                                -sENVIRONMENT=node)
 else()
   find_package(Catch2 2.13 REQUIRED)
+  include(Catch)
   find_package(nlohmann_json 3.11 REQUIRED)
   add_library(rr_test_headers INTERFACE)
   target_link_libraries(rr_test_headers INTERFACE Catch2::Catch2 nlohmann_json::nlohmann_json)
