@@ -1,0 +1,72 @@
+"""Fixtures of the interoperability tests: one pair of service and route at a time, shared by its scenarios."""
+import faulthandler
+import json
+import urllib.request
+
+import pytest
+
+from directions import DIRECTIONS, LEVELS, service_command
+from processes import BUILD, Background, free_port
+
+TEST_DEADLINE = 120.0  # seconds; beyond it the run is ended with all stacks printed
+
+
+@pytest.fixture(autouse=True)
+def deadline():
+    faulthandler.dump_traceback_later(TEST_DEADLINE, exit=True)
+    yield
+    faulthandler.cancel_dump_traceback_later()
+
+
+def pytest_generate_tests(metafunc):
+    if "link" in metafunc.fixturenames:
+        pairs = [(direction, level) for direction in DIRECTIONS for level in LEVELS if level in direction.levels]
+        if metafunc.definition.get_closest_marker("direct"):
+            pairs = [pair for pair in pairs if pair[0].route == "direct"]
+        metafunc.parametrize("link", pairs, indirect=True, scope="module",
+                             ids=[f"{direction.name}-{level}" for direction, level in pairs])
+
+
+@pytest.fixture(scope="module")
+def link(request, tmp_path_factory):
+    """A running service, behind the gateway where the direction says so: (direction, level, port)."""
+    direction, level = request.param
+    folder = tmp_path_factory.mktemp("link")
+    service = Background(service_command(direction.service, level), folder / "service.log")
+    gateway = None
+    try:
+        ready = service.first_line()
+        port = ready["port"]
+        if direction.route != "direct":
+            gateway, port = start_gateway(folder, ready["url"])
+        yield direction, level, port
+        if gateway:
+            code, description = gateway.stop(), gateway.description()
+            gateway = None
+            assert code == 0, f"the gateway did not end by itself: {description}"
+    finally:
+        if gateway:
+            gateway.stop()
+        service.stop()
+
+
+def start_gateway(folder, device_url):
+    port = free_port()
+    config = folder / "gateway.json"
+    config.write_text(json.dumps({"listen": [f"127.0.0.1:{port}"], "devices": [{"name": "interop", "url": device_url}]}))
+    gateway = Background([BUILD / "server" / "rrgate", "serve", "--config", config], folder / "gateway.log")
+
+    def device_is_up():
+        try:
+            with urllib.request.urlopen(f"http://127.0.0.1:{port}/api/v1/devices", timeout=5) as answer:
+                (device,) = json.load(answer)["devices"]
+                return device["state"] == "up"
+        except OSError:
+            return False
+
+    try:
+        gateway.wait_until(device_is_up)
+    except BaseException:
+        gateway.stop()
+        raise
+    return gateway, port

@@ -1,0 +1,138 @@
+"""The test client by the reference implementation: carries out the steps of one scenario (README.md, "Steps").
+
+client.py URL [--robotraconteur-...]    reads {"steps": [...]} from standard input, prints {"results": [...]}
+"""
+import json
+import sys
+import threading
+import time
+
+import RobotRaconteur as RR
+
+import quiet_node
+from values import Values, plain
+
+PATIENCE = 10.0  # seconds for anything that has to come by itself
+
+
+class Client:
+    def __init__(self, url):
+        self._root = RR.RobotRaconteurNode.s.ConnectService(url)
+        self._values = Values(self._root)
+        self._news = threading.Condition()
+        self._events = {}
+        self._wires = {}
+
+    def carry_out(self, step):
+        target = self._root
+        for part in step.get("on", []):
+            name, *index = [part] if isinstance(part, str) else part
+            target = getattr(target, "get_" + name)(*index)
+        verb = next(iter(key for key in step if key not in ("on", "value", "args", "count", "until", "digest")))
+        return getattr(self, "do_" + verb)(target, step[verb], step)
+
+    def do_get(self, target, member, step):
+        return plain(getattr(target, member))
+
+    def do_set(self, target, member, step):
+        setattr(target, member, self._values.build(step["value"]))
+
+    def do_call(self, target, member, step):
+        result = getattr(target, member)(*(self._values.build(value) for value in step.get("args", [])))
+        if step.get("digest"):
+            return {"count": len(result), "first": plain(result[0]), "last": plain(result[-1]), "sum": plain(result.sum())}
+        return plain(result)
+
+    def do_get_until(self, target, member, step):
+        deadline = time.monotonic() + PATIENCE
+        value = plain(getattr(target, member))
+        while value != step["until"] and time.monotonic() < deadline:
+            time.sleep(0.01)
+            value = plain(getattr(target, member))
+        return value
+
+    def do_type_of(self, target, member, step):
+        return target.rrobjecttype if hasattr(target, "rrobjecttype") else RR.RobotRaconteurNode.s.GetObjectType(target)
+
+    # events
+
+    def do_listen(self, target, member, step):
+        seen = self._events.setdefault(member, [])
+
+        def happened(*arguments):
+            with self._news:
+                seen.append([plain(argument) for argument in arguments])
+                self._news.notify_all()
+
+        hook = getattr(target, member)
+        hook += happened
+
+    def do_events(self, target, member, step):
+        seen = self._events[member]
+        with self._news:
+            self._news.wait_for(lambda: len(seen) >= step["count"], PATIENCE)
+            return {"list": seen}
+
+    # wires
+
+    def do_connect(self, target, member, step):
+        connection = getattr(target, member).Connect()
+
+        def changed(wire, value, time):
+            with self._news:
+                self._news.notify_all()
+
+        connection.WireValueChanged += changed
+        self._wires[member] = connection
+
+    def do_in_value(self, target, member, step):
+        connection = self._wires[member]
+
+        def value():
+            return plain(connection.InValue) if connection.InValueValid else None
+
+        with self._news:
+            self._news.wait_for(lambda: value() == step["until"], PATIENCE)
+            return value()
+
+    def do_out_value(self, target, member, step):
+        self._wires[member].OutValue = self._values.build(step["value"])
+
+    def do_close(self, target, member, step):
+        self._wires.pop(member).Close()
+
+    def do_peek_in(self, target, member, step):
+        return plain(getattr(target, member).PeekInValue()[0])
+
+    def do_peek_out(self, target, member, step):
+        return plain(getattr(target, member).PeekOutValue()[0])
+
+    def do_poke_out(self, target, member, step):
+        getattr(target, member).PokeOutValue(self._values.build(step["value"]))
+
+
+def error_of(exception):
+    if isinstance(exception, RR.RobotRaconteurException):
+        return {"name": exception.errorname, "message": exception.message}
+    return {"name": type(exception).__name__, "message": str(exception)}
+
+
+def main(url):
+    steps = json.load(sys.stdin)["steps"]
+    results = []
+    with RR.ClientNodeSetup(argv=quiet_node.arguments(server=False)):
+        try:
+            client = Client(url)
+        except Exception as exception:
+            print(json.dumps({"connect_error": error_of(exception)}), flush=True)
+            return
+        for step in steps:
+            try:
+                results.append({"value": client.carry_out(step)})
+            except Exception as exception:
+                results.append({"error": error_of(exception)})
+        print(json.dumps({"results": results}), flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,189 @@
+"""The test service by the reference implementation: offers experimental.interop on a free port of the loopback.
+
+Prints one line of JSON when it is ready, {"port": N, "url": "..."}, and runs until its standard input ends. Options of
+the node (--robotraconteur-...) are handed on; without them discovery and local transports are off.
+"""
+import json
+import pathlib
+import sys
+import threading
+
+import numpy
+import RobotRaconteur as RR
+
+import quiet_node
+
+DEFINITION = pathlib.Path(__file__).parent.parent / "experimental.interop.robdef"
+TYPE = "experimental.interop"
+
+ERRORS = {
+    "operation_failed": RR.OperationFailedException,
+    "invalid_argument": RR.InvalidArgumentException,
+    "out_of_range": RR.OutOfRangeException,
+    "not_implemented": RR.NotImplementedException,
+}
+
+
+class Part:
+    def __init__(self, name, depth=1):
+        self.name = name
+        self.size = 1.0
+        self._inner = Part(name + ".inner", depth - 1) if depth else None
+
+    def identify(self):
+        return "part " + self.name
+
+    def get_inner(self):
+        if self._inner is None:
+            raise RR.ObjectNotFoundException("part " + self.name + " has no inner part")
+        return self._inner, TYPE + ".Part"
+
+
+class SpecialPart(Part):
+    def __init__(self, name):
+        super().__init__(name)
+        self.feature = "none"
+
+
+class Interop:
+    """Properties that only store are plain attributes; those with a rule are written out below."""
+
+    def __init__(self):
+        for name in "double single int8 uint8 int16 uint16 int32 uint32 int64 uint64".split():
+            setattr(self, "p_" + name, 0)
+        self.p_cdouble = self.p_csingle = 0j
+        self.p_bool = False
+        self.p_string = ""
+        self.p_color = 1
+        for name in STORED_OBJECTS:
+            setattr(self, "p_" + name, None)
+        self.version = "1"
+        self.seen_secret = 0.0
+        self.seen_target = 0.0
+        self.changed = RR.EventHook()
+        self.cleared = RR.EventHook()
+        self._head = Part("head")
+        self._parts = {index: Part(f"number {index}") for index in (0, 1, 7)}
+        self._named = {key: Part(f"named {key}") for key in ("left", "right hand", "a.b")}
+        self._special = SpecialPart("special")
+
+    def RRServiceObjectInit(self, context, path):
+        # By now the wires are there: writeonly ones as receivers, readonly ones as broadcasters.
+        self._both = 0.0
+        self.target.InValueChanged += self._follow_target
+        self.both.WireConnectCallback = self._echo_both
+        self.both.PeekInValueCallback = lambda endpoint: 2 * self._both
+        self.both.PeekOutValueCallback = lambda endpoint: self._both
+        self.both.PokeOutValueCallback = self._poke_both
+
+    # wires
+
+    def _follow_target(self, value, time, endpoint):
+        self.seen_target = value
+
+    def _echo_both(self, connection):
+        def echo(wire, value, time):
+            self._both = value
+            wire.OutValue = 2 * value
+
+        connection.WireValueChanged += echo
+
+    def _poke_both(self, value, time, endpoint):
+        self._both = value
+
+    def publish_state(self, value):
+        self.state.OutValue = value
+
+    def publish_pose(self, value):
+        self.pose.OutValue = value
+
+    # property with a rule
+
+    @property
+    def secret(self):
+        raise RR.WriteOnlyMemberException("secret is write only")
+
+    @secret.setter
+    def secret(self, value):
+        self.seen_secret = value
+
+    # functions
+
+    def nothing(self):
+        pass
+
+    def add(self, left, right):
+        return left + right
+
+    def join(self, words, separator):
+        return separator.join(words)
+
+    def shift(self, pose, dx, dy):
+        pose.px += dx
+        pose.py += dy
+        return pose
+
+    def ramp(self, count):
+        return numpy.arange(count, dtype=numpy.float64)
+
+    def sum(self, values):
+        return float(numpy.sum(values))
+
+    def echo(self, value):
+        return value
+
+    def fail(self, kind, text):
+        if kind == "custom":
+            raise RR.RobotRaconteurNode.s.GetExceptionType(TYPE + ".InteropError")(text)
+        raise ERRORS[kind](text)
+
+    # events
+
+    def fire(self, count):
+        for number in range(count):
+            self.changed.fire(float(number), f"number {number}")
+
+    def clear(self):
+        self.cleared.fire()
+
+    # objects
+
+    def get_head(self):
+        return self._head, TYPE + ".Part"
+
+    def get_parts(self, index):
+        return self._find(self._parts, int(index))
+
+    def get_named(self, key):
+        return self._find(self._named, key)
+
+    def get_anything(self):
+        return self._special, TYPE + ".SpecialPart"
+
+    def _find(self, parts, index):
+        if index not in parts:
+            raise RR.ObjectNotFoundException(f"no part {index!r}")
+        return parts[index], TYPE + ".Part"
+
+
+STORED_OBJECTS = """
+    doubles singles int8s uint8s int16s uint16s int32s uint32s int64s uint64s cdoubles csingles bools three_doubles
+    up_to_four grid two_by_three image pose everything vector vectors vector_grid transform sample samples sample_grid
+    double_list string_list array_list pose_list double_map string_map pose_map any any_list any_map
+""".split()
+
+
+def main():
+    node = RR.RobotRaconteurNode.s
+    with RR.ServerNodeSetup("interop.service", 0, argv=quiet_node.arguments(server=True)) as setup:
+        node.RegisterServiceType(DEFINITION.read_text(encoding="ascii"))
+        node.RegisterService("interop", TYPE + ".Interop", Interop())
+        port = setup.tcp_transport.GetListenPort()
+        print(json.dumps({"port": port, "url": f"rr+tcp://127.0.0.1:{port}/?service=interop"}), flush=True)
+        sys.stdin.buffer.read()
+
+
+if __name__ == "__main__":
+    # Its threads do not always let go; the harness has its answer by then.
+    threading.excepthook = lambda arguments: print("service thread:", arguments.exc_value, file=sys.stderr)
+    main()

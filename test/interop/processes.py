@@ -1,0 +1,97 @@
+"""Processes of the harness: started on free ports, waited for by what they say, always ended."""
+import json
+import os
+import pathlib
+import selectors
+import signal
+import socket
+import subprocess
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+BUILD = pathlib.Path(os.environ.get("RR_BUILD", ROOT / "build" / "release"))
+START_DEADLINE = 30.0  # seconds until a process must be ready
+STEP_DEADLINE = 60.0  # seconds for a client to carry out one scenario
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+class Background:
+    """A process that runs beside the tests. Its standard input stays open while it is wanted."""
+
+    def __init__(self, command, log):
+        self.command = [str(word) for word in command]
+        self._log = pathlib.Path(log)
+        with open(self._log, "wb") as errors:
+            # A session of its own: whatever it starts is ended with it.
+            self.process = subprocess.Popen(self.command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                                            stderr=errors, start_new_session=True, cwd=ROOT)
+
+    def first_line(self):
+        """The first line that the process prints, as JSON."""
+        buffer = b""
+        deadline = time.monotonic() + START_DEADLINE
+        with selectors.DefaultSelector() as selector:
+            selector.register(self.process.stdout, selectors.EVENT_READ)
+            while b"\n" not in buffer:
+                if not selector.select(max(0.0, deadline - time.monotonic())):
+                    raise AssertionError(f"not ready after {START_DEADLINE} s: {self.description()}")
+                chunk = os.read(self.process.stdout.fileno(), 65536)
+                if not chunk:
+                    raise AssertionError(f"ended before it was ready: {self.description()}")
+                buffer += chunk
+        return json.loads(buffer.split(b"\n")[0])
+
+    def wait_until(self, is_ready):
+        deadline = time.monotonic() + START_DEADLINE
+        while not is_ready():
+            if self.process.poll() is not None:
+                raise AssertionError(f"ended before it was ready: {self.description()}")
+            if time.monotonic() > deadline:
+                raise AssertionError(f"not ready after {START_DEADLINE} s: {self.description()}")
+            time.sleep(0.02)
+
+    def description(self):
+        return f"{' '.join(self.command)}\n(exit {self.process.poll()}) {self._log.read_text(errors='replace')[-4000:]}"
+
+    def stop(self):
+        """Asks, then kills. Returns the exit code, or None where it had to be killed."""
+        code = None
+        try:
+            self.process.stdin.close()
+            self.process.send_signal(signal.SIGTERM)
+            code = self.process.wait(10)
+        except (subprocess.TimeoutExpired, BrokenPipeError):
+            pass
+        try:
+            os.killpg(self.process.pid, signal.SIGKILL)
+        except ProcessLookupError:
+            pass
+        self.process.wait()
+        self.process.stdout.close()
+        return code
+
+
+def run_client(command, scenario):
+    """Hands the steps of a scenario to a client program. Returns its results, one for each step."""
+    steps = [{key: value for key, value in step.items() if not key.startswith("expect") and key not in ("message", "any_order")}
+             for step in scenario.steps]
+    client = subprocess.Popen([str(word) for word in command], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                              stderr=subprocess.PIPE, text=True, start_new_session=True, cwd=ROOT)
+    try:
+        output, errors = client.communicate(json.dumps({"steps": steps}), timeout=STEP_DEADLINE)
+    except subprocess.TimeoutExpired:
+        os.killpg(client.pid, signal.SIGKILL)
+        output, errors = client.communicate()
+        raise AssertionError(f"client still busy after {STEP_DEADLINE} s\n{output[-2000:]}\n{errors[-4000:]}") from None
+    lines = output.strip().splitlines()
+    if client.returncode != 0 or not lines:
+        raise AssertionError(f"client ended with {client.returncode}\n{output[-2000:]}\n{errors[-4000:]}")
+    answer = json.loads(lines[-1])
+    if "results" not in answer:
+        raise AssertionError(f"client did not connect: {answer}")
+    return answer["results"]

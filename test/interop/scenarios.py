@@ -1,0 +1,210 @@
+"""What every client does with every service, and what must come of it: the one table that all directions share.
+
+A scenario is a list of steps; README.md explains steps and values. Each step carries what is expected of it:
+`expect` a plain value (None: nothing comes back), or `expect_error` the qualified name of the error.
+"""
+from dataclasses import dataclass
+
+
+@dataclass
+class Scenario:
+    name: str
+    steps: list
+
+
+def plain_of(tagged):
+    """The plain form of a value that a scenario sends: what must come back when it is echoed."""
+    if tagged is None or isinstance(tagged, str):
+        return tagged
+    (tag, body), = tagged.items()
+    base, _, rest = tag.partition("[")
+    if tag == "list":
+        return {"list": [plain_of(item) for item in body]}
+    if tag.startswith("map"):
+        return {"map": [[key, plain_of(item)] for key, item in body]}
+    if tag == "varvalue":
+        return plain_of(body)
+    if base in ("Pose", "Everything"):
+        return {name: plain_of(field) for name, field in body.items()}
+    if base == "Sample":
+        if not rest:
+            return [{name: plain_of(field) for name, field in body.items()}]
+        if rest == "]":
+            return [{name: plain_of(field) for name, field in item.items()} for item in body]
+        return {"dims": body["dims"], "data": [{name: plain_of(field) for name, field in item.items()} for item in body["data"]]}
+    return body
+
+
+def round_trip(member, *values):
+    steps = []
+    for value in values:
+        steps.append({"set": member, "value": value, "expect": None})
+        steps.append({"get": member, "expect": plain_of(value)})
+    return steps
+
+
+POSE = {"Pose": {"px": {"double": 1.5}, "py": {"double": -2.25}, "label": "dock"}}
+OTHER_POSE = {"Pose": {"px": {"double": 0.0}, "py": {"double": 1e300}, "label": "Zürich ✓"}}
+SAMPLE = {"Sample": {"id": {"int32": -7}, "reading": {"double[]": [1.0, 2.0, 3.0]}, "tag": {"uint8[]": [9, 8]},
+                     "position": {"Vector3": [0.5, 0.25, 0.125]}}}
+OTHER_SAMPLE = {"Sample": {"id": {"int32": 2147483647}, "reading": {"double[]": [-1.0, 0.0, 1.0]}, "tag": {"uint8[]": []},
+                           "position": {"Vector3": [4.0, 5.0, 6.0]}}}
+TRANSFORM = {"Transform": [1.0, 0.0, 0.0, 0.0, 10.0, 20.0, 30.0]}
+EVERYTHING = {"Everything": {
+    "first": POSE,
+    "missing": None,
+    "items": {"list": [POSE, OTHER_POSE]},
+    "by_number": {"map{int32}": [[-1, POSE], [5, OTHER_POSE]]},
+    "by_name": {"map{string}": [["a", POSE], ["b c", OTHER_POSE]]},
+    "any": {"varvalue": {"double[]": [1.0, 2.0]}},
+    "nothing": None,
+    "fixed": {"int32[]": [1, 2, 3]},
+    "upto": {"int32[]": [4]},
+    "grid": {"double[*]": {"dims": [2, 2], "data": [1.0, 2.0, 3.0, 4.0]}},
+    "color": {"Color": -3},
+    "frame": TRANSFORM,
+    "points": {"Vector3[]": [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]},
+    "sample": SAMPLE,
+    "samples": {"Sample[]": [SAMPLE["Sample"], OTHER_SAMPLE["Sample"]]},
+    "names": {"list": ["one", "", "three"]},
+    "ok": {"bool": True},
+    "large": {"uint64": 18446744073709551615},
+}}
+
+INTEGERS = {"int8": 8, "int16": 16, "int32": 32, "int64": 64, "uint8": 8, "uint16": 16, "uint32": 32, "uint64": 64}
+
+
+def range_of(word):
+    bits = INTEGERS[word]
+    return (0, 2**bits - 1) if word.startswith("u") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+
+
+def json_integer(number):
+    """As plain results write it: beyond 2^53 as decimal text."""
+    return number if abs(number) <= 2**53 else str(number)
+
+
+def integer_scalars():
+    return [step for word in INTEGERS for step in round_trip(
+        "p_" + word, *({word: json_integer(number)} for number in range_of(word)), {word: 1})]
+
+
+def integer_arrays():
+    return [step for word in INTEGERS for step in round_trip(
+        f"p_{word}s", {word + "[]": [json_integer(number) for number in (*range_of(word), 0, 1)]}, {word + "[]": []})]
+
+
+EVERYTHING["Everything"]["large"] = {"uint64": str(2**64 - 1)}
+
+SCENARIOS = [
+    Scenario("property_numbers", integer_scalars()
+             + round_trip("p_double", {"double": 1.5}, {"double": -0.1}, {"double": 1e308}, {"double": 5e-324})
+             + round_trip("p_single", {"single": 1.5}, {"single": -0.25})
+             + round_trip("p_cdouble", {"cdouble": [1.5, -2.5]})
+             + round_trip("p_csingle", {"csingle": [0.5, 4.0]})
+             + round_trip("p_bool", {"bool": True}, {"bool": False})
+             + round_trip("p_color", {"Color": 2}, {"Color": -3})),
+    Scenario("property_string", round_trip("p_string", "", "plain", "Zürich ✓ 🤖", "x" * 100000, "a\tb\nc\"\\")),
+    Scenario("property_arrays", integer_arrays()
+             + round_trip("p_doubles", {"double[]": [1.0, -2.5, 1e-300]}, {"double[]": []}, {"double[]": [7.0]})
+             + round_trip("p_singles", {"single[]": [0.5, 0.25]})
+             + round_trip("p_cdoubles", {"cdouble[]": [[1.0, 2.0], [3.0, -4.0]]})
+             + round_trip("p_csingles", {"csingle[]": [[0.5, 0.25]]})
+             + round_trip("p_bools", {"bool[]": [True, False, True]})
+             + round_trip("p_three_doubles", {"double[]": [1.0, 2.0, 3.0]})
+             + round_trip("p_up_to_four", {"int32[]": []}, {"int32[]": [1, 2, 3, 4]})),
+    Scenario("property_multidim_arrays",
+             round_trip("p_grid", {"double[*]": {"dims": [2, 3], "data": [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]}},
+                        {"double[*]": {"dims": [2, 1, 2], "data": [1.0, 2.0, 3.0, 4.0]}})
+             + round_trip("p_two_by_three", {"int16[*]": {"dims": [2, 3], "data": [1, -2, 3, -4, 5, -6]}})
+             + round_trip("p_image", {"uint8[*]": {"dims": [3, 2], "data": [0, 1, 2, 253, 254, 255]}})),
+    Scenario("property_structures", round_trip("p_pose", POSE, OTHER_POSE, None) + round_trip("p_everything", EVERYTHING)),
+    Scenario("property_named_arrays", round_trip("p_vector", {"Vector3": [1.0, 2.0, 3.0]})
+             + round_trip("p_vectors", {"Vector3[]": [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]}, {"Vector3[]": []})
+             + round_trip("p_vector_grid", {"Vector3[*]": {"dims": [2, 2], "data": [float(n) for n in range(12)]}})
+             + round_trip("p_transform", TRANSFORM)),
+    Scenario("property_pods", round_trip("p_sample", SAMPLE)
+             + round_trip("p_samples", {"Sample[]": [SAMPLE["Sample"], OTHER_SAMPLE["Sample"]]}, {"Sample[]": []})
+             + round_trip("p_sample_grid", {"Sample[*]": {"dims": [1, 2], "data": [OTHER_SAMPLE["Sample"], SAMPLE["Sample"]]}})),
+    Scenario("property_containers",
+             round_trip("p_double_list", {"list": [{"double": 1.0}, {"double": 2.0}]}, {"list": []}, None)
+             + round_trip("p_string_list", {"list": ["a", "", "ü"]})
+             + round_trip("p_array_list", {"list": [{"double[]": [1.0, 2.0]}, {"double[]": [3.0]}]})
+             + round_trip("p_pose_list", {"list": [POSE, OTHER_POSE]})
+             + round_trip("p_double_map", {"map{int32}": [[-5, {"double": 1.0}], [0, {"double": 2.0}]]}, {"map{int32}": []})
+             + round_trip("p_string_map", {"map{string}": [["", "empty"], ["key two", "2"]]})
+             + round_trip("p_pose_map", {"map{string}": [["here", POSE]]})),
+    Scenario("property_varvalues",
+             round_trip("p_any", {"varvalue": "text"}, {"varvalue": {"double[]": [1.0, 2.0]}}, {"varvalue": POSE},
+                        {"varvalue": {"Vector3[]": [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]}}, None)
+             + round_trip("p_any_list", {"list": [{"varvalue": "text"}, {"varvalue": {"int16[]": [1, 2]}}]})
+             + round_trip("p_any_map", {"map{string}": [["a", {"varvalue": POSE}], ["b", {"varvalue": "text"}]]})),
+    Scenario("property_directions", [
+        {"get": "version", "expect": "1"},
+        {"set": "secret", "value": {"double": 4.5}, "expect": None},
+        {"get": "seen_secret", "expect": 4.5}]),
+    Scenario("functions", [
+        {"call": "nothing", "expect": None},
+        {"call": "add", "args": [{"double": 1.5}, {"double": 2.25}], "expect": 3.75},
+        {"call": "join", "args": [{"list": ["a", "b", "c"]}, ", "], "expect": "a, b, c"},
+        {"call": "shift", "args": [POSE, {"double": 1.0}, {"double": 0.25}],
+         "expect": {"px": 2.5, "py": -2.0, "label": "dock"}},
+        {"call": "ramp", "args": [{"uint32": 4}], "expect": [0.0, 1.0, 2.0, 3.0]},
+        {"call": "sum", "args": [{"double[]": [1.0, 2.0, 3.5]}], "expect": 6.5},
+        {"call": "echo", "args": [{"varvalue": "text"}], "expect": "text"}]),
+    Scenario("large_arrays", [
+        {"call": "ramp", "args": [{"uint32": 1310720}], "digest": True,
+         "expect": {"count": 1310720, "first": 0.0, "last": 1310719.0, "sum": 858992803840.0}},
+        {"call": "sum", "args": [{"ramp": 1310720}], "expect": 858992803840.0}]),
+    Scenario("errors", [
+        {"call": "fail", "args": ["custom", "it broke"], "expect_error": "experimental.interop.InteropError", "message": "it broke"},
+        {"call": "fail", "args": ["operation_failed", "no luck"], "expect_error": "RobotRaconteur.OperationFailed", "message": "no luck"},
+        {"call": "fail", "args": ["invalid_argument", "Zürich"], "expect_error": "RobotRaconteur.InvalidArgument", "message": "Zürich"},
+        {"call": "fail", "args": ["out_of_range", "too far"], "expect_error": "RobotRaconteur.OutOfRange", "message": "too far"},
+        {"call": "fail", "args": ["not_implemented", "later"], "expect_error": "RobotRaconteur.NotImplementedError", "message": "later"},
+        {"call": "add", "args": [{"double": 1.0}, {"double": 1.0}], "expect": 2.0}]),
+    Scenario("events", [
+        {"listen": "changed", "expect": None},
+        {"listen": "cleared", "expect": None},
+        {"call": "fire", "args": [{"int32": 3}], "expect": None},
+        {"events": "changed", "count": 3, "any_order": True, "expect": {"list": [[0.0, "number 0"], [1.0, "number 1"], [2.0, "number 2"]]}},
+        {"call": "clear", "expect": None},
+        {"events": "cleared", "count": 1, "expect": {"list": [[]]}}]),
+    Scenario("objects", [
+        {"get": "name", "on": ["head"], "expect": "head"},
+        {"call": "identify", "on": ["head"], "expect": "part head"},
+        {"set": "size", "value": {"double": 8.5}, "on": ["head"], "expect": None},
+        {"get": "size", "on": ["head"], "expect": 8.5},
+        {"call": "identify", "on": ["head", "inner"], "expect": "part head.inner"},
+        {"call": "identify", "on": [["parts", 7]], "expect": "part number 7"},
+        {"call": "identify", "on": [["parts", 0], "inner"], "expect": "part number 0.inner"},
+        {"call": "identify", "on": [["named", "left"]], "expect": "part named left"},
+        {"call": "identify", "on": [["named", "right hand"]], "expect": "part named right hand"},
+        {"call": "identify", "on": [["named", "a.b"]], "expect": "part named a.b"},
+        {"set": "feature", "value": "grip", "on": ["anything"], "expect": None},
+        {"get": "feature", "on": ["anything"], "expect": "grip"},
+        {"call": "identify", "on": [["parts", 99]], "expect_error": "RobotRaconteur.ObjectNotFound"},
+        {"call": "identify", "on": ["head"], "expect": "part head"}]),
+    Scenario("wires", [
+        {"connect": "state", "expect": None},
+        {"call": "publish_state", "args": [{"double[]": [1.0, 2.0]}], "expect": None},
+        {"in_value": "state", "until": [1.0, 2.0], "expect": [1.0, 2.0]},
+        {"call": "publish_state", "args": [{"double[]": [3.0]}], "expect": None},
+        {"in_value": "state", "until": [3.0], "expect": [3.0]},
+        {"peek_in": "state", "expect": [3.0]},
+        {"close": "state", "expect": None},
+        {"connect": "pose", "expect": None},
+        {"call": "publish_pose", "args": [POSE], "expect": None},
+        {"in_value": "pose", "until": plain_of(POSE), "expect": plain_of(POSE)},
+        {"connect": "target", "expect": None},
+        {"out_value": "target", "value": {"double": 6.25}, "expect": None},
+        {"get_until": "seen_target", "until": 6.25, "expect": 6.25},
+        {"close": "target", "expect": None},
+        {"connect": "both", "expect": None},
+        {"out_value": "both", "value": {"double": 21.0}, "expect": None},
+        {"in_value": "both", "until": 42.0, "expect": 42.0},
+        {"close": "both", "expect": None},
+        {"poke_out": "both", "value": {"double": 5.5}, "expect": None},
+        {"peek_out": "both", "expect": 5.5},
+        {"peek_in": "both", "expect": 11.0}]),
+]

@@ -1,0 +1,74 @@
+"""A TCP forwarder that remembers the bytes, to see what two peers have agreed on."""
+import socket
+import struct
+import threading
+
+
+class Tap:
+    def __init__(self, port):
+        self._target = ("127.0.0.1", port)
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.port = self._listener.getsockname()[1]
+        self.streams = []  # one bytearray for each direction of each connection
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def close(self):
+        self._listener.close()
+
+    def _accept(self):
+        while True:
+            try:
+                client, _ = self._listener.accept()
+            except OSError:
+                return
+            service = socket.create_connection(self._target)
+            for source, sink in ((client, service), (service, client)):
+                stream = bytearray()
+                self.streams.append(stream)
+                threading.Thread(target=forward, args=(source, sink, stream), daemon=True).start()
+
+    def level(self):
+        """"v2", "v4" or "v4+table": what the messages after the handshake are."""
+        seen = {message_level(message) for stream in self.streams for message in messages(bytes(stream))}
+        return max(seen, default=None)
+
+
+def forward(source, sink, stream):
+    try:
+        while data := source.recv(65536):
+            stream += data
+            sink.sendall(data)
+        sink.shutdown(socket.SHUT_WR)
+    except OSError:
+        pass
+
+
+def messages(stream):
+    while len(stream) >= 10:
+        magic, size = stream[:4], struct.unpack_from("<I", stream, 4)[0]
+        assert magic == b"RRAC", f"not a message: {stream[:16].hex()}"
+        if len(stream) < size:
+            return
+        yield stream[:size]
+        stream = stream[size:]
+
+
+def message_level(message):
+    version = struct.unpack_from("<H", message, 8)[0]
+    if version == 2:
+        return "v2"
+    header_size, width = read_uint(message, 10)
+    flags = message[10 + width]
+    has_local_table = flags & 0x20
+    _, width = read_uint(message, header_size)  # size of the first entry
+    has_coded_names = message[header_size + width] & 0x0A if header_size < len(message) else 0
+    return "v4+table" if has_local_table or has_coded_names else "v4"
+
+
+def read_uint(data, offset):
+    """A uint_x: one byte up to 252, then markers for 2, 4 and 8 bytes."""
+    first = data[offset]
+    if first <= 252:
+        return first, 1
+    size = {253: 2, 254: 4, 255: 8}[first]
+    return int.from_bytes(data[offset + 1 : offset + 1 + size], "little"), 1 + size

@@ -1,0 +1,44 @@
+"""Every scenario in every direction, and what the peers agreed on."""
+import json
+
+import pytest
+
+from directions import client_command
+from processes import run_client
+from scenarios import SCENARIOS
+from tap import Tap
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda scenario: scenario.name)
+def test_scenario(link, scenario):
+    direction, _, port = link
+    results = run_client(client_command(direction, port), scenario)
+    assert len(results) == len(scenario.steps)
+    for number, (step, result) in enumerate(zip(scenario.steps, results), 1):
+        check(f"step {number}: {json.dumps(step, ensure_ascii=False)[:400]}", step, result)
+
+
+def check(what, step, result):
+    if "expect_error" in step:
+        assert "error" in result, f"{what}\nwanted an error, got {result}"
+        assert result["error"]["name"] == step["expect_error"], what
+        assert step.get("message", "") in result["error"]["message"], what
+        return
+    assert "error" not in result, f"{what}\nfailed: {result['error']}"
+    wanted, found = step["expect"], result.get("value")
+    if step.get("any_order"):  # The reference hands events to a pool of threads.
+        wanted, found = ({"list": sorted(value["list"])} for value in (wanted, found))
+    assert found == wanted, what
+
+
+@pytest.mark.direct
+def test_agreed_level(link):
+    """The level that the service was started with is the level on the wire."""
+    direction, level, port = link
+    tap = Tap(port)
+    try:
+        functions = next(scenario for scenario in SCENARIOS if scenario.name == "functions")
+        run_client(client_command(direction, tap.port), functions)
+        assert tap.level() == level
+    finally:
+        tap.close()
