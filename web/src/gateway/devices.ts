@@ -1,0 +1,136 @@
+// What the gateway says about its devices, asked again every two seconds while somebody looks.
+// Layer: web/gateway. Source: GET /api/v1/devices.
+
+import { Store } from "../app/store";
+
+export type DeviceState = "online" | "offline" | "connecting";
+
+export interface Service {
+  name: string;
+  /** Qualified type of the root object; empty until the gateway has read it. */
+  type: string;
+}
+
+export interface Device {
+  name: string;
+  url: string;
+  node_id: string;
+  node_name: string;
+  state: DeviceState;
+  last_error: string | null;
+  services: Service[];
+}
+
+export type GatewayState =
+  | { kind: "loading" }
+  | { kind: "known"; devices: Device[] }
+  /** The gateway does not answer; `devices` is what it said last, null if it never did. */
+  | { kind: "away"; since: number; reason: string; devices: Device[] | null };
+
+const POLL_MS = 2_000;
+const DEADLINE_MS = 5_000;
+
+export class DeviceList {
+  readonly state = new Store<GatewayState>({ kind: "loading" });
+  #timer: ReturnType<typeof setTimeout> | undefined;
+  #abort: AbortController | null = null;
+
+  start(): void {
+    document.addEventListener("visibilitychange", this.#on_visibility);
+    void this.#poll();
+  }
+
+  stop(): void {
+    document.removeEventListener("visibilitychange", this.#on_visibility);
+    clearTimeout(this.#timer);
+    this.#abort?.abort();
+    this.#abort = null;
+  }
+
+  /** Asks now. */
+  refresh(): void {
+    if (this.#abort) return;
+    clearTimeout(this.#timer);
+    void this.#poll();
+  }
+
+  readonly #on_visibility = (): void => {
+    if (!document.hidden) this.refresh();
+  };
+
+  async #poll(): Promise<void> {
+    const abort = new AbortController();
+    this.#abort = abort;
+    const deadline = setTimeout(() => abort.abort(new Error("the gateway did not answer within 5 s")), DEADLINE_MS);
+    try {
+      const devices = await fetch_devices(abort.signal);
+      if (this.#abort !== abort) return;
+      this.state.value = { kind: "known", devices };
+    } catch (error) {
+      if (this.#abort !== abort) return;
+      const before = this.state.value;
+      this.state.value = {
+        kind: "away",
+        since: before.kind === "away" ? before.since : Date.now(),
+        reason: error instanceof TypeError ? "the gateway cannot be reached" : (error as Error).message,
+        devices: before.kind === "loading" ? null : before.devices,
+      };
+    } finally {
+      clearTimeout(deadline);
+    }
+    this.#abort = null;
+    // A hidden tab asks five times less often: enough to be right when it is shown.
+    this.#timer = setTimeout(() => void this.#poll(), document.hidden ? POLL_MS * 5 : POLL_MS);
+  }
+}
+
+export function devices_of(state: GatewayState): Device[] | null {
+  return state.kind === "loading" ? null : state.devices;
+}
+
+async function fetch_devices(signal: AbortSignal): Promise<Device[]> {
+  const response = await fetch(new URL("api/v1/devices", document.baseURI), { signal, cache: "no-store" });
+  if (!response.ok) throw new Error(`the gateway answered ${response.status} ${response.statusText}`.trim());
+  return read_devices(await response.json());
+}
+
+/** Reads the answer field by field: an older or newer gateway may leave some out. @throws Error when it is no list. */
+export function read_devices(answer: unknown): Device[] {
+  const list = (answer as { devices?: unknown } | null)?.devices;
+  if (!Array.isArray(list)) throw new Error('the answer of the gateway has no list "devices"');
+  return list.filter(is_record).map((device) => ({
+    name: text(device["name"]),
+    url: text(device["url"]),
+    node_id: text(device["node_id"]),
+    node_name: text(device["node_name"]),
+    state: state_of(device["state"]),
+    last_error: typeof device["last_error"] === "string" ? device["last_error"] : null,
+    services: read_services(device["services"]),
+  }));
+}
+
+function read_services(services: unknown): Service[] {
+  if (!Array.isArray(services)) return [];
+  return services.filter(is_record).map((service) => ({ name: text(service["name"]), type: text(service["type"]) }));
+}
+
+function state_of(state: unknown): DeviceState {
+  return state === "online" || state === "connecting" ? state : "offline";
+}
+
+function text(value: unknown): string {
+  return typeof value === "string" ? value : "";
+}
+
+function is_record(value: unknown): value is Record<string, unknown> {
+  return typeof value === "object" && value !== null;
+}
+
+/** Where a service of a device is reached through the gateway that served this page. */
+export function relay_url(device: string, service: string, base: string = document.baseURI): string {
+  const url = new URL(`devices/${encodeURIComponent(device)}`, base);
+  url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
+  url.search = new URLSearchParams({ service }).toString();
+  url.hash = "";
+  return url.href;
+}

@@ -1,0 +1,224 @@
+// What is known of the demo robot: pose, trail, readings and bumps. Outlives connections, so nothing is lost with one.
+// Layer: web/robot. Source: experimental.create (and create2); members beyond it are used when the device has them.
+
+import { Store } from "../app/store";
+import { Reckoner } from "./reckoning";
+import type { Pose } from "./reckoning";
+import { explain } from "./remote";
+import type { Remote } from "./remote";
+import { pose_of, walls_of } from "./room";
+import type { Wall } from "./room";
+import { read_sensor_packet } from "./sensor_packet";
+import { Series } from "./series";
+import { Trail } from "./trail";
+
+export interface Bump {
+  number: number;
+  time: number;
+  side: string;
+  pose: Pose;
+}
+
+export interface Readings {
+  distance_mm: number | null;
+  angle_deg: number | null;
+  bumpers: number | null;
+  left_wheel_mm_s: number | null;
+  right_wheel_mm_s: number | null;
+  packet: { id: number; bytes: Uint8Array } | null;
+}
+
+const POLL_MS = 100;
+const RETRY_MS = 1_000;
+const SHOW_MS = 100; // numbers faster than this cannot be read
+const MAX_BUMPS = 200;
+const NO_READINGS: Readings = {
+  distance_mm: null,
+  angle_deg: null,
+  bumpers: null,
+  left_wheel_mm_s: null,
+  right_wheel_mm_s: null,
+  packet: null,
+};
+
+export class RobotModel {
+  pose: Pose = { x: 0, y: 0, theta: 0 };
+  /** Whether the device tells its pose itself; else it is reckoned from distance and angle. */
+  readonly pose_source = new Store<"device" | "reckoned">("reckoned");
+  readonly trail = new Trail();
+  readonly walls = new Store<readonly Wall[]>([]);
+  readonly readings = new Store<Readings>(NO_READINGS);
+  readonly bumps = new Store<readonly Bump[]>([]);
+  readonly series = {
+    distance: new Series(),
+    angle: new Series(),
+    left_wheel: new Series(),
+    right_wheel: new Series(),
+    packets: new Series(5_000),
+  };
+  /** The last thing that failed while reading, shown beside the values; null when all is well. */
+  readonly trouble = new Store<string | null>(null);
+
+  readonly #reckoner = new Reckoner();
+  readonly #moved = new Set<() => void>();
+  #latest: Readings = NO_READINGS;
+  #show_timer: ReturnType<typeof setTimeout> | undefined;
+  #bump_count = 0;
+
+  /** Runs `moved` whenever the map needs a new picture. */
+  on_moved(moved: () => void): () => void {
+    this.#moved.add(moved);
+    return () => void this.#moved.delete(moved);
+  }
+
+  /** Follows a connected robot until `signal` aborts. */
+  attach(remote: Remote, signal: AbortSignal): void {
+    this.trouble.value = null;
+    this.#reckoner.rebase();
+    const guard = (what: string, work: Promise<void>): void => {
+      work.catch((error: unknown) => {
+        if (!signal.aborted) this.trouble.value = `${what}: ${explain(error)}`;
+      });
+    };
+    guard("reading walls", this.#read_walls(remote));
+    const state = remote.members.find((m) => m.kind === "wire" && /^(state|pose)$/i.test(m.name));
+    this.pose_source.value = state ? "device" : "reckoned";
+    if (state) guard(`wire ${state.name}`, this.#follow_state(remote, state.name, signal));
+    void this.#keep_polling(remote, signal);
+    if (remote.has("packets", "wire")) guard("wire packets", this.#follow_packets(remote, signal));
+    if (remote.has("Bump", "event")) this.#follow_bumps(remote, signal);
+  }
+
+  clear_trail(): void {
+    this.trail.clear();
+    this.bumps.value = [];
+    this.#redraw();
+  }
+
+  async #read_walls(remote: Remote): Promise<void> {
+    const member = remote.members.find((m) => m.kind === "property" && /^(walls|room)$/i.test(m.name));
+    if (!member) return;
+    this.walls.value = walls_of(await remote.get(member.name));
+    this.#redraw();
+  }
+
+  async #follow_state(remote: Remote, wire: string, signal: AbortSignal): Promise<void> {
+    for await (const value of remote.wire(wire, signal)) {
+      const pose = pose_of(value);
+      if (pose) this.#move_to(pose);
+    }
+  }
+
+  /** Each round begins after the one before it is answered; a failed one is shown and tried again a second later. */
+  async #keep_polling(remote: Remote, signal: AbortSignal): Promise<void> {
+    let failed = false;
+    while (!signal.aborted) {
+      try {
+        await this.#poll_once(remote, signal);
+        if (failed) this.trouble.value = null;
+        failed = false;
+      } catch (error) {
+        if (signal.aborted) return;
+        failed = true;
+        this.trouble.value = `reading values: ${explain(error)}`;
+      }
+      await pause(failed ? RETRY_MS : POLL_MS, signal);
+    }
+  }
+
+  async #poll_once(remote: Remote, signal: AbortSignal): Promise<void> {
+    const read = async (name: string): Promise<number | null> =>
+      remote.has(name, "property") ? Number(await remote.get(name)) : null;
+    const [distance_mm, angle_deg, bumpers] = await Promise.all([
+      read("DistanceTraveled"),
+      read("AngleTraveled"),
+      read("Bumpers"),
+    ]);
+    if (signal.aborted) return;
+    const now = performance.now();
+    if (distance_mm !== null) this.series.distance.push(now, distance_mm);
+    if (angle_deg !== null) this.series.angle.push(now, angle_deg);
+    if (distance_mm !== null && angle_deg !== null && this.pose_source.value === "reckoned") {
+      this.#move_to(this.#reckoner.update(distance_mm, angle_deg));
+    }
+    this.#show({ distance_mm, angle_deg, ...(bumpers === null ? {} : { bumpers }) });
+  }
+
+  async #follow_packets(remote: Remote, signal: AbortSignal): Promise<void> {
+    const values = remote.wire("packets", signal);
+    if (remote.has("StartStreaming", "function")) {
+      await remote.call("StartStreaming", []);
+      signal.addEventListener("abort", () => {
+        remote.call("StopStreaming", []).catch(() => undefined); // the connection may be gone, and the stream with it
+      });
+    }
+    for await (const value of values) this.#take_packet(value);
+  }
+
+  #take_packet(value: unknown): void {
+    const { ID, Data } = (value ?? {}) as { ID?: unknown; Data?: unknown };
+    if (typeof ID !== "number" || !(Data instanceof Uint8Array)) return;
+    const now = performance.now();
+    const { bumpers, left_wheel_mm_s, right_wheel_mm_s } = read_sensor_packet(ID, Data);
+    this.series.packets.push(now, Data.length);
+    if (left_wheel_mm_s !== undefined) this.series.left_wheel.push(now, left_wheel_mm_s);
+    if (right_wheel_mm_s !== undefined) this.series.right_wheel.push(now, right_wheel_mm_s);
+    this.#show({
+      packet: { id: ID, bytes: Data },
+      ...(bumpers === undefined ? {} : { bumpers }),
+      ...(left_wheel_mm_s === undefined ? {} : { left_wheel_mm_s }),
+      ...(right_wheel_mm_s === undefined ? {} : { right_wheel_mm_s }),
+    });
+  }
+
+  #follow_bumps(remote: Remote, signal: AbortSignal): void {
+    const unsubscribe = remote.on("Bump", () => {
+      const time = Date.now();
+      // The event has no parameters; the side is in the property, read while the robot still touches.
+      const bumpers = remote.has("Bumpers", "property") ? remote.get("Bumpers") : Promise.resolve(0);
+      bumpers.then(Number).catch(() => 0).then((bits) => this.#log_bump(time, bits), () => undefined);
+    });
+    signal.addEventListener("abort", unsubscribe, { once: true });
+  }
+
+  #log_bump(time: number, bits: number): void {
+    const bump: Bump = { number: ++this.#bump_count, time, side: side_of(bits), pose: this.pose };
+    this.bumps.value = [bump, ...this.bumps.value].slice(0, MAX_BUMPS);
+    this.#redraw();
+  }
+
+  #move_to(pose: Pose): void {
+    this.pose = pose;
+    this.trail.add({ x: pose.x, y: pose.y });
+    this.#redraw();
+  }
+
+  #show(change: Partial<Readings>): void {
+    this.#latest = { ...this.#latest, ...change };
+    this.#show_timer ??= setTimeout(() => {
+      this.#show_timer = undefined;
+      this.readings.value = this.#latest;
+    }, SHOW_MS);
+  }
+
+  #redraw(): void {
+    for (const moved of this.#moved) moved();
+  }
+}
+
+export function side_of(bits: number): string {
+  return ["", "right", "left", "both sides"][bits & 3] ?? "";
+}
+
+/** The Create by its name, or by the two members that the page cannot do without. */
+export function is_create(remote: Remote): boolean {
+  const drive = remote.members.find((m) => m.name === "Drive" && m.kind === "function");
+  return drive?.parameters.length === 2 && drive.parameters.every((p) => p.type === "int16") && remote.has("DistanceTraveled", "property");
+}
+
+function pause(ms: number, signal: AbortSignal): Promise<void> {
+  return new Promise((resolve) => {
+    const timer = setTimeout(resolve, ms);
+    signal.addEventListener("abort", () => (clearTimeout(timer), resolve()), { once: true });
+  });
+}

@@ -1,0 +1,42 @@
+// The last seconds of one number, for a small plot.
+// Layer: web/robot, pure.
+
+export interface Sample {
+  /** Milliseconds, any clock that only grows. */
+  t: number;
+  value: number;
+}
+
+export class Series {
+  readonly #samples: Sample[] = [];
+  readonly #window_ms: number;
+  readonly #limit: number;
+
+  /** Keeps `window_ms` of samples, and `limit` of them at most. */
+  constructor(window_ms = 30_000, limit = 1200) {
+    this.#window_ms = window_ms;
+    this.#limit = limit;
+  }
+
+  push(t: number, value: number): void {
+    if (!Number.isFinite(value)) return;
+    this.#samples.push({ t, value });
+    let stale = Math.max(0, this.#samples.length - this.#limit);
+    while (stale < this.#samples.length - 1 && (this.#samples[stale]?.t ?? t) < t - this.#window_ms) stale++;
+    if (stale > 0) this.#samples.splice(0, stale);
+  }
+
+  get samples(): readonly Sample[] {
+    return this.#samples;
+  }
+
+  get newest(): Sample | undefined {
+    return this.#samples[this.#samples.length - 1];
+  }
+}
+
+/** Samples per second over the last two seconds before `now`. */
+export function rate_of(series: Series, now: number): number {
+  const recent = series.samples.filter((sample) => sample.t > now - 2000).length;
+  return recent / 2;
+}

@@ -1,0 +1,177 @@
+// Turns what a person typed into the value that a member of a given type takes.
+// Layer: web/values, pure. Named types (struct, enum, pod) are typed in as JSON; their definition is checked by the client.
+
+import { INTEGER_RANGES, is_complex, is_float, is_integer, is_numeric, is_wide_integer, parse_type } from "./type_text";
+import type { TypeText } from "./type_text";
+
+/**
+ * Scalars are typed plainly (`12`, `0x1f`, `-1.5e3`, `true`), strings as they are, numeric arrays as `1, 2, 3` or JSON,
+ * everything else as JSON.
+ * @throws Error with what was found and what was expected.
+ */
+export function parse_input(text: string, type_text: string): unknown {
+  const type = parse_type(type_text);
+  if (type.container === "none" && type.array === "none") {
+    if (type.base === "string") return text;
+    if (is_numeric(type.base) && !is_complex(type.base)) return scalar(text.trim(), type.base);
+  }
+  const source = text.trim();
+  if (source === "") {
+    if (type.container === "none" && (type.array === "any" || type.array === "max") && is_numeric(type.base)) {
+      return typed_array([], type);
+    }
+    throw new Error(`nothing given; expected ${describe(type_text, type)}`);
+  }
+  if (type.container === "none" && type.array !== "none" && type.array !== "multidim" && is_numeric(type.base)) {
+    if (!source.startsWith("[")) return typed_array(source.split(/[\s,;]+/).filter(Boolean), type);
+  }
+  return convert(read_json(source, type_text, type), type);
+}
+
+/** An example of what to type, shown in an empty field. */
+export function placeholder(type_text: string): string {
+  const type = parse_type(type_text);
+  if (type.container === "list") return "[…]";
+  if (type.container !== "none") return type.container === "int32" ? '{"0": …}' : '{"key": …}';
+  if (type.array === "multidim") return '{"dims": [2, 2], "data": [1, 2, 3, 4]}';
+  if (type.array !== "none") return is_numeric(type.base) ? "1, 2, 3" : "[…]";
+  if (type.base === "string") return "text";
+  if (is_complex(type.base)) return "[re, im]";
+  if (is_float(type.base)) return "0.0";
+  if (is_integer(type.base)) return "0";
+  return '{"field": …} or a number';
+}
+
+function describe(text: string, type: TypeText): string {
+  return `${text}, such as ${placeholder(text).replace("…", type.base === "string" ? '"text"' : "1")}`;
+}
+
+function read_json(source: string, text: string, type: TypeText): unknown {
+  try {
+    // A 64-bit integer beyond 2^53 would be rounded by JSON.parse: quote long bare integers, `scalar` reads strings.
+    return JSON.parse(is_wide_integer(type.base) ? source.replace(/(?<![\w".])-?\d{16,}(?![\w".])/g, '"$&"') : source);
+  } catch {
+    throw new Error(`${quote(source)} is not valid JSON; expected ${describe(text, type)}`);
+  }
+}
+
+function convert(json: unknown, type: TypeText): unknown {
+  if (json === null) return null;
+  const element: TypeText = { ...type, container: "none" };
+  if (type.container === "list" || type.container === "generator") {
+    if (!Array.isArray(json)) throw new Error(`found ${kind_of(json)}, expected a list [ … ]`);
+    return json.map((item) => convert(item, element));
+  }
+  if (type.container === "string" || type.container === "int32") return convert_map(json, element, type.container);
+  if (type.array === "multidim" && is_numeric(type.base)) return multidim(json, type);
+  if (type.array !== "none" && is_numeric(type.base)) {
+    if (!Array.isArray(json)) throw new Error(`found ${kind_of(json)}, expected numbers [ … ]`);
+    return typed_array(json, type);
+  }
+  if (is_complex(type.base)) return complex(json);
+  if (is_numeric(type.base)) return scalar(json, type.base);
+  if (type.base === "string" && typeof json !== "string") throw new Error(`found ${kind_of(json)}, expected a "string"`);
+  return json;
+}
+
+function convert_map(json: unknown, element: TypeText, keys: "string" | "int32"): Map<string | number, unknown> {
+  if (typeof json !== "object" || json === null || Array.isArray(json)) {
+    throw new Error(`found ${kind_of(json)}, expected a map {"key": …}`);
+  }
+  const map = new Map<string | number, unknown>();
+  for (const [key, value] of Object.entries(json)) {
+    map.set(keys === "int32" ? (scalar(key, "int32") as number) : key, convert(value, element));
+  }
+  return map;
+}
+
+function multidim(json: unknown, type: TypeText): { dims: number[]; data: unknown } {
+  const { dims, data } = (json ?? {}) as { dims?: unknown; data?: unknown };
+  if (!Array.isArray(dims) || !Array.isArray(data)) {
+    throw new Error(`found ${kind_of(json)}, expected {"dims": [rows, columns], "data": [column by column]}`);
+  }
+  const sizes = dims.map((d) => scalar(d, "uint32") as number);
+  const count = sizes.reduce((product, size) => product * size, 1);
+  if (count !== data.length) throw new Error(`dims ${sizes.join(" × ")} need ${count} elements, found ${data.length}`);
+  return { dims: sizes, data: typed_array(data, { ...type, array: "any", sizes: [] }) };
+}
+
+function complex(json: unknown): [number, number] {
+  if (!Array.isArray(json) || json.length !== 2) throw new Error(`found ${kind_of(json)}, expected [re, im]`);
+  return [scalar(json[0], "double") as number, scalar(json[1], "double") as number];
+}
+
+function scalar(found: unknown, base: string): number | bigint | boolean {
+  if (base === "bool") {
+    if (found === true || found === "true" || found === "1") return true;
+    if (found === false || found === "false" || found === "0") return false;
+    throw new Error(`${quote(found)} is not a bool; expected true or false`);
+  }
+  const text = String(found).trim();
+  if (is_float(base)) {
+    const number = /^[+-]?(inf|infinity)$/i.test(text) ? (text.startsWith("-") ? -Infinity : Infinity) : Number(text);
+    if (text === "" || (Number.isNaN(number) && !/^nan$/i.test(text))) {
+      throw new Error(`${quote(found)} is not a number; expected a ${base} such as 1.5 or -2e3`);
+    }
+    return number;
+  }
+  return integer(text, base);
+}
+
+function integer(text: string, base: string): number | bigint {
+  const [low, high] = INTEGER_RANGES[base] ?? [0n, 0n];
+  const match = /^([+-]?)(0x[0-9a-f]+|\d+)$/i.exec(text);
+  if (!match) throw new Error(`${quote(text)} is not a whole number; expected ${base}, ${low} to ${high}`);
+  const magnitude = BigInt(match[2] ?? "0");
+  const value = match[1] === "-" ? -magnitude : magnitude;
+  if (value < low || value > high) throw new Error(`${text} is out of range; expected ${base}, ${low} to ${high}`);
+  return is_wide_integer(base) ? value : Number(value);
+}
+
+const ARRAY_OF: Readonly<Record<string, new (length: number) => ArrayLike<number>>> = {
+  double: Float64Array,
+  single: Float32Array,
+  int8: Int8Array,
+  uint8: Uint8Array,
+  int16: Int16Array,
+  uint16: Uint16Array,
+  int32: Int32Array,
+  uint32: Uint32Array,
+  bool: Uint8Array,
+};
+
+function typed_array(items: readonly unknown[], type: TypeText): unknown {
+  check_length(items.length, type);
+  if (is_complex(type.base)) return items.map(complex);
+  const values = items.map((item, index) => {
+    try {
+      return scalar(item, type.base);
+    } catch (error) {
+      throw new Error(`element ${index}: ${(error as Error).message}`, { cause: error });
+    }
+  });
+  if (type.base === "int64") return BigInt64Array.from(values as bigint[]);
+  if (type.base === "uint64") return BigUint64Array.from(values as bigint[]);
+  const make = ARRAY_OF[type.base];
+  if (!make) throw new Error(`arrays of ${type.base} cannot be typed in here`);
+  const array = new make(values.length) as { [index: number]: number; length: number };
+  values.forEach((value, index) => (array[index] = Number(value)));
+  return array;
+}
+
+function check_length(found: number, type: TypeText): void {
+  const size = type.sizes[0] ?? 0;
+  if (type.array === "fixed" && found !== size) throw new Error(`found ${found} elements, expected exactly ${size}`);
+  if (type.array === "max" && found > size) throw new Error(`found ${found} elements, expected at most ${size}`);
+}
+
+function quote(found: unknown): string {
+  const text = String(found);
+  return `"${text.length > 40 ? `${text.slice(0, 40)}…` : text}"`;
+}
+
+function kind_of(json: unknown): string {
+  if (json === null) return "null";
+  if (Array.isArray(json)) return `a list of ${json.length}`;
+  return typeof json === "object" ? "an object" : `${typeof json} ${quote(json)}`;
+}

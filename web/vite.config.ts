@@ -1,0 +1,30 @@
+// Build of the dashboard: static files with hashed names, no inline script or style, so that the gateway can send
+// `script-src 'self' 'wasm-unsafe-eval'`. `npm run dev` talks to a gateway on RRGATE_URL (default 127.0.0.1:8080).
+import { defineConfig } from "vitest/config";
+
+const gateway = process.env["RRGATE_URL"] ?? "http://127.0.0.1:8080";
+
+export default defineConfig({
+  base: "./",
+  oxc: { jsx: { runtime: "automatic", importSource: "preact" } },
+  build: {
+    outDir: "dist",
+    assetsDir: "assets",
+    assetsInlineLimit: 0, // the wasm file stays a file of its own; data: URLs would need a wider policy
+    modulePreload: { polyfill: false }, // the polyfill is an inline script in older browsers' path
+    target: "es2022",
+  },
+  // Pre-bundling would move the module away from the `rrgate.wasm` that it finds by import.meta.url.
+  optimizeDeps: { exclude: ["rrgate-client"] },
+  server: {
+    proxy: {
+      "/api": gateway,
+      "/devices": { target: gateway, ws: true },
+    },
+  },
+  test: {
+    root: "..",
+    include: ["test/web/**/*.test.ts"],
+    globals: true,
+  },
+});
