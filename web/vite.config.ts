@@ -1,8 +1,9 @@
 // Build of the dashboard: static files with hashed names, no inline script or style, so that the gateway can send
 // `script-src 'self' 'wasm-unsafe-eval'`. `npm run dev` talks to a gateway on RRGATE_URL (default 127.0.0.1:8080).
+import { loadEnv } from "vite";
 import { defineConfig } from "vitest/config";
 
-const gateway = process.env["RRGATE_URL"] ?? "http://127.0.0.1:8080";
+const gateway = loadEnv("", ".", "RRGATE_")["RRGATE_URL"] ?? "http://127.0.0.1:8080";
 
 export default defineConfig({
   base: "./",

@@ -10,7 +10,7 @@ import type { Palette } from "./palette";
 export type Paint = (ctx: CanvasRenderingContext2D, width: number, height: number, palette: Palette) => void;
 
 /** @returns the ref for the canvas, and `redraw`, which asks for a new picture. Size and colour changes ask by themselves. */
-export function useCanvas(paint: Paint): { canvas: RefObject<HTMLCanvasElement>; redraw: () => void } {
+export function useCanvas(paint: Paint): { canvas: RefObject<HTMLCanvasElement | null>; redraw: () => void } {
   const canvas = useRef<HTMLCanvasElement>(null);
   const latest = useRef(paint);
   latest.current = paint;

@@ -1,0 +1,106 @@
+// The frame around every page: head line, the news about the gateway, and the page that the address names.
+// Layer: web/app.
+
+import { useEffect, useRef } from "preact/hooks";
+import { useStore } from "./store";
+import type { Store } from "./store";
+import { format_route, format_step } from "./router";
+import type { Route } from "./router";
+import { theme } from "./theme";
+import type { Theme } from "./theme";
+import type { DeviceList } from "../gateway/devices";
+import { DevicesPage } from "../pages/devices_page";
+import { ServicePage } from "../pages/service_page";
+import { Mark, SunMoonIcon } from "../ui/icons";
+
+export function App({ route, list }: { route: Store<Route>; list: DeviceList }) {
+  const where = useStore(route);
+  const main = useRef<HTMLElement>(null);
+  const title = title_of(where);
+  const first = useRef(true);
+  useEffect(() => {
+    document.title = title === "" ? "rrgate" : `${title} · rrgate`;
+    // A new page is a new place for the keyboard and the screen reader, but not on arrival.
+    if (!first.current) main.current?.focus({ preventScroll: true });
+    first.current = false;
+  }, [title]);
+  return (
+    <>
+      <a class="skip" href="#main" onClick={(event) => (event.preventDefault(), main.current?.focus())}>
+        Skip to content
+      </a>
+      <header class="head">
+        <a class="brand" href="#/">
+          <Mark />
+          <span>rrgate</span>
+        </a>
+        <Crumbs route={where} />
+        <ThemeButton />
+      </header>
+      <main id="main" ref={main} tabIndex={-1}>
+        {where.page === "devices" && <DevicesPage list={list} />}
+        {where.page === "service" && <ServicePage key={`${where.device}/${where.service}`} route={where} list={list} />}
+        {where.page === "unknown" && <UnknownPage address={where.address} />}
+      </main>
+    </>
+  );
+}
+
+function Crumbs({ route }: { route: Route }) {
+  if (route.page !== "service") return <span class="crumbs" />;
+  const { device, service, path, view } = route;
+  const links = [
+    { text: device, href: path.length > 0 || view === "members" ? format_route(device, service) : null },
+    ...path.map((step, depth) => ({
+      text: format_step(step),
+      href: depth < path.length - 1 ? format_route(device, service, path.slice(0, depth + 1)) : null,
+    })),
+  ];
+  return (
+    <nav class="crumbs" aria-label="Where you are">
+      <ol>
+        {links.map(({ text, href }) => (
+          <li key={text}>{href === null ? <span aria-current="page">{text}</span> : <a href={href}>{text}</a>}</li>
+        ))}
+      </ol>
+    </nav>
+  );
+}
+
+const NEXT: Readonly<Record<Theme, Theme>> = { system: "light", light: "dark", dark: "system" };
+
+function ThemeButton() {
+  const chosen = useStore(theme);
+  return (
+    <button
+      class="icon-button"
+      type="button"
+      title={`Colours: ${chosen}`}
+      aria-label={`Colours: ${chosen}. Change to ${NEXT[chosen]}`}
+      onClick={() => (theme.value = NEXT[chosen])}
+    >
+      <SunMoonIcon theme={chosen} />
+    </button>
+  );
+}
+
+function UnknownPage({ address }: { address: string }) {
+  return (
+    <div class="page page-narrow">
+      <h1>No such page</h1>
+      <p>
+        There is nothing at <code>{address}</code>. Services live at <code>/devices/&lt;device&gt;/&lt;service&gt;</code>.
+      </p>
+      <p>
+        <a href="#/">All devices</a>
+      </p>
+    </div>
+  );
+}
+
+function title_of(route: Route): string {
+  if (route.page === "devices") return "Devices";
+  if (route.page === "unknown") return "No such page";
+  const last = route.path[route.path.length - 1];
+  return last ? `${format_step(last)} of ${route.device}` : route.device;
+}

@@ -1,0 +1,193 @@
+// Live pictures of the webcam service behind the same gateway, one `CaptureFrame` after the other.
+// Layer: web/camera.
+
+import { useEffect, useRef, useState } from "preact/hooks";
+import { useStore } from "../app/store";
+import { devices_of, relay_url } from "../gateway/devices";
+import type { DeviceList, GatewayState } from "../gateway/devices";
+import { Link } from "../robot/link";
+import { explain, open_remote } from "../robot/remote";
+import type { Remote } from "../robot/remote";
+import { read_frame } from "./frame";
+import { clock_time } from "../ui/time";
+
+const PAUSE_MS = 80; // between frames, so that the camera never takes the line from the robot
+
+interface Place {
+  device: string;
+  service: string;
+}
+
+/** The robot's own webcam service, else the first one that another device offers. */
+export function find_camera(gateway: GatewayState, robot: string): Place | null {
+  const found = (devices_of(gateway) ?? []).flatMap((device) =>
+    device.services
+      .filter((service) => service.type.endsWith(".WebcamHost"))
+      .map((service) => ({ device: device.name, service: service.name })),
+  );
+  return found.find((place) => place.device === robot) ?? found[0] ?? null;
+}
+
+export function CameraView({ list, robot, shown }: { list: DeviceList; robot: string; shown: boolean }) {
+  const gateway = useStore(list.state);
+  const now_found = find_camera(gateway, robot);
+  // A camera that was there stays: its device may be away for a while, and its services with it.
+  const [place, set_place] = useState<Place | null>(null);
+  useEffect(() => {
+    if (now_found && (place?.device !== now_found.device || place.service !== now_found.service)) {
+      if (place === null || devices_of(gateway)?.some((d) => d.name === place.device) === false) set_place(now_found);
+    }
+  }, [now_found?.device, now_found?.service]);
+  return (
+    <section class="panel camera" aria-labelledby="camera-title">
+      <h2 id="camera-title">Camera</h2>
+      {place ? <Camera key={`${place.device}/${place.service}`} place={place} shown={shown} /> : <NoCamera loading={gateway.kind === "loading"} />}
+    </section>
+  );
+}
+
+function NoCamera({ loading }: { loading: boolean }) {
+  return (
+    <div class="camera-frame">
+      <p class="camera-note">
+        {loading ? "Looking for a camera …" : "No device behind this gateway offers a webcam service right now."}
+      </p>
+    </div>
+  );
+}
+
+function Camera({ place, shown }: { place: Place; shown: boolean }) {
+  const [link, set_link] = useState<Link | null>(null);
+  useEffect(() => {
+    const url = relay_url(place.device, place.service);
+    const made = new Link((signal) => open_remote(url, signal));
+    set_link(made);
+    return () => made.dispose();
+  }, [place.device, place.service]);
+  return link && <Picture link={link} place={place} shown={shown} />;
+}
+
+function Picture({ link, place, shown }: { link: Link; place: Place; shown: boolean }) {
+  const state = useStore(link.state);
+  const remote = state.kind === "online" ? state.remote : null;
+  const cameras = useCameras(remote);
+  const [chosen, set_chosen] = useState<number | null>(null);
+  const index = chosen !== null && cameras.some((c) => c.index === chosen) ? chosen : (cameras[0]?.index ?? null);
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const { failure, has_frame, size } = useFrames(canvas, remote, index, shown);
+  const note =
+    state.kind === "lost"
+      ? `No connection to ${place.device} since ${clock_time(state.since)}. Retrying by itself.`
+      : (failure ?? (has_frame ? null : "Waiting for the first picture …"));
+  return (
+    <>
+      <div class={`camera-frame ${note !== null && has_frame ? "is-stale" : ""}`}>
+        <canvas ref={canvas} width={4} height={3} role="img" aria-label={`Picture from camera ${cameras.find((c) => c.index === index)?.name ?? ""}`} />
+        {note !== null && (
+          <p class="camera-note" role={failure === null ? undefined : "alert"}>
+            {note}
+          </p>
+        )}
+      </div>
+      <div class="camera-foot">
+        {cameras.length > 1 ? (
+          <label>
+            <span class="unseen">Camera</span>
+            <select class="field" value={String(index)} onChange={(event) => set_chosen(Number(event.currentTarget.value))}>
+              {cameras.map((camera) => (
+                <option key={camera.index} value={String(camera.index)}>
+                  {camera.name}
+                </option>
+              ))}
+            </select>
+          </label>
+        ) : (
+          <span>{cameras[0]?.name ?? place.device}</span>
+        )}
+        <span class="note">{size}</span>
+      </div>
+    </>
+  );
+}
+
+interface NamedCamera {
+  index: number;
+  name: string;
+}
+
+function useCameras(remote: Remote | null): readonly NamedCamera[] {
+  const [cameras, set_cameras] = useState<readonly NamedCamera[]>([]);
+  useEffect(() => {
+    if (!remote) return;
+    let current = true;
+    remote.get("WebcamNames").then(
+      (names) => current && set_cameras(read_names(names)),
+      () => current && set_cameras([{ index: 0, name: "camera 0" }]), // an older host without names still has its first
+    );
+    return () => void (current = false);
+  }, [remote]);
+  return cameras;
+}
+
+function read_names(names: unknown): NamedCamera[] {
+  const entries = names instanceof Map ? [...names.entries()] : Object.entries((names ?? {}) as object);
+  return entries.map(([index, name]) => ({ index: Number(index), name: String(name) })).sort((a, b) => a.index - b.index);
+}
+
+interface Frames {
+  failure: string | null;
+  has_frame: boolean;
+  size: string;
+}
+
+function useFrames(
+  canvas: { current: HTMLCanvasElement | null },
+  remote: Remote | null,
+  index: number | null,
+  shown: boolean,
+): Frames {
+  const [frames, set_frames] = useState<Frames>({ failure: null, has_frame: false, size: "" });
+  useEffect(() => {
+    if (!remote || index === null || !shown) return;
+    const stop = new AbortController();
+    const follow = async (): Promise<void> => {
+      const camera = await remote.child("Webcams", index);
+      while (!stop.signal.aborted) {
+        if (!document.hidden) {
+          const size = await show(canvas.current, await camera.call("CaptureFrame", []));
+          if (stop.signal.aborted) return;
+          set_frames((old) => (old.failure === null && old.size === size ? old : { failure: null, has_frame: true, size }));
+        }
+        await new Promise((resolve) => setTimeout(resolve, PAUSE_MS));
+      }
+    };
+    const keep_following = async (): Promise<void> => {
+      while (!stop.signal.aborted) {
+        await follow().catch((error: unknown) => {
+          if (!stop.signal.aborted) set_frames((old) => ({ ...old, failure: explain(error) }));
+        });
+        await new Promise((resolve) => setTimeout(resolve, 1000));
+      }
+    };
+    void keep_following();
+    return () => stop.abort();
+  }, [remote, index, shown]);
+  return frames;
+}
+
+/** @returns the size in words. */
+async function show(canvas: HTMLCanvasElement | null, value: unknown): Promise<string> {
+  const frame = read_frame(value);
+  const bitmap = frame.encoded ? await createImageBitmap(new Blob([frame.encoded])) : null;
+  const width = bitmap?.width ?? frame.width;
+  const height = bitmap?.height ?? frame.height;
+  const ctx = canvas?.getContext("2d");
+  if (canvas && ctx) {
+    if (canvas.width !== width) canvas.width = width;
+    if (canvas.height !== height) canvas.height = height;
+    if (bitmap) ctx.drawImage(bitmap, 0, 0);
+    else if (frame.rgba) ctx.putImageData(new ImageData(frame.rgba, width, height), 0, 0);
+  }
+  bitmap?.close();
+  return `${width} × ${height}`;
+}

@@ -1,0 +1,20 @@
+// Start of the dashboard: builds the parts, joins them, and shows the page that the address names.
+// Layer: web.
+
+import { render } from "preact";
+import { App } from "./app/app";
+import { watch_route } from "./app/router";
+import { DeviceList } from "./gateway/devices";
+import "./styles/tokens.css";
+import "./styles/base.css";
+import "./styles/controls.css";
+import "./styles/devices.css";
+import "./styles/members.css";
+import "./styles/robot.css";
+
+const list = new DeviceList();
+list.start();
+
+const place = document.getElementById("app");
+if (!place) throw new Error("index.html has no element #app");
+render(<App route={watch_route()} list={list} />, place);

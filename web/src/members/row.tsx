@@ -1,0 +1,58 @@
+// What the rows of all member kinds share: their head line, and one running action with its failure.
+// Layer: web/members.
+
+import { useCallback, useEffect, useRef, useState } from "preact/hooks";
+import type { Route } from "../app/router";
+import { explain } from "../robot/remote";
+import type { Member, Remote } from "../robot/remote";
+
+export interface MemberRowProps {
+  object: Remote;
+  member: Member;
+  live: boolean;
+  route: Route & { page: "service" };
+}
+
+export function RowHead({ member, signature }: { member: Member; signature?: string }) {
+  return (
+    <div class="row-head">
+      <h3 class="member-name">{member.name}</h3>
+      <code class="member-type">{signature ?? member.type}</code>
+      {member.modifiers.map((modifier) => (
+        <span key={modifier} class="modifier">
+          {modifier}
+        </span>
+      ))}
+    </div>
+  );
+}
+
+export interface Action {
+  busy: boolean;
+  failure: string | null;
+  run(work: () => Promise<void>): void;
+  fail(text: string): void;
+}
+
+/** One thing at a time: `busy` while it runs, `failure` until the next begins. */
+export function useAction(): Action {
+  const [busy, set_busy] = useState(false);
+  const [failure, set_failure] = useState<string | null>(null);
+  const mounted = useRef(true);
+  useEffect(() => {
+    mounted.current = true;
+    return () => void (mounted.current = false);
+  }, []);
+  const run = useCallback((work: () => Promise<void>) => {
+    set_busy(true);
+    set_failure(null);
+    work()
+      .catch((error: unknown) => {
+        if (mounted.current) set_failure(explain(error));
+      })
+      .finally(() => {
+        if (mounted.current) set_busy(false);
+      });
+  }, []);
+  return { busy, failure, run, fail: set_failure };
+}

@@ -1,0 +1,57 @@
+// Every member of any object: to read, write, call, follow and open, without knowing the device.
+// Layer: web/pages.
+
+import type { ComponentType } from "preact";
+import type { Route } from "../app/router";
+import { EventRow } from "../members/event_row";
+import { FunctionRow } from "../members/function_row";
+import { ObjrefRow } from "../members/objref_row";
+import { OtherRow } from "../members/other_row";
+import { PropertyRow } from "../members/property_row";
+import type { MemberRowProps } from "../members/row";
+import { WireRow } from "../members/wire_row";
+import type { MemberKind, Remote } from "../robot/remote";
+
+const GROUPS: readonly { kind: MemberKind; title: string; row: ComponentType<MemberRowProps> }[] = [
+  { kind: "objref", title: "Objects", row: ObjrefRow },
+  { kind: "property", title: "Properties", row: PropertyRow },
+  { kind: "function", title: "Functions", row: FunctionRow },
+  { kind: "wire", title: "Wires", row: WireRow },
+  { kind: "event", title: "Events", row: EventRow },
+  { kind: "pipe", title: "Pipes", row: OtherRow },
+  { kind: "callback", title: "Callbacks", row: OtherRow },
+  { kind: "memory", title: "Memories", row: OtherRow },
+];
+
+export interface ObjectViewProps {
+  object: Remote;
+  /** False while the connection is lost: what was read stays, nothing can be done. */
+  live: boolean;
+  route: Route & { page: "service" };
+}
+
+export function ObjectView({ object, live, route }: ObjectViewProps) {
+  const groups = GROUPS.map((group) => ({ ...group, members: object.members.filter((m) => m.kind === group.kind) }));
+  return (
+    <div class="object">
+      <p class="object-type">
+        Object of type <code>{object.type}</code>
+      </p>
+      {object.members.length === 0 && <p class="empty">This object has no members.</p>}
+      {groups
+        .filter((group) => group.members.length > 0)
+        .map(({ kind, title, row: Row, members }) => (
+          <section key={kind} class="group" aria-labelledby={`group-${kind}`}>
+            <h2 id={`group-${kind}`}>{title}</h2>
+            <ul class="rows">
+              {members.map((member) => (
+                <li key={member.name} class="row" data-member={member.name}>
+                  <Row object={object} member={member} live={live} route={route} />
+                </li>
+              ))}
+            </ul>
+          </section>
+        ))}
+    </div>
+  );
+}

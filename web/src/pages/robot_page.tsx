@@ -1,0 +1,68 @@
+// The demo robot: chart, controls, live values, bump log, camera.
+// Layer: web/pages. What is known of the robot outlives its connections; see RobotModel.
+
+import { useEffect, useMemo, useState } from "preact/hooks";
+import { useStore } from "../app/store";
+import { CameraView } from "../camera/camera_view";
+import { RobotChart } from "../chart/robot_chart";
+import type { DeviceList } from "../gateway/devices";
+import { Driver } from "../robot/driver";
+import type { Link } from "../robot/link";
+import { explain } from "../robot/remote";
+import { RobotModel } from "../robot/robot_model";
+import { BumpLog } from "../robot_view/bump_log";
+import { DrivePanel } from "../robot_view/drive_panel";
+import { PoseLine } from "../robot_view/pose_line";
+import { ValuesPanel } from "../robot_view/values_panel";
+
+export interface RobotPageProps {
+  link: Link;
+  list: DeviceList;
+  device: string;
+  /** False while another view of the same robot is shown: the model follows on, driving does not. */
+  shown: boolean;
+}
+
+export function RobotPage({ link, list, device, shown }: RobotPageProps) {
+  const state = useStore(link.state);
+  const remote = state.kind === "online" ? state.remote : null;
+  const model = useMemo(() => new RobotModel(), []);
+  const [drive_failure, set_drive_failure] = useState<string | null>(null);
+  const driver = useMemo(() => new Driver((error) => set_drive_failure(`Drive: ${explain(error)}`)), []);
+
+  useEffect(() => {
+    if (!remote) return;
+    const stop = new AbortController();
+    model.attach(remote, stop.signal);
+    set_drive_failure(null);
+    driver.set_connection(async ({ velocity, radius }) => {
+      await remote.call("Drive", [velocity, radius]);
+      set_drive_failure(null);
+    });
+    return () => {
+      driver.dispose();
+      driver.set_connection(null);
+      stop.abort();
+    };
+  }, [remote, model, driver]);
+
+  const live = remote !== null;
+  return (
+    <div class="robot">
+      <section class={`panel chart-panel ${live ? "" : "is-stale"}`} aria-labelledby="chart-title">
+        <div class="panel-head">
+          <h2 id="chart-title">Chart</h2>
+          <button class="button button-quiet" type="button" onClick={() => model.clear_trail()}>
+            Clear trail
+          </button>
+        </div>
+        <RobotChart model={model} live={live} />
+        <PoseLine model={model} live={live} />
+      </section>
+      <DrivePanel driver={driver} enabled={live && shown} lost={state.kind === "lost"} failure={drive_failure} device={device} />
+      <CameraView list={list} robot={device} shown={shown} />
+      <ValuesPanel model={model} live={live} />
+      <BumpLog model={model} />
+    </div>
+  );
+}

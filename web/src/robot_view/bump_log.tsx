@@ -1,0 +1,33 @@
+// When and where the robot bumped, newest first.
+// Layer: web/robot_view.
+
+import { useStore } from "../app/store";
+import type { RobotModel } from "../robot/robot_model";
+import { clock_time_ms } from "../ui/time";
+
+export function BumpLog({ model }: { model: RobotModel }) {
+  const bumps = useStore(model.bumps);
+  return (
+    <section class="panel bumps" aria-labelledby="bumps-title">
+      <h2 id="bumps-title">Bumps</h2>
+      {bumps.length === 0 ? (
+        <p class="note">None yet. Each one gets its time, its side, and a rock on the chart.</p>
+      ) : (
+        <ol class="log" tabIndex={0} aria-labelledby="bumps-title">
+          {bumps.map((bump) => (
+            <li key={bump.number}>
+              <span class="log-number">{bump.number}</span>
+              <time class="log-time" dateTime={new Date(bump.time).toISOString()}>
+                {clock_time_ms(bump.time)}
+              </time>
+              <span>{bump.side}</span>
+              <span class="log-place">
+                {bump.pose.x.toFixed(2)}, {bump.pose.y.toFixed(2)} m
+              </span>
+            </li>
+          ))}
+        </ol>
+      )}
+    </section>
+  );
+}

@@ -1,0 +1,102 @@
+// The controls: four directions and stop, to hold with mouse, fingers or keys, and the speed.
+// Layer: web/robot_view.
+
+import { useState } from "preact/hooks";
+import type { Driver } from "../robot/driver";
+import { SPEED_MAX, SPEED_MIN } from "../robot/steering";
+import type { Direction } from "../robot/steering";
+import { useDriving } from "../robot/use_driving";
+import type { Driving } from "../robot/use_driving";
+import { Failure } from "../ui/failure";
+import { ArrowIcon } from "../ui/icons";
+
+export interface DrivePanelProps {
+  driver: Driver;
+  enabled: boolean;
+  lost: boolean;
+  failure: string | null;
+  device: string;
+}
+
+export function DrivePanel({ driver, enabled, lost, failure, device }: DrivePanelProps) {
+  const [speed, set_speed] = useState(200);
+  const driving = useDriving(driver, speed, enabled);
+  return (
+    <section class="panel drive" aria-labelledby="drive-title">
+      <h2 id="drive-title">Drive</h2>
+      <div class="pad" role="group" aria-label="Hold to drive">
+        <HoldButton direction="forward" label="Forward" driving={driving} enabled={enabled} />
+        <HoldButton direction="left" label="Left" driving={driving} enabled={enabled} />
+        <button class="pad-stop" type="button" disabled={!enabled} onPointerDown={driving.stop} onClick={driving.stop}>
+          Stop
+        </button>
+        <HoldButton direction="right" label="Right" driving={driving} enabled={enabled} />
+        <HoldButton direction="back" label="Back" driving={driving} enabled={enabled} />
+      </div>
+      <div class="speed">
+        <label for="speed">Speed</label>
+        <input
+          id="speed"
+          type="range"
+          min={SPEED_MIN}
+          max={SPEED_MAX}
+          step={10}
+          value={speed}
+          onInput={(event) => set_speed(Number(event.currentTarget.value))}
+          // The arrows belong to the robot again as soon as the mouse lets go of the slider.
+          onPointerUp={(event) => event.currentTarget.blur()}
+        />
+        <output for="speed">{speed} mm/s</output>
+      </div>
+      <p class="note drive-note">
+        {lost
+          ? `Driving is off: no connection to ${device}. It comes back by itself.`
+          : enabled
+            ? "Hold a button, an arrow key or WASD. Letting go stops; so do Space and Esc."
+            : "Driving is off until the robot is connected."}
+      </p>
+      <Failure text={failure} />
+    </section>
+  );
+}
+
+interface HoldButtonProps {
+  direction: Direction;
+  label: string;
+  driving: Driving;
+  enabled: boolean;
+}
+
+function HoldButton({ direction, label, driving, enabled }: HoldButtonProps) {
+  const held = driving.held.has(direction);
+  const source = (event: PointerEvent): string => `pointer ${event.pointerId}`;
+  const key_source = `button ${direction}`;
+  const let_go = (event: PointerEvent): void => driving.release(source(event));
+  return (
+    <button
+      class={`pad-button pad-${direction} ${held ? "is-held" : ""}`}
+      type="button"
+      disabled={!enabled}
+      aria-pressed={held}
+      onPointerDown={(event) => {
+        if (event.button !== 0) return;
+        event.currentTarget.setPointerCapture(event.pointerId); // the finger may slide off; letting go is still heard
+        driving.press(source(event), direction);
+      }}
+      onPointerUp={let_go}
+      onPointerCancel={let_go}
+      onLostPointerCapture={let_go}
+      onContextMenu={(event) => event.preventDefault()} // a long touch is driving, not a menu
+      onKeyDown={(event) => {
+        if (event.code !== "Space" && event.code !== "Enter") return;
+        event.preventDefault();
+        if (!event.repeat) driving.press(key_source, direction);
+      }}
+      onKeyUp={() => driving.release(key_source)}
+      onBlur={() => driving.release(key_source)}
+    >
+      <ArrowIcon towards={direction} />
+      <span>{label}</span>
+    </button>
+  );
+}

@@ -1,0 +1,51 @@
+// The pose in numbers, under the chart.
+// Layer: web/robot_view.
+
+import { useEffect, useState } from "preact/hooks";
+import { useStore } from "../app/store";
+import type { Pose } from "../robot/reckoning";
+import type { RobotModel } from "../robot/robot_model";
+
+const SHOW_MS = 100;
+
+export function PoseLine({ model, live }: { model: RobotModel; live: boolean }) {
+  const source = useStore(model.pose_source);
+  const [pose, set_pose] = useState<Pose>(model.pose);
+  useEffect(() => {
+    let timer: ReturnType<typeof setTimeout> | undefined;
+    const unwatch = model.on_moved(() => {
+      timer ??= setTimeout(() => ((timer = undefined), set_pose(model.pose)), SHOW_MS);
+    });
+    return () => {
+      unwatch();
+      clearTimeout(timer);
+    };
+  }, [model]);
+  const degrees = (pose.theta * 180) / Math.PI;
+  return (
+    <dl class="pose">
+      <Coordinate name="x" text={`${fixed(pose.x, 3)} m`} />
+      <Coordinate name="y" text={`${fixed(pose.y, 3)} m`} />
+      <Coordinate name="heading" text={`${fixed(degrees, 1)}°`} />
+      <div class="pose-source">
+        <dt class="unseen">Source</dt>
+        <dd>{!live ? "last known" : source === "device" ? "told by the robot" : "reckoned from distance and angle"}</dd>
+      </div>
+    </dl>
+  );
+}
+
+function Coordinate({ name, text }: { name: string; text: string }) {
+  return (
+    <div>
+      <dt>{name}</dt>
+      <dd data-pose={name}>{text}</dd>
+    </div>
+  );
+}
+
+/** Fixed decimals without a "-0.000". */
+function fixed(value: number, digits: number): string {
+  const text = value.toFixed(digits);
+  return Number(text) === 0 ? (0).toFixed(digits) : text;
+}

@@ -1,0 +1,75 @@
+// Says plainly whether the page is connected: always there, always the same height, so nothing jumps.
+// Layer: web/ui.
+
+import { useNow, useStore } from "../app/store";
+import { devices_of } from "../gateway/devices";
+import type { DeviceList } from "../gateway/devices";
+import type { Link, LinkState } from "../robot/link";
+import { StateBadge } from "./state_badge";
+import { clock_time, span } from "./time";
+
+export interface LinkStripProps {
+  link: Link;
+  list: DeviceList;
+  device: string;
+  service: string;
+}
+
+export function LinkStrip({ link, list, device, service }: LinkStripProps) {
+  const state = useStore(link.state);
+  const lost = state.kind === "lost";
+  const badge = lost ? "offline" : state.kind;
+  return (
+    <section class={`link-strip link-${badge}`} aria-label="Connection" data-link={state.kind}>
+      <StateBadge state={badge} text={{ online: "connected", connecting: "connecting", offline: "not connected" }[badge]} />
+      <div class="link-words">
+        {/* Only what changes rarely is announced; the seconds beside it are for the eye. */}
+        <p class="link-head" role="status">
+          {headline(state, device, service)}
+        </p>
+        <p class="link-detail">
+          {lost ? <LostDetail state={state} list={list} device={device} /> : detail(state)}
+        </p>
+      </div>
+      <button class="button" type="button" hidden={!lost} disabled={lost && state.retry_at === null} onClick={() => link.retry_now()}>
+        Try now
+      </button>
+    </section>
+  );
+}
+
+function headline(state: LinkState, device: string, service: string): string {
+  if (state.kind === "connecting") return `Connecting to ${device}, service ${service}`;
+  if (state.kind === "online") return `Connected to ${device} since ${clock_time(state.since)}`;
+  return `No connection to ${device} since ${clock_time(state.since)}. Retrying by itself.`;
+}
+
+function detail(state: LinkState): string {
+  return state.kind === "online" ? state.remote.type : "Asking the gateway for the device";
+}
+
+function LostDetail({ state, list, device }: { state: LinkState & { kind: "lost" }; list: DeviceList; device: string }) {
+  const now = useNow(500);
+  const gateway = useStore(list.state);
+  const known = devices_of(gateway)?.find((d) => d.name === device);
+  const next = state.retry_at === null ? "trying now" : `next try in ${span(Math.max(0, state.retry_at - now) + 999)}`;
+  const why =
+    gateway.kind === "away"
+      ? `The gateway itself does not answer (${gateway.reason}).`
+      : known && known.state !== "online"
+        ? `The gateway says: device ${known.state}${known.last_error ? `, ${known.last_error}` : ""}.`
+        : `${sentence(state.reason)}`;
+  return (
+    <>
+      {why}{" "}
+      <span class="nowrap" aria-hidden="true">
+        Away for {span(now - state.since)}, {next}.
+      </span>
+    </>
+  );
+}
+
+function sentence(text: string): string {
+  const trimmed = text.trim();
+  return /[.!?]$/.test(trimmed) ? trimmed : `${trimmed}.`;
+}

@@ -1,0 +1,21 @@
+// Times of day and spans, as people read them.
+// Layer: web/ui, pure.
+
+/** `14:03:22` in the reader's own time. */
+export function clock_time(ms: number): string {
+  return new Date(ms).toLocaleTimeString(undefined, { hour: "2-digit", minute: "2-digit", second: "2-digit", hour12: false });
+}
+
+/** `14:03:22.417`: for logs, where order matters. */
+export function clock_time_ms(ms: number): string {
+  return `${clock_time(ms)}.${String(Math.floor(ms) % 1000).padStart(3, "0")}`;
+}
+
+/** `4 s`, `3 min`, `2 h 5 min`. */
+export function span(ms: number): string {
+  const seconds = Math.max(0, Math.floor(ms / 1000));
+  if (seconds < 60) return `${seconds} s`;
+  const minutes = Math.floor(seconds / 60);
+  if (minutes < 60) return `${minutes} min`;
+  return `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
+}
