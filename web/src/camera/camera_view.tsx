@@ -9,7 +9,7 @@ import { Link } from "../robot/link";
 import { explain, open_remote } from "../robot/remote";
 import type { Remote } from "../robot/remote";
 import { read_frame } from "./frame";
-import { clock_time } from "../ui/time";
+import { clock_time } from "../ui/words";
 
 const PAUSE_MS = 80; // between frames, so that the camera never takes the line from the robot
 
@@ -40,7 +40,9 @@ export function CameraView({ list, robot, shown }: { list: DeviceList; robot: st
   }, [now_found?.device, now_found?.service]);
   return (
     <section class="panel camera" aria-labelledby="camera-title">
-      <h2 id="camera-title">Camera</h2>
+      <h2 id="camera-title" class="unseen">
+        Camera
+      </h2>
       {place ? <Camera key={`${place.device}/${place.service}`} place={place} shown={shown} /> : <NoCamera loading={gateway.kind === "loading"} />}
     </section>
   );

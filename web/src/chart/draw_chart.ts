@@ -3,7 +3,8 @@
 // Layer: web/chart. Draws into a 2D context whose unit is the CSS pixel.
 
 import type { Pose } from "../robot/reckoning";
-import type { Wall } from "../robot/room";
+import { loops_of } from "../robot/room";
+import type { Room } from "../robot/room";
 import type { Point } from "../robot/trail";
 import type { Palette } from "./palette";
 import { grid_step, to_canvas } from "./view";
@@ -12,7 +13,7 @@ import type { View } from "./view";
 export interface ChartContent {
   pose: Pose;
   strokes: readonly (readonly Point[])[];
-  walls: readonly Wall[];
+  room: Room;
   bumps: readonly { pose: Pose }[];
   /** Bit 0 right, bit 1 left. */
   bumpers: number;
@@ -22,7 +23,7 @@ export interface ChartContent {
 
 export const FRAME_PX = 26;
 const ROBOT_RADIUS_M = 0.17;
-const WALL_M = 0.06;
+const WALL_M = 0.04;
 
 export function draw_chart(ctx: CanvasRenderingContext2D, view: View, content: ChartContent, palette: Palette): void {
   const { left, top, width, height } = view;
@@ -33,7 +34,7 @@ export function draw_chart(ctx: CanvasRenderingContext2D, view: View, content: C
   ctx.rect(left, top, width, height);
   ctx.clip();
   draw_grid(ctx, view, palette);
-  draw_walls(ctx, view, content.walls, palette);
+  draw_land(ctx, view, content.room, palette);
   draw_wake(ctx, view, content.strokes, palette);
   for (const bump of content.bumps) draw_rock(ctx, view, bump.pose, palette);
   draw_robot(ctx, view, content, palette);
@@ -67,22 +68,53 @@ function draw_grid(ctx: CanvasRenderingContext2D, view: View, palette: Palette):
   ctx.stroke();
 }
 
-function draw_walls(ctx: CanvasRenderingContext2D, view: View, walls: readonly Wall[], palette: Palette): void {
-  if (walls.length === 0) return;
-  const thick = Math.max(WALL_M * view.scale, 4);
-  ctx.lineCap = "square";
-  ctx.lineJoin = "miter";
-  // Coast line first, land over it: where walls meet, no line crosses.
-  for (const [style, extra] of [[palette.coast, 2.5], [palette.land, 0]] as const) {
-    ctx.strokeStyle = style;
-    ctx.lineWidth = thick + extra;
+/** The largest closed loop of walls is the room: all outside of it is land, and so is the inside of smaller loops. */
+function draw_land(ctx: CanvasRenderingContext2D, view: View, room: Room, palette: Palette): void {
+  const { loops, open } = loops_of(room.walls);
+  loops.sort((a, b) => area_of(b) - area_of(a));
+  ctx.lineJoin = "round";
+  ctx.lineCap = "round";
+  ctx.fillStyle = palette.land;
+  ctx.strokeStyle = palette.coast;
+  ctx.lineWidth = 1.75;
+  ctx.beginPath();
+  if (loops.length > 0) ctx.rect(view.left - 4, view.top - 4, view.width + 8, view.height + 8);
+  for (const loop of loops) {
+    loop.forEach(({ x, y }, i) => {
+      if (i === 0) ctx.moveTo(...to_canvas(view, x, y));
+      else ctx.lineTo(...to_canvas(view, x, y));
+    });
+    ctx.closePath();
+  }
+  ctx.fill("evenodd");
+  ctx.stroke();
+  for (const { x, y, radius } of room.obstacles) {
     ctx.beginPath();
-    for (const wall of walls) {
+    ctx.arc(...to_canvas(view, x, y), radius * view.scale, 0, 2 * Math.PI);
+    ctx.fill();
+    ctx.stroke();
+  }
+  // Walls that stand free have no inside: a spit of land, coast line first and land over it.
+  const thick = Math.max(WALL_M * view.scale, 4);
+  for (const [style, width] of [[palette.coast, thick + 3.5], [palette.land, thick]] as const) {
+    ctx.strokeStyle = style;
+    ctx.lineWidth = width;
+    ctx.beginPath();
+    for (const wall of open) {
       ctx.moveTo(...to_canvas(view, wall.x1, wall.y1));
       ctx.lineTo(...to_canvas(view, wall.x2, wall.y2));
     }
     ctx.stroke();
   }
+}
+
+function area_of(loop: readonly Point[]): number {
+  let twice = 0;
+  loop.forEach((point, i) => {
+    const next = loop[(i + 1) % loop.length] ?? point;
+    twice += point.x * next.y - next.x * point.y;
+  });
+  return Math.abs(twice / 2);
 }
 
 function draw_wake(

@@ -4,7 +4,7 @@
 import { useEffect, useRef } from "preact/hooks";
 import { useStore } from "../app/store";
 import type { RobotModel } from "../robot/robot_model";
-import type { Wall } from "../robot/room";
+import type { Room } from "../robot/room";
 import { draw_chart, FRAME_PX } from "./draw_chart";
 import { useCanvas } from "./use_canvas";
 import { fit, include, START } from "./view";
@@ -12,10 +12,10 @@ import type { Extent } from "./view";
 
 export function RobotChart({ model, live }: { model: RobotModel; live: boolean }) {
   const extent = useRef<Extent | null>(null);
-  const walls = useStore(model.walls);
+  const room = useStore(model.room);
   const readings = useStore(model.readings);
   const { canvas, redraw } = useCanvas((ctx, width, height, palette) => {
-    extent.current = include(extent.current ?? extent_of(walls), model.pose.x, model.pose.y);
+    extent.current = include(extent.current ?? extent_of(room), model.pose.x, model.pose.y);
     const view = fit(extent.current, FRAME_PX, FRAME_PX, width - 2 * FRAME_PX, height - 2 * FRAME_PX);
     draw_chart(
       ctx,
@@ -23,7 +23,7 @@ export function RobotChart({ model, live }: { model: RobotModel; live: boolean }
       {
         pose: model.pose,
         strokes: model.trail.strokes,
-        walls,
+        room,
         bumps: model.bumps.value,
         bumpers: live ? (readings.bumpers ?? 0) : 0,
         live,
@@ -35,7 +35,7 @@ export function RobotChart({ model, live }: { model: RobotModel; live: boolean }
   useEffect(() => {
     extent.current = null;
     redraw();
-  }, [walls, redraw]);
+  }, [room, redraw]);
   useEffect(redraw, [live, readings.bumpers, redraw]);
   return (
     <canvas
@@ -47,7 +47,7 @@ export function RobotChart({ model, live }: { model: RobotModel; live: boolean }
   );
 }
 
-function extent_of(walls: readonly Wall[]): Extent {
+function extent_of({ walls }: Room): Extent {
   if (walls.length === 0) return START;
   let extent: Extent = { x_min: Infinity, x_max: -Infinity, y_min: Infinity, y_max: -Infinity };
   for (const { x1, y1, x2, y2 } of walls) {
@@ -58,7 +58,7 @@ function extent_of(walls: readonly Wall[]): Extent {
       y_max: Math.max(extent.y_max, y1, y2),
     };
   }
-  const margin = 0.15;
+  const margin = 0.1;
   return {
     x_min: extent.x_min - margin,
     x_max: extent.x_max + margin,

@@ -4,7 +4,7 @@
 import { useEffect, useState } from "preact/hooks";
 import { explain } from "../robot/remote";
 import { Failure } from "../ui/failure";
-import { clock_time_ms } from "../ui/time";
+import { clock_time_ms } from "../ui/words";
 import { format_value } from "../values/format";
 import { RowHead } from "./row";
 import type { MemberRowProps } from "./row";

@@ -6,7 +6,7 @@ import { format_route } from "../app/router";
 import { devices_of } from "../gateway/devices";
 import type { Device, DeviceList, GatewayState, Service } from "../gateway/devices";
 import { StateBadge } from "../ui/state_badge";
-import { clock_time, span } from "../ui/time";
+import { clock_time, sentence, span } from "../ui/words";
 
 export function DevicesPage({ list }: { list: DeviceList }) {
   const state = useStore(list.state);
@@ -79,7 +79,7 @@ function DeviceRow({ device, stale }: { device: Device; stale: boolean }) {
       </dl>
       {device.state !== "online" && (
         <p class="device-trouble">
-          {device.last_error ?? "Not reached yet."} {!stale && "The gateway keeps trying."}
+          {sentence(device.last_error ?? "Not reached yet")} {!stale && "The gateway keeps trying."}
         </p>
       )}
       <ul class="services">

@@ -50,14 +50,16 @@ export function RobotPage({ link, list, device, shown }: RobotPageProps) {
   return (
     <div class="robot">
       <section class={`panel chart-panel ${live ? "" : "is-stale"}`} aria-labelledby="chart-title">
-        <div class="panel-head">
-          <h2 id="chart-title">Chart</h2>
+        <h2 id="chart-title" class="unseen">
+          Chart
+        </h2>
+        <RobotChart model={model} live={live} />
+        <div class="chart-foot">
+          <PoseLine model={model} live={live} />
           <button class="button button-quiet" type="button" onClick={() => model.clear_trail()}>
             Clear trail
           </button>
         </div>
-        <RobotChart model={model} live={live} />
-        <PoseLine model={model} live={live} />
       </section>
       <DrivePanel driver={driver} enabled={live && shown} lost={state.kind === "lost"} failure={drive_failure} device={device} />
       <CameraView list={list} robot={device} shown={shown} />

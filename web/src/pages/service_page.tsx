@@ -26,6 +26,7 @@ export function ServicePage({ route, list }: { route: ServiceRoute; list: Device
     <div class={`page ${drives && view === "auto" ? "page-wide" : "page-narrow"}`}>
       <div class="service-head">
         <h1 class="place-name">{device}</h1>
+        {link && <LinkStrip link={link} list={list} device={device} service={service} />}
         {drives && (
           <nav class="tabs" aria-label="Views of this service">
             <a href={format_route(device, service)} aria-current={view === "auto" ? "page" : undefined}>
@@ -37,7 +38,6 @@ export function ServicePage({ route, list }: { route: ServiceRoute; list: Device
           </nav>
         )}
       </div>
-      {link && <LinkStrip link={link} list={list} device={device} service={service} />}
       {drives && link && <div hidden={view !== "auto"}><RobotPage link={link} list={list} device={device} shown={view === "auto"} /></div>}
       {link && (!drives || view === "members") && <MembersPage link={link} route={route} path={path} />}
     </div>

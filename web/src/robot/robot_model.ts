@@ -6,8 +6,8 @@ import { Reckoner } from "./reckoning";
 import type { Pose } from "./reckoning";
 import { explain } from "./remote";
 import type { Remote } from "./remote";
-import { pose_of, walls_of } from "./room";
-import type { Wall } from "./room";
+import { EMPTY_ROOM, pose_of, walls_of } from "./room";
+import type { Room } from "./room";
 import { read_sensor_packet } from "./sensor_packet";
 import { Series } from "./series";
 import { Trail } from "./trail";
@@ -46,7 +46,7 @@ export class RobotModel {
   /** Whether the device tells its pose itself; else it is reckoned from distance and angle. */
   readonly pose_source = new Store<"device" | "reckoned">("reckoned");
   readonly trail = new Trail();
-  readonly walls = new Store<readonly Wall[]>([]);
+  readonly room = new Store<Room>(EMPTY_ROOM);
   readonly readings = new Store<Readings>(NO_READINGS);
   readonly bumps = new Store<readonly Bump[]>([]);
   readonly series = {
@@ -98,7 +98,7 @@ export class RobotModel {
   async #read_walls(remote: Remote): Promise<void> {
     const member = remote.members.find((m) => m.kind === "property" && /^(walls|room)$/i.test(m.name));
     if (!member) return;
-    this.walls.value = walls_of(await remote.get(member.name));
+    this.room.value = { ...this.room.value, walls: walls_of(await remote.get(member.name)) };
     this.#redraw();
   }
 

@@ -3,7 +3,7 @@
 
 import { useStore } from "../app/store";
 import type { RobotModel } from "../robot/robot_model";
-import { clock_time_ms } from "../ui/time";
+import { clock_time_ms } from "../ui/words";
 
 export function BumpLog({ model }: { model: RobotModel }) {
   const bumps = useStore(model.bumps);

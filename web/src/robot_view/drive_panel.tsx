@@ -23,7 +23,9 @@ export function DrivePanel({ driver, enabled, lost, failure, device }: DrivePane
   const driving = useDriving(driver, speed, enabled);
   return (
     <section class="panel drive" aria-labelledby="drive-title">
-      <h2 id="drive-title">Drive</h2>
+      <h2 id="drive-title" class="unseen">
+        Drive
+      </h2>
       <div class="pad" role="group" aria-label="Hold to drive">
         <HoldButton direction="forward" label="Forward" driving={driving} enabled={enabled} />
         <HoldButton direction="left" label="Left" driving={driving} enabled={enabled} />

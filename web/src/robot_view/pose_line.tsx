@@ -23,15 +23,16 @@ export function PoseLine({ model, live }: { model: RobotModel; live: boolean }) 
   }, [model]);
   const degrees = (pose.theta * 180) / Math.PI;
   return (
-    <dl class="pose">
-      <Coordinate name="x" text={`${fixed(pose.x, 3)} m`} />
-      <Coordinate name="y" text={`${fixed(pose.y, 3)} m`} />
-      <Coordinate name="heading" text={`${fixed(degrees, 1)}°`} />
-      <div class="pose-source">
-        <dt class="unseen">Source</dt>
-        <dd>{!live ? "last known" : source === "device" ? "told by the robot" : "reckoned from distance and angle"}</dd>
-      </div>
-    </dl>
+    <>
+      <dl class="pose">
+        <Coordinate name="x" text={`${fixed(pose.x, 3)} m`} />
+        <Coordinate name="y" text={`${fixed(pose.y, 3)} m`} />
+        <Coordinate name="heading" text={`${fixed(degrees, 1)}°`} />
+      </dl>
+      <p class="note">
+        {!live ? "last known pose" : source === "device" ? "as the robot tells" : "reckoned from distance and angle"}
+      </p>
+    </>
   );
 }
 

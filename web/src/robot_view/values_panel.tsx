@@ -38,12 +38,15 @@ export function ValuesPanel({ model, live }: { model: RobotModel; live: boolean 
           </p>
         </Reading>
         <Bumpers bits={readings.bumpers} />
-        <div class="reading reading-packets">
-          <h3>Packets</h3>
-          <p class="reading-value" data-reading="packets">
-            {packet ? (live ? rate_of(series.packets, performance.now()).toFixed(0) : "0") : "–"} <span class="unit">a second</span>
-          </p>
-          <p class="code packet-bytes">{packet ? `${packet.id}: ${format_hex(packet.bytes, 12)}` : "none yet"}</p>
+        <div class="reading">
+          <div class="reading-head">
+            <h3>Packets</h3>
+            <p class="reading-value" data-reading="packets">
+              {packet ? (live ? rate_of(series.packets, performance.now()).toFixed(0) : "0") : "–"}{" "}
+              <span class="unit">a second</span>
+            </p>
+          </div>
+          <p class="code packet-bytes">{packet ? `${packet.id}: ${format_hex(packet.bytes, 14)}` : "none yet"}</p>
         </div>
       </div>
       <Failure text={live ? trouble : null} />
@@ -62,10 +65,12 @@ interface ReadingProps {
 function Reading({ name, id, value, unit, children }: ReadingProps) {
   return (
     <div class="reading">
-      <h3>{name}</h3>
-      <p class="reading-value" data-reading={id}>
-        {value ?? "–"} <span class="unit">{unit}</span>
-      </p>
+      <div class="reading-head">
+        <h3>{name}</h3>
+        <p class="reading-value" data-reading={id}>
+          {value ?? "–"} <span class="unit">{unit}</span>
+        </p>
+      </div>
       {children}
     </div>
   );
@@ -75,10 +80,12 @@ function Bumpers({ bits }: { bits: number | null }) {
   const text = bits === null ? "–" : side_of(bits) || "free";
   return (
     <div class="reading">
-      <h3>Bumpers</h3>
-      <p class="reading-value" data-reading="bumpers">
-        {text}
-      </p>
+      <div class="reading-head">
+        <h3>Bumpers</h3>
+        <p class="reading-value" data-reading="bumpers">
+          {text}
+        </p>
+      </div>
       <svg class="bumpers" viewBox="0 0 80 44" aria-hidden="true">
         <path class={`bumper ${(bits ?? 0) & 2 ? "is-pressed" : ""}`} d="M8 40a32 32 0 0 1 30-32" />
         <path class={`bumper ${(bits ?? 0) & 1 ? "is-pressed" : ""}`} d="M42 8a32 32 0 0 1 30 32" />

@@ -6,7 +6,7 @@ import { devices_of } from "../gateway/devices";
 import type { DeviceList } from "../gateway/devices";
 import type { Link, LinkState } from "../robot/link";
 import { StateBadge } from "./state_badge";
-import { clock_time, span } from "./time";
+import { clock_time, sentence, span } from "./words";
 
 export interface LinkStripProps {
   link: Link;
@@ -41,7 +41,7 @@ export function LinkStrip({ link, list, device, service }: LinkStripProps) {
 function headline(state: LinkState, device: string, service: string): string {
   if (state.kind === "connecting") return `Connecting to ${device}, service ${service}`;
   if (state.kind === "online") return `Connected to ${device} since ${clock_time(state.since)}`;
-  return `No connection to ${device} since ${clock_time(state.since)}. Retrying by itself.`;
+  return `No connection to ${device} since ${clock_time(state.since)}`;
 }
 
 function detail(state: LinkState): string {
@@ -58,18 +58,13 @@ function LostDetail({ state, list, device }: { state: LinkState & { kind: "lost"
       ? `The gateway itself does not answer (${gateway.reason}).`
       : known && known.state !== "online"
         ? `The gateway says: device ${known.state}${known.last_error ? `, ${known.last_error}` : ""}.`
-        : `${sentence(state.reason)}`;
+        : sentence(state.reason);
   return (
     <>
       {why}{" "}
       <span class="nowrap" aria-hidden="true">
-        Away for {span(now - state.since)}, {next}.
+        Away for {span(now - state.since)}; {next}.
       </span>
     </>
   );
-}
-
-function sentence(text: string): string {
-  const trimmed = text.trim();
-  return /[.!?]$/.test(trimmed) ? trimmed : `${trimmed}.`;
 }

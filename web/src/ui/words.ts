@@ -1,4 +1,4 @@
-// Times of day and spans, as people read them.
+// Times of day, spans and sentences, as people read them.
 // Layer: web/ui, pure.
 
 /** `14:03:22` in the reader's own time. */
@@ -18,4 +18,10 @@ export function span(ms: number): string {
   const minutes = Math.floor(seconds / 60);
   if (minutes < 60) return `${minutes} min`;
   return `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
+}
+
+/** The same text with an end. */
+export function sentence(text: string): string {
+  const trimmed = text.trim();
+  return /[.!?]$/.test(trimmed) ? trimmed : `${trimmed}.`;
 }
