@@ -1,0 +1,18 @@
+// rrgate check-config: whether `rrgate serve` would take a file. Layer: server/cli.
+#include "server/cli/command.hpp"
+#include "server/cli/findings.hpp"
+
+namespace rrgate {
+
+int run_check_config(Arguments arguments) {
+  const auto parsed = parse_arguments(arguments, {});
+  if (!parsed.error.empty()) return usage_error("check-config", parsed.error);
+  if (parsed.operands.size() != 1) return usage_error("check-config", "expected one FILE");
+  const auto& file = parsed.operands.front();
+  const auto config = load_config(file);
+  if (!report_findings(file, config)) return exit_usage;
+  std::cout << short_name(file) << ": good; " << config.config.devices.size() << " devices\n";
+  return exit_ok;
+}
+
+}  // namespace rrgate

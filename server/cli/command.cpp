@@ -1,0 +1,84 @@
+#include "server/cli/command.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <iostream>
+
+#include "core/support/error.hpp"
+
+namespace rrgate {
+
+namespace {
+
+void print_help(std::span<const Command> commands, std::ostream& out) {
+  out << "rrgate: a gateway between devices that speak Robot Raconteur and the web\n\nusage:\n";
+  std::size_t width = 0;
+  for (const auto& command : commands) width = std::max(width, command.usage.size());
+  for (const auto& command : commands)
+    out << "  rrgate " << command.usage << std::string(width - command.usage.size() + 2, ' ') << command.summary << "\n";
+  out << "  rrgate --help | --version\n";
+}
+
+}  // namespace
+
+int run_command_line(std::span<const Command> commands, Arguments arguments) {
+  if (arguments.empty()) {
+    print_help(commands, std::cerr);
+    return exit_usage;
+  }
+  const auto name = arguments.front();
+  if (name == "--help" || name == "-h" || name == "help") {
+    print_help(commands, std::cout);
+    return exit_ok;
+  }
+  if (name == "--version") {
+    std::cout << "rrgate " RRGATE_VERSION "\n";
+    return exit_ok;
+  }
+  const auto rest = arguments.subspan(1);
+  for (const auto& command : commands) {
+    if (command.name != name) continue;
+    if (std::find(rest.begin(), rest.end(), "--help") != rest.end()) {
+      std::cout << "usage: rrgate " << command.usage << "\n" << command.summary << "\n";
+      return exit_ok;
+    }
+    return command.run(rest);
+  }
+  std::cerr << "rrgate: unknown command or option " << rr::quoted(name) << "\n\n";
+  print_help(commands, std::cerr);
+  return exit_usage;
+}
+
+ParsedArguments parse_arguments(Arguments arguments, std::span<const std::string_view> known_options) {
+  ParsedArguments out;
+  for (std::size_t i = 0; i < arguments.size(); ++i) {
+    const auto argument = arguments[i];
+    if (argument.substr(0, 1) != "-" || argument.size() == 1) {
+      out.operands.emplace_back(argument);
+      continue;
+    }
+    const auto equals = argument.find('=');
+    const auto name = argument.substr(0, equals);
+    if (std::find(known_options.begin(), known_options.end(), name) == known_options.end()) {
+      out.error = "unknown option " + rr::quoted(name);
+      return out;
+    }
+    if (equals == std::string_view::npos && i + 1 == arguments.size()) {
+      out.error = "option " + std::string(name) + " needs a value";
+      return out;
+    }
+    const auto value = equals == std::string_view::npos ? arguments[++i] : argument.substr(equals + 1);
+    if (!out.options.emplace(name, value).second) {
+      out.error = "option " + std::string(name) + " is given twice";
+      return out;
+    }
+  }
+  return out;
+}
+
+int usage_error(std::string_view command, std::string_view what) {
+  std::cerr << "rrgate " << command << ": " << what << "; see rrgate --help\n";
+  return exit_usage;
+}
+
+}  // namespace rrgate

@@ -1,0 +1,44 @@
+// Subcommands and their options. Layer: server/cli. Each subcommand is one file and one row in main.cpp.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace rrgate {
+
+/// Exit codes: done; failed while running; not understood (arguments or configuration).
+enum ExitCode { exit_ok = 0, exit_failed = 1, exit_usage = 2 };
+
+using Arguments = std::span<const std::string_view>;
+
+struct Command {
+  std::string_view name;
+  std::string_view usage;    ///< "serve --config FILE"
+  std::string_view summary;  ///< one line for --help
+  int (*run)(Arguments arguments);
+};
+
+/// Runs the command that the arguments name, or answers --help and --version.
+int run_command_line(std::span<const Command> commands, Arguments arguments);
+
+/// Options of one subcommand, all of the form "--name VALUE" or "--name=VALUE"; the rest are operands.
+struct ParsedArguments {
+  std::map<std::string, std::string, std::less<>> options;
+  std::vector<std::string> operands;
+  std::string error;  ///< not empty: what wasn't understood
+};
+ParsedArguments parse_arguments(Arguments arguments, std::span<const std::string_view> known_options);
+
+/// Prints "rrgate NAME: what" and how to get help to stderr; returns exit_usage.
+int usage_error(std::string_view command, std::string_view what);
+
+// The subcommands.
+int run_serve(Arguments arguments);
+int run_check_config(Arguments arguments);
+int run_demo(Arguments arguments);
+
+}  // namespace rrgate

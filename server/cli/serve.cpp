@@ -1,0 +1,25 @@
+// rrgate serve: the gateway as a service. Layer: server/cli.
+#include <filesystem>
+
+#include "server/cli/command.hpp"
+#include "server/cli/findings.hpp"
+#include "server/cli/run_gateway.hpp"
+
+namespace rrgate {
+
+int run_serve(Arguments arguments) {
+  constexpr std::string_view options[] = {"--config"};
+  const auto parsed = parse_arguments(arguments, options);
+  if (!parsed.error.empty()) return usage_error("serve", parsed.error);
+  if (!parsed.operands.empty()) return usage_error("serve", "unexpected " + rr::quoted(parsed.operands.front()));
+  const auto file = parsed.options.find("--config");
+  if (file == parsed.options.end()) return usage_error("serve", "missing --config FILE");
+  auto config = load_config(file->second);
+  if (!report_findings(file->second, config)) return exit_usage;
+  // A relative folder counts from the file that names it, wherever the program was started.
+  auto& web_root = config.config.web_root;
+  if (!web_root.empty()) web_root = (std::filesystem::path(file->second).parent_path() / web_root).string();
+  return run_gateway(std::move(config.config), [](auto&, auto&, const auto&) {});
+}
+
+}  // namespace rrgate

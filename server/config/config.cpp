@@ -1,0 +1,169 @@
+#include "server/config/config.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+
+#include "server/config/object_reader.hpp"
+#include "server/http/origin.hpp"
+#include "server/transport/schemes.hpp"
+
+namespace rrgate {
+
+namespace {
+
+constexpr std::int64_t hour_ms = 3'600'000;
+
+/// A name stands in paths and logs: letters, digits, '_', '-', '.', beginning with a letter or digit.
+std::string check_device_name(const std::string& name) {
+  const auto is_plain = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+  };
+  const auto is_name_char = [&](char c) { return is_plain(c) || c == '_' || c == '-' || c == '.'; };
+  if (name.empty() || name.size() > 64 || !is_plain(name.front()) || !std::all_of(name.begin(), name.end(), is_name_char))
+    return "found " + rr::quoted(name) + ", expected 1 to 64 letters, digits, '_', '-', '.', first a letter or digit";
+  return {};
+}
+
+std::string read_device_url(const std::string& text, rr::ConnectionUrl& target) {
+  auto url = rr::parse_url(text, rr::ServiceInUrl::optional);
+  if (!url) return url.error().message;
+  if (!can_dial(url->scheme))
+    return "scheme " + rr::quoted(url->scheme) + " is not available for devices; available: " + dialable_schemes();
+  target = *url;
+  return {};
+}
+
+void read_device(ObjectReader& in, DeviceConfig& device) {
+  in.required_text("name", [&](const std::string& text) {
+    device.name = text;
+    return check_device_name(text);
+  });
+  in.required_text("url", [&](const std::string& text) { return read_device_url(text, device.url); });
+  in.size("max_clients", device.max_clients, {0, 1'000'000});
+}
+
+void read_limits(ObjectReader& in, Limits& limits) {
+  in.size("max_message_size", limits.max_message_size, {16 * 1024, 100 * 1024 * 1024});
+  in.size("header_bytes", limits.header_bytes, {1024, 65536});
+  in.duration("header_timeout_ms", limits.header_timeout, {100, hour_ms});
+  in.size("outbox_bytes", limits.outbox_bytes, {16 * 1024, 64 * 1024 * 1024});
+  in.size("clients", limits.clients, {1, 1'000'000});
+  in.size("clients_per_address", limits.clients_per_address, {1, 1'000'000});
+}
+
+void read_timeouts(ObjectReader& in, Timeouts& timeouts) {
+  in.duration("connect_ms", timeouts.connect, {100, hour_ms});
+  in.duration("drain_ms", timeouts.drain, {0, hour_ms});
+  in.duration("send_stall_ms", timeouts.send_stall, {100, hour_ms});
+  in.duration("idle_ms", timeouts.idle, {100, hour_ms});
+}
+
+void read_retry(ObjectReader& in, Retry& retry) {
+  in.duration("min_ms", retry.min, {50, hour_ms});
+  in.duration("max_ms", retry.max, {50, hour_ms});
+  in.duration("online_ms", retry.online, {50, hour_ms});
+}
+
+void read_config(ObjectReader& in, Config& config) {
+  in.texts("listen", true, [&](const std::string& text) -> std::string {
+    auto address = rr::parse_host_port(text);
+    if (!address) return address.error().message;
+    config.listen.push_back(*address);
+    return {};
+  });
+  in.objects("devices", true, [&](ObjectReader& item) {
+    DeviceConfig device;
+    read_device(item, device);
+    const auto same = [&](const DeviceConfig& other) { return other.name == device.name; };
+    if (!device.name.empty() && std::any_of(config.devices.begin(), config.devices.end(), same))
+      item.finding("name", "found " + rr::quoted(device.name) + " a second time; expected a name of its own");
+    config.devices.push_back(std::move(device));
+  });
+  in.text("web_root", config.web_root);
+  in.texts("allowed_origins", false, [&](const std::string& text) -> std::string {
+    if (!is_origin_pattern(text))
+      return "found " + rr::quoted(text) + ", expected scheme://host[:port] or scheme://*.domain[:port]";
+    config.allowed_origins.push_back(text);
+    return {};
+  });
+  in.object("limits", [&](ObjectReader& part) { read_limits(part, config.limits); });
+  in.object("timeouts", [&](ObjectReader& part) { read_timeouts(part, config.timeouts); });
+  in.object("retry", [&](ObjectReader& part) { read_retry(part, config.retry); });
+  in.object("log", [&](ObjectReader& part) {
+    part.choice("level", config.log.level, {"trace", "debug", "info", "warning", "error"});
+    part.choice("format", config.log.format, {"text", "json"});
+  });
+}
+
+void check_whole(const Config& config, const nlohmann::json& document, std::vector<Finding>& findings) {
+  if (document.contains("listen") && document["listen"].is_array() && document["listen"].empty())
+    findings.push_back({"/listen", "empty; expected at least one \"host:port\""});
+  if (config.retry.min > config.retry.max)
+    findings.push_back({"/retry/min_ms", "found " + std::to_string(config.retry.min.count()) +
+                                             ", expected at most max_ms (" +
+                                             std::to_string(config.retry.max.count()) + ")"});
+}
+
+/// Parses JSON with comments. nlohmann keeps the last of two equal keys; here that is a finding.
+std::optional<nlohmann::json> parse_json(std::string_view text, std::vector<Finding>& findings) {
+  std::vector<std::set<std::string>> seen;
+  const auto watch = [&](int, nlohmann::json::parse_event_t event, nlohmann::json& parsed) {
+    if (event == nlohmann::json::parse_event_t::object_start) seen.emplace_back();
+    if (event == nlohmann::json::parse_event_t::object_end) seen.pop_back();
+    if (event == nlohmann::json::parse_event_t::key && !seen.back().insert(parsed.get<std::string>()).second)
+      findings.push_back({{}, "key " + rr::quoted(parsed.get<std::string>()) + " appears twice in one object"});
+    return true;
+  };
+  try {
+    return nlohmann::json::parse(text, watch, true, true);
+  } catch (const nlohmann::json::parse_error& error) {
+    std::string what = error.what();  // "[json.exception.parse_error.101] parse error at line 1, column 2: ..."
+    const auto begin = what.find("] ");
+    findings.push_back({{}, "not JSON: " + (begin == std::string::npos ? what : what.substr(begin + 2))});
+    return std::nullopt;
+  }
+}
+
+}  // namespace
+
+ParsedConfig parse_config(std::string_view text) {
+  ParsedConfig out;
+  const auto document = parse_json(text, out.findings);
+  if (!document) return out;
+  ReadLog log;
+  ObjectReader root(*document, "", log);
+  if (log.findings.empty()) {
+    read_config(root, out.config);
+    root.finish();
+    check_whole(out.config, *document, log.findings);
+  }
+  out.findings.insert(out.findings.end(), log.findings.begin(), log.findings.end());
+  return out;
+}
+
+ParsedConfig load_config(const std::string& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  if (!in || !(text << in.rdbuf())) {
+    ParsedConfig out;
+    out.findings.push_back({{}, "can't be read; expected a JSON file"});
+    return out;
+  }
+  return parse_config(text.str());
+}
+
+std::vector<OptionInfo> config_options() {
+  std::vector<OptionInfo> options;
+  ReadLog log;
+  log.options = &options;
+  const auto empty = nlohmann::json::object();
+  ObjectReader root(empty, "", log);
+  Config config;
+  read_config(root, config);
+  return options;
+}
+
+}  // namespace rrgate

@@ -1,0 +1,89 @@
+// What an operator can set, with the defaults. Layer: server/config. Mirrors gateway-config/gateway.schema.json.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/session/url.hpp"
+#include "server/config/finding.hpp"
+
+namespace rrgate {
+
+using std::chrono::milliseconds;
+
+struct DeviceConfig {
+  std::string name;  ///< the path segment of /devices/<name>
+  rr::ConnectionUrl url;
+  std::size_t max_clients = 0;  ///< 0: no bound of its own
+
+  bool operator==(const DeviceConfig&) const = default;
+};
+
+struct Limits {
+  std::size_t max_message_size = 12u * 1024 * 1024;  ///< bytes of one Robot Raconteur message, both directions
+  std::size_t header_bytes = 8192;                   ///< of an HTTP request, with its empty line
+  milliseconds header_timeout{5000};                 ///< for the first bytes, and for a whole header
+  std::size_t outbox_bytes = 256u * 1024;            ///< held for one client and direction before reading pauses
+  std::size_t clients = 4000;                        ///< connections at a time, all addresses together
+  std::size_t clients_per_address = 1000;
+
+  bool operator==(const Limits&) const = default;
+};
+
+struct Timeouts {
+  milliseconds connect{5000};      ///< to reach a device
+  milliseconds drain{5000};        ///< for relays to end after SIGTERM
+  milliseconds send_stall{15000};  ///< a peer that takes no byte for so long is cut
+  milliseconds idle{60000};        ///< a kept-alive HTTP connection without a request
+
+  bool operator==(const Timeouts&) const = default;
+};
+
+/// Waiting between attempts to reach a device that is down: doubles from min to max, with jitter.
+struct Retry {
+  milliseconds min{500};
+  milliseconds max{30000};
+  milliseconds online{10000};  ///< between looks at a device that answers
+
+  bool operator==(const Retry&) const = default;
+};
+
+struct LogConfig {
+  std::string level = "info";
+  std::string format = "text";
+
+  bool operator==(const LogConfig&) const = default;
+};
+
+struct Config {
+  std::vector<rr::HostPort> listen;
+  std::vector<DeviceConfig> devices;
+  std::string web_root;  ///< folder of the dashboard; empty: the one that was installed with the program
+  std::vector<std::string> allowed_origins;
+  Limits limits;
+  Timeouts timeouts;
+  Retry retry;
+  LogConfig log;
+
+  bool operator==(const Config&) const = default;
+};
+
+/// Reads a configuration (JSON with comments). Every finding is listed, not only the first; with any of them the config is
+/// not to be used.
+struct ParsedConfig {
+  Config config;
+  std::vector<Finding> findings;
+};
+ParsedConfig parse_config(std::string_view text);
+
+/// The same for a file; a file that can't be read is a finding with an empty path.
+ParsedConfig load_config(const std::string& file);
+
+/// Every option the parser knows, in its order: what the schema must say too.
+std::vector<OptionInfo> config_options();
+
+}  // namespace rrgate

@@ -1,0 +1,44 @@
+#include "server/gateway/client_relay.hpp"
+
+#include "server/gateway/relay.hpp"
+#include "server/log/log.hpp"
+
+namespace rrgate {
+
+awaitable<rr::Result<std::unique_ptr<Boarding>>> board(Device& device) {
+  const auto label = "device " + rr::quoted(device.config().name);
+  auto seat = device.take_seat();
+  if (!seat)
+    co_return rr::make_error(rr::ErrorCode::connection_error,
+                             label + " has all the clients it may have (" + std::to_string(device.clients()) + ")");
+  auto stream = co_await device.connect();
+  if (!stream)
+    co_return rr::make_error(rr::ErrorCode::connection_error, label + " is offline: " + stream.error().message);
+  auto boarding = std::make_unique<Boarding>(Boarding{device, std::move(*seat), std::move(*stream)});
+  co_return boarding;
+}
+
+awaitable<void> relay_client(Gateway& gateway, Connection& connection, ByteStream& client, Boarding& boarding) {
+  const auto& limits = gateway.config().limits;
+  Relay relay(client, *boarding.stream, {limits.max_message_size, limits.outbox_bytes}, gateway.watchdog());
+  connection.is_relay = true;
+  connection.stop = [&relay](EndReason reason) { relay.stop(std::move(reason)); };
+  const auto& name = boarding.device.config().name;
+  log(LogLevel::info, "client connected", {{"device", name}, {"peer", client.peer()}});
+
+  const auto reason = co_await relay.run();
+
+  connection.is_relay = false;
+  connection.stop = [&client](const EndReason&) { client.close(); };
+  // A device that ends a connection may be ending altogether: find out now rather than at the next look.
+  if (!gateway.is_stopping() && (reason.code == 1011 || reason.text.rfind("device", 0) == 0))
+    boarding.device.note_trouble();
+  log(LogLevel::info, "client disconnected",
+      {{"device", name},
+       {"peer", client.peer()},
+       {"reason", reason.text},
+       {"bytes_to_device", relay.bytes_to_device()},
+       {"bytes_to_client", relay.bytes_to_client()}});
+}
+
+}  // namespace rrgate

@@ -1,0 +1,25 @@
+// A client that has found its device: seat, connection, relay, and the log line at its end. Layer: server/gateway.
+#pragma once
+
+#include <memory>
+
+#include "server/gateway/device.hpp"
+#include "server/gateway/gateway.hpp"
+#include "server/transport/byte_stream.hpp"
+
+namespace rrgate {
+
+/// A place at a device and a connection to it.
+struct Boarding {
+  Device& device;
+  Device::Seat seat;
+  std::unique_ptr<ByteStream> stream;
+};
+
+/// Errors   connection_error: the device is full or can't be reached; the text is for the client.
+awaitable<rr::Result<std::unique_ptr<Boarding>>> board(Device& device);
+
+/// Relays until one side ends; ends both. `client` is at the start of its Robot Raconteur stream.
+awaitable<void> relay_client(Gateway& gateway, Connection& connection, ByteStream& client, Boarding& boarding);
+
+}  // namespace rrgate

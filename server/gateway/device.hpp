@@ -1,0 +1,94 @@
+// The devices behind the gateway: who they are and how they are. Layer: server/gateway.
+#pragma once
+
+#include <boost/asio/steady_timer.hpp>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/config/config.hpp"
+#include "server/gateway/probe.hpp"
+#include "server/transport/dial.hpp"
+
+namespace rrgate {
+
+enum class DeviceState { connecting, online, offline };
+std::string_view to_string(DeviceState state);
+
+/// One configured device. Looks at it from time to time; connects clients to it.
+class Device {
+ public:
+  Device(const boost::asio::any_io_executor& executor, DeviceConfig config, const Config& whole, Watchdog& watchdog);
+
+  const DeviceConfig& config() const { return config_; }
+  DeviceState state() const { return state_; }
+  /// Empty while the device is online.
+  const std::string& last_error() const { return last_error_; }
+  /// What the last answer said; kept while the device is offline, so that clients can still be told which one it is.
+  const std::optional<ProbeResult>& identity() const { return identity_; }
+  std::size_t clients() const { return clients_; }
+
+  /// A connection for one client. A failure makes the device be looked at again soon.
+  awaitable<rr::Result<std::unique_ptr<ByteStream>>> connect();
+  /// A client's connection to the device broke: look at it again soon.
+  void note_trouble() { look_again(); }
+
+  /// Counts one client while it lives; see max_clients.
+  class Seat {
+   public:
+    explicit Seat(Device& device) : device_(&device) { ++device_->clients_; }
+    Seat(Seat&& other) noexcept : device_(std::exchange(other.device_, nullptr)) {}
+    Seat& operator=(Seat&&) = delete;
+    ~Seat() {
+      if (device_) --device_->clients_;
+    }
+
+   private:
+    Device* device_;
+  };
+  /// nullopt when the device has as many clients as it may.
+  std::optional<Seat> take_seat();
+
+  /// Probes until stop().
+  awaitable<void> watch();
+  void stop();
+
+ private:
+  void look_again();
+  void note(const rr::Result<ProbeResult>& result);
+
+  DeviceConfig config_;
+  DialOptions dial_options_;
+  Retry retry_;
+  Watchdog& watchdog_;
+  DeviceState state_ = DeviceState::connecting;
+  std::string last_error_;
+  std::optional<ProbeResult> identity_;
+  std::size_t clients_ = 0;
+  bool is_stopping_ = false;
+  bool looks_again_ = false;
+  boost::asio::steady_timer wake_;
+};
+
+class DeviceRegistry {
+ public:
+  DeviceRegistry(const boost::asio::any_io_executor& executor, const Config& config, Watchdog& watchdog);
+
+  void start();
+  void stop();
+
+  const std::vector<std::unique_ptr<Device>>& all() const { return devices_; }
+  /// Null when no device has this name.
+  Device* find(std::string_view name) const;
+  /// The device that a client asks for by node id and name (any id and "" ask for none in particular, and then there
+  /// must be just one device). Null when there is none.
+  Device* route(const rr::NodeId& node_id, std::string_view node_name) const;
+
+ private:
+  boost::asio::any_io_executor executor_;
+  std::vector<std::unique_ptr<Device>> devices_;
+};
+
+}  // namespace rrgate

@@ -1,0 +1,35 @@
+// Lets a stream of Robot Raconteur messages pass, header by header. Layer: server/gateway.
+// Source: messages spec section 2.
+#pragma once
+
+#include <cstddef>
+
+#include "core/support/bytes.hpp"
+#include "core/support/error.hpp"
+
+namespace rrgate {
+
+/// Looks at the first ten bytes of every message and at nothing else; the rest passes without being buffered, so that
+/// a large message costs the gateway no memory and no delay. (rr::FrameScanner hands out whole messages instead.)
+class FrameGate {
+ public:
+  explicit FrameGate(std::size_t max_message_size) : limit_(max_message_size) {}
+
+  /// `bytes` follow those that passed before. Returns how many of them may pass: all, but for the last 9 at most, when
+  /// they begin a message whose header is incomplete. Offer those again with what follows them.
+  /// Errors   protocol_error: magic, version, or a size below 16 or above the limit. No byte of such a message passes.
+  [[nodiscard]] rr::Result<std::size_t> pass(rr::ByteSpan bytes);
+
+  /// After in-stream TLS began: everything passes, unread.
+  void make_opaque() { is_opaque_ = true; }
+  /// Whether the last error was a message above the limit.
+  bool is_too_large() const { return is_too_large_; }
+
+ private:
+  std::size_t limit_;
+  std::size_t left_ = 0;  ///< bytes of the current message still to come
+  bool is_opaque_ = false;
+  bool is_too_large_ = false;
+};
+
+}  // namespace rrgate

@@ -1,0 +1,29 @@
+// One port for all: tells raw Robot Raconteur from HTTP by the first bytes. Layer: server/gateway.
+// Source: transports spec section 4.1.
+#pragma once
+
+#include <memory>
+#include <span>
+
+#include "server/gateway/admission.hpp"
+#include "server/transport/tcp.hpp"
+
+namespace rrgate {
+
+class Gateway;
+
+enum class Protocol {
+  undecided,  ///< more bytes needed
+  robot_raconteur,
+  http,
+  tls,      ///< a ClientHello; not served yet
+  unknown,
+};
+
+/// What the first bytes of a connection say. Decides as early as it can, with four bytes at the latest.
+Protocol detect_protocol(rr::ByteSpan first_bytes);
+
+/// Serves one accepted connection to its end.
+awaitable<void> serve_connection(Gateway& gateway, std::unique_ptr<TcpStream> stream, Admission::Ticket ticket);
+
+}  // namespace rrgate

@@ -1,0 +1,132 @@
+#include "server/gateway/gateway.hpp"
+
+#include <algorithm>
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <random>
+
+#include "server/gateway/front_door.hpp"
+#include "server/http/routes.hpp"
+#include "server/log/log.hpp"
+
+namespace rrgate {
+
+namespace asio = boost::asio;
+
+namespace {
+
+/// After connections were told to end: close frames leave, answers come, sockets close.
+constexpr std::chrono::milliseconds last_wait{2000};
+
+rr::NodeId random_node_id() {
+  std::random_device random;
+  rr::NodeId id;
+  for (auto& byte : id.bytes) byte = static_cast<std::uint8_t>(random());
+  id.bytes[6] = static_cast<std::uint8_t>((id.bytes[6] & 0x0f) | 0x40);  // UUID version 4
+  id.bytes[8] = static_cast<std::uint8_t>((id.bytes[8] & 0x3f) | 0x80);
+  return id;
+}
+
+}  // namespace
+
+Gateway::Gateway(asio::io_context& io, Config config)
+    : io_(io),
+      config_(std::move(config)),
+      watchdog_(io.get_executor()),
+      devices_(io.get_executor(), config_, watchdog_),
+      admission_(config_.limits.clients, config_.limits.clients_per_address),
+      router_(make_routes(*this)),
+      node_id_(random_node_id()),
+      drained_(io) {}
+
+rr::Result<std::vector<rr::HostPort>> Gateway::start() {
+  std::vector<rr::HostPort> bound;
+  for (const auto& address : config_.listen) {
+    auto listener = std::make_unique<TcpListener>(io_.get_executor());
+    auto opened = listener->open(address);
+    if (!opened) {
+      listeners_.clear();
+      return opened.error();
+    }
+    bound.insert(bound.end(), opened->begin(), opened->end());
+    listeners_.push_back(std::move(listener));
+  }
+  for (const auto& listener : listeners_)
+    listener->start([this](asio::ip::tcp::socket socket) { accept(std::move(socket)); });
+  devices_.start();
+  return bound;
+}
+
+void Gateway::accept(asio::ip::tcp::socket socket) {
+  error_code error;
+  const auto peer = socket.remote_endpoint(error);
+  if (error) return;  // gone already
+  auto ticket = admission_.admit(peer.address());
+  if (!ticket) {
+    log(LogLevel::warning, "connection refused: too many",
+        {{"peer", peer.address().to_string()}, {"open", admission_.open()}});
+    return;
+  }
+  ++open_connections_;
+  auto stream = std::make_unique<TcpStream>(std::move(socket), watchdog_, config_.timeouts.send_stall);
+  auto serve = serve_connection(*this, std::move(stream), std::move(*ticket));
+  asio::co_spawn(io_, std::move(serve), [this](std::exception_ptr failure) {
+    --open_connections_;
+    if (is_stopping_) drained_.cancel();
+    if (!failure) return;
+    try {
+      std::rethrow_exception(failure);
+    } catch (const std::exception& exception) {  // out of memory, or a mistake of ours: this connection only
+      log(LogLevel::error, "connection failed", {{"error", exception.what()}});
+    }
+  });
+}
+
+void Gateway::stop(std::function<void()> on_stopped) {
+  if (is_stopping_) {
+    ends_at_once_ = true;
+    drained_.cancel();
+    return;
+  }
+  is_stopping_ = true;
+  on_stopped_ = std::move(on_stopped);
+  if (on_stop_) on_stop_();
+  for (const auto& listener : listeners_) listener->close();
+  devices_.stop();
+  asio::co_spawn(io_, drain(), asio::detached);
+}
+
+bool Gateway::has_relay() const {
+  return std::any_of(connections_.begin(), connections_.end(), [](const auto& each) { return each.is_relay; });
+}
+
+void Gateway::end_all(const EndReason& reason) {
+  for (auto it = connections_.begin(); it != connections_.end();) {
+    auto& connection = *it++;
+    connection.stop(reason);
+  }
+}
+
+awaitable<void> Gateway::drain() {
+  for (auto it = connections_.begin(); it != connections_.end();) {
+    auto& connection = *it++;
+    if (!connection.is_relay) connection.stop({1001, "the gateway is stopping"});
+  }
+  log(LogLevel::info, "stopping", {{"connections", open_connections_}, {"drain_ms", config_.timeouts.drain.count()}});
+  const auto wait_until = [this](std::chrono::steady_clock::time_point deadline) -> awaitable<void> {
+    drained_.expires_at(deadline);
+    co_await drained_.async_wait(asio::as_tuple(asio::use_awaitable));
+  };
+  auto deadline = std::chrono::steady_clock::now() + config_.timeouts.drain;
+  while (has_relay() && !ends_at_once_ && std::chrono::steady_clock::now() < deadline) co_await wait_until(deadline);
+  const EndReason reason{1001, "the gateway is stopping"};
+  end_all(reason);
+  deadline = std::chrono::steady_clock::now() + last_wait;
+  while (open_connections_ > 0 && std::chrono::steady_clock::now() < deadline) co_await wait_until(deadline);
+  log(LogLevel::info, "stopped", {{"connections_cut", open_connections_}});
+  on_stopped_();
+}
+
+}  // namespace rrgate

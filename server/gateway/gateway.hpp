@@ -1,0 +1,77 @@
+// The gateway as a whole: listeners, devices, connections, and how it stops. Layer: server/gateway.
+#pragma once
+
+#include <boost/asio/io_context.hpp>
+#include <boost/intrusive/list.hpp>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "server/config/config.hpp"
+#include "server/gateway/admission.hpp"
+#include "server/gateway/device.hpp"
+#include "server/http/router.hpp"
+#include "server/transport/tcp.hpp"
+#include "server/transport/watchdog.hpp"
+
+namespace rrgate {
+
+/// One open connection as the gateway knows it, so that it can be asked to end.
+struct Connection : boost::intrusive::list_base_hook<boost::intrusive::link_mode<boost::intrusive::auto_unlink>> {
+  /// Ends it soon.
+  std::function<void(EndReason)> stop;
+  /// Whether it may go on for a while when the gateway stops: it carries a client's session.
+  bool is_relay = false;
+};
+
+/// Uses one thread: that of the io_context. Outlives its run().
+class Gateway {
+ public:
+  Gateway(boost::asio::io_context& io, Config config);
+  Gateway(const Gateway&) = delete;
+  Gateway& operator=(const Gateway&) = delete;
+
+  /// Opens all listeners and starts to look at the devices. Returns the addresses with their true ports.
+  /// Errors   connection_error: an address that can't be listened on; then nothing is started.
+  [[nodiscard]] rr::Result<std::vector<rr::HostPort>> start();
+
+  /// Closes the listeners, lets relays end within timeouts.drain, then ends them; calls `on_stopped` when nothing is
+  /// left. A second call ends them at once.
+  void stop(std::function<void()> on_stopped);
+  bool is_stopping() const { return is_stopping_; }
+  /// Called when stopping begins.
+  void on_stop(std::function<void()> call) { on_stop_ = std::move(call); }
+
+  // What connections need.
+  const Config& config() const { return config_; }
+  Watchdog& watchdog() { return watchdog_; }
+  DeviceRegistry& devices() { return devices_; }
+  const Router& router() const { return router_; }
+  /// Our own node id, for answers to native clients that no device takes.
+  const rr::NodeId& node_id() const { return node_id_; }
+  void add(Connection& connection) { connections_.push_back(connection); }
+
+ private:
+  void accept(boost::asio::ip::tcp::socket socket);
+  awaitable<void> drain();
+  bool has_relay() const;
+  void end_all(const EndReason& reason);
+
+  boost::asio::io_context& io_;
+  Config config_;
+  Watchdog watchdog_;
+  DeviceRegistry devices_;
+  Admission admission_;
+  Router router_;
+  rr::NodeId node_id_;
+  std::vector<std::unique_ptr<TcpListener>> listeners_;
+  boost::intrusive::list<Connection, boost::intrusive::constant_time_size<false>> connections_;
+  std::size_t open_connections_ = 0;
+  bool is_stopping_ = false;
+  bool ends_at_once_ = false;
+  std::function<void()> on_stop_;
+  std::function<void()> on_stopped_;
+  boost::asio::steady_timer drained_;  ///< cancelled when a connection ends while stopping
+};
+
+}  // namespace rrgate

@@ -1,0 +1,134 @@
+#include "server/gateway/http_client.hpp"
+
+#include "server/gateway/client_relay.hpp"
+#include "server/http/request_reader.hpp"
+#include "server/http/upgrade.hpp"
+#include "server/log/log.hpp"
+#include "server/transport/websocket.hpp"
+
+namespace rrgate {
+
+namespace {
+
+constexpr std::string_view devices_prefix = "/devices/";
+
+awaitable<error_code> write_text(ByteStream& stream, std::string_view text) {
+  const auto slice = rr::as_bytes(text);
+  const std::span<const rr::ByteSpan> slices(&slice, 1);
+  co_return co_await stream.write(slices);
+}
+
+awaitable<error_code> write_response(ByteStream& stream, const Request* request, const Response& response) {
+  const bool keeps_alive = request && request->message.keep_alive() && !response.closes;
+  const auto head = format_response_head(response, keeps_alive, request && request->message.version() == 10 ? 0 : 1);
+  const bool has_body = response.body && !(request && request->message.method() == http::verb::head);
+  const rr::ByteSpan parts[] = {rr::as_bytes(head), has_body ? rr::as_bytes(*response.body) : rr::ByteSpan()};
+  const std::span<const rr::ByteSpan> slices(parts, has_body ? 2 : 1);
+  co_return co_await stream.write(slices);
+}
+
+/// The device of an upgrade: by path, or at "/" by the node that native clients put into the query.
+rr::Result<Device*> find_device(Gateway& gateway, const Request& request) {
+  const auto path = request.path();
+  const auto not_found = [](std::string text) { return rr::make_error(rr::ErrorCode::node_not_found, std::move(text)); };
+  if (path.substr(0, devices_prefix.size()) == devices_prefix) {
+    auto name = path.substr(devices_prefix.size());
+    if (!name.empty() && name.back() == '/') name.remove_suffix(1);
+    auto* device = gateway.devices().find(name);
+    if (!device) return not_found("no device " + rr::quoted(name) + "; /api/v1/devices lists them");
+    return device;
+  }
+  if (path != "/") return not_found("no WebSocket at " + rr::quoted(path) + "; expected /devices/NAME or /");
+  rr::NodeId node_id;
+  if (const auto text = rr::query_value(request.query(), "nodeid")) {
+    auto parsed = rr::parse_node_id(*text);
+    if (!parsed) return parsed.error();
+    node_id = *parsed;
+  }
+  const auto node_name = rr::query_value(request.query(), "nodename").value_or("");
+  auto* device = gateway.devices().route(node_id, node_name);
+  if (!device)
+    return not_found(node_id.is_any() && node_name.empty() ? "several devices; expected /devices/NAME"
+                                                           : "no device is the node that the query names");
+  return device;
+}
+
+/// Carries an upgrade through. The stream is used up.
+awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, std::unique_ptr<TcpStream> stream,
+                                const Request& request, rr::ByteSpan unread) {
+  auto& tcp = *stream;
+  const auto refuse = [&tcp, &request](const Response& refusal) -> awaitable<void> {
+    auto response = refusal;
+    response.closes = true;
+    co_await write_response(tcp, &request, response);
+    co_await tcp.end(no_reason);
+  };
+  if (auto refusal = refuse_upgrade(request, gateway.config().allowed_origins)) {
+    log(LogLevel::info, "upgrade refused",
+        {{"peer", tcp.peer()}, {"status", refusal->status}, {"origin", request.header(http::field::origin)}});
+    co_await refuse(*refusal);
+    co_return;
+  }
+  auto device = find_device(gateway, request);
+  if (!device) {
+    const auto response = problem_response(device.error().code == rr::ErrorCode::node_not_found ? 404 : 400,
+                                           device.error().message);
+    co_await refuse(response);
+    co_return;
+  }
+  auto boarding = co_await board(**device);
+  const bool takes_close = takes_close_frames(request);
+  if (!boarding && !takes_close) {
+    auto response = problem_response(503, boarding.error().message);
+    response.set("Retry-After", "2");
+    co_await refuse(response);
+    co_return;
+  }
+  const auto accepted = format_upgrade_response(request);
+  if (co_await write_text(tcp, accepted)) co_return;
+  tcp.put_back(unread);
+  WebSocketStream socket(std::move(stream), gateway.watchdog(), takes_close);
+  if (!boarding) {  // a page can't read the status of a refused upgrade, but it can read why a WebSocket closes
+    log(LogLevel::info, "client refused", {{"peer", socket.peer()}, {"error", boarding.error().message}});
+    const EndReason reason{1013, boarding.error().message};
+    co_await socket.end(reason);
+    co_return;
+  }
+  co_await relay_client(gateway, connection, socket, **boarding);
+}
+
+}  // namespace
+
+awaitable<void> serve_http_client(Gateway& gateway, Connection& connection, std::unique_ptr<TcpStream> stream) {
+  const auto& config = gateway.config();
+  const RequestLimits limits{config.limits.header_bytes, config.limits.header_timeout, config.timeouts.idle};
+  RequestReader reader(*stream, limits, gateway.watchdog());
+  for (;;) {
+    const auto read = co_await reader.next();
+    if (!read.request && read.refusal == 0) break;
+    if (!read.request) {
+      log(LogLevel::info, "request refused",
+          {{"peer", stream->peer()}, {"status", read.refusal}, {"detail", read.detail}});
+      const auto response = problem_response(read.refusal, read.detail);
+      co_await write_response(*stream, nullptr, response);
+      co_await stream->end(no_reason);
+      break;
+    }
+    const auto& request = *read.request;
+    if (asks_for_websocket(request)) {
+      const rr::Bytes unread(reader.unread().begin(), reader.unread().end());
+      co_await serve_websocket(gateway, connection, std::move(stream), request, unread);
+      break;
+    }
+    auto response = gateway.router().answer(request);
+    if (gateway.is_stopping()) response.closes = true;
+    const bool goes_on = request.message.keep_alive() && !response.closes;
+    if (co_await write_response(*stream, &request, response)) break;
+    if (!goes_on) {
+      co_await stream->end(no_reason);
+      break;
+    }
+  }
+}
+
+}  // namespace rrgate

@@ -1,0 +1,13 @@
+// HTTP clients: requests to the router, upgrades to a relay. Layer: server/gateway.
+#pragma once
+
+#include <memory>
+
+#include "server/gateway/gateway.hpp"
+
+namespace rrgate {
+
+/// Serves requests, kept alive and pipelined, until the connection ends or becomes a WebSocket and that ends.
+awaitable<void> serve_http_client(Gateway& gateway, Connection& connection, std::unique_ptr<TcpStream> stream);
+
+}  // namespace rrgate

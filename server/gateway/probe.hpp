@@ -1,0 +1,31 @@
+// Asks a device who it is. Layer: server/gateway. Source: transports spec section 3.1.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/support/node_id.hpp"
+#include "server/transport/dial.hpp"
+
+namespace rrgate {
+
+struct DeviceService {
+  std::string name;
+  std::string type;
+
+  bool operator==(const DeviceService&) const = default;
+};
+
+struct ProbeResult {
+  rr::NodeId node_id;
+  std::string node_name;
+  std::vector<DeviceService> services;
+
+  bool operator==(const ProbeResult&) const = default;
+};
+
+/// Connects, greets, disconnects; all of it within options.timeout.
+/// Errors   connection_error: not reached, no or a wrong answer. node_not_found: another node than the URL names.
+awaitable<rr::Result<ProbeResult>> probe(rr::ConnectionUrl url, DialOptions options, Watchdog& watchdog);
+
+}  // namespace rrgate

@@ -1,0 +1,104 @@
+#include "server/gateway/relay.hpp"
+
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/error.hpp>
+#include <boost/asio/this_coro.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <cstring>
+#include <memory>
+
+namespace rrgate {
+
+namespace asio = boost::asio;
+
+namespace {
+
+/// After the client has ended its side, the answers on their way may still come for so long.
+constexpr std::chrono::milliseconds half_closed_time{1000};
+
+}  // namespace
+
+Relay::Relay(ByteStream& client, ByteStream& device, RelayOptions options, Watchdog& watchdog)
+    : client_(client),
+      device_(device),
+      options_(options),
+      to_device_{client, device, FrameGate(options.max_message_size), false},
+      to_client_{device, client, FrameGate(options.max_message_size), true},
+      half_closed_limit_(watchdog, [this] { stop({1000, "the client has ended"}); }),
+      to_device_done_(watchdog.executor(), asio::steady_timer::time_point::max()) {}
+
+awaitable<EndReason> Relay::run() {
+  const auto executor = co_await asio::this_coro::executor;
+  asio::co_spawn(executor, pump_to_device(), asio::detached);
+  co_await pump(to_client_);
+  while (!is_to_device_done_) co_await to_device_done_.async_wait(asio::as_tuple(asio::use_awaitable));
+  half_closed_limit_.disarm();
+  device_.close();
+  auto reason = *end_reason_;
+  co_await client_.end(reason);
+  co_return reason;
+}
+
+void Relay::stop(EndReason reason) {
+  if (end_reason_) return;
+  end_reason_ = std::move(reason);
+  device_.close();
+  client_.cancel();
+}
+
+awaitable<void> Relay::pump_to_device() {
+  co_await pump(to_device_);
+  is_to_device_done_ = true;
+  to_device_done_.cancel();
+}
+
+awaitable<void> Relay::pump(Direction& direction) {
+  // Not a vector: its pages are touched, and so become memory, only as far as they are used.
+  const auto buffer = std::make_unique_for_overwrite<std::uint8_t[]>(options_.outbox_bytes);
+  std::size_t held = 0;  // bytes of an incomplete message start, at the front
+  while (!end_reason_) {
+    const auto read = co_await direction.from.read_some({buffer.get() + held, options_.outbox_bytes - held});
+    if (read.error || read.is_end()) {
+      end_of(direction, read.error);
+      break;
+    }
+    held += read.bytes;
+    const auto passed = direction.gate.pass({buffer.get(), held});
+    if (!passed) {
+      stop(broken_rule(direction, passed.error()));
+      break;
+    }
+    if (*passed == 0) continue;
+    const rr::ByteSpan slice(buffer.get(), *passed);
+    const auto error = co_await direction.to.write({&slice, 1});
+    if (error) {
+      const bool is_slow = error == asio::error::timed_out;
+      stop(direction.is_from_device ? EndReason{1013, is_slow ? "client too slow" : "client lost: " + error.message()}
+                                    : EndReason{1011, is_slow ? "device takes no data" : "device lost: " + error.message()});
+      break;
+    }
+    direction.bytes += *passed;
+    held -= *passed;
+    if (held > 0) std::memmove(buffer.get(), buffer.get() + *passed, held);
+  }
+}
+
+void Relay::end_of(Direction& direction, error_code error) {
+  if (direction.is_from_device) {
+    stop(error ? EndReason{1011, "device lost: " + error.message()} : EndReason{1000, "device closed the connection"});
+  } else if (error) {
+    stop({1000, "client lost: " + error.message()});
+  } else if (!end_reason_) {
+    device_.finish_sending();
+    half_closed_limit_.arm(half_closed_time);
+  }
+}
+
+EndReason Relay::broken_rule(const Direction& direction, const rr::Error& error) const {
+  const std::uint16_t code = direction.gate.is_too_large() ? 1009 : direction.is_from_device ? 1011 : 1002;
+  return {code, (direction.is_from_device ? "from the device: " : "from the client: ") + error.message};
+}
+
+}  // namespace rrgate

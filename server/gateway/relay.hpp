@@ -1,0 +1,61 @@
+// One client and one device, byte for byte in both directions. Layer: server/gateway.
+#pragma once
+
+#include <boost/asio/steady_timer.hpp>
+#include <chrono>
+#include <cstdint>
+#include <optional>
+
+#include "server/gateway/frame_gate.hpp"
+#include "server/transport/byte_stream.hpp"
+#include "server/transport/watchdog.hpp"
+
+namespace rrgate {
+
+struct RelayOptions {
+  std::size_t max_message_size;
+  /// Bytes held for each direction. While they wait to be written nothing is read from the other side: a reader that
+  /// stops makes its writer stop, and costs this much memory at most.
+  std::size_t outbox_bytes;
+};
+
+/// Both streams outlive the relay. One relay, one run().
+class Relay {
+ public:
+  Relay(ByteStream& client, ByteStream& device, RelayOptions options, Watchdog& watchdog);
+
+  /// Forwards until one side ends, fails, or breaks the rules. Ends both streams and says why.
+  awaitable<EndReason> run();
+
+  /// Makes run() end soon, with this reason for the client.
+  void stop(EndReason reason);
+
+  std::uint64_t bytes_to_device() const { return to_device_.bytes; }
+  std::uint64_t bytes_to_client() const { return to_client_.bytes; }
+
+ private:
+  struct Direction {
+    ByteStream& from;
+    ByteStream& to;
+    FrameGate gate;
+    bool is_from_device;
+    std::uint64_t bytes = 0;
+  };
+
+  awaitable<void> pump_to_device();
+  awaitable<void> pump(Direction& direction);
+  void end_of(Direction& direction, error_code error);
+  EndReason broken_rule(const Direction& direction, const rr::Error& error) const;
+
+  ByteStream& client_;
+  ByteStream& device_;
+  RelayOptions options_;
+  Direction to_device_;
+  Direction to_client_;
+  Deadline half_closed_limit_;
+  std::optional<EndReason> end_reason_;
+  bool is_to_device_done_ = false;
+  boost::asio::steady_timer to_device_done_;  ///< cancelled when that pump has ended
+};
+
+}  // namespace rrgate

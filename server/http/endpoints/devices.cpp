@@ -1,0 +1,59 @@
+#include "server/http/endpoints/devices.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include "server/gateway/gateway.hpp"
+#include "server/http/upgrade.hpp"
+
+namespace rrgate {
+
+namespace {
+
+nlohmann::ordered_json describe(const Device& device) {
+  nlohmann::ordered_json out;
+  out["name"] = device.config().name;
+  out["url"] = rr::format_url(device.config().url);
+  out["node_id"] = nullptr;
+  out["node_name"] = nullptr;
+  const auto& identity = device.identity();
+  if (identity) {
+    out["node_id"] = rr::format_node_id(identity->node_id, rr::NodeIdFormat::dashes);
+    out["node_name"] = identity->node_name;
+  }
+  out["state"] = std::string(to_string(device.state()));
+  out["last_error"] = nullptr;
+  if (!device.last_error().empty()) out["last_error"] = device.last_error();
+  out["services"] = nlohmann::ordered_json::array();
+  if (identity)
+    for (const auto& service : identity->services)
+      out["services"].push_back({{"name", service.name}, {"type", service.type}});
+  out["clients"] = device.clients();
+  return out;
+}
+
+}  // namespace
+
+Handler devices_endpoint(Gateway& gateway) {
+  return [&gateway](const Request&, std::string_view) {
+    nlohmann::ordered_json out;
+    out["devices"] = nlohmann::ordered_json::array();
+    for (const auto& device : gateway.devices().all()) out["devices"].push_back(describe(*device));
+    return json_response(200, out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+  };
+}
+
+Handler no_such_api_endpoint() {
+  return [](const Request& request, std::string_view) {
+    return problem_response(404, "nothing is at " + rr::quoted(request.path()));
+  };
+}
+
+Handler device_endpoint(Gateway& gateway) {
+  return [&gateway](const Request&, std::string_view name) {
+    if (!gateway.devices().find(name))
+      return problem_response(404, "no device " + rr::quoted(name) + "; /api/v1/devices lists them");
+    return upgrade_required("this is a WebSocket for Robot Raconteur clients; connect with a ws:// or rr+ws:// URL");
+  };
+}
+
+}  // namespace rrgate

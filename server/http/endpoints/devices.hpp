@@ -1,0 +1,18 @@
+// /api/v1/devices: what is behind the gateway. Layer: server/http.
+#pragma once
+
+#include "server/http/router.hpp"
+
+namespace rrgate {
+
+class Gateway;
+
+/// {"devices":[{"name","url","node_id","node_name","state","last_error","services":[{"name","type"}],"clients"}]};
+/// node_id and node_name are null until the device has answered once, last_error is null while it is online.
+Handler devices_endpoint(Gateway& gateway);
+/// Everything else below /api/: 404.
+Handler no_such_api_endpoint();
+/// /devices/NAME without an upgrade: says that a WebSocket is expected, or 404.
+Handler device_endpoint(Gateway& gateway);
+
+}  // namespace rrgate

@@ -1,0 +1,53 @@
+// A request and what answers it. Layer: server/http.
+#pragma once
+
+#include <boost/beast/http/message.hpp>
+#include <boost/beast/http/string_body.hpp>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace rrgate {
+
+namespace http = boost::beast::http;
+
+/// A whole request, its body included (bounded while it was read).
+struct Request {
+  http::request<http::string_body> message;
+
+  /// The target before and after '?'. The path is as received, not percent-decoded.
+  std::string_view path() const;
+  std::string_view query() const;
+  /// First value of a header, without surrounding white space; empty when absent.
+  std::string_view header(http::field name) const;
+  std::string_view header(std::string_view name) const;
+};
+
+struct Response {
+  unsigned status = 200;
+  std::vector<std::pair<std::string, std::string>> headers;
+  /// Immutable, so that a cached file is shared by all who fetch it. Null: no body.
+  std::shared_ptr<const std::string> body;
+  bool closes = false;  ///< end the connection after this
+
+  Response& set(std::string name, std::string value) {
+    headers.emplace_back(std::move(name), std::move(value));
+    return *this;
+  }
+};
+
+Response text_response(unsigned status, std::string_view content_type, std::string body);
+Response json_response(unsigned status, std::string json);
+/// RFC 9457: {"type":"about:blank","title":...,"status":...,"detail":...} as application/problem+json.
+Response problem_response(unsigned status, std::string_view detail);
+
+/// Status line and headers, with Content-Length, Date-less, and the headers every response of ours has.
+std::string format_response_head(const Response& response, bool keeps_alive, unsigned http_minor_version);
+
+/// Whether a comma-separated header value has `token`, in any case.
+bool has_token(std::string_view list, std::string_view token);
+bool equals_ignoring_case(std::string_view left, std::string_view right);
+
+}  // namespace rrgate

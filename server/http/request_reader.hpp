@@ -1,0 +1,43 @@
+// Reads requests from a byte stream, within limits. Layer: server/http. Parsing is Beast's.
+#pragma once
+
+#include <chrono>
+
+#include "server/http/message.hpp"
+#include "server/transport/byte_stream.hpp"
+#include "server/transport/watchdog.hpp"
+
+namespace rrgate {
+
+struct RequestLimits {
+  std::size_t header_bytes;
+  std::chrono::milliseconds header_timeout;  ///< for a whole request, from its first byte
+  std::chrono::milliseconds idle_timeout;    ///< until that first byte
+  std::size_t body_bytes = 64 * 1024;
+};
+
+/// What reading came to: a request, or a status to refuse with (408, 413, 431, 400), or neither: the peer is gone.
+struct ReadRequest {
+  std::optional<Request> request;
+  unsigned refusal = 0;
+  std::string detail;
+};
+
+/// One for each connection: keeps what was read beyond a request.
+class RequestReader {
+ public:
+  RequestReader(ByteStream& stream, RequestLimits limits, Watchdog& watchdog);
+
+  awaitable<ReadRequest> next();
+  /// Bytes behind the last request: of the next one, or of the protocol that was upgraded to.
+  rr::ByteSpan unread() const { return buffer_; }
+
+ private:
+  ByteStream& stream_;
+  RequestLimits limits_;
+  Deadline limit_;
+  rr::Bytes buffer_;
+  bool is_first_ = true;
+};
+
+}  // namespace rrgate

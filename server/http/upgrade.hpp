@@ -1,0 +1,31 @@
+// Whether a request becomes a WebSocket. Layer: server/http. Source: transports spec section 4.2.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/http/message.hpp"
+
+namespace rrgate {
+
+inline constexpr std::string_view websocket_subprotocol = "robotraconteur.robotraconteur.com";
+
+/// Whether the request asks to become a WebSocket at all.
+bool asks_for_websocket(const Request& request);
+
+/// Checks an upgrade: method and version, Upgrade, key and version (426), subprotocol if named (426), Origin if sent
+/// (403). nullopt: all is well.
+std::optional<Response> refuse_upgrade(const Request& request, const std::vector<std::string>& allowed_origins);
+
+/// The 101 response, with `Connection: Upgrade` alone: native clients compare it as a single token.
+std::string format_upgrade_response(const Request& request);
+
+/// 426, with the headers that say what is expected.
+Response upgrade_required(std::string_view detail);
+
+/// Whether the peer is a browser or another full WebSocket client, which takes close frames. Native Robot Raconteur
+/// peers send neither Origin nor extensions, and take a close frame for an error.
+bool takes_close_frames(const Request& request);
+
+}  // namespace rrgate

@@ -1,0 +1,14 @@
+// rrgate: the table of contents of the program.
+#include <vector>
+
+#include "server/cli/command.hpp"
+
+int main(int count, char** values) {
+  constexpr rrgate::Command commands[] = {
+      {"serve", "serve --config FILE", "run the gateway", rrgate::run_serve},
+      {"demo", "demo [--port N]", "run two simulated devices and a gateway to them", rrgate::run_demo},
+      {"check-config", "check-config FILE", "say what is wrong with a configuration", rrgate::run_check_config},
+  };
+  const std::vector<std::string_view> arguments(values + 1, values + count);
+  return rrgate::run_command_line(commands, arguments);
+}

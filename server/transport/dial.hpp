@@ -1,0 +1,22 @@
+// The one list of transports that reach a device, by URL scheme. Layer: server/transport.
+#pragma once
+
+#include <chrono>
+#include <memory>
+
+#include "server/transport/byte_stream.hpp"
+#include "server/transport/schemes.hpp"
+#include "server/transport/watchdog.hpp"
+
+namespace rrgate {
+
+struct DialOptions {
+  std::chrono::milliseconds timeout{5000};
+  std::chrono::milliseconds send_stall{15000};
+};
+
+/// Connects to the device of `url`; nothing is sent.
+/// Errors   connection_error: not reached in time, refused, or a scheme that isn't in the list.
+awaitable<rr::Result<std::unique_ptr<ByteStream>>> dial(rr::ConnectionUrl url, DialOptions options, Watchdog& watchdog);
+
+}  // namespace rrgate

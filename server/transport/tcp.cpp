@@ -1,0 +1,304 @@
+#include "server/transport/tcp.hpp"
+
+#include <netinet/tcp.h>
+
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/this_coro.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <boost/container/static_vector.hpp>
+#include <cstring>
+
+#include "server/log/log.hpp"
+
+namespace rrgate {
+
+namespace asio = boost::asio;
+using asio::ip::tcp;
+
+namespace {
+
+constexpr auto await_tuple = asio::as_tuple(asio::use_awaitable);
+
+/// Bytes that the kernel may hold unsent for one socket. More would only make data older: what the peer can't take yet
+/// waits at its source instead. In-flight data is not limited by it, so long fat links keep their throughput.
+constexpr int unsent_low_mark = 256 * 1024;
+
+/// How long end() waits for the peer to take the last bytes, and how much it reads meanwhile.
+constexpr std::chrono::milliseconds linger_time{1000};
+constexpr std::size_t linger_bytes = 1024 * 1024;
+
+std::string describe(const tcp::endpoint& endpoint) {
+  return rr::format_host_port(endpoint.address().to_string(), endpoint.port());
+}
+
+}  // namespace
+
+TcpStream::TcpStream(Socket socket, Watchdog& watchdog, std::chrono::milliseconds send_stall)
+    : socket_(std::move(socket)),
+      stall_(watchdog,
+             [this] {
+               is_stalled_ = true;
+               close();
+             }),
+      linger_(watchdog, [this] { cancel(); }),
+      send_stall_(send_stall) {
+  error_code ignored;  // a socket that is gone already shows it at the first read
+  socket_.non_blocking(true, ignored);
+  socket_.set_option(tcp::no_delay(true), ignored);
+  ::setsockopt(socket_.native_handle(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &unsent_low_mark, sizeof(unsent_low_mark));
+  const auto endpoint = socket_.remote_endpoint(ignored);
+  peer_ = ignored ? "(gone)" : describe(endpoint);
+}
+
+awaitable<ReadResult> TcpStream::read_some(std::span<std::uint8_t> into) {
+  if (put_back_used_ < put_back_.size()) {
+    const auto count = std::min(into.size(), put_back_.size() - put_back_used_);
+    std::memcpy(into.data(), put_back_.data() + put_back_used_, count);
+    put_back_used_ += count;
+    if (put_back_used_ == put_back_.size()) rr::Bytes().swap(put_back_);
+    co_return ReadResult{{}, count};
+  }
+  auto [error, bytes] = co_await socket_.async_read_some(asio::buffer(into.data(), into.size()), await_tuple);
+  if (error == asio::error::eof) error = {};
+  co_return ReadResult{error, bytes};
+}
+
+awaitable<error_code> TcpStream::write(std::span<const rr::ByteSpan> slices) {
+  const auto cancel_count = cancel_count_;
+  std::size_t offset = 0;  // bytes of slices.front() that are written
+  while (!slices.empty()) {
+    boost::container::static_vector<asio::const_buffer, 64> buffers;
+    for (const auto& slice : slices) {
+      if (buffers.size() == buffers.capacity()) break;
+      const auto rest = buffers.empty() ? slice.subspan(offset) : slice;
+      buffers.emplace_back(rest.data(), rest.size());
+    }
+    error_code error;
+    auto written = socket_.write_some(buffers, error);
+    if (error == asio::error::would_block) {
+      if (!stall_.is_armed()) stall_.arm(send_stall_);
+      std::tie(error) = co_await socket_.async_wait(tcp::socket::wait_write, await_tuple);
+      if (is_stalled_) co_return asio::error::timed_out;
+      if (!error && cancel_count != cancel_count_) error = asio::error::operation_aborted;
+    }
+    if (error) {
+      stall_.disarm();
+      co_return error;
+    }
+    if (written > 0) stall_.disarm();
+    while (!slices.empty() && written >= slices.front().size() - offset) {
+      written -= slices.front().size() - offset;
+      slices = slices.subspan(1);
+      offset = 0;
+    }
+    offset += written;
+  }
+  co_return error_code();
+}
+
+void TcpStream::finish_sending() {
+  error_code ignored;
+  socket_.shutdown(tcp::socket::shutdown_send, ignored);
+}
+
+void TcpStream::cancel() {
+  ++cancel_count_;
+  error_code ignored;
+  socket_.cancel(ignored);
+}
+
+awaitable<void> TcpStream::end(const EndReason&) {
+  // Closing with unread input resets the connection, and a reset may overtake the last bytes sent: read on for a while.
+  finish_sending();
+  linger_.arm(linger_time);
+  std::uint8_t scrap[4096];
+  for (std::size_t total = 0; total < linger_bytes && linger_.is_armed();) {
+    const auto read = co_await read_some(scrap);
+    if (read.error || read.is_end()) break;
+    total += read.bytes;
+  }
+  linger_.disarm();
+  close();
+}
+
+void TcpStream::close() {
+  error_code ignored;
+  socket_.close(ignored);
+}
+
+void TcpStream::put_back(rr::ByteSpan bytes) {
+  put_back_.erase(put_back_.begin(), put_back_.begin() + static_cast<std::ptrdiff_t>(put_back_used_));
+  put_back_used_ = 0;
+  put_back_.insert(put_back_.begin(), bytes.begin(), bytes.end());
+}
+
+rr::Result<std::vector<rr::HostPort>> TcpListener::open(const rr::HostPort& address) {
+  const auto fail = [&](const error_code& error) {
+    return rr::make_error(rr::ErrorCode::connection_error,
+                          "listen on " + rr::format_host_port(address.host, address.port) + ": " + error.message());
+  };
+  error_code error;
+  tcp::resolver resolver(executor_);
+  const auto endpoints =
+      resolver.resolve(address.host, std::to_string(address.port), tcp::resolver::passive, error);
+  if (error) return fail(error);
+  std::vector<rr::HostPort> bound;
+  for (const auto& entry : endpoints) {
+    const auto endpoint = entry.endpoint();
+    auto acceptor = std::make_shared<Acceptor>(executor_);
+    acceptor->open(endpoint.protocol(), error);
+    if (!error) acceptor->set_option(Acceptor::reuse_address(true), error);
+    if (!error && endpoint.address().is_v6()) acceptor->set_option(asio::ip::v6_only(true), error);
+    if (!error) acceptor->bind(endpoint, error);
+    if (!error) acceptor->listen(asio::socket_base::max_listen_connections, error);
+    if (error) return fail(error);
+    const auto local = acceptor->local_endpoint(error);
+    bound.push_back({local.address().to_string(), local.port()});
+    acceptors_.push_back(std::move(acceptor));
+  }
+  return bound;
+}
+
+void TcpListener::start(OnAccept on_accept) {
+  for (const auto& acceptor : acceptors_) asio::co_spawn(executor_, accept_all(acceptor, on_accept), asio::detached);
+}
+
+awaitable<void> TcpListener::accept_all(std::shared_ptr<Acceptor> acceptor, OnAccept on_accept) {
+  asio::steady_timer pause(acceptor->get_executor());
+  while (acceptor->is_open()) {
+    auto [error, socket] = co_await acceptor->async_accept(await_tuple);
+    if (!error) {
+      on_accept(std::move(socket));
+      continue;
+    }
+    if (error == asio::error::operation_aborted) break;
+    // Out of descriptors or memory: accepting again at once would spin.
+    log(LogLevel::error, "accept failed", {{"error", error.message()}});
+    pause.expires_after(std::chrono::milliseconds(200));
+    co_await pause.async_wait(await_tuple);
+  }
+}
+
+void TcpListener::close() {
+  for (const auto& acceptor : acceptors_) {
+    error_code ignored;
+    acceptor->close(ignored);
+  }
+  acceptors_.clear();
+}
+
+namespace {
+
+constexpr std::chrono::milliseconds stagger{5};
+
+/// Attempts that run side by side. Shared by them, since the losers outlive the call.
+struct Race {
+  explicit Race(const asio::any_io_executor& executor) : changed(executor) {}
+
+  asio::steady_timer changed;  ///< cancelled when an attempt ends
+  std::vector<std::unique_ptr<tcp::socket>> sockets;
+  std::size_t failed = 0;
+  std::optional<std::size_t> winner;
+  std::string last_failure;
+};
+
+awaitable<void> attempt(std::shared_ptr<Race> race, std::size_t index, tcp::endpoint endpoint) {
+  auto [error] = co_await race->sockets[index]->async_connect(endpoint, await_tuple);
+  if (error) {
+    ++race->failed;
+    if (error != asio::error::operation_aborted) race->last_failure = describe(endpoint) + ": " + error.message();
+  } else if (!race->winner) {
+    race->winner = index;
+  }
+  race->changed.cancel();
+}
+
+rr::Error connect_error(const std::string& host, std::uint16_t port, const std::string& cause) {
+  return rr::make_error(rr::ErrorCode::connection_error,
+                        "connect to " + rr::format_host_port(host, port) + ": " + cause);
+}
+
+/// A name look-up. Shared, since getaddrinfo can't be interrupted and may outlive the patience of its caller.
+struct Lookup {
+  explicit Lookup(const asio::any_io_executor& executor) : resolver(executor), finished(executor) {}
+
+  tcp::resolver resolver;
+  asio::steady_timer finished;  ///< cancelled when the answer is there
+  bool is_done = false;
+  error_code error;
+  tcp::resolver::results_type found;
+};
+
+awaitable<void> look_up(std::shared_ptr<Lookup> lookup, std::string host, std::string port) {
+  auto [error, found] = co_await lookup->resolver.async_resolve(host, port, await_tuple);
+  lookup->is_done = true;
+  lookup->error = error;
+  lookup->found = found;
+  lookup->finished.cancel();
+}
+
+/// IPv4 first, order kept otherwise; a literal needs no look-up.
+awaitable<rr::Result<std::vector<tcp::endpoint>>> resolve(std::string host, std::uint16_t port,
+                                                          std::chrono::milliseconds timeout) {
+  std::vector<tcp::endpoint> endpoints;
+  error_code error;
+  if (const auto literal = asio::ip::make_address(host, error); !error) {
+    endpoints.emplace_back(literal, port);
+    co_return endpoints;
+  }
+  const auto executor = co_await asio::this_coro::executor;
+  auto lookup = std::make_shared<Lookup>(executor);
+  lookup->finished.expires_after(timeout);
+  asio::co_spawn(executor, look_up(lookup, host, std::to_string(port)), asio::detached);
+  co_await lookup->finished.async_wait(await_tuple);
+  if (!lookup->is_done) co_return connect_error(host, port, "the name look-up takes too long");
+  if (lookup->error) co_return connect_error(host, port, lookup->error.message());
+  for (const bool want_v4 : {true, false})
+    for (const auto& entry : lookup->found)
+      if (entry.endpoint().address().is_v4() == want_v4) endpoints.push_back(entry.endpoint());
+  co_return endpoints;
+}
+
+}  // namespace
+
+awaitable<rr::Result<tcp::socket>> connect_tcp(std::string host, std::uint16_t port,
+                                               std::chrono::milliseconds timeout) {
+  const auto executor = co_await asio::this_coro::executor;
+  const auto give_up = std::chrono::steady_clock::now() + timeout;
+  auto endpoints = co_await resolve(host, port, timeout);
+  if (!endpoints) co_return endpoints.error();
+
+  auto race = std::make_shared<Race>(executor);
+  std::size_t started = 0;
+  std::string cause;
+  while (!race->winner) {
+    const bool all_started = started == endpoints->size();
+    if (all_started && race->failed == started) {
+      cause = race->last_failure;
+      break;
+    }
+    const auto now = std::chrono::steady_clock::now();
+    if (now >= give_up) {
+      cause = "no answer within " + std::to_string(timeout.count()) + " ms";
+      break;
+    }
+    if (!all_started) {
+      race->sockets.push_back(std::make_unique<tcp::socket>(executor));
+      asio::co_spawn(executor, attempt(race, started, (*endpoints)[started]), asio::detached);
+      ++started;
+    }
+    // Until the next attempt is due, one ends, or time is up.
+    race->changed.expires_at(started < endpoints->size() ? std::min(give_up, now + stagger) : give_up);
+    co_await race->changed.async_wait(await_tuple);
+  }
+  for (std::size_t i = 0; i < race->sockets.size(); ++i) {
+    error_code ignored;
+    if (i != race->winner) race->sockets[i]->close(ignored);
+  }
+  if (!race->winner) co_return connect_error(host, port, cause);
+  co_return std::move(*race->sockets[*race->winner]);
+}
+
+}  // namespace rrgate

@@ -1,0 +1,74 @@
+// TCP: streams, listening, connecting. Layer: server/transport. Source: transports spec sections 1.3, 2 (socket options).
+#pragma once
+
+#include <boost/asio/ip/tcp.hpp>
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/session/url.hpp"
+#include "server/transport/byte_stream.hpp"
+#include "server/transport/watchdog.hpp"
+
+namespace rrgate {
+
+class TcpStream final : public ByteStream {
+ public:
+  using Socket = boost::asio::ip::tcp::socket;
+
+  /// Takes over a connected socket. `send_stall`: see ByteStream::write.
+  TcpStream(Socket socket, Watchdog& watchdog, std::chrono::milliseconds send_stall);
+
+  awaitable<ReadResult> read_some(std::span<std::uint8_t> into) override;
+  awaitable<error_code> write(std::span<const rr::ByteSpan> slices) override;
+  void finish_sending() override;
+  void cancel() override;
+  awaitable<void> end(const EndReason& reason) override;
+  void close() override;
+  std::string peer() const override { return peer_; }
+
+  /// The next reads return these bytes first: what was read to find out which protocol the peer speaks.
+  void put_back(rr::ByteSpan bytes);
+
+ private:
+  Socket socket_;
+  rr::Bytes put_back_;
+  std::size_t put_back_used_ = 0;
+  Deadline stall_;
+  Deadline linger_;
+  std::chrono::milliseconds send_stall_;
+  bool is_stalled_ = false;
+  unsigned cancel_count_ = 0;  ///< a write that was between two waits notices cancel() by it
+  std::string peer_;
+};
+
+/// Accepts connections on the addresses that one host name or literal stands for.
+class TcpListener {
+ public:
+  explicit TcpListener(const boost::asio::any_io_executor& executor) : executor_(executor) {}
+
+  /// Binds and listens. Returns the addresses with their true ports (port 0 asks the system for one).
+  /// Errors   connection_error: name unknown, address in use, not permitted.
+  [[nodiscard]] rr::Result<std::vector<rr::HostPort>> open(const rr::HostPort& address);
+
+  /// Calls `on_accept` for every connection until close().
+  using OnAccept = std::function<void(boost::asio::ip::tcp::socket)>;
+  void start(OnAccept on_accept);
+  void close();
+
+ private:
+  using Acceptor = boost::asio::ip::tcp::acceptor;
+  static awaitable<void> accept_all(std::shared_ptr<Acceptor> acceptor, OnAccept on_accept);
+
+  boost::asio::any_io_executor executor_;
+  std::vector<std::shared_ptr<Acceptor>> acceptors_;
+};
+
+/// Connects to a host: all its addresses, IPv4 first, 5 ms apart and side by side; the first to connect wins.
+/// Errors   connection_error with the last cause, or that `timeout` has passed.
+awaitable<rr::Result<boost::asio::ip::tcp::socket>> connect_tcp(std::string host, std::uint16_t port,
+                                                               std::chrono::milliseconds timeout);
+
+}  // namespace rrgate
