@@ -7,25 +7,38 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <tuple>
 #include <utility>
 #include <vector>
 
+#include "core/robdef/service_definition.hpp"
 #include "core/types/value.hpp"
 
 namespace rr {
 
+/// What a handler of a member is for.
 enum class HandlerSlot : std::uint8_t { call, get, set, wire_received };
 
-/// What a parameter or return type of a handler accepts.
+/// A parameter or return type of a handler.
 struct HandlerType {
   DataType type = DataType::void_t;  ///< varvalue_t: any Value
   bool is_array = false;
 };
 
+/// "int32", "double[]", "any value", "nothing".
+std::string handler_type_text(const HandlerType& type);
+/// Whether every value of `type` can be handed to a parameter of type `handler`. Numbers may widen (int16 to int32);
+/// enums are int32.
+bool accepts(const HandlerType& handler, const TypeDefinition& type);
+/// Whether what a handler returns can be a value of `type`; numbers may be of any type, values are checked when they are
+/// sent.
+bool returns(const HandlerType& handler, const TypeDefinition& type);
+
 /// A callable with its deduced signature.
 struct Handler {
   std::vector<HandlerType> parameters;
   HandlerType result;
+  /// `arguments` as many as `parameters`. Errors: data_type_mismatch, out_of_range.
   std::function<Result<Value>(std::span<const Value>)> call;
 };
 
@@ -59,7 +72,7 @@ constexpr HandlerType handler_type() {
 template <class T>
 Result<T> from_value(const Value& value) {
   if constexpr (std::is_same_v<T, Value>) {
-    return value;
+    return value;  // shares array payloads
   } else if constexpr (Number<T>) {
     return value.to<T>();
   } else if constexpr (std::is_enum_v<T>) {
@@ -77,9 +90,6 @@ Result<T> from_value(const Value& value) {
     return T(items->begin(), items->end());
   }
 }
-
-template <class... Args, std::size_t... Index, class F>
-Result<Value> invoke(F& function, std::span<const Value> arguments, std::index_sequence<Index...>);
 
 }  // namespace detail
 
@@ -102,10 +112,10 @@ Handler make_typed_handler(F function, std::index_sequence<Index...>) {
   handler.call = [function = std::move(function)](std::span<const Value> arguments) mutable -> Result<Value> {
     if (arguments.size() != sizeof...(Args))
       return make_error(ErrorCode::invalid_argument, "wrong number of arguments for the handler");
-    auto converted = std::make_tuple(from_value<std::remove_cvref_t<Args>>(arguments[Index])...);
-    Error failure{ErrorCode::none, {}};
-    ((void)(std::get<Index>(converted) || (failure = std::get<Index>(converted).error(), false)), ...);
-    if (failure.code != ErrorCode::none) return failure;
+    [[maybe_unused]] std::tuple converted{from_value<std::remove_cvref_t<Args>>(arguments[Index])...};
+    const Error* failure = nullptr;
+    ((std::get<Index>(converted).has_error() ? void(failure = &std::get<Index>(converted).error()) : void()), ...);
+    if (failure) return *failure;
     if constexpr (std::is_void_v<R>) {
       function(std::move(*std::get<Index>(converted))...);
       return Value{};

@@ -1,4 +1,4 @@
-// A native node: listens, dials, and runs services and clients on one thread. Layer: node.
+// A native node: listens, and serves services to clients on one thread. Layer: node.
 #pragma once
 
 #include <boost/asio/io_context.hpp>
@@ -16,38 +16,44 @@ struct NodeOptions {
   NodeId id = {};  ///< any: random
   Features features = {};
   std::size_t max_message_size = 12u * 1024 * 1024;
+  std::size_t max_clients = 4096;  ///< more connections are closed at once
+  /// A sentence about something that went wrong and that no client hears of; the default writes it to stderr.
+  std::function<void(const std::string& problem)> report = {};
 };
 
-/// A node on one thread: everything runs in run(), handlers included. Other threads use post().
+/// A node on one thread: everything runs in run(), handlers included. Other threads use post() alone.
 class Node {
  public:
   /// `name` may be empty.
+  /// Throws   std::invalid_argument: not a node name.
   explicit Node(std::string name, NodeOptions options = {});
-  /// Runs on somebody else's io_context; run() and stop() then are theirs.
+  /// Runs on somebody else's io_context, which must outlive the node; run() is not for it then.
   Node(boost::asio::io_context& io, std::string name, NodeOptions options = {});
   ~Node();
 
-  /// Throws   std::invalid_argument that names the handler that does not fit.
+  /// Throws   std::invalid_argument that names the missing handlers or the name that is taken.
   void add(const std::shared_ptr<Service>& service);
-  /// "rr+tcp://0.0.0.0:52222", "rr+tcp://[::]:0"; port 0 takes a free one.
-  /// Returns  the port. Throws std::system_error ("listen on rr+tcp://...: Address already in use").
+  /// "rr+tcp://0.0.0.0:52222", "rr+tcp://[::]:0" (IPv4 as well), "rr+tcp://localhost:0"; port 0 takes a free one.
+  /// Returns  the port. Throws std::invalid_argument; std::system_error ("listen on rr+tcp://...: Address in use").
   std::uint16_t listen(std::string_view url);
 
   /// Runs until stop(), SIGINT or SIGTERM.
   void run();
+  /// Closes the listeners and tells the clients that their services end; run() returns when they are gone, after half a
+  /// second at the latest.
   void stop();
   /// Runs `work` on the node's thread.
   void post(std::function<void()> work);
-  /// Runs `work` again and again, `period` apart, without drift; for the node's lifetime.
+  /// Runs `work` again and again, `period` apart, until the node stops. Does not drift; what could not run in time
+  /// because something else took too long is left out.
   void every(std::chrono::nanoseconds period, std::function<void()> work);
 
   const NodeIdentity& identity() const;
   boost::asio::io_context& io_context();
-  /// Clients connected now.
+  /// Clients that are connected to a service now.
   std::size_t client_count() const;
 
  private:
-  friend class Object;
   class Implementation;
   std::unique_ptr<Implementation> implementation_;
 };

@@ -1,34 +1,43 @@
 // How to write a device: a service definition plus handlers. Layer: node (the public C++ service API).
 //
 //   rr::Node node{"my.robot"};
-//   auto create = rr::Service::from_file("robdef/experimental.create.robdef", "Create", "Create");
+//   auto create = rr::Service::from_file("robdef/modern/experimental.create2.robdef", "Create", "Create");
 //   create->function("Drive", [&](std::int16_t velocity, std::int16_t radius) { robot.drive(velocity, radius); });
 //   create->property("DistanceTraveled").get([&] { return robot.distance_mm(); });
 //   node.add(create);
 //   node.listen("rr+tcp://0.0.0.0:52222");
 //   node.run();
 //
-// Handlers take and return C++ numbers, bool, std::string, std::vector of numbers, or rr::Value for anything else
-// (Value accepts all of them). They run on the node's thread and may throw rr::ServiceException to send an error to the
-// client. Node::add() checks every handler against the definition: a missing member, a wrong parameter type or count is
-// a std::invalid_argument that names it, before anything listens.
+// Handlers take and return C++ numbers, bool, enums, std::string, std::vector of numbers, or rr::Value for anything else
+// (Value accepts all of them). They run on the node's thread. A handler may throw rr::ServiceException to send an error
+// to the client; other exceptions reach it as code 100, "rrgate.UnhandledException", with their text.
+//
+// Handlers are checked against the definition before anything listens: one that does not fit (no such member, wrong
+// kind, wrong parameter type or count) is a std::invalid_argument where it is set, one that is missing where the service
+// is added to the node. Each names the member.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 #include <vector>
 
 #include "core/session/hosted_service.hpp"
+#include "core/session/service_session.hpp"
 #include "server/node/handler.hpp"
 
 namespace rr {
 
 class Service;
-class Node;
+
+/// One client of a node, for as long as it is connected; never 0, never used again.
+using ClientId = std::uint64_t;
 
 /// Thrown by a handler: the client gets this error.
 class ServiceException : public std::runtime_error {
@@ -44,7 +53,7 @@ class ServiceException : public std::runtime_error {
 };
 
 /// One object of a service. The root comes with the service; others are made by Service::make_object and handed out by
-/// objref handlers. Keep it alive with the shared_ptr.
+/// objrefs. The service must outlive it.
 class Object : public ServiceObject, public std::enable_shared_from_this<Object> {
  public:
   class Property {
@@ -73,54 +82,93 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
     set_handler(name, HandlerSlot::call, make_handler(std::forward<F>(handler)));
   }
   Property property(std::string_view name) { return {this, std::string(name)}; }
+
   /// Fires an event to every client of the service.
+  /// Throws   std::invalid_argument: no such event, wrong number of arguments or types.
   template <class... Args>
   void fire(std::string_view event, Args&&... arguments) {
-    const std::vector<Value> values{to_value(std::forward<Args>(arguments))...};
+    const std::array<Value, sizeof...(Args)> values{to_value(std::forward<Args>(arguments))...};
     fire_values(event, values);
   }
   void fire_values(std::string_view event, std::span<const Value> arguments);
+
   /// Sets a wire's InValue: sent to every client that has connected it, to later ones when they connect, and to peeks.
+  /// Throws   std::invalid_argument: no such wire, one that is writeonly, a value that does not fit its type.
   void set_wire(std::string_view wire, Value value);
   /// A client's newest OutValue: handler(Value) or of the wire's C++ type.
   template <class F>
   void on_wire(std::string_view wire, F&& handler) {
     set_handler(wire, HandlerSlot::wire_received, make_handler(std::forward<F>(handler)));
   }
-  /// objref without index.
-  void objref(std::string_view name, std::shared_ptr<Object> child);
-  /// Indexed objref: handler(index text) returns the object, or nullptr where there is none.
-  void objref(std::string_view name, std::function<std::shared_ptr<Object>(std::string_view index)> find);
 
-  const std::string& type_name() const override { return type_name_; }
+  /// objref without index. Set again, clients are told to look it up anew.
+  void objref(std::string_view name, std::shared_ptr<Object> child);
+  /// Indexed objref: find(index text) returns the object, or nullptr where there is none.
+  void objref(std::string_view name, std::function<std::shared_ptr<Object>(std::string_view index)> find);
+  /// The object behind an indexed objref was replaced: clients are told to look it up anew.
+  void release(std::string_view objref, std::string_view index);
+
+  const std::string& type_name() const override { return type_->qualified_name; }
   Result<std::shared_ptr<ServiceObject>> find_child(const MemberDefinition& objref,
                                                     const std::optional<std::string>& index) override;
-  Object(Service* service, std::string type_name) : service_(service), type_name_(std::move(type_name)) {}
 
  private:
   friend class Service;
-  friend class Node;
-  using Key = std::pair<std::string, HandlerSlot>;
+  friend class ServiceClient;
 
+  /// What the service has for one member.
+  struct Member {
+    Handler call;  ///< functions
+    Handler get;
+    Handler set;
+    Handler wire_received;
+    std::optional<Value> in_value = {};   ///< wires: what clients receive
+    std::optional<Value> out_value = {};  ///< wires: the newest that a client sent
+    std::function<std::shared_ptr<Object>(std::string_view)> find = {};  ///< objrefs
+  };
+
+  Object(Service& service, const EntityDefinition& type) : service_(service), type_(&type) {}
+  const MemberDefinition& require_member(std::string_view name, MemberKind kind) const;
   void set_handler(std::string_view name, HandlerSlot slot, Handler handler);
-  const Handler* find_handler(std::string_view name, HandlerSlot slot) const;
+  std::vector<std::string> paths() const;
+  void release_path(const std::string& path);
+  /// Texts like "function Drive", for functions, property accessors and objrefs without handler.
+  std::vector<std::string> missing_handlers() const;
 
-  Service* service_;
-  std::string type_name_;
-  std::map<Key, Handler> handlers_;
-  std::map<std::string, std::function<std::shared_ptr<Object>(std::string_view)>, std::less<>> children_;
-  std::map<std::string, Value, std::less<>> wire_in_values_;
-  std::map<std::string, Value, std::less<>> wire_out_values_;
+  // Requests of clients; handlers run in here and may throw.
+  Result<Value> answer(const Called& called);
+  void receive_wire(const WireReceived& received);
+  const Value* in_value(const MemberDefinition& wire) const;
+
+  Service& service_;
+  const EntityDefinition* type_;
+  std::unordered_map<const MemberDefinition*, Member> members_;
+};
+
+/// What a node does for the services that were added to it.
+class ServiceHost {
+ public:
+  virtual void send_event(const Service& service, const std::string& path, const MemberDefinition& event,
+                          std::span<const Value> arguments) = 0;
+  virtual void send_wire(const Service& service, const std::string& path, const MemberDefinition& wire,
+                         const Value& value) = 0;
+  virtual void release_path(const Service& service, const std::string& path) = 0;
+  virtual ClientId current_client() const = 0;
+
+ protected:
+  ~ServiceHost() = default;
 };
 
 /// A service: definition, name, root object.
-class Service : public std::enable_shared_from_this<Service> {
+class Service {
  public:
-  /// `root_type` is the object's name in the definition, or its qualified name.
-  /// Throws   std::invalid_argument with the first finding where the definition is not valid.
+  /// `root_type` is the object's name in the last definition, or its qualified name.
+  /// Throws   std::invalid_argument with the first finding where a definition is not valid, an import is missing, or there
+  ///          is no such object.
   static std::shared_ptr<Service> from_text(const std::vector<std::string>& definitions, std::string name,
                                             std::string root_type);
   /// As from_text; the files may import one another. The last file holds the root type.
+  /// Throws   std::invalid_argument: also for a file that cannot be read.
   static std::shared_ptr<Service> from_files(const std::vector<std::string>& paths, std::string name,
                                              std::string root_type);
   static std::shared_ptr<Service> from_file(const std::string& path, std::string name, std::string root_type) {
@@ -128,11 +176,18 @@ class Service : public std::enable_shared_from_this<Service> {
   }
 
   Object& root() { return *root_; }
-  /// Another object of this service, for an objref handler. `type` as root_type.
-  std::shared_ptr<Object> make_object(const std::string& type);
+  /// Another object of this service, for an objref. `type` as root_type.
+  std::shared_ptr<Object> make_object(std::string_view type);
   const std::string& name() const { return name_; }
   const TypeRegistry& types() const { return *types_; }
+  /// A number, text or array that clients find with the service. Before Node::add().
   void set_attribute(std::string key, Value value);
+
+  /// Which client's request is being handled; 0 outside of handlers.
+  ClientId current_client() const { return host_ ? host_->current_client() : 0; }
+  void on_client_connected(std::function<void(ClientId)> handler) { on_connected_ = std::move(handler); }
+  /// Also when the connection broke. Not called any more when the node stops.
+  void on_client_gone(std::function<void(ClientId)> handler) { on_gone_ = std::move(handler); }
 
   // The root's members, for short.
   template <class F>
@@ -145,19 +200,36 @@ class Service : public std::enable_shared_from_this<Service> {
     root_->fire(event, std::forward<Args>(arguments)...);
   }
   void set_wire(std::string_view wire, Value value) { root_->set_wire(wire, std::move(value)); }
+  template <class F>
+  void on_wire(std::string_view wire, F&& handler) {
+    root_->on_wire(wire, std::forward<F>(handler));
+  }
+  template <class Child>
+  void objref(std::string_view member, Child&& child) {
+    root_->objref(member, std::forward<Child>(child));
+  }
+
+  /// For the node: makes the service ready to be served.
+  /// Throws   std::invalid_argument that lists the missing handlers, or that it was added before.
+  std::shared_ptr<HostedService> attach(ServiceHost& host);
+  /// For the node: from now on nothing reaches clients.
+  void detach() { host_ = nullptr; }
 
  private:
-  friend class Node;
   friend class Object;
+  friend class ServiceClient;
   Service() = default;
 
   std::string name_;
   std::shared_ptr<TypeRegistry> types_;
+  std::string definition_;  ///< name of the one that unqualified object types are of
   std::shared_ptr<Object> root_;
   std::vector<std::weak_ptr<Object>> objects_;
   MapString attributes_;
   std::shared_ptr<HostedService> hosted_;
-  Node* node_ = nullptr;  ///< once added
+  ServiceHost* host_ = nullptr;
+  std::function<void(ClientId)> on_connected_;
+  std::function<void(ClientId)> on_gone_;
 };
 
 }  // namespace rr

@@ -1,0 +1,98 @@
+// A client that waits: for tests, tools and scripts in C++. Layer: node.
+//
+//   auto create = rr::connect("rr+tcp://127.0.0.1:52222/?service=Create");
+//   create.call("Drive", 100, 5000);
+//   std::cout << *create.get("DistanceTraveled").to<std::int32_t>() << " mm\n";
+//   create.on_event("Bump", [](std::span<const rr::Value>) { std::cout << "bump\n"; });
+//   create.connection().run_for(std::chrono::seconds(5));
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+#include "server/node/client_connection.hpp"
+#include "server/node/handler.hpp"
+
+namespace rr {
+
+/// A request that failed, or a connection that could not be opened.
+class ClientException : public std::runtime_error {
+ public:
+  explicit ClientException(Error error) : std::runtime_error(error.message), error_(std::move(error)) {}
+  const Error& error() const { return error_; }
+
+ private:
+  Error error_;
+};
+
+/// A connection and the io_context that it runs on, which runs only while one of the functions here waits: handlers of
+/// events and wires are called then, and may not wait themselves (std::logic_error). For one thread.
+class BlockingConnection {
+ public:
+  /// Throws   ClientException.
+  BlockingConnection(std::string_view url, ClientOptions options);
+  /// Disconnects, within a second.
+  ~BlockingConnection();
+  BlockingConnection(const BlockingConnection&) = delete;
+  BlockingConnection& operator=(const BlockingConnection&) = delete;
+
+  /// Calls handlers for a time, or until `is_done()`. Returns whether it is done.
+  void run_for(std::chrono::milliseconds duration);
+  bool run_until(const std::function<bool()>& is_done, std::chrono::milliseconds timeout);
+  /// Starts a request and waits for its completion. Throws ClientException.
+  Value wait_for(const std::function<void(ClientConnection&, ClientConnection::Completion)>& start);
+  void close();
+  bool is_closed() const { return close_reason_.has_value(); }
+  ClientConnection& asynchronous() { return *connection_; }
+
+ private:
+  boost::asio::io_context io_{1};
+  std::shared_ptr<ClientConnection> connection_;
+  std::optional<Error> close_reason_;
+  bool is_running_ = false;
+};
+
+/// An object of the service: a handle that is cheap to copy. Everything throws ClientException.
+class RemoteObject {
+ public:
+  RemoteObject(std::shared_ptr<BlockingConnection> connection, std::string path)
+      : connection_(std::move(connection)), path_(std::move(path)) {}
+
+  template <class... Args>
+  Value call(std::string_view function, Args&&... arguments) const {
+    const std::array<Value, sizeof...(Args)> values{to_value(std::forward<Args>(arguments))...};
+    return call_values(function, values);
+  }
+  Value call_values(std::string_view function, std::span<const Value> arguments) const;
+  Value get(std::string_view property) const;
+  void set(std::string_view property, const Value& value) const;
+  RemoteObject object(std::string_view objref) const;
+  RemoteObject object(std::string_view objref, std::string_view index) const;
+
+  Value peek_in(std::string_view wire) const;
+  Value peek_out(std::string_view wire) const;
+  void poke_out(std::string_view wire, const Value& value) const;
+  void connect_wire(std::string_view wire, ClientConnection::WireHandler handler) const;
+  void disconnect_wire(std::string_view wire) const;
+  void send_wire(std::string_view wire, const Value& value) const;
+  void on_event(std::string_view event, ClientConnection::EventHandler handler) const;
+
+  /// Qualified.
+  const std::string& type_name() const;
+  const std::string& path() const { return path_; }
+  BlockingConnection& connection() const { return *connection_; }
+
+ private:
+  std::shared_ptr<BlockingConnection> connection_;
+  std::string path_;
+};
+
+/// The root object of the service that `url` names.
+RemoteObject connect(std::string_view url, ClientOptions options = {});
+
+}  // namespace rr

@@ -1,0 +1,151 @@
+#include "server/node/client_connection.hpp"
+
+#include <boost/asio/post.hpp>
+#include <variant>
+
+#include "core/session/service_path.hpp"
+#include "core/session/url.hpp"
+#include "server/node/random_node_id.hpp"
+#include "server/node/tcp_connect.hpp"
+
+namespace rr {
+
+namespace asio = boost::asio;
+
+ClientConnection::ClientConnection(asio::ip::tcp::socket socket, ClientOptions options, Opened opened)
+    : TcpDriver(std::move(socket)), session_(std::move(options), read_clocks()), opened_(std::move(opened)) {}
+
+void ClientConnection::open(asio::io_context& io, std::string_view url, ClientOptions options, Opened done) {
+  const auto refuse = [&](ErrorCode code, std::string why) {
+    asio::post(io, [done, error = make_error(code, std::move(why))] { done(error); });
+  };
+  const auto parsed = parse_url(url);
+  if (!parsed) return refuse(parsed.error().code, parsed.error().message);
+  if (parsed->scheme != "rr+tcp")
+    return refuse(ErrorCode::connection_error, "connect to " + quoted(url) + ": scheme '" + parsed->scheme +
+                                                   "' is not available here, expected rr+tcp");
+  options.service = parsed->service;
+  options.connection.target = {parsed->node_id.value_or(NodeId{}), parsed->node_name};
+  if (options.connection.self.id.is_any()) options.connection.self.id = random_node_id();
+  const auto deadline = std::chrono::steady_clock::now() + options.connect_timeout;
+  const auto timeout = options.connect_timeout;
+  tcp_connect(io, parsed->host, parsed->port, timeout,
+              [options = std::move(options), deadline, done = std::move(done)](Result<asio::ip::tcp::socket> socket) mutable {
+                if (!socket) return done(socket.error());
+                const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
+                    deadline - std::chrono::steady_clock::now());
+                options.connect_timeout = std::max(left, std::chrono::milliseconds(1));
+                std::make_shared<ClientConnection>(std::move(*socket), std::move(options), std::move(done))->start();
+              });
+}
+
+void ClientConnection::expect(RequestId id, Completion done) {
+  completions_.emplace(id, std::move(done));
+  settle();
+}
+
+void ClientConnection::call(std::string_view path, std::string_view function, std::span<const Value> arguments,
+                            Completion done) {
+  expect(session_.call_function(path, function, arguments, read_clocks()), std::move(done));
+}
+
+void ClientConnection::get(std::string_view path, std::string_view property, Completion done) {
+  expect(session_.get_property(path, property, read_clocks()), std::move(done));
+}
+
+void ClientConnection::set(std::string_view path, std::string_view property, const Value& value, Completion done) {
+  expect(session_.set_property(path, property, value, read_clocks()), std::move(done));
+}
+
+void ClientConnection::find_object(std::string_view path, Completion done) {
+  expect(session_.find_object(path, read_clocks()), std::move(done));
+}
+
+void ClientConnection::peek_in(std::string_view path, std::string_view wire, Completion done) {
+  expect(session_.peek_in_value(path, wire, read_clocks()), std::move(done));
+}
+
+void ClientConnection::peek_out(std::string_view path, std::string_view wire, Completion done) {
+  expect(session_.peek_out_value(path, wire, read_clocks()), std::move(done));
+}
+
+void ClientConnection::poke_out(std::string_view path, std::string_view wire, const Value& value, Completion done) {
+  expect(session_.poke_out_value(path, wire, value, read_clocks()), std::move(done));
+}
+
+void ClientConnection::connect_wire(std::string_view path, std::string_view wire, WireHandler handler,
+                                    Completion done) {
+  wire_handlers_[{std::string(path), std::string(wire)}] = std::make_shared<WireHandler>(std::move(handler));
+  expect(session_.connect_wire(path, wire, read_clocks()), std::move(done));
+}
+
+void ClientConnection::disconnect_wire(std::string_view path, std::string_view wire, Completion done) {
+  wire_handlers_.erase({std::string(path), std::string(wire)});
+  expect(session_.disconnect_wire(path, wire, read_clocks()), std::move(done));
+}
+
+Result<> ClientConnection::send_wire(std::string_view path, std::string_view wire, const Value& value) {
+  auto sent = session_.send_wire(path, wire, value, read_clocks());
+  settle();
+  return sent;
+}
+
+void ClientConnection::on_event(std::string_view path, std::string_view event, EventHandler handler) {
+  event_handlers_[{std::string(path), std::string(event)}] = std::make_shared<EventHandler>(std::move(handler));
+}
+
+void ClientConnection::disconnect() {
+  session_.disconnect(read_clocks());
+  settle();
+}
+
+bool ClientConnection::handle_event(Now) {
+  auto event = session_.poll_event();
+  if (!event) return false;
+  std::visit([this](auto& happened) { handle(std::move(happened)); }, *event);
+  return true;
+}
+
+void ClientConnection::handle(Connected&&) {
+  const Opened opened = std::exchange(opened_, nullptr);
+  opened(std::static_pointer_cast<ClientConnection>(shared_from_this()));
+}
+
+void ClientConnection::handle(Completed&& completed) {
+  auto found = completions_.extract(completed.id);
+  if (!found.empty() && found.mapped()) found.mapped()(std::move(completed.result));
+}
+
+void ClientConnection::handle(EventReceived&& received) {
+  const auto found = event_handlers_.find({std::move(received.path), std::move(received.member)});
+  if (found == event_handlers_.end()) return;
+  const auto handler = found->second;  // it may replace itself
+  (*handler)(received.arguments);
+}
+
+void ClientConnection::handle(WireValueReceived&& received) {
+  const auto found = wire_handlers_.find({std::move(received.path), std::move(received.member)});
+  if (found == wire_handlers_.end()) return;
+  const auto handler = found->second;
+  (*handler)(received.value, received.time);
+}
+
+void ClientConnection::handle(WireClosedByService&& closed) {
+  wire_handlers_.erase({std::move(closed.path), std::move(closed.member)});
+}
+
+/// Whoever uses objects below the path hears of it when the next request fails; their handlers have to go now.
+void ClientConnection::handle(PathReleased&& released) {
+  const auto is_released = [&](const auto& item) { return is_within(item.first.first, released.path); };
+  std::erase_if(event_handlers_, is_released);
+  std::erase_if(wire_handlers_, is_released);
+}
+
+void ClientConnection::handle(SessionClosed&& closed) {
+  event_handlers_.clear();
+  wire_handlers_.clear();
+  if (const Opened opened = std::exchange(opened_, nullptr)) return opened(std::move(closed.reason));
+  if (const auto handler = std::exchange(on_closed_, nullptr)) handler(closed.reason);
+}
+
+}  // namespace rr

@@ -1,0 +1,91 @@
+// A client of one service over TCP, with callbacks. Layer: node.
+#pragma once
+
+#include <boost/asio/io_context.hpp>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "core/session/client_session.hpp"
+#include "server/node/tcp_driver.hpp"
+
+namespace rr {
+
+/// One connection to a service. All callbacks run on the thread of the io_context. Each completion is called exactly
+/// once, when the reply is there or the connection has ended; for a request that cannot be sent, maybe before the
+/// function returns.
+class ClientConnection final : public TcpDriver {
+ public:
+  using Opened = std::function<void(Result<std::shared_ptr<ClientConnection>>)>;
+  using Completion = std::function<void(Result<Value>)>;
+  using EventHandler = std::function<void(std::span<const Value> arguments)>;
+  using WireHandler = std::function<void(const Value& value, TimeSpec time)>;
+
+  /// Resolves, connects (all addresses, side by side) and opens the session, all within options.connect_timeout.
+  /// `url`      rr+tcp://host:port/?service=NAME, with nodeid or nodename where that node alone will do.
+  /// `options`  service and target node are taken from the URL; a random NodeID where none is given.
+  static void open(boost::asio::io_context& io, std::string_view url, ClientOptions options, Opened done);
+
+  // Paths name objects: root_path(), or those of child_path() after find_object(). See ClientSession for what requests
+  // complete with.
+  const std::string& root_path() const { return session_.service(); }
+  void call(std::string_view path, std::string_view function, std::span<const Value> arguments, Completion done);
+  void get(std::string_view path, std::string_view property, Completion done);
+  void set(std::string_view path, std::string_view property, const Value& value, Completion done);
+  void find_object(std::string_view path, Completion done);
+  void peek_in(std::string_view path, std::string_view wire, Completion done);
+  void peek_out(std::string_view path, std::string_view wire, Completion done);
+  void poke_out(std::string_view path, std::string_view wire, const Value& value, Completion done);
+  /// `handler` gets each InValue that is newer than the one before, until disconnect_wire().
+  void connect_wire(std::string_view path, std::string_view wire, WireHandler handler, Completion done);
+  void disconnect_wire(std::string_view path, std::string_view wire, Completion done);
+  /// Errors   the wire is not connected; those of packing.
+  Result<> send_wire(std::string_view path, std::string_view wire, const Value& value);
+  /// One handler an event; a second replaces the first.
+  void on_event(std::string_view path, std::string_view event, EventHandler handler);
+  /// Called once, when the session has ended for whatever reason; not after a failed open().
+  void on_closed(std::function<void(const Error& reason)> handler) { on_closed_ = std::move(handler); }
+  /// Tells the service, then closes; on_closed follows.
+  void disconnect();
+
+  const ClientSession& session() const { return session_; }
+
+  /// For open(): use that.
+  ClientConnection(boost::asio::ip::tcp::socket socket, ClientOptions options, Opened opened);
+
+ private:
+  using MemberKey = std::pair<std::string, std::string>;  // path, member
+
+  void handle_bytes(ByteSpan input, Now now) override { session_.handle_bytes(input, now); }
+  void handle_transmitted(std::size_t bytes, Now now) override { session_.handle_transmitted(bytes, now); }
+  void handle_timeout(Now now) override { session_.handle_timeout(now); }
+  void handle_closed(Error reason, Now now) override { session_.handle_closed(std::move(reason), now); }
+  std::span<const ByteSpan> poll_transmit() override { return session_.poll_transmit(); }
+  bool wants_close() const override { return session_.wants_close(); }
+  TimePoint poll_timeout() const override { return session_.poll_timeout(); }
+  bool handle_event(Now now) override;
+  void ended() override {}
+
+  void handle(Connected&& connected);
+  void handle(Completed&& completed);
+  void handle(EventReceived&& received);
+  void handle(WireValueReceived&& received);
+  void handle(WireClosedByService&& closed);
+  void handle(PathReleased&& released);
+  void handle(SessionClosed&& closed);
+  void expect(RequestId id, Completion done);
+
+  ClientSession session_;
+  Opened opened_;
+  std::unordered_map<RequestId, Completion> completions_;
+  std::map<MemberKey, std::shared_ptr<EventHandler>> event_handlers_;
+  std::map<MemberKey, std::shared_ptr<WireHandler>> wire_handlers_;
+  std::function<void(const Error&)> on_closed_;
+};
+
+}  // namespace rr

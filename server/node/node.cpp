@@ -1,0 +1,272 @@
+#include "server/node/node.hpp"
+
+#include <algorithm>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <iostream>
+#include <map>
+#include <optional>
+#include <system_error>
+
+#include "core/session/url.hpp"
+#include "server/node/random_node_id.hpp"
+#include "server/node/service_client.hpp"
+
+namespace rr {
+
+namespace asio = boost::asio;
+using asio::ip::tcp;
+using boost::system::error_code;
+
+namespace {
+
+constexpr std::chrono::milliseconds stop_deadline{500};
+constexpr std::chrono::milliseconds accept_pause{100};  // after a failure, e.g. no file descriptors left
+
+NodeIdentity make_identity(std::string name, const NodeId& id) {
+  if (!name.empty() && !is_valid_node_name(name))
+    throw std::invalid_argument("node name " + quoted(name) + " is not valid: expected letters, digits, '_', '-', '.'");
+  return {id.is_any() ? random_node_id() : id, std::move(name)};
+}
+
+HostPort parse_listen_url(std::string_view url) {
+  constexpr std::string_view scheme = "rr+tcp://";
+  const auto fail = [&](const std::string& why) {
+    throw std::invalid_argument("listen on " + quoted(url) + ": " + why + ", expected rr+tcp://HOST:PORT");
+  };
+  if (url.substr(0, scheme.size()) != scheme) fail("unknown scheme");
+  std::string_view rest = url.substr(scheme.size());
+  if (!rest.empty() && rest.back() == '/') rest.remove_suffix(1);
+  const auto parsed = parse_host_port(rest);
+  if (!parsed) fail(parsed.error().message);
+  return *parsed;
+}
+
+/// Runs work at multiples of a period.
+struct Repeat {
+  Repeat(asio::io_context& io, std::chrono::nanoseconds interval, std::function<void()> what)
+      : timer(io), period(interval), work(std::move(what)) {}
+  asio::steady_timer timer;
+  std::chrono::nanoseconds period;
+  std::function<void()> work;
+  bool is_stopped = false;
+};
+
+void repeat(const std::shared_ptr<Repeat>& job) {
+  job->timer.async_wait([job](const error_code&) {
+    if (!job->is_stopped) job->work();
+    if (job->is_stopped) return;
+    const auto late = std::chrono::steady_clock::now() - job->timer.expiry();
+    job->timer.expires_at(job->timer.expiry() + job->period * std::max<std::int64_t>(1, late / job->period + 1));
+    repeat(job);
+  });
+}
+
+}  // namespace
+
+class Node::Implementation final : public ServiceClientOwner, public ServiceHost {
+ public:
+  Implementation(asio::io_context* io, std::string name, NodeOptions options)
+      : options_(std::move(options)),
+        own_io_(io ? nullptr : std::make_unique<asio::io_context>(1)),
+        io_(io ? *io : *own_io_),
+        directory_(make_identity(std::move(name), options_.id)),
+        stop_timer_(io_) {}
+
+  ~Implementation() {
+    close_listeners();
+    stop_timer_.cancel();
+    for (const auto& service : services_) service->detach();
+    for (const auto& [id, client] : std::exchange(clients_, {})) client->abandon();
+  }
+
+  void add(const std::shared_ptr<Service>& service) {
+    auto hosted = service->attach(*this);
+    if (auto added = directory_.add(hosted); !added) {
+      service->detach();
+      throw std::invalid_argument(added.error().message);
+    }
+    services_.push_back(service);
+  }
+
+  std::uint16_t listen(std::string_view url) {
+    const HostPort address = parse_listen_url(url);
+    try {
+      tcp::resolver resolver(io_);
+      const auto endpoints = resolver.resolve(address.host, std::to_string(address.port),
+                                              tcp::resolver::passive | tcp::resolver::numeric_service);
+      auto acceptor = std::make_shared<tcp::acceptor>(io_, endpoints.begin()->endpoint());
+      acceptors_.push_back(acceptor);
+      accept(acceptor);
+      return acceptor->local_endpoint().port();
+    } catch (const boost::system::system_error& failure) {
+      throw std::system_error(failure.code(), "listen on " + std::string(url));
+    }
+  }
+
+  void run() {
+    asio::signal_set signals(io_, SIGINT, SIGTERM);
+    signals.async_wait([this](const error_code& error, int) {
+      if (!error) stop();
+    });
+    signals_ = &signals;
+    io_.run();
+    signals_ = nullptr;
+  }
+
+  void stop() {
+    if (std::exchange(is_stopping_, true)) return;
+    if (signals_) signals_->cancel();
+    close_listeners();
+    for (const auto& service : services_) {
+      service->on_client_connected(nullptr);
+      service->on_client_gone(nullptr);
+    }
+    const auto clients = clients_;  // each removes itself
+    for (const auto& [id, client] : clients) client->close_service();
+    if (clients_.empty()) return;
+    stop_timer_.expires_after(stop_deadline);
+    stop_timer_.async_wait([this](const error_code& error) {
+      if (error) return;
+      const auto stubborn = clients_;
+      for (const auto& [id, client] : stubborn) client->close(make_error(ErrorCode::connection_error, "the node stops"));
+    });
+  }
+
+  void every(std::chrono::nanoseconds period, std::function<void()> work) {
+    if (period <= std::chrono::nanoseconds::zero())
+      throw std::invalid_argument("Node::every: the period must be longer than nothing");
+    const auto job = std::make_shared<Repeat>(io_, period, std::move(work));
+    job->timer.expires_after(period);
+    repeats_.push_back(job);
+    repeat(job);
+  }
+
+  asio::io_context& io() { return io_; }
+  const NodeIdentity& identity() const { return directory_.identity(); }
+  std::size_t client_count() const {
+    return static_cast<std::size_t>(
+        std::count_if(clients_.begin(), clients_.end(), [](const auto& client) { return client.second->service(); }));
+  }
+
+  // ServiceHost: from services to clients
+
+  void send_event(const Service& service, const std::string& path, const MemberDefinition& event,
+                  std::span<const Value> arguments) override {
+    for_clients_of(service, [&](ServiceClient& client) { client.send_event(path, event, arguments); });
+  }
+  void send_wire(const Service& service, const std::string& path, const MemberDefinition& wire,
+                 const Value& value) override {
+    for_clients_of(service, [&](ServiceClient& client) { client.send_wire(path, wire, value); });
+  }
+  void release_path(const Service& service, const std::string& path) override {
+    for_clients_of(service, [&](ServiceClient& client) { client.release_path(path); });
+  }
+  ClientId current_client() const override { return current_client_; }
+
+  // ServiceClientOwner: from clients
+
+  Service* find_service(const HostedService& hosted) override {
+    for (const auto& service : services_)
+      if (service->name() == hosted.name()) return service.get();
+    return nullptr;  // the service index
+  }
+  void set_current_client(ClientId id) override { current_client_ = id; }
+  void report(const std::string& problem) override {
+    if (options_.report) options_.report(problem);
+    else std::cerr << identity().name << ": " << problem << '\n';
+  }
+  void client_ended(ServiceClient& client) override {
+    clients_.erase(client.id());
+    if (is_stopping_ && clients_.empty()) stop_timer_.cancel();
+  }
+
+ private:
+  /// Clients that are lost while they are sent to, or by what handlers do then, leave clients_ meanwhile.
+  template <class F>
+  void for_clients_of(const Service& service, F&& what) {
+    for (auto next = clients_.begin(); next != clients_.end();) {
+      const auto client = next->second;
+      if (client->service() == &service) what(*client);
+      next = clients_.upper_bound(client->id());
+    }
+  }
+
+  void accept(const std::shared_ptr<tcp::acceptor>& acceptor) {
+    acceptor->async_accept([this, acceptor](const error_code& error, tcp::socket socket) {
+      if (error == asio::error::operation_aborted || !acceptor->is_open()) return;
+      if (error) return accept_later(acceptor, error);
+      if (clients_.size() < options_.max_clients) add_client(std::move(socket));
+      accept(acceptor);
+    });
+  }
+
+  void accept_later(const std::shared_ptr<tcp::acceptor>& acceptor, const error_code& why) {
+    report("accept: " + why.message());
+    const auto pause = std::make_shared<asio::steady_timer>(io_, accept_pause);
+    pause->async_wait([this, acceptor, pause](const error_code&) {
+      if (acceptor->is_open()) accept(acceptor);
+    });
+  }
+
+  void add_client(tcp::socket socket) {
+    error_code error;
+    const tcp::endpoint local = socket.local_endpoint(error);
+    if (error) return;  // gone already
+    ServiceSessionOptions session;
+    session.connection.features = options_.features;
+    session.connection.max_message_size = options_.max_message_size;
+    session.base_url = "rr+tcp://" + format_host_port(local.address().to_string(), local.port()) + "/";
+    const ClientId id = ++last_client_id_;
+    const auto client = std::make_shared<ServiceClient>(id, *this, directory_, std::move(session), std::move(socket));
+    clients_.emplace(id, client);
+    client->start();
+  }
+
+  void close_listeners() {
+    error_code ignored;
+    for (const auto& acceptor : acceptors_) acceptor->close(ignored);
+    acceptors_.clear();
+    for (const auto& job : repeats_) {
+      job->is_stopped = true;
+      job->timer.cancel();
+    }
+    repeats_.clear();
+  }
+
+  NodeOptions options_;
+  std::unique_ptr<asio::io_context> own_io_;
+  asio::io_context& io_;
+  ServiceDirectory directory_;
+  std::vector<std::shared_ptr<Service>> services_;
+  std::vector<std::shared_ptr<tcp::acceptor>> acceptors_;
+  std::vector<std::shared_ptr<Repeat>> repeats_;
+  std::map<ClientId, std::shared_ptr<ServiceClient>> clients_;
+  ClientId last_client_id_ = 0;
+  ClientId current_client_ = 0;
+  bool is_stopping_ = false;
+  asio::steady_timer stop_timer_;
+  asio::signal_set* signals_ = nullptr;
+};
+
+Node::Node(std::string name, NodeOptions options)
+    : implementation_(std::make_unique<Implementation>(nullptr, std::move(name), std::move(options))) {}
+Node::Node(asio::io_context& io, std::string name, NodeOptions options)
+    : implementation_(std::make_unique<Implementation>(&io, std::move(name), std::move(options))) {}
+Node::~Node() = default;
+
+void Node::add(const std::shared_ptr<Service>& service) { implementation_->add(service); }
+std::uint16_t Node::listen(std::string_view url) { return implementation_->listen(url); }
+void Node::run() { implementation_->run(); }
+void Node::stop() { implementation_->stop(); }
+void Node::post(std::function<void()> work) { asio::post(implementation_->io(), std::move(work)); }
+void Node::every(std::chrono::nanoseconds period, std::function<void()> work) {
+  implementation_->every(period, std::move(work));
+}
+const NodeIdentity& Node::identity() const { return implementation_->identity(); }
+asio::io_context& Node::io_context() { return implementation_->io(); }
+std::size_t Node::client_count() const { return implementation_->client_count(); }
+
+}  // namespace rr

@@ -1,0 +1,67 @@
+// One client of a node: its session, driven over TCP, and the way from its requests to handlers. Layer: node.
+#pragma once
+
+#include <memory>
+#include <string_view>
+
+#include "core/session/service_session.hpp"
+#include "server/node/service.hpp"
+#include "server/node/tcp_driver.hpp"
+
+namespace rr {
+
+class ServiceClient;
+
+/// What a client needs of its node.
+class ServiceClientOwner {
+ public:
+  virtual Service* find_service(const HostedService& hosted) = 0;
+  virtual void set_current_client(ClientId id) = 0;  ///< 0: no handler runs
+  /// A handler failed and no client waits for the answer.
+  virtual void report(const std::string& problem) = 0;
+  virtual void client_ended(ServiceClient& client) = 0;
+
+ protected:
+  ~ServiceClientOwner() = default;
+};
+
+class ServiceClient final : public TcpDriver {
+ public:
+  ServiceClient(ClientId id, ServiceClientOwner& owner, ServiceDirectory& directory, ServiceSessionOptions options,
+                boost::asio::ip::tcp::socket socket);
+
+  ClientId id() const { return id_; }
+  /// Null while the client is in no service of ours.
+  Service* service() const { return service_; }
+  void send_event(const std::string& path, const MemberDefinition& event, std::span<const Value> arguments);
+  void send_wire(const std::string& path, const MemberDefinition& wire, const Value& value);
+  void release_path(const std::string& path);
+  /// Tells the client that its service ends, then closes.
+  void close_service();
+  /// The owner goes away: nothing is told to it or to handlers any more.
+  void abandon();
+
+ private:
+  void handle_bytes(ByteSpan input, Now now) override { session_.handle_bytes(input, now); }
+  void handle_transmitted(std::size_t bytes, Now now) override { session_.handle_transmitted(bytes, now); }
+  void handle_timeout(Now now) override { session_.handle_timeout(now); }
+  void handle_closed(Error reason, Now now) override { session_.handle_closed(std::move(reason), now); }
+  std::span<const ByteSpan> poll_transmit() override { return session_.poll_transmit(); }
+  bool wants_close() const override { return session_.wants_close(); }
+  TimePoint poll_timeout() const override { return session_.poll_timeout(); }
+  bool handle_event(Now now) override;
+  void ended() override;
+
+  void handle(const Called& called, Now now);
+  void handle(const ClientConnected& connected, Now now);
+  void handle(const WireConnected& connected, Now now);
+  void handle(const WireReceived& received, Now now);
+  void handle(const ClientGone& gone, Now now);
+
+  ClientId id_;
+  ServiceClientOwner* owner_;
+  Service* service_ = nullptr;
+  ServiceSession session_;
+};
+
+}  // namespace rr

@@ -1,0 +1,72 @@
+// Moves bytes between a TCP socket and a sans-IO session, for both roles. Layer: node.
+// Source: the contract in core/session/connection.hpp.
+#pragma once
+
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <memory>
+#include <span>
+
+#include "core/support/bytes.hpp"
+#include "core/support/error.hpp"
+#include "core/support/time.hpp"
+
+namespace rr {
+
+/// Both clocks, read now.
+Now read_clocks();
+
+/// One socket and, in the derived class, one session. Everything runs on the thread of the socket's io_context and a
+/// message is handled to the end where it was read: read, decode, handler, reply, write, without a hop, a lock, or a
+/// timer operation. Writes are tried at once and gather all that is queued; only a full socket waits.
+///
+/// Lives in a shared_ptr, which the pending read keeps; after close() the last handlers let go of it.
+class TcpDriver : public std::enable_shared_from_this<TcpDriver> {
+ public:
+  explicit TcpDriver(boost::asio::ip::tcp::socket socket);
+  virtual ~TcpDriver() = default;
+  TcpDriver(const TcpDriver&) = delete;
+  TcpDriver& operator=(const TcpDriver&) = delete;
+
+  /// Begins to read; call once.
+  void start();
+  /// Handles the session's events, writes what it has to send, sees to timer and end. Due after everything asked of
+  /// the session; inside of event handlers it does nothing, because the loop that called them goes on anyway.
+  void settle();
+  /// Closes the socket at once. The session hears `reason` unless it has ended already.
+  void close(Error reason);
+  bool is_closed() const { return is_closed_; }
+
+ private:
+  // The session's half of the contract.
+  virtual void handle_bytes(ByteSpan input, Now now) = 0;
+  virtual void handle_transmitted(std::size_t bytes, Now now) = 0;
+  virtual void handle_timeout(Now now) = 0;
+  virtual void handle_closed(Error reason, Now now) = 0;
+  virtual std::span<const ByteSpan> poll_transmit() = 0;
+  virtual bool wants_close() const = 0;
+  virtual TimePoint poll_timeout() const = 0;
+  /// Polls one event and handles it. Returns whether there was one.
+  virtual bool handle_event(Now now) = 0;
+  /// The socket was closed and all events are handled; called once, last.
+  virtual void ended() = 0;
+
+  void read();
+  void settle(Now now);
+  void write(Now now);
+  void wait_for_room();
+  void arm_timer();
+  void finish(Error reason, Now now);
+
+  static constexpr std::size_t read_size = 64 * 1024;
+
+  boost::asio::ip::tcp::socket socket_;
+  boost::asio::steady_timer timer_;
+  TimePoint armed_for_ = TimePoint::max();
+  std::unique_ptr<std::uint8_t[]> buffer_;
+  bool is_settling_ = false;
+  bool is_waiting_for_room_ = false;
+  bool is_closed_ = false;
+};
+
+}  // namespace rr
