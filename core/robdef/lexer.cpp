@@ -101,7 +101,7 @@ std::optional<LogicalLine> LineReader::read_logical() {
     is_clean = check_characters(*physical, first) && is_clean;
     line.join(LogicalLine(kind, physical->text, physical->number, 1));
   }
-  if (!is_clean) line.mark_bad();
+  if (!is_clean && kind == LineKind::statement) line.mark_bad();
   return line;
 }
 

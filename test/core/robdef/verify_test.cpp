@@ -15,8 +15,7 @@ std::string one_error(const Checked& checked) {
 }
 
 std::string member_error(const std::string& member, RobdefMode mode = RobdefMode::strict) {
-  return one_error(check_body("struct S\nend\nenum E\nend\npod P\nend\n"
-                              "object O\n    " + member + "\nend\n", mode));
+  return one_error(check_body("object O\n    " + member + "\nend\n", mode));
 }
 
 bool is_member_fine(const std::string& member, RobdefMode mode = RobdefMode::strict) {
