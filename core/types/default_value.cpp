@@ -93,6 +93,8 @@ class Defaults {
 
 }  // namespace
 
-Value default_value(const TypeDefinition& type, const TypeRegistry& types) { return Defaults(types).make(type); }
+Value default_value(const TypeDefinition& type, const TypeRegistry& types) {
+  return Defaults(types).make(type);
+}
 
 }  // namespace rr

@@ -28,8 +28,12 @@ std::string path_text(const FieldPath& path) {
         if (!text.empty()) text += '.';
         text += is_word(step.name) ? std::string(step.name) : quoted(step.name, 40);
         break;
-      case FieldPath::Step::index: text += '[' + std::to_string(step.number) + ']'; break;
-      case FieldPath::Step::key: text += '[' + quoted(step.name, 40) + ']'; break;
+      case FieldPath::Step::index:
+        text += '[' + std::to_string(step.number) + ']';
+        break;
+      case FieldPath::Step::key:
+        text += '[' + quoted(step.name, 40) + ']';
+        break;
     }
   }
   if (text.size() > longest) text = text.substr(0, longest / 2) + " ... " + text.substr(text.size() - longest / 2);

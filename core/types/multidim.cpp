@@ -6,12 +6,14 @@ namespace rr {
 
 bool has_declared_dims(const TypeDefinition& type, std::span<const std::uint32_t> dims) {
   if (type.array != ArrayKind::fixed_multidim) return true;
-  return std::equal(dims.begin(), dims.end(), type.sizes.begin(), type.sizes.end(),
-                    [](std::uint32_t dim, std::int32_t size) { return size >= 0 && dim == static_cast<std::uint32_t>(size); });
+  return std::equal(
+      dims.begin(), dims.end(), type.sizes.begin(), type.sizes.end(),
+      [](std::uint32_t dim, std::int32_t size) { return size >= 0 && dim == static_cast<std::uint32_t>(size); });
 }
 
 std::string wrong_count(const TypeDefinition& type, std::size_t count) {
-  if (type.array != ArrayKind::fixed && type.array != ArrayKind::max && type.array != ArrayKind::fixed_multidim) return {};
+  if (type.array != ArrayKind::fixed && type.array != ArrayKind::max && type.array != ArrayKind::fixed_multidim)
+    return {};
   const auto declared = product_of(std::span<const std::int32_t>(type.sizes));
   const bool is_max = type.array == ArrayKind::max;
   if (declared && (is_max ? count <= *declared : count == *declared)) return {};

@@ -12,11 +12,15 @@ enum class Kind : std::uint8_t { integer, real, complex, boolean, none };
 Kind kind_of(DataType type) {
   switch (type) {
     case DataType::double_t:
-    case DataType::single_t: return Kind::real;
+    case DataType::single_t:
+      return Kind::real;
     case DataType::cdouble_t:
-    case DataType::csingle_t: return Kind::complex;
-    case DataType::bool_t: return Kind::boolean;
-    default: return is_numeric(type) ? Kind::integer : Kind::none;
+    case DataType::csingle_t:
+      return Kind::complex;
+    case DataType::bool_t:
+      return Kind::boolean;
+    default:
+      return is_numeric(type) ? Kind::integer : Kind::none;
   }
 }
 
@@ -79,10 +83,14 @@ Conversion narrow(double value, float& out) {
 CDouble read_parts(const Scalar& scalar) {
   const auto* bytes = scalar.storage.data();
   switch (scalar.type) {
-    case DataType::double_t: return {load<double>(bytes), 0};
-    case DataType::single_t: return {load<float>(bytes), 0};
-    case DataType::cdouble_t: return {load<double>(bytes), load<double>(bytes + 8)};
-    default: return {load<float>(bytes), load<float>(bytes + 4)};
+    case DataType::double_t:
+      return {load<double>(bytes), 0};
+    case DataType::single_t:
+      return {load<float>(bytes), 0};
+    case DataType::cdouble_t:
+      return {load<double>(bytes), load<double>(bytes + 8)};
+    default:
+      return {load<float>(bytes), load<float>(bytes + 4)};
   }
 }
 
@@ -141,18 +149,21 @@ Conversion convert_number(const Scalar& from, DataType to, Scalar& out) {
 
 std::string number_text(const Scalar& number) {
   switch (kind_of(number.type)) {
-    case Kind::boolean: return number.storage[0] ? "true" : "false";
+    case Kind::boolean:
+      return number.storage[0] ? "true" : "false";
     case Kind::integer: {
       const auto integer = read_integer(number);
       return (integer.is_negative ? "-" : "") + std::to_string(integer.magnitude);
     }
-    case Kind::real: return real_text(read_parts(number).real());
+    case Kind::real:
+      return real_text(read_parts(number).real());
     case Kind::complex: {
       const auto parts = read_parts(number);
       const auto imaginary = real_text(parts.imag());
       return real_text(parts.real()) + (imaginary.front() == '-' ? "" : "+") + imaginary + "i";
     }
-    case Kind::none: break;
+    case Kind::none:
+      break;
   }
   return "?";
 }

@@ -23,8 +23,12 @@ ByteSpan dims_bytes(const std::vector<std::uint32_t>& dims) {
   return {reinterpret_cast<const std::uint8_t*>(dims.data()), dims.size() * sizeof(std::uint32_t)};
 }
 
-FieldPath step_to(const FieldPath& path, std::int32_t key) { return path.index(key); }
-FieldPath step_to(const FieldPath& path, const std::string& key) { return path.key(key); }
+FieldPath step_to(const FieldPath& path, std::int32_t key) {
+  return path.index(key);
+}
+FieldPath step_to(const FieldPath& path, const std::string& key) {
+  return path.key(key);
+}
 
 }  // namespace
 
@@ -44,11 +48,15 @@ Result<> pack_varvalue(Message& message, ElementKey key, const Value& value, con
 bool Packer::pack_value(const FieldPath& path, const Value& value, const TypeDefinition& type, Place place) {
   const auto pack_one = [&](const FieldPath& at, const Value& item) { return pack_item(at, item, type, place); };
   switch (type.container) {
-    case ContainerKind::list: return pack_list(path, value, pack_one);
-    case ContainerKind::map_int32: return pack_map<MapInt32>(path, value, DataType::map_int32_t, pack_one);
-    case ContainerKind::map_string: return pack_map<MapString>(path, value, DataType::map_string_t, pack_one);
+    case ContainerKind::list:
+      return pack_list(path, value, pack_one);
+    case ContainerKind::map_int32:
+      return pack_map<MapInt32>(path, value, DataType::map_int32_t, pack_one);
+    case ContainerKind::map_string:
+      return pack_map<MapString>(path, value, DataType::map_string_t, pack_one);
     case ContainerKind::none:
-    case ContainerKind::generator: break;  // a generator carries one item at a time
+    case ContainerKind::generator:
+      break;  // a generator carries one item at a time
   }
   return pack_item(path, value, type, place);
 }
@@ -74,15 +82,19 @@ bool Packer::pack_varvalue(const FieldPath& path, const Value& value) {
 
 bool Packer::pack_item(const FieldPath& path, const Value& value, const TypeDefinition& type, Place place) {
   switch (type.type) {
-    case DataType::varvalue_t: return pack_varvalue(path, value);
-    case DataType::enum_t: return pack_scalar(path, value, DataType::int32_t);
+    case DataType::varvalue_t:
+      return pack_varvalue(path, value);
+    case DataType::enum_t:
+      return pack_scalar(path, value, DataType::int32_t);
     case DataType::string_t:
       if (const auto* text = value.get_if<std::string>()) return pack_text(path, *text);
       return fail_mismatch(path, value, "string");
     case DataType::structure_t:
     case DataType::pod_t:
-    case DataType::namedarray_t: return pack_named(path, value, type, place);
-    default: break;
+    case DataType::namedarray_t:
+      return pack_named(path, value, type, place);
+    default:
+      break;
   }
   if (!is_numeric(type.type))
     return fail(ErrorCode::data_type_error, path, item_type_text(type) + " is not the type of a value");
@@ -97,15 +109,18 @@ bool Packer::pack_scalar(const FieldPath& path, const Value& value, DataType typ
   if (scalar->type == type) return add_leaf(path, type, 1, scalar->bytes());
   Scalar converted;
   switch (convert_number(*scalar, type, converted)) {
-    case Conversion::ok: return add_leaf(path, type, 1, message_.store(converted.bytes()));
-    case Conversion::wrong_kind: break;
+    case Conversion::ok:
+      return add_leaf(path, type, 1, message_.store(converted.bytes()));
+    case Conversion::wrong_kind:
+      break;
     case Conversion::out_of_range:
-      return fail(ErrorCode::out_of_range, path,
-                  value.type_text() + " " + number_text(*scalar) + " does not fit " + std::string(data_type_name(type)));
+      return fail(
+          ErrorCode::out_of_range, path,
+          value.type_text() + " " + number_text(*scalar) + " does not fit " + std::string(data_type_name(type)));
   }
-  return fail(ErrorCode::data_type_mismatch, path,
-              "found " + value.type_text() + " " + number_text(*scalar) + ", expected " +
-                  std::string(data_type_name(type)));
+  return fail(
+      ErrorCode::data_type_mismatch, path,
+      "found " + value.type_text() + " " + number_text(*scalar) + ", expected " + std::string(data_type_name(type)));
 }
 
 bool Packer::pack_text(const FieldPath& path, std::string_view text) {
@@ -239,7 +254,8 @@ bool Packer::fail(ErrorCode code, const FieldPath& path, std::string_view text) 
 
 bool Packer::fail_mismatch(const FieldPath& path, const Value& found, std::string_view expected) {
   if (found.is_null()) return fail(ErrorCode::null_value, path, "is null, expected " + std::string(expected));
-  return fail(ErrorCode::data_type_mismatch, path, "found " + found.type_text() + ", expected " + std::string(expected));
+  return fail(ErrorCode::data_type_mismatch, path,
+              "found " + found.type_text() + ", expected " + std::string(expected));
 }
 
 }  // namespace rr

@@ -24,9 +24,9 @@ struct ElementKey {
 ///
 /// A number converts where the type holds it (convert_number(): int32 5 for a uint8 or double property); arrays must
 /// have the declared item type unless they are empty; nothing else converts. Structures give their fields in any order,
-/// all of them and no others; their type_name, as that of pods and named arrays, may be empty. A scalar pod may be given
-/// as a Structure.
-/// Errors   null_value, data_type_mismatch, data_type_error, out_of_range; the text names the field path, e.g.
+/// all of them and no others; their type_name, as that of pods and named arrays, may be empty. A scalar pod may be
+/// given as a Structure. Errors   null_value, data_type_mismatch, data_type_error, out_of_range; the text names the
+/// field path, e.g.
 ///          "pack 'pose.q' (com.x.Pose): has 3, expected 4 (double[4])".
 /// Source   messages spec, section 9.
 Result<> pack(Message& message, ElementKey key, const Value& value, const TypeDefinition& type,
@@ -47,8 +47,8 @@ Result<Value> unpack(const Message& message, const MessageElement& element, cons
 /// pod or named array as an array of one (is_scalar false): the wire does not tell them apart.
 Result<Value> unpack_varvalue(const Message& message, const MessageElement& element, const TypeRegistry& types);
 
-/// The default of spec 5.4: zeros, empty, null; enums 0; named types from `types`. Null also where the declared sizes ask
-/// for more than 12 MiB, which a definition from a peer may.
+/// The default of spec 5.4: zeros, empty, null; enums 0; named types from `types`. Null also where the declared sizes
+/// ask for more than 12 MiB, which a definition from a peer may.
 Value default_value(const TypeDefinition& type, const TypeRegistry& types);
 
 }  // namespace rr

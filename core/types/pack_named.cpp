@@ -12,7 +12,8 @@ bool Packer::pack_named(const FieldPath& path, const Value& value, const TypeDef
   switch (entity->kind) {
     case EntityKind::structure:
       if (value.is_null()) return add_leaf(path, DataType::void_t, 0, {});
-      if (const auto* structure = value.get_if<Structure>()) return pack_structure(path, *structure, *entity, type_name);
+      if (const auto* structure = value.get_if<Structure>())
+        return pack_structure(path, *structure, *entity, type_name);
       break;
     case EntityKind::pod:
       if (const auto* pod = value.get_if<Structure>(); pod && type.array == ArrayKind::none)
@@ -28,7 +29,8 @@ bool Packer::pack_named(const FieldPath& path, const Value& value, const TypeDef
                pack_named_arrays(path, *named, *entity, type_name, as_multidim);
       }
       break;
-    case EntityKind::object: return fail(ErrorCode::data_type_error, path, "an object is not a value");
+    case EntityKind::object:
+      return fail(ErrorCode::data_type_error, path, "an object is not a value");
   }
   return fail_mismatch(path, value, item_type_text(type));
 }
@@ -139,9 +141,9 @@ bool Packer::check_shape(const FieldPath& path, const Named& value, std::size_t 
   }
   const auto product = product_of(std::span<const std::uint32_t>(value.dims));
   if (product && *product == count && has_declared_dims(type, value.dims)) return true;
-  return fail(ErrorCode::data_type_error, path,
-              "has " + std::to_string(count) + " with dims " + dims_text(value.dims) + ", expected " +
-                  item_type_text(type));
+  return fail(
+      ErrorCode::data_type_error, path,
+      "has " + std::to_string(count) + " with dims " + dims_text(value.dims) + ", expected " + item_type_text(type));
 }
 
 bool Packer::check_type_name(const FieldPath& path, std::string_view found, std::string_view expected) {

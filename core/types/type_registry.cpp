@@ -14,7 +14,8 @@ auto find_in(const Index& index, std::string_view name) {
 
 Error definition_error(const Diagnostic& diagnostic) {
   const auto service = diagnostic.service.empty() ? std::string() : " " + quoted(diagnostic.service);
-  return make_error(ErrorCode::service_definition_error, "service definition" + service + ": " + format_diagnostic(diagnostic));
+  return make_error(ErrorCode::service_definition_error,
+                    "service definition" + service + ": " + format_diagnostic(diagnostic));
 }
 
 /// The first error, if there is one; warnings go to `warnings`.
@@ -79,7 +80,9 @@ Result<> TypeRegistry::add(const std::vector<std::string>& texts, RobdefMode mod
     auto parsed = parse_service_definition(text, mode);
     const auto& name = parsed.definition.name;
     if (find_service(name)) continue;
-    const auto is_same = [&](const auto& other) { return other->name == name && other->text == parsed.definition.text; };
+    const auto is_same = [&](const auto& other) {
+      return other->name == name && other->text == parsed.definition.text;
+    };
     if (std::any_of(added.begin(), added.end(), is_same)) continue;
     if (const auto* error = sort_out(parsed.diagnostics, warnings)) return definition_error(*error);
     added.push_back(std::make_unique<ServiceDefinition>(std::move(parsed.definition)));
@@ -117,7 +120,9 @@ std::vector<std::string> TypeRegistry::imports_of(std::string_view text) {
   return names;
 }
 
-const ServiceDefinition* TypeRegistry::find_service(std::string_view name) const { return find_in(services_, name); }
+const ServiceDefinition* TypeRegistry::find_service(std::string_view name) const {
+  return find_in(services_, name);
+}
 
 const EntityDefinition* TypeRegistry::find_entity(std::string_view qualified_name) const {
   return find_in(entities_, qualified_name);

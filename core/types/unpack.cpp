@@ -21,8 +21,12 @@ std::string element_text(const MessageElement& element) {
   return element.type_name.empty() ? name : name + " " + quoted(element.type_name);
 }
 
-FieldPath step_to(const FieldPath& path, std::int32_t key) { return path.index(key); }
-FieldPath step_to(const FieldPath& path, const std::string& key) { return path.key(key); }
+FieldPath step_to(const FieldPath& path, std::int32_t key) {
+  return path.index(key);
+}
+FieldPath step_to(const FieldPath& path, const std::string& key) {
+  return path.key(key);
+}
 
 }  // namespace
 
@@ -47,11 +51,15 @@ bool Unpacker::unpack_value(const FieldPath& path, const MessageElement& element
     return unpack_item(at, item, type, place, to);
   };
   switch (type.container) {
-    case ContainerKind::list: return unpack_list(path, element, out, unpack_one);
-    case ContainerKind::map_int32: return unpack_map<MapInt32>(path, element, out, unpack_one);
-    case ContainerKind::map_string: return unpack_map<MapString>(path, element, out, unpack_one);
+    case ContainerKind::list:
+      return unpack_list(path, element, out, unpack_one);
+    case ContainerKind::map_int32:
+      return unpack_map<MapInt32>(path, element, out, unpack_one);
+    case ContainerKind::map_string:
+      return unpack_map<MapString>(path, element, out, unpack_one);
     case ContainerKind::none:
-    case ContainerKind::generator: break;  // a generator carries one item at a time
+    case ContainerKind::generator:
+      break;  // a generator carries one item at a time
   }
   return unpack_item(path, element, type, place, out);
 }
@@ -61,11 +69,17 @@ bool Unpacker::unpack_varvalue(const FieldPath& path, const MessageElement& elem
     return unpack_varvalue(at, item, to);
   };
   switch (element.type) {
-    case DataType::void_t: return true;
-    case DataType::string_t: out = Value(element.text()); return true;
-    case DataType::list_t: return unpack_list(path, element, out, unpack_one);
-    case DataType::map_int32_t: return unpack_map<MapInt32>(path, element, out, unpack_one);
-    case DataType::map_string_t: return unpack_map<MapString>(path, element, out, unpack_one);
+    case DataType::void_t:
+      return true;
+    case DataType::string_t:
+      out = Value(element.text());
+      return true;
+    case DataType::list_t:
+      return unpack_list(path, element, out, unpack_one);
+    case DataType::map_int32_t:
+      return unpack_map<MapInt32>(path, element, out, unpack_one);
+    case DataType::map_string_t:
+      return unpack_map<MapString>(path, element, out, unpack_one);
     case DataType::multidimarray_t: {
       const auto* array = find_child(path, element, "array");
       if (!array) return false;
@@ -75,7 +89,8 @@ bool Unpacker::unpack_varvalue(const FieldPath& path, const MessageElement& elem
       type.array = ArrayKind::multidim;
       return unpack_multidim(path, element, type, Place::anywhere, out);
     }
-    default: break;
+    default:
+      break;
   }
   if (!is_numeric(element.type)) return unpack_named_varvalue(path, element, out);
   out = Array::copy(element.type, element.data);
@@ -85,9 +100,12 @@ bool Unpacker::unpack_varvalue(const FieldPath& path, const MessageElement& elem
 bool Unpacker::unpack_item(const FieldPath& path, const MessageElement& element, const TypeDefinition& type,
                            Place place, Value& out) {
   switch (type.type) {
-    case DataType::void_t: return true;  // what stands for "no value" differs between peers
-    case DataType::varvalue_t: return unpack_varvalue(path, element, out);
-    case DataType::enum_t: return unpack_scalar(path, element, type, out);
+    case DataType::void_t:
+      return true;  // what stands for "no value" differs between peers
+    case DataType::varvalue_t:
+      return unpack_varvalue(path, element, out);
+    case DataType::enum_t:
+      return unpack_scalar(path, element, type, out);
     case DataType::string_t:
       if (element.type == DataType::void_t) return fail(ErrorCode::data_type_error, path, "is null, expected string");
       if (element.type != DataType::string_t) return fail_mismatch(path, element, "string");
@@ -95,8 +113,10 @@ bool Unpacker::unpack_item(const FieldPath& path, const MessageElement& element,
       return true;
     case DataType::structure_t:
     case DataType::pod_t:
-    case DataType::namedarray_t: return unpack_named(path, element, type, place, out);
-    default: break;
+    case DataType::namedarray_t:
+      return unpack_named(path, element, type, place, out);
+    default:
+      break;
   }
   if (!is_numeric(type.type))
     return fail(ErrorCode::data_type_error, path, item_type_text(type) + " is not the type of a value");

@@ -157,8 +157,8 @@ bool Unpacker::unpack_pod_items(const FieldPath& path, const MessageElement& ele
   return true;
 }
 
-bool Unpacker::unpack_named_arrays(const FieldPath& path, const MessageElement& element,
-                                   const EntityDefinition& entity, std::string_view type_name, NamedArray& out) {
+bool Unpacker::unpack_named_arrays(const FieldPath& path, const MessageElement& element, const EntityDefinition& entity,
+                                   std::string_view type_name, NamedArray& out) {
   out.type_name = type_name;
   if (element.type != DataType::namedarray_multidimarray_t)
     return unpack_named_numbers(path, element, entity, type_name, out);
@@ -189,8 +189,8 @@ bool Unpacker::set_shape(const FieldPath& path, Named& value, std::size_t count,
     return fail(ErrorCode::data_type_error, path,
                 "has dims " + dims_text(value.dims) + ", expected " + item_type_text(type));
   }
-  const auto wrong = value.is_scalar && count != 1 ? "has " + std::to_string(count) + ", expected 1"
-                                                   : wrong_count(type, count);
+  const auto wrong =
+      value.is_scalar && count != 1 ? "has " + std::to_string(count) + ", expected 1" : wrong_count(type, count);
   if (!wrong.empty()) return fail(ErrorCode::data_type_error, path, wrong + " (" + item_type_text(type) + ")");
   if (is_multidim(type)) {
     value.is_multidim = true;

@@ -10,7 +10,8 @@
 namespace rr {
 
 /// One use, one element. Functions return false after the first failure, which take_error() then holds. `path` is the
-/// way to the value, for messages. Each level of recursion takes a level of the message, whose depth the decoder bounds.
+/// way to the value, for messages. Each level of recursion takes a level of the message, whose depth the decoder
+/// bounds.
 class Unpacker {
  public:
   Unpacker(const Message& message, const TypeRegistry& types) : message_(message), types_(types) {}

@@ -46,7 +46,9 @@ Scalar Scalar::from_bytes(DataType type, ByteSpan bytes) {
   return scalar;
 }
 
-bool Scalar::operator==(const Scalar& other) const { return type == other.type && is_same_bytes(bytes(), other.bytes()); }
+bool Scalar::operator==(const Scalar& other) const {
+  return type == other.type && is_same_bytes(bytes(), other.bytes());
+}
 
 Array Array::copy(DataType type, ByteSpan bytes) {
   Array array = empty(type);
@@ -67,7 +69,9 @@ Array Array::empty(DataType type) {
   return array;
 }
 
-bool Array::operator==(const Array& other) const { return type_ == other.type_ && is_same_bytes(bytes_, other.bytes_); }
+bool Array::operator==(const Array& other) const {
+  return type_ == other.type_ && is_same_bytes(bytes_, other.bytes_);
+}
 
 const Value* Structure::find(std::string_view name) const {
   for (const auto& field : fields)
@@ -84,9 +88,13 @@ bool PodArray::operator==(const PodArray& other) const {
          is_multidim == other.is_multidim;
 }
 
-bool List::operator==(const List& other) const { return items == other.items; }
+bool List::operator==(const List& other) const {
+  return items == other.items;
+}
 
-bool MapInt32::operator==(const MapInt32& other) const { return is_same_map(*this, other); }
+bool MapInt32::operator==(const MapInt32& other) const {
+  return is_same_map(*this, other);
+}
 
 const Value* MapString::find(std::string_view key) const {
   for (const auto& [item_key, value] : items)
@@ -94,7 +102,9 @@ const Value* MapString::find(std::string_view key) const {
   return nullptr;
 }
 
-bool MapString::operator==(const MapString& other) const { return is_same_map(*this, other); }
+bool MapString::operator==(const MapString& other) const {
+  return is_same_map(*this, other);
+}
 
 template <Number T>
 Result<T> Value::to() const {
@@ -111,7 +121,8 @@ Result<T> Value::to() const {
   const std::string found = type_text() + (scalar ? " " + number_text(*scalar) : "");
   if (conversion == Conversion::out_of_range)
     return make_error(ErrorCode::out_of_range, found + " does not fit " + std::string(data_type_name(type)));
-  return make_error(ErrorCode::data_type_mismatch, "found " + found + ", expected " + std::string(data_type_name(type)));
+  return make_error(ErrorCode::data_type_mismatch,
+                    "found " + found + ", expected " + std::string(data_type_name(type)));
 }
 
 Result<std::string_view> Value::to_text() const {
@@ -129,7 +140,7 @@ Result<std::span<const T>> Value::to_items() const {
                     "found " + type_text() + ", expected " + std::string(data_type_name(type)) + "[]");
 }
 
-#define RR_INSTANTIATE(T)              \
+#define RR_INSTANTIATE(T)               \
   template Result<T> Value::to() const; \
   template Result<std::span<const T>> Value::to_items() const;
 RR_INSTANTIATE(double)

@@ -26,24 +26,39 @@ using CSingle = std::complex<float>;
 /// DataType of a C++ number type; void_t for anything else.
 template <class T>
 constexpr DataType data_type_of() {
-  if constexpr (std::is_same_v<T, double>) return DataType::double_t;
-  else if constexpr (std::is_same_v<T, float>) return DataType::single_t;
-  else if constexpr (std::is_same_v<T, std::int8_t>) return DataType::int8_t;
-  else if constexpr (std::is_same_v<T, std::uint8_t>) return DataType::uint8_t;
-  else if constexpr (std::is_same_v<T, std::int16_t>) return DataType::int16_t;
-  else if constexpr (std::is_same_v<T, std::uint16_t>) return DataType::uint16_t;
-  else if constexpr (std::is_same_v<T, std::int32_t>) return DataType::int32_t;
-  else if constexpr (std::is_same_v<T, std::uint32_t>) return DataType::uint32_t;
-  else if constexpr (std::is_same_v<T, std::int64_t>) return DataType::int64_t;
-  else if constexpr (std::is_same_v<T, std::uint64_t>) return DataType::uint64_t;
-  else if constexpr (std::is_same_v<T, CDouble>) return DataType::cdouble_t;
-  else if constexpr (std::is_same_v<T, CSingle>) return DataType::csingle_t;
-  else if constexpr (std::is_same_v<T, bool>) return DataType::bool_t;
-  else return DataType::void_t;
+  if constexpr (std::is_same_v<T, double>)
+    return DataType::double_t;
+  else if constexpr (std::is_same_v<T, float>)
+    return DataType::single_t;
+  else if constexpr (std::is_same_v<T, std::int8_t>)
+    return DataType::int8_t;
+  else if constexpr (std::is_same_v<T, std::uint8_t>)
+    return DataType::uint8_t;
+  else if constexpr (std::is_same_v<T, std::int16_t>)
+    return DataType::int16_t;
+  else if constexpr (std::is_same_v<T, std::uint16_t>)
+    return DataType::uint16_t;
+  else if constexpr (std::is_same_v<T, std::int32_t>)
+    return DataType::int32_t;
+  else if constexpr (std::is_same_v<T, std::uint32_t>)
+    return DataType::uint32_t;
+  else if constexpr (std::is_same_v<T, std::int64_t>)
+    return DataType::int64_t;
+  else if constexpr (std::is_same_v<T, std::uint64_t>)
+    return DataType::uint64_t;
+  else if constexpr (std::is_same_v<T, CDouble>)
+    return DataType::cdouble_t;
+  else if constexpr (std::is_same_v<T, CSingle>)
+    return DataType::csingle_t;
+  else if constexpr (std::is_same_v<T, bool>)
+    return DataType::bool_t;
+  else
+    return DataType::void_t;
 }
 
 template <class T>
-concept Number = data_type_of<T>() != DataType::void_t;
+concept Number = data_type_of<T>()
+!= DataType::void_t;
 
 /// One number, complex number, bool or enum value (int32_t).
 struct Scalar {
@@ -143,7 +158,7 @@ struct PodArray {
   std::string type_name;
   std::vector<Structure> items;  ///< their type_name is empty as read, and may be when packed: the pods' is above
   std::vector<std::uint32_t> dims = {};
-  bool is_scalar = false;     ///< declared as a scalar: one item
+  bool is_scalar = false;  ///< declared as a scalar: one item
   bool is_multidim = false;
   bool operator==(const PodArray&) const;
 };
@@ -153,7 +168,7 @@ struct NamedArray {
   std::string type_name;
   Array array;
   std::vector<std::uint32_t> dims = {};
-  bool is_scalar = false;     ///< declared as a scalar: one value
+  bool is_scalar = false;  ///< declared as a scalar: one value
   bool is_multidim = false;
   bool operator==(const NamedArray&) const = default;
 };
@@ -188,11 +203,11 @@ class Value {
   template <Number T>
   Value(std::vector<T> items) : storage_(Array::take(std::move(items))) {}
   template <class T>
-    requires std::is_same_v<T, Scalar> || std::is_same_v<T, std::string> || std::is_same_v<T, Array> ||
-             std::is_same_v<T, MultiDimArray> || std::is_same_v<T, Structure> || std::is_same_v<T, PodArray> ||
-             std::is_same_v<T, NamedArray> || std::is_same_v<T, List> || std::is_same_v<T, MapInt32> ||
-             std::is_same_v<T, MapString>
-  Value(T value) : storage_(std::move(value)) {}
+  requires std::is_same_v<T, Scalar> || std::is_same_v<T, std::string> || std::is_same_v<T, Array> ||
+      std::is_same_v<T, MultiDimArray> || std::is_same_v<T, Structure> || std::is_same_v<T, PodArray> ||
+      std::is_same_v<T, NamedArray> || std::is_same_v<T, List> || std::is_same_v<T, MapInt32> ||
+      std::is_same_v<T, MapString>
+      Value(T value) : storage_(std::move(value)) {}
 
   bool is_null() const { return std::holds_alternative<std::monostate>(storage_); }
   template <class T>

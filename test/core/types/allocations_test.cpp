@@ -5,6 +5,7 @@
 #include <new>
 
 #include "test/core/types/fixture.hpp"
+#include "test/core/types/show_result.hpp"
 
 namespace {
 std::size_t allocations = 0;
@@ -16,8 +17,12 @@ std::size_t allocations = 0;
   if (void* memory = std::malloc(size)) return memory;
   throw std::bad_alloc();
 }
-[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory) noexcept {
+  std::free(memory);
+}
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept {
+  std::free(memory);
+}
 
 using namespace rr;
 using namespace rr::test;

@@ -3,13 +3,16 @@
 
 #include "core/types/pack.hpp"
 #include "test/core/types/fixture.hpp"
+#include "test/core/types/show_result.hpp"
 
 using namespace rr;
 using namespace rr::test;
 
 namespace {
 
-Value default_of(std::string_view field) { return default_value(field_type("test.types.every", field), test_types()); }
+Value default_of(std::string_view field) {
+  return default_value(field_type("test.types.every", field), test_types());
+}
 
 }  // namespace
 

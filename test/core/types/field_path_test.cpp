@@ -1,7 +1,9 @@
 #include "core/types/field_path.hpp"
 
 #include <catch2/catch.hpp>
+
 #include <deque>
+#include "test/core/types/show_result.hpp"
 
 using namespace rr;
 

@@ -160,7 +160,10 @@ TypeDefinition named_type(std::string_view qualified_name, ArrayKind array) {
   if (!entity) throw std::runtime_error("no type " + std::string(qualified_name));
   const bool is_pod = entity->kind == EntityKind::pod;
   const bool is_structure = entity->kind == EntityKind::structure;
-  auto definition = type_of(is_structure ? DataType::structure_t : is_pod ? DataType::pod_t : DataType::namedarray_t, array);
+  auto definition = type_of(is_structure ? DataType::structure_t
+                            : is_pod     ? DataType::pod_t
+                                         : DataType::namedarray_t,
+                            array);
   definition.name = definition.qualified_name = qualified_name;
   return definition;
 }

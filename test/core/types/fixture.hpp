@@ -1,21 +1,12 @@
 // Definitions and shorthand for tests of values on the wire.
 #pragma once
 
-#include <catch2/catch.hpp>
 #include <string>
 #include <string_view>
 
 #include "core/types/pack.hpp"
 #include "core/types/type_registry.hpp"
 #include "core/wire/codec.hpp"
-
-/// A failed CHECK shows the error.
-template <class T>
-struct Catch::StringMaker<boost::system::result<T, rr::Error>> {
-  static std::string convert(const boost::system::result<T, rr::Error>& result) {
-    return result ? "a value" : result.error().message;
-  }
-};
 
 namespace rr::test {
 

@@ -13,9 +13,12 @@ template <class To, class From>
 std::string convert(From from) {
   Scalar out;
   switch (convert_number(Scalar::of(from), data_type_of<To>(), out)) {
-    case Conversion::wrong_kind: return "wrong kind";
-    case Conversion::out_of_range: return "out of range";
-    case Conversion::ok: break;
+    case Conversion::wrong_kind:
+      return "wrong kind";
+    case Conversion::out_of_range:
+      return "out of range";
+    case Conversion::ok:
+      break;
   }
   CHECK(out.type == data_type_of<To>());
   return number_text(out);

@@ -4,17 +4,26 @@
 #include <catch2/catch.hpp>
 
 #include "test/core/types/fixture.hpp"
+#include "test/core/types/show_result.hpp"
 
 using namespace rr;
 using namespace rr::test;
 
 namespace {
 
-const TypeDefinition& every(std::string_view field) { return field_type("test.types.every", field); }
+const TypeDefinition& every(std::string_view field) {
+  return field_type("test.types.every", field);
+}
 
-Value point3(double x, double y, double z) { return Structure{"test.types.point3", {{"x", x}, {"y", y}, {"z", z}}}; }
-Structure point(std::int32_t id, double value) { return {"", {{"id", id}, {"value", value}}}; }
-Array doubles(std::vector<double> items) { return Array::take(std::move(items)); }
+Value point3(double x, double y, double z) {
+  return Structure{"test.types.point3", {{"x", x}, {"y", y}, {"z", z}}};
+}
+Structure point(std::int32_t id, double value) {
+  return {"", {{"id", id}, {"value", value}}};
+}
+Array doubles(std::vector<double> items) {
+  return Array::take(std::move(items));
+}
 
 /// `text` goes on where "pack 'value" ends: "[1].x (test.types.point3): is missing".
 void check_refused(const Value& value, const TypeDefinition& type, ErrorCode code, const std::string& text) {
@@ -53,8 +62,7 @@ TEST_CASE("numbers that do not fit are refused") {
   check_refused(true, every("i32"), ErrorCode::data_type_mismatch, ": found bool true, expected int32");
   check_refused(std::int32_t{1}, every("b"), ErrorCode::data_type_mismatch, ": found int32 1, expected bool");
   check_refused("5", every("i32"), ErrorCode::data_type_mismatch, ": found string, expected int32");
-  check_refused(std::vector<double>{1}, every("d"), ErrorCode::data_type_mismatch,
-                ": found double[], expected double");
+  check_refused(std::vector<double>{1}, every("d"), ErrorCode::data_type_mismatch, ": found double[], expected double");
 }
 
 TEST_CASE("null is for structures, lists, maps and varvalues") {
@@ -174,8 +182,7 @@ TEST_CASE("pods are packed as declared") {
                 "[0].id (test.types.point): int32 100000 does not fit int16");
   check_refused(PodArray{"test.types.shape", {}}, every("ps"), ErrorCode::data_type_error,
                 ": found type 'test.types.shape', expected test.types.point");
-  check_refused(point(1, 1), every("ps"), ErrorCode::data_type_mismatch,
-                ": found unnamed structure, expected point[]");
+  check_refused(point(1, 1), every("ps"), ErrorCode::data_type_mismatch, ": found unnamed structure, expected point[]");
 }
 
 TEST_CASE("fields of pods are packed as declared") {
@@ -233,7 +240,8 @@ TEST_CASE("a varvalue decides its own type") {
   CHECK(round_trip(point3(1, 2, 3), any).value() == point3(1, 2, 3));
   CHECK(round_trip(Structure{"test.types.point", point(1, 2).fields}, any).value() ==
         PodArray{"test.types.point", {{"", {{"id", std::int16_t{1}}, {"value", 2.0f}}}}});
-  CHECK(round_trip(List{{Value("a"), Value(List{}), Value()}}, any).value() == List{{Value("a"), Value(List{}), Value()}});
+  CHECK(round_trip(List{{Value("a"), Value(List{}), Value()}}, any).value() ==
+        List{{Value("a"), Value(List{}), Value()}});
   check_refused(point3(1, 2, 3).get_if<Structure>()->fields.empty() ? Value() : Value(Structure{"", {}}), any,
                 ErrorCode::data_type_error, ": type '' is not known");
   check_refused(Structure{"test.types.other", {}}, any, ErrorCode::data_type_error,

@@ -3,6 +3,7 @@
 
 #include "core/types/pack.hpp"
 #include "test/core/types/fixture.hpp"
+#include "test/core/types/show_result.hpp"
 #include "test/support/golden.hpp"
 
 using namespace rr;
@@ -41,11 +42,14 @@ struct Vector {
   Bytes bytes;
 };
 
-std::vector<Vector> pack_vectors() {
-  std::vector<Vector> vectors;
-  for (const auto& vector : read_golden_json("messages/messages.json"))
-    if (vector["name"].get<std::string>().rfind("pack_", 0) == 0)
-      vectors.push_back({vector["name"], vector["version"], from_hex(vector["hex"].get<std::string>())});
+const std::vector<Vector>& pack_vectors() {
+  static const auto vectors = [] {
+    std::vector<Vector> list;
+    for (const auto& vector : read_golden_json("messages/messages.json"))
+      if (vector["name"].get<std::string>().rfind("pack_", 0) == 0)
+        list.push_back({vector["name"], vector["version"], from_hex(vector["hex"].get<std::string>())});
+    return list;
+  }();
   return vectors;
 }
 
@@ -62,7 +66,7 @@ Value unpack_vector(const std::string& name) {
 }  // namespace
 
 TEST_CASE("every packed vector unpacks and packs to the same bytes") {
-  const auto vectors = pack_vectors();
+  const auto& vectors = pack_vectors();
   REQUIRE(vectors.size() == 52);
   for (const auto& vector : vectors) {
     INFO(vector.name);

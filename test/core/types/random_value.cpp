@@ -42,7 +42,8 @@ Value RandomValue::make(const TypeDefinition& type, int depth) {
       for (std::uint32_t i = 0; i < count; ++i) items[make_text()] = make_item(type, depth + 1);
       return MapString{{items.begin(), items.end()}};
     }
-    default: return make_item(type, depth);
+    default:
+      return make_item(type, depth);
   }
 }
 
@@ -62,12 +63,21 @@ Value RandomValue::make_varvalue(int depth) {
   TypeDefinition type;
   type.type = DataType::varvalue_t;
   switch (below(depth > 4 ? 3 : 8)) {
-    case 0: return {};
-    case 1: return make_text();
-    case 2: return make_array(numeric_types[below(13)], below(5));
-    case 3: type.container = ContainerKind::list; break;
-    case 4: type.container = ContainerKind::map_int32; break;
-    case 5: type.container = ContainerKind::map_string; break;
+    case 0:
+      return {};
+    case 1:
+      return make_text();
+    case 2:
+      return make_array(numeric_types[below(13)], below(5));
+    case 3:
+      type.container = ContainerKind::list;
+      break;
+    case 4:
+      type.container = ContainerKind::map_int32;
+      break;
+    case 5:
+      type.container = ContainerKind::map_string;
+      break;
     default: {
       const auto& definition = *types_.definitions()[below(static_cast<std::uint32_t>(types_.definitions().size()))];
       const auto& entity = definition.entities[below(static_cast<std::uint32_t>(definition.entities.size()))];

@@ -13,7 +13,9 @@ class RandomValue {
   RandomValue(const TypeRegistry& types, std::uint32_t seed) : types_(types), engine_(seed) {}
 
   Value make(const TypeDefinition& type, int depth = 0);
-  std::uint32_t below(std::uint32_t limit) { return std::uniform_int_distribution<std::uint32_t>(0, limit - 1)(engine_); }
+  std::uint32_t below(std::uint32_t limit) {
+    return std::uniform_int_distribution<std::uint32_t>(0, limit - 1)(engine_);
+  }
 
  private:
   Value make_item(const TypeDefinition& type, int depth);

@@ -3,6 +3,7 @@
 
 #include "test/core/types/fixture.hpp"
 #include "test/core/types/random_value.hpp"
+#include "test/core/types/show_result.hpp"
 
 using namespace rr;
 using namespace rr::test;

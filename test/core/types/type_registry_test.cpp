@@ -2,14 +2,16 @@
 
 #include <catch2/catch.hpp>
 
-#include "test/core/types/fixture.hpp"
+#include "test/core/types/show_result.hpp"
 
 using namespace rr;
 
 namespace {
 
-const std::string base = "service a.base\nstdver 0.10\nexception Broken\nenum mode\n  off = 0\nend\nstruct S\n  field double x\nend\n";
-const std::string user = "service a.user\nstdver 0.10\nimport a.base\nusing a.base.S as T\nobject O\n  property T t\nend\n";
+const std::string base =
+    "service a.base\nstdver 0.10\nexception Broken\nenum mode\n  off = 0\nend\nstruct S\n  field double x\nend\n";
+const std::string user =
+    "service a.user\nstdver 0.10\nimport a.base\nusing a.base.S as T\nobject O\n  property T t\nend\n";
 const std::string top = "service top\nstdver 0.10\nimport a.user\nimport a.base\nobject O\n  objref a.user.O o\nend\n";
 
 std::vector<std::string> names_of(const TypeRegistry& types) {

@@ -3,13 +3,16 @@
 
 #include "core/types/pack.hpp"
 #include "test/core/types/fixture.hpp"
+#include "test/core/types/show_result.hpp"
 
 using namespace rr;
 using namespace rr::test;
 
 namespace {
 
-const TypeDefinition& every(std::string_view field) { return field_type("test.types.every", field); }
+const TypeDefinition& every(std::string_view field) {
+  return field_type("test.types.every", field);
+}
 
 /// A message under construction whose first element is the value.
 class Wire : public Message {
@@ -91,7 +94,8 @@ TEST_CASE("void where a value must be: NullValue, for string and single pods and
 
 TEST_CASE("another element type is a DataTypeMismatch") {
   const auto mismatch = ErrorCode::data_type_mismatch;
-  check_refused(Wire().number<std::int32_t>("value", {1, 2}), every("d"), mismatch, ": found int32[2], expected double");
+  check_refused(Wire().number<std::int32_t>("value", {1, 2}), every("d"), mismatch,
+                ": found int32[2], expected double");
   check_refused(Wire().text("value", "x"), every("d"), mismatch, ": found string, expected double");
   check_refused(Wire().number<double>("value", {1}), every("m"), mismatch, ": found double[1], expected mode");
   check_refused(Wire().number<double>("value", {1}), every("text"), mismatch, ": found double[1], expected string");
@@ -115,8 +119,7 @@ TEST_CASE("another element type is a DataTypeMismatch") {
 TEST_CASE("scalars take the first item and need one") {
   CHECK(Wire().number<double>("value", {1, 2, 3}).as(every("d")).value() == Value(1.0));
   CHECK(Wire().number<std::int32_t>("value", {77}).as(every("m")).value() == Value(std::int32_t{77}));
-  check_refused(Wire().number<double>("value", {}), every("d"), ErrorCode::out_of_range,
-                ": is empty, expected double");
+  check_refused(Wire().number<double>("value", {}), every("d"), ErrorCode::out_of_range, ": is empty, expected double");
   check_refused(Wire().number<std::int32_t>("value", {}), every("m"), ErrorCode::out_of_range,
                 ": is empty, expected mode");
 }
@@ -162,7 +165,9 @@ TEST_CASE("multi-dim arrays match their dims") {
   check_refused(Wire().open("value", DataType::multidimarray_t).number("dims", Int32s{1}).number("array", Doubles{1}),
                 every("grid"), ErrorCode::data_type_mismatch, ".dims: found int32[1], expected uint32[]");
   Wire turned;
-  turned.open("value", DataType::multidimarray_t).number("dims", Uint32s{3, 2}).number("array", std::vector<std::int16_t>(6));
+  turned.open("value", DataType::multidimarray_t)
+      .number("dims", Uint32s{3, 2})
+      .number("array", std::vector<std::int16_t>(6));
   check_refused(turned, every("grid23"), ErrorCode::data_type_error, ": has dims [3,2], expected int16[2,3]");
 }
 
@@ -171,19 +176,30 @@ TEST_CASE("fields are found by name, the first of a name, among others") {
   SECTION("in another order, with unknown ones") {
     Wire wire;
     wire.open("value", DataType::structure_t, "test.types.point3")
-        .text("note", "unknown").number("z", Doubles{3}).number(5, Doubles{9}).number("x", Doubles{1}).number("y", Doubles{2});
+        .text("note", "unknown")
+        .number("z", Doubles{3})
+        .number(5, Doubles{9})
+        .number("x", Doubles{1})
+        .number("y", Doubles{2});
     CHECK(wire.as(every("p3")).value() == expected);
   }
   SECTION("a repeated one after the first") {
     Wire wire;
     wire.open("value", DataType::structure_t, "test.types.point3")
-        .number("x", Doubles{1}).number("x", Doubles{9}).number("y", Doubles{2}).number("z", Doubles{3}).number("y", Doubles{9});
+        .number("x", Doubles{1})
+        .number("x", Doubles{9})
+        .number("y", Doubles{2})
+        .number("z", Doubles{3})
+        .number("y", Doubles{9});
     CHECK(wire.as(every("p3")).value() == expected);
   }
   SECTION("a repeated one before the place where it is expected") {
     Wire wire;
     wire.open("value", DataType::structure_t, "test.types.point3")
-        .number("y", Doubles{2}).number("x", Doubles{1}).number("y", Doubles{9}).number("z", Doubles{3});
+        .number("y", Doubles{2})
+        .number("x", Doubles{1})
+        .number("y", Doubles{9})
+        .number("z", Doubles{3});
     CHECK(wire.as(every("p3")).value() == expected);
   }
 }
@@ -232,7 +248,10 @@ TEST_CASE("lists are numbered from 0") {
 TEST_CASE("maps have unique keys and are read in ascending order") {
   const auto& by_number = every("ds_by_number");
   Wire wire;
-  wire.open("value", DataType::map_int32_t).number("7", Doubles{7}).number(-1, Doubles{-1}).number("-2147483648", Doubles{0});
+  wire.open("value", DataType::map_int32_t)
+      .number("7", Doubles{7})
+      .number(-1, Doubles{-1})
+      .number("-2147483648", Doubles{0});
   const auto value = wire.as(by_number);
   REQUIRE(value);
   const auto& items = value->get_if<MapInt32>()->items;
@@ -265,7 +284,10 @@ TEST_CASE("pods are numbered from 0 and typed") {
   const auto pods = [](std::int32_t first_key, std::string_view type_name = "test.types.point") {
     Wire wire;
     wire.open("value", DataType::pod_array_t, type_name);
-    wire.open(first_key, DataType::pod_t).number("value", std::vector<float>{1}).number("id", std::vector<std::int16_t>{2}).close();
+    wire.open(first_key, DataType::pod_t)
+        .number("value", std::vector<float>{1})
+        .number("id", std::vector<std::int16_t>{2})
+        .close();
     return wire;
   };
   CHECK(pods(0).as(every("p")).value() ==
@@ -310,15 +332,18 @@ TEST_CASE("named arrays hold a multiple of their numbers") {
     wire.open("value", DataType::namedarray_array_t, "test.types.vec3").number("array", std::move(items));
     return wire;
   };
-  CHECK(named({1, 2, 3}).as(every("v")).value() == NamedArray{"test.types.vec3", Array::take(Doubles{1, 2, 3}), {}, true});
-  check_refused(named({1, 2, 3, 4}), every("vs"), ErrorCode::data_type_error, ": has 4 numbers, expected a multiple of 3");
+  CHECK(named({1, 2, 3}).as(every("v")).value() ==
+        NamedArray{"test.types.vec3", Array::take(Doubles{1, 2, 3}), {}, true});
+  check_refused(named({1, 2, 3, 4}), every("vs"), ErrorCode::data_type_error,
+                ": has 4 numbers, expected a multiple of 3");
   check_refused(named({1, 2, 3, 4, 5, 6}), every("v"), ErrorCode::data_type_error, ": has 2, expected 1 (vec3)");
   check_refused(named({}), every("v2"), ErrorCode::data_type_error, ": has 0, expected 2 (vec3[2])");
   check_refused(Wire().open("value", DataType::namedarray_array_t, "test.types.vec3"), every("v"),
                 ErrorCode::message_element_not_found, ".array: is missing");
-  check_refused(
-      Wire().open("value", DataType::namedarray_array_t, "test.types.vec3").number("array", std::vector<float>{1, 2, 3}),
-      every("v"), ErrorCode::data_type_mismatch, ".array: found single[3], expected double[]");
+  check_refused(Wire()
+                    .open("value", DataType::namedarray_array_t, "test.types.vec3")
+                    .number("array", std::vector<float>{1, 2, 3}),
+                every("v"), ErrorCode::data_type_mismatch, ".array: found single[3], expected double[]");
 }
 
 TEST_CASE("a varvalue is what its element is") {

@@ -2,7 +2,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "test/core/types/fixture.hpp"
+#include "test/core/types/show_result.hpp"
 
 using namespace rr;
 
