@@ -29,8 +29,8 @@ export function PoseLine({ model, live }: { model: RobotModel; live: boolean }) 
         <Coordinate name="y" text={`${fixed(pose.y, 3)} m`} />
         <Coordinate name="heading" text={`${fixed(degrees, 1)}°`} />
       </dl>
-      <p class="note">
-        {!live ? "last known pose" : source === "device" ? "as the robot tells" : "reckoned from distance and angle"}
+      <p class="note" title={source === "device" ? undefined : "From DistanceTraveled and AngleTraveled, since this page was opened"}>
+        {!live ? "last known" : source === "device" ? "told by the robot" : "reckoned"}
       </p>
     </>
   );

@@ -26,15 +26,15 @@ export function ValuesPanel({ model, live }: { model: RobotModel; live: boolean 
         <Reading name="Angle" id="angle" value={angle_deg} unit="°">
           <Plot series={[series.angle]} label="Angle, last 30 seconds" min_span={10} first_colour={1} live={live} />
         </Reading>
-        <Reading
-          name="Wheels"
-          id="wheels"
-          value={has_wheels ? `${left_wheel_mm_s ?? "–"} / ${right_wheel_mm_s ?? "–"}` : null}
-          unit="mm/s"
-        >
+        <Reading name="Wheels" id="wheels" value={has_wheels ? "" : null} unit="mm/s">
           <Plot series={[series.left_wheel, series.right_wheel]} label="Wheel speeds, last 30 seconds" min_span={50} first_colour={2} live={live} />
           <p class="legend-line">
-            <span class="legend-3">left</span> <span class="legend-4">right</span>
+            <span class="legend-3">
+              left <b data-reading="left-wheel">{left_wheel_mm_s ?? "–"}</b>
+            </span>
+            <span class="legend-4">
+              right <b data-reading="right-wheel">{right_wheel_mm_s ?? "–"}</b>
+            </span>
           </p>
         </Reading>
         <Bumpers bits={readings.bumpers} />

@@ -1,0 +1,106 @@
+import { format_route, parse_route } from "../../web/src/app/router";
+import { read_devices, relay_url } from "../../web/src/gateway/devices";
+import { read_frame } from "../../web/src/camera/frame";
+import { fit, grid_step, include, START, to_canvas } from "../../web/src/chart/view";
+import { sentence, span } from "../../web/src/ui/words";
+
+describe("list of devices", () => {
+  it("reads what the gateway says", () => {
+    const device = {
+      name: "create",
+      url: "rr+tcp://127.0.0.1:52222/?service=Create",
+      node_id: "{00}",
+      node_name: "demo",
+      state: "online",
+      last_error: null,
+      services: [{ name: "Create", type: "experimental.create2.Create" }],
+    };
+    expect(read_devices({ devices: [device] })).toEqual([device]);
+  });
+  it("does without fields that an older gateway leaves out", () => {
+    expect(read_devices({ devices: [{ name: "arm", state: "sleeping" }, null] })).toEqual([
+      { name: "arm", url: "", node_id: "", node_name: "", state: "offline", last_error: null, services: [] },
+    ]);
+  });
+  it("refuses an answer that is no list of devices", () => {
+    expect(() => read_devices("<html>")).toThrow('no list "devices"');
+    expect(() => read_devices(null)).toThrow('no list "devices"');
+  });
+  it("finds the relay beside the page, secure where the page is", () => {
+    expect(relay_url("create", "Create", "http://127.0.0.1:8080/")).toBe("ws://127.0.0.1:8080/devices/create?service=Create");
+    expect(relay_url("a b", "S&T", "https://host/robots/#/x")).toBe("wss://host/robots/devices/a%20b?service=S%26T");
+  });
+});
+
+describe("addresses", () => {
+  it("name pages, services and the objects in them", () => {
+    expect(parse_route("")).toEqual({ page: "devices" });
+    expect(parse_route("#/")).toEqual({ page: "devices" });
+    expect(parse_route("#/devices/create/Create")).toEqual({ page: "service", device: "create", service: "Create", path: [], view: "auto" });
+    expect(parse_route("#/else")).toEqual({ page: "unknown", address: "/else" });
+    expect(parse_route("#/devices/%")).toEqual({ page: "unknown", address: "/devices/%" });
+  });
+  it("are read back as they were written", () => {
+    const path = [
+      { member: "Webcams", index: "0" },
+      { member: "parts", index: "a/b]?" },
+      { member: "lens", index: null },
+    ];
+    expect(parse_route(format_route("my cam", "W", path))).toEqual({ page: "service", device: "my cam", service: "W", path, view: "auto" });
+    expect(parse_route(format_route("c", "C", [], "members"))).toMatchObject({ view: "members" });
+  });
+});
+
+describe("camera frames", () => {
+  it("turns blue, green, red rows with padding into pixels", () => {
+    const data = Uint8Array.of(1, 2, 3, 4, 5, 6, 0, 0, 7, 8, 9, 10, 11, 12);
+    const frame = read_frame({ width: 2, height: 2, step: 8, data });
+    expect([...(frame.rgba ?? [])]).toEqual([3, 2, 1, 255, 6, 5, 4, 255, 9, 8, 7, 255, 12, 11, 10, 255]);
+  });
+  it("shows one byte a pixel as grey", () => {
+    expect([...(read_frame({ width: 1, height: 1, step: 1, data: Uint8Array.of(9) }).rgba ?? [])]).toEqual([9, 9, 9, 255]);
+  });
+  it("leaves image files to the browser", () => {
+    const frame = read_frame({ width: 0, height: 0, step: 0, data: Uint8Array.of(0xff, 0xd8, 0xff, 0xe0) });
+    expect(frame.encoded).toHaveLength(4);
+  });
+  it("refuses frames whose size and bytes contradict each other", () => {
+    expect(() => read_frame({ width: 2, height: 2, step: 6, data: new Uint8Array(11) })).toThrow("has 11 bytes in rows of 6; expected 12");
+    expect(() => read_frame({ width: -1, height: 2, step: 6, data: new Uint8Array(12) })).toThrow("-1 by 2 pixels");
+    expect(() => read_frame({ width: 1e9, height: 1e9, step: 6, data: new Uint8Array(12) })).toThrow("pixels");
+    expect(() => read_frame(null)).toThrow("no bytes");
+  });
+});
+
+describe("view of the chart", () => {
+  it("fits the wanted floor, centred, north up", () => {
+    const view = fit({ x_min: -2, x_max: 2, y_min: -1, y_max: 1 }, 10, 20, 400, 400);
+    expect(view.scale).toBe(100);
+    expect(to_canvas(view, 0, 0)).toEqual([210, 220]);
+    expect(to_canvas(view, 2, 2)).toEqual([410, 20]);
+  });
+  it("grows in half metres to hold the robot, and stays while it is inside", () => {
+    expect(include(START, 1, 1)).toBe(START);
+    expect(include(START, 2.2, 0)).toEqual({ ...START, x_max: 3 });
+    expect(include(START, NaN, 0)).toBe(START);
+  });
+  it("labels the grid at readable distances", () => {
+    expect(grid_step(120)).toBe(0.5);
+    expect(grid_step(60)).toBe(1);
+    expect(grid_step(10)).toBe(10);
+    expect(grid_step(0.001)).toBeGreaterThan(1000);
+  });
+});
+
+describe("words", () => {
+  it("say spans as people do", () => {
+    expect(span(4_999)).toBe("4 s");
+    expect(span(61_000)).toBe("1 min");
+    expect(span(7_500_000)).toBe("2 h 5 min");
+    expect(span(-5)).toBe("0 s");
+  });
+  it("end sentences once", () => {
+    expect(sentence("refused")).toBe("refused.");
+    expect(sentence("refused. ")).toBe("refused.");
+  });
+});

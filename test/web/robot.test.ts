@@ -1,0 +1,281 @@
+import { backoff_ms } from "../../web/src/robot/backoff";
+import { Driver } from "../../web/src/robot/driver";
+import { Holds } from "../../web/src/robot/holds";
+import { advance, ORIGIN, Reckoner, wrap_angle } from "../../web/src/robot/reckoning";
+import { loops_of, pose_of, walls_of } from "../../web/src/robot/room";
+import { read_sensor_packet } from "../../web/src/robot/sensor_packet";
+import { rate_of, Series } from "../../web/src/robot/series";
+import { command_for, direction_of_key, SPIN_LEFT, SPIN_RIGHT, STOP, STRAIGHT, TURN_RADIUS } from "../../web/src/robot/steering";
+import type { Direction, DriveCommand } from "../../web/src/robot/steering";
+import { Trail } from "../../web/src/robot/trail";
+
+describe("waits between attempts", () => {
+  it("double from half a second to ten seconds", () => {
+    const least = [0, 1, 2, 3].map((attempt) => backoff_ms(attempt, () => 0));
+    expect(least).toEqual([500, 1000, 2000, 4000]);
+    expect(backoff_ms(50, () => 0.999999)).toBe(10_000);
+    expect(backoff_ms(1e9, () => 1)).toBe(10_000);
+  });
+  it("differ from page to page, on the first attempt already", () => {
+    expect(backoff_ms(0, () => 0)).not.toBe(backoff_ms(0, () => 0.9));
+    for (let attempt = 0; attempt < 20; attempt++) {
+      expect(backoff_ms(attempt)).toBeGreaterThanOrEqual(500);
+      expect(backoff_ms(attempt)).toBeLessThanOrEqual(10_000);
+    }
+  });
+});
+
+describe("dead reckoning", () => {
+  it("drives straight along the heading", () => {
+    const pose = advance({ x: 1, y: 1, theta: Math.PI / 2 }, 2, 0);
+    expect(pose.x).toBeCloseTo(1);
+    expect(pose.y).toBeCloseTo(3);
+  });
+  it("drives arcs exactly: a quarter circle of radius 1 to the left ends at (1, 1) looking north", () => {
+    const pose = advance(ORIGIN, Math.PI / 2, Math.PI / 2);
+    expect(pose.x).toBeCloseTo(1, 12);
+    expect(pose.y).toBeCloseTo(1, 12);
+    expect(pose.theta).toBeCloseTo(Math.PI / 2, 12);
+  });
+  it("comes back to the start after a full circle in steps of a degree", () => {
+    const reckoner = new Reckoner();
+    for (let degree = 0; degree <= 360; degree++) reckoner.update((2000 * Math.PI * degree) / 360, degree);
+    expect(reckoner.pose.x).toBeCloseTo(0, 6);
+    expect(reckoner.pose.y).toBeCloseTo(0, 6);
+    expect(Math.abs(reckoner.pose.theta)).toBeCloseTo(0, 6);
+  });
+  it("takes the first counters, and those after a restart, as a baseline only", () => {
+    const reckoner = new Reckoner();
+    reckoner.update(5000, 90);
+    expect(reckoner.pose).toEqual(ORIGIN);
+    reckoner.update(6000, 90);
+    expect(reckoner.pose.x).toBeCloseTo(1);
+    reckoner.rebase();
+    reckoner.update(0, 0);
+    reckoner.update(500, 0);
+    expect(reckoner.pose.x).toBeCloseTo(1.5);
+  });
+  it("keeps angles between -180 and 180 degrees", () => {
+    expect(wrap_angle(3 * Math.PI)).toBeCloseTo(Math.PI);
+    expect(wrap_angle(-Math.PI - 0.1)).toBeCloseTo(Math.PI - 0.1);
+    expect(wrap_angle(0)).toBe(0);
+  });
+});
+
+describe("steering", () => {
+  const held = (...directions: Direction[]): Set<Direction> => new Set(directions);
+  it("turns directions into velocity and radius of the Create", () => {
+    expect(command_for(held(), 200)).toEqual(STOP);
+    expect(command_for(held("forward"), 200)).toEqual({ velocity: 200, radius: STRAIGHT });
+    expect(command_for(held("back"), 200)).toEqual({ velocity: -200, radius: STRAIGHT });
+    expect(command_for(held("forward", "left"), 200)).toEqual({ velocity: 200, radius: TURN_RADIUS });
+    expect(command_for(held("forward", "right"), 200)).toEqual({ velocity: 200, radius: -TURN_RADIUS });
+    expect(command_for(held("left"), 200)).toEqual({ velocity: 100, radius: SPIN_LEFT });
+    expect(command_for(held("right"), 200)).toEqual({ velocity: 100, radius: SPIN_RIGHT });
+  });
+  it("stops where directions contradict each other", () => {
+    expect(command_for(held("forward", "back"), 200)).toEqual(STOP);
+    expect(command_for(held("left", "right"), 200)).toEqual(STOP);
+    expect(command_for(held("forward", "left", "right"), 200)).toEqual({ velocity: 200, radius: STRAIGHT });
+  });
+  it("knows arrows and WASD", () => {
+    expect(direction_of_key("ArrowUp")).toBe("forward");
+    expect(direction_of_key("KeyA")).toBe("left");
+    expect(direction_of_key("KeyQ")).toBeUndefined();
+  });
+  it("holds a direction as long as any finger or key does", () => {
+    const holds = new Holds();
+    holds.press("KeyW", "forward");
+    holds.press("ArrowUp", "forward");
+    holds.release("KeyW");
+    expect([...holds.directions]).toEqual(["forward"]);
+    holds.press("pointer 1", "left");
+    holds.clear();
+    expect([...holds.directions]).toEqual([]);
+  });
+});
+
+describe("driver", () => {
+  const GO: DriveCommand = { velocity: 200, radius: STRAIGHT };
+  const TURN: DriveCommand = { velocity: 200, radius: TURN_RADIUS };
+
+  interface Call {
+    command: DriveCommand;
+    answer: () => Promise<void>;
+    fail: (error: Error) => Promise<void>;
+  }
+
+  function connection(): { calls: Call[]; send: (command: DriveCommand) => Promise<void> } {
+    const calls: Call[] = [];
+    const settle = async (action: () => void): Promise<void> => {
+      action();
+      await Promise.resolve();
+      await Promise.resolve();
+    };
+    const send = (command: DriveCommand): Promise<void> =>
+      new Promise((resolve, reject) => {
+        calls.push({ command, answer: () => settle(resolve), fail: (error) => settle(() => reject(error)) });
+      });
+    return { calls, send };
+  }
+
+  beforeEach(() => void vi.useFakeTimers());
+  afterEach(() => void vi.useRealTimers());
+
+  it("has one command in flight, and the newest wish replaces those that wait", async () => {
+    const { calls, send } = connection();
+    const driver = new Driver(() => undefined);
+    driver.set_connection(send);
+    driver.want(GO);
+    driver.want(TURN);
+    driver.want(STOP);
+    expect(calls.map((c) => c.command)).toEqual([GO]);
+    await calls[0]?.answer();
+    expect(calls.map((c) => c.command)).toEqual([GO, STOP]);
+    await calls[1]?.answer();
+    expect(driver.is_moving).toBe(false);
+    vi.advanceTimersByTime(5000);
+    expect(calls).toHaveLength(2);
+  });
+  it("repeats a held command, and not a stop", async () => {
+    const { calls, send } = connection();
+    const driver = new Driver(() => undefined);
+    driver.set_connection(send);
+    driver.want(GO);
+    await calls[0]?.answer();
+    vi.advanceTimersByTime(450);
+    expect(calls.map((c) => c.command)).toEqual([GO, GO]);
+  });
+  it("stops a robot that was moving when its connection broke, as soon as there is one again", async () => {
+    const { calls, send } = connection();
+    const driver = new Driver(() => undefined);
+    driver.set_connection(send);
+    driver.want(GO);
+    await calls[0]?.answer();
+    driver.set_connection(null);
+    driver.want(GO);
+    expect(calls).toHaveLength(1);
+    const again = connection();
+    driver.set_connection(again.send);
+    expect(again.calls.map((c) => c.command)).toEqual([STOP]);
+  });
+  it("leaves a robot alone that it never moved: somebody else may be driving", () => {
+    const { calls, send } = connection();
+    const driver = new Driver(() => undefined);
+    driver.set_connection(send);
+    driver.want(STOP);
+    expect(calls).toHaveLength(0);
+  });
+  it("stops after a failed command, and tries a failed stop again", async () => {
+    const { calls, send } = connection();
+    const errors: unknown[] = [];
+    const driver = new Driver((error) => errors.push(error));
+    driver.set_connection(send);
+    driver.want(GO);
+    await calls[0]?.fail(new Error("timeout"));
+    expect(calls.map((c) => c.command)).toEqual([GO, STOP]);
+    await calls[1]?.fail(new Error("timeout"));
+    expect(calls).toHaveLength(2);
+    vi.advanceTimersByTime(450);
+    expect(calls.map((c) => c.command)).toEqual([GO, STOP, STOP]);
+    await calls[2]?.answer();
+    vi.advanceTimersByTime(5000);
+    expect(calls).toHaveLength(3);
+    expect(errors).toHaveLength(2);
+  });
+  it("does not mind the answers of a connection that is gone", async () => {
+    const { calls, send } = connection();
+    const errors: unknown[] = [];
+    const driver = new Driver((error) => errors.push(error));
+    driver.set_connection(send);
+    driver.want(GO);
+    driver.set_connection(null);
+    await calls[0]?.fail(new Error("connection lost"));
+    expect(errors).toEqual([]);
+    expect(driver.is_moving).toBe(true);
+  });
+});
+
+describe("sensor packets", () => {
+  it("reads the wheels and bumpers out of the group of all sensors", () => {
+    const bytes = new Uint8Array(52);
+    const view = new DataView(bytes.buffer);
+    bytes[0] = 0b111;
+    view.setUint16(17, 16_100);
+    view.setInt16(48, -120);
+    view.setInt16(50, 250);
+    expect(read_sensor_packet(6, bytes)).toEqual({
+      bumpers: 3,
+      voltage_mv: 16_100,
+      charge_mah: 0,
+      right_wheel_mm_s: -120,
+      left_wheel_mm_s: 250,
+    });
+  });
+  it("reads a single packet, at an unaligned place too", () => {
+    const bytes = Uint8Array.of(9, 0xff, 0x88).subarray(1);
+    expect(read_sensor_packet(42, bytes)).toEqual({ left_wheel_mm_s: -120 });
+  });
+  it("reads nothing from unknown or misshapen packets", () => {
+    expect(read_sensor_packet(6, new Uint8Array(51))).toEqual({});
+    expect(read_sensor_packet(200, new Uint8Array(2))).toEqual({});
+    expect(read_sensor_packet(3, new Uint8Array(0))).toEqual({});
+  });
+});
+
+describe("room and trail", () => {
+  it("reads poses and walls of several shapes", () => {
+    expect(pose_of({ x: 1, y: 2, theta: 3 })).toEqual({ x: 1, y: 2, theta: 3 });
+    expect(pose_of({ pose: { x: 1, y: 2, heading: 3 } })).toEqual({ x: 1, y: 2, theta: 3 });
+    expect(pose_of({ x: 1, y: NaN, theta: 0 })).toBeNull();
+    expect(pose_of(null)).toBeNull();
+    const wall = { x1: 0, y1: 1, x2: 2, y2: 3 };
+    expect(walls_of(Float64Array.of(0, 1, 2, 3, 9))).toEqual([wall]);
+    expect(walls_of({ dims: [4, 1], data: Float64Array.of(0, 1, 2, 3) })).toEqual([wall]);
+    expect(walls_of([wall, { x1: "?" }])).toEqual([wall]);
+    expect(walls_of(null)).toEqual([]);
+  });
+  it("joins walls that come back to their start", () => {
+    const square = [
+      { x1: 0, y1: 0, x2: 1, y2: 0 },
+      { x1: 1, y1: 0, x2: 1, y2: 1 },
+      { x1: 1, y1: 1, x2: 0, y2: 0 },
+    ];
+    const free = { x1: 5, y1: 5, x2: 6, y2: 6 };
+    const { loops, open } = loops_of([free, ...square, free]);
+    expect(loops).toEqual([[{ x: 0, y: 0 }, { x: 1, y: 0 }, { x: 1, y: 1 }]]);
+    expect(open).toEqual([free, free]);
+  });
+  it("draws a new stroke after a jump and none for standing still", () => {
+    const trail = new Trail();
+    trail.add({ x: 0, y: 0 });
+    trail.add({ x: 0.001, y: 0 });
+    trail.add({ x: 0.1, y: 0 });
+    trail.add({ x: 3, y: 0 });
+    expect(trail.strokes.map((stroke) => stroke.length)).toEqual([2, 1]);
+  });
+  it("forgets the oldest of a very long trail", () => {
+    const trail = new Trail();
+    for (let i = 0; i < 30_000; i++) trail.add({ x: i * 0.02, y: 0 });
+    expect(trail.count).toBeLessThanOrEqual(12_000);
+    expect(trail.strokes[0]?.at(-1)?.x).toBeCloseTo(29_999 * 0.02);
+  });
+});
+
+describe("series", () => {
+  it("keeps its window and its limit", () => {
+    const series = new Series(1000, 5);
+    for (let t = 0; t <= 3000; t += 400) series.push(t, t);
+    expect(series.samples[0]?.t).toBeGreaterThanOrEqual(1600);
+    for (let t = 3001; t < 3020; t++) series.push(t, t);
+    expect(series.samples).toHaveLength(5);
+    series.push(4000, NaN);
+    expect(series.newest?.t).toBe(3019);
+  });
+  it("counts a rate over two seconds", () => {
+    const series = new Series(5000);
+    for (let t = 0; t < 4000; t += 50) series.push(t, 1);
+    expect(rate_of(series, 3999)).toBe(20);
+    expect(rate_of(series, 9000)).toBe(0);
+  });
+});
