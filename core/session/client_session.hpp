@@ -109,6 +109,8 @@ class ClientSession {
   Result<> send_wire(std::string_view path, std::string_view member, const Value& value, Now now);
   /// Forgets a request: its late reply is ignored, no event follows. Nothing is sent: the service still runs it.
   void cancel(RequestId id);
+  /// How long requests from now on may take; those that wait already keep their deadline.
+  void set_request_timeout(std::chrono::milliseconds timeout) { options_.request_timeout = timeout; }
   /// Orderly: tells the service, then closes (after its answer or 500 ms). SessionClosed follows.
   void disconnect(Now now);
 

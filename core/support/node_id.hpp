@@ -4,6 +4,7 @@
 #include <array>
 #include <compare>
 #include <cstdint>
+#include <cstring>
 #include <string>
 #include <string_view>
 
@@ -15,7 +16,11 @@ struct NodeId {
   std::array<std::uint8_t, 16> bytes{};
 
   bool is_any() const { return *this == NodeId{}; }
-  auto operator<=>(const NodeId&) const = default;
+  bool operator==(const NodeId&) const = default;
+  /// libc++ 13 cannot default it: its std::array has no operator<=>.
+  std::strong_ordering operator<=>(const NodeId& other) const {
+    return std::memcmp(bytes.data(), other.bytes.data(), bytes.size()) <=> 0;
+  }
 };
 
 enum class NodeIdFormat {

@@ -5,13 +5,20 @@
 mergeInto(LibraryManager.library, {
   // Kinds and numbers are those of js_access.hpp and of rr::DataType.
   $RrJs__deps: ['$Emval'],
+  $RrJs__postset: 'RrJs.start();',
   $RrJs: {
-    arrays: [null, Float64Array, Float32Array, Int8Array, Uint8Array, Int16Array, Uint16Array, Int32Array, Uint32Array,
-             BigInt64Array, BigUint64Array],
-    exact: Symbol.for('rrgate.exactValue'),
-    type: Symbol.for('rrgate.type'),
-    decoder: new TextDecoder('utf-8', { ignoreBOM: true }),
-    encoder: new TextEncoder(),
+    // This file is evaluated while linking: what belongs to the page's engine is looked up when the module starts.
+    start: function() {
+      RrJs.arrays = [null, Float64Array, Float32Array, Int8Array, Uint8Array, Int16Array, Uint16Array, Int32Array,
+                     Uint32Array, BigInt64Array, BigUint64Array];
+      RrJs.exact = Symbol.for('rrgate.exactValue');
+      RrJs.type = Symbol.for('rrgate.type');
+      RrJs.decoder = new TextDecoder('utf-8', { ignoreBOM: true });
+      RrJs.encoder = new TextEncoder();
+      // The engine's own getter: knows arrays of other realms (frames, vm contexts), runs no foreign code, never throws.
+      RrJs.items_name =
+          Object.getOwnPropertyDescriptor(Object.getPrototypeOf(Uint8Array.prototype), Symbol.toStringTag).get;
+    },
 
     text: function(at, length) {
       if (length <= 32) {
@@ -25,9 +32,6 @@ mergeInto(LibraryManager.library, {
       }
       return RrJs.decoder.decode(HEAPU8.subarray(at, at + length));
     },
-
-    // The engine's own getter: knows arrays of other realms (frames, vm contexts), runs no foreign code, never throws.
-    items_name: Object.getOwnPropertyDescriptor(Object.getPrototypeOf(Uint8Array.prototype), Symbol.toStringTag).get,
 
     items_type: function(value) {
       switch (RrJs.items_name.call(value)) {

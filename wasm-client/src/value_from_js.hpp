@@ -85,7 +85,7 @@ class FromJs {
     ~Level() { --level_; }
     int& level_;
   };
-  static constexpr int max_depth = 100;
+  static constexpr int max_depth = 256;  // a message nests 128, and a varvalue counts twice
   /// Of arrays that are no TypedArrays; well above what a message may hold.
   static constexpr std::size_t max_items = 16u * 1024 * 1024;
 

@@ -1,0 +1,41 @@
+#include "wasm-client/src/object_info.hpp"
+
+namespace rr {
+
+namespace {
+
+std::string modifier_text(const Modifier& modifier) {
+  if (modifier.arguments.empty()) return modifier.name;
+  std::string text = modifier.name + "(";
+  for (std::size_t i = 0; i < modifier.arguments.size(); ++i) text += (i == 0 ? "" : ",") + modifier.arguments[i];
+  return text + ")";
+}
+
+}  // namespace
+
+val make_js_members(const EntityDefinition& entity) {
+  const val members = make_js_array();
+  for (const auto& member : entity.members) {
+    const val info = make_js_object();
+    set_js_field(info, "name", make_js_text(member.name));
+    set_js_field(info, "kind", make_js_text(member_kind_name(member.kind)));
+    set_js_field(info, "type", make_js_text(format_type(member.type)));
+    const val parameters = make_js_array();
+    for (const auto& parameter : member.parameters) {
+      const val item = make_js_object();
+      set_js_field(item, "name", make_js_text(parameter.name));
+      set_js_field(item, "type", make_js_text(format_type(parameter.type)));
+      push_js(parameters, item);
+    }
+    set_js_field(info, "parameters", parameters);
+    const val modifiers = make_js_array();
+    for (const auto& modifier : member.modifiers) push_js(modifiers, make_js_text(modifier_text(modifier)));
+    set_js_field(info, "modifiers", modifiers);
+    set_js_field(info, "documentation", make_js_text(member.documentation));
+    set_js_field(info, "isGenerator", make_js_boolean(member.is_generator()));
+    push_js(members, info);
+  }
+  return members;
+}
+
+}  // namespace rr

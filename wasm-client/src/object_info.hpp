@@ -1,0 +1,12 @@
+// What an object's type offers, for TypeScript to build members from. Layer: wasm-client/src.
+#pragma once
+
+#include "core/types/type_registry.hpp"
+#include "wasm-client/src/js_access.hpp"
+
+namespace rr {
+
+/// [{name, kind, type, parameters: [{name, type}], modifiers: [text], documentation, isGenerator}]
+val make_js_members(const EntityDefinition& entity);
+
+}  // namespace rr
