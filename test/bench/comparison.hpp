@@ -1,0 +1,61 @@
+// Two ways of doing the same work, measured in turn within one run, so that the machine's moods hit both alike.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+namespace rr::bench {
+
+struct Samples {
+  std::vector<double> nanoseconds = {};
+
+  double minimum() const { return *std::min_element(nanoseconds.begin(), nanoseconds.end()); }
+  /// Of all but the slowest hundredth, which other programs of the machine decide.
+  double mean() const {
+    auto sorted = nanoseconds;
+    std::sort(sorted.begin(), sorted.end());
+    sorted.resize(sorted.size() - sorted.size() / 100);
+    double sum = 0;
+    for (const double sample : sorted) sum += sample;
+    return sum / static_cast<double>(sorted.size());
+  }
+};
+
+template <class Work>
+double time_of(Work&& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// Runs `ours` and `yardstick` in turn after a warm-up, `rounds` times or for ten seconds, and prints one line of JSON
+/// for run.py.
+template <class Ours, class Yardstick>
+void compare(const std::string& name, int rounds, Ours&& ours, Yardstick&& yardstick) {
+  Samples our_samples;
+  Samples yardstick_samples;
+  const int warm_up = rounds / 10 + 1;
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+  for (int round = -warm_up; round < rounds; ++round) {
+    if (std::chrono::steady_clock::now() > end) {
+      if (!our_samples.nanoseconds.empty()) break;
+      if (round < 0) round = 0;  // too slow for a warm-up
+    }
+    const double our_time = time_of(ours);
+    const double yardstick_time = time_of(yardstick);
+    if (round < 0) continue;
+    our_samples.nanoseconds.push_back(our_time);
+    yardstick_samples.nanoseconds.push_back(yardstick_time);
+  }
+  std::printf(
+      "{\"name\": \"%s\", \"rounds\": %d, \"ours\": {\"min\": %.1f, \"mean\": %.1f}, "
+      "\"yardstick\": {\"min\": %.1f, \"mean\": %.1f}}\n",
+      name.c_str(), static_cast<int>(our_samples.nanoseconds.size()), our_samples.minimum(), our_samples.mean(),
+      yardstick_samples.minimum(), yardstick_samples.mean());
+  std::fflush(stdout);
+}
+
+}  // namespace rr::bench
