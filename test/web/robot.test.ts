@@ -2,7 +2,7 @@ import { backoff_ms } from "../../web/src/robot/backoff";
 import { Driver } from "../../web/src/robot/driver";
 import { Holds } from "../../web/src/robot/holds";
 import { advance, ORIGIN, Reckoner, wrap_angle } from "../../web/src/robot/reckoning";
-import { loops_of, pose_of, walls_of } from "../../web/src/robot/room";
+import { loops_of, obstacles_of, pose_of, walls_of } from "../../web/src/robot/room";
 import { read_sensor_packet } from "../../web/src/robot/sensor_packet";
 import { rate_of, Series } from "../../web/src/robot/series";
 import { command_for, direction_of_key, SPIN_LEFT, SPIN_RIGHT, STOP, STRAIGHT, TURN_RADIUS } from "../../web/src/robot/steering";
@@ -224,16 +224,16 @@ describe("sensor packets", () => {
 });
 
 describe("room and trail", () => {
-  it("reads poses and walls of several shapes", () => {
-    expect(pose_of({ x: 1, y: 2, theta: 3 })).toEqual({ x: 1, y: 2, theta: 3 });
-    expect(pose_of({ pose: { x: 1, y: 2, heading: 3 } })).toEqual({ x: 1, y: 2, theta: 3 });
-    expect(pose_of({ x: 1, y: NaN, theta: 0 })).toBeNull();
+  it("reads poses, walls and obstacles, and leaves out what is none", () => {
+    expect(pose_of({ x: 1, y: 2, heading: 3, velocity: 0 })).toEqual({ x: 1, y: 2, theta: 3 });
+    expect(pose_of({ x: 1, y: NaN, heading: 0 })).toBeNull();
     expect(pose_of(null)).toBeNull();
     const wall = { x1: 0, y1: 1, x2: 2, y2: 3 };
-    expect(walls_of(Float64Array.of(0, 1, 2, 3, 9))).toEqual([wall]);
-    expect(walls_of({ dims: [4, 1], data: Float64Array.of(0, 1, 2, 3) })).toEqual([wall]);
-    expect(walls_of([wall, { x1: "?" }])).toEqual([wall]);
+    expect(walls_of([{ ...wall, height: 0.5 }, { x1: "?" }, null])).toEqual([wall]);
     expect(walls_of(null)).toEqual([]);
+    const obstacle = { x: 0, y: 1, radius: 0.2 };
+    expect(obstacles_of([{ ...obstacle, height: 0.3 }, { x: 1 }, null])).toEqual([obstacle]);
+    expect(obstacles_of("?")).toEqual([]);
   });
   it("joins walls that come back to their start", () => {
     const square = [

@@ -59,7 +59,7 @@ describe("typed input", () => {
     expect(() => parse_input("1, 256", "uint8[]")).toThrow("element 1: 256 is out of range; expected uint8, 0 to 255");
   });
   it("reads complex and multidimensional values", () => {
-    expect(parse_input("[1, -2]", "cdouble")).toEqual([1, -2]);
+    expect(parse_input("[1, -2]", "cdouble")).toEqual({ re: 1, im: -2 });
     expect(parse_input('{"dims": [2, 1], "data": [1, 2]}', "double[*]")).toEqual({ dims: [2, 1], data: Float64Array.of(1, 2) });
     expect(() => parse_input('{"dims": [2, 2], "data": [1]}', "double[*]")).toThrow("dims 2 × 2 need 4 elements, found 1");
   });
@@ -99,6 +99,7 @@ describe("shown values", () => {
     expect(format_value("x".repeat(10_000)).length).toBeLessThan(450);
     expect(format_value(9007199254740993n)).toBe("9007199254740993");
     expect(format_value(null)).toBe("null");
+    expect(format_value({ re: 1.5, im: -2 })).toBe("1.5 - 2i");
   });
   it("ends on values that contain themselves", () => {
     const loop: Record<string, unknown> = {};

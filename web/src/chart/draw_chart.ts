@@ -15,6 +15,7 @@ export interface ChartContent {
   strokes: readonly (readonly Point[])[];
   room: Room;
   bumps: readonly { pose: Pose }[];
+  radius_m: number;
   /** Bit 0 right, bit 1 left. */
   bumpers: number;
   /** Whether the pose is current; an old one is drawn hollow. */
@@ -22,7 +23,6 @@ export interface ChartContent {
 }
 
 export const FRAME_PX = 26;
-const ROBOT_RADIUS_M = 0.17;
 const WALL_M = 0.04;
 
 export function draw_chart(ctx: CanvasRenderingContext2D, view: View, content: ChartContent, palette: Palette): void {
@@ -36,7 +36,7 @@ export function draw_chart(ctx: CanvasRenderingContext2D, view: View, content: C
   draw_grid(ctx, view, palette);
   draw_land(ctx, view, content.room, palette);
   draw_wake(ctx, view, content.strokes, palette);
-  for (const bump of content.bumps) draw_rock(ctx, view, bump.pose, palette);
+  for (const bump of content.bumps) draw_rock(ctx, view, bump.pose, content.radius_m, palette);
   draw_robot(ctx, view, content, palette);
   ctx.restore();
   draw_frame(ctx, view, palette);
@@ -139,11 +139,11 @@ function draw_wake(
 }
 
 /** The chart sign of a rock awash: a cross with four dots, off the nose of the robot where it touched. */
-function draw_rock(ctx: CanvasRenderingContext2D, view: View, pose: Pose, palette: Palette): void {
+function draw_rock(ctx: CanvasRenderingContext2D, view: View, pose: Pose, radius_m: number, palette: Palette): void {
   const [x, y] = to_canvas(
     view,
-    pose.x + Math.cos(pose.theta) * ROBOT_RADIUS_M,
-    pose.y + Math.sin(pose.theta) * ROBOT_RADIUS_M,
+    pose.x + Math.cos(pose.theta) * radius_m,
+    pose.y + Math.sin(pose.theta) * radius_m,
   );
   ctx.strokeStyle = ctx.fillStyle = palette.ink;
   ctx.lineWidth = 1.5;
@@ -157,8 +157,8 @@ function draw_rock(ctx: CanvasRenderingContext2D, view: View, pose: Pose, palett
 }
 
 function draw_robot(ctx: CanvasRenderingContext2D, view: View, content: ChartContent, palette: Palette): void {
-  const { pose, bumpers, live } = content;
-  const radius = Math.max(ROBOT_RADIUS_M * view.scale, 9);
+  const { pose, bumpers, live, radius_m } = content;
+  const radius = Math.max(radius_m * view.scale, 9);
   ctx.save();
   ctx.translate(...to_canvas(view, pose.x, pose.y));
   ctx.rotate(-pose.theta); // canvas y is down: counterclockwise on the floor is negative here

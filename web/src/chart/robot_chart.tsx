@@ -24,6 +24,7 @@ export function RobotChart({ model, live }: { model: RobotModel; live: boolean }
         pose: model.pose,
         strokes: model.trail.strokes,
         room,
+        radius_m: model.radius_m,
         bumps: model.bumps.value,
         bumpers: live ? (readings.bumpers ?? 0) : 0,
         live,

@@ -15,6 +15,7 @@ export interface MemberRowProps {
 
 export function RowHead({ member, signature }: { member: Member; signature?: string }) {
   return (
+    <>
     <div class="row-head">
       <h3 class="member-name">{member.name}</h3>
       <code class="member-type">{signature ?? member.type}</code>
@@ -24,6 +25,8 @@ export function RowHead({ member, signature }: { member: Member; signature?: str
         </span>
       ))}
     </div>
+    {member.documentation !== "" && <p class="note row-documentation">{member.documentation}</p>}
+    </>
   );
 }
 

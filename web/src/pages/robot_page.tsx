@@ -9,6 +9,7 @@ import type { DeviceList } from "../gateway/devices";
 import { Driver } from "../robot/driver";
 import type { Link } from "../robot/link";
 import { explain } from "../robot/remote";
+import type { Remote } from "../robot/remote";
 import { RobotModel } from "../robot/robot_model";
 import { BumpLog } from "../robot_view/bump_log";
 import { DrivePanel } from "../robot_view/drive_panel";
@@ -47,6 +48,9 @@ export function RobotPage({ link, list, device, shown }: RobotPageProps) {
   }, [remote, model, driver]);
 
   const live = remote !== null;
+  const put_back = (robot: Remote): void => {
+    robot.call("reset", []).catch((error: unknown) => set_drive_failure(`reset: ${explain(error)}`));
+  };
   return (
     <div class="robot">
       <section class={`panel chart-panel ${live ? "" : "is-stale"}`} aria-labelledby="chart-title">
@@ -56,6 +60,11 @@ export function RobotPage({ link, list, device, shown }: RobotPageProps) {
         <RobotChart model={model} live={live} />
         <div class="chart-foot">
           <PoseLine model={model} live={live} />
+          {remote?.has("reset", "function") && (
+            <button class="button button-quiet" type="button" onClick={() => put_back(remote)}>
+              To start
+            </button>
+          )}
           <button class="button button-quiet" type="button" onClick={() => model.clear_trail()}>
             Clear trail
           </button>

@@ -79,7 +79,7 @@ function useRobot(link: Link | null, device: string, service: string, list: Devi
   }, [link]);
   if (by_object !== null) return by_object;
   const known = devices_of(gateway)?.find((d) => d.name === device)?.services.find((s) => s.name === service);
-  return /^experimental\.create\d*\.Create$/.test(known?.type ?? "");
+  return /^experimental\.(create\d*\.Create|simulatedcreate\.SimulatedCreate)$/.test(known?.type ?? "");
 }
 
 /** The object that the path leads to, found anew on every connection. */

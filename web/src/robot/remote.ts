@@ -3,22 +3,10 @@
 // Layer: web/robot. The only file that imports `rrgate-client`.
 
 import { connect, RobotRaconteurError } from "rrgate-client";
+import type { DynamicMember, MemberInfo, MemberKind, RemoteObject } from "rrgate-client";
 
-export type MemberKind = "property" | "function" | "event" | "objref" | "pipe" | "callback" | "wire" | "memory";
-
-export interface Parameter {
-  name: string;
-  type: string;
-}
-
-export interface Member {
-  name: string;
-  kind: MemberKind;
-  /** Value type; for functions the return type, for objrefs the target with its index. */
-  type: string;
-  parameters: Parameter[];
-  modifiers: string[];
-}
+export type Member = MemberInfo;
+export type { MemberKind };
 
 /** A connected object of a device. */
 export interface Remote {
@@ -41,7 +29,7 @@ export interface Remote {
 
 /** Opens a service. @throws Error with a sentence for people; see `explain` for the names behind it. */
 export async function open_remote(url: string, signal: AbortSignal): Promise<Remote> {
-  return wrap((await connect(url, { signal, timeout: 10_000 })) as unknown as Raw);
+  return wrap(await connect(url, { signal, timeout: 10_000 }));
 }
 
 /** One sentence for any failure; errors of a device keep the name of their Robot Raconteur exception. */
@@ -53,40 +41,40 @@ export function explain(error: unknown): string {
   return error instanceof Error ? error.message : String(error);
 }
 
-interface RawInfo {
-  type: string;
-  members: readonly Member[];
-  onClose(heard: (error?: unknown) => void): unknown;
-  close(): unknown;
-}
-
-type Raw = { readonly $: RawInfo } & Record<string, unknown>;
-
-function wrap(raw: Raw): Remote {
-  const info = raw.$;
-  const member = <T>(name: string): T => {
+function wrap(object: RemoteObject): Remote {
+  const info = object.$;
+  // By name through `$`: a definition may call a member "then" or "toString".
+  const member = (name: string): DynamicMember => {
     if (!info.members.some((m) => m.name === name)) throw new Error(`${info.type} has no member "${name}"`);
-    return raw[name] as T;
+    return info.member(name);
   };
   return {
     type: info.type,
     members: info.members,
     has: (name, kind) => info.members.some((m) => m.name === name && m.kind === kind),
-    call: async (name, args) => member<(...args: unknown[]) => Promise<unknown>>(name)(...args),
-    get: async (name) => member<{ get(): Promise<unknown> }>(name).get(),
-    set: async (name, value) => member<{ set(v: unknown): Promise<void> }>(name).set(value),
-    wire: (name, signal) => wire_values(member<{ connect(): AsyncIterable<unknown> }>(name).connect(), signal),
-    poke: async (name, value) => member<{ poke(v: unknown): Promise<void> }>(name).poke(value),
-    on: (name, heard) => member<{ on(f: (...args: unknown[]) => void): () => void }>(name).on(heard),
-    child: async (name, index) => wrap(await member<{ get(i?: string | number): Promise<Raw> }>(name).get(index)),
-    on_close: (heard) => void info.onClose((error) => heard(error === undefined ? "the connection was closed" : explain(error))),
-    close: () => void info.close(),
+    call: async (name, args) => member(name)(...args),
+    get: async (name) => member(name).get(),
+    set: async (name, value) => member(name).set(value),
+    wire: (name, signal) => wire_values(() => member(name).connect({ signal }), signal),
+    poke: async (name, value) => member(name).poke(value),
+    on: (name, heard) => member(name).on(heard),
+    child: async (name, index) => wrap(await (index === undefined ? find(member(name)) : member(name).get(index))),
+    on_close: (heard) => void info.onClose((reason) => heard(reason ? explain(reason) : "the connection was closed")),
+    close: () => {
+      info.close().catch(() => undefined); // it ends either way; there is nobody left to tell
+    },
   };
 }
 
-async function* wire_values(source: AsyncIterable<unknown>, signal: AbortSignal): AsyncGenerator<unknown, void> {
-  const values = source[Symbol.asyncIterator]();
-  const stop = () => void values.return?.();
+/** The object of an objref without index: `get` is also that of properties, so its type says less than the definition. */
+async function find(objref: DynamicMember): Promise<RemoteObject> {
+  return (await objref.get()) as unknown as RemoteObject;
+}
+
+/** Leaving the loop, or `signal`, closes the wire's connection. */
+async function* wire_values(open: () => AsyncIterable<unknown>, signal: AbortSignal): AsyncGenerator<unknown, void> {
+  const values = open()[Symbol.asyncIterator]();
+  const stop = (): void => void values.return?.()?.catch(() => undefined); // closing what is already gone
   signal.addEventListener("abort", stop, { once: true });
   try {
     while (!signal.aborted) {
@@ -94,6 +82,8 @@ async function* wire_values(source: AsyncIterable<unknown>, signal: AbortSignal)
       if (next.done || signal.aborted) return;
       yield next.value;
     }
+  } catch (error) {
+    if (!signal.aborted) throw error;
   } finally {
     signal.removeEventListener("abort", stop);
     stop();

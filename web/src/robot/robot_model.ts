@@ -1,12 +1,12 @@
 // What is known of the demo robot: pose, trail, readings and bumps. Outlives connections, so nothing is lost with one.
-// Layer: web/robot. Source: experimental.create (and create2); members beyond it are used when the device has them.
+// Layer: web/robot. Source: experimental.create and create2; what simulatedcreate adds is used when the device has it.
 
 import { Store } from "../app/store";
 import { Reckoner } from "./reckoning";
 import type { Pose } from "./reckoning";
 import { explain } from "./remote";
 import type { Remote } from "./remote";
-import { EMPTY_ROOM, pose_of, walls_of } from "./room";
+import { EMPTY_ROOM, obstacles_of, pose_of, walls_of } from "./room";
 import type { Room } from "./room";
 import { read_sensor_packet } from "./sensor_packet";
 import { Series } from "./series";
@@ -47,6 +47,7 @@ export class RobotModel {
   readonly pose_source = new Store<"device" | "reckoned">("reckoned");
   readonly trail = new Trail();
   readonly room = new Store<Room>(EMPTY_ROOM);
+  radius_m = 0.165;
   readonly readings = new Store<Readings>(NO_READINGS);
   readonly bumps = new Store<readonly Bump[]>([]);
   readonly series = {
@@ -80,8 +81,8 @@ export class RobotModel {
         if (!signal.aborted) this.trouble.value = `${what}: ${explain(error)}`;
       });
     };
-    guard("reading walls", this.#read_walls(remote));
-    const state = remote.members.find((m) => m.kind === "wire" && /^(state|pose)$/i.test(m.name));
+    guard("reading the room", this.#read_room(remote));
+    const state = remote.members.find((m) => m.kind === "wire" && m.name === "state");
     this.pose_source.value = state ? "device" : "reckoned";
     if (state) guard(`wire ${state.name}`, this.#follow_state(remote, state.name, signal));
     void this.#keep_polling(remote, signal);
@@ -95,10 +96,11 @@ export class RobotModel {
     this.#redraw();
   }
 
-  async #read_walls(remote: Remote): Promise<void> {
-    const member = remote.members.find((m) => m.kind === "property" && /^(walls|room)$/i.test(m.name));
-    if (!member) return;
-    this.room.value = { ...this.room.value, walls: walls_of(await remote.get(member.name)) };
+  async #read_room(remote: Remote): Promise<void> {
+    const read = async (name: string): Promise<unknown> => (remote.has(name, "property") ? remote.get(name) : null);
+    const [walls, obstacles, radius] = await Promise.all([read("walls"), read("obstacles"), read("radius")]);
+    this.room.value = { walls: walls_of(walls), obstacles: obstacles_of(obstacles) };
+    if (typeof radius === "number" && radius > 0) this.radius_m = radius;
     this.#redraw();
   }
 
@@ -106,6 +108,8 @@ export class RobotModel {
     for await (const value of remote.wire(wire, signal)) {
       const pose = pose_of(value);
       if (pose) this.#move_to(pose);
+      const { bumpers } = (value ?? {}) as { bumpers?: unknown };
+      if (typeof bumpers === "number") this.#show({ bumpers });
     }
   }
 
@@ -146,12 +150,9 @@ export class RobotModel {
 
   async #follow_packets(remote: Remote, signal: AbortSignal): Promise<void> {
     const values = remote.wire("packets", signal);
-    if (remote.has("StartStreaming", "function")) {
-      await remote.call("StartStreaming", []);
-      signal.addEventListener("abort", () => {
-        remote.call("StopStreaming", []).catch(() => undefined); // the connection may be gone, and the stream with it
-      });
-    }
+    // Counted per client on some robots, one switch for all on others: so it is never stopped from here. The count ends
+    // with the connection, and a switch is not ours to turn off.
+    if (remote.has("StartStreaming", "function")) await remote.call("StartStreaming", []);
     for await (const value of values) this.#take_packet(value);
   }
 
@@ -210,7 +211,7 @@ export function side_of(bits: number): string {
   return ["", "right", "left", "both sides"][bits & 3] ?? "";
 }
 
-/** The Create by its name, or by the two members that the page cannot do without. */
+/** By the members that the page cannot do without. */
 export function is_create(remote: Remote): boolean {
   const drive = remote.members.find((m) => m.name === "Drive" && m.kind === "function");
   return drive?.parameters.length === 2 && drive.parameters.every((p) => p.type === "int16") && remote.has("DistanceTraveled", "property");

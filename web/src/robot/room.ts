@@ -1,5 +1,5 @@
-// Reads pose, walls and obstacles out of values whose exact definition is the device's own.
-// Layer: web/robot, pure. Units out: metres, radians.
+// Reads pose, walls and obstacles out of the simulation's structs.
+// Layer: web/robot, pure. Source: experimental.simulatedcreate. Units: metres, radians.
 
 import type { Pose } from "./reckoning";
 
@@ -24,39 +24,37 @@ export interface Room {
 
 export const EMPTY_ROOM: Room = { walls: [], obstacles: [] };
 
-/** A pose from a struct with x, y and theta (or heading, yaw), itself or in a field `pose`; null when there is none. */
+/** A pose from a struct with x, y and heading; null when there is none. */
 export function pose_of(value: unknown): Pose | null {
-  if (typeof value !== "object" || value === null) return null;
-  const fields = value as Record<string, unknown>;
-  const x = number_of(fields["x"]);
-  const y = number_of(fields["y"]);
-  const theta = number_of(fields["theta"] ?? fields["heading"] ?? fields["yaw"]);
-  if (x !== null && y !== null && theta !== null) return { x, y, theta };
-  return "pose" in fields ? pose_of(fields["pose"]) : null;
+  const { x, y, heading } = (value ?? {}) as Record<string, unknown>;
+  const pose = [x, y, heading].map(number_of);
+  if (pose.includes(null)) return null;
+  const [a = 0, b = 0, theta = 0] = pose as number[];
+  return { x: a, y: b, theta };
 }
 
-/** Walls as a flat array x1, y1, x2, y2, ..., the same as `{dims: [4, n], data}`, or a list of structs; else none. */
+/** A list of structs with x1, y1, x2, y2; what is something else is left out. */
 export function walls_of(value: unknown): Wall[] {
-  if (value === null || typeof value !== "object") return [];
-  if (ArrayBuffer.isView(value)) return walls_from_flat(value as unknown as ArrayLike<number>);
-  if (Array.isArray(value)) return value.flatMap(walls_from_item);
-  const { data, walls } = value as { data?: unknown; walls?: unknown };
-  return walls_of(data ?? walls);
+  if (!Array.isArray(value)) return [];
+  return value.flatMap((item) => {
+    const { x1, y1, x2, y2 } = (item ?? {}) as Record<string, unknown>;
+    const wall = [x1, y1, x2, y2].map(number_of);
+    if (wall.includes(null)) return [];
+    const [a = 0, b = 0, c = 0, d = 0] = wall as number[];
+    return [{ x1: a, y1: b, x2: c, y2: d }];
+  });
 }
 
-function walls_from_item(item: unknown): Wall[] {
-  if (ArrayBuffer.isView(item)) return walls_from_flat(item as unknown as ArrayLike<number>);
-  const { x1, y1, x2, y2 } = (item ?? {}) as Record<string, unknown>;
-  const ends = [x1, y1, x2, y2].map(number_of);
-  return ends.includes(null) ? [] : walls_from_flat(ends as number[]);
-}
-
-function walls_from_flat(flat: ArrayLike<number>): Wall[] {
-  const walls: Wall[] = [];
-  for (let i = 0; i + 3 < flat.length; i += 4) {
-    walls.push({ x1: flat[i] ?? 0, y1: flat[i + 1] ?? 0, x2: flat[i + 2] ?? 0, y2: flat[i + 3] ?? 0 });
-  }
-  return walls;
+/** A list of structs with x, y and radius; what is something else is left out. */
+export function obstacles_of(value: unknown): Obstacle[] {
+  if (!Array.isArray(value)) return [];
+  return value.flatMap((item) => {
+    const { x, y, radius } = (item ?? {}) as Record<string, unknown>;
+    const circle = [x, y, radius].map(number_of);
+    if (circle.includes(null)) return [];
+    const [a = 0, b = 0, r = 0] = circle as number[];
+    return [{ x: a, y: b, radius: r }];
+  });
 }
 
 /**

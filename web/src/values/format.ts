@@ -63,7 +63,10 @@ function format_list(list: readonly unknown[], depth: number): string {
 }
 
 function format_object(object: Record<string, unknown>, depth: number): string {
-  const { dims, data } = object;
+  const { dims, data, re, im } = object;
+  if (typeof re === "number" && typeof im === "number" && Object.keys(object).length === 2) {
+    return `${format_number(re)} ${im < 0 ? "-" : "+"} ${format_number(Math.abs(im))}i`;
+  }
   if (Array.isArray(dims) && ArrayBuffer.isView(data) && Object.keys(object).length === 2) {
     return `${dims.join(" × ")} ${format_value(data, depth)}`;
   }

@@ -96,9 +96,9 @@ function multidim(json: unknown, type: TypeText): { dims: number[]; data: unknow
   return { dims: sizes, data: typed_array(data, { ...type, array: "any", sizes: [] }) };
 }
 
-function complex(json: unknown): [number, number] {
+function complex(json: unknown): { re: number; im: number } {
   if (!Array.isArray(json) || json.length !== 2) throw new Error(`found ${kind_of(json)}, expected [re, im]`);
-  return [scalar(json[0], "double") as number, scalar(json[1], "double") as number];
+  return { re: scalar(json[0], "double") as number, im: scalar(json[1], "double") as number };
 }
 
 function scalar(found: unknown, base: string): number | bigint | boolean {
@@ -142,7 +142,13 @@ const ARRAY_OF: Readonly<Record<string, new (length: number) => ArrayLike<number
 
 function typed_array(items: readonly unknown[], type: TypeText): unknown {
   check_length(items.length, type);
-  if (is_complex(type.base)) return items.map(complex);
+  if (is_complex(type.base)) {
+    const numbers = items.map(complex);
+    const [re, im] = [numbers.map((n) => n.re), numbers.map((n) => n.im)];
+    return type.base === "cdouble"
+      ? { re: Float64Array.from(re), im: Float64Array.from(im) }
+      : { re: Float32Array.from(re), im: Float32Array.from(im) };
+  }
   const values = items.map((item, index) => {
     try {
       return scalar(item, type.base);
