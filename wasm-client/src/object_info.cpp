@@ -32,7 +32,6 @@ val make_js_members(const EntityDefinition& entity) {
     for (const auto& modifier : member.modifiers) push_js(modifiers, make_js_text(modifier_text(modifier)));
     set_js_field(info, "modifiers", modifiers);
     set_js_field(info, "documentation", make_js_text(member.documentation));
-    set_js_field(info, "isGenerator", make_js_boolean(member.is_generator()));
     push_js(members, info);
   }
   return members;

@@ -1,0 +1,154 @@
+// connect(): from a URL to an object. Layer: wasm-client/ts.
+import { make_error } from "./errors.js";
+import { ObjectTree } from "./object.js";
+import { Session } from "./session.js";
+import type { OpenTransport, Transport } from "./transport.js";
+import type { ObjectInfo, RemoteObject } from "./types.js";
+import { parse_service_url } from "./url.js";
+import { Core } from "./wasm_module.js";
+import { open_websocket } from "./websocket.js";
+
+export interface ConnectOptions {
+  /** Gives up connecting. Once connected it has no effect; use `$.close()`. */
+  signal?: AbortSignal | undefined;
+  /** Milliseconds for everything until the session is up; 30,000. */
+  timeout?: number | undefined;
+  /** Milliseconds for each request that brings no limit of its own; 15,000. */
+  requestTimeout?: number | undefined;
+  username?: string | undefined;
+  /** Stands for `credentials: {password}`. */
+  password?: string | undefined;
+  /** What the service's authenticator wants to see, as varvalues. */
+  credentials?: Record<string, unknown> | ReadonlyMap<string, unknown> | undefined;
+  /** Uses the root object as this type, which it must implement: "com.example.Robot". */
+  objectType?: string | undefined;
+  /** Messages above this many bytes end the session; 12 MiB. */
+  maxMessageSize?: number | undefined;
+  /** The name of this client's node, as services see it. */
+  nodeName?: string | undefined;
+  /** For tests and peers with a gap: the newest message version to offer (4), and whether to offer string tables. */
+  version?: 2 | 4 | undefined;
+  stringTable?: boolean | undefined;
+  /** Carries the bytes instead of a WebSocket. */
+  transport?: OpenTransport | undefined;
+}
+
+const default_connect_timeout = 30_000;
+const default_request_timeout = 15_000;
+
+/**
+ * Connects to a service.
+ * @param url "wss://host/devices/create?service=Create"; schemes ws, wss, http, https, rr+ws, rr+wss, rr+tcp (the port
+ *            of a node takes WebSockets too); in a page also relative to it.
+ * @returns   the service's root object, once the session is up.
+ * @throws    RobotRaconteurError InvalidArgument (URL, options), ConnectionError, ServiceNotFound, NodeNotFound,
+ *            AuthenticationError, RequestTimeout, ...; the reason of `signal`.
+ */
+export async function connect<T = RemoteObject>(
+  url: string | URL,
+  options: ConnectOptions = {},
+): Promise<T & { readonly $: ObjectInfo }> {
+  const { signal } = options;
+  signal?.throwIfAborted();
+  const { socket, service, nodeId, nodeName } = parse_service_url(url);
+  const timeout = options.timeout ?? default_connect_timeout;
+  if (!(timeout > 0)) throw make_error("InvalidArgument", `timeout ${String(timeout)}: expected milliseconds above 0`);
+
+  const attempt = new Attempt();
+  const abort = () => attempt.fail(signal?.reason);
+  signal?.addEventListener("abort", abort, { once: true });
+  const timer = setTimeout(
+    () => attempt.fail(make_error("RequestTimeout", `${socket.host}: no session within ${timeout} ms`)),
+    Math.min(timeout, 2 ** 31 - 1),
+  );
+  try {
+    await attempt.open(socket, options.transport ?? open_websocket);
+    const core = await attempt.unless_failed(
+      Core.create({
+        service,
+        nodeId,
+        nodeName,
+        selfName: options.nodeName,
+        username: options.username,
+        credentials: options.credentials ?? (options.password === undefined ? undefined : { password: options.password }),
+        objectType: options.objectType,
+        version: options.version,
+        stringTable: options.stringTable,
+        connectTimeout: timeout,
+        maxMessageSize: options.maxMessageSize,
+      }),
+    );
+    const session = attempt.begin(core, options.requestTimeout ?? default_request_timeout);
+    const type = await attempt.unless_failed(session.start());
+    return new ObjectTree(session).root(service, type) as T & { readonly $: ObjectInfo };
+  } catch (error) {
+    attempt.fail(error);
+    throw error;
+  } finally {
+    clearTimeout(timer);
+    signal?.removeEventListener("abort", abort);
+  }
+}
+
+/** What exists of a connection so far, and the way to end it at any point. */
+class Attempt {
+  #transport: Transport | undefined;
+  #session: Session | undefined;
+  /** Comes before the core is there, if a peer speaks first. */
+  #early: Uint8Array[] = [];
+  #has_failed = false;
+  readonly #failure: Promise<never>;
+  #reject!: (reason: unknown) => void;
+
+  constructor() {
+    this.#failure = new Promise((_, reject) => (this.#reject = reject));
+    this.#failure.catch(() => undefined);
+  }
+
+  async open(url: URL, open: OpenTransport): Promise<void> {
+    let opened!: () => void;
+    const is_open = new Promise<void>((resolve) => (opened = resolve));
+    const opening = Promise.resolve(
+      open(url, {
+        opened,
+        received: (bytes) => {
+          if (this.#session) this.#session.received(bytes);
+          else this.#early.push(bytes.slice());
+        },
+        closed: (reason) => {
+          if (this.#session) this.#session.lost(reason);
+          else this.fail(make_error("ConnectionError", reason));
+        },
+      }),
+    );
+    void opening.then(
+      (transport) => {
+        this.#transport = transport;
+        if (this.#has_failed) transport.close();
+      },
+      () => undefined,
+    );
+    await this.unless_failed(opening);
+    await this.unless_failed(is_open);
+  }
+
+  begin(core: Core, timeout: number): Session {
+    const session = new Session(core, this.#transport as Transport, timeout);
+    this.#session = session;
+    for (const bytes of this.#early.splice(0)) session.received(bytes);
+    return session;
+  }
+
+  unless_failed<T>(step: Promise<T>): Promise<T> {
+    return Promise.race([step, this.#failure]);
+  }
+
+  /** Ends what there is; the first reason counts. */
+  fail(reason: unknown): void {
+    if (this.#has_failed) return;
+    this.#has_failed = true;
+    this.#reject(reason);
+    if (this.#session) void this.#session.close();
+    else this.#transport?.close();
+  }
+}

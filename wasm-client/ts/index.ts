@@ -1,0 +1,13 @@
+/**
+ * rrgate-client: Robot Raconteur services in browsers, workers and Node, over WebSocket.
+ * @module
+ */
+export { connect } from "./connect.js";
+export type { ConnectOptions } from "./connect.js";
+export { ErrorCode, RobotRaconteurError } from "./errors.js";
+export type { ErrorFields } from "./errors.js";
+export type { OpenTransport, Transport, TransportListener } from "./transport.js";
+export type * from "./types.js";
+export { rrValue, typeOf } from "./values.js";
+export type { ExactValue } from "./values.js";
+export { version } from "./version.js";

@@ -1,0 +1,12 @@
+// Properties. Layer: wasm-client/ts/members. Source: sessions spec section 2.9.
+import type { PropertyMember } from "../types.js";
+import type { MemberContext } from "./member.js";
+
+export function make_property({ session, path, info }: MemberContext): PropertyMember<unknown> {
+  return Object.freeze({
+    get: async (options = {}) => session.request((core) => core.get_property(path, info.name), options),
+    set: async (value: unknown, options = {}) => {
+      await session.request((core) => core.set_property(path, info.name, value), options);
+    },
+  } satisfies PropertyMember<unknown>);
+}

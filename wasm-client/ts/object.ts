@@ -1,0 +1,191 @@
+// Objects of a service, built from the definition that the service sent. Layer: wasm-client/ts.
+import { make_error, report, RobotRaconteurError } from "./errors.js";
+import { make_event } from "./members/event.js";
+import { make_function } from "./members/function.js";
+import { make_later } from "./members/later.js";
+import type { MemberContext } from "./members/member.js";
+import { make_objref } from "./members/objref.js";
+import { make_property } from "./members/property.js";
+import { make_wire } from "./members/wire.js";
+import type { Session } from "./session.js";
+import type {
+  CallOptions,
+  DynamicMember,
+  MemberInfo,
+  MemberKind,
+  ObjectInfo,
+  ObjectState,
+  RemoteObject,
+  RrValue,
+  SessionStats,
+} from "./types.js";
+
+/** One row a kind of member. */
+const faces: Record<MemberKind, (context: MemberContext) => unknown> = {
+  property: make_property,
+  function: make_function,
+  event: make_event,
+  objref: make_objref,
+  wire: make_wire,
+  pipe: (context) => make_later(context, "pipe"),
+  callback: (context) => make_later(context, "callback"),
+  memory: (context) => make_later(context, "memory"),
+};
+
+/**
+ * Names that JavaScript calls by itself: `await robot` would call a function `then`, text conversion a `toString`.
+ * Such members are reached by `robot.$.member(name)`.
+ */
+const implicit_names = new Set(["then", "toString", "toJSON", "valueOf"]);
+
+/** The objects of one session, by path. */
+export class ObjectTree {
+  readonly #objects = new Map<string, { object: Promise<RemoteObject>; released: (() => void)[] }>();
+  readonly #session: Session;
+
+  constructor(session: Session) {
+    this.#session = session;
+    session.on_release((path) => this.#release(path));
+  }
+
+  root(path: string, type: string): RemoteObject {
+    return this.#build(path, type, []);
+  }
+
+  find(path: string, options: CallOptions = {}): Promise<RemoteObject> {
+    const known = this.#objects.get(path);
+    // A look-up with limits of its own shares nothing: its end must not be that of others.
+    if (known && !options.signal && options.timeout === undefined) return known.object;
+    const released: (() => void)[] = [];
+    const object = this.#session
+      .request((core) => core.find_object(path), options)
+      .then((type) => this.#build(path, String(type), released));
+    if (known) return object;
+    const entry = { object, released };
+    this.#objects.set(path, entry);
+    object.catch(() => {
+      if (this.#objects.get(path) === entry) this.#objects.delete(path);
+    });
+    return object;
+  }
+
+  #release(path: string): void {
+    for (const [known, { released }] of [...this.#objects]) {
+      if (known !== path && !known.startsWith(`${path}.`)) continue;
+      this.#objects.delete(known);
+      for (const tell of released.splice(0)) tell();
+    }
+  }
+
+  #build(path: string, type: string, released: (() => void)[]): RemoteObject {
+    const session = this.#session;
+    const members = (session.look((core) => core.members(path)) ?? []).map(freeze_info);
+    const handles = new Map<string, DynamicMember>();
+    for (const info of members) {
+      const context: MemberContext = { session, path, info, find_object: (child, options) => this.find(child, options) };
+      handles.set(info.name, faces[info.kind](context) as DynamicMember);
+    }
+    // No prototype: what is not a member of the service is not there at all.
+    const object: object = Object.create(null);
+    for (const [name, handle] of handles) {
+      if (!implicit_names.has(name)) Object.defineProperty(object, name, { value: handle, enumerable: true });
+    }
+    Object.defineProperty(object, "$", { value: new Info(session, type, path, members, handles, released) });
+    Object.defineProperty(object, Symbol.toStringTag, { value: type });
+    return Object.freeze(object) as RemoteObject;
+  }
+}
+
+class Info implements ObjectInfo {
+  #is_released = false;
+  readonly #session: Session;
+  readonly #handles: ReadonlyMap<string, DynamicMember>;
+  readonly #closers = new Set<(reason?: RobotRaconteurError) => void>();
+  readonly #attributes: Map<string, RrValue>;
+  readonly #node: { id: string; name: string };
+  #stats: SessionStats = { messagesReceived: 0, messagesSent: 0, bytesReceived: 0, bytesSent: 0 };
+  #types: string[] = [];
+
+  constructor(
+    session: Session,
+    readonly type: string,
+    readonly path: string,
+    readonly members: readonly MemberInfo[],
+    handles: ReadonlyMap<string, DynamicMember>,
+    released: (() => void)[],
+  ) {
+    this.#session = session;
+    this.#handles = handles;
+    this.#attributes = session.look((core) => core.attributes()) ?? new Map<string, RrValue>();
+    this.#node = session.look((core) => core.peer()) ?? { id: "", name: "" };
+    released.push(() => this.#release());
+  }
+
+  get state(): ObjectState {
+    if (this.#session.is_closed) return "closed";
+    return this.#is_released ? "released" : "connected";
+  }
+
+  get attributes(): ReadonlyMap<string, RrValue> {
+    return this.#attributes;
+  }
+
+  get node(): { readonly id: string; readonly name: string } {
+    return this.#node;
+  }
+
+  get types(): readonly string[] {
+    return (this.#types = this.#session.look((core) => core.definitions()) ?? this.#types);
+  }
+
+  get stats(): SessionStats {
+    return (this.#stats = this.#session.look((core) => core.stats()) ?? this.#stats);
+  }
+
+  member(name: string): DynamicMember {
+    const handle = this.#handles.get(name);
+    if (!handle) throw make_error("MemberNotFound", `${this.type} has no member "${name}"`);
+    return handle;
+  }
+
+  close(): Promise<void> {
+    return this.#session.close();
+  }
+
+  onClose(closed: (reason?: RobotRaconteurError) => void): () => void {
+    const stop = this.#session.on_close((reason) => {
+      this.#closers.delete(closer);
+      if (reason) closed(reason);
+      else closed();
+    });
+    const closer = (reason?: RobotRaconteurError) => {
+      stop();
+      closed(reason);
+    };
+    this.#closers.add(closer);
+    return () => {
+      this.#closers.delete(closer);
+      stop();
+    };
+  }
+
+  #release(): void {
+    this.#is_released = true;
+    const closers = [...this.#closers];
+    this.#closers.clear();
+    for (const closed of closers) {
+      try {
+        closed(make_error("ObjectNotFound", `the service released object "${this.path}": look it up again`));
+      } catch (error) {
+        report(error);
+      }
+    }
+  }
+}
+
+function freeze_info(info: MemberInfo): MemberInfo {
+  info.parameters.forEach((parameter) => Object.freeze(parameter));
+  Object.freeze(info.parameters);
+  Object.freeze(info.modifiers);
+  return Object.freeze(info);
+}

@@ -1,0 +1,296 @@
+// Drives the core: bytes in and out, timers, and which promise a request belongs to. Layer: wasm-client/ts.
+import { make_error, report, RobotRaconteurError } from "./errors.js";
+import type { Transport } from "./transport.js";
+import type { CallOptions, RrValue } from "./types.js";
+import type { Core, CoreEvent } from "./wasm_module.js";
+
+/** Above this many bytes in the transport, the core keeps what it has: there newer wire values replace older ones. */
+const high_mark = 256 * 1024;
+/** WebSockets do not say when they have room again. */
+const drain_poll_ms = 10;
+const longest_timer_ms = 2 ** 31 - 1;
+
+interface Pending {
+  resolve(value: RrValue): void;
+  reject(reason: unknown): void;
+}
+
+/** What a member hears of, besides the answers to its requests. */
+export interface MemberListener {
+  on_event?(args: RrValue[]): void;
+  on_wire_value?(value: RrValue, seconds: number, nanoseconds: number): void;
+  on_wire_closed?(): void;
+}
+
+export class Session {
+  /** Set by close(), or by whatever ended the session. */
+  #end: { reason: RobotRaconteurError; is_local: boolean } | undefined;
+  #is_closed = false;
+  #is_pumping = false;
+  #timer: ReturnType<typeof setTimeout> | undefined;
+  #timer_at = Infinity;
+  readonly #pending = new Map<number, Pending>();
+  readonly #listeners = new Map<string, Set<MemberListener>>();
+  readonly #closers = new Set<(reason?: RobotRaconteurError) => void>();
+  readonly #release_listeners = new Set<(path: string) => void>();
+  readonly #connected: Promise<string>;
+  #settle_connected!: { resolve(type: string): void; reject(reason: unknown): void };
+  readonly #closed: Promise<void>;
+  #settle_closed!: () => void;
+
+  /** `transport` is open; `timeout`: of requests that bring none, in milliseconds. */
+  constructor(
+    private readonly core: Core,
+    private readonly transport: Transport,
+    private readonly timeout: number,
+  ) {
+    this.#connected = new Promise((resolve, reject) => (this.#settle_connected = { resolve, reject }));
+    this.#connected.catch(() => undefined); // whoever waits for it hears of it
+    this.#closed = new Promise((resolve) => (this.#settle_closed = resolve));
+  }
+
+  /** Begins the handshake. Resolves with the root object's type. */
+  start(): Promise<string> {
+    this.#pump();
+    return this.#connected;
+  }
+
+  get is_closed(): boolean {
+    return this.#end !== undefined;
+  }
+
+  // --- the transport's news ---
+
+  received(bytes: Uint8Array): void {
+    if (this.#is_closed) return;
+    this.#guarded(() => this.core.handle_bytes(bytes));
+    this.#pump();
+  }
+
+  /** The stream is gone. */
+  lost(reason: string): void {
+    if (this.#is_closed) return;
+    this.#guarded(() => this.core.handle_closed(reason));
+    this.#pump();
+  }
+
+  // --- requests ---
+
+  /**
+   * @param ask   makes the request in the core and returns its number.
+   * @param late  called with what a request brings after its caller gave it up.
+   */
+  request(ask: (core: Core) => number, options: CallOptions = {}): Promise<RrValue> {
+    const { signal } = options;
+    if (signal?.aborted) return Promise.reject(signal.reason);
+    if (this.#end) return Promise.reject(this.#end.reason);
+    return new Promise((resolve, reject) => {
+      this.core.set_request_timeout(check_timeout(options.timeout ?? this.timeout));
+      const id = ask(this.core);
+      const abort = () => {
+        this.#pending.delete(id);
+        if (!this.#is_closed) this.core.cancel(id);
+        reject(signal?.reason);
+      };
+      const done = () => signal?.removeEventListener("abort", abort);
+      this.#pending.set(id, {
+        resolve: (value) => (done(), resolve(value)),
+        reject: (reason) => (done(), reject(reason)),
+      });
+      signal?.addEventListener("abort", abort, { once: true });
+      this.#pump();
+    });
+  }
+
+  /** Something without an answer. @throws RobotRaconteurError */
+  tell(what: (core: Core) => void): void {
+    if (this.#end) throw this.#end.reason;
+    what(this.core);
+    this.#pump();
+  }
+
+  /** Something that sends nothing; undefined once the session is over. */
+  look<T>(at: (core: Core) => T): T | undefined {
+    return this.#is_closed ? undefined : at(this.core);
+  }
+
+  // --- listeners ---
+
+  /** @returns a function that ends it. */
+  listen(path: string, member: string, listener: MemberListener): () => void {
+    const key = `${path} ${member}`;
+    let listeners = this.#listeners.get(key);
+    if (!listeners) this.#listeners.set(key, (listeners = new Set()));
+    listeners.add(listener);
+    return () => {
+      listeners.delete(listener);
+      if (listeners.size === 0 && this.#listeners.get(key) === listeners) this.#listeners.delete(key);
+    };
+  }
+
+  on_release(released: (path: string) => void): () => void {
+    this.#release_listeners.add(released);
+    return () => void this.#release_listeners.delete(released);
+  }
+
+  /** Calls once, when the session has ended; soon, if it has already. */
+  on_close(closed: (reason?: RobotRaconteurError) => void): () => void {
+    if (this.#is_closed) {
+      let is_wanted = true;
+      queueMicrotask(() => is_wanted && this.#tell_closed(closed));
+      return () => void (is_wanted = false);
+    }
+    this.#closers.add(closed);
+    return () => void this.#closers.delete(closed);
+  }
+
+  // --- the end ---
+
+  /** Takes leave of the service; what waits for an answer rejects at once. */
+  close(): Promise<void> {
+    if (!this.#end) {
+      this.#end = { reason: make_error("ConnectionError", "the session was closed by this side"), is_local: true };
+      this.#reject_pending(this.#end.reason);
+      this.#guarded(() => this.core.disconnect());
+      this.#pump();
+    }
+    return this.#closed;
+  }
+
+  #reject_pending(reason: RobotRaconteurError): void {
+    const waiting = [...this.#pending.values()];
+    this.#pending.clear();
+    this.#settle_connected.reject(reason);
+    for (const { reject } of waiting) reject(reason);
+  }
+
+  #finish(reason: RobotRaconteurError): void {
+    if (this.#is_closed) return;
+    this.#end ??= { reason, is_local: false };
+    this.#is_closed = true;
+    clearTimeout(this.#timer);
+    this.#reject_pending(this.#end.reason);
+    this.transport.close();
+    const closers = [...this.#closers];
+    this.#closers.clear();
+    this.#listeners.clear();
+    this.#release_listeners.clear();
+    for (const closed of closers) this.#tell_closed(closed);
+    this.#settle_closed();
+  }
+
+  #tell_closed(closed: (reason?: RobotRaconteurError) => void): void {
+    const end = this.#end;
+    call_safely(() => (end && !end.is_local ? closed(end.reason) : closed()));
+  }
+
+  // --- the pump: after whatever was told or asked, poll until nothing is left ---
+
+  #pump(): void {
+    if (this.#is_pumping || this.#is_closed) return; // a listener asked something: the loop below goes on with it
+    this.#is_pumping = true;
+    this.#guarded(() => {
+      for (;;) {
+        this.#transmit();
+        const event = this.core.poll_event();
+        if (!event) break;
+        this.#dispatch(event);
+        if (this.#is_closed) break;
+      }
+    });
+    this.#is_pumping = false;
+    if (this.#is_closed) this.core.dispose();
+    else this.#arm_timer();
+  }
+
+  #transmit(): void {
+    while (this.transport.buffered < high_mark) {
+      const bytes = this.core.poll_transmit();
+      if (!bytes) return;
+      this.transport.send(bytes);
+      this.core.handle_transmitted(bytes.length);
+    }
+  }
+
+  #dispatch(event: CoreEvent): void {
+    switch (event.kind) {
+      case "connected":
+        this.#settle_connected.resolve(event.type);
+        break;
+      case "completed":
+        this.#take_pending(event.id)?.resolve(event.value);
+        break;
+      case "failed":
+        this.#take_pending(event.id)?.reject(new RobotRaconteurError(event.error));
+        break;
+      case "event":
+        this.#tell(event.path, event.member, (listener) => listener.on_event?.(event.arguments));
+        break;
+      case "wire":
+        this.#tell(event.path, event.member, (listener) =>
+          listener.on_wire_value?.(event.value, event.seconds, event.nanoseconds),
+        );
+        break;
+      case "wire_closed":
+        this.#tell(event.path, event.member, (listener) => listener.on_wire_closed?.());
+        break;
+      case "path_released":
+        for (const released of [...this.#release_listeners]) call_safely(() => released(event.path));
+        break;
+      case "closed":
+        this.#finish(new RobotRaconteurError(event.error));
+        break;
+    }
+  }
+
+  #take_pending(id: number): Pending | undefined {
+    const pending = this.#pending.get(id);
+    this.#pending.delete(id);
+    return pending;
+  }
+
+  #tell(path: string, member: string, what: (listener: MemberListener) => void): void {
+    const listeners = this.#listeners.get(`${path} ${member}`);
+    if (!listeners) return;
+    for (const listener of [...listeners]) call_safely(() => what(listener));
+  }
+
+  #arm_timer(): void {
+    const is_held_back = this.transport.buffered >= high_mark;
+    const due = is_held_back ? performance.now() + drain_poll_ms : this.core.poll_timeout();
+    if (due >= this.#timer_at) return; // the running timer looks again when it fires
+    clearTimeout(this.#timer);
+    this.#timer_at = due;
+    // Rounded up: a timer that fires early would only be set anew.
+    const delay = Math.min(Math.max(Math.ceil(due - performance.now()), 0), longest_timer_ms);
+    this.#timer = setTimeout(() => {
+      this.#timer_at = Infinity;
+      if (this.#is_closed) return;
+      this.#guarded(() => this.core.handle_timeout());
+      this.#pump();
+    }, delay);
+  }
+
+  /** An exception here is a trap in the core (memory at its end) or a broken transport: the session is over. */
+  #guarded(what: () => void): void {
+    try {
+      what();
+    } catch (error) {
+      const text = error instanceof Error ? error.message : String(error);
+      this.#finish(make_error("InternalError", `the session failed: ${text}`));
+    }
+  }
+}
+
+function check_timeout(milliseconds: number): number {
+  if (milliseconds > 0) return milliseconds;
+  throw make_error("InvalidArgument", `timeout ${String(milliseconds)}: expected milliseconds above 0`);
+}
+
+function call_safely(what: () => void): void {
+  try {
+    what();
+  } catch (error) {
+    report(error);
+  }
+}

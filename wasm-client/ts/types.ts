@@ -1,0 +1,176 @@
+// The public types: what a connected object and its members look like. Layer: wasm-client/ts.
+import type { RobotRaconteurError } from "./errors.js";
+
+export type NumericArray =
+  | Float64Array
+  | Float32Array
+  | Int8Array
+  | Uint8Array
+  | Int16Array
+  | Uint16Array
+  | Int32Array
+  | Uint32Array
+  | BigInt64Array
+  | BigUint64Array;
+
+export interface Complex<T = number> {
+  re: T;
+  im: T;
+}
+
+/** `data` is column-major: the first index runs fastest. */
+export interface MultiDim<A = RrValue> {
+  dims: number[];
+  data: A;
+}
+
+/** Any value that a service can send; the table in README.md says which is which. */
+export type RrValue =
+  | null
+  | boolean
+  | number
+  | bigint
+  | string
+  | NumericArray
+  | Complex
+  | Complex<Float64Array | Float32Array>
+  | MultiDim
+  | RrValue[]
+  | Map<number, RrValue>
+  | Map<string, RrValue>
+  | { [field: string]: RrValue };
+
+export interface CallOptions {
+  /** Gives the call up: it rejects with the signal's reason. The service is not told and may still carry it out. */
+  signal?: AbortSignal | undefined;
+  /** Milliseconds until the call rejects with RequestTimeout; the session's `timeout` (15 s) where not given. */
+  timeout?: number | undefined;
+}
+
+export type MemberKind = "property" | "function" | "event" | "objref" | "pipe" | "callback" | "wire" | "memory";
+
+export interface ParameterInfo {
+  readonly name: string;
+  readonly type: string;
+}
+
+/** A member as its definition declares it. */
+export interface MemberInfo {
+  readonly name: string;
+  readonly kind: MemberKind;
+  /** Value type; of functions and callbacks what they return, of objrefs the object with its index. */
+  readonly type: string;
+  readonly parameters: readonly ParameterInfo[];
+  /** Such as "readonly". */
+  readonly modifiers: readonly string[];
+  readonly documentation: string;
+}
+
+export interface SessionStats {
+  messagesReceived: number;
+  messagesSent: number;
+  bytesReceived: number;
+  bytesSent: number;
+}
+
+/** "released": the service replaced this object; look it up again. */
+export type ObjectState = "connected" | "released" | "closed";
+
+/** What belongs to the connection and not to the object's own members; under `$`, which no member can be called. */
+export interface ObjectInfo {
+  readonly state: ObjectState;
+  /** Qualified type, "experimental.create.Create". */
+  readonly type: string;
+  /** Service path, "Create.Webcams[0]". */
+  readonly path: string;
+  readonly members: readonly MemberInfo[];
+  /** What the service says of itself. */
+  readonly attributes: ReadonlyMap<string, RrValue>;
+  /** The service's node. */
+  readonly node: { readonly id: string; readonly name: string };
+  /** The texts of all service definitions known so far. */
+  readonly types: readonly string[];
+  readonly stats: SessionStats;
+  /** A member by name: the way to those whose names JavaScript itself calls ("then", "toString"). */
+  member(name: string): DynamicMember;
+  /** Ends the session of this object and of all others that came from it. Repeated calls do nothing. */
+  close(): Promise<void>;
+  /**
+   * Calls `closed` once when the session ends or the object is released: without argument after close() of this
+   * side, else with the reason.
+   * @returns a function that takes the callback back.
+   */
+  onClose(closed: (reason?: RobotRaconteurError) => void): () => void;
+}
+
+/** `robot.Drive(100, 5000)`: arguments by position, then CallOptions where wanted. */
+export interface FunctionMember<A extends unknown[] = never[], R = RrValue> {
+  /** @throws RobotRaconteurError (rejects): what the service raised, DataTypeMismatch, OutOfRange, ConnectionError, ... */
+  (...args: A): Promise<R>;
+  (...args: [...A, CallOptions]): Promise<R>;
+}
+
+export interface PropertyMember<T = RrValue> {
+  get(options?: CallOptions): Promise<T>;
+  set(value: T, options?: CallOptions): Promise<void>;
+}
+
+export interface EventMember<A extends unknown[] = RrValue[]> extends AsyncIterable<A> {
+  /** @returns a function that takes the listener back. */
+  on(listener: (...args: A) => void): () => void;
+  /** The next occurrence. */
+  once(options?: CallOptions): Promise<A>;
+}
+
+export interface ObjRefMember<T = RemoteObject, I extends number | string | void = number | string | void> {
+  /** Looks the object up. Rejects with ObjectNotFound and the like. */
+  get(index: I, options?: CallOptions): Promise<T>;
+}
+
+export interface WireTime {
+  /** Since 1970, UTC, by the sender's clock. */
+  seconds: number;
+  nanoseconds: number;
+}
+
+/**
+ * A connected wire. Iterating gives the newest value each time; values that came in between are skipped. Leaving the
+ * loop closes the connection.
+ */
+export interface WireConnection<T = RrValue> extends AsyncIterable<T> {
+  /** The newest value; undefined before the first. */
+  readonly value: T | undefined;
+  readonly time: WireTime | undefined;
+  /** When the service has agreed; rejects where it refuses. */
+  readonly ready: Promise<void>;
+  /** Sends the OutValue; one that waits for a slow network is replaced by a newer one. */
+  send(value: T): Promise<void>;
+  close(): Promise<void>;
+}
+
+export interface WireMember<T = RrValue> {
+  connect(options?: CallOptions): WireConnection<T>;
+  /** The InValue, without connection. */
+  peek(options?: CallOptions): Promise<T>;
+  /** The OutValue as the service has it. */
+  peekOut(options?: CallOptions): Promise<T>;
+  /** Sets the OutValue, without connection. */
+  poke(value: T, options?: CallOptions): Promise<void>;
+}
+
+/** A member where no type is known: everything that any member can do. What this one cannot do is missing on it. */
+export interface DynamicMember extends AsyncIterable<RrValue[]> {
+  (...args: unknown[]): Promise<RrValue>;
+  get(options?: CallOptions): Promise<RrValue>;
+  get(index?: number | string, options?: CallOptions): Promise<RemoteObject>;
+  set(value: unknown, options?: CallOptions): Promise<void>;
+  on(listener: (...args: RrValue[]) => void): () => void;
+  once(options?: CallOptions): Promise<RrValue[]>;
+  connect(options?: CallOptions): WireConnection;
+  peek(options?: CallOptions): Promise<RrValue>;
+  peekOut(options?: CallOptions): Promise<RrValue>;
+  poke(value: unknown, options?: CallOptions): Promise<void>;
+}
+
+/** A connected object: its members by name, and `$`. */
+export type RemoteObject = { readonly $: ObjectInfo } & { readonly [member: string]: DynamicMember };

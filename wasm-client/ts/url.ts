@@ -1,0 +1,59 @@
+// URLs of services. Layer: wasm-client/ts. Source: transports spec section 1.
+import { make_error } from "./errors.js";
+
+export interface ServiceUrl {
+  /** What the WebSocket opens: ws: or wss:. */
+  socket: URL;
+  service: string;
+  nodeId: string | undefined;
+  nodeName: string | undefined;
+}
+
+const schemes: Record<string, string> = {
+  "ws:": "ws:",
+  "wss:": "wss:",
+  "http:": "ws:",
+  "https:": "wss:",
+  "rr+ws:": "ws:",
+  "rr+wss:": "wss:",
+  "rr+tcp:": "ws:", // the port of a node takes WebSockets as well
+};
+const tcp_port = "48653";
+
+/**
+ * Reads "wss://host/devices/create?service=Create", the same with another scheme of the table above, or, in a page, a
+ * URL relative to it.
+ * @throws RobotRaconteurError InvalidArgument
+ */
+export function parse_service_url(text: string | URL, base = globalThis.location?.href): ServiceUrl {
+  const refuse = (why: string) => make_error("InvalidArgument", `URL "${String(text).slice(0, 200)}": ${why}`);
+  const scheme = /^([a-z][a-z0-9+.-]*:)/i.exec(String(text))?.[1]?.toLowerCase();
+  const rest = scheme === undefined ? String(text) : String(text).slice(scheme.length);
+  if (scheme !== undefined && !(scheme in schemes)) {
+    const known = Object.keys(schemes).map((name) => name.slice(0, -1));
+    const why = scheme.startsWith("rrs+") ? "encryption inside of the stream is not available here, use rr+wss" : "scheme unknown";
+    throw refuse(`${why}; known: ${known.join(", ")}`);
+  }
+  let socket: URL;
+  try {
+    // "http" is parsed like "ws", and unlike "rr+tcp" by the rules for hosts and ports.
+    const parseable = scheme === undefined ? rest : `${schemes[scheme] === "wss:" ? "https:" : "http:"}${rest}`;
+    socket = new URL(parseable, base);
+    if (scheme === "rr+tcp:" && !/^\/\/[^/?#]*:\d+([/?#]|$)/.test(rest)) socket.port = tcp_port;
+    const to = schemes[socket.protocol];
+    if (!to) throw new TypeError(`scheme ${socket.protocol} unknown`);
+    socket.protocol = to;
+  } catch (error) {
+    throw refuse(error instanceof Error ? error.message : String(error));
+  }
+  socket.hash = "";
+  const query = socket.searchParams;
+  const service = query.get("service");
+  if (!service) throw refuse('names no service; add "?service=NAME"');
+  return {
+    socket,
+    service,
+    nodeId: query.get("nodeid") ?? undefined,
+    nodeName: query.get("nodename") ?? undefined,
+  };
+}
