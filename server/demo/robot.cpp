@@ -47,6 +47,12 @@ void Robot::drive(std::int16_t velocity, std::int16_t radius_mm) {
   wheels_ = wheel_speeds_for(velocity, radius_mm);
 }
 
+void Robot::place(Pose pose) {
+  pose_ = pose;
+  drive(0, drive_straight);
+  bumpers_ = feel_bumpers();
+}
+
 bool Robot::advance() {
   const double seconds = std::chrono::duration<double>(step).count();
   const double wanted = (wheels_.left + wheels_.right) / 2 * seconds;

@@ -44,6 +44,9 @@ class Robot {
   /// have to be faster than 500 mm/s both are slowed: the arc stays.
   void drive(std::int16_t velocity, std::int16_t radius_mm);
 
+  /// Lifts the robot to `pose`, which must be clear, and lets it stand there. The totals stay.
+  void place(Pose pose);
+
   /// Moves on by one step. Returns whether a bumper that was free before is pressed now.
   bool advance();
 

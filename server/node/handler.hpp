@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -113,9 +114,9 @@ Handler make_typed_handler(F function, std::index_sequence<Index...>) {
     if (arguments.size() != sizeof...(Args))
       return make_error(ErrorCode::invalid_argument, "wrong number of arguments for the handler");
     [[maybe_unused]] std::tuple converted{from_value<std::remove_cvref_t<Args>>(arguments[Index])...};
-    const Error* failure = nullptr;
-    ((std::get<Index>(converted).has_error() ? void(failure = &std::get<Index>(converted).error()) : void()), ...);
-    if (failure) return *failure;
+    std::optional<Error> failure;
+    ((std::get<Index>(converted).has_error() ? void(failure = std::get<Index>(converted).error()) : void()), ...);
+    if (failure) return std::move(*failure);
     if constexpr (std::is_void_v<R>) {
       function(std::move(*std::get<Index>(converted))...);
       return Value{};

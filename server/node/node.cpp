@@ -126,7 +126,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     }
     const auto clients = clients_;  // each removes itself
     for (const auto& [id, client] : clients) client->close_service();
-    if (clients_.empty()) return;
+    if (clients_.empty()) return stopped();
     stop_timer_.expires_after(stop_deadline);
     stop_timer_.async_wait([this](const error_code& error) {
       if (error) return;
@@ -180,7 +180,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   }
   void client_ended(ServiceClient& client) override {
     clients_.erase(client.id());
-    if (is_stopping_ && clients_.empty()) stop_timer_.cancel();
+    if (is_stopping_ && clients_.empty()) stopped();
   }
 
  private:
@@ -223,6 +223,11 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     const auto client = std::make_shared<ServiceClient>(id, *this, directory_, std::move(session), std::move(socket));
     clients_.emplace(id, client);
     client->start();
+  }
+
+  void stopped() {
+    stop_timer_.cancel();
+    if (own_io_) own_io_->stop();  // whatever else runs on it ends with the node
   }
 
   void close_listeners() {

@@ -37,7 +37,7 @@ class Node {
   /// Returns  the port. Throws std::invalid_argument; std::system_error ("listen on rr+tcp://...: Address in use").
   std::uint16_t listen(std::string_view url);
 
-  /// Runs until stop(), SIGINT or SIGTERM.
+  /// Runs until stop(), SIGINT or SIGTERM; what else was given to io_context() does not hold it up then.
   void run();
   /// Closes the listeners and tells the clients that their services end; run() returns when they are gone, after half a
   /// second at the latest.

@@ -143,6 +143,19 @@ TEST_CASE("backing into something stops it without a bumper") {
   CHECK(robot.pose().position.x == Approx(Robot::radius - 300).margin(0.01));
 }
 
+TEST_CASE("put elsewhere it stands still and keeps its totals") {
+  Robot robot(wall_ahead());
+  robot.drive(300, drive_straight);
+  run(robot, 5);
+  const double distance = robot.distance();
+  robot.place({{-100, 50}, 1});
+  CHECK(robot.bumpers() == 0);
+  CHECK(run(robot, 1) == 0);
+  CHECK(robot.pose().position == Point{-100, 50});
+  CHECK(robot.pose().heading == Approx(1));
+  CHECK(robot.distance() == distance);
+}
+
 TEST_CASE("it never gets into anything, whatever it is told") {
   const World world = demo_world();
   Robot robot(world);

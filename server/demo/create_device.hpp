@@ -1,0 +1,34 @@
+// The service of the demo robot: the Create of the Robot Raconteur paper's Example 1, simulated. Layer: demo.
+// Definition: robdef/modern/experimental.simulatedcreate.robdef.
+#pragma once
+
+#include <memory>
+
+#include "server/demo/robot.hpp"
+#include "server/demo/sensor_packet.hpp"
+#include "server/node/node.hpp"
+
+namespace rrgate::demo {
+
+class CreateDevice {
+ public:
+  static constexpr std::string_view service_name = "Create";
+
+  /// Adds the service to `node`, which must not outlive the device. The robot moves while the node runs.
+  explicit CreateDevice(rr::Node& node);
+  CreateDevice(const CreateDevice&) = delete;
+  CreateDevice& operator=(const CreateDevice&) = delete;
+
+ private:
+  void add_members_of_create();
+  void add_members_of_simulation();
+  void publish();
+
+  Robot robot_;
+  SensorStream sensors_;
+  bool is_streaming_ = true;
+  rr::ClientId driver_ = 0;  ///< who sent the last Drive
+  std::shared_ptr<rr::Service> service_;
+};
+
+}  // namespace rrgate::demo

@@ -1,0 +1,34 @@
+// Command line of the demo devices. Layer: demo.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace rrgate::demo {
+
+struct Options {
+  std::string host = "127.0.0.1";
+  std::uint16_t port = 0;
+  std::string robot;  ///< webcams: URL of the Create service
+};
+
+/// What a program takes, with its defaults.
+struct Program {
+  std::string_view name;
+  std::string_view purpose;
+  Options defaults;
+};
+
+/// Reads the arguments; empty where the program is to end now with `exit_code`, after --help (0) or a mistake, which
+/// was written to stderr (2).
+std::optional<Options> parse_options(const Program& program, int argc, char** argv, int& exit_code);
+
+/// "rr+tcp://127.0.0.1:52222/?service=Create": where a client on this machine finds the service.
+std::string service_url(const std::string& host, std::uint16_t port, std::string_view service);
+
+/// "rr+tcp://127.0.0.1:52222", for Node::listen().
+std::string listen_url(const Options& options);
+
+}  // namespace rrgate::demo

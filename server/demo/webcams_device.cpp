@@ -1,0 +1,62 @@
+#include "server/demo/webcams_device.hpp"
+
+#include "server/demo/robdef_texts.hpp"
+
+namespace rrgate::demo {
+
+namespace {
+
+rr::Value to_value(Image image) {
+  return rr::Structure{"experimental.createwebcam2.WebcamImage",
+                       {{"width", image.width},
+                        {"height", image.height},
+                        {"step", image.step},
+                        {"data", std::move(image.data)}}};
+}
+
+[[noreturn]] void refuse(const char* what) {
+  throw rr::ServiceException(std::string(what) + " is not available yet; use CaptureFrame",
+                             rr::ErrorCode::not_implemented_error);
+}
+
+}  // namespace
+
+WebcamsDevice::WebcamsDevice(rr::Node& node, std::function<Pose()> robot_pose)
+    : world_(demo_world()),
+      robot_pose_(std::move(robot_pose)),
+      service_(rr::Service::from_text({std::string(robdef_createwebcam2)}, std::string(service_name), "WebcamHost")) {
+  Camera left;
+  left.offset = {90, 60};
+  left.yaw = 0.15;
+  Camera right;
+  right.offset = {90, -60};
+  right.yaw = -0.15;
+  webcams_ = {{"Left", left, {}}, {"Right", right, {}}};
+  for (Webcam& webcam : webcams_) webcam.object = make_object(webcam);
+
+  service_->property("WebcamNames").get([this] {
+    rr::MapInt32 names;
+    for (std::size_t i = 0; i < webcams_.size(); ++i)
+      names.items.emplace_back(static_cast<std::int32_t>(i), webcams_[i].name);
+    return rr::Value(std::move(names));
+  });
+  service_->objref("Webcams", [this](std::string_view index) -> std::shared_ptr<rr::Object> {
+    for (std::size_t i = 0; i < webcams_.size(); ++i)
+      if (index == std::to_string(i)) return webcams_[i].object;
+    return nullptr;
+  });
+  node.add(service_);
+}
+
+std::shared_ptr<rr::Object> WebcamsDevice::make_object(const Webcam& webcam) {
+  auto object = service_->make_object("Webcam");
+  object->property("Name").get([name = webcam.name] { return name; });
+  object->function("CaptureFrame",
+                   [this, camera = webcam.camera] { return to_value(render(world_, robot_pose_(), camera)); });
+  object->function("StartStreaming", [] { refuse("FrameStream"); });
+  object->function("StopStreaming", [] { refuse("FrameStream"); });
+  object->function("CaptureFrameToBuffer", []() -> rr::Value { refuse("buffer"); });
+  return object;
+}
+
+}  // namespace rrgate::demo

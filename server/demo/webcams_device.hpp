@@ -1,0 +1,38 @@
+// The service of the demo cameras: the webcams of the Robot Raconteur paper's Example 2, on the demo robot. Layer: demo.
+// Definition: robdef/modern/experimental.createwebcam2.robdef.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "server/demo/camera.hpp"
+#include "server/node/node.hpp"
+
+namespace rrgate::demo {
+
+class WebcamsDevice {
+ public:
+  static constexpr std::string_view service_name = "Webcam";
+
+  /// Adds the service to `node`, which must not outlive the device. `robot_pose` is asked for each frame.
+  WebcamsDevice(rr::Node& node, std::function<Pose()> robot_pose);
+  WebcamsDevice(const WebcamsDevice&) = delete;
+  WebcamsDevice& operator=(const WebcamsDevice&) = delete;
+
+ private:
+  struct Webcam {
+    std::string name;
+    Camera camera;
+    std::shared_ptr<rr::Object> object;
+  };
+
+  std::shared_ptr<rr::Object> make_object(const Webcam& webcam);
+
+  World world_;
+  std::function<Pose()> robot_pose_;
+  std::shared_ptr<rr::Service> service_;
+  std::vector<Webcam> webcams_;  ///< by index of the objref Webcams
+};
+
+}  // namespace rrgate::demo
