@@ -5,7 +5,7 @@
 
 #include "core/session/service_path.hpp"
 #include "core/session/url.hpp"
-#include "server/node/random_node_id.hpp"
+#include "core/support/random.hpp"
 #include "server/node/tcp_connect.hpp"
 
 namespace rr {

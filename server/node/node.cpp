@@ -11,7 +11,7 @@
 #include <system_error>
 
 #include "core/session/url.hpp"
-#include "server/node/random_node_id.hpp"
+#include "core/support/random.hpp"
 #include "server/node/service_client.hpp"
 
 namespace rr {
