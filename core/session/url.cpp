@@ -133,6 +133,7 @@ Result<ConnectionUrl> parse_legacy(std::string_view text, std::string_view rest)
     return bad_url(text, "path " + quoted(path) + ": expected node/service");
   ConnectionUrl url;
   url.scheme = "rr+tcp";
+  url.path = "/";
   url.host = authority->host;
   url.port = *port;
   const auto node = path.substr(0, separator);

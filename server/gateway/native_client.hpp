@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "core/wire/message.hpp"
 #include "server/gateway/gateway.hpp"
 
 namespace rrgate {

@@ -5,6 +5,7 @@
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
+#include <boost/asio/ip/v6_only.hpp>
 #include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/container/static_vector.hpp>
@@ -57,7 +58,10 @@ awaitable<ReadResult> TcpStream::read_some(std::span<std::uint8_t> into) {
     const auto count = std::min(into.size(), put_back_.size() - put_back_used_);
     std::memcpy(into.data(), put_back_.data() + put_back_used_, count);
     put_back_used_ += count;
-    if (put_back_used_ == put_back_.size()) rr::Bytes().swap(put_back_);
+    if (put_back_used_ == put_back_.size()) {
+      rr::Bytes().swap(put_back_);
+      put_back_used_ = 0;
+    }
     co_return ReadResult{{}, count};
   }
   auto [error, bytes] = co_await socket_.async_read_some(asio::buffer(into.data(), into.size()), await_tuple);

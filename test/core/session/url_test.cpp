@@ -9,14 +9,14 @@ namespace {
 ConnectionUrl parsed(std::string_view text, ServiceInUrl rule = ServiceInUrl::required) {
   auto url = parse_url(text, rule);
   INFO(text << ": " << (url ? std::string() : url.error().message));
-  REQUIRE(url);
+  REQUIRE(url.has_value());
   return *url;
 }
 
 void refused(std::string_view text, std::string_view why, ErrorCode code = ErrorCode::connection_error) {
   auto url = parse_url(text);
   INFO(text);
-  REQUIRE_FALSE(url);
+  REQUIRE_FALSE(url.has_value());
   CHECK(url.error().code == code);
   CHECK_THAT(url.error().message, Catch::Contains(std::string(why)));
 }
@@ -32,11 +32,11 @@ TEST_CASE("the examples of the specification parse") {
   CHECK(url.port == 52222);
   CHECK(url.path.empty());
   CHECK(url.service == "arm");
-  CHECK_FALSE(url.node_id);
+  CHECK_FALSE(url.node_id.has_value());
 
   url = parsed("rr+tcp://[fe80::48ac:c24d:4a5b]:52222/?nodeid=" + std::string(id_text) + "&service=arm");
   CHECK(url.host == "fe80::48ac:c24d:4a5b");
-  REQUIRE(url.node_id);
+  REQUIRE(url.node_id.has_value());
   CHECK(format_node_id(*url.node_id, NodeIdFormat::dashes) == id_text);
 
   url = parsed("rr+ws://localhost/?nodename=my.robot&service=arm");
@@ -74,7 +74,7 @@ TEST_CASE("the legacy form is understood") {
   CHECK(url.node_name == "my.robot");
   CHECK(url.service == "Create");
   url = parsed("tcp://10.0.0.1:2355/{" + std::string(id_text) + "}/Create");
-  REQUIRE(url.node_id);
+  REQUIRE(url.node_id.has_value());
   CHECK(parsed(format_url(url)) == url);
   refused("tcp://10.0.0.1/my.robot/Create", "port");
   refused("tcp://10.0.0.1:2355/?service=Create", "without a query");
@@ -130,7 +130,7 @@ TEST_CASE("listen addresses") {
   CHECK(parse_host_port("[::1]:0").value() == HostPort{"::1", 0});
   for (const auto bad : {"", "8080", ":8080", "h:", "h:65536", "::1:80", "[::1]", "h:-1", "h:1x"}) {
     INFO(bad);
-    CHECK_FALSE(parse_host_port(bad));
+    CHECK_FALSE(parse_host_port(bad).has_value());
   }
 }
 
