@@ -1,0 +1,42 @@
+#include <catch2/catch.hpp>
+
+#include "server/cli/command.hpp"
+#include "server/log/log.hpp"
+
+using namespace rrgate;
+
+TEST_CASE("options are taken in both spellings, unknown ones are named") {
+  constexpr std::string_view known[] = {"--config", "--port"};
+  const auto parse = [&](std::vector<std::string_view> arguments) { return parse_arguments(arguments, known); };
+  CHECK(parse({"--config", "a"}).options.at("--config") == "a");
+  CHECK(parse({"--config=a=b"}).options.at("--config") == "a=b");
+  CHECK(parse({"file", "--port=1"}).operands == std::vector<std::string>{"file"});
+  CHECK_THAT(parse({"--confg", "a"}).error, Catch::Contains("unknown option '--confg'"));
+  CHECK_THAT(parse({"--config"}).error, Catch::Contains("needs a value"));
+  CHECK_THAT(parse({"--port=1", "--port=2"}).error, Catch::Contains("twice"));
+}
+
+TEST_CASE("commands are found by name; help and mistakes have their exit codes") {
+  static std::size_t given = 0;
+  constexpr Command commands[] = {{"go", "go FILE", "goes", [](Arguments arguments) {
+                                     given = arguments.size();
+                                     return 7;
+                                   }}};
+  const auto run = [&](std::vector<std::string_view> arguments) { return run_command_line(commands, arguments); };
+  CHECK(run({"go", "a", "b"}) == 7);
+  CHECK(given == 2);
+  CHECK(run({"go", "--help"}) == exit_ok);
+  CHECK(run({"--help"}) == exit_ok);
+  CHECK(run({"--version"}) == exit_ok);
+  CHECK(run({"stop"}) == exit_usage);
+  CHECK(run({"--verbose"}) == exit_usage);
+  CHECK(run({}) == exit_usage);
+}
+
+TEST_CASE("log lines quote what strangers wrote") {
+  CHECK(format_log_text("client gone", {{"peer", "127.0.0.1:1"}, {"bytes", 7}}) == "client gone peer=127.0.0.1:1 bytes=7");
+  CHECK(format_log_text("x", {{"name", "a b"}, {"none", ""}}) == "x name='a b' none=''");
+  CHECK(format_log_text("x", {{"name", "a\nlevel=error"}}) == "x name='a\\x0alevel=error'");
+  CHECK(format_log_json("x", {{"name", "a\"\n\\"}, {"n", 7}}) == R"("event":"x","name":"a\"\u000a\\","n":7)");
+  CHECK(format_log_text("x", {{"name", std::string(1000, 'y')}}).size() < 400);
+}

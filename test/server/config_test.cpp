@@ -1,0 +1,186 @@
+#include "server/config/config.hpp"
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+using namespace rrgate;
+
+namespace {
+
+constexpr std::string_view smallest =
+    R"({"listen": ["127.0.0.1:8080"], "devices": [{"name": "create", "url": "rr+tcp://127.0.0.1:52222/?service=Create"}]})";
+
+std::vector<std::string> findings_of(std::string_view text) {
+  std::vector<std::string> out;
+  for (const auto& finding : parse_config(text).findings) out.push_back(format_finding("gateway.json", finding));
+  return out;
+}
+
+/// One finding, that begins and continues so.
+void finds(std::string_view text, const std::string& begin, const std::string& contains = {}) {
+  const auto findings = findings_of(text);
+  INFO(text);
+  REQUIRE(findings.size() == 1);
+  CHECK_THAT(findings[0], Catch::StartsWith(begin));
+  CHECK_THAT(findings[0], Catch::Contains(contains));
+}
+
+std::string with(std::string_view more) {
+  return R"({"listen": ["127.0.0.1:0"], "devices": [], )" + std::string(more) + "}";
+}
+
+std::string with_device(std::string_view device) {
+  return R"({"listen": ["127.0.0.1:0"], "devices": [)" + std::string(device) + "]}";
+}
+
+const std::filesystem::path config_folder = RRGATE_CONFIG_DIR;
+
+/// The schema's options as the parser would list them.
+void list_schema(const nlohmann::json& schema, const std::string& path, bool is_required,
+                 std::vector<OptionInfo>& options) {
+  if (!path.empty()) {
+    OptionInfo info;
+    info.path = path;
+    info.type = schema.at("type");
+    info.is_required = is_required;
+    if (schema.contains("minimum")) info.minimum = schema["minimum"];
+    if (schema.contains("maximum")) info.maximum = schema["maximum"];
+    if (schema.contains("enum")) info.choices = schema["enum"].get<std::vector<std::string>>();
+    if (schema.contains("default")) info.default_value = schema["default"].dump();
+    options.push_back(std::move(info));
+  }
+  if (schema.contains("items")) list_schema(schema["items"], path + "/*", false, options);
+  if (!schema.contains("properties")) return;
+  INFO(path);
+  CHECK(schema.at("additionalProperties") == false);
+  const auto required = schema.value("required", std::vector<std::string>());
+  for (const auto& [key, member] : schema["properties"].items())
+    list_schema(member, path + "/" + key, std::find(required.begin(), required.end(), key) != required.end(), options);
+}
+
+}  // namespace
+
+TEST_CASE("the smallest configuration works, with the defaults") {
+  const auto parsed = parse_config(smallest);
+  CHECK(parsed.findings.empty());
+  REQUIRE(parsed.config.listen.size() == 1);
+  CHECK(parsed.config.listen[0] == rr::HostPort{"127.0.0.1", 8080});
+  REQUIRE(parsed.config.devices.size() == 1);
+  CHECK(parsed.config.devices[0].name == "create");
+  CHECK(parsed.config.devices[0].url.service == "Create");
+  CHECK(parsed.config.limits == Limits());
+  CHECK(parsed.config.limits.header_bytes == 8192);
+  CHECK(parsed.config.timeouts.send_stall == std::chrono::seconds(15));
+}
+
+TEST_CASE("every option arrives") {
+  const auto parsed = parse_config(R"(/* all of them */ {
+    "listen": ["[::1]:1", "localhost:2"],
+    "devices": [{"name": "a", "url": "rr+tcp://h:1/?service=s", "max_clients": 3}],
+    "web_root": "web", "allowed_origins": ["https://a.example", "http://*.b.example:81"],
+    "limits": {"max_message_size": 20000, "header_bytes": 2000, "header_timeout_ms": 300, "outbox_bytes": 40000,
+               "clients": 5, "clients_per_address": 6},
+    "timeouts": {"connect_ms": 101, "drain_ms": 102, "send_stall_ms": 103, "idle_ms": 104},
+    "retry": {"min_ms": 51, "max_ms": 52, "online_ms": 53},
+    "log": {"level": "debug", "format": "json"} // the end
+  })");
+  CHECK(parsed.findings.empty());
+  const auto& config = parsed.config;
+  CHECK(config.listen == std::vector<rr::HostPort>{{"::1", 1}, {"localhost", 2}});
+  CHECK(config.devices.at(0).max_clients == 3);
+  CHECK(config.web_root == "web");
+  CHECK(config.allowed_origins.size() == 2);
+  CHECK(config.limits == Limits{20000, 2000, milliseconds(300), 40000, 5, 6});
+  CHECK(config.timeouts == Timeouts{milliseconds(101), milliseconds(102), milliseconds(103), milliseconds(104)});
+  CHECK(config.retry == Retry{milliseconds(51), milliseconds(52), milliseconds(53)});
+  CHECK(config.log == LogConfig{"debug", "json"});
+}
+
+TEST_CASE("mistakes are named by path, with what was found and expected") {
+  finds("", "gateway.json: not JSON");
+  finds("{", "gateway.json: not JSON", "line 1");
+  finds("[]", "gateway.json: ", "found array, expected an object");
+  finds(R"({"devices": []})", "gateway.json: /listen: missing; expected an array");
+  finds(R"({"listen": ["127.0.0.1:0"]})", "gateway.json: /devices: missing");
+  finds(R"({"listen": [], "devices": []})", "gateway.json: /listen: empty");
+  finds(with(R"("listn": 1)"), "gateway.json: /listn: unknown option; known here: listen, devices, web_root");
+  finds(with(R"("a/b~c": 1)"), "gateway.json: /a~1b~0c: unknown");
+  finds(with(R"("limits": {"clents": 1})"), "gateway.json: /limits/clents: unknown option", "clients_per_address");
+  finds(with(R"("limits": 3)"), "gateway.json: /limits: found integer 3, expected an object");
+  finds(with(R"("limits": {"clients": "many"})"), "gateway.json: /limits/clients: found string 'many', expected an integer");
+  finds(with(R"("limits": {"clients": 1.5})"), "gateway.json: /limits/clients: found number 1.5, expected an integer");
+  finds(with(R"("limits": {"clients": true})"), "gateway.json: /limits/clients: found boolean true");
+  finds(with(R"("limits": {"clients": null})"), "gateway.json: /limits/clients: found null");
+  finds(with(R"("limits": {"clients": 0})"), "gateway.json: /limits/clients: found 0, expected 1 to");
+  finds(with(R"("limits": {"clients": -1})"), "gateway.json: /limits/clients: found -1, expected 1 to");
+  finds(with(R"("limits": {"clients": 18446744073709551615})"), "gateway.json: /limits/clients: found 18446744073709551615");
+  finds(with(R"("log": {"level": "loud"})"), "gateway.json: /log/level: found 'loud', expected one of: trace, debug");
+  finds(with(R"("retry": {"min_ms": 9000, "max_ms": 8000})"), "gateway.json: /retry/min_ms: found 9000");
+  finds(with(R"("allowed_origins": ["lab.example"])"), "gateway.json: /allowed_origins/0: found 'lab.example'");
+  finds(with(R"("allowed_origins": [7])"), "gateway.json: /allowed_origins/0: found integer 7, expected a string");
+  finds(with(R"("web_root": "a", "web_root": "b")"), "gateway.json: key 'web_root' appears twice");
+  finds(R"({"listen": ["8080"], "devices": []})", "gateway.json: /listen/0: address '8080'", "host:port");
+}
+
+TEST_CASE("mistakes in devices are named by their index") {
+  finds(with_device("7"), "gateway.json: /devices/0: found integer 7, expected an object");
+  finds(with_device(R"({"url": "rr+tcp://h:1/?service=s"})"), "gateway.json: /devices/0/name: missing");
+  finds(with_device(R"({"name": "a"})"), "gateway.json: /devices/0/url: missing; expected a string");
+  finds(with_device(R"({"name": "a/b", "url": "rr+tcp://h:1/?service=s"})"), "gateway.json: /devices/0/name: found 'a/b'");
+  finds(with_device(R"({"name": "", "url": "rr+tcp://h:1/?service=s"})"), "gateway.json: /devices/0/name: found ''");
+  finds(with_device(R"({"name": "a", "url": "rr+tpc://h:1/?service=s"})"), "gateway.json: /devices/0/url: ",
+        "scheme 'rr+tpc' unknown; known: rr+tcp");
+  finds(with_device(R"({"name": "a", "url": "rr+local:///?nodename=n&service=s"})"), "gateway.json: /devices/0/url: ",
+        "available: rr+tcp");
+  const std::string device = R"({"name": "a", "url": "rr+tcp://h:1/?service=s"})";
+  finds(with_device(device + "," + device), "gateway.json: /devices/1/name: found 'a' a second time");
+}
+
+TEST_CASE("all findings are listed at once") {
+  const auto findings = findings_of(R"({"listen": [1, "x"], "devices": [{}], "limits": {"clients": "a", "b": 1}})");
+  CHECK(findings.size() == 6);
+}
+
+TEST_CASE("the schema and the parser know the same options") {
+  std::ifstream in(config_folder / "gateway.schema.json");
+  const auto schema = nlohmann::json::parse(in);
+  CHECK(schema.at("$schema") == "https://json-schema.org/draft/2020-12/schema");
+  std::vector<OptionInfo> stated;
+  list_schema(schema, "", false, stated);
+  auto known = config_options();
+  const auto by_path = [](const OptionInfo& left, const OptionInfo& right) { return left.path < right.path; };
+  std::sort(stated.begin(), stated.end(), by_path);
+  std::sort(known.begin(), known.end(), by_path);
+  REQUIRE(known.size() > 25);
+  REQUIRE(stated.size() == known.size());
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    INFO(known[i].path);
+    CHECK(stated[i].path == known[i].path);
+    CHECK(stated[i].type == known[i].type);
+    CHECK(stated[i].is_required == known[i].is_required);
+    CHECK(stated[i].minimum == known[i].minimum);
+    CHECK(stated[i].maximum == known[i].maximum);
+    CHECK(stated[i].choices == known[i].choices);
+    CHECK(stated[i].default_value == known[i].default_value);
+  }
+}
+
+TEST_CASE("the example configurations load") {
+  std::size_t count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(config_folder)) {
+    if (entry.path().extension() != ".json" || entry.path().filename() == "gateway.schema.json") continue;
+    ++count;
+    const auto parsed = load_config(entry.path().string());
+    for (const auto& finding : parsed.findings) FAIL_CHECK(format_finding(entry.path().string(), finding));
+  }
+  CHECK(count >= 2);
+}
+
+TEST_CASE("a file that isn't there is a finding") {
+  const auto parsed = load_config("no/such/file.json");
+  REQUIRE(parsed.findings.size() == 1);
+  CHECK(parsed.findings[0].path.empty());
+}
