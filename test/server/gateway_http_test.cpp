@@ -1,0 +1,184 @@
+// HTTP at the gateway's port: answers, limits, deadlines.
+#include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
+
+#include "test/server/support/test_gateway.hpp"
+
+using namespace rrgate;
+using namespace rrgate::test;
+
+namespace {
+
+TestClient::HttpResponse fetch(TestGateway& gateway, const std::string& request, bool has_body = true) {
+  TestClient client(gateway.port());
+  client.send(request);
+  return client.receive_response(has_body);
+}
+
+/// A GET whose header block has exactly this many bytes.
+std::string request_of_size(std::size_t size) {
+  const std::string begin = "GET /healthz HTTP/1.1\r\nHost: gw\r\nX-Fill: ";
+  return begin + std::string(size - begin.size() - 4, 'x') + "\r\n\r\n";
+}
+
+constexpr auto short_deadlines = [](Config& config) {
+  config.limits.header_timeout = milliseconds(200);
+  config.timeouts.idle = milliseconds(200);
+};
+
+}  // namespace
+
+TEST_CASE("health, readiness and devices are answered") {
+  TestGateway gateway(2);
+  gateway.wait_for_state("online", 0);
+  const auto text = gateway.wait_for_state("online", 1);
+  const auto device = nlohmann::json::parse(text);
+  CHECK(device["name"] == "y");
+  CHECK(device["url"] == gateway.device(1).url());
+  CHECK(device["node_id"] == rr::format_node_id(gateway.device(1).node_id(), rr::NodeIdFormat::dashes));
+  CHECK(device["node_name"] == "node.y");
+  CHECK(device["last_error"].is_null());
+  CHECK(device["services"].is_array());
+  CHECK(device["clients"] == 0);
+
+  const auto health = fetch(gateway, "GET /healthz HTTP/1.1\r\nHost: gw\r\n\r\n");
+  CHECK(health.status == 200);
+  CHECK_THAT(health.head, Catch::Contains("Content-Type: application/json\r\n"));
+  CHECK_THAT(health.head, Catch::Contains("X-Content-Type-Options: nosniff\r\n"));
+  const auto ready = fetch(gateway, "GET /readyz HTTP/1.1\r\nHost: gw\r\n\r\n");
+  CHECK(ready.status == 200);
+  CHECK(nlohmann::json::parse(ready.body)["devices_online"] == 2);
+}
+
+TEST_CASE("requests follow each other on one connection, also unasked") {
+  TestGateway gateway;
+  TestClient client(gateway.port());
+  std::string many;
+  for (int i = 0; i < 20; ++i) many += "GET /healthz HTTP/1.1\r\nHost: gw\r\n\r\nGET /nope HTTP/1.1\r\nHost: gw\r\n\r\n";
+  client.send(many);
+  for (int i = 0; i < 20; ++i) {
+    CHECK(client.receive_response().status == 200);
+    CHECK(client.receive_response().status == 404);
+  }
+  client.send("HEAD /healthz HTTP/1.1\r\nHost: gw\r\n\r\n");
+  const auto head = client.receive_response(false);
+  CHECK(head.status == 200);
+  CHECK_THAT(head.head, Catch::Contains("Content-Length: 16\r\n"));
+  client.send("GET /healthz HTTP/1.1\r\nHost: gw\r\nConnection: close\r\n\r\n");
+  CHECK_THAT(client.receive_response().head, Catch::Contains("Connection: close\r\n"));
+  CHECK(client.receive_all().empty());
+}
+
+TEST_CASE("HTTP/1.0 is answered and closed") {
+  TestGateway gateway;
+  TestClient client(gateway.port());
+  client.send("GET /healthz HTTP/1.0\r\n\r\n");
+  CHECK_THAT(client.receive_all(), Catch::StartsWith("HTTP/1.0 200 OK\r\n"));
+}
+
+TEST_CASE("errors are problem documents") {
+  TestGateway gateway;
+  const auto missing = fetch(gateway, "GET /api/v2/x HTTP/1.1\r\nHost: gw\r\n\r\n");
+  CHECK(missing.status == 404);
+  CHECK_THAT(missing.head, Catch::Contains("Content-Type: application/problem+json\r\n"));
+  CHECK(nlohmann::json::parse(missing.body)["status"] == 404);
+  const auto refused = fetch(gateway, "POST /healthz HTTP/1.1\r\nHost: gw\r\nContent-Length: 2\r\n\r\nhi");
+  CHECK(refused.status == 405);
+  CHECK_THAT(refused.head, Catch::Contains("Allow: GET, HEAD\r\n"));
+  CHECK(fetch(gateway, "GET /devices/x HTTP/1.1\r\nHost: gw\r\n\r\n").status == 426);
+  CHECK(fetch(gateway, "GET /devices/other HTTP/1.1\r\nHost: gw\r\n\r\n").status == 404);
+  CHECK(fetch(gateway, "POST /healthz HTTP/1.1\r\nHost: gw\r\nContent-Length: 99999999\r\n\r\n").status == 413);
+  CHECK(fetch(gateway, "GET /\x01 HTTP/1.1\r\n\r\n").status == 400);
+  CHECK(fetch(gateway, "GET / HTTP/9.9\r\n\r\n").status == 400);
+  CHECK(fetch(gateway, "GET / HTTP/1.1\r\nno colon\r\n\r\n").status == 400);
+}
+
+TEST_CASE("a header may have 8192 bytes and not one more") {
+  TestGateway gateway;
+  CHECK(fetch(gateway, request_of_size(8192)).status == 200);
+  CHECK(fetch(gateway, request_of_size(8193)).status == 431);
+  CHECK(fetch(gateway, "GET /" + std::string(100'000, 'a')).status == 431);
+  CHECK(fetch(gateway, "GET / HTTP/1.1\r\n" + std::string(9000, 'a')).status == 431);
+  std::string flood = "GET / HTTP/1.1\r\n";
+  for (int i = 0; i < 2000; ++i) flood += "X-" + std::to_string(i) + ": y\r\n";
+  CHECK(fetch(gateway, flood).status == 431);
+}
+
+TEST_CASE("a header of two pieces has the same limit") {
+  TestGateway gateway;
+  for (const std::size_t size : {8192u, 8193u}) {
+    const auto request = request_of_size(size);
+    TestClient client(gateway.port());
+    client.send(request.substr(0, 4000));
+    client.send(request.substr(4000));
+    CHECK(client.receive_response().status == (size == 8192 ? 200 : 431));
+  }
+}
+
+TEST_CASE("half a header is answered 408 when its time is over") {
+  TestGateway gateway(1, short_deadlines);
+  CHECK(fetch(gateway, "GET /healthz HTTP/1.1\r\nHost: g").status == 408);
+  TestClient slow(gateway.port());  // a byte now and then doesn't buy time
+  const auto begin = std::chrono::steady_clock::now();
+  while (slow.send("G") && std::chrono::steady_clock::now() - begin < std::chrono::seconds(5)) {
+    std::this_thread::yield();
+    if (std::chrono::steady_clock::now() - begin > std::chrono::milliseconds(600)) break;
+  }
+  slow.receive_all();
+  CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(4));
+}
+
+TEST_CASE("silent, half-open and idle connections are closed") {
+  TestGateway gateway(1, short_deadlines);
+  TestClient silent(gateway.port());
+  TestClient undecided(gateway.port());
+  undecided.send("RRA");
+  TestClient half_message(gateway.port());
+  half_message.send(rr::ByteSpan(make_greeting()).first(40));
+  TestClient idle(gateway.port());
+  idle.send("GET /healthz HTTP/1.1\r\nHost: gw\r\n\r\n");
+  CHECK(idle.receive_response().status == 200);
+  CHECK(silent.receive_all().empty());
+  CHECK(undecided.receive_all().empty());
+  CHECK(half_message.receive_all().empty());
+  CHECK(idle.receive_all().empty());
+}
+
+TEST_CASE("neither HTTP nor Robot Raconteur gets the line of native nodes; TLS gets nothing") {
+  TestGateway gateway;
+  TestClient garbage(gateway.port());
+  garbage.send("hello there\r\n");
+  CHECK(garbage.receive_all() == "HTTP/1.1 404 File Not Found\r\n");
+  TestClient tls(gateway.port());
+  tls.send("\x16\x03\x01\x02");
+  CHECK(tls.receive_all().empty());
+}
+
+TEST_CASE("a flood of requests is answered") {
+  TestGateway gateway;
+  std::vector<TestClient> clients;
+  for (int i = 0; i < 100; ++i) clients.emplace_back(gateway.port());
+  for (auto& client : clients) client.send("GET /healthz HTTP/1.1\r\nHost: gw\r\n\r\nGET /nope HTTP/1.1\r\n\r\n");
+  for (auto& client : clients) {
+    CHECK(client.receive_response().status == 200);
+    CHECK(client.receive_response().status == 404);
+  }
+}
+
+TEST_CASE("IPv6 is listened on, and by name") {
+  TestGateway gateway(1, [](Config& config) { config.listen[0] = {"::1", 0}; });
+  TestClient client(gateway.port(), "::1");
+  client.send("GET /healthz HTTP/1.1\r\nHost: gw\r\n\r\n");
+  CHECK(client.receive_response().status == 200);
+}
+
+TEST_CASE("an address in use is an error that names it") {
+  TestGateway gateway;
+  boost::asio::io_context io;
+  Config config;
+  config.listen = {{"127.0.0.1", gateway.port()}};
+  Gateway second(io, config);
+  const auto started = second.start();
+  REQUIRE_FALSE(started.has_value());
+  CHECK_THAT(started.error().message, Catch::StartsWith("listen on 127.0.0.1:") && Catch::Contains("in use"));
+}

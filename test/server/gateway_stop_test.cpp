@@ -1,0 +1,71 @@
+// Stopping: listeners first, relays within their time, then everything.
+#include <catch2/catch.hpp>
+
+#include "test/server/support/test_gateway.hpp"
+
+using namespace rrgate;
+using namespace rrgate::test;
+
+namespace {
+
+constexpr auto long_drain = [](Config& config) { config.timeouts.drain = std::chrono::seconds(60); };
+
+bool is_ready(const std::future<void>& future) {
+  return future.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+}
+
+const std::string page =
+    "Sec-WebSocket-Protocol: robotraconteur.robotraconteur.com\r\nOrigin: http://gw:8080\r\n";
+
+}  // namespace
+
+TEST_CASE("a gateway without clients stops at once") {
+  TestGateway gateway(1, long_drain);
+  CHECK(gateway.stop().wait_for(std::chrono::seconds(5)) == std::future_status::ready);
+}
+
+TEST_CASE("relays go on while the gateway stops, new connections are refused") {
+  TestGateway gateway(1, long_drain);
+  TestClient client(gateway.port());
+  client.send(make_greeting());
+  client.receive_message();
+  TestClient idle(gateway.port());
+  idle.send("GET /healthz HTTP/1.1\r\nHost: gw\r\n\r\n");
+  CHECK(idle.receive_response().status == 200);
+
+  const auto stopped = gateway.stop();
+  CHECK(idle.receive_all().empty());
+  CHECK_THROWS(TestClient(gateway.port()));
+  const auto message = make_message("echo", 100'000);
+  client.send(message);
+  CHECK(client.receive_message() == message);
+  CHECK_FALSE(is_ready(stopped));
+  client.send(make_message("bye"));
+  CHECK(client.receive_all().empty());
+  CHECK(stopped.wait_for(std::chrono::seconds(5)) == std::future_status::ready);
+}
+
+TEST_CASE("what is left at the deadline is ended with a reason") {
+  TestGateway gateway(1, [](Config& config) { config.timeouts.drain = milliseconds(200); });
+  TestClient browser(gateway.port());
+  browser.upgrade("/devices/x", page);
+  TestClient peer(gateway.port());
+  peer.send(make_greeting());
+  peer.receive_message();
+  const auto stopped = gateway.stop();
+  const auto frame = browser.receive_frame();
+  CHECK(frame.first == 0x88);
+  CHECK((frame.payload.at(0) << 8 | frame.payload.at(1)) == 1001);
+  CHECK(peer.receive_all().empty());
+  CHECK(stopped.wait_for(std::chrono::seconds(5)) == std::future_status::ready);
+}
+
+TEST_CASE("a client that takes nothing doesn't hold up the end") {
+  TestGateway gateway;
+  TestClient stuck(gateway.port());
+  stuck.send(make_greeting());
+  stuck.receive_message();
+  stuck.send(make_message("flood"));
+  while (gateway.device().flooded() < 1'000'000) std::this_thread::yield();
+  CHECK(gateway.stop().wait_for(std::chrono::seconds(5)) == std::future_status::ready);
+}
