@@ -1,57 +1,47 @@
 #include "server/gateway/probe.hpp"
 
-#include <boost/asio/error.hpp>
-
-#include "core/wire/codec.hpp"
-#include "core/wire/frame_scanner.hpp"
+#include "core/session/client_session.hpp"
+#include "core/session/service_index.hpp"
+#include "core/support/random.hpp"
+#include "server/node/clocks.hpp"
 
 namespace rrgate {
 
 namespace {
 
-constexpr std::uint32_t offered_capabilities[] = {0x02000003, 0x04000003, 0x04100007};
-constexpr std::size_t largest_reply = 64 * 1024;
-
-rr::Error bad_answer(std::string what) {
-  return rr::make_error(rr::ErrorCode::connection_error, "device: " + std::move(what));
+rr::ClientOptions index_options(const rr::ConnectionUrl& url, std::chrono::milliseconds timeout) {
+  rr::ClientOptions options;
+  options.connection.self = {rr::random_node_id(), "rrgate"};
+  options.connection.target = {url.node_id.value_or(rr::NodeId{}), url.node_name};
+  options.connection.handshake_timeout = timeout;
+  options.service = rr::service_index_name;
+  return options;
 }
 
-rr::Bytes make_greeting(const rr::ConnectionUrl& url) {
-  rr::Message message;
-  message.header.version = 2;
-  if (url.node_id) message.header.receiver_node_id = *url.node_id;
-  message.header.receiver_node_name = url.node_name;
-  message.header.sender_node_name = "rrgate";
-  message.begin_entry(rr::EntryType::stream_op, "", "CreateConnection");
-  message.add("capabilities", rr::DataType::uint32_t, std::size(offered_capabilities),
-              rr::ByteSpan(reinterpret_cast<const std::uint8_t*>(offered_capabilities), sizeof(offered_capabilities)));
-  rr::EncodedMessage encoded;
-  if (auto done = rr::encode(message, {}, encoded); !done) return {};
-  return encoded.to_bytes();
+std::string text_of(const rr::Structure& info, std::string_view field) {
+  const auto* value = info.find(field);
+  const auto text = value ? value->to_text() : rr::Result<std::string_view>(std::string_view());
+  return text ? std::string(*text) : std::string();
 }
 
-rr::Result<ProbeResult> read_reply(rr::ByteSpan bytes, const rr::ConnectionUrl& url) {
-  rr::Message reply;
-  if (auto decoded = rr::decode(bytes, {}, reply); !decoded) return decoded.error();
-  if (reply.entries.empty() || reply.entries[0].type != rr::EntryType::stream_op_ret)
-    return bad_answer("answered CreateConnection with something else");
-  const auto& entry = reply.entries[0];
-  // ProtocolError is how nodes without CreateConnection answer it: the header still says who they are.
-  if (entry.error != rr::ErrorCode::none && entry.error != rr::ErrorCode::protocol_error) {
-    const auto* text = reply.elements_of(entry).find("errorstring");
-    return rr::make_error(entry.error, "device refused the connection: " +
-                                           (text ? rr::quoted(text->text()) : std::string(rr::error_code_name(entry.error))));
-  }
-  ProbeResult result;
-  result.node_id = reply.header.sender_node_id;
-  result.node_name = std::string(reply.header.sender_node_name);
-  if (url.node_id && !url.node_id->is_any() && *url.node_id != result.node_id)
-    return rr::make_error(rr::ErrorCode::node_not_found, "found node " + rr::format_node_id(result.node_id) +
-                                                             ", expected " + rr::format_node_id(*url.node_id));
-  if (!url.node_name.empty() && url.node_name != result.node_name)
-    return rr::make_error(rr::ErrorCode::node_not_found, "found node " + rr::quoted(result.node_name) + ", expected " +
-                                                             rr::quoted(url.node_name));
-  return result;
+/// The services of a node but for the index itself, which every node has.
+std::vector<DeviceService> read_services(const rr::Value& answer) {
+  std::vector<DeviceService> services;
+  if (const auto* infos = answer.get_if<rr::MapInt32>())
+    for (const auto& [key, info] : infos->items)
+      if (const auto* fields = info.get_if<rr::Structure>();
+          fields && text_of(*fields, "Name") != rr::service_index_name)
+        services.push_back({text_of(*fields, "Name"), text_of(*fields, "RootObjectType")});
+  return services;
+}
+
+rr::Error about_device(rr::Error error) {
+  error.message = "device: " + error.message;
+  return error;
+}
+
+rr::Error lost(std::string what) {
+  return {rr::ErrorCode::connection_error, "device: " + std::move(what)};
 }
 
 }  // namespace
@@ -63,32 +53,47 @@ awaitable<rr::Result<ProbeResult>> probe(rr::ConnectionUrl url, DialOptions opti
   Deadline limit(watchdog, [&stream] { stream.close(); });
   limit.arm(options.timeout);
 
-  const auto greeting = make_greeting(url);
-  const rr::ByteSpan slice(greeting);
-  const std::span<const rr::ByteSpan> slices(&slice, 1);
-  if (const auto error = co_await stream.write(slices); error) co_return bad_answer(error.message());
-
-  rr::FrameScanner scanner(largest_reply);
-  rr::Bytes buffer(4096);
+  rr::ClientSession session(index_options(url, options.timeout), rr::read_clocks());
+  ProbeResult result;
+  std::optional<rr::Error> failure;
+  rr::Bytes buffer(16 * 1024);
   for (;;) {
-    const auto read = co_await stream.read_some(buffer);
-    if (!limit.is_armed()) co_return bad_answer("no answer within " + std::to_string(options.timeout.count()) + " ms");
-    if (read.error) co_return bad_answer(read.error.message());
-    if (read.is_end()) co_return bad_answer("closed the connection without an answer");
-    rr::ByteSpan rest(buffer.data(), read.bytes);
-    while (!rest.empty()) {
-      const auto consumed = scanner.feed(rest);
-      if (!consumed) co_return bad_answer(consumed.error().message);
-      rest = rest.subspan(*consumed);
-      const auto message = scanner.message();
-      if (!message) continue;
-      // Heartbeats may come before the answer.
-      rr::Message peek;
-      if (rr::decode(*message, {}, peek) && !peek.entries.empty() &&
-          peek.entries[0].type == rr::EntryType::connection_test)
-        continue;
-      co_return read_reply(*message, url);
+    while (auto event = session.poll_event()) {
+      if (std::get_if<rr::Connected>(&*event)) {
+        const auto& peer = session.connection().peer();
+        result.node_id = peer.id;
+        result.node_name = peer.name;
+        session.call_function(rr::service_index_name, "GetLocalNodeServices", {}, rr::read_clocks());
+      } else if (auto* completed = std::get_if<rr::Completed>(&*event)) {
+        if (completed->result)
+          result.services = read_services(*completed->result);
+        else
+          failure = about_device(completed->result.error());
+        session.disconnect(rr::read_clocks());
+      } else if (auto* closed = std::get_if<rr::SessionClosed>(&*event)) {
+        if (failure) co_return *failure;
+        if (result.node_id.is_any()) co_return about_device(std::move(closed->reason));
+        co_return result;
+      }
     }
+    if (const auto slices = session.poll_transmit(); !slices.empty()) {
+      std::size_t size = 0;
+      for (const auto& slice : slices) size += slice.size();
+      const auto error = co_await stream.write(slices);
+      if (error) session.handle_closed(lost(error.message()), rr::read_clocks());
+      session.handle_transmitted(size, rr::read_clocks());
+      continue;
+    }
+    const auto read = co_await stream.read_some(buffer);
+    if (!limit.is_armed())
+      session.handle_closed(lost("no answer within " + std::to_string(options.timeout.count()) + " ms"),
+                            rr::read_clocks());
+    else if (read.error)
+      session.handle_closed(lost(read.error.message()), rr::read_clocks());
+    else if (read.is_end())
+      session.handle_closed(lost("closed the connection without an answer"), rr::read_clocks());
+    else
+      session.handle_bytes(rr::ByteSpan(buffer.data(), read.bytes), rr::read_clocks());
   }
 }
 

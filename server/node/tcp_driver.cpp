@@ -18,13 +18,6 @@ Error stream_error(const error_code& error) {
 
 }  // namespace
 
-Now read_clocks() {
-  const auto utc = std::chrono::system_clock::now().time_since_epoch();
-  const auto seconds = std::chrono::floor<std::chrono::seconds>(utc);
-  const auto rest = std::chrono::duration_cast<std::chrono::nanoseconds>(utc - seconds);
-  return {std::chrono::steady_clock::now(), {seconds.count(), static_cast<std::int32_t>(rest.count())}};
-}
-
 TcpDriver::TcpDriver(asio::ip::tcp::socket socket)
     : socket_(std::move(socket)), timer_(socket_.get_executor()), buffer_(new std::uint8_t[read_size]) {
   error_code ignored;  // a socket that is dead already tells so when it is read

@@ -9,12 +9,9 @@
 
 #include "core/support/bytes.hpp"
 #include "core/support/error.hpp"
-#include "core/support/time.hpp"
+#include "server/node/clocks.hpp"
 
 namespace rr {
-
-/// Both clocks, read now.
-Now read_clocks();
 
 /// One socket and, in the derived class, one session. Everything runs on the thread of the socket's io_context and a
 /// message is handled to the end where it was read: read, decode, handler, reply, write, without a hop, a lock, or a
