@@ -25,7 +25,7 @@ void check_round_trip(Checked& checked, RobdefMode mode) {
 }  // namespace
 
 TEST_CASE("shared cases have their verdict and line", "[robdef]") {
-  const auto cases = read_golden_json("robdef/cases.json");
+  const auto cases = read_golden_json("robdef/robdef-cases.json");
   REQUIRE(cases.size() == 161);
   for (const auto& item : cases) {
     const auto text = item.at("text").get<std::string>();
@@ -56,7 +56,7 @@ TEST_CASE("shared cases have their verdict and line", "[robdef]") {
 }
 
 TEST_CASE("verification of verified definitions changes nothing", "[robdef]") {
-  for (const auto& item : read_golden_json("robdef/cases.json")) {
+  for (const auto& item : read_golden_json("robdef/robdef-cases.json")) {
     const auto text = item.at("text").get<std::string>();
     auto checked = check(text, RobdefMode::compat, imports_of(item));
     std::vector<ServiceDefinition*> set;
