@@ -30,12 +30,20 @@ struct DemoDevice {
   std::string_view service;
   std::string path = {};
   std::uint16_t port = 0;
+  std::vector<std::string> arguments = {};
   pid_t process = -1;
+
+  std::string url() const { return "rr+tcp://127.0.0.1:" + std::to_string(port) + "/?service=" + std::string(service); }
+  std::string command() const {
+    auto text = path;
+    for (const auto& argument : arguments) text += ' ' + argument;
+    return text;
+  }
 };
 
-/// The program beside rrgate (installed) or in the build tree.
+/// The program beside rrgate (installed) or below it (in the build tree).
 std::string find_program(std::string_view name) {
-  for (const auto folder : {".", "../demo", "../libexec/rrgate"}) {
+  for (const auto folder : {".", "demo", "../libexec/rrgate"}) {
     const auto path = std::filesystem::path(program_folder()) / folder / name;
     std::error_code error;
     if (std::filesystem::exists(path, error)) return std::filesystem::canonical(path, error).string();
@@ -61,15 +69,17 @@ std::uint16_t find_free_port() {
 }
 
 /// Starts a device that ends with us, however we end.
-pid_t start_program(const std::string& path, std::uint16_t port) {
-  const auto port_text = std::to_string(port);
+pid_t start_program(const std::string& path, const std::vector<std::string>& arguments) {
+  std::vector<char*> texts{const_cast<char*>(path.c_str())};
+  for (const auto& argument : arguments) texts.push_back(const_cast<char*>(argument.c_str()));
+  texts.push_back(nullptr);
   const pid_t parent = ::getpid();
   const pid_t child = ::fork();
   if (child != 0) return child;
   ::prctl(PR_SET_PDEATHSIG, SIGTERM);
   if (::getppid() != parent) ::_exit(1);
   ::setpgid(0, 0);  // Ctrl-C reaches us alone; we stop the devices when the gateway has let them go
-  ::execl(path.c_str(), path.c_str(), "--port", port_text.c_str(), static_cast<char*>(nullptr));
+  ::execv(path.c_str(), texts.data());
   ::_exit(127);
 }
 
@@ -78,7 +88,7 @@ void note_dead_devices(std::vector<DemoDevice>& devices) {
     if (device.process <= 0 || ::waitpid(device.process, nullptr, WNOHANG) != device.process) continue;
     device.process = -1;
     log(LogLevel::warning, "demo device has ended; it may be started again by hand",
-        {{"device", device.name}, {"command", device.path + " --port " + std::to_string(device.port)}});
+        {{"device", device.name}, {"command", device.command()}});
   }
 }
 
@@ -123,8 +133,7 @@ Config make_config(const std::vector<DemoDevice>& devices, std::uint16_t port) {
   Config config;
   config.listen.push_back({"127.0.0.1", port});
   for (const auto& device : devices) {
-    const auto url = "rr+tcp://127.0.0.1:" + std::to_string(device.port) + "/?service=" + std::string(device.service);
-    config.devices.push_back({std::string(device.name), rr::parse_url(url).value(), 0});
+    config.devices.push_back({std::string(device.name), rr::parse_url(device.url()).value(), 0});
   }
   config.retry.min = milliseconds(200);
   config.retry.max = milliseconds(2000);
@@ -153,14 +162,17 @@ int run_demo(Arguments arguments) {
   for (auto& device : devices) {
     device.path = find_program(device.program);
     if (device.path.empty()) {
-      std::cerr << "rrgate demo: " << device.program << " not found beside rrgate or in ../demo\n";
+      std::cerr << "rrgate demo: " << device.program << " not found beside rrgate\n";
       return exit_failed;
     }
   }
   for (auto& device : devices) {
     device.port = find_free_port();
-    device.process = start_program(device.path, device.port);
+    device.arguments = {"--port", std::to_string(device.port)};
   }
+  // The cameras ride on the robot: they follow its pose.
+  devices[1].arguments.insert(devices[1].arguments.end(), {"--robot", devices[0].url()});
+  for (auto& device : devices) device.process = start_program(device.path, device.arguments);
 
   std::optional<asio::signal_set> deaths;
   std::function<void()> wait_for_death = [&] {
