@@ -1,0 +1,169 @@
+// rr-test-client URL: carries out the steps of one scenario (README.md, "The client").
+#include <iostream>
+#include <map>
+
+#include "server/node/client.hpp"
+#include "test/interop/cpp/plain_value.hpp"
+#include "test/interop/cpp/scenario_value.hpp"
+
+namespace {
+
+using nlohmann::json;
+
+constexpr std::chrono::seconds patience{10};
+
+class Client {
+ public:
+  explicit Client(const std::string& url) : root_(rr::connect(url)) {}
+
+  json carry_out(const json& step) {
+    const rr::RemoteObject target = find(step);
+    for (const auto& [verb, carry_out] : verbs())
+      if (step.contains(verb)) return (this->*carry_out)(target, step.at(verb).get<std::string>(), step);
+    throw std::invalid_argument("unknown step " + step.dump());
+  }
+
+ private:
+  using Verb = json (Client::*)(const rr::RemoteObject&, const std::string&, const json&);
+
+  static const std::map<std::string, Verb>& verbs() {
+    static const std::map<std::string, Verb> table{
+        {"get", &Client::get},           {"set", &Client::set},         {"call", &Client::call},
+        {"get_until", &Client::get_until}, {"listen", &Client::listen},   {"events", &Client::events},
+        {"connect", &Client::connect},   {"close", &Client::close},     {"in_value", &Client::in_value},
+        {"out_value", &Client::out_value}, {"peek_in", &Client::peek_in}, {"peek_out", &Client::peek_out},
+        {"poke_out", &Client::poke_out}};
+    return table;
+  }
+
+  rr::RemoteObject find(const json& step) const {
+    rr::RemoteObject object = root_;
+    for (const auto& part : step.value("on", json::array())) {
+      if (part.is_string()) object = object.object(part.get<std::string>());
+      else if (part.at(1).is_string()) object = object.object(part.at(0).get<std::string>(), part.at(1).get<std::string>());
+      else object = object.object(part.at(0).get<std::string>(), std::to_string(part.at(1).get<int>()));
+    }
+    return object;
+  }
+
+  bool wait(const std::function<bool()>& is_done) { return root_.connection().run_until(is_done, patience); }
+
+  // properties and functions
+
+  json get(const rr::RemoteObject& target, const std::string& member, const json&) { return to_plain(target.get(member)); }
+
+  json set(const rr::RemoteObject& target, const std::string& member, const json& step) {
+    target.set(member, from_scenario(step.at("value")));
+    return nullptr;
+  }
+
+  json call(const rr::RemoteObject& target, const std::string& member, const json& step) {
+    std::vector<rr::Value> arguments;
+    for (const auto& argument : step.value("args", json::array())) arguments.push_back(from_scenario(argument));
+    const rr::Value result = target.call_values(member, arguments);
+    return step.value("digest", false) ? to_digest(result) : to_plain(result);
+  }
+
+  json get_until(const rr::RemoteObject& target, const std::string& member, const json& step) {
+    json value;
+    const auto deadline = std::chrono::steady_clock::now() + patience;
+    do value = to_plain(target.get(member));
+    while (value != step.at("until") && std::chrono::steady_clock::now() < deadline);
+    return value;
+  }
+
+  // events
+
+  json listen(const rr::RemoteObject& target, const std::string& member, const json&) {
+    json& seen = events_[member] = json::array();
+    target.on_event(member, [&seen](std::span<const rr::Value> arguments) {
+      json happened = json::array();
+      for (const auto& argument : arguments) happened.push_back(to_plain(argument));
+      seen.push_back(std::move(happened));
+    });
+    return nullptr;
+  }
+
+  json events(const rr::RemoteObject&, const std::string& member, const json& step) {
+    const json& seen = events_.at(member);
+    wait([&] { return seen.size() >= step.at("count").get<std::size_t>(); });
+    return {{"list", seen}};
+  }
+
+  // wires
+
+  json connect(const rr::RemoteObject& target, const std::string& member, const json&) {
+    json& newest = in_values_[member] = nullptr;
+    target.connect_wire(member, [&newest](const rr::Value& value, rr::TimeSpec) { newest = to_plain(value); });
+    return nullptr;
+  }
+
+  json close(const rr::RemoteObject& target, const std::string& member, const json&) {
+    target.disconnect_wire(member);
+    return nullptr;
+  }
+
+  json in_value(const rr::RemoteObject&, const std::string& member, const json& step) {
+    const json& newest = in_values_.at(member);
+    wait([&] { return newest == step.at("until"); });
+    return newest;
+  }
+
+  json out_value(const rr::RemoteObject& target, const std::string& member, const json& step) {
+    target.send_wire(member, from_scenario(step.at("value")));
+    return nullptr;
+  }
+
+  json peek_in(const rr::RemoteObject& target, const std::string& member, const json&) {
+    return to_plain(target.peek_in(member));
+  }
+
+  json peek_out(const rr::RemoteObject& target, const std::string& member, const json&) {
+    return to_plain(target.peek_out(member));
+  }
+
+  json poke_out(const rr::RemoteObject& target, const std::string& member, const json& step) {
+    target.poke_out(member, from_scenario(step.at("value")));
+    return nullptr;
+  }
+
+  rr::RemoteObject root_;
+  std::map<std::string, json> events_;     ///< by event
+  std::map<std::string, json> in_values_;  ///< by wire
+};
+
+json error_of(const rr::ClientException& exception) {
+  return {{"name", exception.error().qualified_name()}, {"message", exception.error().message}};
+}
+
+json run_scenario(const std::string& url, const json& steps) {
+  json results = json::array();
+  try {
+    Client client(url);
+    for (const auto& step : steps) {
+      try {
+        results.push_back({{"value", client.carry_out(step)}});
+      } catch (const rr::ClientException& failure) {
+        results.push_back({{"error", error_of(failure)}});
+      }
+    }
+  } catch (const rr::ClientException& failure) {
+    return {{"connect_error", error_of(failure)}};
+  }
+  return {{"results", results}};
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 2) {
+    std::cerr << "usage: rr-test-client URL < scenario.json\n";
+    return 2;
+  }
+  try {
+    std::cout << run_scenario(argv[1], json::parse(std::cin).at("steps")) << std::endl;
+  } catch (const std::exception& failure) {
+    std::cerr << "rr-test-client: " << failure.what() << '\n';
+    return 1;
+  }
+}

@@ -1,0 +1,181 @@
+// rr-test-service: offers experimental.interop as README.md describes it, on a free port of the loopback.
+#include <unistd.h>
+
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/posix/stream_descriptor.hpp>
+#include <iostream>
+#include <map>
+#include <numeric>
+
+#include "core/types/pack.hpp"
+#include "server/node/node.hpp"
+
+namespace {
+
+const std::string type_prefix = "experimental.interop.";
+
+class Interop {
+ public:
+  explicit Interop(rr::Node& node)
+      : service_(rr::Service::from_file(RR_INTEROP_ROBDEF, "interop", "Interop")) {
+    add_stored_properties();
+    add_other_properties();
+    add_functions();
+    add_objects();
+    add_wires();
+    node.add(service_);
+  }
+
+ private:
+  void add_stored_properties() {
+    for (const auto& member : service_->types().find_entity(type_prefix + "Interop")->members) {
+      if (member.name.rfind("p_", 0) != 0) continue;
+      rr::Value& value = stored_[member.name];
+      value = rr::default_value(member.type, service_->types());
+      service_->property(member.name).get([&value] { return value; }).set([&value](rr::Value newer) {
+        value = std::move(newer);
+      });
+    }
+  }
+
+  void add_other_properties() {
+    service_->property("version").get([] { return "1"; });
+    service_->property("secret").set([this](double value) { secret_ = value; });
+    service_->property("seen_secret").get([this] { return secret_; });
+    service_->property("seen_target").get([this] { return target_; });
+  }
+
+  void add_functions() {
+    service_->function("nothing", [] {});
+    service_->function("add", [](double left, double right) { return left + right; });
+    service_->function("join", [](const rr::Value& words, const std::string& separator) {
+      std::string joined;
+      for (const auto& word : words.get_if<rr::List>()->items) {
+        if (&word != words.get_if<rr::List>()->items.data()) joined += separator;
+        joined += word.to_text().value();
+      }
+      return joined;
+    });
+    service_->function("shift", [](rr::Value pose, double dx, double dy) {
+      for (auto& field : pose.get_if<rr::Structure>()->fields) {
+        if (field.name == "px") field.value = field.value.to<double>().value() + dx;
+        if (field.name == "py") field.value = field.value.to<double>().value() + dy;
+      }
+      return pose;
+    });
+    service_->function("ramp", [](std::uint32_t count) {
+      std::vector<double> items(count);
+      std::iota(items.begin(), items.end(), 0.0);
+      return items;
+    });
+    service_->function("sum", [](const rr::Value& values) {  // as a value: the array is not copied
+      const auto items = values.to_items<double>().value();
+      return std::accumulate(items.begin(), items.end(), 0.0);
+    });
+    service_->function("echo", [](rr::Value value) { return value; });
+    service_->function("fail", fail);
+    service_->function("fire", [this](std::int32_t count) {
+      for (std::int32_t i = 0; i < count; ++i)
+        service_->fire("changed", static_cast<double>(i), "number " + std::to_string(i));
+    });
+    service_->function("clear", [this] { service_->fire("cleared"); });
+  }
+
+  static void fail(const std::string& kind, const std::string& text) {
+    if (kind == "custom") throw rr::ServiceException(type_prefix + "InteropError", text);
+    const std::map<std::string, rr::ErrorCode> codes{{"operation_failed", rr::ErrorCode::operation_failed},
+                                                     {"invalid_argument", rr::ErrorCode::invalid_argument},
+                                                     {"out_of_range", rr::ErrorCode::out_of_range},
+                                                     {"not_implemented", rr::ErrorCode::not_implemented_error}};
+    throw rr::ServiceException(text, codes.at(kind));
+  }
+
+  void add_objects() {
+    service_->objref("head", make_part("Part", "head"));
+    service_->objref("anything", make_part("SpecialPart", "special"));
+    for (const std::string index : {"0", "1", "7"}) parts_[index] = make_part("Part", "number " + index);
+    for (const std::string key : {"left", "right hand", "a.b"}) named_[key] = make_part("Part", "named " + key);
+    service_->objref("parts", [this](std::string_view index) { return find(parts_, index); });
+    service_->objref("named", [this](std::string_view key) { return find(named_, key); });
+  }
+
+  using Parts = std::map<std::string, std::shared_ptr<rr::Object>, std::less<>>;
+
+  static std::shared_ptr<rr::Object> find(const Parts& parts, std::string_view index) {
+    const auto found = parts.find(index);
+    if (found == parts.end())
+      throw rr::ServiceException("no part " + rr::quoted(index), rr::ErrorCode::object_not_found);
+    return found->second;
+  }
+
+  std::shared_ptr<rr::Object> make_part(const std::string& type, const std::string& name, bool has_inner = true) {
+    auto part = service_->make_object(type);
+    part->property("name").get([name] { return name; });
+    const auto size = std::make_shared<double>(1);
+    part->property("size").get([size] { return *size; }).set([size](double value) { *size = value; });
+    part->function("identify", [name] { return "part " + name; });
+    part->objref("inner", has_inner ? make_part("Part", name + ".inner", false) : nullptr);
+    if (type == "SpecialPart") {
+      const auto feature = std::make_shared<std::string>("none");
+      part->property("feature").get([feature] { return *feature; }).set([feature](std::string value) {
+        *feature = std::move(value);
+      });
+    }
+    return part;
+  }
+
+  void add_wires() {
+    service_->function("publish_state", [this](rr::Value value) { service_->set_wire("state", std::move(value)); });
+    service_->function("publish_pose", [this](rr::Value value) { service_->set_wire("pose", std::move(value)); });
+    service_->on_wire("target", [this](double value) { target_ = value; });
+    service_->on_wire("both", [this](double value) { service_->set_wire("both", 2 * value); });
+  }
+
+  std::shared_ptr<rr::Service> service_;
+  std::map<std::string, rr::Value> stored_;
+  double secret_ = 0;
+  double target_ = 0;
+  Parts parts_;
+  Parts named_;
+};
+
+rr::NodeOptions parse_options(int argc, char** argv) {
+  rr::NodeOptions options;
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view argument = argv[i];
+    if (argument == "--robotraconteur-disable-message4=true") options.features.v4 = false;
+    if (argument == "--robotraconteur-disable-stringtable=true")
+      options.features.string_table = {.local = false, .standard = false};
+  }
+  return options;
+}
+
+/// Stops the node when standard input ends.
+void watch_input(rr::Node& node, boost::asio::posix::stream_descriptor& input, std::array<char, 64>& buffer) {
+  input.async_read_some(boost::asio::buffer(buffer), [&](const boost::system::error_code& error, std::size_t) {
+    if (error == boost::asio::error::operation_aborted) return;
+    if (error) node.stop();
+    else watch_input(node, input, buffer);
+  });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    rr::Node node("interop.service", parse_options(argc, argv));
+    const Interop interop(node);
+    const std::string port = std::to_string(node.listen("rr+tcp://127.0.0.1:0"));
+    std::cout << R"({"port": )" << port << R"(, "url": "rr+tcp://127.0.0.1:)" << port << R"(/?service=interop"})"
+              << std::endl;
+    boost::asio::posix::stream_descriptor input(node.io_context());
+    boost::system::error_code error;
+    std::array<char, 64> buffer{};
+    input.assign(::dup(STDIN_FILENO), error);
+    if (!error) watch_input(node, input, buffer);  // a file or /dev/null cannot be watched: SIGTERM ends it then
+    node.run();
+  } catch (const std::exception& failure) {
+    std::cerr << "rr-test-service: " << failure.what() << '\n';
+    return 1;
+  }
+}
