@@ -1,0 +1,69 @@
+#include "server/demo/webcams_device.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "server/demo/create_device.hpp"
+#include "server/demo/pose_follower.hpp"
+#include "test/server/node/node_fixture.hpp"
+
+using namespace rrgate::demo;
+using namespace std::chrono_literals;
+
+namespace {
+
+rr::Value field_of(const rr::Value& structure, std::string_view name) {
+  return *structure.get_if<rr::Structure>()->find(name);
+}
+
+}  // namespace
+
+TEST_CASE("two cameras look out from the pose that they are given") {
+  std::unique_ptr<WebcamsDevice> webcams;
+  Pose pose{{300, -200}, 0.4};
+  rr::RunningNode node([&](rr::Node& made) { webcams = std::make_unique<WebcamsDevice>(made, [&] { return pose; }); });
+  const auto host = rr::connect(node.url("Webcam"));
+  const auto names = host.get("WebcamNames");
+  CHECK(names == rr::Value(rr::MapInt32{{{0, "Left"}, {1, "Right"}}}));
+
+  const auto left = host.object("Webcams", "0");
+  CHECK(left.get("Name") == rr::Value("Left"));
+  const auto frame = left.call("CaptureFrame");
+  CHECK(field_of(frame, "width") == rr::Value(std::int32_t{320}));
+  CHECK(field_of(frame, "height") == rr::Value(std::int32_t{240}));
+  CHECK(field_of(frame, "step") == rr::Value(std::int32_t{960}));
+  CHECK(field_of(frame, "data").get_if<rr::Array>()->size() == 960u * 240u);
+  CHECK(left.call("CaptureFrame") == frame);
+  CHECK_FALSE(host.object("Webcams", "1").call("CaptureFrame") == frame);
+
+  node.ask([&](rr::Node&) { return pose.heading = 1.0; });
+  CHECK_FALSE(left.call("CaptureFrame") == frame);
+
+  CHECK(rr::error_of([&] { host.object("Webcams", "2"); }).code == rr::ErrorCode::service_error);
+  CHECK(rr::error_of([&] { left.call("CaptureFrameToBuffer"); }).code == rr::ErrorCode::not_implemented_error);
+  CHECK(rr::error_of([&] { left.call("StartStreaming"); }).code == rr::ErrorCode::not_implemented_error);
+}
+
+TEST_CASE("the cameras follow the robot, and turn by themselves while there is none") {
+  boost::asio::io_context io;
+  const auto run_until = [&](const auto& is_done) {
+    const auto deadline = std::chrono::steady_clock::now() + 10s;
+    while (!is_done() && std::chrono::steady_clock::now() < deadline) io.run_one_for(100ms);
+    return is_done();
+  };
+  std::unique_ptr<CreateDevice> create;
+  auto robot = std::make_unique<rr::RunningNode>([&](rr::Node& made) { create = std::make_unique<CreateDevice>(made); });
+  PoseFollower follower(io, robot->url("Create"));
+  const double before = follower.pose().heading;
+  CHECK(run_until([&] { return follower.pose().heading > before; }));
+
+  rr::connect(robot->url("Create")).call("Drive", 0, 0);
+  CHECK(run_until([&] { return follower.pose().heading == 0; }));
+  auto driver = std::make_unique<rr::RemoteObject>(rr::connect(robot->url("Create")));
+  driver->call("Drive", -300, drive_straight);
+  CHECK(run_until([&] { return follower.pose().position.x < -30; }));
+
+  driver.reset();
+  robot.reset();
+  CHECK(run_until([&] { return follower.pose().heading > 0.01; }));
+  CHECK(follower.pose().position.x < -30);
+}
