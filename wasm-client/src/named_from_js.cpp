@@ -56,11 +56,19 @@ bool FromJs::read_fields(const FieldPath& path, const JsValue& js, const EntityD
   for (const auto& member : entity.members) {
     const auto at = path.field(member.name, type_name);
     std::optional<JsValue> item;
-    if (!field_of(at, js, member.name, item)) return false;
+    if (!field_of(at, js, member.name, item) || !check_there(at, *item, member.type)) return false;
     out.fields.push_back({member.name, {}});
     if (!read(at, *item, member.type, out.fields.back().value)) return false;
   }
   return check_keys(path, js, entity, type_name);
+}
+
+/// A field that may be null may also be left out.
+bool FromJs::check_there(const FieldPath& path, const JsValue& js, const TypeDefinition& type) {
+  const bool may_be_null = type.container != ContainerKind::none || type.type == DataType::structure_t ||
+                           type.type == DataType::varvalue_t;
+  if (may_be_null || js.kind() != JsKind::undefined) return true;
+  return fail(ErrorCode::data_type_error, path, "is missing, expected " + format_type(type));
 }
 
 /// A misspelt field must not be dropped silently.
@@ -135,7 +143,9 @@ bool FromJs::flatten(const FieldPath& path, const JsValue& js, const EntityDefin
     const auto at = path.field(member.name, type_name);
     std::optional<JsValue> item;
     Value value;
-    if (!field_of(at, js, member.name, item) || !read(at, *item, member.type, value)) return false;
+    if (!field_of(at, js, member.name, item) || !check_there(at, *item, member.type) ||
+        !read(at, *item, member.type, value))
+      return false;
     std::size_t expected = item_size(entity.namedarray_type);
     for (const auto size : member.type.sizes) expected *= static_cast<std::size_t>(size);
     if (member.type.type == DataType::namedarray_t)

@@ -64,6 +64,7 @@ class FromJs {
                          std::string_view type_name, Bytes& out);
   bool flatten(const FieldPath& path, const JsValue& js, const EntityDefinition& entity, std::string_view type_name,
                Bytes& out);
+  bool check_there(const FieldPath& path, const JsValue& js, const TypeDefinition& type);
   bool check_keys(const FieldPath& path, const JsValue& js, const EntityDefinition& entity,
                   std::string_view type_name);
 

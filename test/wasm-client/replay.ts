@@ -1,0 +1,105 @@
+// A transport that answers with what a real service once sent. Source: test/golden/transcripts (see their README).
+import { readFileSync } from "node:fs";
+import type { OpenTransport, TransportListener } from "../../wasm-client/dist/index.js";
+
+interface Step {
+  dir: "c>s" | "s>c";
+  hex?: string;
+  payload_hex?: string;
+  http?: string;
+  decoded?: string;
+}
+
+/** Of the client that was recorded. */
+const recorded_node_id = Buffer.from("aaaaaaaabbbbccccddddeeeeeeeeeeee", "hex");
+
+/**
+ * Plays the service's part: whenever the client has sent as many messages as the record says, the answers follow.
+ * Node id and endpoint of the client are random, so they are exchanged in both directions.
+ */
+export class Replay {
+  /** The client's messages as they were recorded, and as they came, with the recorded ids put in. */
+  readonly expected: Buffer[] = [];
+  readonly found: Buffer[] = [];
+  readonly open: OpenTransport;
+  #steps: { dir: string; bytes: Buffer; text: string }[];
+  #listener: TransportListener | undefined;
+  #received = Buffer.alloc(0);
+  #node_id: Buffer | undefined;
+  #endpoint: Buffer | undefined;
+  readonly #recorded_endpoint: Buffer;
+
+  constructor(name: string) {
+    const file = new URL(`../golden/transcripts/${name}.json`, import.meta.url);
+    const { steps } = JSON.parse(readFileSync(file, "utf8")) as { steps: Step[] };
+    this.#steps = steps
+      .filter((step) => step.hex && !step.http)
+      .map((step) => ({
+        dir: step.dir,
+        bytes: Buffer.from(step.payload_hex ?? step.hex!, "hex"),
+        text: step.decoded ?? "",
+      }));
+    const connecting = this.#steps.find(({ text }) => /ep \d+>0 \| (ConnectClientCombined|GetServiceDesc)/.test(text))!;
+    this.#recorded_endpoint = u32(Number(/ep (\d+)>0/.exec(connecting.text)![1]));
+    this.open = (_url, listener) => {
+      this.#listener = listener;
+      queueMicrotask(() => listener.opened());
+      return { send: (bytes) => this.#receive(Buffer.from(bytes)), buffered: 0, close: () => undefined };
+    };
+  }
+
+  /** Whether everything that was recorded has been played. */
+  get is_over(): boolean {
+    return this.#steps.length === 0;
+  }
+
+  #receive(bytes: Buffer): void {
+    this.#received = Buffer.concat([this.#received, bytes]);
+    for (;;) {
+      if (this.#received.length < 8) return;
+      const size = this.#received.readUInt32LE(4);
+      if (this.#received.length < size) return;
+      const message = Buffer.from(this.#received.subarray(0, size));
+      this.#received = Buffer.from(this.#received.subarray(size));
+      this.#take(message);
+    }
+  }
+
+  #take(message: Buffer): void {
+    // Version 2: the sender's node id follows the sizes and the version; later messages name the endpoint.
+    this.#node_id ??= Buffer.from(message.subarray(10, 26));
+    const step = this.#steps.shift();
+    if (step?.dir !== "c>s") throw new Error(`the client sent a message where ${step ? step.text : "nothing"} follows`);
+    if (!this.#endpoint && / ep \d+>0 \| (ConnectClientCombined|GetServiceDesc)/.test(step.text)) {
+      const at = step.bytes.indexOf(this.#recorded_endpoint);
+      this.#endpoint = Buffer.from(message.subarray(at, at + 4));
+    }
+    this.expected.push(step.bytes);
+    this.found.push(this.#exchange(message, false));
+    queueMicrotask(() => this.#play());
+  }
+
+  #play(): void {
+    while (this.#steps[0]?.dir === "s>c") {
+      this.#listener!.received(this.#exchange(this.#steps.shift()!.bytes, true));
+    }
+  }
+
+  #exchange(bytes: Buffer, to_ours: boolean): Buffer {
+    const copy = Buffer.from(bytes);
+    replace(copy, to_ours ? recorded_node_id : this.#node_id, to_ours ? this.#node_id : recorded_node_id);
+    replace(copy, to_ours ? this.#recorded_endpoint : this.#endpoint, to_ours ? this.#endpoint : this.#recorded_endpoint);
+    return copy;
+  }
+}
+
+function u32(value: number): Buffer {
+  const bytes = Buffer.alloc(4);
+  bytes.writeUInt32LE(value);
+  return bytes;
+}
+
+function replace(bytes: Buffer, from: Buffer | undefined, to: Buffer | undefined): void {
+  if (!from || !to) return;
+  for (let at = bytes.indexOf(from); at >= 0; at = bytes.indexOf(from, at + 1)) to.copy(bytes, at);
+}

@@ -1,0 +1,183 @@
+// A service that gives back what it is given, for any definition; ../service.ts says what each member does.
+#include <emscripten/bind.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <map>
+#include <optional>
+
+#include "core/session/service_session.hpp"
+#include "wasm-client/src/js_access.hpp"
+
+#ifdef BOOST_NO_EXCEPTIONS
+namespace boost {
+BOOST_NORETURN void throw_exception(const std::exception&) { std::abort(); }
+BOOST_NORETURN void throw_exception(const std::exception&, const boost::source_location&) { std::abort(); }
+}  // namespace boost
+#endif
+
+namespace {
+
+using emscripten::val;
+using namespace rr;
+
+class TestObject : public ServiceObject {
+ public:
+  explicit TestObject(std::string type) : type_(std::move(type)) {}
+  const std::string& type_name() const override { return type_; }
+
+  Result<std::shared_ptr<ServiceObject>> find_child(const MemberDefinition& objref,
+                                                    const std::optional<std::string>& index) override {
+    if (index == "missing" || index == "99") return make_error(ErrorCode::object_not_found, "no " + *index);
+    const auto type = objref.type.qualified_name.empty() ? type_ : objref.type.qualified_name;
+    auto child = std::make_shared<TestObject>(type);
+    child->values["name"] = index ? objref.name + " " + *index : objref.name;
+    return std::shared_ptr<ServiceObject>(std::move(child));
+  }
+
+  std::map<std::string, Value, std::less<>> values;
+
+ private:
+  std::string type_;
+};
+
+class TestService {
+ public:
+  /// `options`: {definitions: [text], root: qualified type, version, stringTable}
+  TestService(val options, double steady) : directory_(NodeIdentity{random_node_id(), "test.service"}) {
+    set_now(steady);
+    const JsValue js(std::move(options));
+    std::vector<std::string> texts;
+    const auto list = js.field("definitions");
+    for (std::size_t i = 0; list && i < list->length().value_or(0); ++i) texts.push_back(list->at(i)->text().value());
+    auto types = std::make_shared<TypeRegistry>();
+    if (const auto added = types->add(texts, RobdefMode::compat); added.has_error()) return fail(added.error());
+    root_ = std::make_shared<TestObject>(js.field("root")->text().value());
+    MapString attributes;
+    attributes.items.emplace_back("site", Value("dock"));
+    auto service = HostedService::make("test", root_, types, std::move(attributes));
+    if (service.has_error()) return fail(service.error());
+    if (const auto added = directory_.add(*service); added.has_error()) return fail(added.error());
+    types_ = std::move(types);
+    ServiceSessionOptions session_options;
+    auto& features = session_options.connection.features;
+    if (js.field("version")->number() == 2) features.v4 = false;
+    if (!js.field("stringTable")->is_true()) features.string_table = {.local = false, .standard = false};
+    session_.emplace(directory_, session_options, now_);
+  }
+
+  val error() const { return make_js_text(error_); }
+
+  void set_now(double steady) {
+    now_.steady = TimePoint(std::chrono::duration_cast<TimePoint::duration>(std::chrono::duration<double, std::milli>(steady)));
+    now_.utc.seconds = static_cast<std::int64_t>(steady / 1000);
+    now_.utc.nanoseconds = static_cast<std::int32_t>(std::fmod(steady, 1000) * 1e6);
+  }
+
+  std::uintptr_t receive_buffer(std::size_t size) {
+    received_.resize(size);
+    return reinterpret_cast<std::uintptr_t>(received_.data());
+  }
+  void handle_bytes() {
+    session_->handle_bytes(received_, now_);
+    carry_out();
+  }
+  void release(val path) { session_->release_path(JsValue(std::move(path)).text().value(), now_); }
+  void stop() { session_->close_service(now_); }
+  bool wants_close() const { return session_->wants_close(); }
+
+  val poll_transmit() {
+    const auto slices = session_->poll_transmit();
+    return slices.empty() ? val::undefined() : make_js_view(slices.front());
+  }
+  void handle_transmitted(std::size_t size) {
+    session_->handle_transmitted(size, now_);
+    carry_out();
+  }
+
+ private:
+  void fail(const Error& error) { error_ = error.qualified_name() + ": " + error.message; }
+
+  void carry_out() {
+    while (auto event = session_->poll_event()) {
+      if (const auto* called = std::get_if<Called>(&*event)) answer(*called);
+      if (const auto* wire = std::get_if<WireConnected>(&*event)) {
+        auto& values = static_cast<TestObject&>(*wire->object).values;
+        if (const auto found = values.find(wire->member->name); found != values.end())
+          (void)session_->send_wire(wire->path, *wire->member, found->second, now_);
+      }
+      if (const auto* wire = std::get_if<WireReceived>(&*event))
+        static_cast<TestObject&>(*wire->object).values[wire->member->name] = wire->value;
+    }
+  }
+
+  void answer(const Called& called) {
+    const auto result = result_of(called);
+    if (result) session_->reply(called.id, *result, now_);
+  }
+
+  std::optional<Result<Value>> result_of(const Called& called) {
+    auto& values = static_cast<TestObject&>(*called.object).values;
+    const auto& name = called.member->name;
+    switch (called.kind) {
+      case CallKind::property_set:
+      case CallKind::poke_out:
+        values[name] = called.arguments.front();
+        return Value{};
+      case CallKind::property_get:
+      case CallKind::peek_in:
+      case CallKind::peek_out: {
+        const auto found = values.find(name);
+        return found != values.end() ? found->second : default_value(called.member->type, *types_);
+      }
+      case CallKind::function: return call(name, called.arguments, called.member->type);
+    }
+    return Value{};
+  }
+
+  std::optional<Result<Value>> call(std::string_view name, const std::vector<Value>& arguments,
+                                    const TypeDefinition& type) {
+    if (name == "hang") return std::nullopt;
+    if (name == "stop") return session_->close_service(now_), std::nullopt;
+    if (name == "fail") {
+      Error error{ErrorCode::remote_error, std::string(*arguments[1].to_text()), std::string(*arguments[0].to_text())};
+      error.sub_name = "detail";
+      error.param = std::make_shared<const Value>(std::vector<std::int32_t>{1, 2});
+      return error;
+    }
+    const auto* root = types_->find_entity(root_->type_name());
+    if (name.starts_with("fire_"))
+      if (const auto* event = root->find_member(name.substr(5)))
+        (void)session_->send_event("test", *event, arguments, now_);
+    if (name.starts_with("publish_"))
+      if (const auto* wire = root->find_member(name.substr(8)))
+        (void)session_->send_wire("test", *wire, arguments.front(), now_);
+    if (name == "release") session_->release_path(*arguments.front().to_text(), now_);
+    if (type.type == DataType::void_t || arguments.empty()) return Value{};
+    return arguments.front();
+  }
+
+  ServiceDirectory directory_;
+  std::shared_ptr<TestObject> root_;
+  std::shared_ptr<const TypeRegistry> types_;
+  std::optional<ServiceSession> session_;
+  std::string error_;
+  Now now_;
+  Bytes received_;
+};
+
+}  // namespace
+
+EMSCRIPTEN_BINDINGS(rrgate_test_service) {
+  emscripten::class_<TestService>("Service")
+      .constructor<val, double>()
+      .function("error", &TestService::error)
+      .function("set_now", &TestService::set_now)
+      .function("receive_buffer", &TestService::receive_buffer)
+      .function("handle_bytes", &TestService::handle_bytes)
+      .function("release", &TestService::release)
+      .function("stop", &TestService::stop)
+      .function("wants_close", &TestService::wants_close)
+      .function("poll_transmit", &TestService::poll_transmit)
+      .function("handle_transmitted", &TestService::handle_transmitted);
+}

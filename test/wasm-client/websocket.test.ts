@@ -1,0 +1,93 @@
+// The WebSocket transport against a server in the same process.
+import { createRequire } from "node:module";
+import type { AddressInfo } from "node:net";
+import { connect, ErrorCode } from "../../wasm-client/dist/index.js";
+import { failure } from "./service.js";
+
+interface Socket {
+  on(event: string, heard: (...args: any[]) => void): void;
+  send(data: string | Uint8Array): void;
+  close(code?: number, reason?: string): void;
+  terminate(): void;
+}
+interface Server extends Socket {
+  address(): AddressInfo;
+  close(done?: () => void): void;
+}
+const { WebSocketServer } = createRequire(new URL("../../wasm-client/package.json", import.meta.url))("ws") as {
+  WebSocketServer: new (options: object) => Server;
+};
+
+let server: Server;
+let url: string;
+let upgrade: { url: string; headers: Record<string, string | undefined> };
+let greet: (socket: Socket) => void;
+
+beforeEach(async () => {
+  greet = () => undefined;
+  server = new WebSocketServer({ host: "127.0.0.1", port: 0, handleProtocols: (offered: Set<string>) => [...offered][0] });
+  server.on("connection", (socket: Socket, request: typeof upgrade) => {
+    upgrade = request;
+    greet(socket);
+  });
+  await new Promise((resolve) => server.on("listening", resolve as () => void));
+  url = `ws://127.0.0.1:${server.address().port}/devices/create?service=Create`;
+});
+afterEach(() => new Promise<void>((resolve) => server.close(() => resolve())));
+
+it("asks for the subprotocol, sends no Origin, keeps path and query, and begins with CreateConnection", async () => {
+  const first = new Promise<Buffer>((resolve) => {
+    greet = (socket) => socket.on("message", (data: Buffer) => (resolve(data), socket.close(1000)));
+  });
+  const connecting = failure(connect(url));
+  const bytes = await first;
+  expect(bytes.subarray(0, 4).toString()).toBe("RRAC");
+  expect(upgrade.url).toBe("/devices/create?service=Create");
+  expect(upgrade.headers["sec-websocket-protocol"]).toBe("robotraconteur.robotraconteur.com");
+  expect(upgrade.headers["origin"]).toBeUndefined();
+  await connecting;
+});
+
+it("says why the server closed", async () => {
+  greet = (socket) => socket.close(1013, "device offline: create: connection refused");
+  const error = await failure(connect(url));
+  expect(error.code).toBe(ErrorCode.ConnectionError);
+  expect(error.message).toMatch(/^the connection to ws:\/\/127\.0\.0\.1:\d+\/devices\/create was closed: device offline: create/);
+});
+
+it("says so where the server gives no reason", async () => {
+  greet = (socket) => socket.terminate();
+  expect((await failure(connect(url))).message).toContain("WebSocket code 1006");
+});
+
+it("says where it could not connect to", async () => {
+  const { port } = server.address();
+  await new Promise<void>((resolve) => server.close(() => resolve()));
+  const error = await failure(connect(url));
+  expect(error.code).toBe(ErrorCode.ConnectionError);
+  expect(error.message).toContain(`could not connect to ws://127.0.0.1:${port}/devices/create`);
+  server = new WebSocketServer({ host: "127.0.0.1", port: 0 });
+});
+
+it("refuses text frames", async () => {
+  const closed = new Promise<number>((resolve) => {
+    greet = (socket) => {
+      socket.on("close", resolve);
+      socket.send("hello");
+    };
+  });
+  await failure(connect(url));
+  expect(await closed).toBe(1003);
+});
+
+it("lets go of the socket when connecting is given up", async () => {
+  const abort = new AbortController();
+  const closed = new Promise((resolve) => {
+    greet = (socket) => {
+      socket.on("close", resolve);
+      abort.abort(new Error("enough"));
+    };
+  });
+  expect((await failure(connect(url, { signal: abort.signal }))).message).toBe("enough");
+  await closed;
+});
