@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "core/session/service_session.hpp"
+#include "core/support/random.hpp"
 #include "wasm-client/src/js_access.hpp"
 
 #ifdef BOOST_NO_EXCEPTIONS
@@ -46,24 +47,8 @@ class TestService {
   /// `options`: {definitions: [text], root: qualified type, version, stringTable}
   TestService(val options, double steady) : directory_(NodeIdentity{random_node_id(), "test.service"}) {
     set_now(steady);
-    const JsValue js(std::move(options));
-    std::vector<std::string> texts;
-    const auto list = js.field("definitions");
-    for (std::size_t i = 0; list && i < list->length().value_or(0); ++i) texts.push_back(list->at(i)->text().value());
-    auto types = std::make_shared<TypeRegistry>();
-    if (const auto added = types->add(texts, RobdefMode::compat); added.has_error()) return fail(added.error());
-    root_ = std::make_shared<TestObject>(js.field("root")->text().value());
-    MapString attributes;
-    attributes.items.emplace_back("site", Value("dock"));
-    auto service = HostedService::make("test", root_, types, std::move(attributes));
-    if (service.has_error()) return fail(service.error());
-    if (const auto added = directory_.add(*service); added.has_error()) return fail(added.error());
-    types_ = std::move(types);
-    ServiceSessionOptions session_options;
-    auto& features = session_options.connection.features;
-    if (js.field("version")->number() == 2) features.v4 = false;
-    if (!js.field("stringTable")->is_true()) features.string_table = {.local = false, .standard = false};
-    session_.emplace(directory_, session_options, now_);
+    if (const auto started = start(JsValue(std::move(options))); started.has_error())
+      error_ = started.error().qualified_name() + ": " + started.error().message;
   }
 
   val error() const { return make_js_text(error_); }
@@ -96,7 +81,26 @@ class TestService {
   }
 
  private:
-  void fail(const Error& error) { error_ = error.qualified_name() + ": " + error.message; }
+  Result<> start(const JsValue& options) {
+    std::vector<std::string> texts;
+    const auto list = options.field("definitions");
+    for (std::size_t i = 0; i < list->length().value_or(0); ++i) texts.push_back(*list->at(i)->text());
+    auto types = std::make_shared<TypeRegistry>();
+    if (auto added = types->add(texts, RobdefMode::compat); added.has_error()) return added;
+    root_ = std::make_shared<TestObject>(*options.field("root")->text());
+    MapString attributes;
+    attributes.items.emplace_back("site", Value("dock"));
+    auto service = HostedService::make("test", root_, types, std::move(attributes));
+    if (service.has_error()) return service.error();
+    if (auto added = directory_.add(*service); added.has_error()) return added;
+    types_ = std::move(types);
+    ServiceSessionOptions session_options;
+    auto& features = session_options.connection.features;
+    if (options.field("version")->number() == 2) features.v4 = false;
+    if (!options.field("stringTable")->is_true()) features.string_table = {.local = false, .standard = false};
+    session_.emplace(directory_, session_options, now_);
+    return {};
+  }
 
   void carry_out() {
     while (auto event = session_->poll_event()) {
