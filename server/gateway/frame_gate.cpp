@@ -13,7 +13,8 @@ rr::Result<std::size_t> FrameGate::pass(rr::ByteSpan bytes) {
     if (left_ == 0) {
       const auto start = bytes.subspan(passed).first(std::min(bytes.size() - passed, rr::frame_start_size));
       if (auto checked = rr::check_frame_start(start, limit_); !checked) {
-        is_too_large_ = start.size() >= 8 && rr::frame_message_size(start) > limit_;
+        is_too_large_ = start.size() >= 8 && rr::as_text(start.first(4)) == rr::frame_magic &&
+                        rr::frame_message_size(start) > limit_;
         return checked.error();
       }
       if (start.size() < rr::frame_start_size) return passed;

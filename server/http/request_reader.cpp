@@ -23,11 +23,19 @@ ReadRequest refuse_for(const boost::beast::error_code& error, const RequestLimit
 RequestReader::RequestReader(ByteStream& stream, RequestLimits limits, Watchdog& watchdog)
     : stream_(stream), limits_(limits), limit_(watchdog, [this] { stream_.cancel(); }) {}
 
+/// Beast's own header_limit is a few bytes generous; ours counts every byte up to and with the empty line.
+bool RequestReader::is_header_too_long(std::size_t consumed) const {
+  const auto text = rr::as_text(buffer_);
+  const auto end = text.find("\r\n\r\n");
+  return consumed + (end == std::string_view::npos ? text.size() : end + 4) > limits_.header_bytes;
+}
+
 awaitable<ReadRequest> RequestReader::next() {
   http::request_parser<http::string_body> parser;
-  parser.header_limit(static_cast<std::uint32_t>(limits_.header_bytes));
+  parser.header_limit(static_cast<std::uint32_t>(limits_.header_bytes) + 1024);
   parser.body_limit(limits_.body_bytes);
   parser.eager(true);
+  std::size_t consumed = 0;  // of the header
   // The first request follows the first bytes of the connection, so the short limit holds for it from the start.
   bool is_started = std::exchange(is_first_, false) || !buffer_.empty();
   limit_.arm(is_started ? limits_.header_timeout : limits_.idle_timeout);
@@ -35,19 +43,16 @@ awaitable<ReadRequest> RequestReader::next() {
   while (!parser.is_done()) {
     if (!buffer_.empty()) {
       boost::beast::error_code error;
-      const auto used = parser.put(boost::asio::const_buffer(buffer_.data(), buffer_.size()), error);
+      if (!parser.is_header_done() && is_header_too_long(consumed)) error = http::error::header_limit;
+      const auto used = error ? 0 : parser.put(boost::asio::const_buffer(buffer_.data(), buffer_.size()), error);
       buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(used));
+      consumed += used;
       if (error && error != http::error::need_more) {
         limit_.disarm();
         co_return refuse_for(error, limits_);
       }
       if (parser.is_done()) break;
-      if (!error && !buffer_.empty()) continue;
-      // Beast counts a header only once it is whole, or fills a buffer of that size.
-      if (!parser.is_header_done() && buffer_.size() >= limits_.header_bytes) {
-        limit_.disarm();
-        co_return refuse_for(http::error::header_limit, limits_);
-      }
+      if (used > 0 && !buffer_.empty()) continue;
     }
     const auto read = co_await stream_.read_some(chunk);
     if (read.error || read.is_end()) {

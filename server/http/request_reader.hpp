@@ -33,6 +33,8 @@ class RequestReader {
   rr::ByteSpan unread() const { return buffer_; }
 
  private:
+  bool is_header_too_long(std::size_t consumed) const;
+
   ByteStream& stream_;
   RequestLimits limits_;
   Deadline limit_;

@@ -63,6 +63,8 @@ TEST_CASE("anything but a message start is refused at its first wrong byte") {
     CHECK_FALSE(gate.is_too_large());
   };
   refuses({'R', 'R', 'X'});
+  const auto text = rr::as_bytes("not a message");
+  refuses(rr::Bytes(text.begin(), text.end()));
   refuses(message(16, 3));
   auto small = message(16);
   small[4] = 15;

@@ -2,7 +2,6 @@
 
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/post.hpp>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "server/log/log.hpp"
@@ -53,15 +52,21 @@ void TestGateway::restart_device(std::size_t index) {
   done.get_future().wait();
 }
 
-std::string TestGateway::wait_for_state(std::string_view state, std::size_t index) {
+nlohmann::json TestGateway::wait_for_device(std::size_t index,
+                                            const std::function<bool(const nlohmann::json&)>& is_wanted) {
   const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(10);
   TestClient client(port_);
+  nlohmann::json device;
   while (std::chrono::steady_clock::now() < give_up) {
     client.send("GET /api/v1/devices HTTP/1.1\r\nHost: gw\r\n\r\n");
-    const auto devices = nlohmann::json::parse(client.receive_response().body).at("devices");
-    if (devices.at(index).at("state") == std::string(state)) return devices.at(index).dump();
+    device = nlohmann::json::parse(client.receive_response().body).at("devices").at(index);
+    if (is_wanted(device)) return device;
   }
-  throw std::runtime_error("device not " + std::string(state) + " within 10 s");
+  throw std::runtime_error("device not as wanted within 10 s: " + device.dump());
+}
+
+std::string TestGateway::wait_for_state(std::string_view state, std::size_t index) {
+  return wait_for_device(index, [&](const auto& device) { return device["state"] == std::string(state); }).dump();
 }
 
 std::future<void> TestGateway::stop() {

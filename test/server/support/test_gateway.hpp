@@ -4,6 +4,7 @@
 #include <boost/asio/io_context.hpp>
 #include <future>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <thread>
 
@@ -25,7 +26,9 @@ class TestGateway {
   void end_device(std::size_t index = 0);
   void restart_device(std::size_t index = 0);
 
-  /// Asks /api/v1/devices until the device is in this state; returns its JSON. Throws after 10 s.
+  /// Asks /api/v1/devices until the device's entry is as wanted; returns it. Throws after 10 s.
+  nlohmann::json wait_for_device(std::size_t index, const std::function<bool(const nlohmann::json&)>& is_wanted);
+  /// Until its state is this one; returns its JSON text.
   std::string wait_for_state(std::string_view state, std::size_t index = 0);
 
   /// Gateway::stop; the future is ready when everything has ended.

@@ -1,0 +1,105 @@
+"""rrgate as a process: exit codes, messages, signals. Usage: process_test.py PATH_TO_RRGATE"""
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import unittest
+
+RRGATE = sys.argv.pop()
+
+
+def run(*arguments):
+    return subprocess.run([RRGATE, *arguments], capture_output=True, text=True, timeout=30)
+
+
+class Files(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+
+    def file(self, text):
+        path = os.path.join(self.folder.name, "gateway.json")
+        with open(path, "w") as out:
+            out.write(text if isinstance(text, str) else json.dumps(text))
+        return path
+
+
+class CommandLine(Files):
+    def test_help_and_version(self):
+        self.assertEqual(run("--version").returncode, 0)
+        self.assertRegex(run("--version").stdout, r"^rrgate \d+\.\d+\.\d+\n$")
+        help_text = run("--help")
+        self.assertEqual(help_text.returncode, 0)
+        self.assertIn("serve --config FILE", help_text.stdout)
+
+    def test_mistakes_end_with_2(self):
+        for arguments in [(), ("swerve",), ("serve",), ("serve", "--confg", "x"), ("serve", "--config"), ("demo", "--port", "x")]:
+            with self.subTest(arguments):
+                result = run(*arguments)
+                self.assertEqual(result.returncode, 2)
+                self.assertTrue(result.stderr)
+
+    def test_a_bad_configuration_is_listed_and_ends_with_2(self):
+        path = self.file({"listen": ["8080"], "devices": [{"name": "a", "url": "rr+tpc://h/?service=s"}], "colour": 1})
+        for arguments in [("serve", "--config", path), ("check-config", path)]:
+            result = run(*arguments)
+            self.assertEqual(result.returncode, 2)
+            lines = result.stderr.splitlines()
+            self.assertEqual(len(lines), 3)
+            self.assertTrue(all(line.startswith("gateway.json: /") for line in lines), lines)
+            self.assertIn("/devices/0/url: ", result.stderr)
+            self.assertIn("known: rr+tcp", result.stderr)
+
+    def test_a_good_configuration(self):
+        result = run("check-config", self.file({"listen": ["127.0.0.1:1"], "devices": []}))
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+
+    def test_an_address_in_use_ends_with_1(self):
+        with socket.create_server(("127.0.0.1", 0)) as taken:
+            port = taken.getsockname()[1]
+            result = run("serve", "--config", self.file({"listen": [f"127.0.0.1:{port}"], "devices": []}))
+        self.assertEqual(result.returncode, 1)
+        self.assertIn(f"127.0.0.1:{port}", result.stderr)
+
+
+class Serving(Files):
+    def start(self, **more):
+        config = {"listen": ["127.0.0.1:0"], "devices": [], "log": {"format": "json"}, **more}
+        process = subprocess.Popen([RRGATE, "serve", "--config", self.file(config)], stderr=subprocess.PIPE, text=True)
+        self.addCleanup(process.stderr.close)
+        self.addCleanup(process.wait)
+        self.addCleanup(process.kill)
+        for line in process.stderr:
+            event = json.loads(line)
+            if event["event"] == "listening":
+                return process, int(re.search(r":(\d+)$", event["address"]).group(1))
+        self.fail("it ended before it listened")
+
+    def test_signals_end_it_with_0(self):
+        for number in (signal.SIGTERM, signal.SIGINT):
+            process, port = self.start()
+            with socket.create_connection(("127.0.0.1", port)) as client:
+                client.sendall(b"GET /healthz HTTP/1.1\r\nHost: gw\r\n\r\n")
+                self.assertTrue(client.recv(4096).startswith(b"HTTP/1.1 200 OK\r\n"))
+                process.send_signal(number)
+                self.assertEqual(process.wait(timeout=10), 0)
+                self.assertEqual(client.recv(4096), b"")
+            events = [json.loads(line)["event"] for line in process.stderr]
+            self.assertEqual(events[-1], "stopped")
+
+    def test_web_root_counts_from_the_configuration_file(self):
+        with open(os.path.join(self.folder.name, "index.html"), "w") as page:
+            page.write("<p>here")
+        _, port = self.start(web_root=".")
+        with socket.create_connection(("127.0.0.1", port)) as client:
+            client.sendall(b"GET / HTTP/1.1\r\nHost: gw\r\nConnection: close\r\n\r\n")
+            answer = b"".join(iter(lambda: client.recv(4096), b""))
+        self.assertTrue(answer.endswith(b"<p>here"), answer)
+
+
+if __name__ == "__main__":
+    unittest.main()
