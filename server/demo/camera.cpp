@@ -10,28 +10,30 @@ namespace {
 
 /// Something upright that a column's ray meets.
 struct Hit {
-  double depth = 0;    ///< along the camera's axis, mm
+  double depth = 0;  ///< along the camera's axis, mm
   double height = 0;
-  Color color;         ///< lit
+  Color color;  ///< lit
 };
 
 struct View {
   Point position;
-  Point axis;     ///< unit vector, where the camera looks
-  Point right;    ///< unit vector, to the right of it
+  Point axis;   ///< unit vector, where the camera looks
+  Point right;  ///< unit vector, to the right of it
   double focal_length;
   double center_column;
   double center_row;
 };
 
-constexpr double near_plane = 5;         // mm; nothing nearer is drawn
-constexpr double fog_distance = 9'000;   // mm at which colours are half gone
-constexpr double panel_width = 500;      // mm between the joints on walls
-constexpr double tile_size = 500;        // mm, floor
-constexpr Point light{0.5547, 0.8321};   // unit vector towards the light
+constexpr double near_plane = 5;        // mm; nothing nearer is drawn
+constexpr double fog_distance = 9'000;  // mm at which colours are half gone
+constexpr double panel_width = 500;     // mm between the joints on walls
+constexpr double tile_size = 500;       // mm, floor
+constexpr Point light{0.5547, 0.8321};  // unit vector towards the light
 constexpr Color haze{206, 214, 224};
 
-std::uint8_t to_channel(double value) { return static_cast<std::uint8_t>(std::clamp(value, 0.0, 255.0)); }
+std::uint8_t to_channel(double value) {
+  return static_cast<std::uint8_t>(std::clamp(value, 0.0, 255.0));
+}
 
 Color mix(Color a, Color b, double share_of_b) {
   const auto channel = [&](std::uint8_t from, std::uint8_t to) { return to_channel(from + (to - from) * share_of_b); };
@@ -42,10 +44,14 @@ Color scaled(Color color, double factor) {
   return {to_channel(color.red * factor), to_channel(color.green * factor), to_channel(color.blue * factor)};
 }
 
-Color in_fog(Color color, double depth) { return mix(color, haze, depth / (depth + fog_distance)); }
+Color in_fog(Color color, double depth) {
+  return mix(color, haze, depth / (depth + fog_distance));
+}
 
 /// Brighter the more a surface faces the light; never dark.
-Color lit(Color color, Point normal) { return scaled(color, 0.8 + 0.2 * dot(normal, light)); }
+Color lit(Color color, Point normal) {
+  return scaled(color, 0.8 + 0.2 * dot(normal, light));
+}
 
 std::optional<Hit> cast(const Wall& wall, const View& view, Point ray) {
   const Point along = wall.to - wall.from;
@@ -153,7 +159,9 @@ Color Image::at(int column, int row) const {
   return {pixel[2], pixel[1], pixel[0]};
 }
 
-double Camera::focal_length() const { return width / 2.0 / std::tan(field_of_view / 2); }
+double Camera::focal_length() const {
+  return width / 2.0 / std::tan(field_of_view / 2);
+}
 
 Image render(const World& world, const Pose& pose, const Camera& camera) {
   const Point ahead{std::cos(pose.heading), std::sin(pose.heading)};

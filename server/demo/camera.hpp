@@ -21,10 +21,10 @@ struct Image {
 
 /// How a camera is mounted on the robot and what it sees.
 struct Camera {
-  Point offset;                   ///< from the robot's centre: x ahead, y to the left; mm
-  double yaw = 0;                 ///< radians to the left of the robot's heading
-  double height = 220;            ///< above the floor; below every wall's top, so that the horizon is never seen over walls
-  double field_of_view = 1.2;     ///< radians, horizontally
+  Point offset;         ///< from the robot's centre: x ahead, y to the left; mm
+  double yaw = 0;       ///< radians to the left of the robot's heading
+  double height = 220;  ///< above the floor; below every wall's top, so that the horizon is never seen over walls
+  double field_of_view = 1.2;  ///< radians, horizontally
   int width = 320;
   int height_pixels = 240;
 

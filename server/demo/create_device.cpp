@@ -12,7 +12,9 @@ namespace {
 constexpr std::chrono::milliseconds publish_period{50};
 constexpr double metres = 0.001;  // per millimetre: the simulation's unit is the robot's, the service's is the metre
 
-std::int32_t rounded(double value) { return static_cast<std::int32_t>(std::lround(value)); }
+std::int32_t rounded(double value) {
+  return static_cast<std::int32_t>(std::lround(value));
+}
 
 rr::Value to_state(const Robot& robot) {
   return rr::Structure{"experimental.simulatedcreate.RobotState",

@@ -7,9 +7,9 @@
 int main(int argc, char** argv) {
   using namespace rrgate::demo;
   int exit_code = 0;
-  const auto options = parse_options({"rrgate-demo-create", "A simulated iRobot Create, for Robot Raconteur.",
-                                      {"127.0.0.1", 52222, {}}},
-                                     argc, argv, exit_code);
+  const auto options =
+      parse_options({"rrgate-demo-create", "A simulated iRobot Create, for Robot Raconteur.", {"127.0.0.1", 52222, {}}},
+                    argc, argv, exit_code);
   if (!options) return exit_code;
   try {
     rr::Node node("rrgate.demo.create");

@@ -52,8 +52,10 @@ std::optional<Options> parse_options(const Program& program, int argc, char** ar
     std::string problem;
     if (equals != std::string_view::npos)
       problem = read_option(program, name.substr(0, equals), name.substr(equals + 1), options);
-    else if (i + 1 < argc) problem = read_option(program, name, argv[++i], options);
-    else problem = "option " + rr::quoted(name) + " needs a value, or is unknown; --help lists all";
+    else if (i + 1 < argc)
+      problem = read_option(program, name, argv[++i], options);
+    else
+      problem = "option " + rr::quoted(name) + " needs a value, or is unknown; --help lists all";
     if (problem.empty()) continue;
     std::cerr << program.name << ": " << problem << '\n';
     exit_code = 2;
@@ -64,10 +66,12 @@ std::optional<Options> parse_options(const Program& program, int argc, char** ar
 
 std::string service_url(const std::string& host, std::uint16_t port, std::string_view service) {
   const bool is_everywhere = host == "0.0.0.0" || host == "::" || host == "[::]";
-  return "rr+tcp://" + rr::format_host_port(is_everywhere ? "127.0.0.1" : host, port) + "/?service=" +
-         std::string(service);
+  return "rr+tcp://" + rr::format_host_port(is_everywhere ? "127.0.0.1" : host, port) +
+         "/?service=" + std::string(service);
 }
 
-std::string listen_url(const Options& options) { return "rr+tcp://" + rr::format_host_port(options.host, options.port); }
+std::string listen_url(const Options& options) {
+  return "rr+tcp://" + rr::format_host_port(options.host, options.port);
+}
 
 }  // namespace rrgate::demo

@@ -23,7 +23,9 @@ PoseFollower::PoseFollower(boost::asio::io_context& io, std::string url)
   connect();
 }
 
-PoseFollower::~PoseFollower() { stop(); }
+PoseFollower::~PoseFollower() {
+  stop();
+}
 
 Pose PoseFollower::pose() const {
   if (is_following_) return pose_;
@@ -70,7 +72,8 @@ void PoseFollower::follow(rr::ClientConnection& connection) {
   const auto take = [alive = alive_](const rr::Value& value, rr::TimeSpec) {
     const auto* state = value.get_if<rr::Structure>();
     if (!*alive || !state) return;
-    (*alive)->pose_ = {Point{number_in(*state, "x"), number_in(*state, "y")} * millimetres, number_in(*state, "heading")};
+    (*alive)->pose_ = {Point{number_in(*state, "x"), number_in(*state, "y")} * millimetres,
+                       number_in(*state, "heading")};
     (*alive)->is_following_ = true;
   };
   // A robot that does not tell where it is stays unknown; the connection is kept all the same.

@@ -8,7 +8,7 @@ namespace rrgate::demo {
 
 namespace {
 
-constexpr double touch_distance = 0.5;  // mm: nearer than this counts as touching
+constexpr double touch_distance = 0.5;                          // mm: nearer than this counts as touching
 constexpr double bumper_overlap = 15 * std::numbers::pi / 180;  // straight ahead presses both
 
 double wrap_angle(double angle) {

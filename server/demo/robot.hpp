@@ -39,9 +39,9 @@ class Robot {
   explicit Robot(World world, Pose start = {});
 
   /// Drives until told otherwise. `velocity` is that of the robot's centre in mm/s (spinning: of the wheels), forwards
-  /// positive; `radius_mm` that of the centre's circle, positive to the left, or one of the constants above; 0 is straight.
-  /// Velocities beyond +-500 and radii beyond +-2000 count as these limits, as on the robot. Where a wheel would
-  /// have to be faster than 500 mm/s both are slowed: the arc stays.
+  /// positive; `radius_mm` that of the centre's circle, positive to the left, or one of the constants above; 0 is
+  /// straight. Velocities beyond +-500 and radii beyond +-2000 count as these limits, as on the robot. Where a wheel
+  /// would have to be faster than 500 mm/s both are slowed: the arc stays.
   void drive(std::int16_t velocity, std::int16_t radius_mm);
 
   /// Lifts the robot to `pose`, which must be clear, and lets it stand there. The totals stay.

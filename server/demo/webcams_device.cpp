@@ -7,11 +7,9 @@ namespace rrgate::demo {
 namespace {
 
 rr::Value to_value(Image image) {
-  return rr::Structure{"experimental.createwebcam2.WebcamImage",
-                       {{"width", image.width},
-                        {"height", image.height},
-                        {"step", image.step},
-                        {"data", std::move(image.data)}}};
+  return rr::Structure{
+      "experimental.createwebcam2.WebcamImage",
+      {{"width", image.width}, {"height", image.height}, {"step", image.step}, {"data", std::move(image.data)}}};
 }
 
 [[noreturn]] void refuse(const char* what) {

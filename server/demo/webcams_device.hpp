@@ -1,5 +1,5 @@
-// The service of the demo cameras: the webcams of the Robot Raconteur paper's Example 2, on the demo robot. Layer: demo.
-// Definition: robdef/modern/experimental.createwebcam2.robdef.
+// The service of the demo cameras: the webcams of the Robot Raconteur paper's Example 2, on the demo robot. Layer:
+// demo. Definition: robdef/modern/experimental.createwebcam2.robdef.
 #pragma once
 
 #include <functional>

@@ -8,10 +8,10 @@
 int main(int argc, char** argv) {
   using namespace rrgate::demo;
   int exit_code = 0;
-  const auto options =
-      parse_options({"rrgate-demo-webcams", "Two simulated webcams on the demo robot, for Robot Raconteur.",
-                     {"127.0.0.1", 52223, "rr+tcp://127.0.0.1:52222/?service=Create"}},
-                    argc, argv, exit_code);
+  const auto options = parse_options({"rrgate-demo-webcams",
+                                      "Two simulated webcams on the demo robot, for Robot Raconteur.",
+                                      {"127.0.0.1", 52223, "rr+tcp://127.0.0.1:52222/?service=Create"}},
+                                     argc, argv, exit_code);
   if (!options) return exit_code;
   try {
     rr::Node node("rrgate.demo.webcams");

@@ -24,15 +24,19 @@ class Running {
 BlockingConnection::BlockingConnection(std::string_view url, ClientOptions options) {
   std::optional<Error> failure;
   ClientConnection::open(io_, url, std::move(options), [&](Result<std::shared_ptr<ClientConnection>> opened) {
-    if (opened) connection_ = std::move(*opened);
-    else failure = opened.error();
+    if (opened)
+      connection_ = std::move(*opened);
+    else
+      failure = opened.error();
   });
   while (!connection_ && !failure) io_.run_one();
   if (failure) throw ClientException(*failure);
   connection_->on_closed([this](const Error& reason) { close_reason_ = reason; });
 }
 
-BlockingConnection::~BlockingConnection() { close(); }
+BlockingConnection::~BlockingConnection() {
+  close();
+}
 
 void BlockingConnection::run_for(std::chrono::milliseconds duration) {
   (void)run_until([] { return false; }, duration);
@@ -49,8 +53,7 @@ bool BlockingConnection::run_until(const std::function<bool()>& is_done, std::ch
   return true;
 }
 
-Value BlockingConnection::wait_for(
-    const std::function<void(ClientConnection&, ClientConnection::Completion)>& start) {
+Value BlockingConnection::wait_for(const std::function<void(ClientConnection&, ClientConnection::Completion)>& start) {
   if (close_reason_) throw ClientException(*close_reason_);
   const Running running(is_running_);
   std::optional<Result<Value>> result;

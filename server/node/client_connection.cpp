@@ -29,14 +29,15 @@ void ClientConnection::open(asio::io_context& io, std::string_view url, ClientOp
   if (options.connection.self.id.is_any()) options.connection.self.id = random_node_id();
   const auto deadline = std::chrono::steady_clock::now() + options.connect_timeout;
   const auto timeout = options.connect_timeout;
-  tcp_connect(io, parsed->host, parsed->port, timeout,
-              [options = std::move(options), deadline, done = std::move(done)](Result<asio::ip::tcp::socket> socket) mutable {
-                if (!socket) return done(socket.error());
-                const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
-                    deadline - std::chrono::steady_clock::now());
-                options.connect_timeout = std::max(left, std::chrono::milliseconds(1));
-                std::make_shared<ClientConnection>(std::move(*socket), std::move(options), std::move(done))->start();
-              });
+  tcp_connect(
+      io, parsed->host, parsed->port, timeout,
+      [options = std::move(options), deadline, done = std::move(done)](Result<asio::ip::tcp::socket> socket) mutable {
+        if (!socket) return done(socket.error());
+        const auto left =
+            std::chrono::duration_cast<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
+        options.connect_timeout = std::max(left, std::chrono::milliseconds(1));
+        std::make_shared<ClientConnection>(std::move(*socket), std::move(options), std::move(done))->start();
+      });
 }
 
 void ClientConnection::expect(RequestId id, Completion done) {

@@ -6,23 +6,33 @@ namespace rr {
 
 namespace {
 
-bool is_integer(DataType type) { return type >= DataType::int8_t && type <= DataType::uint64_t; }
-bool is_signed(DataType type) {
-  return type == DataType::int8_t || type == DataType::int16_t || type == DataType::int32_t || type == DataType::int64_t;
+bool is_integer(DataType type) {
+  return type >= DataType::int8_t && type <= DataType::uint64_t;
 }
-bool is_floating(DataType type) { return type == DataType::double_t || type == DataType::single_t; }
-bool is_complex(DataType type) { return type == DataType::cdouble_t || type == DataType::csingle_t; }
+bool is_signed(DataType type) {
+  return type == DataType::int8_t || type == DataType::int16_t || type == DataType::int32_t ||
+         type == DataType::int64_t;
+}
+bool is_floating(DataType type) {
+  return type == DataType::double_t || type == DataType::single_t;
+}
+bool is_complex(DataType type) {
+  return type == DataType::cdouble_t || type == DataType::csingle_t;
+}
 
 /// The number or text type in which values of `type` reach a handler; void_t where only rr::Value can hold them.
 HandlerType plain_type(const TypeDefinition& type) {
   if (type.container != ContainerKind::none) return {};
   const DataType item = type.type == DataType::enum_t ? DataType::int32_t : type.type;
   switch (type.array) {
-    case ArrayKind::none: return {item_size(item) != 0 ? item : DataType::void_t, false};
+    case ArrayKind::none:
+      return {item_size(item) != 0 ? item : DataType::void_t, false};
     case ArrayKind::variable:
     case ArrayKind::fixed:
-    case ArrayKind::max: return {is_numeric(item) ? item : DataType::void_t, true};
-    default: return {};
+    case ArrayKind::max:
+      return {is_numeric(item) ? item : DataType::void_t, true};
+    default:
+      return {};
   }
 }
 

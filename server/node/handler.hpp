@@ -7,8 +7,8 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <type_traits>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -31,8 +31,8 @@ std::string handler_type_text(const HandlerType& type);
 /// Whether every value of `type` can be handed to a parameter of type `handler`. Numbers may widen (int16 to int32);
 /// enums are int32.
 bool accepts(const HandlerType& handler, const TypeDefinition& type);
-/// Whether what a handler returns can be a value of `type`; numbers may be of any type, values are checked when they are
-/// sent.
+/// Whether what a handler returns can be a value of `type`; numbers may be of any type, values are checked when they
+/// are sent.
 bool returns(const HandlerType& handler, const TypeDefinition& type);
 
 /// A callable with its deduced signature.

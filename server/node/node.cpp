@@ -131,7 +131,8 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     stop_timer_.async_wait([this](const error_code& error) {
       if (error) return;
       const auto stubborn = clients_;
-      for (const auto& [id, client] : stubborn) client->close(make_error(ErrorCode::connection_error, "the node stops"));
+      for (const auto& [id, client] : stubborn)
+        client->close(make_error(ErrorCode::connection_error, "the node stops"));
     });
   }
 
@@ -175,8 +176,10 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   }
   void set_current_client(ClientId id) override { current_client_ = id; }
   void report(const std::string& problem) override {
-    if (options_.report) options_.report(problem);
-    else std::cerr << identity().name << ": " << problem << '\n';
+    if (options_.report)
+      options_.report(problem);
+    else
+      std::cerr << identity().name << ": " << problem << '\n';
   }
   void client_ended(ServiceClient& client) override {
     clients_.erase(client.id());
@@ -262,16 +265,32 @@ Node::Node(asio::io_context& io, std::string name, NodeOptions options)
     : implementation_(std::make_unique<Implementation>(&io, std::move(name), std::move(options))) {}
 Node::~Node() = default;
 
-void Node::add(const std::shared_ptr<Service>& service) { implementation_->add(service); }
-std::uint16_t Node::listen(std::string_view url) { return implementation_->listen(url); }
-void Node::run() { implementation_->run(); }
-void Node::stop() { implementation_->stop(); }
-void Node::post(std::function<void()> work) { asio::post(implementation_->io(), std::move(work)); }
+void Node::add(const std::shared_ptr<Service>& service) {
+  implementation_->add(service);
+}
+std::uint16_t Node::listen(std::string_view url) {
+  return implementation_->listen(url);
+}
+void Node::run() {
+  implementation_->run();
+}
+void Node::stop() {
+  implementation_->stop();
+}
+void Node::post(std::function<void()> work) {
+  asio::post(implementation_->io(), std::move(work));
+}
 void Node::every(std::chrono::nanoseconds period, std::function<void()> work) {
   implementation_->every(period, std::move(work));
 }
-const NodeIdentity& Node::identity() const { return implementation_->identity(); }
-asio::io_context& Node::io_context() { return implementation_->io(); }
-std::size_t Node::client_count() const { return implementation_->client_count(); }
+const NodeIdentity& Node::identity() const {
+  return implementation_->identity();
+}
+asio::io_context& Node::io_context() {
+  return implementation_->io();
+}
+std::size_t Node::client_count() const {
+  return implementation_->client_count();
+}
 
 }  // namespace rr

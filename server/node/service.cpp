@@ -11,7 +11,9 @@ namespace rr {
 
 namespace {
 
-[[noreturn]] void refuse(const std::string& what) { throw std::invalid_argument(what); }
+[[noreturn]] void refuse(const std::string& what) {
+  throw std::invalid_argument(what);
+}
 
 /// Kinds whose members need no handler yet: calls of them are answered with NotImplementedError.
 bool may_be_absent(const MemberDefinition& member) {
@@ -44,8 +46,8 @@ std::string read_file(const std::string& path) {
 void check_parameters(const std::string& where, const Handler& handler,
                       const std::vector<ParameterDefinition>& parameters) {
   if (handler.parameters.size() != parameters.size())
-    refuse(where + ": the handler takes " + std::to_string(handler.parameters.size()) + " parameters, the definition has " +
-           std::to_string(parameters.size()));
+    refuse(where + ": the handler takes " + std::to_string(handler.parameters.size()) +
+           " parameters, the definition has " + std::to_string(parameters.size()));
   for (std::size_t i = 0; i < parameters.size(); ++i)
     if (!accepts(handler.parameters[i], parameters[i].type))
       refuse(where + ": parameter '" + parameters[i].name + "' is " + format_type(parameters[i].type) +
@@ -57,8 +59,8 @@ void check_result(const std::string& where, const Handler& handler, const TypeDe
     refuse(where + ": is " + format_type(type) + ", the handler returns " + handler_type_text(handler.result));
 }
 
-/// Whether a value can be sent, found out by packing it: a device learns of a wrong value where it sets it, also while no
-/// client is connected.
+/// Whether a value can be sent, found out by packing it: a device learns of a wrong value where it sets it, also while
+/// no client is connected.
 void check_value(const std::string& where, const Value& value, const TypeDefinition& type, const TypeRegistry& types) {
   Message scratch;
   scratch.begin_entry(EntryType::null, {}, {});
@@ -221,7 +223,8 @@ Result<Value> Object::answer(const Called& called) {
   switch (called.kind) {
     case CallKind::function:
       return mine && mine->call.call ? mine->call.call(called.arguments) : missing("function");
-    case CallKind::property_get: return mine && mine->get.call ? mine->get.call({}) : missing("get of property");
+    case CallKind::property_get:
+      return mine && mine->get.call ? mine->get.call({}) : missing("get of property");
     case CallKind::property_set:
       return mine && mine->set.call ? mine->set.call(called.arguments) : missing("set of property");
     case CallKind::peek_in:

@@ -8,13 +8,13 @@
 //   node.listen("rr+tcp://0.0.0.0:52222");
 //   node.run();
 //
-// Handlers take and return C++ numbers, bool, enums, std::string, std::vector of numbers, or rr::Value for anything else
-// (Value accepts all of them). They run on the node's thread. A handler may throw rr::ServiceException to send an error
-// to the client; other exceptions reach it as code 100, "rrgate.UnhandledException", with their text.
+// Handlers take and return C++ numbers, bool, enums, std::string, std::vector of numbers, or rr::Value for anything
+// else (Value accepts all of them). They run on the node's thread. A handler may throw rr::ServiceException to send an
+// error to the client; other exceptions reach it as code 100, "rrgate.UnhandledException", with their text.
 //
 // Handlers are checked against the definition before anything listens: one that does not fit (no such member, wrong
-// kind, wrong parameter type or count) is a std::invalid_argument where it is set, one that is missing where the service
-// is added to the node. Each names the member.
+// kind, wrong parameter type or count) is a std::invalid_argument where it is set, one that is missing where the
+// service is added to the node. Each names the member.
 #pragma once
 
 #include <array>
@@ -122,8 +122,8 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
     Handler get;
     Handler set;
     Handler wire_received;
-    std::optional<Value> in_value = {};   ///< wires: what clients receive
-    std::optional<Value> out_value = {};  ///< wires: the newest that a client sent
+    std::optional<Value> in_value = {};                                  ///< wires: what clients receive
+    std::optional<Value> out_value = {};                                 ///< wires: the newest that a client sent
     std::function<std::shared_ptr<Object>(std::string_view)> find = {};  ///< objrefs
   };
 
@@ -163,7 +163,8 @@ class ServiceHost {
 class Service {
  public:
   /// `root_type` is the object's name in the last definition, or its qualified name.
-  /// Throws   std::invalid_argument with the first finding where a definition is not valid, an import is missing, or there
+  /// Throws   std::invalid_argument with the first finding where a definition is not valid, an import is missing, or
+  /// there
   ///          is no such object.
   static std::shared_ptr<Service> from_text(const std::vector<std::string>& definitions, std::string name,
                                             std::string root_type);

@@ -98,7 +98,9 @@ void TcpDriver::arm_timer() {
   });
 }
 
-void TcpDriver::close(Error reason) { finish(std::move(reason), read_clocks()); }
+void TcpDriver::close(Error reason) {
+  finish(std::move(reason), read_clocks());
+}
 
 void TcpDriver::finish(Error reason, Now now) {
   if (is_closed_) return;

@@ -39,30 +39,56 @@ json plain_items(rr::ByteSpan bytes) {
 json plain_items(rr::DataType type, rr::ByteSpan bytes) {
   using rr::DataType;
   switch (type) {
-    case DataType::double_t: return plain_items<double>(bytes);
-    case DataType::single_t: return plain_items<float>(bytes);
-    case DataType::int8_t: return plain_items<std::int8_t>(bytes);
-    case DataType::uint8_t: return plain_items<std::uint8_t>(bytes);
-    case DataType::int16_t: return plain_items<std::int16_t>(bytes);
-    case DataType::uint16_t: return plain_items<std::uint16_t>(bytes);
-    case DataType::int32_t: return plain_items<std::int32_t>(bytes);
-    case DataType::uint32_t: return plain_items<std::uint32_t>(bytes);
-    case DataType::int64_t: return plain_items<std::int64_t>(bytes);
-    case DataType::uint64_t: return plain_items<std::uint64_t>(bytes);
-    case DataType::cdouble_t: return plain_items<rr::CDouble>(bytes);
-    case DataType::csingle_t: return plain_items<rr::CSingle>(bytes);
-    case DataType::bool_t: return plain_items<bool>(bytes);
-    default: return json::array();
+    case DataType::double_t:
+      return plain_items<double>(bytes);
+    case DataType::single_t:
+      return plain_items<float>(bytes);
+    case DataType::int8_t:
+      return plain_items<std::int8_t>(bytes);
+    case DataType::uint8_t:
+      return plain_items<std::uint8_t>(bytes);
+    case DataType::int16_t:
+      return plain_items<std::int16_t>(bytes);
+    case DataType::uint16_t:
+      return plain_items<std::uint16_t>(bytes);
+    case DataType::int32_t:
+      return plain_items<std::int32_t>(bytes);
+    case DataType::uint32_t:
+      return plain_items<std::uint32_t>(bytes);
+    case DataType::int64_t:
+      return plain_items<std::int64_t>(bytes);
+    case DataType::uint64_t:
+      return plain_items<std::uint64_t>(bytes);
+    case DataType::cdouble_t:
+      return plain_items<rr::CDouble>(bytes);
+    case DataType::csingle_t:
+      return plain_items<rr::CSingle>(bytes);
+    case DataType::bool_t:
+      return plain_items<bool>(bytes);
+    default:
+      return json::array();
   }
 }
 
-json shaped(const std::vector<std::uint32_t>& dims, json data) { return {{"dims", dims}, {"data", std::move(data)}}; }
+json shaped(const std::vector<std::uint32_t>& dims, json data) {
+  return {{"dims", dims}, {"data", std::move(data)}};
+}
 
-json plain(std::monostate) { return nullptr; }
-json plain(const rr::Scalar& scalar) { return plain_items(scalar.type, scalar.bytes()).front(); }
-json plain(const std::string& text) { return text; }
-json plain(const rr::Array& array) { return plain_items(array.type(), array.bytes()); }
-json plain(const rr::MultiDimArray& grid) { return shaped(grid.dims, plain(grid.array)); }
+json plain(std::monostate) {
+  return nullptr;
+}
+json plain(const rr::Scalar& scalar) {
+  return plain_items(scalar.type, scalar.bytes()).front();
+}
+json plain(const std::string& text) {
+  return text;
+}
+json plain(const rr::Array& array) {
+  return plain_items(array.type(), array.bytes());
+}
+json plain(const rr::MultiDimArray& grid) {
+  return shaped(grid.dims, plain(grid.array));
+}
 
 json plain(const rr::Structure& structure) {
   json fields = json::object();
@@ -95,8 +121,12 @@ json plain_map(const Map& map) {
   for (const auto& [key, value] : items) pairs.push_back(json::array({key, to_plain(value)}));
   return {{"map", std::move(pairs)}};
 }
-json plain(const rr::MapInt32& map) { return plain_map(map); }
-json plain(const rr::MapString& map) { return plain_map(map); }
+json plain(const rr::MapInt32& map) {
+  return plain_map(map);
+}
+json plain(const rr::MapString& map) {
+  return plain_map(map);
+}
 
 }  // namespace
 

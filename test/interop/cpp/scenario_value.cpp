@@ -15,8 +15,10 @@ T to_number(const json& value) {
   } else if constexpr (std::is_integral_v<T> && !std::is_same_v<T, bool>) {
     // Beyond 2^53 as decimal text.
     if (!value.is_string()) return value.get<T>();
-    if constexpr (std::is_signed_v<T>) return static_cast<T>(std::stoll(value.get<std::string>()));
-    else return static_cast<T>(std::stoull(value.get<std::string>()));
+    if constexpr (std::is_signed_v<T>)
+      return static_cast<T>(std::stoll(value.get<std::string>()));
+    else
+      return static_cast<T>(std::stoull(value.get<std::string>()));
   } else {
     return value.get<T>();
   }
@@ -30,7 +32,9 @@ rr::Array to_array(const json& items) {
   return rr::Array::copy(std::span<const T>(numbers.get(), count));
 }
 
-std::vector<std::uint32_t> dims_of(const json& shaped) { return shaped.at("dims").get<std::vector<std::uint32_t>>(); }
+std::vector<std::uint32_t> dims_of(const json& shaped) {
+  return shaped.at("dims").get<std::vector<std::uint32_t>>();
+}
 
 /// `rest` is what follows the type's word: "", "[]" or "[*]".
 template <class T>
@@ -52,8 +56,10 @@ rr::Value to_pods(const std::string& name, const std::string& rest, const json& 
   pods.is_scalar = rest.empty();
   pods.is_multidim = rest == "[*]";
   if (pods.is_multidim) pods.dims = dims_of(body);
-  if (pods.is_scalar) pods.items.push_back(to_structure(name, body));
-  else for (const auto& item : pods.is_multidim ? body.at("data") : body) pods.items.push_back(to_structure(name, item));
+  if (pods.is_scalar)
+    pods.items.push_back(to_structure(name, body));
+  else
+    for (const auto& item : pods.is_multidim ? body.at("data") : body) pods.items.push_back(to_structure(name, item));
   return pods;
 }
 

@@ -27,21 +27,25 @@ class Client {
   using Verb = json (Client::*)(const rr::RemoteObject&, const std::string&, const json&);
 
   static const std::map<std::string, Verb>& verbs() {
-    static const std::map<std::string, Verb> table{
-        {"get", &Client::get},           {"set", &Client::set},         {"call", &Client::call},
-        {"get_until", &Client::get_until}, {"listen", &Client::listen},   {"events", &Client::events},
-        {"connect", &Client::connect},   {"close", &Client::close},     {"in_value", &Client::in_value},
-        {"out_value", &Client::out_value}, {"peek_in", &Client::peek_in}, {"peek_out", &Client::peek_out},
-        {"poke_out", &Client::poke_out}};
+    static const std::map<std::string, Verb> table{{"get", &Client::get},           {"set", &Client::set},
+                                                   {"call", &Client::call},         {"get_until", &Client::get_until},
+                                                   {"listen", &Client::listen},     {"events", &Client::events},
+                                                   {"connect", &Client::connect},   {"close", &Client::close},
+                                                   {"in_value", &Client::in_value}, {"out_value", &Client::out_value},
+                                                   {"peek_in", &Client::peek_in},   {"peek_out", &Client::peek_out},
+                                                   {"poke_out", &Client::poke_out}};
     return table;
   }
 
   rr::RemoteObject find(const json& step) const {
     rr::RemoteObject object = root_;
     for (const auto& part : step.value("on", json::array())) {
-      if (part.is_string()) object = object.object(part.get<std::string>());
-      else if (part.at(1).is_string()) object = object.object(part.at(0).get<std::string>(), part.at(1).get<std::string>());
-      else object = object.object(part.at(0).get<std::string>(), std::to_string(part.at(1).get<int>()));
+      if (part.is_string())
+        object = object.object(part.get<std::string>());
+      else if (part.at(1).is_string())
+        object = object.object(part.at(0).get<std::string>(), part.at(1).get<std::string>());
+      else
+        object = object.object(part.at(0).get<std::string>(), std::to_string(part.at(1).get<int>()));
     }
     return object;
   }
@@ -50,7 +54,9 @@ class Client {
 
   // properties and functions
 
-  json get(const rr::RemoteObject& target, const std::string& member, const json&) { return to_plain(target.get(member)); }
+  json get(const rr::RemoteObject& target, const std::string& member, const json&) {
+    return to_plain(target.get(member));
+  }
 
   json set(const rr::RemoteObject& target, const std::string& member, const json& step) {
     target.set(member, from_scenario(step.at("value")));

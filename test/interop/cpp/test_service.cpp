@@ -16,8 +16,7 @@ const std::string type_prefix = "experimental.interop.";
 
 class Interop {
  public:
-  explicit Interop(rr::Node& node)
-      : service_(rr::Service::from_file(RR_INTEROP_ROBDEF, "interop", "Interop")) {
+  explicit Interop(rr::Node& node) : service_(rr::Service::from_file(RR_INTEROP_ROBDEF, "interop", "Interop")) {
     add_stored_properties();
     add_other_properties();
     add_functions();
@@ -154,8 +153,10 @@ rr::NodeOptions parse_options(int argc, char** argv) {
 void watch_input(rr::Node& node, boost::asio::posix::stream_descriptor& input, std::array<char, 64>& buffer) {
   input.async_read_some(boost::asio::buffer(buffer), [&](const boost::system::error_code& error, std::size_t) {
     if (error == boost::asio::error::operation_aborted) return;
-    if (error) node.stop();
-    else watch_input(node, input, buffer);
+    if (error)
+      node.stop();
+    else
+      watch_input(node, input, buffer);
   });
 }
 

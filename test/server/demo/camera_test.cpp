@@ -10,8 +10,12 @@ namespace {
 constexpr Color red{200, 0, 0};
 constexpr Color green{0, 200, 0};
 
-bool is_reddish(Color c) { return c.red > 2 * c.green && c.red > 2 * c.blue; }
-bool is_greenish(Color c) { return c.green > 2 * c.red && c.green > 2 * c.blue; }
+bool is_reddish(Color c) {
+  return c.red > 2 * c.green && c.red > 2 * c.blue;
+}
+bool is_greenish(Color c) {
+  return c.green > 2 * c.red && c.green > 2 * c.blue;
+}
 
 World wall_at(double x, double height = 500) {
   return {.walls = {{{x, -5000}, {x, 5000}, height, red}}, .obstacles = {}};

@@ -34,8 +34,8 @@ TEST_CASE("options are read in both spellings, defaults stay") {
 
 TEST_CASE("mistakes end the program with code 2, help with 0") {
   int exit_code = 0;
-  for (const auto& mistake : std::vector<std::vector<std::string>>{{"--port", "70000"}, {"--port", "12x"}, {"--port"},
-                                                                   {"--prt", "1"}, {"file"}, {"--robot", "x"}}) {
+  for (const auto& mistake : std::vector<std::vector<std::string>>{
+           {"--port", "70000"}, {"--port", "12x"}, {"--port"}, {"--prt", "1"}, {"file"}, {"--robot", "x"}}) {
     CHECK_FALSE(parse(mistake, exit_code));
     CHECK(exit_code == 2);
   }

@@ -20,7 +20,9 @@ int run(Robot& robot, double seconds) {
 }
 
 const World open_field;
-World wall_ahead() { return {.walls = {{{500, -1000}, {500, 1000}, 500, {}}}, .obstacles = {}}; }
+World wall_ahead() {
+  return {.walls = {{{500, -1000}, {500, 1000}, 500, {}}}, .obstacles = {}};
+}
 
 }  // namespace
 
@@ -165,8 +167,9 @@ TEST_CASE("it never gets into anything, whatever it is told") {
   int bumps = 0;
   for (int command = 0; command < 2000; ++command) {
     const int kind = command % 4;
-    robot.drive(static_cast<std::int16_t>(velocity(random)),
-                kind == 0 ? drive_straight : kind == 1 ? spin_clockwise : static_cast<std::int16_t>(radius(random)));
+    robot.drive(static_cast<std::int16_t>(velocity(random)), kind == 0   ? drive_straight
+                                                             : kind == 1 ? spin_clockwise
+                                                                         : static_cast<std::int16_t>(radius(random)));
     for (int step = 0; step < 80; ++step) {
       bumps += robot.advance() ? 1 : 0;
       const auto inside = find_contacts(world, robot.pose().position, Robot::radius - 1e-6);

@@ -21,12 +21,12 @@ TEST_CASE("a packet holds all sensors at their places") {
   for (int i = 0; i < 50; ++i) robot.advance();
   const auto driving = stream.next_packet(robot);
   CHECK(driving.at(0) == 0);
-  CHECK(read16(driving, 12) == 50);    // distance since the last packet
-  CHECK(read16(driving, 14) == -1);    // angle: 1.4 degrees to the right
+  CHECK(read16(driving, 12) == 50);  // distance since the last packet
+  CHECK(read16(driving, 14) == -1);  // angle: 1.4 degrees to the right
   CHECK(read16(driving, 17) == 16100);
-  CHECK(read16(driving, 44) == 100);   // commanded velocity and radius
+  CHECK(read16(driving, 44) == 100);  // commanded velocity and radius
   CHECK(read16(driving, 46) == -2000);
-  CHECK(read16(driving, 48) == 94);    // right wheel, left wheel
+  CHECK(read16(driving, 48) == 94);  // right wheel, left wheel
   CHECK(read16(driving, 50) == 106);
 
   robot.drive(500, 32767);

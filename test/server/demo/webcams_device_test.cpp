@@ -51,7 +51,8 @@ TEST_CASE("the cameras follow the robot, and turn by themselves while there is n
     return is_done();
   };
   std::unique_ptr<CreateDevice> create;
-  auto robot = std::make_unique<rr::RunningNode>([&](rr::Node& made) { create = std::make_unique<CreateDevice>(made); });
+  auto robot =
+      std::make_unique<rr::RunningNode>([&](rr::Node& made) { create = std::make_unique<CreateDevice>(made); });
   PoseFollower follower(io, robot->url("Create"));
   const double before = follower.pose().heading;
   CHECK(run_until([&] { return follower.pose().heading > before; }));

@@ -58,9 +58,8 @@ TEST_CASE("a lost connection fails what is pending, and everything after it") {
   auto& connection = echo.connection().asynchronous();
   std::vector<ErrorCode> codes;
   const std::array<Value, 1> arguments{Value("x")};
-  connection.call("Echo", "say", arguments, [&](Result<Value> result) {
-    codes.push_back(result ? ErrorCode::none : result.error().code);
-  });
+  connection.call("Echo", "say", arguments,
+                  [&](Result<Value> result) { codes.push_back(result ? ErrorCode::none : result.error().code); });
   connection.close(make_error(ErrorCode::connection_error, "cut"));
   CHECK(codes == std::vector{ErrorCode::connection_error});
   CHECK(error_of([&] { echo.call("say", "y"); }).message == "cut");

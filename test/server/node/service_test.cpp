@@ -45,7 +45,9 @@ object Lamp
 end
 )";
 
-std::shared_ptr<Service> make_lamp() { return Service::from_text({definition}, "lamp", "Lamp"); }
+std::shared_ptr<Service> make_lamp() {
+  return Service::from_text({definition}, "lamp", "Lamp");
+}
 
 std::string refusal(const std::function<void()>& work) {
   try {
@@ -135,8 +137,9 @@ TEST_CASE("a node names every handler that is missing, and leaves out kinds that
 TEST_CASE("a service needs a definition that holds its root type") {
   CHECK_THAT(refusal([] { Service::from_text({definition}, "lamp", "Candle"); }), Contains("test.lamp.Candle"));
   CHECK_THAT(refusal([] { Service::from_text({"service test.bad\nobject\nend\n"}, "bad", "X"); }), Contains("2"));
-  CHECK_THAT(refusal([] { Service::from_text({"service test.a\nstdver 0.10\nimport test.b\nobject X\nend\n"}, "a", "X"); }),
-             Contains("test.b"));
+  CHECK_THAT(
+      refusal([] { Service::from_text({"service test.a\nstdver 0.10\nimport test.b\nobject X\nend\n"}, "a", "X"); }),
+      Contains("test.b"));
   CHECK_THAT(refusal([] { Service::from_text({}, "none", "X"); }), Contains("no definition"));
   CHECK_THAT(refusal([] { Service::from_file("no/such.robdef", "x", "X"); }), Contains("no/such.robdef"));
 }
