@@ -21,7 +21,7 @@ class CanonicalNames {
 
  private:
   std::string_view service_;
-  std::unordered_map<std::string_view, std::string_view> targets_ = {};  ///< alias -> qualified name
+  std::unordered_map<std::string_view, std::string_view> targets_ = {};      ///< alias -> qualified name
   std::unordered_map<std::string_view, std::string_view> first_alias_ = {};  ///< qualified name -> alias
 };
 

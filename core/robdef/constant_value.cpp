@@ -19,14 +19,22 @@ struct IntegerRange {
 
 IntegerRange integer_range(DataType type) {
   switch (type) {
-    case DataType::int8_t: return {0x80u, 0x7fu};
-    case DataType::uint8_t: return {0, 0xffu};
-    case DataType::int16_t: return {0x8000u, 0x7fffu};
-    case DataType::uint16_t: return {0, 0xffffu};
-    case DataType::int32_t: return {0x80000000u, 0x7fffffffu};
-    case DataType::uint32_t: return {0, 0xffffffffu};
-    case DataType::int64_t: return {std::uint64_t{1} << 63, (std::uint64_t{1} << 63) - 1};
-    default: return {0, std::numeric_limits<std::uint64_t>::max()};
+    case DataType::int8_t:
+      return {0x80u, 0x7fu};
+    case DataType::uint8_t:
+      return {0, 0xffu};
+    case DataType::int16_t:
+      return {0x8000u, 0x7fffu};
+    case DataType::uint16_t:
+      return {0, 0xffffu};
+    case DataType::int32_t:
+      return {0x80000000u, 0x7fffffffu};
+    case DataType::uint32_t:
+      return {0, 0xffffffffu};
+    case DataType::int64_t:
+      return {std::uint64_t{1} << 63, (std::uint64_t{1} << 63) - 1};
+    default:
+      return {0, std::numeric_limits<std::uint64_t>::max()};
   }
 }
 
@@ -92,17 +100,20 @@ ConstantValue ValueReader::read() {
   ConstantValue value;
   const bool is_struct = !type_.name.empty();
   const bool is_string = type_.type == DataType::string_t && !is_struct;
-  if (type_.name == "structure" || (!is_struct && !is_string && (!is_numeric(type_.type) || type_.type == DataType::bool_t ||
-                                    type_.type == DataType::cdouble_t || type_.type == DataType::csingle_t))) {
-    fail(0, 0, "constant-invalid", "a constant cannot have the type " + quoted(format_type(type_)) +
-                                       ", expected a number type, string or struct");
+  if (type_.name == "structure" || (!is_struct && !is_string &&
+                                    (!is_numeric(type_.type) || type_.type == DataType::bool_t ||
+                                     type_.type == DataType::cdouble_t || type_.type == DataType::csingle_t))) {
+    fail(
+        0, 0, "constant-invalid",
+        "a constant cannot have the type " + quoted(format_type(type_)) + ", expected a number type, string or struct");
     return value;
   }
   const bool may_be_array = !is_struct && !is_string;
   if (type_.array == ArrayKind::multidim || type_.array == ArrayKind::fixed_multidim ||
       (type_.array != ArrayKind::none && !may_be_array)) {
     fail(0, 0, "constant-invalid",
-         "a constant cannot have the array type " + quoted(format_type(type_)) + ", expected numbers in [], [n] or [n-]");
+         "a constant cannot have the array type " + quoted(format_type(type_)) +
+             ", expected numbers in [], [n] or [n-]");
     return value;
   }
   if (type_.container != ContainerKind::none) {
@@ -172,7 +183,8 @@ bool ValueReader::read_number(std::size_t from, std::size_t to, ConstantValue& o
     if (!is_float_literal(text)) return fail(from, to, "constant-invalid", found + ", expected a decimal number");
     const double value = parse_float_literal(text, type_.type == DataType::single_t);
     if (std::isinf(value)) {
-      return fail(from, to, "constant-range", found + ", which is too large for " + std::string(builtin_type_word(type_.type)));
+      return fail(from, to, "constant-range",
+                  found + ", which is too large for " + std::string(builtin_type_word(type_.type)));
     }
     std::get<2>(out.data).push_back(value);
     return true;
@@ -184,7 +196,8 @@ bool ValueReader::read_number(std::size_t from, std::size_t to, ConstantValue& o
   const auto range = integer_range(type_.type);
   const bool is_unsigned = range.most_negative == 0;
   const auto limit = literal.is_negative && !is_unsigned ? range.most_negative : range.maximum;
-  const auto complaint = found + ", expected " + range_text(type_.type) + " for " + std::string(builtin_type_word(type_.type));
+  const auto complaint =
+      found + ", expected " + range_text(type_.type) + " for " + std::string(builtin_type_word(type_.type));
   if (literal.is_too_large || literal.magnitude > limit) return fail(from, to, "constant-range", complaint);
   const auto wrapped = literal.is_negative ? std::uint64_t{0} - literal.magnitude : literal.magnitude;
   if (is_unsigned) {

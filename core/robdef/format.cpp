@@ -4,13 +4,11 @@
 #include "core/robdef/canonical_names.hpp"
 #include "core/robdef/names.hpp"
 #include "core/robdef/robdef.hpp"
+#include "core/robdef/version_levels.hpp"
 
 namespace rr {
 
 namespace {
-
-constexpr Version first_stdver{0, 9, 0, 0};
-constexpr Version first_without_options{0, 9, 2, 0};
 
 std::string hex_text(std::int32_t value) {
   constexpr std::string_view digits = "0123456789abcdef";
@@ -223,18 +221,22 @@ bool has_options_before_version(const ServiceDefinition& definition) {
   return !definition.options.empty() && !definition.version_is_option && definition.version >= first_without_options;
 }
 
-std::string format_service_definition(const ServiceDefinition& definition) { return Writer(definition).write(); }
+std::string format_service_definition(const ServiceDefinition& definition) {
+  return Writer(definition).write();
+}
 
 bool is_equal(const ServiceDefinition& left, const ServiceDefinition& right) {
   const Comparison comparison(left, right);
   const auto same_entity = [&comparison](const auto* a, const auto* b) { return comparison.is_equal_entity(*a, *b); };
   return left.name == right.name && left.version == right.version &&
          is_equal_list(left.imports, right.imports, [](const auto& a, const auto& b) { return a.name == b.name; }) &&
-         is_equal_list(left.usings, right.usings,
-                       [](const auto& a, const auto& b) { return a.qualified_name == b.qualified_name && a.alias == b.alias; }) &&
+         is_equal_list(
+             left.usings, right.usings,
+             [](const auto& a, const auto& b) { return a.qualified_name == b.qualified_name && a.alias == b.alias; }) &&
          is_equal_options(left.options, right.options) && is_equal_constants(left.constants, right.constants) &&
          is_equal_list(left.enums, right.enums, is_equal_enum) &&
-         is_equal_list(left.exceptions, right.exceptions, [](const auto& a, const auto& b) { return a.name == b.name; }) &&
+         is_equal_list(left.exceptions, right.exceptions,
+                       [](const auto& a, const auto& b) { return a.name == b.name; }) &&
          is_equal_list(entities_by_kind(left), entities_by_kind(right), same_entity);
 }
 

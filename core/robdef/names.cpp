@@ -8,11 +8,11 @@ namespace rr {
 namespace {
 
 constexpr auto reserved_words = std::to_array<std::string_view>({
-    "object",   "end",     "option",    "service", "struct",  "import",  "implements", "field",  "property",
-    "function", "event",   "objref",    "pipe",    "callback", "wire",   "memory",     "void",   "int8",
-    "uint8",    "int16",   "uint16",    "int32",   "uint32",  "int64",   "uint64",     "single", "double",
-    "string",   "varvalue", "varobject", "exception", "using", "constant", "enum",      "pod",    "namedarray",
-    "cdouble",  "csingle", "bool",      "stdver",  "this",    "self",    "Me",
+    "object",   "end",      "option",    "service",   "struct",   "import",   "implements", "field",  "property",
+    "function", "event",    "objref",    "pipe",      "callback", "wire",     "memory",     "void",   "int8",
+    "uint8",    "int16",    "uint16",    "int32",     "uint32",   "int64",    "uint64",     "single", "double",
+    "string",   "varvalue", "varobject", "exception", "using",    "constant", "enum",       "pod",    "namedarray",
+    "cdouble",  "csingle",  "bool",      "stdver",    "this",     "self",     "Me",
 });
 
 constexpr auto reserved_prefixes = std::to_array<std::string_view>({"get_", "set_", "async_", "rr", "robotraconteur"});
@@ -20,9 +20,9 @@ constexpr auto reserved_prefixes = std::to_array<std::string_view>({"get_", "set
 constexpr auto top_level_keywords = std::to_array<std::string_view>(
     {"service", "stdver", "import", "using", "exception", "enum", "struct", "pod", "namedarray", "object"});
 
-constexpr auto body_keywords = std::to_array<std::string_view>(
-    {"option", "constant", "implements", "field", "property", "function", "event", "objref", "pipe", "callback", "wire",
-     "memory", "end"});
+constexpr auto body_keywords =
+    std::to_array<std::string_view>({"option", "constant", "implements", "field", "property", "function", "event",
+                                     "objref", "pipe", "callback", "wire", "memory", "end"});
 
 struct TypeWord {
   std::string_view word;
@@ -30,12 +30,24 @@ struct TypeWord {
 };
 
 constexpr auto type_words = std::to_array<TypeWord>({
-    {"void", DataType::void_t},       {"double", DataType::double_t},       {"single", DataType::single_t},
-    {"int8", DataType::int8_t},       {"uint8", DataType::uint8_t},         {"int16", DataType::int16_t},
-    {"uint16", DataType::uint16_t},   {"int32", DataType::int32_t},         {"uint32", DataType::uint32_t},
-    {"int64", DataType::int64_t},     {"uint64", DataType::uint64_t},       {"string", DataType::string_t},
-    {"cdouble", DataType::cdouble_t}, {"csingle", DataType::csingle_t},     {"bool", DataType::bool_t},
-    {"object", DataType::object_t},   {"varobject", DataType::varobject_t}, {"varvalue", DataType::varvalue_t},
+    {"void", DataType::void_t},
+    {"double", DataType::double_t},
+    {"single", DataType::single_t},
+    {"int8", DataType::int8_t},
+    {"uint8", DataType::uint8_t},
+    {"int16", DataType::int16_t},
+    {"uint16", DataType::uint16_t},
+    {"int32", DataType::int32_t},
+    {"uint32", DataType::uint32_t},
+    {"int64", DataType::int64_t},
+    {"uint64", DataType::uint64_t},
+    {"string", DataType::string_t},
+    {"cdouble", DataType::cdouble_t},
+    {"csingle", DataType::csingle_t},
+    {"bool", DataType::bool_t},
+    {"object", DataType::object_t},
+    {"varobject", DataType::varobject_t},
+    {"varvalue", DataType::varvalue_t},
 });
 
 template <class List>
@@ -96,7 +108,9 @@ QualifiedName split_qualified(std::string_view name) {
   return {name.substr(0, dot), name.substr(dot + 1)};
 }
 
-bool is_top_level_keyword(std::string_view word) { return contains(top_level_keywords, word); }
+bool is_top_level_keyword(std::string_view word) {
+  return contains(top_level_keywords, word);
+}
 
 bool is_statement_keyword(std::string_view word) {
   return is_top_level_keyword(word) || contains(body_keywords, word);

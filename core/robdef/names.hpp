@@ -9,13 +9,25 @@
 
 namespace rr {
 
-constexpr bool is_blank(char c) { return c == ' ' || c == '\t'; }
-constexpr bool is_letter(char c) { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z'); }
-constexpr bool is_digit(char c) { return c >= '0' && c <= '9'; }
-constexpr bool is_word_character(char c) { return is_letter(c) || is_digit(c) || c == '_'; }
-constexpr bool is_hex_digit(char c) { return is_digit(c) || (c >= 'a' && c <= 'f') || (c >= 'A' && c <= 'F'); }
+constexpr bool is_blank(char c) {
+  return c == ' ' || c == '\t';
+}
+constexpr bool is_letter(char c) {
+  return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z');
+}
+constexpr bool is_digit(char c) {
+  return c >= '0' && c <= '9';
+}
+constexpr bool is_word_character(char c) {
+  return is_letter(c) || is_digit(c) || c == '_';
+}
+constexpr bool is_hex_digit(char c) {
+  return is_digit(c) || (c >= 'a' && c <= 'f') || (c >= 'A' && c <= 'F');
+}
 /// U+0020..U+007E and TAB: all that a line may hold.
-constexpr bool is_text_character(char c) { return (c >= ' ' && c <= '~') || c == '\t'; }
+constexpr bool is_text_character(char c) {
+  return (c >= ' ' && c <= '~') || c == '\t';
+}
 
 std::string_view trim_blanks(std::string_view text);
 std::vector<std::string_view> split_words(std::string_view text);

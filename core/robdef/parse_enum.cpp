@@ -3,7 +3,7 @@
 
 #include "core/robdef/constant_value.hpp"
 #include "core/robdef/names.hpp"
-#include "core/robdef/parser.hpp"
+#include "core/robdef/parse_statement.hpp"
 
 namespace rr {
 

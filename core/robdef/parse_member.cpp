@@ -2,8 +2,8 @@
 
 #include "core/robdef/constant_value.hpp"
 #include "core/robdef/names.hpp"
+#include "core/robdef/parse_statement.hpp"
 #include "core/robdef/parse_type.hpp"
-#include "core/robdef/parser.hpp"
 
 namespace rr {
 
@@ -146,8 +146,9 @@ bool parse_constant(StatementReader& reader, bool is_option, ConstantDefinition&
   std::size_t value_start = 0;
   out.value_text = reader.rest(value_start);
   if (is_option && !out.type.name.empty()) {
-    return reader.fail_at(type_start, type_end, "constant-invalid",
-                          "found " + quoted(out.type.name) + ", expected a number type or string after 'option constant'");
+    return reader.fail_at(
+        type_start, type_end, "constant-invalid",
+        "found " + quoted(out.type.name) + ", expected a number type or string after 'option constant'");
   }
   std::vector<ConstantIssue> issues;
   read_constant_value(out.type, out.value_text, issues);
@@ -165,9 +166,9 @@ bool parse_constant(StatementReader& reader, bool is_option, ConstantDefinition&
     }
   }
   if (is_good && (out.type.type == DataType::int8_t || out.type.type == DataType::uint8_t)) {
-    reader.reporter().warning("interop", reader.span(type_start, type_end),
-                              "constant " + quoted(out.name) +
-                                  ": existing peers read 8-bit constants as characters; prefer a wider type");
+    reader.reporter().warning(
+        "interop", reader.span(type_start, type_end),
+        "constant " + quoted(out.name) + ": existing peers read 8-bit constants as characters; prefer a wider type");
   }
   return is_good;
 }

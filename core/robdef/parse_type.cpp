@@ -23,9 +23,9 @@ bool parse_size(StatementReader& reader, std::int32_t& out) {
   }
   if (reader.position() == start) return reader.fail("a size: decimal digits");
   if (is_too_large) {
-    return reader.fail_at(start, reader.position(), "array-size",
-                          "found the size " + quoted(reader.text(start, reader.position())) +
-                              ", expected at most 2147483647");
+    return reader.fail_at(
+        start, reader.position(), "array-size",
+        "found the size " + quoted(reader.text(start, reader.position())) + ", expected at most 2147483647");
   }
   out = static_cast<std::int32_t>(value);
   return true;
@@ -114,9 +114,14 @@ bool parse_type(StatementReader& reader, TypeDefinition& out) {
 std::string format_type(const TypeDefinition& type) {
   std::string out = type.name.empty() ? std::string(builtin_type_word(type.type)) : type.name;
   switch (type.array) {
-    case ArrayKind::none: break;
-    case ArrayKind::variable: out += "[]"; break;
-    case ArrayKind::multidim: out += "[*]"; break;
+    case ArrayKind::none:
+      break;
+    case ArrayKind::variable:
+      out += "[]";
+      break;
+    case ArrayKind::multidim:
+      out += "[*]";
+      break;
     case ArrayKind::fixed:
     case ArrayKind::max:
     case ArrayKind::fixed_multidim: {
@@ -132,11 +137,20 @@ std::string format_type(const TypeDefinition& type) {
     }
   }
   switch (type.container) {
-    case ContainerKind::none: break;
-    case ContainerKind::list: out += "{list}"; break;
-    case ContainerKind::map_int32: out += "{int32}"; break;
-    case ContainerKind::map_string: out += "{string}"; break;
-    case ContainerKind::generator: out += "{generator}"; break;
+    case ContainerKind::none:
+      break;
+    case ContainerKind::list:
+      out += "{list}";
+      break;
+    case ContainerKind::map_int32:
+      out += "{int32}";
+      break;
+    case ContainerKind::map_string:
+      out += "{string}";
+      break;
+    case ContainerKind::generator:
+      out += "{generator}";
+      break;
   }
   return out;
 }

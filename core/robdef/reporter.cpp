@@ -37,7 +37,8 @@ void Reporter::add(Severity severity, std::string_view code, const SourceSpan& s
   if (!last_was_kept_) return;
   if (++count_[index(severity)] > max_diagnostics) {
     code = "too-many";
-    message = severity == Severity::error ? "more errors follow that are not shown" : "more warnings follow that are not shown";
+    message = severity == Severity::error ? "more errors follow that are not shown"
+                                          : "more warnings follow that are not shown";
   }
   Diagnostic diagnostic;
   diagnostic.severity = severity;

@@ -29,10 +29,10 @@ struct DiagnosticNote {
 /// spans several lines is named by its first; its columns may lie on a later one.
 struct Diagnostic {
   Severity severity = Severity::error;
-  std::string code;     ///< of the spec's list, e.g. "name-reserved"
-  std::string message;  ///< what was found and what was expected
-  std::string file;     ///< as given by the caller; may be empty
-  std::string service;  ///< service name where known
+  std::string code;               ///< of the spec's list, e.g. "name-reserved"
+  std::string message;            ///< what was found and what was expected
+  std::string file;               ///< as given by the caller; may be empty
+  std::string service;            ///< service name where known
   std::uint32_t line = 0;         ///< the first line of the statement
   std::uint32_t column_line = 0;  ///< the line that the columns belong to; 0 where they are unknown
   std::uint32_t column = 0;

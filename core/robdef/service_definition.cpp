@@ -18,20 +18,31 @@ const T* find_named(const std::vector<T>& items, std::string_view name) {
 
 std::string_view member_kind_name(MemberKind kind) {
   switch (kind) {
-    case MemberKind::field: return "field";
-    case MemberKind::property: return "property";
-    case MemberKind::function: return "function";
-    case MemberKind::event: return "event";
-    case MemberKind::objref: return "objref";
-    case MemberKind::pipe: return "pipe";
-    case MemberKind::callback: return "callback";
-    case MemberKind::wire: return "wire";
-    case MemberKind::memory: return "memory";
+    case MemberKind::field:
+      return "field";
+    case MemberKind::property:
+      return "property";
+    case MemberKind::function:
+      return "function";
+    case MemberKind::event:
+      return "event";
+    case MemberKind::objref:
+      return "objref";
+    case MemberKind::pipe:
+      return "pipe";
+    case MemberKind::callback:
+      return "callback";
+    case MemberKind::wire:
+      return "wire";
+    case MemberKind::memory:
+      return "memory";
   }
   return "unknown";
 }
 
-bool MemberDefinition::has_modifier(std::string_view modifier) const { return find_named(modifiers, modifier); }
+bool MemberDefinition::has_modifier(std::string_view modifier) const {
+  return find_named(modifiers, modifier);
+}
 
 MemberDirection MemberDefinition::direction() const {
   if (has_modifier("readonly")) return MemberDirection::readonly;

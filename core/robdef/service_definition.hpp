@@ -27,12 +27,12 @@ Result<Version> parse_version(std::string_view text);
 std::string format_version(const Version& version);
 
 enum class ArrayKind : std::uint8_t {
-  none,             ///< scalar
-  variable,         ///< [] any length
-  fixed,            ///< [5] exactly 5
-  max,              ///< [5-] 0 to 5
-  multidim,         ///< [*] any shape
-  fixed_multidim,   ///< [3,4] or [3,]; column-major, first index fastest
+  none,            ///< scalar
+  variable,        ///< [] any length
+  fixed,           ///< [5] exactly 5
+  max,             ///< [5-] 0 to 5
+  multidim,        ///< [*] any shape
+  fixed_multidim,  ///< [3,4] or [3,]; column-major, first index fastest
 };
 
 enum class ContainerKind : std::uint8_t { none, list, map_int32, map_string, generator };
@@ -174,8 +174,8 @@ struct ServiceDefinition {
   std::vector<ExceptionDefinition> exceptions = {};
   std::vector<EntityDefinition> entities = {};  ///< structs, pods, namedarrays, objects in source order
   std::string documentation = {};
-  std::string text = {};  ///< the source as received: what a node sends on
-  std::string file = {};  ///< where the text came from, for diagnostics; may be empty
+  std::string text = {};           ///< the source as received: what a node sends on
+  std::string file = {};           ///< where the text came from, for diagnostics; may be empty
   std::uint32_t line = 0;          ///< of the `service` statement
   std::uint32_t version_line = 0;  ///< of `stdver` or `option version`; 0 where there is none
 

@@ -18,7 +18,9 @@ std::string_view read_while(std::string_view text, std::size_t& position, Predic
 
 }  // namespace
 
-bool StatementReader::skip_blanks() { return !read_while(text_, position_, is_blank).empty(); }
+bool StatementReader::skip_blanks() {
+  return !read_while(text_, position_, is_blank).empty();
+}
 
 bool StatementReader::accept(char c) {
   if (is_end() || text_[position_] != c) return false;
@@ -26,7 +28,9 @@ bool StatementReader::accept(char c) {
   return true;
 }
 
-std::string_view StatementReader::word() { return read_while(text_, position_, is_word_character); }
+std::string_view StatementReader::word() {
+  return read_while(text_, position_, is_word_character);
+}
 
 std::string_view StatementReader::dotted_word() {
   return read_while(text_, position_, [](char c) { return is_word_character(c) || c == '.'; });

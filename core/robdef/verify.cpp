@@ -37,10 +37,18 @@ ResolvedName find_in(VerifyScope& target, std::string_view name) {
   if (const auto found = target.entities.find(name); found != target.entities.end()) {
     out.entity = found->second;
     switch (found->second->kind) {
-      case EntityKind::structure: out.type = DataType::structure_t; break;
-      case EntityKind::pod: out.type = DataType::pod_t; break;
-      case EntityKind::namedarray: out.type = DataType::namedarray_t; break;
-      case EntityKind::object: out.type = DataType::object_t; break;
+      case EntityKind::structure:
+        out.type = DataType::structure_t;
+        break;
+      case EntityKind::pod:
+        out.type = DataType::pod_t;
+        break;
+      case EntityKind::namedarray:
+        out.type = DataType::namedarray_t;
+        break;
+      case EntityKind::object:
+        out.type = DataType::object_t;
+        break;
     }
   } else if (const auto found_enum = target.enums.find(name); found_enum != target.enums.end()) {
     out.enumeration = found_enum->second;
@@ -76,9 +84,9 @@ ResolvedName resolve_name(VerifyScope& scope, std::string_view name, std::uint32
       auto found = find_in(scope, name);
       if (found.type == DataType::void_t) {
         scope.error(error_code, line, name,
-                    scope.others.contains(name)
-                        ? "found " + quoted(name) + ", which is no type, expected one"
-                        : "found the unknown name " + quoted(name) + ", expected a type of this definition or an alias");
+                    scope.others.contains(name) ? "found " + quoted(name) + ", which is no type, expected one"
+                                                : "found the unknown name " + quoted(name) +
+                                                      ", expected a type of this definition or an alias");
       }
       return found;
     }

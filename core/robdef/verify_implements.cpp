@@ -84,7 +84,8 @@ void ImplementsCheck::report_cycles() {
                        "the object " + quoted(first.object->name) + " implements itself");
     for (const auto member : cycle) {
       nodes_[member].is_cyclic = true;
-      first.scope->reporter.note(nodes_[member].object->line, quoted(nodes_[member].object->name) + " is part of the cycle");
+      first.scope->reporter.note(nodes_[member].object->line,
+                                 quoted(nodes_[member].object->name) + " is part of the cycle");
     }
   }
 }
@@ -94,7 +95,9 @@ bool is_same_type(const TypeDefinition& a, const TypeDefinition& b) {
          a.container == b.container;
 }
 
-bool is_resolved(const TypeDefinition& type) { return type.type != DataType::namedtype_t; }
+bool is_resolved(const TypeDefinition& type) {
+  return type.type != DataType::namedtype_t;
+}
 
 /// What differs between a member and its redeclaration; empty where nothing does, or a type is unknown anyway.
 std::string_view difference(const MemberDefinition& own, const MemberDefinition& base) {
@@ -126,7 +129,8 @@ void ImplementsCheck::check_object(const ObjectNode& node) {
   }
 }
 
-void ImplementsCheck::check_bases(const ObjectNode& node, const ObjectNode& base, const ImplementsDefinition& implements,
+void ImplementsCheck::check_bases(const ObjectNode& node, const ObjectNode& base,
+                                  const ImplementsDefinition& implements,
                                   const std::unordered_set<std::string_view>& own_bases) {
   std::size_t missing = 0;
   for (const auto& item : base.object->implements) {
@@ -139,7 +143,8 @@ void ImplementsCheck::check_bases(const ObjectNode& node, const ObjectNode& base
   }
 }
 
-void ImplementsCheck::check_members(const ObjectNode& node, const ObjectNode& base, const ImplementsDefinition& implements,
+void ImplementsCheck::check_members(const ObjectNode& node, const ObjectNode& base,
+                                    const ImplementsDefinition& implements,
                                     const std::unordered_map<std::string_view, const MemberDefinition*>& own_members) {
   std::size_t missing = 0;
   for (const auto& member : base.object->members) {
@@ -148,10 +153,12 @@ void ImplementsCheck::check_members(const ObjectNode& node, const ObjectNode& ba
       const auto what = difference(*own->second, member);
       if (what.empty()) continue;
       node.scope->error("implements-mismatch", own->second->line, member.name,
-                        std::string(member_kind_name(own->second->kind)) + ' ' + quoted(member.name) + " differs from that of " +
-                            quoted(implements.name) + " in " + std::string(what) + ", expected them equal");
-      node.scope->reporter.note(base.scope == node.scope ? member.line : 0,
-                                "the member of " + quoted(implements.qualified_name) + ", line " + std::to_string(member.line));
+                        std::string(member_kind_name(own->second->kind)) + ' ' + quoted(member.name) +
+                            " differs from that of " + quoted(implements.name) + " in " + std::string(what) +
+                            ", expected them equal");
+      node.scope->reporter.note(
+          base.scope == node.scope ? member.line : 0,
+          "the member of " + quoted(implements.qualified_name) + ", line " + std::to_string(member.line));
       continue;
     }
     if (++missing > max_missing_members) return;
@@ -164,6 +171,8 @@ void ImplementsCheck::check_members(const ObjectNode& node, const ObjectNode& ba
 
 }  // namespace
 
-void verify_implements(VerifySet& set) { ImplementsCheck(set).run(); }
+void verify_implements(VerifySet& set) {
+  ImplementsCheck(set).run();
+}
 
 }  // namespace rr

@@ -15,7 +15,8 @@ void verify_import(VerifyScope& scope, const ImportDefinition& import,
   const auto found = services.find(import.name);
   auto* const target = found == services.end() ? nullptr : found->second;
   if (!scope.imports.emplace(import.name, target).second) {
-    scope.warning("duplicate-import", import.line, import.name, "found the import of " + quoted(import.name) + " again");
+    scope.warning("duplicate-import", import.line, import.name,
+                  "found the import of " + quoted(import.name) + " again");
     return;
   }
   if (target == nullptr) {
@@ -61,8 +62,9 @@ void verify_import_cycles(VerifySet& set) {
     auto& first = *scopes[cycle.front()];
     const auto* const import = next_import(cycle.front());
     if (import == nullptr) continue;
-    first.error("import-cycle", import->line, import->name,
-                "found a cycle of imports: " + quoted(import->name) + " leads back to " + quoted(first.definition->name));
+    first.error(
+        "import-cycle", import->line, import->name,
+        "found a cycle of imports: " + quoted(import->name) + " leads back to " + quoted(first.definition->name));
     for (const auto node : cycle) {
       if (const auto* const edge = next_import(node)) {
         first.reporter.note(edge->line, quoted(scopes[node]->definition->name) + " imports " + quoted(edge->name));
@@ -89,8 +91,9 @@ void verify_struct_constants(VerifyScope& scope, const std::vector<ConstantDefin
     const auto& constant = constants[i];
     if (constant.type.name.empty()) continue;
     if (constant.type.name != "struct" && !is_known_entity(scope, constant.type.name)) {
-      scope.warning("type-unknown", constant.line, constant.type.name,
-                    "the struct constant " + quoted(constant.name) + " names the unknown type " + quoted(constant.type.name));
+      scope.warning(
+          "type-unknown", constant.line, constant.type.name,
+          "the struct constant " + quoted(constant.name) + " names the unknown type " + quoted(constant.type.name));
     }
     std::vector<ConstantIssue> issues;
     const auto value = read_constant_value(constant.type, constant.value_text, issues);
@@ -150,9 +153,11 @@ void verify_aliases(VerifyScope& scope) {
     }
     if (import->second == nullptr) continue;
     const auto& other = *import->second;
-    if (other.entities.contains(target.name) || other.enums.contains(target.name) || other.others.contains(target.name)) continue;
-    scope.error("alias-invalid", item.line, item.qualified_name,
-                "found " + quoted(item.qualified_name) + ", but " + quoted(target.service) + " has nothing of this name");
+    if (other.entities.contains(target.name) || other.enums.contains(target.name) || other.others.contains(target.name))
+      continue;
+    scope.error(
+        "alias-invalid", item.line, item.qualified_name,
+        "found " + quoted(item.qualified_name) + ", but " + quoted(target.service) + " has nothing of this name");
   }
 }
 

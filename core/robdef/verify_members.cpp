@@ -58,11 +58,14 @@ void verify_modifiers(VerifyScope& scope, const MemberDefinition& member, const 
   for (const auto& [winner, loser] : {std::pair("readonly", "writeonly"), std::pair("nolock", "nolockread")}) {
     if (!names.contains(winner) || !names.contains(loser)) continue;
     scope.warning("modifier-combination", member.line, loser,
-                  place + "found both " + quoted(winner) + " and " + quoted(loser) + "; " + quoted(winner) + " wins", member.name);
+                  place + "found both " + quoted(winner) + " and " + quoted(loser) + "; " + quoted(winner) + " wins",
+                  member.name);
   }
 }
 
-bool is_generator_type(const TypeDefinition& type) { return type.container == ContainerKind::generator; }
+bool is_generator_type(const TypeDefinition& type) {
+  return type.container == ContainerKind::generator;
+}
 
 TypeDefinition element_of_generator(TypeDefinition type) {
   type.container = ContainerKind::none;
@@ -111,8 +114,8 @@ void verify_call(VerifyScope& scope, MemberDefinition& member) {
     const bool is_last = &parameter == &member.parameters.back();
     const auto where = place + ", parameter " + quoted(parameter.name);
     if (may_generate && !is_last && is_generator_type(parameter.type)) {
-      scope.error("generator", member.line, parameter.name, where + ": found a generator, expected it as the last parameter only",
-                  member.name);
+      scope.error("generator", member.line, parameter.name,
+                  where + ": found a generator, expected it as the last parameter only", member.name);
       continue;
     }
     check_call_type(scope, parameter.type, may_generate, member.line, where);
@@ -129,8 +132,9 @@ void verify_call(VerifyScope& scope, MemberDefinition& member) {
       scope.error("type-not-allowed", member.line, "void", message);
     }
   } else if (has_generator && !is_generator_type(type)) {
-    scope.error("generator", member.line, {},
-                where + ": found " + quoted(format_type(type)) + " beside a generator parameter, expected void or a generator");
+    scope.error(
+        "generator", member.line, {},
+        where + ": found " + quoted(format_type(type)) + " beside a generator parameter, expected void or a generator");
   } else {
     check_call_type(scope, type, may_generate, member.line, where);
   }
@@ -178,9 +182,12 @@ void verify_member(VerifyScope& scope, MemberDefinition& member) {
   switch (member.kind) {
     case MemberKind::function:
     case MemberKind::callback:
-    case MemberKind::event: return verify_call(scope, member);
-    case MemberKind::memory: return verify_memory(scope, member);
-    case MemberKind::objref: return verify_objref(scope, member);
+    case MemberKind::event:
+      return verify_call(scope, member);
+    case MemberKind::memory:
+      return verify_memory(scope, member);
+    case MemberKind::objref:
+      return verify_objref(scope, member);
     case MemberKind::field:
     case MemberKind::property:
     case MemberKind::pipe:

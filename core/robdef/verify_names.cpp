@@ -1,16 +1,15 @@
-// Versions, feature gates, names and name spaces. Layer: robdef. Source: service definitions spec sections 5.1, 5.2, 5.6.
+// Versions, feature gates, names and name spaces. Layer: robdef. Source: service definitions spec
+// sections 5.1, 5.2, 5.6.
 #include <algorithm>
 
 #include "core/robdef/constant_value.hpp"
 #include "core/robdef/names.hpp"
 #include "core/robdef/verify_scope.hpp"
+#include "core/robdef/version_levels.hpp"
 
 namespace rr {
 
 namespace {
-
-constexpr Version newest_known{1, 2, 8, 0};
-constexpr Version first_with_features{0, 9, 0, 0};
 
 struct FeatureUse {
   std::string_view feature;
@@ -24,9 +23,11 @@ void verify_service_name(VerifyScope& scope) {
   const std::string_view name = definition.name;
   if (name.starts_with("RobotRaconteurTestService") || name == "RobotRaconteurServiceIndex") return;
   if (!is_qualified_name(name)) {
-    scope.error("name-invalid", definition.line, name, "found the service name " + quoted(name) + ", expected names joined by dots");
+    scope.error("name-invalid", definition.line, name,
+                "found the service name " + quoted(name) + ", expected names joined by dots");
   } else if (is_reserved_name(name) || name.ends_with("_signed")) {
-    scope.error("name-reserved", definition.line, name, "found the reserved service name " + quoted(name) + ", expected another");
+    scope.error("name-reserved", definition.line, name,
+                "found the reserved service name " + quoted(name) + ", expected another");
   }
 }
 
@@ -64,7 +65,8 @@ void verify_top_level_names(VerifyScope& scope) {
 
 void verify_enum_values(VerifyScope& scope, const EnumDefinition& enumeration) {
   if (enumeration.values.empty()) {
-    scope.warning("empty-enum", enumeration.line, enumeration.name, "the enum " + quoted(enumeration.name) + " has no values");
+    scope.warning("empty-enum", enumeration.line, enumeration.name,
+                  "the enum " + quoted(enumeration.name) + " has no values");
   }
   NameSpace names(scope, "the enum " + quoted(enumeration.name));
   std::unordered_map<std::int32_t, const EnumValueDefinition*> numbers;
@@ -111,17 +113,19 @@ void NameSpace::declare(std::string_view name, std::uint32_t line, std::string_v
   }
   const auto [same, is_alone] = folded_.emplace(to_lower(name), name);
   if (is_alone) return;
-  scope_->warning("case-clash", line, name, "the names " + quoted(same->second) + " and " + quoted(name) + " in " + place_ +
-                                                " differ by case only", after);
+  scope_->warning(
+      "case-clash", line, name,
+      "the names " + quoted(same->second) + " and " + quoted(name) + " in " + place_ + " differ by case only", after);
 }
 
 void verify_versions(VerifyScope& scope) {
   const auto& definition = *scope.definition;
   if (definition.version > newest_known) {
-    scope.error("version-too-new", definition.version_line, {},
-                "found version " + format_version(definition.version) + ", expected at most " + format_version(newest_known));
+    scope.error(
+        "version-too-new", definition.version_line, {},
+        "found version " + format_version(definition.version) + ", expected at most " + format_version(newest_known));
   }
-  if (!definition.version_is_option || definition.version >= first_with_features) return;
+  if (!definition.version_is_option || definition.version >= first_stdver) return;
   FeatureUse constants{"constant"};
   FeatureUse usings{"using"};
   FeatureUse enums{"enum"};

@@ -23,7 +23,7 @@ struct VerifyScope {
   ServiceDefinition* definition;
   Reporter reporter;
   SourceLocator locator;
-  std::unordered_map<std::string_view, VerifyScope*> imports = {};  ///< direct ones; nullptr where missing
+  std::unordered_map<std::string_view, VerifyScope*> imports = {};      ///< direct ones; nullptr where missing
   std::unordered_map<std::string_view, std::string_view> aliases = {};  ///< alias -> qualified name
   std::unordered_map<std::string_view, EntityDefinition*> entities = {};
   std::unordered_map<std::string_view, EnumDefinition*> enums = {};

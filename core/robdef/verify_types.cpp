@@ -1,4 +1,5 @@
-// Value types, and what structs, pods and namedarrays hold. Layer: robdef. Source: service definitions spec section 5.4.
+// Value types, and what structs, pods and namedarrays hold. Layer: robdef. Source: service definitions spec
+// section 5.4.
 #include <algorithm>
 #include <limits>
 
@@ -22,7 +23,8 @@ void verify_pod_field(VerifyScope& scope, const EntityDefinition& pod, const Mem
   const auto& type = field.type;
   const auto place = field_place(pod, field) + ": ";
   const bool is_named = !type.name.empty();
-  const bool is_allowed = is_named ? type.type == DataType::pod_t || type.type == DataType::namedarray_t : is_numeric(type.type);
+  const bool is_allowed =
+      is_named ? type.type == DataType::pod_t || type.type == DataType::namedarray_t : is_numeric(type.type);
   if (!is_allowed) {
     scope.error("pod-field", field.line, field.name,
                 place + "found the type " + quoted(format_type(type)) + ", expected numbers, a pod or a namedarray");
@@ -30,8 +32,9 @@ void verify_pod_field(VerifyScope& scope, const EntityDefinition& pod, const Mem
     scope.error("pod-field", field.line, field.name,
                 place + "found the container type " + quoted(format_type(type)) + ", expected none in a pod");
   } else if (type.array == ArrayKind::variable || type.array == ArrayKind::multidim || !has_positive_sizes(type)) {
-    scope.error("pod-field", field.line, field.name,
-                place + "found the array type " + quoted(format_type(type)) + ", expected fixed or bounded sizes in a pod");
+    scope.error(
+        "pod-field", field.line, field.name,
+        place + "found the array type " + quoted(format_type(type)) + ", expected fixed or bounded sizes in a pod");
   }
 }
 
@@ -42,7 +45,8 @@ void verify_namedarray_field(VerifyScope& scope, const EntityDefinition& array, 
   if (!is_allowed) {
     scope.error("namedarray-field", field.line, field.name,
                 place + "found the type " + quoted(format_type(type)) + ", expected numbers or a namedarray");
-  } else if (type.container != ContainerKind::none || (type.array != ArrayKind::none && type.array != ArrayKind::fixed)) {
+  } else if (type.container != ContainerKind::none ||
+             (type.array != ArrayKind::none && type.array != ArrayKind::fixed)) {
     scope.error("namedarray-field", field.line, field.name,
                 place + "found the type " + quoted(format_type(type)) + ", expected a scalar or [n] in a namedarray");
   }
@@ -82,7 +86,8 @@ void flatten_namedarray(const Node& node, const std::vector<Node>& nodes, const 
     } else if (array.namedarray_type != type) {
       node.scope->error("namedarray-field", field.line, field.name,
                         field_place(array, field) + ": found elements of type " + quoted(builtin_type_word(type)) +
-                            ", expected " + quoted(builtin_type_word(array.namedarray_type)) + " as in the fields before");
+                            ", expected " + quoted(builtin_type_word(array.namedarray_type)) +
+                            " as in the fields before");
       break;
     }
   }
@@ -94,7 +99,8 @@ void report_recursion(const std::vector<std::size_t>& cycle, const std::vector<N
   first.scope->error("recursion", first.entity->line, first.entity->name,
                      quoted(first.entity->name) + " contains itself, which a pod or namedarray cannot");
   for (const auto member : cycle) {
-    first.scope->reporter.note(nodes[member].entity->line, quoted(nodes[member].entity->name) + " is part of the cycle");
+    first.scope->reporter.note(nodes[member].entity->line,
+                               quoted(nodes[member].entity->name) + " is part of the cycle");
   }
 }
 
@@ -114,20 +120,26 @@ bool check_value_type(VerifyScope& scope, const TypeDefinition& type, std::uint3
   if (type.type == DataType::namedtype_t) return false;  // unresolved, reported
   if (type.container == ContainerKind::generator) return refuse("generator", "no generator here");
   switch (type.type) {
-    case DataType::void_t: return refuse("type-not-allowed", "a value type");
+    case DataType::void_t:
+      return refuse("type-not-allowed", "a value type");
     case DataType::object_t:
       if (!type.name.empty()) return refuse("type-not-allowed", "a value type; objects are reached by objref");
       return relax("a value type; objects are reached by objref");
-    case DataType::varobject_t: return relax("a value type; objects are reached by objref");
-    default: break;
+    case DataType::varobject_t:
+      return relax("a value type; objects are reached by objref");
+    default:
+      break;
   }
   if (type.array == ArrayKind::none) return true;
   switch (type.type) {
     case DataType::string_t:
     case DataType::structure_t:
-    case DataType::enum_t: return refuse("type-not-allowed", "no array of it; use {list}");
-    case DataType::varvalue_t: return relax("no array of it; use {list}");
-    default: return true;
+    case DataType::enum_t:
+      return refuse("type-not-allowed", "no array of it; use {list}");
+    case DataType::varvalue_t:
+      return relax("no array of it; use {list}");
+    default:
+      return true;
   }
 }
 
@@ -137,9 +149,14 @@ void verify_fields(VerifyScope& scope) {
     for (auto& field : entity.members) {
       if (!resolve_type(scope, field.type, field.line)) continue;
       switch (entity.kind) {
-        case EntityKind::pod: verify_pod_field(scope, entity, field); break;
-        case EntityKind::namedarray: verify_namedarray_field(scope, entity, field); break;
-        default: check_value_type(scope, field.type, field.line, field_place(entity, field));
+        case EntityKind::pod:
+          verify_pod_field(scope, entity, field);
+          break;
+        case EntityKind::namedarray:
+          verify_namedarray_field(scope, entity, field);
+          break;
+        default:
+          check_value_type(scope, field.type, field.line, field_place(entity, field));
       }
     }
     if (entity.kind == EntityKind::namedarray && entity.members.empty()) {
@@ -182,7 +199,8 @@ void verify_containment(VerifySet& set) {
     for (const auto member : cycle) is_cyclic[member] = true;
   }
   for (const auto node : dependencies_first(graph)) {
-    if (nodes[node].entity->kind == EntityKind::namedarray && !is_cyclic[node]) flatten_namedarray(nodes[node], nodes, index);
+    if (nodes[node].entity->kind == EntityKind::namedarray && !is_cyclic[node])
+      flatten_namedarray(nodes[node], nodes, index);
   }
 }
 

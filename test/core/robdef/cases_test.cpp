@@ -31,7 +31,8 @@ TEST_CASE("shared cases have their verdict and line", "[robdef]") {
     const auto text = item.at("text").get<std::string>();
     for (const auto mode : {RobdefMode::strict, RobdefMode::compat}) {
       const bool is_strict = mode == RobdefMode::strict;
-      const bool is_valid = is_strict ? item.at("valid").get<bool>() : item.value("compat", item.at("valid").get<bool>());
+      const bool is_valid =
+          is_strict ? item.at("valid").get<bool>() : item.value("compat", item.at("valid").get<bool>());
       auto checked = check(text, mode, imports_of(item));
       INFO(item.at("name") << (is_strict ? " (strict)" : " (compat)") << "\n" << text << "\n" << checked.report());
       CHECK(checked.ok() == is_valid);

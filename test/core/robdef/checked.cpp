@@ -16,14 +16,17 @@ std::vector<Diagnostic> of_severity(const std::vector<Diagnostic>& all, Severity
 
 }  // namespace
 
-std::vector<Diagnostic> Checked::errors() const { return of_severity(diagnostics, Severity::error); }
+std::vector<Diagnostic> Checked::errors() const {
+  return of_severity(diagnostics, Severity::error);
+}
 
-std::vector<Diagnostic> Checked::warnings() const { return of_severity(diagnostics, Severity::warning); }
+std::vector<Diagnostic> Checked::warnings() const {
+  return of_severity(diagnostics, Severity::warning);
+}
 
 bool Checked::has(Severity severity, std::string_view code) const {
-  return std::any_of(diagnostics.begin(), diagnostics.end(), [&](const Diagnostic& item) {
-    return item.severity == severity && item.code == code;
-  });
+  return std::any_of(diagnostics.begin(), diagnostics.end(),
+                     [&](const Diagnostic& item) { return item.severity == severity && item.code == code; });
 }
 
 std::string Checked::report() const {

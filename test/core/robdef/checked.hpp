@@ -23,7 +23,8 @@ struct Checked {
   std::string report() const;
 };
 
-Checked check(std::string_view text, RobdefMode mode = RobdefMode::strict, const std::vector<std::string>& imports = {});
+Checked check(std::string_view text, RobdefMode mode = RobdefMode::strict,
+              const std::vector<std::string>& imports = {});
 
 /// "service demo.a\nstdver 0.10\n" and the body: the body begins at line 3.
 Checked check_body(std::string_view body, RobdefMode mode = RobdefMode::strict,

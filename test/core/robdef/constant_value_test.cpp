@@ -87,7 +87,8 @@ TEST_CASE("malformed numbers are refused", "[robdef]") {
     INFO(text);
     CHECK(strict(type_of("int32"), text).has_error());
   }
-  for (const auto* text : {"", ".", "-", "00.5", "0x1", "nan", "inf", "-inf", "1e", "1e+", "e5", "1.5f", "1..2", "1 2"}) {
+  for (const auto* text :
+       {"", ".", "-", "00.5", "0x1", "nan", "inf", "-inf", "1e", "1e+", "e5", "1.5f", "1..2", "1 2"}) {
     INFO(text);
     CHECK(strict(type_of("double"), text).has_error());
   }
@@ -157,7 +158,8 @@ TEST_CASE("string constants", "[robdef]") {
   CHECK(string_of(R"("\"\\\/\b\f\n\r\t")") == "\"\\/\b\f\n\r\t");
   CHECK(string_of(R"("\u0041\u00e9\u20AC\ud83d\ude00")") == "A\xc3\xa9\xe2\x82\xac\xf0\x9f\x98\x80");
   CHECK(string_of(R"("a\u0000b")") == std::string("a\0b", 3));
-  for (const auto* text : {R"(a)", R"(")", R"("a)", R"("a"b)", R"("\x41")", R"("\u12")", R"("\u12g4")", R"("\)", R"("\")"}) {
+  for (const auto* text :
+       {R"(a)", R"(")", R"("a)", R"("a"b)", R"("\x41")", R"("\u12")", R"("\u12g4")", R"("\)", R"("\")"}) {
     INFO(text);
     CHECK(strict(type_of("string"), text).has_error());
     CHECK(compat(type_of("string"), text).has_error());

@@ -11,7 +11,8 @@ TEST_CASE("documentation goes to everything that can carry it", "[robdef]") {
       "## limit\nconstant int32 LIMIT 3\n"
       "## mode\nenum Mode\n    ## off value\n    off = 0, on,\n    ## later\n\n    third\nend\n"
       "## jam\nexception Jam\n"
-      "## arm\nobject Arm\n    ## rate\n    constant int32 RATE 1\n    ## angle\n    property double angle\n    ## end\nend\n"
+      "## arm\nobject Arm\n    ## rate\n    constant int32 RATE 1\n    ## angle\n    property double angle\n    ## "
+      "end\nend\n"
       "## lost at the end\n");
   REQUIRE(checked.ok());
   const auto& definition = checked.first();
@@ -35,14 +36,22 @@ TEST_CASE("a gap keeps documentation unless more follows", "[robdef]") {
 TEST_CASE("comments discard documentation outside of blocks only", "[robdef]") {
   CHECK(check_body("## a\n# c\nstruct S\nend\n").first().entities[0].documentation.empty());
   CHECK(check_body("struct S\n## a\n# c\nfield double x\nend\n").first().entities[0].members[0].documentation == " a");
-  CHECK(check_body("struct S\n## a\n# c\n## b\nfield double x\nend\n").first().entities[0].members[0].documentation == " b");
+  CHECK(check_body("struct S\n## a\n# c\n## b\nfield double x\nend\n").first().entities[0].members[0].documentation ==
+        " b");
 }
 
 TEST_CASE("statements without documentation drop it", "[robdef]") {
   const std::vector<std::string> imports = {"service demo.b\nstdver 0.10\n"};
-  CHECK(check_body("## a\nimport demo.b\nstruct S\nend\n", RobdefMode::strict, imports).first().entities[0].documentation.empty());
+  CHECK(check_body("## a\nimport demo.b\nstruct S\nend\n", RobdefMode::strict, imports)
+            .first()
+            .entities[0]
+            .documentation.empty());
   CHECK(check("service demo.a\n## a\noption x\nstruct S\nend\n").first().entities[0].documentation.empty());
-  CHECK(check_body("object B\nend\nobject A\n## a\nimplements B\nproperty double x\nend\n").first().entities[1].members[0].documentation.empty());
+  CHECK(check_body("object B\nend\nobject A\n## a\nimplements B\nproperty double x\nend\n")
+            .first()
+            .entities[1]
+            .members[0]
+            .documentation.empty());
 }
 
 TEST_CASE("documentation that ends in a backslash is kept, with a warning inside a block", "[robdef]") {

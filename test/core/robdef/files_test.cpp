@@ -9,7 +9,9 @@ namespace rr::test {
 
 namespace {
 
-std::string definition_text(const std::string& name) { return read_golden("../../robdef/" + name + ".robdef"); }
+std::string definition_text(const std::string& name) {
+  return read_golden("../../robdef/" + name + ".robdef");
+}
 
 }  // namespace
 

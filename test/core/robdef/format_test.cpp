@@ -47,7 +47,8 @@ TEST_CASE("versions and options print in the order that peers read", "[robdef]")
   CHECK(canonical("service a") == "service a\n\n");
   CHECK(canonical("service a\nstdver 0.9\noption  x  y \n") == "service a\n\nstdver 0.9\n\noption x  y\n\n");
   CHECK(canonical("service a\noption version 0.8\noption b\n") == "service a\n\noption version 0.8\noption b\n\n");
-  CHECK(canonical("service a\noption x\nstdver 0.10\n", RobdefMode::compat) == "service a\n\noption x\n\nstdver 0.10\n\n");
+  CHECK(canonical("service a\noption x\nstdver 0.10\n", RobdefMode::compat) ==
+        "service a\n\noption x\n\nstdver 0.10\n\n");
   ServiceDefinition built;
   built.name = "a";
   built.version = {0, 8, 0, 0};
@@ -55,26 +56,40 @@ TEST_CASE("versions and options print in the order that peers read", "[robdef]")
 }
 
 TEST_CASE("names print by their first alias, own names without the service", "[robdef]") {
-  CHECK(canonical("service a\nimport b\nusing b.T as X\nusing b.T as Y\nstruct S\nfield Y y\nfield b.T t\nfield b.U u\nfield a.S s\nend\n", RobdefMode::compat) ==
-        "service a\n\nimport b\n\nusing b.T as X\nusing b.T as Y\n\nstruct S\n    field X y\n    field X t\n    field b.U u\n    field S s\nend\n\n");
+  CHECK(canonical("service a\nimport b\nusing b.T as X\nusing b.T as Y\nstruct S\nfield Y y\nfield b.T t\nfield b.U "
+                  "u\nfield a.S s\nend\n",
+                  RobdefMode::compat) ==
+        "service a\n\nimport b\n\nusing b.T as X\nusing b.T as Y\n\nstruct S\n    field X y\n    field X t\n    field "
+        "b.U u\n    field S s\nend\n\n");
 }
 
 TEST_CASE("array sizes print as they are", "[robdef]") {
-  CHECK(canonical("service a\nstruct S\nfield double[0] x\nfield double[0-] y\nfield double[007-] z\nend\n", RobdefMode::compat) ==
+  CHECK(canonical("service a\nstruct S\nfield double[0] x\nfield double[0-] y\nfield double[007-] z\nend\n",
+                  RobdefMode::compat) ==
         "service a\n\nstruct S\n    field double[0] x\n    field double[] y\n    field double[7-] z\nend\n\n");
 }
 
 TEST_CASE("equality is blind to what the canonical text loses", "[robdef]") {
   const auto parse = [](const char* text) { return parse_service_definition(text, RobdefMode::compat).definition; };
-  const auto base = parse("service a\nimport b\nusing b.T\nconstant int32 K 1\nenum E\nx = 1,\ny\nend\nexception X\nstruct S\nfield T t\nend\nobject O\nconstant int32 K 2\nwire S w [readonly]\nend\n");
-  CHECK(is_equal(base, parse("## d\nservice a\n\nimport b\nusing b.T\nexception X\n# c\nenum E\nx = 1,\ny\nend\nconstant int32  K  1 \nobject O\nconstant int32 K 2\nwire S w [ readonly, ]\nend\nstruct S\nfield b.T t\nend struct\n")));
+  const auto base = parse(
+      "service a\nimport b\nusing b.T\nconstant int32 K 1\nenum E\nx = 1,\ny\nend\nexception X\nstruct S\nfield T "
+      "t\nend\nobject O\nconstant int32 K 2\nwire S w [readonly]\nend\n");
+  CHECK(is_equal(
+      base,
+      parse("## d\nservice a\n\nimport b\nusing b.T\nexception X\n# c\nenum E\nx = 1,\ny\nend\nconstant int32  K  1 "
+            "\nobject O\nconstant int32 K 2\nwire S w [ readonly, ]\nend\nstruct S\nfield b.T t\nend struct\n")));
   for (const auto* other : {
            "service a\n",
-           "service a\nimport b\nusing b.T as U\nconstant int32 K 1\nenum E\nx = 1,\ny\nend\nexception X\nstruct S\nfield U t\nend\nobject O\nconstant int32 K 2\nwire S w [readonly]\nend\n",
-           "service a\nimport b\nusing b.T\nconstant int32 K 0x1\nenum E\nx = 1,\ny\nend\nexception X\nstruct S\nfield T t\nend\nobject O\nconstant int32 K 2\nwire S w [readonly]\nend\n",
-           "service a\nimport b\nusing b.T\nconstant int32 K 1\nenum E\nx = 1,\ny = 2\nend\nexception X\nstruct S\nfield T t\nend\nobject O\nconstant int32 K 2\nwire S w [readonly]\nend\n",
-           "service a\nimport b\nusing b.T\nconstant int32 K 1\nenum E\nx = 1,\ny\nend\nexception X\nstruct S\nfield T t\nend\nobject O\nconstant int32 K 2\nwire S w\nend\n",
-           "service a\nimport b\nusing b.T\nconstant int32 K 1\nenum E\nx = 1,\ny\nend\nexception X\nstruct S\nfield T{list} t\nend\nobject O\nconstant int32 K 2\nwire S w [readonly]\nend\n",
+           "service a\nimport b\nusing b.T as U\nconstant int32 K 1\nenum E\nx = 1,\ny\nend\nexception X\nstruct "
+           "S\nfield U t\nend\nobject O\nconstant int32 K 2\nwire S w [readonly]\nend\n",
+           "service a\nimport b\nusing b.T\nconstant int32 K 0x1\nenum E\nx = 1,\ny\nend\nexception X\nstruct S\nfield "
+           "T t\nend\nobject O\nconstant int32 K 2\nwire S w [readonly]\nend\n",
+           "service a\nimport b\nusing b.T\nconstant int32 K 1\nenum E\nx = 1,\ny = 2\nend\nexception X\nstruct "
+           "S\nfield T t\nend\nobject O\nconstant int32 K 2\nwire S w [readonly]\nend\n",
+           "service a\nimport b\nusing b.T\nconstant int32 K 1\nenum E\nx = 1,\ny\nend\nexception X\nstruct S\nfield T "
+           "t\nend\nobject O\nconstant int32 K 2\nwire S w\nend\n",
+           "service a\nimport b\nusing b.T\nconstant int32 K 1\nenum E\nx = 1,\ny\nend\nexception X\nstruct S\nfield "
+           "T{list} t\nend\nobject O\nconstant int32 K 2\nwire S w [readonly]\nend\n",
        }) {
     CHECK_FALSE(is_equal(base, parse(other)));
   }

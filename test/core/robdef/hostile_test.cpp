@@ -86,10 +86,13 @@ TEST_CASE("many of everything", "[robdef][hostile]") {
   const std::size_t count = 10000;
   check_quickly(head + numbered(count, [](const auto& i) { return "struct S" + i + "\n field S" + i + " x\nend\n"; }));
   check_quickly(head + "enum E\n a=0,\n" + numbered(count, [](const auto& i) { return " v" + i + ",\n"; }) + "end\n");
-  check_quickly(head + "object O\n" + numbered(count, [](const auto& i) { return " wire double w" + i + " [a(K)]\n"; }) + "end\n");
-  check_quickly(head + "object O\n" + numbered(count, [](const auto& i) { return " constant int32 K" + i + " 1\n"; }) + "end\n");
+  check_quickly(head + "object O\n" +
+                numbered(count, [](const auto& i) { return " wire double w" + i + " [a(K)]\n"; }) + "end\n");
+  check_quickly(head + "object O\n" + numbered(count, [](const auto& i) { return " constant int32 K" + i + " 1\n"; }) +
+                "end\n");
   check_quickly(head + numbered(count, [](const auto& i) { return "import demo.x" + i + "\n"; }));
-  check_quickly(head + "import demo.b\n" + numbered(count, [](const auto& i) { return "using demo.b.T as A" + i + "\n"; }) + "struct S\n" +
+  check_quickly(head + "import demo.b\n" +
+                    numbered(count, [](const auto& i) { return "using demo.b.T as A" + i + "\n"; }) + "struct S\n" +
                     numbered(count, [](const auto& i) { return "field A" + i + " f" + i + "\n"; }) + "end\n",
                 {"service demo.b\nstdver 0.9\nstruct T\nend\n"});
 }
@@ -98,20 +101,25 @@ TEST_CASE("long chains and large cycles", "[robdef][hostile]") {
   const std::size_t count = 10000;
   const auto next = [](const std::string& i) { return std::to_string(std::stoul(i) + 1); };
   for (const auto* last : {"field double x", "field P0 x"}) {
-    check_quickly(head + numbered(count, [&](const auto& i) { return "pod P" + i + "\n field P" + next(i) + " x\nend\n"; }) + "pod P" +
-                  std::to_string(count) + "\n " + last + "\nend\n");
-    check_quickly(head + numbered(count, [&](const auto& i) { return "namedarray P" + i + "\n field P" + next(i) + "[2] x\nend\n"; }) +
-                  "namedarray P" + std::to_string(count) + "\n " + last + "\nend\n");
+    check_quickly(head +
+                  numbered(count, [&](const auto& i) { return "pod P" + i + "\n field P" + next(i) + " x\nend\n"; }) +
+                  "pod P" + std::to_string(count) + "\n " + last + "\nend\n");
+    check_quickly(
+        head +
+        numbered(count, [&](const auto& i) { return "namedarray P" + i + "\n field P" + next(i) + "[2] x\nend\n"; }) +
+        "namedarray P" + std::to_string(count) + "\n " + last + "\nend\n");
   }
-  check_quickly(head + numbered(count, [&](const auto& i) { return "constant struct C" + i + " {a: C" + next(i) + "}\n"; }) + "constant struct C" +
-                std::to_string(count) + " {a: C0}\n");
-  check_quickly(head + numbered(count, [&](const auto& i) { return "object O" + i + "\n implements O" + next(i) + "\nend\n"; }) + "object O" +
-                std::to_string(count) + "\nend\n");
+  check_quickly(head +
+                numbered(count, [&](const auto& i) { return "constant struct C" + i + " {a: C" + next(i) + "}\n"; }) +
+                "constant struct C" + std::to_string(count) + " {a: C0}\n");
+  check_quickly(
+      head + numbered(count, [&](const auto& i) { return "object O" + i + "\n implements O" + next(i) + "\nend\n"; }) +
+      "object O" + std::to_string(count) + "\nend\n");
 }
 
 TEST_CASE("one large base and many objects that lack its members", "[robdef][hostile]") {
-  check_quickly(head + "object B\n" + numbered(10000, [](const auto& i) { return " wire double w" + i + "\n"; }) + "end\n" +
-                numbered(10000, [](const auto& i) { return "object O" + i + "\n implements B\nend\n"; }));
+  check_quickly(head + "object B\n" + numbered(10000, [](const auto& i) { return " wire double w" + i + "\n"; }) +
+                "end\n" + numbered(10000, [](const auto& i) { return "object O" + i + "\n implements B\nend\n"; }));
 }
 
 TEST_CASE("imports in a circle of thousands", "[robdef][hostile]") {

@@ -25,7 +25,7 @@ Lexed lex(std::string_view text) {
 TEST_CASE("lines are statements, documentation, comments or blank", "[robdef]") {
   const auto lexed = lex("service a\n\n \t\n# c\n\t## d #\n###\nlast");
   REQUIRE(lexed.lines.size() == 7);
-  const LineKind kinds[] = {LineKind::statement, LineKind::blank,         LineKind::blank,    LineKind::comment,
+  const LineKind kinds[] = {LineKind::statement,     LineKind::blank,         LineKind::blank,    LineKind::comment,
                             LineKind::documentation, LineKind::documentation, LineKind::statement};
   for (std::size_t i = 0; i < 7; ++i) {
     CHECK(lexed.lines[i].kind() == kinds[i]);

@@ -98,15 +98,15 @@ TEST_CASE("the source text and the file stay with the definition", "[robdef]") {
 
 TEST_CASE("all errors are reported, not only the first", "[robdef]") {
   const auto checked = check_body(
-      "constant int32 A x\n"              // 3
+      "constant int32 A x\n"                   // 3
       "enum Mode\n    off\n    on = 1\nend\n"  // 5 (no value), 6 (comma)
       "struct S\n"
-      "    field double[3 x\n"            // 9
-      "    property double y\n"           // 10
+      "    field double[3 x\n"   // 9
+      "    property double y\n"  // 10
       "    field double z\n"
       "end\n"
-      "object\n    nonsense\nend\n"       // 13
-      "bogus\n"                           // 16
+      "object\n    nonsense\nend\n"                                 // 13
+      "bogus\n"                                                     // 16
       "object Arm\n    function f()\n    event e(double)\nend\n");  // 18, 19
   INFO(checked.report());
   CHECK(error_lines(checked) == Lines{3, 5, 6, 9, 10, 13, 16, 18, 19});
@@ -114,7 +114,7 @@ TEST_CASE("all errors are reported, not only the first", "[robdef]") {
 
 TEST_CASE("verification reports all errors, too", "[robdef]") {
   const auto checked = check_body(
-      "struct S\n    field Unknown a\n    field string[] b\n    field void c\nend\n"  // 4, 5, 6
+      "struct S\n    field Unknown a\n    field string[] b\n    field void c\nend\n"          // 4, 5, 6
       "object Arm\n    property S rr_x\n    property S rr_x\n    memory string[] m\nend\n");  // 9, 10 (twice), 11
   INFO(checked.report());
   CHECK(error_lines(checked) == Lines{4, 5, 6, 9, 10, 10, 11});
@@ -135,14 +135,16 @@ TEST_CASE("a reserved word as the name of an enum value is no block", "[robdef]"
 }
 
 TEST_CASE("an illegal character costs its own statement only", "[robdef]") {
-  const auto checked = check_body("object Arm\xc3\xa9\n    property double x\nend\nstruct S\n    field double \x01 y\n    field double z\nend\n");
+  const auto checked = check_body(
+      "object Arm\xc3\xa9\n    property double x\nend\nstruct S\n    field double \x01 y\n    field double z\nend\n");
   CHECK(error_lines(checked) == Lines{3, 7});
   CHECK(error_lines(check("\x01service demo.a\nstruct S\nend\n")) == Lines{1, 2});
 }
 
 TEST_CASE("wrapped parameters are joined in compat mode", "[robdef]") {
   const std::string text =
-      "service demo.a\nobject Arm\n    function void move(double a,\n        double b\n        , string\n     c) [urgent]\n"
+      "service demo.a\nobject Arm\n    function void move(double a,\n        double b\n        , string\n     c) "
+      "[urgent]\n"
       "    property double x\nend\n";
   const auto strict = check(text);
   CHECK(error_lines(strict) == Lines{3});
@@ -158,9 +160,11 @@ TEST_CASE("wrapped parameters are joined in compat mode", "[robdef]") {
 }
 
 TEST_CASE("wrapped parameters stop at keywords, comments and blank lines", "[robdef]") {
-  for (const auto* next : {"    end\n", "    wire double w\n", "# c\n    double b)\n", "\n    double b)\n", "## d\n    double b)\n"}) {
+  for (const auto* next :
+       {"    end\n", "    wire double w\n", "# c\n    double b)\n", "\n    double b)\n", "## d\n    double b)\n"}) {
     const auto checked =
-        check("service demo.a\nobject Arm\n    function void move(double a,\n" + std::string(next) + "end\n", RobdefMode::compat);
+        check("service demo.a\nobject Arm\n    function void move(double a,\n" + std::string(next) + "end\n",
+              RobdefMode::compat);
     INFO(next << checked.report());
     REQUIRE_FALSE(checked.ok());
     CHECK(checked.errors()[0].line == 3);
@@ -170,7 +174,9 @@ TEST_CASE("wrapped parameters stop at keywords, comments and blank lines", "[rob
 }
 
 TEST_CASE("an unreliable pipe of the old form", "[robdef]") {
-  auto checked = check("service demo.a\nobject Arm\n    option pipe  p unreliable\n    pipe double p\n    pipe double q\n    pipe double r [unreliable]\nend\n");
+  auto checked = check(
+      "service demo.a\nobject Arm\n    option pipe  p unreliable\n    pipe double p\n    pipe double q\n    pipe "
+      "double r [unreliable]\nend\n");
   REQUIRE(checked.ok());
   const auto& arm = checked.first().entities.at(0);
   CHECK(arm.is_unreliable_pipe(arm.members.at(0)));

@@ -21,7 +21,9 @@ std::string member_error(const std::string& member, RobdefMode mode = RobdefMode
 bool is_member_fine(const std::string& member, RobdefMode mode = RobdefMode::strict) {
   const auto checked = check_body(
       "enum E\n    a = 0\nend\nstruct S\nend\npod P\nend\nnamedarray N\n    field double x\nend\n"
-      "object O\n    " + member + "\nend\n", mode);
+      "object O\n    " +
+          member + "\nend\n",
+      mode);
   UNSCOPED_INFO(checked.report());
   return checked.ok();
 }
@@ -29,8 +31,8 @@ bool is_member_fine(const std::string& member, RobdefMode mode = RobdefMode::str
 }  // namespace
 
 TEST_CASE("value types of members", "[robdef]") {
-  for (const auto* type : {"double", "bool[]", "cdouble[3,4]", "string{list}", "varvalue{string}", "E", "E{int32}", "S{list}",
-                           "P[*]", "N[4-]{string}", "csingle[7,]"}) {
+  for (const auto* type : {"double", "bool[]", "cdouble[3,4]", "string{list}", "varvalue{string}", "E", "E{int32}",
+                           "S{list}", "P[*]", "N[4-]{string}", "csingle[7,]"}) {
     for (const auto* kind : {"property", "wire", "pipe"}) {
       CHECK(is_member_fine(std::string(kind) + ' ' + type + " x"));
     }
@@ -53,9 +55,10 @@ TEST_CASE("generators", "[robdef]") {
   CHECK(is_member_fine("function double{generator} f()"));
   CHECK(is_member_fine("function S{generator} f(double[3]{generator} a)"));
   CHECK(is_member_fine("function void f(int32 n, E{generator} a)"));
-  for (const auto* member : {"function double f(double{generator} a)", "function void{generator} f()", "event e(double{generator} a)",
-                             "callback void c(double{generator} a)", "function void f(double{generator} a, double{generator} b)",
-                             "function void f(void{generator} a)"}) {
+  for (const auto* member :
+       {"function double f(double{generator} a)", "function void{generator} f()", "event e(double{generator} a)",
+        "callback void c(double{generator} a)", "function void f(double{generator} a, double{generator} b)",
+        "function void f(void{generator} a)"}) {
     INFO(member);
     CHECK_FALSE(is_member_fine(member, RobdefMode::compat));
   }
@@ -65,25 +68,29 @@ TEST_CASE("generators", "[robdef]") {
 TEST_CASE("memories and object references", "[robdef]") {
   CHECK(is_member_fine("memory bool[] m"));
   CHECK(is_member_fine("memory N[*] m"));
-  for (const auto* member : {"memory double m", "memory double[3] m", "memory string[] m", "memory E[] m", "memory S[] m",
-                             "memory varvalue[] m", "memory O[] m"}) {
+  for (const auto* member : {"memory double m", "memory double[3] m", "memory string[] m", "memory E[] m",
+                             "memory S[] m", "memory varvalue[] m", "memory O[] m"}) {
     INFO(member);
     CHECK_FALSE(is_member_fine(member, RobdefMode::compat));
   }
   CHECK(is_member_fine("objref O[] o"));
   CHECK(is_member_fine("objref varobject{string} o"));
-  for (const auto* member : {"objref S o", "objref double o", "objref object o", "objref varvalue o", "objref O[*] o", "objref O[3] o",
-                             "objref O{list} o", "objref O{generator} o"}) {
+  for (const auto* member : {"objref S o", "objref double o", "objref object o", "objref varvalue o", "objref O[*] o",
+                             "objref O[3] o", "objref O{list} o", "objref O{generator} o"}) {
     INFO(member);
     CHECK_FALSE(is_member_fine(member, RobdefMode::compat));
   }
 }
 
 TEST_CASE("types are found by alias and by full name, seen from where they are used", "[robdef]") {
-  const std::vector<std::string> imports = {"service demo.lib\nstdver 0.10\nimport demo.deep\nenum Mode\nend\nobject Tool\n    objref Part part\nend\nobject Part\nend\n",
-                                            "service demo.deep\nstdver 0.10\nstruct Deep\nend\n"};
-  auto checked = check_body("import demo.lib\nusing demo.lib.Mode as State\nobject O\n    property State a\n    property demo.lib.Mode b\n    objref demo.lib.Tool c\nend\n",
-                            RobdefMode::strict, imports);
+  const std::vector<std::string> imports = {
+      "service demo.lib\nstdver 0.10\nimport demo.deep\nenum Mode\nend\nobject Tool\n    objref Part part\nend\nobject "
+      "Part\nend\n",
+      "service demo.deep\nstdver 0.10\nstruct Deep\nend\n"};
+  auto checked = check_body(
+      "import demo.lib\nusing demo.lib.Mode as State\nobject O\n    property State a\n    property demo.lib.Mode b\n   "
+      " objref demo.lib.Tool c\nend\n",
+      RobdefMode::strict, imports);
   INFO(checked.report());
   REQUIRE(checked.ok());
   const auto& members = checked.first().entities[0].members;
@@ -92,13 +99,19 @@ TEST_CASE("types are found by alias and by full name, seen from where they are u
   CHECK(members[1].type.qualified_name == "demo.lib.Mode");
   CHECK(members[2].type.type == DataType::object_t);
   CHECK(checked.definitions[1].entities[0].members[0].type.qualified_name == "demo.lib.Part");
-  CHECK(one_error(check_body("import demo.lib\nstruct S\n    field demo.deep.Deep d\nend\n", RobdefMode::strict, imports)) == "type-unknown");
-  CHECK(one_error(check_body("import demo.lib\nstruct S\n    field demo.lib.Gone d\nend\n", RobdefMode::strict, imports)) == "type-unknown");
-  CHECK(one_error(check_body("import demo.lib\nstruct S\n    field Mode d\nend\n", RobdefMode::strict, imports)) == "type-unknown");
-  CHECK(one_error(check_body("import demo.lib\nusing demo.lib.Gone\nstruct S\n    field Gone d\nend\n", RobdefMode::strict, imports)) == "alias-invalid");
+  CHECK(one_error(check_body("import demo.lib\nstruct S\n    field demo.deep.Deep d\nend\n", RobdefMode::strict,
+                             imports)) == "type-unknown");
+  CHECK(one_error(check_body("import demo.lib\nstruct S\n    field demo.lib.Gone d\nend\n", RobdefMode::strict,
+                             imports)) == "type-unknown");
+  CHECK(one_error(check_body("import demo.lib\nstruct S\n    field Mode d\nend\n", RobdefMode::strict, imports)) ==
+        "type-unknown");
+  CHECK(one_error(check_body("import demo.lib\nusing demo.lib.Gone\nstruct S\n    field Gone d\nend\n",
+                             RobdefMode::strict, imports)) == "alias-invalid");
   CHECK(one_error(check_body("constant int32 K 1\nstruct S\n    field K d\nend\n")) == "type-unknown");
   // A missing import is one error, whatever hangs on it.
-  CHECK(one_error(check_body("import demo.gone\nusing demo.gone.A as B\nstruct S\n    field B b\n    field demo.gone.C c\nend\n")) == "import-missing");
+  CHECK(one_error(check_body(
+            "import demo.gone\nusing demo.gone.A as B\nstruct S\n    field B b\n    field demo.gone.C c\nend\n")) ==
+        "import-missing");
 }
 
 TEST_CASE("self-qualified names resolve in compat mode", "[robdef]") {
@@ -113,29 +126,35 @@ TEST_CASE("namedarrays know their numbers", "[robdef]") {
       "import demo.lib\n"
       "namedarray Pose\n    field demo.lib.Vector position\n    field Turn[2] turns\nend\n"
       "namedarray Turn\n    field double w\n    field double[3] xyz\nend\n",
-      RobdefMode::strict, {"service demo.lib\nstdver 0.10\nnamedarray Vector\n    field double x\n    field double y\nend\n"});
+      RobdefMode::strict,
+      {"service demo.lib\nstdver 0.10\nnamedarray Vector\n    field double x\n    field double y\nend\n"});
   INFO(checked.report());
   REQUIRE(checked.ok());
   CHECK(checked.first().entities[0].namedarray_type == DataType::double_t);
   CHECK(checked.first().entities[0].namedarray_count == 10);
   CHECK(checked.first().entities[1].namedarray_count == 4);
   // Beyond 32 bits the count stays at its maximum.
-  auto large = check_body("namedarray A\n    field B[2147483647] x\nend\nnamedarray B\n    field double[2147483647] x\nend\n");
+  auto large =
+      check_body("namedarray A\n    field B[2147483647] x\nend\nnamedarray B\n    field double[2147483647] x\nend\n");
   REQUIRE(large.ok());
   CHECK(large.first().entities[0].namedarray_count == 0xffffffffu);
 }
 
 TEST_CASE("what pods and namedarrays cannot hold", "[robdef]") {
-  for (const auto* field : {"string x", "S x", "E x", "O x", "varvalue x", "double[] x", "double[*] x", "double{list} x", "double[0] x", "double[0-] x", "void x"}) {
+  for (const auto* field : {"string x", "S x", "E x", "O x", "varvalue x", "double[] x", "double[*] x",
+                            "double{list} x", "double[0] x", "double[0-] x", "void x"}) {
     INFO(field);
-    const std::string others = "enum E\n    a = 1\nend\nstruct S\nend\nobject O\nend\nnamedarray N\n    field double x\nend\n";
+    const std::string others =
+        "enum E\n    a = 1\nend\nstruct S\nend\nobject O\nend\nnamedarray N\n    field double x\nend\n";
     CHECK_FALSE(check_body(others + "pod T\n    field " + field + "\nend\n", RobdefMode::compat).ok());
     const bool is_zero_size = std::string_view(field) == "double[0] x";
-    CHECK(check_body(others + "namedarray T\n    field double y\n    field " + field + "\nend\n", RobdefMode::compat).ok() == is_zero_size);
+    CHECK(check_body(others + "namedarray T\n    field double y\n    field " + field + "\nend\n", RobdefMode::compat)
+              .ok() == is_zero_size);
   }
   CHECK(one_error(check_body("namedarray T\nend\n")) == "namedarray-field");
   CHECK(one_error(check_body("namedarray T\n    field double x\n    field T y\nend\n")) == "recursion");
-  CHECK(one_error(check_body("pod T\n    field U[2] x\nend\npod U\n    field V x\nend\npod V\n    field T x\nend\n")) == "recursion");
+  CHECK(one_error(check_body("pod T\n    field U[2] x\nend\npod U\n    field V x\nend\npod V\n    field T x\nend\n")) ==
+        "recursion");
 }
 
 TEST_CASE("names of every name space", "[robdef]") {
@@ -143,7 +162,8 @@ TEST_CASE("names of every name space", "[robdef]") {
   CHECK(one_error(check_body("enum A\nend\nstruct A\nend\n")) == "duplicate-name");
   CHECK(one_error(check_body("exception A\nconstant int32 A 1\n")) == "duplicate-name");
   CHECK(one_error(check("service demo.a\noption constant int32 A 1\nstruct A\nend\n")) == "duplicate-name");
-  CHECK(one_error(check("service demo.a\nobject O\n    option constant int32 A.B 1\n    property double A_B\nend\n", RobdefMode::compat)) == "duplicate-name");
+  CHECK(one_error(check("service demo.a\nobject O\n    option constant int32 A.B 1\n    property double A_B\nend\n",
+                        RobdefMode::compat)) == "duplicate-name");
   CHECK(one_error(check_body("enum E\n    a = 1,\n    a = 2\nend\n")) == "duplicate-name");
   CHECK(one_error(check_body("enum E\n    a = 1,\n    set_b = 2\nend\n")) == "name-reserved");
   CHECK(member_error("function void f(int32 a, int32 a)") == "duplicate-name");
@@ -161,16 +181,20 @@ TEST_CASE("names of every name space", "[robdef]") {
 
 TEST_CASE("inheritance compares all that counts", "[robdef]") {
   const auto with = [](const std::string& base, const std::string& own) {
-    return check_body("import demo.lib\nusing demo.lib.S as T\nobject B\n    " + base + "\nend\nobject D\n    implements B\n    " + own + "\nend\n", RobdefMode::strict,
-                      {"service demo.lib\nstdver 0.10\nstruct S\nend\n"});
+    return check_body("import demo.lib\nusing demo.lib.S as T\nobject B\n    " + base +
+                          "\nend\nobject D\n    implements B\n    " + own + "\nend\n",
+                      RobdefMode::strict, {"service demo.lib\nstdver 0.10\nstruct S\nend\n"});
   };
   CHECK(with("property T x [readonly]", "## other text\n    property demo.lib.S x [ readonly ]").ok());
   CHECK(with("function void f(int32 a, T{list} b)", "function void f( int32 a,demo.lib.S{list} b )").ok());
-  for (const auto& [base, own] : {std::pair("property double x", "wire double x"), std::pair("property double x", "property single x"),
-                                  std::pair("property double[] x", "property double[3] x"), std::pair("property double x", "property double{list} x"),
-                                  std::pair("function void f(int32 a)", "function void f()"), std::pair("function void f(int32 a)", "function void f(int64 a)"),
-                                  std::pair("wire double x", "wire double x [readonly]"), std::pair("property T x", "property double x"),
-                                  std::pair("wire double x [a(1)]", "wire double x [a(2)]")}) {
+  for (const auto& [base, own] :
+       {std::pair("property double x", "wire double x"), std::pair("property double x", "property single x"),
+        std::pair("property double[] x", "property double[3] x"),
+        std::pair("property double x", "property double{list} x"),
+        std::pair("function void f(int32 a)", "function void f()"),
+        std::pair("function void f(int32 a)", "function void f(int64 a)"),
+        std::pair("wire double x", "wire double x [readonly]"), std::pair("property T x", "property double x"),
+        std::pair("wire double x [a(1)]", "wire double x [a(2)]")}) {
     INFO(own);
     CHECK(one_error(with(base, own)) == "implements-mismatch");
   }
@@ -178,7 +202,8 @@ TEST_CASE("inheritance compares all that counts", "[robdef]") {
   CHECK(one_error(check_body("object D\n    implements Gone\nend\n")) == "implements-unknown");
   CHECK(one_error(check_body("struct S\nend\nobject D\n    implements S\nend\n")) == "implements-unknown");
   CHECK(one_error(check_body("object D\n    implements D\nend\n")) == "implements-cycle");
-  CHECK(check_body("object B\nend\nobject D\n    implements B\n    implements B\nend\n").has(Severity::warning, "duplicate-implements"));
+  CHECK(check_body("object B\nend\nobject D\n    implements B\n    implements B\nend\n")
+            .has(Severity::warning, "duplicate-implements"));
 }
 
 TEST_CASE("modifiers that mean nothing give warnings", "[robdef]") {
@@ -201,7 +226,9 @@ TEST_CASE("modifiers that mean nothing give warnings", "[robdef]") {
 }
 
 TEST_CASE("features of later versions are gated where they are first used", "[robdef]") {
-  const auto checked = check("service demo.a\noption version 0.8\nconstant int32 A 1\nenum E\n    a = 1\nend\nobject O\n    constant int32 K 1\n    wire double w [readonly]\nend\n");
+  const auto checked = check(
+      "service demo.a\noption version 0.8\nconstant int32 A 1\nenum E\n    a = 1\nend\nobject O\n    constant int32 K "
+      "1\n    wire double w [readonly]\nend\n");
   INFO(checked.report());
   REQUIRE(checked.errors().size() == 3);
   CHECK(checked.errors()[0].line == 3);

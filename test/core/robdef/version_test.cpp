@@ -10,7 +10,8 @@ TEST_CASE("versions are two to four numbers", "[robdef]") {
   CHECK(*parse_version("1.2.8.1") == Version{1, 2, 8, 1});
   CHECK(*parse_version("0.09") == Version{0, 9, 0, 0});
   CHECK(*parse_version("4294967295.0") == Version{4294967295u, 0, 0, 0});
-  for (const auto* text : {"", "1", "1.", ".1", "1.2.3.4.5", "1.2.3.4.", "1..2", "a.b", "1.2 ", "-1.0", "4294967296.0", "0.0x1"}) {
+  for (const auto* text :
+       {"", "1", "1.", ".1", "1.2.3.4.5", "1.2.3.4.", "1..2", "a.b", "1.2 ", "-1.0", "4294967296.0", "0.0x1"}) {
     INFO(text);
     REQUIRE(parse_version(text).has_error());
     CHECK(parse_version(text).error().code == ErrorCode::service_definition_error);
