@@ -59,7 +59,7 @@ class Defaults {
       pod.fields.push_back({member.name, make_value(member.type)});
     }
     copies_ = outer_copies;
-    pods.items.assign(count, pod);
+    pods.items.assign(static_cast<std::size_t>(count), pod);
     return Value(std::move(pods));
   }
 
@@ -75,7 +75,7 @@ class Defaults {
 
   Array zeros(DataType type, std::uint64_t count) {
     if (!take(count, item_size(type))) return Array::empty(type);
-    return Array::copy(type, Bytes(count * item_size(type)));
+    return Array::copy(type, Bytes(static_cast<std::size_t>(count) * item_size(type)));
   }
 
   /// Nothing overflows: copies_ and count are at most most_bytes, sizes a few hundred.
