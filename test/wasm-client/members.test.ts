@@ -32,7 +32,7 @@ object Root
   function void hang()
   function double{generator} ramp(int32 count)
   function void then(double x)
-  function string toString()
+  function string toString(string text)
   function void constructor(int32 value)
   property double hasOwnProperty
   event bump(int32 side, string text)
@@ -105,7 +105,7 @@ describe("the object", () => {
     expect(service.sent.length).toBe(before); // nothing was called
     expect("then" in robot).toBe(false);
     await robot.$.member("then")(1.5);
-    expect(await robot.$.member("toString")()).toBe(null);
+    expect(await robot.$.member("toString")("x")).toBe("x");
     await m("constructor")(3);
     await m("hasOwnProperty").set(2);
     expect(await m("hasOwnProperty").get()).toBe(2);

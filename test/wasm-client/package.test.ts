@@ -23,7 +23,8 @@ it("depends on nothing", () => {
 it("needs no eval, no shared memory and nothing of Node in a page", () => {
   const loader = read("rrgate.js");
   expect(loader).not.toMatch(/\beval\(|new Function\(|SharedArrayBuffer|require\(/);
-  for (const file of readdirSync(dist).filter((name) => name.endsWith(".js") && !name.endsWith("_node.js"))) {
+  const ours = readdirSync(dist).filter((name) => name.endsWith(".js") && !name.endsWith("_node.js") && name !== "rrgate.js");
+  for (const file of ours) {
     expect(read(file), file).not.toMatch(/from "node:|import\("node:|process\./);
   }
 });

@@ -66,16 +66,18 @@ export class Replay {
   }
 
   #take(message: Buffer): void {
-    // Version 2: the sender's node id follows the sizes and the version; later messages name the endpoint.
-    this.#node_id ??= Buffer.from(message.subarray(10, 26));
+    // Version 2: the sender's node id follows sizes and version; later messages name the endpoint.
+    this.#node_id ??= Buffer.from(message.subarray(12, 28));
     const step = this.#steps.shift();
     if (step?.dir !== "c>s") throw new Error(`the client sent a message where ${step ? step.text : "nothing"} follows`);
+    const is_before_session = / ep \d+>0 /.test(step.text);
     if (!this.#endpoint && / ep \d+>0 \| (ConnectClientCombined|GetServiceDesc)/.test(step.text)) {
-      const at = step.bytes.indexOf(this.#recorded_endpoint);
-      this.#endpoint = Buffer.from(message.subarray(at, at + 4));
+      this.#endpoint = sender_endpoint(message);
     }
-    this.expected.push(step.bytes);
-    this.found.push(this.#exchange(message, false));
+    const found = this.#exchange(message, false);
+    // Before there is a session the reference leaves out which node it speaks to; this client has learnt it.
+    this.expected.push(is_before_session ? without_header(step.bytes) : step.bytes);
+    this.found.push(is_before_session ? without_header(found) : found);
     queueMicrotask(() => this.#play());
   }
 
@@ -91,6 +93,22 @@ export class Replay {
     replace(copy, to_ours ? this.#recorded_endpoint : this.#endpoint, to_ours ? this.#endpoint : this.#recorded_endpoint);
     return copy;
   }
+}
+
+/** The message behind its header. */
+function without_header(bytes: Buffer): Buffer {
+  const is_version_2 = bytes.readUInt16LE(8) === 2;
+  return bytes.subarray(is_version_2 ? bytes.readUInt16LE(10) : bytes.readUInt8(10));
+}
+
+/** Of a message with all routing fields (messages spec sections 3 and 4). */
+function sender_endpoint(bytes: Buffer): Buffer {
+  if (bytes.readUInt16LE(8) === 2) return Buffer.from(bytes.subarray(44, 48));
+  let at = 12 + 32; // sizes, version, flags; both node ids
+  for (let name = 0; name < 2; ++name) at += 1 + bytes.readUInt8(at);
+  const first = bytes.readUInt8(at);
+  if (first < 0xfd) return u32(first);
+  return first === 0xfd ? u32(bytes.readUInt16LE(at + 1)) : Buffer.from(bytes.subarray(at + 1, at + 5));
 }
 
 function u32(value: number): Buffer {

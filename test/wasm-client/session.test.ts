@@ -284,8 +284,8 @@ describe("the end of a session", () => {
   });
 
   it("by silence comes after the heartbeat has stayed unanswered", async () => {
+    vi.useFakeTimers({ toFake: ["setTimeout", "clearTimeout", "performance", "Date"] });
     const robot = await start();
-    vi.useFakeTimers();
     let reason: RobotRaconteurError | undefined;
     robot.$.onClose((why) => (reason = why));
     service.is_mute = true;

@@ -187,5 +187,6 @@ function freeze_info(info: MemberInfo): MemberInfo {
   info.parameters.forEach((parameter) => Object.freeze(parameter));
   Object.freeze(info.parameters);
   Object.freeze(info.modifiers);
-  return Object.freeze(info);
+  // The text stands right behind its "##"; the customary blank there is not meant.
+  return Object.freeze({ ...info, documentation: info.documentation.replace(/^ /gm, "").trim() });
 }

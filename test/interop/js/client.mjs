@@ -2,17 +2,13 @@
 //
 //   node client.mjs URL     reads {"steps": [...]} from standard input, prints {"results": [...]}
 import { readFileSync } from "node:fs";
-import { connect } from "../../../wasm-client/dist/index.js";
+import { connect, rrValue, typeOf } from "../../../wasm-client/dist/index.js";
 
 const patience = 10_000; // ms for anything that has to come by itself
 
-const numbers = {
-  "double": Float64Array, "single": Float32Array,
-  "int8": Int8Array, "uint8": Uint8Array, "int16": Int16Array, "uint16": Uint16Array,
-  "int32": Int32Array, "uint32": Uint32Array, "int64": BigInt64Array, "uint64": BigUint64Array,
-  "cdouble": Float64Array, "csingle": Float32Array, "bool": Uint8Array,
-};
-const namedArrays = ["Vector3", "Quaternion", "Transform"];
+const service = "experimental.interop";
+const numberWords = ["double", "single", "int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "bool"];
+const complexWords = ["cdouble", "csingle"];
 
 /** A scenario's value -> what rrgate-client takes. */
 function build(tagged) {
@@ -22,48 +18,89 @@ function build(tagged) {
   if (tag === "ramp") return Float64Array.from({ length: body }, (_, index) => index);
   if (tag === "list") return body.map(build);
   if (tag === "map{int32}" || tag === "map{string}") return new Map(body.map(([key, value]) => [key, build(value)]));
-  if (tag === "varvalue") return build(body);
+  if (tag === "varvalue") return exact(body);
   if (tag === "Color") return body;
-  if (base in numbers) {
-    if (rest === undefined) return scalar(base, body);
-    if (rest === "]") return typedArray(base, body);
-    return { dims: body.dims, data: typedArray(base, body.data) };
-  }
-  if (namedArrays.includes(base)) {
-    return rest === "*]" ? { dims: body.dims, data: Float64Array.from(body.data) } : Float64Array.from(body);
-  }
-  if (rest === "]") return body.map(fields);
-  if (rest === "*]") return { dims: body.dims, data: body.data.map(fields) };
-  return fields(body);
+  const isNumber = numberWords.includes(base) || complexWords.includes(base);
+  // Pods are objects; the numbers of named arrays stand in one array, which rrgate-client takes as it is.
+  const item = (one) => (isNumber ? scalar(base, one) : typeof one === "number" ? one : fields(one));
+  if (rest === "*]") return { dims: body.dims, data: body.data.map(item) };
+  if (rest === "]" || (!isNumber && Array.isArray(body))) return body.map(item);
+  return item(body);
+}
+
+function scalar(type, value) {
+  if (complexWords.includes(type)) return { re: value[0], im: value[1] };
+  return type.endsWith("int64") ? BigInt(value) : value;
 }
 
 const fields = (body) => Object.fromEntries(Object.entries(body).map(([name, value]) => [name, build(value)]));
 
-function scalar(type, value) {
-  if (type === "int64" || type === "uint64") return BigInt(value);
-  if (type === "cdouble" || type === "csingle") return { re: value[0], im: value[1] };
-  return value;
+/** A varvalue with the type that the scenario names. */
+function exact(tagged) {
+  if (tagged === null || typeof tagged === "string") return tagged;
+  const [[tag]] = Object.entries(tagged);
+  const isNamed = /^[A-Z]/.test(tag);
+  return rrValue(isNamed ? `${service}.${tag}` : tag, build(tagged));
 }
 
-function typedArray(type, items) {
-  const flat = type.startsWith("c") ? items.flat() : items;
-  return numbers[type].from(flat, type.endsWith("int64") ? (item) => BigInt(item) : (item) => Number(item));
+/** Structs, pods and named arrays of the service's definitions: name -> {kind, fields: [[type, name]]}. */
+function readSchema(texts) {
+  const schema = new Map();
+  for (const [, kind, name, body] of texts.join("\n").matchAll(/^(struct|pod|namedarray) (\w+)\n(.*?)\nend$/gms)) {
+    schema.set(name, { kind, fields: [...body.matchAll(/^\s*field (\S+) (\w+)/gm)].map(([, type, field]) => [type, field]) });
+  }
+  return schema;
 }
 
-/** What rrgate-client gives -> the plain JSON of results. */
-function plain(value) {
+/** What rrgate-client gives for a value of `type` -> the plain JSON of results. */
+function plain(value, type, schema) {
   if (value === null || value === undefined) return null;
+  const [, base, shape, container] = /^([^[{]*)(\[[^\]]*\])?(\{\w+\})?$/.exec(type);
+  const inner = base + (shape ?? "");
+  if (container === "{list}") return { list: value.map((item) => plain(item, inner, schema)) };
+  if (container) return plainMap(value, (item) => plain(item, inner, schema));
+  if (base === "varvalue") return plainVarvalue(value, schema);
+  if (shape && /\*|,/.test(shape)) return { dims: [...value.dims], data: plainItems(value.data, base, schema) };
+  return shape ? plainItems(value, base, schema) : plainItem(value, base, schema);
+}
+
+function plainItems(items, base, schema) {
+  if (complexWords.includes(base)) return Array.from(items.re, (re, index) => [number(re), number(items.im[index])]);
+  const kind = schema.get(base)?.kind;
+  const one = (item) => (kind === "pod" ? plainFields(item, base, schema) : plainItem(item, base, schema));
+  return kind === "namedarray" ? items.flatMap(one) : Array.from(items, one);
+}
+
+function plainItem(value, base, schema) {
+  if (complexWords.includes(base)) return [number(value.re), number(value.im)];
+  const kind = schema.get(base)?.kind;
+  if (kind === "namedarray") return schema.get(base).fields.flatMap(([type, field]) => plain(value[field], type, schema));
+  if (kind === "pod") return [plainFields(value, base, schema)];
+  return kind === "struct" ? plainFields(value, base, schema) : number(value);
+}
+
+const plainFields = (value, base, schema) =>
+  Object.fromEntries(schema.get(base).fields.map(([type, field]) => [field, plain(value[field], type, schema)]));
+
+function plainVarvalue(value, schema) {
+  const named = typeOf(value);
+  if (named) return plain(value, named.replace(`${service}.`, ""), schema);
+  if (value === null || typeof value !== "object") return number(value);
+  if (ArrayBuffer.isView(value)) return Array.from(value, number);
+  if (value instanceof Map) return plainMap(value, (item) => plainVarvalue(item, schema));
+  if (Array.isArray(value)) return { list: value.map((item) => plainVarvalue(item, schema)) };
+  return { dims: [...value.dims], data: Array.from(value.data, number) };
+}
+
+function plainMap(map, one) {
+  const order = ([left], [right]) => (left < right ? -1 : left > right ? 1 : 0);
+  return { map: [...map].sort(order).map(([key, item]) => [key, one(item)]) };
+}
+
+function number(value) {
   if (typeof value === "bigint") return abs(value) <= 2n ** 53n ? Number(value) : value.toString();
   if (typeof value === "number") return Number.isFinite(value) ? value : String(value);
-  if (typeof value !== "object") return value;
-  if (ArrayBuffer.isView(value)) return Array.from(value, plain);
-  if (Array.isArray(value)) return { list: value.map(plain) };
-  if (value instanceof Map) {
-    const order = ([left], [right]) => (left < right ? -1 : left > right ? 1 : 0);
-    return { map: [...value].sort(order).map(([key, item]) => [key, plain(item)]) };
-  }
-  if ("dims" in value) return { dims: [...value.dims], data: Array.isArray(value.data) ? value.data.map(plain) : plain(value.data) };
-  return Object.fromEntries(Object.entries(value).map(([name, item]) => [name, plain(item)]));
+  return value;
 }
 
 const abs = (value) => (value < 0n ? -value : value);
@@ -75,6 +112,11 @@ class Client {
 
   constructor(root) {
     this.root = root;
+  }
+
+  /** A value of a member as plain JSON; `type` where it is not the member's own. */
+  plainOf(target, member, value, type = target.$.members.find(({ name }) => name === member).type) {
+    return plain(value, type, readSchema(this.root.$.types));
   }
 
   async carryOut(step) {
@@ -89,7 +131,7 @@ class Client {
 
   verbs = {
     async get(target, member) {
-      return plain(await target[member].get());
+      return this.plainOf(target, member, await target[member].get());
     },
     async set(target, member, step) {
       await target[member].set(build(step.value));
@@ -97,16 +139,19 @@ class Client {
     },
     async call(target, member, step) {
       const result = await target[member](...(step.args ?? []).map(build));
-      if (!step.digest) return plain(result);
+      if (!step.digest) return this.plainOf(target, member, result);
       return { count: result.length, first: result[0], last: result.at(-1), sum: result.reduce((sum, item) => sum + item, 0) };
     },
     async get_until(target, member, step) {
-      return until(async () => plain(await target[member].get()), step.until);
+      return until(async () => this.plainOf(target, member, await target[member].get()), step.until);
     },
     async listen(target, member) {
       const seen = [];
       this.#events.set(member, seen);
-      target[member].on((...values) => seen.push(values.map(plain)));
+      const { parameters } = target.$.members.find(({ name }) => name === member);
+      target[member].on((...values) =>
+        seen.push(values.map((value, index) => this.plainOf(target, member, value, parameters[index].type))),
+      );
       return null;
     },
     async events(target, member, step) {
@@ -115,10 +160,11 @@ class Client {
       return { list: seen };
     },
     async connect(target, member) {
-      const wire = { connection: await target[member].connect(), last: null };
+      const wire = { connection: target[member].connect(), last: null };
+      await wire.connection.ready;
       this.#wires.set(member, wire);
       (async () => {
-        for await (const value of wire.connection) wire.last = plain(value);
+        for await (const value of wire.connection) wire.last = this.plainOf(target, member, value);
       })().catch(() => {});
       return null;
     },
@@ -135,10 +181,10 @@ class Client {
       return null;
     },
     async peek_in(target, member) {
-      return plain(await target[member].peek());
+      return this.plainOf(target, member, await target[member].peek());
     },
     async peek_out(target, member) {
-      return plain(await target[member].peekOut());
+      return this.plainOf(target, member, await target[member].peekOut());
     },
     async poke_out(target, member, step) {
       await target[member].poke(build(step.value));
