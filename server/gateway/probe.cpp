@@ -61,8 +61,7 @@ awaitable<rr::Result<ProbeResult>> probe(rr::ConnectionUrl url, DialOptions opti
     while (auto event = session.poll_event()) {
       if (std::get_if<rr::Connected>(&*event)) {
         const auto& peer = session.connection().peer();
-        result.node_id = peer.id;
-        result.node_name = peer.name;
+        result = {peer.id, peer.name, {}};
         session.call_function(rr::service_index_name, "GetLocalNodeServices", {}, rr::read_clocks());
       } else if (auto* completed = std::get_if<rr::Completed>(&*event)) {
         if (completed->result)
@@ -72,6 +71,9 @@ awaitable<rr::Result<ProbeResult>> probe(rr::ConnectionUrl url, DialOptions opti
         session.disconnect(rr::read_clocks());
       } else if (auto* closed = std::get_if<rr::SessionClosed>(&*event)) {
         if (failure) co_return *failure;
+        const auto& peer = session.connection().peer();
+        // A small device may have no service index: it is there all the same, and said so in its handshake.
+        if (closed->reason.code == rr::ErrorCode::service_not_found) result = {peer.id, peer.name, {}};
         if (result.node_id.is_any()) co_return about_device(std::move(closed->reason));
         co_return result;
       }

@@ -44,6 +44,21 @@ rr::Bytes answer_greeting(const FakeDevice::State& state, const rr::Message& req
   return encoded(reply);
 }
 
+/// A device without a service index refuses it.
+rr::Bytes refuse_service(const FakeDevice::State& state, const rr::Message& request) {
+  rr::Message reply;
+  reply.header.version = 2;
+  reply.header.sender_node_id = state.node_id;
+  reply.header.receiver_node_id = request.header.sender_node_id;
+  reply.header.receiver_endpoint = request.header.sender_endpoint;
+  const auto& entry = request.entries[0];
+  reply.begin_entry(rr::reply_type(entry.type), entry.service_path, "", entry.request_id).error =
+      rr::ErrorCode::service_not_found;
+  reply.add_text("errorname", "RobotRaconteur.ServiceNotFound");
+  reply.add_text("errorstring", "Service not found");
+  return encoded(reply);
+}
+
 asio::awaitable<void> flood(Socket socket, StatePointer state) {
   const auto message = make_message("data", 100'000);
   for (;;) {
@@ -68,6 +83,7 @@ asio::awaitable<void> serve(Socket socket, StatePointer state) {
     const auto member = request.entries[0].member_name;
     rr::Bytes answer = bytes;
     if (member == "CreateConnection") answer = answer_greeting(*state, request);
+    if (request.entries[0].type == rr::EntryType::connect_client_combined) answer = refuse_service(*state, request);
     if (member == "bye") co_return;
     if (member == "flood") co_await flood(socket, state);
     if (member == "huge") {

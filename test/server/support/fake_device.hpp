@@ -1,4 +1,4 @@
-// A device for gateway tests: answers CreateConnection, echoes everything else.
+// A device for gateway tests: answers CreateConnection, has no services, echoes everything else.
 #pragma once
 
 #include <atomic>
