@@ -209,11 +209,11 @@ Result<> encode_v2(const Message& message, const EncodeOptions& options, Encoded
   const auto& header = message.header;
   const std::size_t header_size =
       header_fixed_size + header.sender_node_name.size() + header.receiver_node_name.size() + header.metadata.size();
-  const auto message_size = header_size + pass.entries_size();
-  if (auto checked = check_message_size(message_size, options); !checked) return checked;
+  const auto message_size = check_message_size(header_size + pass.entries_size(), options);
+  if (!message_size) return message_size.error();
 
-  out.begin(message_size, pass.gathered_size());
-  write_header(out, message, header_size, message_size);
+  out.begin(*message_size, pass.gathered_size());
+  write_header(out, message, header_size, *message_size);
   for (std::size_t index = 0; index < message.entries.size(); ++index) {
     const auto& entry = message.entries[index];
     write_entry(out, entry, plan.entries[index].size);

@@ -447,13 +447,13 @@ Result<> encode_v4(const Message& message, const EncodeOptions& options, Encoded
 
   const auto flags = flags_of(message, coder);
   const auto header_size = header_size_of(message, coder, flags);
-  const auto message_size = header_size + pass.entries_size();
-  if (auto checked = check_message_size(message_size, options); !checked) return checked;
-  if (message_size < min_message_size)
+  const auto message_size = check_message_size(header_size + pass.entries_size(), options);
+  if (!message_size) return message_size.error();
+  if (*message_size < min_message_size)
     return protocol_error("encode: a message without entries and routing is too short to be sent");
 
-  out.begin(message_size, pass.gathered_size());
-  write_header(out, message, coder, flags, header_size, message_size);
+  out.begin(*message_size, pass.gathered_size());
+  write_header(out, message, coder, flags, header_size, *message_size);
   for (std::size_t index = 0; index < message.entries.size(); ++index) {
     const auto& entry = message.entries[index];
     write_entry(out, entry, plan.entries[index]);

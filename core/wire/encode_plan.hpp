@@ -46,8 +46,8 @@ class SizePass {
     return {};
   }
 
-  std::uint64_t entries_size() const { return entries_size_; }    ///< bytes of all entries
-  std::uint64_t gathered_size() const { return gathered_size_; }  ///< bytes of payloads that are referenced
+  std::uint64_t entries_size() const { return entries_size_; }  ///< bytes of all entries
+  std::size_t gathered_size() const { return gathered_size_; }  ///< bytes of payloads that are referenced
 
  private:
   Result<> size_element(std::size_t index) {
@@ -106,15 +106,15 @@ class SizePass {
   EncodePlan& plan_;
   Format& format_;
   std::uint64_t entries_size_ = 0;
-  std::uint64_t gathered_size_ = 0;
+  std::size_t gathered_size_ = 0;
 };
 
-/// The last check before writing: section 11's bounds of a whole message.
-inline Result<> check_message_size(std::uint64_t size, const EncodeOptions& options) {
+/// The last check before writing: section 11's bounds of a whole message. Returns its size.
+inline Result<std::size_t> check_message_size(std::uint64_t size, const EncodeOptions& options) {
   if (size > options.max_message_size || size > max_structure_size)
     return protocol_error("encode: the message has " + std::to_string(size) + " bytes, the limit is " +
                           std::to_string(options.max_message_size));
-  return {};
+  return static_cast<std::size_t>(size);
 }
 
 }  // namespace rr

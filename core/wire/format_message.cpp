@@ -33,20 +33,34 @@ std::string format_item(DataType type, const std::uint8_t* item) {
   const auto real = [](double value) { return format_float(value, 17); };
   const auto single = [](float value) { return format_float(value, 9); };
   switch (type) {
-    case DataType::double_t: return real(load<double>(item));
-    case DataType::single_t: return single(load<float>(item));
-    case DataType::int8_t: return std::to_string(load<std::int8_t>(item));
-    case DataType::uint8_t: return std::to_string(load<std::uint8_t>(item));
-    case DataType::int16_t: return std::to_string(load<std::int16_t>(item));
-    case DataType::uint16_t: return std::to_string(load<std::uint16_t>(item));
-    case DataType::int32_t: return std::to_string(load<std::int32_t>(item));
-    case DataType::uint32_t: return std::to_string(load<std::uint32_t>(item));
-    case DataType::int64_t: return std::to_string(load<std::int64_t>(item));
-    case DataType::uint64_t: return std::to_string(load<std::uint64_t>(item));
-    case DataType::cdouble_t: return "[" + real(load<double>(item)) + ", " + real(load<double>(item + 8)) + "]";
-    case DataType::csingle_t: return "[" + single(load<float>(item)) + ", " + single(load<float>(item + 4)) + "]";
-    case DataType::bool_t: return *item != 0 ? "true" : "false";
-    default: return "?";
+    case DataType::double_t:
+      return real(load<double>(item));
+    case DataType::single_t:
+      return single(load<float>(item));
+    case DataType::int8_t:
+      return std::to_string(load<std::int8_t>(item));
+    case DataType::uint8_t:
+      return std::to_string(load<std::uint8_t>(item));
+    case DataType::int16_t:
+      return std::to_string(load<std::int16_t>(item));
+    case DataType::uint16_t:
+      return std::to_string(load<std::uint16_t>(item));
+    case DataType::int32_t:
+      return std::to_string(load<std::int32_t>(item));
+    case DataType::uint32_t:
+      return std::to_string(load<std::uint32_t>(item));
+    case DataType::int64_t:
+      return std::to_string(load<std::int64_t>(item));
+    case DataType::uint64_t:
+      return std::to_string(load<std::uint64_t>(item));
+    case DataType::cdouble_t:
+      return "[" + real(load<double>(item)) + ", " + real(load<double>(item + 8)) + "]";
+    case DataType::csingle_t:
+      return "[" + single(load<float>(item)) + ", " + single(load<float>(item + 4)) + "]";
+    case DataType::bool_t:
+      return *item != 0 ? "true" : "false";
+    default:
+      return "?";
   }
 }
 

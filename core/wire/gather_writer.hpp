@@ -46,9 +46,14 @@ class GatherWriter {
 
   void int_x(std::int32_t value) {
     switch (int_x_size(value)) {
-      case 1: return number(static_cast<std::int8_t>(value));
-      case 3: number(int_x_i16); return number(static_cast<std::int16_t>(value));
-      default: number(int_x_i32); return number(value);
+      case 1:
+        return number(static_cast<std::int8_t>(value));
+      case 3:
+        number(int_x_i16);
+        return number(static_cast<std::int16_t>(value));
+      default:
+        number(int_x_i32);
+        return number(value);
     }
   }
 

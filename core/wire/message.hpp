@@ -68,8 +68,10 @@ constexpr bool is_nested(DataType type) {
     case DataType::pod_multidimarray_t:
     case DataType::namedarray_array_t:
     case DataType::namedarray_multidimarray_t:
-    case DataType::multidimarray_t: return true;
-    default: return false;
+    case DataType::multidimarray_t:
+      return true;
+    default:
+      return false;
   }
 }
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <catch2/catch.hpp>
-#include <regex>
 
 #include "core/wire/codec.hpp"
 #include "core/wire/frame_scanner.hpp"
@@ -35,11 +34,19 @@ Result<> receive(ByteSpan input, std::size_t split, StringTableMode string_table
   return {};
 }
 
+/// "<field> at byte <number>: <what is wrong>"
+bool names_field_and_offset(const std::string& text) {
+  const auto at = text.find(" at byte ");
+  if (at == std::string::npos || at == 0) return false;
+  const auto number = at + 9;
+  const auto colon = text.find_first_not_of("0123456789", number);
+  return colon != std::string::npos && colon > number && text.compare(colon, 2, ": ") == 0 && colon + 2 < text.size();
+}
+
 }  // namespace
 
 TEST_CASE("every malformed message gets its verdict, wherever the stream is split") {
   REQUIRE(malformed_vectors().size() == 497);
-  const std::regex names_field_and_offset("^[A-Za-z][A-Za-z ]* at byte [0-9]+: .+");
   Message message;
   for (const auto& vector : malformed_vectors()) {
     const auto size = vector.bytes.size();
@@ -51,7 +58,7 @@ TEST_CASE("every malformed message gets its verdict, wherever the stream is spli
       REQUIRE(received.has_value() == vector.accepted);
       if (received) continue;
       REQUIRE(received.error().code == vector.error);
-      REQUIRE(std::regex_search(received.error().message, names_field_and_offset));
+      REQUIRE(names_field_and_offset(received.error().message));
       REQUIRE(received.error().message.size() < 300);
     }
   }

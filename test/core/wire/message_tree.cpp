@@ -59,22 +59,36 @@ std::uint64_t unsigned_of(const json& item) {
 
 void append_item(Bytes& out, DataType type, const json& item) {
   switch (type) {
-    case DataType::double_t: return append_number(out, real_of(item));
-    case DataType::single_t: return append_number(out, static_cast<float>(real_of(item)));
-    case DataType::int8_t: return append_number(out, static_cast<std::int8_t>(signed_of(item)));
-    case DataType::uint8_t: return append_number(out, static_cast<std::uint8_t>(unsigned_of(item)));
-    case DataType::int16_t: return append_number(out, static_cast<std::int16_t>(signed_of(item)));
-    case DataType::uint16_t: return append_number(out, static_cast<std::uint16_t>(unsigned_of(item)));
-    case DataType::int32_t: return append_number(out, static_cast<std::int32_t>(signed_of(item)));
-    case DataType::uint32_t: return append_number(out, static_cast<std::uint32_t>(unsigned_of(item)));
-    case DataType::int64_t: return append_number(out, signed_of(item));
-    case DataType::uint64_t: return append_number(out, unsigned_of(item));
-    case DataType::cdouble_t: append_number(out, real_of(item[0])); return append_number(out, real_of(item[1]));
+    case DataType::double_t:
+      return append_number(out, real_of(item));
+    case DataType::single_t:
+      return append_number(out, static_cast<float>(real_of(item)));
+    case DataType::int8_t:
+      return append_number(out, static_cast<std::int8_t>(signed_of(item)));
+    case DataType::uint8_t:
+      return append_number(out, static_cast<std::uint8_t>(unsigned_of(item)));
+    case DataType::int16_t:
+      return append_number(out, static_cast<std::int16_t>(signed_of(item)));
+    case DataType::uint16_t:
+      return append_number(out, static_cast<std::uint16_t>(unsigned_of(item)));
+    case DataType::int32_t:
+      return append_number(out, static_cast<std::int32_t>(signed_of(item)));
+    case DataType::uint32_t:
+      return append_number(out, static_cast<std::uint32_t>(unsigned_of(item)));
+    case DataType::int64_t:
+      return append_number(out, signed_of(item));
+    case DataType::uint64_t:
+      return append_number(out, unsigned_of(item));
+    case DataType::cdouble_t:
+      append_number(out, real_of(item[0]));
+      return append_number(out, real_of(item[1]));
     case DataType::csingle_t:
       append_number(out, static_cast<float>(real_of(item[0])));
       return append_number(out, static_cast<float>(real_of(item[1])));
-    case DataType::bool_t: return append_number(out, static_cast<std::uint8_t>(item.get<bool>()));
-    default: throw std::runtime_error("no items of this type");
+    case DataType::bool_t:
+      return append_number(out, static_cast<std::uint8_t>(item.get<bool>()));
+    default:
+      throw std::runtime_error("no items of this type");
   }
 }
 
