@@ -60,7 +60,7 @@ def start_gateway(folder, device_url):
         try:
             with urllib.request.urlopen(f"http://127.0.0.1:{port}/api/v1/devices", timeout=5) as answer:
                 (device,) = json.load(answer)["devices"]
-                return device["state"] == "up"
+                return device["state"] == "online"
         except OSError:
             return False
 
