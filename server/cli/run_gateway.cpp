@@ -42,6 +42,17 @@ int run_gateway(Config config, const OnStarted& on_started) {
 
   boost::asio::io_context io(1);
   Gateway gateway(io, std::move(config));
+  boost::asio::signal_set signals(io, SIGTERM, SIGINT);
+  std::function<void()> wait_for_signal = [&] {
+    signals.async_wait([&](const boost::system::error_code& error, int number) {
+      if (error) return;
+      log(LogLevel::info, "signal", {{"number", number}});
+      wait_for_signal();  // first: an idle gateway stops within the call below
+      gateway.stop([&] { signals.cancel(); });
+    });
+  };
+  wait_for_signal();
+
   const auto addresses = gateway.start();
   if (!addresses) {
     log(LogLevel::error, "not started", {{"error", addresses.error().message}});
@@ -51,16 +62,6 @@ int run_gateway(Config config, const OnStarted& on_started) {
     log(LogLevel::info, "listening", {{"address", rr::format_host_port(address.host, address.port)}});
   on_started(io, gateway, *addresses);
 
-  boost::asio::signal_set signals(io, SIGTERM, SIGINT);
-  std::function<void()> wait_for_signal = [&] {
-    signals.async_wait([&](const boost::system::error_code& error, int number) {
-      if (error) return;
-      log(LogLevel::info, "signal", {{"number", number}});
-      gateway.stop([&] { signals.cancel(); });
-      wait_for_signal();
-    });
-  };
-  wait_for_signal();
   io.run();  // returns when everything has ended by itself: nothing outlives what it refers to
   return exit_ok;
 }

@@ -79,6 +79,11 @@ class Serving(Files):
                 return process, int(re.search(r":(\d+)$", event["address"]).group(1))
         self.fail("it ended before it listened")
 
+    def test_a_signal_ends_an_idle_gateway(self):
+        process, _ = self.start()
+        process.send_signal(signal.SIGTERM)
+        self.assertEqual(process.wait(timeout=10), 0)
+
     def test_signals_end_it_with_0(self):
         for number in (signal.SIGTERM, signal.SIGINT):
             process, port = self.start()
