@@ -36,6 +36,8 @@ if exists("test/interop/cpp/CMakeLists.txt"):
         Direction("ours-to-reference", "ours", "direct", "reference"),
         Direction("ours-to-ours", "ours", "direct", "ours"),
     ]
+if exists("wasm-client/package.json"):
+    DIRECTIONS += [Direction("browser-to-reference", "browser", "direct", "reference")]
 if exists("server/gateway/relay.cpp"):
     DIRECTIONS += [
         Direction("reference-gateway-tcp-reference", "reference", "gateway-tcp", "reference"),
@@ -53,7 +55,8 @@ def service_command(service, level):
 
 def client_command(direction, port):
     if direction.client == "browser":
-        return ["node", ROOT / "test/interop/js/client.mjs", f"ws://127.0.0.1:{port}/devices/interop?service=interop"]
+        path = "" if direction.route == "direct" else "devices/interop"  # a node takes WebSockets on its own port
+        return ["node", ROOT / "test/interop/js/client.mjs", f"ws://127.0.0.1:{port}/{path}?service=interop"]
     url = {
         "direct": f"rr+tcp://127.0.0.1:{port}/?service=interop",
         # A native client names the device that it wants; the gateway is only the way to it.

@@ -211,16 +211,18 @@ try {
   robot = await connect(process.argv[2]);
 } catch (error) {
   console.log(JSON.stringify({ connect_error: errorOf(error) }));
-  process.exit(0);
 }
-const client = new Client(robot);
-const results = [];
-for (const step of steps) {
-  try {
-    results.push({ value: await client.carryOut(step) });
-  } catch (error) {
-    results.push({ error: errorOf(error) });
+if (robot) {
+  const client = new Client(robot);
+  const results = [];
+  for (const step of steps) {
+    try {
+      results.push({ value: await client.carryOut(step) });
+    } catch (error) {
+      results.push({ error: errorOf(error) });
+    }
   }
+  await robot.$.close();
+  // No process.exit(): it would cut what is still on its way through the pipe.
+  console.log(JSON.stringify({ results }));
 }
-console.log(JSON.stringify({ results }));
-process.exit(0);
