@@ -92,6 +92,8 @@ describe("shown values", () => {
   });
   it("shows nested values, and no more than a bounded part of large ones", () => {
     expect(format_value({ x: 1, label: "a" })).toBe('x: 1\nlabel: "a"');
+    expect(format_value({ a: { b: 1, c: 2 } })).toBe("a: {b: 1, c: 2}");
+    expect(format_value([{ x: 1, note: "n".repeat(80) }])).toBe(`[\n  {\n    x: 1\n    note: "${"n".repeat(80)}"\n  }\n]`);
     expect(format_value(Uint8Array.of(1, 2))).toBe("[1, 2]");
     expect(format_value(new Map([[0, "front"]]))).toBe('0: "front"');
     expect(format_value({ dims: [2, 1], data: Float64Array.of(1, 2) })).toBe("2 × 1 [1, 2]");

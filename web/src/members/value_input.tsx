@@ -2,7 +2,7 @@
 // Layer: web/members.
 
 import { useId } from "preact/hooks";
-import { parse_type } from "../values/type_text";
+import { is_numeric, parse_type } from "../values/type_text";
 import { placeholder } from "../values/parse";
 
 export interface ValueInputProps {
@@ -31,7 +31,7 @@ export function ValueInput({ label, type, text, disabled, on_text, quiet = false
           <option value="false">false</option>
           <option value="true">true</option>
         </select>
-      ) : scalar && !/^[a-z]*$/.test(parsed.base) ? (
+      ) : !is_numeric(parsed.base) && !(scalar && parsed.base === "string") ? (
         <textarea {...common} rows={2} spellcheck={false} value={text} placeholder={placeholder(type)} onInput={changed} />
       ) : (
         <input
@@ -39,7 +39,6 @@ export function ValueInput({ label, type, text, disabled, on_text, quiet = false
           type="text"
           autocomplete="off"
           spellcheck={false}
-          inputMode={scalar && parsed.base !== "string" ? "text" : undefined}
           value={text}
           placeholder={placeholder(type)}
           onInput={changed}

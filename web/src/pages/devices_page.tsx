@@ -14,7 +14,7 @@ export function DevicesPage({ list }: { list: DeviceList }) {
   return (
     <div class="page page-narrow">
       <h1>Devices</h1>
-      <GatewayLine state={state} />
+      <GatewayStrip state={state} />
       {state.kind === "loading" && <LoadingRows />}
       {devices && devices.length === 0 && state.kind === "known" && <NoDevices />}
       {devices && devices.length > 0 && (
@@ -28,31 +28,37 @@ export function DevicesPage({ list }: { list: DeviceList }) {
   );
 }
 
-function GatewayLine({ state }: { state: GatewayState }) {
-  if (state.kind === "away") return <AwayLine state={state} />;
-  if (state.kind === "loading") return <p class="gateway-line">Asking the gateway …</p>;
-  const online = state.devices.filter((device) => device.state === "online").length;
-  const count = state.devices.length;
+/** Like the strip of a connection: always there, always the same height. */
+function GatewayStrip({ state }: { state: GatewayState }) {
+  const badge = { loading: "connecting", known: "online", away: "offline" } as const;
   return (
-    <p class="gateway-line" data-gateway="known">
-      {count === 0 ? `Gateway at ${location.host}` : `${online} of ${count} online behind the gateway at ${location.host}`}
-    </p>
+    <section class={`link-strip gateway-strip link-${badge[state.kind]}`} aria-label="Gateway" data-gateway={state.kind}>
+      <StateBadge state={badge[state.kind]} text={{ loading: "asking", known: "gateway", away: "gateway away" }[state.kind]} />
+      <div class="link-words">
+        <p class="link-head" role="status">
+          {headline(state)}
+        </p>
+        <p class="link-detail">{state.kind === "away" ? <AwayDetail state={state} /> : location.host}</p>
+      </div>
+    </section>
   );
 }
 
-function AwayLine({ state }: { state: GatewayState & { kind: "away" } }) {
+function headline(state: GatewayState): string {
+  if (state.kind === "loading") return "Asking the gateway for its devices";
+  if (state.kind === "away") return `The gateway does not answer since ${clock_time(state.since)}`;
+  const online = state.devices.filter((device) => device.state === "online").length;
+  return state.devices.length === 0 ? "No devices configured" : `${online} of ${state.devices.length} devices online`;
+}
+
+function AwayDetail({ state }: { state: GatewayState & { kind: "away" } }) {
   const now = useNow(1000);
   return (
-    <div class="gateway-line gateway-away" data-gateway="away">
-      <StateBadge state="offline" text="gateway away" />
-      <p>
-        <span role="status">
-          The gateway at {location.host} does not answer since {clock_time(state.since)}: {state.reason}.
-        </span>{" "}
-        <span aria-hidden="true">Away for {span(now - state.since)}, asking every 2 s.</span>
-        {state.devices && state.devices.length > 0 && " Below is what it said last."}
-      </p>
-    </div>
+    <>
+      {location.host}: {sentence(state.reason)}{" "}
+      <span aria-hidden="true">Away for {span(now - state.since)}; asking every 2 s.</span>
+      {state.devices && state.devices.length > 0 && " Below is what it said last."}
+    </>
   );
 }
 

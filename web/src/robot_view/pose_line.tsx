@@ -25,21 +25,21 @@ export function PoseLine({ model, live }: { model: RobotModel; live: boolean }) 
   return (
     <>
       <dl class="pose">
-        <Coordinate name="x" text={`${fixed(pose.x, 3)} m`} />
-        <Coordinate name="y" text={`${fixed(pose.y, 3)} m`} />
-        <Coordinate name="heading" text={`${fixed(degrees, 1)}°`} />
+        <Coordinate name="x" sign="x" text={`${fixed(pose.x, 3)} m`} />
+        <Coordinate name="y" sign="y" text={`${fixed(pose.y, 3)} m`} />
+        <Coordinate name="heading" sign="θ" text={`${fixed(degrees, 1)}°`} />
       </dl>
       <p class="note" title={source === "device" ? undefined : "From DistanceTraveled and AngleTraveled, since this page was opened"}>
-        {!live ? "last known" : source === "device" ? "told by the robot" : "reckoned"}
+        {!live ? "last known" : source === "device" ? "" : "reckoned"}
       </p>
     </>
   );
 }
 
-function Coordinate({ name, text }: { name: string; text: string }) {
+function Coordinate({ name, sign, text }: { name: string; sign: string; text: string }) {
   return (
     <div>
-      <dt>{name}</dt>
+      <dt>{sign === name ? name : <abbr title={name}>{sign}</abbr>}</dt>
       <dd data-pose={name}>{text}</dd>
     </div>
   );

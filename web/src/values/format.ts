@@ -77,8 +77,9 @@ function format_fields(fields: readonly (readonly [unknown, unknown])[], depth: 
   if (fields.length === 0) return "{ }";
   const lines = fields.slice(0, MAX_ITEMS * 2).map(([key, value]) => `${String(key)}: ${format_value(value, depth + 1)}`);
   if (fields.length > lines.length) lines.push(`… ${fields.length - lines.length} more`);
-  const text = lines.join("\n");
-  return depth === 0 ? text : `{\n${indent(text)}\n}`;
+  if (depth === 0) return lines.join("\n");
+  const line = `{${lines.join(", ")}}`;
+  return line.length <= 72 && !line.includes("\n") ? line : `{\n${indent(lines.join("\n"))}\n}`;
 }
 
 function indent(text: string): string {

@@ -1,0 +1,80 @@
+// `test` with a running lab, a page that may not complain, and the readings of the robot page.
+import { test as base, expect } from "@playwright/test";
+import type { Page } from "@playwright/test";
+import { Lab } from "./processes";
+
+export { expect };
+
+export const test = base.extend<{ quiet: void }, { lab: Lab }>({
+  lab: [
+    async ({}, use) => {
+      const lab = await Lab.start();
+      await use(lab);
+      await lab.stop();
+    },
+    { scope: "worker" },
+  ],
+  /** Fails a test whose page threw an error or broke its content security policy. */
+  quiet: [
+    async ({ page }, use) => {
+      const complaints: string[] = [];
+      page.on("pageerror", (error) => complaints.push(String(error)));
+      page.on("console", (message) => {
+        if (message.type() === "error" && /Content Security Policy/.test(message.text())) complaints.push(message.text());
+      });
+      await use();
+      expect(complaints).toEqual([]);
+    },
+    { auto: true },
+  ],
+});
+
+export interface Pose {
+  x: number;
+  y: number;
+  heading: number;
+}
+
+export async function pose_of(page: Page): Promise<Pose> {
+  const read = async (name: string): Promise<number> =>
+    Number.parseFloat(await page.locator(`[data-pose="${name}"]`).innerText());
+  return { x: await read("x"), y: await read("y"), heading: await read("heading") };
+}
+
+export function distance(a: Pose, b: Pose): number {
+  return Math.hypot(a.x - b.x, a.y - b.y);
+}
+
+export async function open_robot(page: Page, lab: Lab): Promise<void> {
+  await page.goto(`${lab.url}#/devices/create/Create`);
+  await expect(page.locator('[data-link="online"]')).toBeVisible();
+  await expect(page.getByRole("button", { name: "Forward" })).toBeEnabled();
+}
+
+/** Until two looks 400 ms apart show the same place. */
+export async function wait_until_still(page: Page): Promise<Pose> {
+  let before = await pose_of(page);
+  await expect(async () => {
+    const now = await pose_of(page);
+    const moved = distance(before, now);
+    before = now;
+    expect(moved).toBeLessThan(0.002);
+  }).toPass({ intervals: [400] });
+  return before;
+}
+
+/** Until the robot is further than `metres` from where it was. */
+export async function wait_until_moved(page: Page, from: Pose, metres: number): Promise<Pose> {
+  let now = from;
+  await expect(async () => {
+    now = await pose_of(page);
+    expect(distance(from, now)).toBeGreaterThan(metres);
+  }).toPass({ intervals: [100] });
+  return now;
+}
+
+export async function put_at_start(page: Page): Promise<Pose> {
+  await page.getByRole("button", { name: "To start" }).click();
+  await expect(page.locator('[data-pose="x"]')).toHaveText("0.000 m");
+  return wait_until_still(page);
+}

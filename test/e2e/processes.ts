@@ -1,0 +1,155 @@
+// Starts the programs under test and ends them; a test that kills a device starts it again on the same port.
+import { spawn } from "node:child_process";
+import type { ChildProcess } from "node:child_process";
+import { existsSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { createServer } from "node:net";
+import type { AddressInfo } from "node:net";
+import { tmpdir } from "node:os";
+import path from "node:path";
+import { fileURLToPath } from "node:url";
+
+const repository = path.resolve(path.dirname(fileURLToPath(import.meta.url)), "../..");
+export const rrgate = process.env["RRGATE"] ?? path.join(repository, "build/dev/server/rrgate");
+const web_root = process.env["RRGATE_WEB_ROOT"] ?? path.join(repository, "web/dist");
+
+/** A device's program: beside the gateway (installed) or in the build tree. */
+function device_program(name: string): string {
+  const folder = path.dirname(rrgate);
+  const found = [".", "../demo", "demo", "../libexec/rrgate"].map((at) => path.join(folder, at, name)).find(existsSync);
+  if (!found) throw new Error(`${name} is not beside ${rrgate} or in ../demo; build the target ${name} first`);
+  return found;
+}
+
+export class Program {
+  #child: ChildProcess | null = null;
+  #output = "";
+  readonly #file: string;
+  readonly #args: readonly string[];
+
+  constructor(file: string, args: readonly string[]) {
+    this.#file = file;
+    this.#args = args;
+  }
+
+  start(): void {
+    if (this.#child) throw new Error(`${this.#file} runs already`);
+    this.#output = "";
+    const child = spawn(this.#file, this.#args, { stdio: ["ignore", "pipe", "pipe"] });
+    const keep = (chunk: Buffer): void => void (this.#output = (this.#output + chunk.toString()).slice(-20_000));
+    child.stdout.on("data", keep);
+    child.stderr.on("data", keep);
+    child.on("error", (error) => (this.#output += String(error)));
+    this.#child = child;
+  }
+
+  /** Ends at once, as a crash or a pulled plug would. */
+  async kill(signal: NodeJS.Signals = "SIGKILL"): Promise<void> {
+    const child = this.#child;
+    this.#child = null;
+    if (!child || child.exitCode !== null || child.signalCode !== null) return;
+    const ended = new Promise((resolve) => child.once("exit", resolve));
+    child.kill(signal);
+    await ended;
+  }
+
+  /** Waits for the process to write what `pattern` finds. */
+  async wait_for_output(pattern: RegExp, within_ms = 30_000): Promise<RegExpExecArray> {
+    const give_up = Date.now() + within_ms;
+    while (Date.now() < give_up) {
+      const found = pattern.exec(this.#output);
+      if (found) return found;
+      if (this.#child?.exitCode !== null) break;
+      await pause(50);
+    }
+    throw new Error(`${this.#file} did not write ${pattern} within ${within_ms} ms; it wrote:\n${this.#output}`);
+  }
+
+  get output(): string {
+    return this.#output;
+  }
+}
+
+/** The demo robot, its cameras, and a gateway to both, each a process of its own. */
+export class Lab {
+  readonly create: Program;
+  readonly webcams: Program;
+  readonly gateway: Program;
+  readonly url: string;
+  readonly create_url: string;
+  readonly #folder: string;
+
+  private constructor(create_port: number, webcams_port: number, gateway_port: number) {
+    this.#folder = mkdtempSync(path.join(tmpdir(), "rrgate-e2e-"));
+    const config = path.join(this.#folder, "gateway.json");
+    this.url = `http://127.0.0.1:${gateway_port}/`;
+    this.create_url = `rr+tcp://127.0.0.1:${create_port}/?service=Create`;
+    const webcams_url = `rr+tcp://127.0.0.1:${webcams_port}/?service=Webcam`;
+    writeFileSync(
+      config,
+      JSON.stringify({
+        listen: [`127.0.0.1:${gateway_port}`],
+        web_root,
+        devices: [
+          { name: "create", url: this.create_url },
+          { name: "webcams", url: webcams_url },
+        ],
+      }),
+    );
+    this.create = new Program(device_program("rrgate-demo-create"), ["--port", String(create_port)]);
+    this.webcams = new Program(device_program("rrgate-demo-webcams"), [
+      "--port",
+      String(webcams_port),
+      "--robot",
+      this.create_url,
+    ]);
+    this.gateway = new Program(rrgate, ["serve", "--config", config]);
+  }
+
+  static async start(): Promise<Lab> {
+    if (!existsSync(rrgate)) throw new Error(`${rrgate} is missing: build it, or name it in RRGATE`);
+    if (!existsSync(path.join(web_root, "index.html"))) throw new Error(`${web_root} is missing: run npm run build in web/`);
+    const lab = new Lab(await free_port(), await free_port(), await free_port());
+    for (const program of [lab.create, lab.webcams, lab.gateway]) program.start();
+    await lab.wait_until_online();
+    return lab;
+  }
+
+  /** Until the gateway has reached all devices. */
+  async wait_until_online(within_ms = 30_000): Promise<void> {
+    const give_up = Date.now() + within_ms;
+    for (;;) {
+      const states = await this.device_states().catch(() => null);
+      if (states && Object.values(states).every((state) => state === "online")) return;
+      if (Date.now() > give_up) {
+        const wrote = [this.create, this.webcams, this.gateway].map((program) => program.output).join("\n");
+        throw new Error(`devices are not online after ${within_ms} ms: ${JSON.stringify(states)}\n${wrote}`);
+      }
+      await pause(100);
+    }
+  }
+
+  async device_states(): Promise<Record<string, string>> {
+    const answer = (await (await fetch(`${this.url}api/v1/devices`)).json()) as {
+      devices: { name: string; state: string }[];
+    };
+    return Object.fromEntries(answer.devices.map(({ name, state }) => [name, state]));
+  }
+
+  async stop(): Promise<void> {
+    await Promise.all([this.gateway.kill("SIGTERM"), this.create.kill("SIGTERM"), this.webcams.kill("SIGTERM")]);
+    rmSync(this.#folder, { recursive: true, force: true });
+  }
+}
+
+/** Free at this moment: whoever asked binds it a moment later. */
+export async function free_port(): Promise<number> {
+  const server = createServer();
+  await new Promise<void>((resolve) => server.listen(0, "127.0.0.1", resolve));
+  const { port } = server.address() as AddressInfo;
+  await new Promise((resolve) => server.close(resolve));
+  return port;
+}
+
+function pause(ms: number): Promise<void> {
+  return new Promise((resolve) => setTimeout(resolve, ms));
+}

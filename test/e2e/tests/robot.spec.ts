@@ -1,0 +1,111 @@
+// The demo robot: drive, see it move; kill the device, see the page say so; start it, see the page recover.
+import { distance, expect, open_robot, pose_of, put_at_start, test, wait_until_moved, wait_until_still } from "../lab_test";
+
+test.beforeEach(async ({ page, lab }) => {
+  await open_robot(page, lab);
+  await put_at_start(page);
+});
+
+test("an arrow key drives while it is held", async ({ page }) => {
+  const start = await pose_of(page);
+  await page.keyboard.down("ArrowUp");
+  await expect(page.getByRole("button", { name: "Forward" })).toHaveAttribute("aria-pressed", "true");
+  const there = await wait_until_moved(page, start, 0.2);
+  await page.keyboard.up("ArrowUp");
+  await wait_until_still(page);
+  expect(there.x).toBeGreaterThan(start.x + 0.19); // it looks east at the start
+  await expect(page.locator('[data-reading="distance"]')).not.toHaveText(/^0 /);
+});
+
+test("A turns left on the spot", async ({ page }) => {
+  const start = await pose_of(page);
+  await page.keyboard.down("KeyA");
+  await expect(async () => expect((await pose_of(page)).heading).toBeGreaterThan(start.heading + 20)).toPass();
+  await page.keyboard.up("KeyA");
+  const end = await wait_until_still(page);
+  expect(distance(start, end)).toBeLessThan(0.01);
+});
+
+test("a held button drives, letting go anywhere stops", async ({ page }) => {
+  const start = await pose_of(page);
+  await page.getByRole("button", { name: "Forward" }).hover();
+  await page.mouse.down();
+  await wait_until_moved(page, start, 0.1);
+  await page.mouse.move(5, 5);
+  await page.mouse.up();
+  await wait_until_still(page);
+});
+
+test("it stops when the window loses the keyboard", async ({ page }) => {
+  const start = await pose_of(page);
+  await page.keyboard.down("ArrowUp");
+  await wait_until_moved(page, start, 0.05);
+  await page.evaluate(() => window.dispatchEvent(new Event("blur")));
+  await wait_until_still(page);
+  await page.keyboard.up("ArrowUp");
+});
+
+test("it stops when the page is closed while driving", async ({ page, context, lab }) => {
+  const watcher = await context.newPage();
+  await open_robot(watcher, lab);
+  const start = await pose_of(watcher);
+  await page.bringToFront();
+  await page.keyboard.down("ArrowUp");
+  await wait_until_moved(watcher, start, 0.05);
+  await page.close();
+  await wait_until_still(watcher);
+});
+
+test("bumps are logged with their time and the bumpers shown", async ({ page }) => {
+  await page.getByRole("slider", { name: "Speed" }).fill("500");
+  await page.getByRole("slider", { name: "Speed" }).blur();
+  await page.keyboard.down("ArrowUp");
+  const log = page.getByRole("region", { name: "Bumps" }).getByRole("listitem");
+  await expect(log.first()).toHaveText(/^1\d\d:\d\d:\d\d\.\d{3}/);
+  await expect(page.locator('[data-reading="bumpers"]')).not.toHaveText("free");
+  await page.keyboard.up("ArrowUp");
+});
+
+test("sensor packets and camera pictures arrive", async ({ page }) => {
+  await expect(page.locator('[data-reading="packets"]')).toHaveText(/^(1[5-9]|2[0-5]) a second$/);
+  const picture = page.getByRole("region", { name: "Camera" }).locator("canvas");
+  await expect(async () => {
+    const colours = await picture.evaluate((canvas: HTMLCanvasElement) => {
+      const pixels = canvas.getContext("2d")?.getImageData(0, 0, canvas.width, canvas.height).data ?? [];
+      return { width: canvas.width, distinct: new Set(Array.from(pixels).filter((_, i) => i % 4 === 0)).size };
+    });
+    expect(colours.width).toBeGreaterThan(4);
+    expect(colours.distinct).toBeGreaterThan(3);
+  }).toPass();
+});
+
+test("says when the device is lost, disables driving, and recovers without a reload", async ({ page, lab }) => {
+  await page.evaluate(() => ((window as { kept?: boolean }).kept = true));
+  const start = await pose_of(page);
+  await page.keyboard.down("ArrowUp");
+  await wait_until_moved(page, start, 0.1);
+  await lab.create.kill();
+  await expect(page.locator('[data-link="lost"]')).toContainText("No connection to create since");
+  await expect(page.getByRole("button", { name: "Forward" })).toBeDisabled();
+  await expect(page.getByRole("button", { name: "Forward" })).toHaveAttribute("aria-pressed", "false");
+  await page.keyboard.up("ArrowUp");
+  const last_known = await pose_of(page);
+  expect(last_known.x).toBeGreaterThan(start.x);
+
+  lab.create.start();
+  await expect(page.locator('[data-link="online"]')).toBeVisible({ timeout: 30_000 });
+  await expect(page.getByRole("button", { name: "Forward" })).toBeEnabled();
+  expect(await page.evaluate(() => (window as { kept?: boolean }).kept)).toBe(true);
+  const again = await wait_until_still(page);
+  await page.keyboard.down("ArrowUp");
+  await wait_until_moved(page, again, 0.1);
+  await page.keyboard.up("ArrowUp");
+});
+
+test("a gateway that restarts is survived too", async ({ page, lab }) => {
+  await lab.gateway.kill();
+  await expect(page.locator('[data-link="lost"]')).toContainText("The gateway itself does not answer");
+  lab.gateway.start();
+  await expect(page.locator('[data-link="online"]')).toBeVisible({ timeout: 30_000 });
+  await lab.wait_until_online();
+});
