@@ -1,6 +1,6 @@
 // Large and hostile texts: linear time, bounded findings, no deep recursion.
 #include <catch2/catch.hpp>
-#include <chrono>
+#include <ctime>
 
 #include "test/core/robdef/checked.hpp"
 
@@ -25,12 +25,11 @@ std::string numbered(std::size_t count, Make make) {
 /// Each takes a fraction of a second; a quadratic one would take minutes, sanitizers or not.
 void check_quickly(const std::string& text, const std::vector<std::string>& imports = {}) {
   for (const auto mode : {RobdefMode::strict, RobdefMode::compat}) {
-    const auto start = std::chrono::steady_clock::now();
+    const auto start = std::clock();  // processor time: the machine may be busy with other things
     auto checked = check(text, mode, imports);
     const auto printed = format_service_definition(checked.first());
     CHECK(is_equal(checked.first(), checked.first()));
-    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
-    CHECK(elapsed.count() < 20.0);
+    CHECK(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC < 20.0);
     CHECK(checked.diagnostics.size() <= 4 * (max_diagnostics + 1));
     CHECK(printed.size() < 4 * text.size() + 100);
   }
