@@ -21,7 +21,9 @@ int hex_value(char digit) {
   return -1;
 }
 
-bool is_word(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_'; }
+bool is_word(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
+}
 
 std::optional<std::uint16_t> parse_port(std::string_view digits, std::uint32_t smallest) {
   if (digits.empty() || digits.size() > 5) return std::nullopt;
@@ -105,7 +107,8 @@ Result<void> read_query(std::string_view text, ServiceInUrl rule, ConnectionUrl&
       } else if (name == "nodename" && !has_node_name) {
         has_node_name = true;
         if (!is_valid_node_name(*value))
-          return bad_value(text, "nodename " + quoted(*value) + ": expected a letter, then letters, digits, '_', '.', '-'");
+          return bad_value(text,
+                           "nodename " + quoted(*value) + ": expected a letter, then letters, digits, '_', '.', '-'");
         url.node_name = *value;
       }
     }
@@ -301,7 +304,8 @@ Result<std::string> percent_decode(std::string_view text) {
     const int high = i + 1 < text.size() ? hex_value(text[i + 1]) : -1;
     const int low = i + 2 < text.size() ? hex_value(text[i + 2]) : -1;
     if (high < 0 || low < 0)
-      return make_error(ErrorCode::invalid_argument, "escape in " + quoted(text) + ": expected two hex digits after '%'");
+      return make_error(ErrorCode::invalid_argument,
+                        "escape in " + quoted(text) + ": expected two hex digits after '%'");
     out += static_cast<char>(high << 4 | low);
     i += 2;
   }

@@ -28,13 +28,13 @@ const UrlScheme* find_url_scheme(std::string_view name);
 
 /// The parts of a connection URL. `scheme`, `host` and so on are as written; recognised query values are decoded.
 struct ConnectionUrl {
-  std::string scheme;    ///< "rr+tcp", ...
-  std::string host;      ///< without the brackets of IPv6, zone kept raw ("fe80::1%eth0"); empty for host-less schemes
+  std::string scheme;  ///< "rr+tcp", ...
+  std::string host;    ///< without the brackets of IPv6, zone kept raw ("fe80::1%eth0"); empty for host-less schemes
   std::uint16_t port = 0;  ///< the default of the scheme where none is written; 0 for schemes without port
-  std::string path;      ///< "" or begins with '/'
-  std::string query;     ///< raw, without '?'
+  std::string path;        ///< "" or begins with '/'
+  std::string query;       ///< raw, without '?'
   std::string service;
-  std::string user;      ///< of "user@localhost" (rr+local)
+  std::string user;  ///< of "user@localhost" (rr+local)
   std::optional<NodeId> node_id;
   std::string node_name;  ///< empty when the URL names none
 
@@ -43,8 +43,8 @@ struct ConnectionUrl {
 
 enum class ServiceInUrl { required, optional };
 
-/// Parses `text` in the form of section 1.1, or in the legacy form "tcp://host:port/<node>/service", which comes back as
-/// scheme "rr+tcp". Without a service (allowed by ServiceInUrl::optional) the query may be missing altogether.
+/// Parses `text` in the form of section 1.1, or in the legacy form "tcp://host:port/<node>/service", which comes back
+/// as scheme "rr+tcp". Without a service (allowed by ServiceInUrl::optional) the query may be missing altogether.
 /// Errors   invalid_argument: an empty or malformed nodeid or nodename, a broken % escape in a recognised value.
 ///          connection_error: everything else. Both say what was found and what was expected.
 [[nodiscard]] Result<ConnectionUrl> parse_url(std::string_view text, ServiceInUrl rule = ServiceInUrl::required);

@@ -15,7 +15,8 @@ void print_help(std::span<const Command> commands, std::ostream& out) {
   std::size_t width = 0;
   for (const auto& command : commands) width = std::max(width, command.usage.size());
   for (const auto& command : commands)
-    out << "  rrgate " << command.usage << std::string(width - command.usage.size() + 2, ' ') << command.summary << "\n";
+    out << "  rrgate " << command.usage << std::string(width - command.usage.size() + 2, ' ') << command.summary
+        << "\n";
   out << "  rrgate --help | --version\n";
 }
 

@@ -10,7 +10,9 @@
 namespace rrgate {
 
 /// The file's name alone: the messages name places inside it.
-inline std::string short_name(const std::string& file) { return std::filesystem::path(file).filename().string(); }
+inline std::string short_name(const std::string& file) {
+  return std::filesystem::path(file).filename().string();
+}
 
 /// Prints all findings to stderr; returns whether the configuration can be used.
 inline bool report_findings(const std::string& file, const ParsedConfig& parsed) {

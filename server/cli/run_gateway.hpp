@@ -10,8 +10,7 @@
 namespace rrgate {
 
 /// Called once the listeners are open; the gateway is not yet serving.
-using OnStarted =
-    std::function<void(boost::asio::io_context&, Gateway&, const std::vector<rr::HostPort>& addresses)>;
+using OnStarted = std::function<void(boost::asio::io_context&, Gateway&, const std::vector<rr::HostPort>& addresses)>;
 
 /// Serves until SIGTERM or SIGINT, then drains; a second signal ends what is left at once. Returns an exit code.
 int run_gateway(Config config, const OnStarted& on_started);

@@ -22,7 +22,8 @@ std::string check_device_name(const std::string& name) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
   };
   const auto is_name_char = [&](char c) { return is_plain(c) || c == '_' || c == '-' || c == '.'; };
-  if (name.empty() || name.size() > 64 || !is_plain(name.front()) || !std::all_of(name.begin(), name.end(), is_name_char))
+  if (name.empty() || name.size() > 64 || !is_plain(name.front()) ||
+      !std::all_of(name.begin(), name.end(), is_name_char))
     return "found " + rr::quoted(name) + ", expected 1 to 64 letters, digits, '_', '-', '.', first a letter or digit";
   return {};
 }
@@ -103,8 +104,8 @@ void check_whole(const Config& config, const nlohmann::json& document, std::vect
     findings.push_back({"/listen", "empty; expected at least one \"host:port\""});
   if (config.retry.min > config.retry.max)
     findings.push_back({"/retry/min_ms", "found " + std::to_string(config.retry.min.count()) +
-                                             ", expected at most max_ms (" +
-                                             std::to_string(config.retry.max.count()) + ")"});
+                                             ", expected at most max_ms (" + std::to_string(config.retry.max.count()) +
+                                             ")"});
 }
 
 /// Parses JSON with comments. nlohmann keeps the last of two equal keys; here that is a finding.

@@ -72,8 +72,8 @@ struct Config {
   bool operator==(const Config&) const = default;
 };
 
-/// Reads a configuration (JSON with comments). Every finding is listed, not only the first; with any of them the config is
-/// not to be used.
+/// Reads a configuration (JSON with comments). Every finding is listed, not only the first; with any of them the config
+/// is not to be used.
 struct ParsedConfig {
   Config config;
   std::vector<Finding> findings;

@@ -118,8 +118,8 @@ void ObjectReader::text(std::string_view key, std::string& target) {
 }
 
 void ObjectReader::choice(std::string_view key, std::string& target, std::vector<std::string> choices) {
-  const auto* value = find(
-      key, "string", {.path = {}, .type = {}, .choices = choices, .default_value = nlohmann::json(target).dump()});
+  const auto* value =
+      find(key, "string", {.path = {}, .type = {}, .choices = choices, .default_value = nlohmann::json(target).dump()});
   if (!value) return;
   const auto& text = value->get_ref<const std::string&>();
   if (std::find(choices.begin(), choices.end(), text) != choices.end()) {

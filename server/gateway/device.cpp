@@ -25,9 +25,12 @@ milliseconds with_jitter(milliseconds wait) {
 
 std::string_view to_string(DeviceState state) {
   switch (state) {
-    case DeviceState::connecting: return "connecting";
-    case DeviceState::online: return "online";
-    case DeviceState::offline: return "offline";
+    case DeviceState::connecting:
+      return "connecting";
+    case DeviceState::online:
+      return "online";
+    case DeviceState::offline:
+      return "offline";
   }
   return "unknown";
 }

@@ -16,7 +16,7 @@ enum class Protocol {
   undecided,  ///< more bytes needed
   robot_raconteur,
   http,
-  tls,      ///< a ClientHello; not served yet
+  tls,  ///< a ClientHello; not served yet
   unknown,
 };
 

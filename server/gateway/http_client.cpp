@@ -30,7 +30,9 @@ awaitable<error_code> write_response(ByteStream& stream, const Request* request,
 /// The device of an upgrade: by path, or at "/" by the node that native clients put into the query.
 rr::Result<Device*> find_device(Gateway& gateway, const Request& request) {
   const auto path = request.path();
-  const auto not_found = [](std::string text) { return rr::make_error(rr::ErrorCode::node_not_found, std::move(text)); };
+  const auto not_found = [](std::string text) {
+    return rr::make_error(rr::ErrorCode::node_not_found, std::move(text));
+  };
   if (path.substr(0, devices_prefix.size()) == devices_prefix) {
     auto name = path.substr(devices_prefix.size());
     if (!name.empty() && name.back() == '/') name.remove_suffix(1);
@@ -71,8 +73,8 @@ awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, std::u
   }
   auto device = find_device(gateway, request);
   if (!device) {
-    const auto response = problem_response(device.error().code == rr::ErrorCode::node_not_found ? 404 : 400,
-                                           device.error().message);
+    const auto response =
+        problem_response(device.error().code == rr::ErrorCode::node_not_found ? 404 : 400, device.error().message);
     co_await refuse(response);
     co_return;
   }

@@ -26,7 +26,10 @@ Relay::Relay(ByteStream& client, ByteStream& device, RelayOptions options, Watch
       options_(options),
       to_device_{client, device, FrameGate(options.max_message_size), false},
       to_client_{device, client, FrameGate(options.max_message_size), true},
-      half_closed_limit_(watchdog, [this] { stop({1000, "the client has ended"}); }),
+      half_closed_limit_(watchdog,
+                         [this] {
+                           stop({1000, "the client has ended"});
+                         }),
       to_device_done_(watchdog.executor(), asio::steady_timer::time_point::max()) {}
 
 awaitable<EndReason> Relay::run() {
@@ -75,8 +78,9 @@ awaitable<void> Relay::pump(Direction& direction) {
     const auto error = co_await direction.to.write({&slice, 1});
     if (error) {
       const bool is_slow = error == asio::error::timed_out;
-      stop(direction.is_from_device ? EndReason{1013, is_slow ? "client too slow" : "client lost: " + error.message()}
-                                    : EndReason{1011, is_slow ? "device takes no data" : "device lost: " + error.message()});
+      stop(direction.is_from_device
+               ? EndReason{1013, is_slow ? "client too slow" : "client lost: " + error.message()}
+               : EndReason{1011, is_slow ? "device takes no data" : "device lost: " + error.message()});
       break;
     }
     direction.bytes += *passed;

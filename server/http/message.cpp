@@ -14,7 +14,9 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
-std::string_view view(boost::beast::string_view text) { return {text.data(), text.size()}; }
+std::string_view view(boost::beast::string_view text) {
+  return {text.data(), text.size()};
+}
 
 }  // namespace
 
@@ -29,7 +31,9 @@ std::string_view Request::query() const {
   return question == std::string_view::npos ? std::string_view() : target.substr(question + 1);
 }
 
-std::string_view Request::header(http::field name) const { return trimmed(view(message[name])); }
+std::string_view Request::header(http::field name) const {
+  return trimmed(view(message[name]));
+}
 
 std::string_view Request::header(std::string_view name) const {
   const auto found = message.find(boost::beast::string_view(name.data(), name.size()));

@@ -53,7 +53,8 @@ std::optional<Origin> parse_origin(std::string_view text) {
   if (separator == std::string_view::npos || separator == 0) return std::nullopt;
   const auto scheme = text.substr(0, separator);
   const auto is_scheme_char = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '+' || c == '-' || c == '.';
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '+' || c == '-' ||
+           c == '.';
   };
   if (!std::all_of(scheme.begin(), scheme.end(), is_scheme_char)) return std::nullopt;
   return parse_authority(scheme, text.substr(separator + 3));

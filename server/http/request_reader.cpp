@@ -8,7 +8,9 @@ namespace rrgate {
 
 namespace {
 
-ReadRequest refuse(unsigned status, std::string detail) { return {std::nullopt, status, std::move(detail)}; }
+ReadRequest refuse(unsigned status, std::string detail) {
+  return {std::nullopt, status, std::move(detail)};
+}
 
 ReadRequest refuse_for(const boost::beast::error_code& error, const RequestLimits& limits) {
   if (error == http::error::header_limit)
@@ -58,9 +60,9 @@ awaitable<ReadRequest> RequestReader::next() {
     if (read.error || read.is_end()) {
       const bool is_late = is_started && !limit_.is_armed();
       limit_.disarm();
-      co_return is_late ? refuse(408, "the request took longer than " +
-                                          std::to_string(limits_.header_timeout.count()) + " ms")
-                        : ReadRequest{};
+      co_return is_late
+          ? refuse(408, "the request took longer than " + std::to_string(limits_.header_timeout.count()) + " ms")
+          : ReadRequest{};
     }
     if (!is_started) {
       is_started = true;

@@ -11,7 +11,8 @@ namespace {
 
 /// What "*" stands for; nullopt when the path doesn't fit.
 std::optional<std::string_view> match(std::string_view pattern, std::string_view path) {
-  if (pattern.empty() || pattern.back() != '*') return pattern == path ? std::optional(path.substr(path.size())) : std::nullopt;
+  if (pattern.empty() || pattern.back() != '*')
+    return pattern == path ? std::optional(path.substr(path.size())) : std::nullopt;
   const auto prefix = pattern.substr(0, pattern.size() - 1);
   if (path.substr(0, prefix.size()) != prefix) return std::nullopt;
   return path.substr(prefix.size());

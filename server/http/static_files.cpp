@@ -22,10 +22,9 @@ constexpr std::string_view content_security_policy =
     "img-src 'self' data: blob:; object-src 'none'; base-uri 'none'; frame-ancestors 'none'";
 
 bool is_safe_segment(std::string_view segment) {
-  return !segment.empty() && segment.front() != '.' &&
-         std::none_of(segment.begin(), segment.end(), [](char c) {
-           return c == '\\' || static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
-         });
+  return !segment.empty() && segment.front() != '.' && std::none_of(segment.begin(), segment.end(), [](char c) {
+    return c == '\\' || static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
+  });
 }
 
 bool is_safe_path(std::string_view path) {

@@ -6,7 +6,9 @@
 
 namespace rrgate {
 
-bool asks_for_websocket(const Request& request) { return has_token(request.header(http::field::upgrade), "websocket"); }
+bool asks_for_websocket(const Request& request) {
+  return has_token(request.header(http::field::upgrade), "websocket");
+}
 
 Response upgrade_required(std::string_view detail) {
   auto response = problem_response(426, detail);
@@ -44,8 +46,9 @@ std::optional<Response> refuse_upgrade(const Request& request, const std::vector
   const auto origins = message.count(http::field::origin);
   const auto origin = request.header(http::field::origin);
   if (origins > 1 || (origins == 1 && !is_origin_allowed(origin, request.header(http::field::host), allowed_origins))) {
-    auto response = problem_response(403, "pages of origin " + rr::quoted(origin) +
-                                              " may not connect; allowed_origins in the configuration lists those that may");
+    auto response =
+        problem_response(403, "pages of origin " + rr::quoted(origin) +
+                                  " may not connect; allowed_origins in the configuration lists those that may");
     response.closes = true;
     return response;
   }

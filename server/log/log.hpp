@@ -20,8 +20,8 @@ struct LogField {
   LogField(std::string_view field, std::string_view text) : name(field), value(text) {}
   LogField(std::string_view field, const char* text) : name(field), value(text) {}
   template <class T>
-    requires std::is_integral_v<T>
-  LogField(std::string_view field, T number) : name(field), value(std::to_string(number)), is_number(true) {}
+  requires std::is_integral_v<T> LogField(std::string_view field, T number)
+      : name(field), value(std::to_string(number)), is_number(true) {}
 };
 
 /// `event` is a short fixed phrase ("device online"); what varies goes into the fields. Goes to stderr.

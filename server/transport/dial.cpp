@@ -33,7 +33,9 @@ const Dialer* find_dialer(std::string_view scheme) {
 
 }  // namespace
 
-bool can_dial(std::string_view scheme) { return find_dialer(scheme) != nullptr; }
+bool can_dial(std::string_view scheme) {
+  return find_dialer(scheme) != nullptr;
+}
 
 std::string dialable_schemes() {
   std::string out;

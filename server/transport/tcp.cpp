@@ -145,8 +145,7 @@ rr::Result<std::vector<rr::HostPort>> TcpListener::open(const rr::HostPort& addr
   };
   error_code error;
   tcp::resolver resolver(executor_);
-  const auto endpoints =
-      resolver.resolve(address.host, std::to_string(address.port), tcp::resolver::passive, error);
+  const auto endpoints = resolver.resolve(address.host, std::to_string(address.port), tcp::resolver::passive, error);
   if (error) return fail(error);
   std::vector<rr::HostPort> bound;
   for (const auto& entry : endpoints) {

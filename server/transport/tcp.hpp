@@ -1,4 +1,5 @@
-// TCP: streams, listening, connecting. Layer: server/transport. Source: transports spec sections 1.3, 2 (socket options).
+// TCP: streams, listening, connecting. Layer: server/transport. Source: transports spec sections 1.3, 2 (socket
+// options).
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>
@@ -69,6 +70,6 @@ class TcpListener {
 /// Connects to a host: all its addresses, IPv4 first, 5 ms apart and side by side; the first to connect wins.
 /// Errors   connection_error with the last cause, or that `timeout` has passed.
 awaitable<rr::Result<boost::asio::ip::tcp::socket>> connect_tcp(std::string host, std::uint16_t port,
-                                                               std::chrono::milliseconds timeout);
+                                                                std::chrono::milliseconds timeout);
 
 }  // namespace rrgate

@@ -66,8 +66,7 @@ awaitable<void> WebSocketStream::end(const EndReason& given) {
   const auto& reason = violation_ ? *violation_ : given;
   const auto& received = decoder_.received_close();
   if (!is_broken_ && (takes_close_ || received || decoder_.has_seen_control())) {
-    const auto frame =
-        received ? make_close_frame(received->code, {}) : make_close_frame(reason.code, reason.text);
+    const auto frame = received ? make_close_frame(received->code, {}) : make_close_frame(reason.code, reason.text);
     const rr::ByteSpan slice(frame);
     const std::span<const rr::ByteSpan> slices(&slice, 1);
     close_limit_.arm(close_time);

@@ -36,7 +36,7 @@ class WebSocketStream final : public ByteStream {
   bool takes_close_;
   std::optional<EndReason> violation_;  ///< what the peer did against RFC 6455
   bool is_writing_ = false;
-  bool is_broken_ = false;  ///< a write ended in the middle of a frame: nothing more can be sent
+  bool is_broken_ = false;             ///< a write ended in the middle of a frame: nothing more can be sent
   boost::asio::steady_timer written_;  ///< cancelled when a write ends
 };
 

@@ -9,7 +9,9 @@ namespace rrgate {
 
 namespace {
 
-bool is_control(WebSocketOpcode opcode) { return static_cast<std::uint8_t>(opcode) >= 8; }
+bool is_control(WebSocketOpcode opcode) {
+  return static_cast<std::uint8_t>(opcode) >= 8;
+}
 
 /// Length of a whole header by its first two bytes.
 std::size_t header_length(std::uint8_t second) {
@@ -70,9 +72,12 @@ rr::Result<> WebSocketDecoder::begin_frame() {
     case WebSocketOpcode::binary:
     case WebSocketOpcode::close:
     case WebSocketOpcode::ping:
-    case WebSocketOpcode::pong: break;
-    case WebSocketOpcode::text: return fail(1003, "text frame; expected binary frames");
-    default: return fail(1002, "opcode " + std::to_string(header_[0] & 0x0f) + " is reserved");
+    case WebSocketOpcode::pong:
+      break;
+    case WebSocketOpcode::text:
+      return fail(1003, "text frame; expected binary frames");
+    default:
+      return fail(1002, "opcode " + std::to_string(header_[0] & 0x0f) + " is reserved");
   }
   if ((header_[1] & 0x80) == 0) return fail(1002, "frame of a client without mask");
   left_ = header_[1] & 0x7f;

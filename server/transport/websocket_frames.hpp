@@ -51,10 +51,10 @@ class WebSocketDecoder {
   rr::Error fail(std::uint16_t code, std::string what);
 
   std::array<std::uint8_t, 14> header_{};
-  std::size_t header_size_ = 0;    ///< bytes of the header in hand
+  std::size_t header_size_ = 0;  ///< bytes of the header in hand
   bool in_payload_ = false;
   WebSocketOpcode opcode_ = WebSocketOpcode::binary;
-  std::uint64_t left_ = 0;         ///< payload bytes of this frame still to come
+  std::uint64_t left_ = 0;  ///< payload bytes of this frame still to come
   std::array<std::uint8_t, 4> mask_{};
   std::size_t mask_index_ = 0;
   rr::Bytes control_;

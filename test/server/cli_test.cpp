@@ -34,7 +34,8 @@ TEST_CASE("commands are found by name; help and mistakes have their exit codes")
 }
 
 TEST_CASE("log lines quote what strangers wrote") {
-  CHECK(format_log_text("client gone", {{"peer", "127.0.0.1:1"}, {"bytes", 7}}) == "client gone peer=127.0.0.1:1 bytes=7");
+  CHECK(format_log_text("client gone", {{"peer", "127.0.0.1:1"}, {"bytes", 7}}) ==
+        "client gone peer=127.0.0.1:1 bytes=7");
   CHECK(format_log_text("x", {{"name", "a b"}, {"none", ""}}) == "x name='a b' none=''");
   CHECK(format_log_text("x", {{"name", "a\nlevel=error"}}) == "x name='a\\x0alevel=error'");
   CHECK(format_log_json("x", {{"name", "a\"\n\\"}, {"n", 7}}) == R"("event":"x","name":"a\"\u000a\\","n":7)");

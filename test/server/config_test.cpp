@@ -110,13 +110,15 @@ TEST_CASE("mistakes are named by path, with what was found and expected") {
   finds(with(R"("a/b~c": 1)"), "gateway.json: /a~1b~0c: unknown");
   finds(with(R"("limits": {"clents": 1})"), "gateway.json: /limits/clents: unknown option", "clients_per_address");
   finds(with(R"("limits": 3)"), "gateway.json: /limits: found integer 3, expected an object");
-  finds(with(R"("limits": {"clients": "many"})"), "gateway.json: /limits/clients: found string 'many', expected an integer");
+  finds(with(R"("limits": {"clients": "many"})"),
+        "gateway.json: /limits/clients: found string 'many', expected an integer");
   finds(with(R"("limits": {"clients": 1.5})"), "gateway.json: /limits/clients: found number 1.5, expected an integer");
   finds(with(R"("limits": {"clients": true})"), "gateway.json: /limits/clients: found boolean true");
   finds(with(R"("limits": {"clients": null})"), "gateway.json: /limits/clients: found null");
   finds(with(R"("limits": {"clients": 0})"), "gateway.json: /limits/clients: found 0, expected 1 to");
   finds(with(R"("limits": {"clients": -1})"), "gateway.json: /limits/clients: found -1, expected 1 to");
-  finds(with(R"("limits": {"clients": 18446744073709551615})"), "gateway.json: /limits/clients: found 18446744073709551615");
+  finds(with(R"("limits": {"clients": 18446744073709551615})"),
+        "gateway.json: /limits/clients: found 18446744073709551615");
   finds(with(R"("log": {"level": "loud"})"), "gateway.json: /log/level: found 'loud', expected one of: trace, debug");
   finds(with(R"("retry": {"min_ms": 9000, "max_ms": 8000})"), "gateway.json: /retry/min_ms: found 9000");
   finds(with(R"("allowed_origins": ["lab.example"])"), "gateway.json: /allowed_origins/0: found 'lab.example'");
@@ -129,12 +131,13 @@ TEST_CASE("mistakes in devices are named by their index") {
   finds(with_device("7"), "gateway.json: /devices/0: found integer 7, expected an object");
   finds(with_device(R"({"url": "rr+tcp://h:1/?service=s"})"), "gateway.json: /devices/0/name: missing");
   finds(with_device(R"({"name": "a"})"), "gateway.json: /devices/0/url: missing; expected a string");
-  finds(with_device(R"({"name": "a/b", "url": "rr+tcp://h:1/?service=s"})"), "gateway.json: /devices/0/name: found 'a/b'");
+  finds(with_device(R"({"name": "a/b", "url": "rr+tcp://h:1/?service=s"})"),
+        "gateway.json: /devices/0/name: found 'a/b'");
   finds(with_device(R"({"name": "", "url": "rr+tcp://h:1/?service=s"})"), "gateway.json: /devices/0/name: found ''");
-  finds(with_device(R"({"name": "a", "url": "rr+tpc://h:1/?service=s"})"), "gateway.json: /devices/0/url: ",
-        "scheme 'rr+tpc' unknown; known: rr+tcp");
-  finds(with_device(R"({"name": "a", "url": "rr+local:///?nodename=n&service=s"})"), "gateway.json: /devices/0/url: ",
-        "available: rr+tcp");
+  finds(with_device(R"({"name": "a", "url": "rr+tpc://h:1/?service=s"})"),
+        "gateway.json: /devices/0/url: ", "scheme 'rr+tpc' unknown; known: rr+tcp");
+  finds(with_device(R"({"name": "a", "url": "rr+local:///?nodename=n&service=s"})"),
+        "gateway.json: /devices/0/url: ", "available: rr+tcp");
   const std::string device = R"({"name": "a", "url": "rr+tcp://h:1/?service=s"})";
   finds(with_device(device + "," + device), "gateway.json: /devices/1/name: found 'a' a second time");
 }

@@ -54,7 +54,8 @@ TEST_CASE("requests follow each other on one connection, also unasked") {
   TestGateway gateway;
   TestClient client(gateway.port());
   std::string many;
-  for (int i = 0; i < 20; ++i) many += "GET /healthz HTTP/1.1\r\nHost: gw\r\n\r\nGET /nope HTTP/1.1\r\nHost: gw\r\n\r\n";
+  for (int i = 0; i < 20; ++i)
+    many += "GET /healthz HTTP/1.1\r\nHost: gw\r\n\r\nGET /nope HTTP/1.1\r\nHost: gw\r\n\r\n";
   client.send(many);
   for (int i = 0; i < 20; ++i) {
     CHECK(client.receive_response().status == 200);

@@ -225,7 +225,8 @@ TEST_CASE("garbage never hurts: random bytes, cut and mixed with what is right")
   TestClient good(gateway.port());
   greet(good);
   std::mt19937 random(7);
-  const std::string starts[] = {"", "RRAC", "GET ", "GET / HTTP/1.1\r\n", "\x16\x03\x01", "POST /", "PRI * HTTP/2.0\r\n\r\n"};
+  const std::string starts[] = {
+      "", "RRAC", "GET ", "GET / HTTP/1.1\r\n", "\x16\x03\x01", "POST /", "PRI * HTTP/2.0\r\n\r\n"};
   for (int i = 0; i < 300; ++i) {
     TestClient client(gateway.port());
     auto text = starts[random() % std::size(starts)];

@@ -14,8 +14,7 @@ bool is_ready(const std::future<void>& future) {
   return future.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
 }
 
-const std::string page =
-    "Sec-WebSocket-Protocol: robotraconteur.robotraconteur.com\r\nOrigin: http://gw:8080\r\n";
+const std::string page = "Sec-WebSocket-Protocol: robotraconteur.robotraconteur.com\r\nOrigin: http://gw:8080\r\n";
 
 }  // namespace
 

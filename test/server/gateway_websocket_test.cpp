@@ -61,7 +61,9 @@ TEST_CASE("at / the query of native clients names the node") {
   TestGateway gateway(2);
   gateway.wait_for_state("online", 0);
   gateway.wait_for_state("online", 1);
-  const auto status = [&](const std::string& target) { return TestClient(gateway.port()).upgrade(target, native).status; };
+  const auto status = [&](const std::string& target) {
+    return TestClient(gateway.port()).upgrade(target, native).status;
+  };
   const auto id = rr::format_node_id(gateway.device(1).node_id(), rr::NodeIdFormat::dashes);
   CHECK(status("/?nodeid=" + id + "&service=test") == 101);
   CHECK(status("/?nodename=node.y&service=test") == 101);

@@ -68,7 +68,9 @@ struct WebRoot {
 TEST_CASE("the router finds the first fitting route") {
   Router router;
   const auto says = [](std::string text) {
-    return [text](const Request&, std::string_view rest) { return text_response(200, "text/plain", text + std::string(rest)); };
+    return [text](const Request&, std::string_view rest) {
+      return text_response(200, "text/plain", text + std::string(rest));
+    };
   };
   router.add(http::verb::get, "/a", says("a:"));
   router.add(http::verb::post, "/a", says("posted:"));
@@ -92,7 +94,8 @@ TEST_CASE("an upgrade is accepted from native clients and own pages") {
   CHECK(upgrade_status({}) == 101);
   CHECK(upgrade_status({{"Sec-WebSocket-Protocol", "robotraconteur.robotraconteur.com"}}) == 101);
   CHECK(upgrade_status({{"Sec-WebSocket-Protocol", "chat, RobotRaconteur.robotraconteur.com"}}) == 101);
-  CHECK(upgrade_status({{"Sec-WebSocket-Protocol", "chat"}, {"Sec-WebSocket-Protocol", "robotraconteur.robotraconteur.com"}}) == 101);
+  CHECK(upgrade_status({{"Sec-WebSocket-Protocol", "chat"},
+                        {"Sec-WebSocket-Protocol", "robotraconteur.robotraconteur.com"}}) == 101);
   CHECK(upgrade_status({{"Origin", "http://gw:8080"}}) == 101);
   CHECK(upgrade_status({{"Origin", "https://lab.example"}}) == 101);
 }
@@ -142,8 +145,9 @@ TEST_CASE("static files carry type, tag and cache rules") {
   CHECK(*index.body == "<html>");
   CHECK(header(index, "Content-Type") == "text/html; charset=utf-8");
   CHECK(header(index, "Cache-Control") == "no-cache");
-  CHECK_THAT(header(index, "Content-Security-Policy"),
-             Catch::StartsWith("default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self' ws: wss:"));
+  CHECK_THAT(
+      header(index, "Content-Security-Policy"),
+      Catch::StartsWith("default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self' ws: wss:"));
   CHECK(header(get("assets/client.wasm"), "Content-Type") == "application/wasm");
 
   const auto again = get("", {{"If-None-Match", header(index, "ETag")}});
@@ -175,9 +179,9 @@ TEST_CASE("a file that changes is read again") {
 TEST_CASE("nothing outside the folder is served") {
   const WebRoot root;
   StaticFiles files(root.folder / "web");
-  for (const auto path : {"../secret.txt", "%2e%2e/secret.txt", "assets/../../secret.txt", "..%2fsecret.txt", "link.txt",
-                          ".hidden", "assets", "assets/", "/etc/passwd", "//etc/passwd", "%00", "index.html%00.js", "%",
-                          "..\\secret.txt", "nothing.html"}) {
+  for (const auto path : {"../secret.txt", "%2e%2e/secret.txt", "assets/../../secret.txt", "..%2fsecret.txt",
+                          "link.txt", ".hidden", "assets", "assets/", "/etc/passwd", "//etc/passwd", "%00",
+                          "index.html%00.js", "%", "..\\secret.txt", "nothing.html"}) {
     INFO(path);
     CHECK(files.answer(request(http::verb::get, "/"), path).status == 404);
   }
@@ -186,7 +190,8 @@ TEST_CASE("nothing outside the folder is served") {
 }
 
 TEST_CASE("a name has a content hash or not") {
-  for (const auto name : {"index-Bx81Qz0k.js", "client-D4e_f-12.wasm", "style-12345678.css", "a-Bx81Qz0k.js.map"}) CHECK(has_content_hash(name));
+  for (const auto name : {"index-Bx81Qz0k.js", "client-D4e_f-12.wasm", "style-12345678.css", "a-Bx81Qz0k.js.map"})
+    CHECK(has_content_hash(name));
   for (const auto name : {"index.html", "index-abcdefgh.js", "long-component.js", "Bx81Qz0k.js", "-.js", "a-b.js"}) {
     INFO(name);
     CHECK_FALSE(has_content_hash(name));
@@ -201,7 +206,8 @@ TEST_CASE("the first bytes tell the protocol, as early as they can") {
   }
   CHECK(detect("RRAC") == Protocol::robot_raconteur);
   CHECK(detect("RRACx") == Protocol::robot_raconteur);
-  for (const auto text : {"GET /", "HEAD / ", "POST", "PUT / HTTP", "OPTIONS", "RRAB"}) CHECK(detect(text) == Protocol::http);
+  for (const auto text : {"GET /", "HEAD / ", "POST", "PUT / HTTP", "OPTIONS", "RRAB"})
+    CHECK(detect(text) == Protocol::http);
   CHECK(detect("\x16") == Protocol::tls);
   CHECK(detect("\x16\x03\x01\x02") == Protocol::tls);
   for (const auto text : {"get ", "x", "GE\r", "G T ", "\x80\x01", "RRx"}) {

@@ -34,10 +34,9 @@ TEST_CASE("configured origins may, and only those") {
   CHECK(is_origin_allowed("https://LAB.example.org", "gw", allowed));
   CHECK(is_origin_allowed("http://a.bench.example:8000", "gw", allowed));
   CHECK(is_origin_allowed("http://a.b.bench.example:8000", "gw", allowed));
-  for (const auto origin :
-       {"http://lab.example.org", "https://lab.example.org:8443", "https://xlab.example.org",
-        "https://lab.example.org.evil.example", "http://bench.example:8000", "http://evilbench.example:8000",
-        "http://a.bench.example", "http://*.bench.example:8000"}) {
+  for (const auto origin : {"http://lab.example.org", "https://lab.example.org:8443", "https://xlab.example.org",
+                            "https://lab.example.org.evil.example", "http://bench.example:8000",
+                            "http://evilbench.example:8000", "http://a.bench.example", "http://*.bench.example:8000"}) {
     INFO(origin);
     CHECK_FALSE(is_origin_allowed(origin, "gw", allowed));
   }

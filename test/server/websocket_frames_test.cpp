@@ -17,7 +17,8 @@ rr::Bytes frame(std::uint8_t first, std::string_view payload, int form = 0, bool
     out.push_back(static_cast<std::uint8_t>(mask_bit | size));
   } else {
     out.push_back(static_cast<std::uint8_t>(mask_bit | (form == 2 ? 126 : 127)));
-    for (int i = form - 1; i >= 0; --i) out.push_back(static_cast<std::uint8_t>(static_cast<std::uint64_t>(size) >> (8 * i)));
+    for (int i = form - 1; i >= 0; --i)
+      out.push_back(static_cast<std::uint8_t>(static_cast<std::uint64_t>(size) >> (8 * i)));
   }
   const std::uint8_t mask[] = {0x12, 0xa4, 0x00, 0xff};
   if (is_masked) out.insert(out.end(), mask, mask + 4);
@@ -55,7 +56,8 @@ TEST_CASE("frames of any shape become one byte stream") {
 }
 
 TEST_CASE("split at every byte the payload is the same") {
-  const auto bytes = frame(0x82, text_of(300)) + frame(0x89, "ping") + frame(0x82, text_of(9), 8) + frame(0x88, "\x03\xe8");
+  const auto bytes =
+      frame(0x82, text_of(300)) + frame(0x89, "ping") + frame(0x82, text_of(9), 8) + frame(0x88, "\x03\xe8");
   for (std::size_t cut = 0; cut <= bytes.size(); ++cut) {
     WebSocketDecoder decoder;
     const auto middle = bytes.begin() + static_cast<std::ptrdiff_t>(cut);
@@ -74,7 +76,8 @@ TEST_CASE("split at every byte the payload is the same") {
 
 TEST_CASE("control frames are noticed and take no part in the stream") {
   WebSocketDecoder decoder;
-  CHECK(decoded(decoder, frame(0x82, "a") + frame(0x89, "1") + frame(0x89, "2") + frame(0x8a, "x") + frame(0x82, "b")) == "ab");
+  CHECK(decoded(decoder,
+                frame(0x82, "a") + frame(0x89, "1") + frame(0x89, "2") + frame(0x8a, "x") + frame(0x82, "b")) == "ab");
   CHECK(decoder.has_seen_control());
   CHECK(decoder.take_ping() == rr::Bytes{'2'});
   CHECK_FALSE(decoder.take_ping().has_value());

@@ -17,9 +17,8 @@ Handler ready_endpoint(Gateway& gateway) {
     nlohmann::ordered_json out;
     out["status"] = gateway.is_stopping() ? "stopping" : "ready";
     out["devices"] = devices.size();
-    out["devices_online"] = std::count_if(devices.begin(), devices.end(), [](const auto& device) {
-      return device->state() == DeviceState::online;
-    });
+    out["devices_online"] = std::count_if(devices.begin(), devices.end(),
+                                          [](const auto& device) { return device->state() == DeviceState::online; });
     return json_response(gateway.is_stopping() ? 503 : 200, out.dump() + "\n");
   };
 }

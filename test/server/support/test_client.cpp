@@ -85,7 +85,9 @@ std::string TestClient::receive_all() {
   return std::exchange(pending_, {});
 }
 
-void TestClient::finish_sending() { ::shutdown(socket_, SHUT_WR); }
+void TestClient::finish_sending() {
+  ::shutdown(socket_, SHUT_WR);
+}
 
 rr::Bytes TestClient::receive_message() {
   auto out = receive(10);
@@ -107,8 +109,10 @@ TestClient::HttpResponse TestClient::receive_response(bool has_body) {
 }
 
 TestClient::HttpResponse TestClient::upgrade(const std::string& target, const std::string& headers) {
-  send("GET " + target + " HTTP/1.1\r\nHost: gw:8080\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-       "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n" + headers + "\r\n");
+  send("GET " + target +
+       " HTTP/1.1\r\nHost: gw:8080\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+       "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n" +
+       headers + "\r\n");
   return receive_response();
 }
 

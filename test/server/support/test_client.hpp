@@ -15,7 +15,8 @@ class TestClient {
  public:
   explicit TestClient(std::uint16_t port, const std::string& host = "127.0.0.1");
   ~TestClient();
-  TestClient(TestClient&& other) noexcept : socket_(std::exchange(other.socket_, -1)), pending_(std::move(other.pending_)) {}
+  TestClient(TestClient&& other) noexcept
+      : socket_(std::exchange(other.socket_, -1)), pending_(std::move(other.pending_)) {}
   TestClient& operator=(TestClient&&) = delete;
 
   /// Returns false when the peer is gone.

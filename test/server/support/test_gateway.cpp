@@ -12,7 +12,9 @@ namespace asio = boost::asio;
 
 namespace {
 
-std::string device_name(std::size_t index) { return std::string(1, static_cast<char>('x' + index)); }
+std::string device_name(std::size_t index) {
+  return std::string(1, static_cast<char>('x' + index));
+}
 
 }  // namespace
 
@@ -41,7 +43,9 @@ TestGateway::~TestGateway() {
   thread_.join();
 }
 
-void TestGateway::end_device(std::size_t index) { devices_.at(index).reset(); }
+void TestGateway::end_device(std::size_t index) {
+  devices_.at(index).reset();
+}
 
 void TestGateway::restart_device(std::size_t index) {
   std::promise<void> done;
