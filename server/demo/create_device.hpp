@@ -14,7 +14,7 @@ class CreateDevice {
  public:
   static constexpr std::string_view service_name = "Create";
 
-  /// Adds the service to `node`, which must not outlive the device. The robot moves while the node runs.
+  /// Adds the service to `node`, which must not run any more once the device is gone. The robot moves while it runs.
   explicit CreateDevice(rr::Node& node);
   CreateDevice(const CreateDevice&) = delete;
   CreateDevice& operator=(const CreateDevice&) = delete;

@@ -15,7 +15,8 @@ class WebcamsDevice {
  public:
   static constexpr std::string_view service_name = "Webcam";
 
-  /// Adds the service to `node`, which must not outlive the device. `robot_pose` is asked for each frame.
+  /// Adds the service to `node`, which must not run any more once the device is gone. `robot_pose` is asked for each
+  /// frame.
   WebcamsDevice(rr::Node& node, std::function<Pose()> robot_pose);
   WebcamsDevice(const WebcamsDevice&) = delete;
   WebcamsDevice& operator=(const WebcamsDevice&) = delete;
