@@ -4,7 +4,9 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <string>
 
+#include "server/node/client.hpp"
 #include "test/bench/comparison.hpp"
 #include "test/bench/raw_echo.hpp"
 #include "test/bench/raw_session.hpp"
@@ -23,13 +25,18 @@ void run(std::uint16_t port) {
   auto socket = rr::bench::connect_to(io, echo.port());
   std::vector<std::uint8_t> answer(reply_size);
 
+  const auto echo_round_trip = [&] {
+    boost::asio::write(socket, boost::asio::buffer(request));
+    boost::asio::read(socket, boost::asio::buffer(answer));
+  };
+
   rr::bench::compare(
-      "call, empty function, service alone", 20'000, [&] { session.round_trip(request); },
-      [&] {
-        boost::asio::write(socket, boost::asio::buffer(request));
-        boost::asio::read(socket, boost::asio::buffer(answer));
-      });
+      "call, empty function, service alone", 20'000, [&] { session.round_trip(request); }, echo_round_trip);
   session.decode_reply(reply);
+
+  const auto robot = rr::connect("rr+tcp://127.0.0.1:" + std::to_string(port) + "/?service=interop");
+  rr::bench::compare(
+      "call, empty function, client and service", 20'000, [&] { robot.call("nothing"); }, echo_round_trip);
 }
 
 }  // namespace
