@@ -12,7 +12,7 @@ export default defineConfig({
     outDir: "dist",
     assetsDir: "assets",
     assetsInlineLimit: 0, // the wasm file stays a file of its own; data: URLs would need a wider policy
-    modulePreload: { polyfill: false }, // the polyfill is an inline script in older browsers' path
+    modulePreload: { polyfill: false }, // every browser that runs the target below knows it
     target: "es2022",
   },
   // Pre-bundling would move the module away from the `rrgate.wasm` that it finds by import.meta.url.

@@ -25,7 +25,7 @@ test("opens an object behind a reference, and shows the service's own error for 
   await page.getByRole("button", { name: "Open Webcams" }).click();
   await expect(page.getByText("experimental.createwebcam2.Webcam", { exact: true })).toBeVisible();
   await expect(page.locator('[data-member="Name"] output')).not.toHaveText("not read");
-  await page.getByRole("button", { name: "Call CaptureFrame" }).click();
+  await page.getByRole("button", { name: "Call CaptureFrame", exact: true }).click();
   await expect(page.locator('[data-member="CaptureFrame"] output')).toContainText("width: 320");
 
   await page.goto(`${lab.url}#/devices/webcams/Webcam/Webcams%5B99%5D`);

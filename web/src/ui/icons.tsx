@@ -15,9 +15,9 @@ function Icon({ children, size = 20 }: { children: ComponentChildren; size?: num
 export function Mark() {
   return (
     <svg class="mark" width="30" height="30" viewBox="0 0 32 32" aria-hidden="true" focusable="false">
-      <path class="mark-wake" d="M2 26c8 1 9-5 14-8.500s6-9 14-8.500" />
-      <rect class="mark-post" x="8.500" y="4" width="3.600" height="24" rx="1.300" />
-      <rect class="mark-post" x="19.900" y="4" width="3.600" height="24" rx="1.300" />
+      <path class="mark-wake" d="M2 26c8 1 9-5 14-8.5s6-9 14-8.5" />
+      <rect class="mark-post" x="8.5" y="4" width="3.6" height="24" rx="1.3" />
+      <rect class="mark-post" x="19.9" y="4" width="3.6" height="24" rx="1.3" />
     </svg>
   );
 }
@@ -26,11 +26,11 @@ export function SunMoonIcon({ theme }: { theme: "system" | "light" | "dark" }) {
   if (theme === "light") {
     return (
       <Icon>
-        <circle cx="10" cy="10" r="3.500" fill="none" stroke="currentColor" stroke-width="1.600" />
+        <circle cx="10" cy="10" r="3.5" fill="none" stroke="currentColor" stroke-width="1.6" />
         <path
-          d="M10 2v2.200M10 15.800V18M2 10h2.200M15.800 10H18M4.300 4.300l1.600 1.600M14.100 14.100l1.600 1.600M15.700 4.300l-1.600 1.600M5.900 14.100l-1.600 1.600"
+          d="M10 2v2.2M10 15.8V18M2 10h2.2M15.8 10H18M4.3 4.3l1.6 1.6M14.1 14.1l1.6 1.6M15.7 4.3l-1.6 1.6M5.9 14.1l-1.6 1.6"
           stroke="currentColor"
-          stroke-width="1.600"
+          stroke-width="1.6"
           stroke-linecap="round"
         />
       </Icon>
@@ -40,10 +40,10 @@ export function SunMoonIcon({ theme }: { theme: "system" | "light" | "dark" }) {
     return (
       <Icon>
         <path
-          d="M16.500 12.200A7 7 0 0 1 7.800 3.500a7 7 0 1 0 8.700 8.700Z"
+          d="M16.5 12.2A7 7 0 0 1 7.8 3.5a7 7 0 1 0 8.7 8.7Z"
           fill="none"
           stroke="currentColor"
-          stroke-width="1.600"
+          stroke-width="1.6"
           stroke-linejoin="round"
         />
       </Icon>
@@ -51,8 +51,8 @@ export function SunMoonIcon({ theme }: { theme: "system" | "light" | "dark" }) {
   }
   return (
     <Icon>
-      <circle cx="10" cy="10" r="6.500" fill="none" stroke="currentColor" stroke-width="1.600" />
-      <path d="M10 3.500a6.500 6.500 0 0 1 0 13Z" fill="currentColor" />
+      <circle cx="10" cy="10" r="6.5" fill="none" stroke="currentColor" stroke-width="1.6" />
+      <path d="M10 3.5a6.5 6.5 0 0 1 0 13Z" fill="currentColor" />
     </Icon>
   );
 }
@@ -62,7 +62,7 @@ const TURNS = { forward: 0, right: 90, back: 180, left: 270 } as const;
 export function ArrowIcon({ towards }: { towards: keyof typeof TURNS }) {
   return (
     <Icon size={26}>
-      <path d="M10 3.500 16.500 11H12v5.500H8V11H3.500Z" fill="currentColor" transform={`rotate(${TURNS[towards]} 10 10)`} />
+      <path d="M10 3.5 16.5 11H12v5.5H8V11H3.5Z" fill="currentColor" transform={`rotate(${TURNS[towards]} 10 10)`} />
     </Icon>
   );
 }
