@@ -1,4 +1,4 @@
-// Browser tests of the dashboard. RRGATE names the gateway's program (default: build/dev/server/rrgate), CHROMIUM the
+// Browser tests of the dashboard. RRGATE names the gateway's program (default: build/release/server/rrgate), CHROMIUM the
 // browser (default: /usr/bin/chromium); the dashboard is taken from web/dist, so build it first.
 import { defineConfig, devices } from "@playwright/test";
 

@@ -9,7 +9,7 @@ import path from "node:path";
 import { fileURLToPath } from "node:url";
 
 const repository = path.resolve(path.dirname(fileURLToPath(import.meta.url)), "../..");
-export const rrgate = process.env["RRGATE"] ?? path.join(repository, "build/dev/server/rrgate");
+export const rrgate = process.env["RRGATE"] ?? path.join(repository, "build/release/server/rrgate");
 const web_root = process.env["RRGATE_WEB_ROOT"] ?? path.join(repository, "web/dist");
 
 /** A device's program: beside the gateway (installed) or in the build tree. */
