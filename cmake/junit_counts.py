@@ -1,27 +1,45 @@
 #!/usr/bin/env python3
 """Counts of a test run, from the JUnit file that its runner wrote.
 
-junit_counts.py FILE          prints "passed failed skipped"; a missing or broken file counts as nothing
-junit_counts.py --write FILE  makes a JUnit file of lines "name passed|failed" on standard input
+junit_counts.py FILE             prints "passed failed skipped"; a missing or broken file counts as nothing
+junit_counts.py --failures FILE  prints name and output of what failed, shortened
+junit_counts.py --write FILE     makes a JUnit file of lines "name passed|failed" on standard input
 """
 import sys
 import xml.etree.ElementTree as ElementTree
 
 
-def counts(path):
-    passed = failed = skipped = 0
+def cases(path):
     try:
         root = ElementTree.parse(path).getroot()
     except (OSError, ElementTree.ParseError):
-        return 0, 0, 0
-    for case in root.iter("testcase"):
-        if case.find("failure") is not None or case.find("error") is not None or case.get("status") == "fail":
-            failed += 1
-        elif case.find("skipped") is not None or case.get("status") in ("notrun", "disabled"):
-            skipped += 1
-        else:
-            passed += 1
-    return passed, failed, skipped
+        return
+    yield from root.iter("testcase")
+
+
+def verdict_of(case):
+    if case.find("failure") is not None or case.find("error") is not None or case.get("status") == "fail":
+        return "failed"
+    if case.find("skipped") is not None or case.get("status") in ("notrun", "disabled"):
+        return "skipped"
+    return "passed"
+
+
+def counts(path):
+    verdicts = [verdict_of(case) for case in cases(path)]
+    return [verdicts.count(verdict) for verdict in ("passed", "failed", "skipped")]
+
+
+def failures(path, most=20):
+    failed = [case for case in cases(path) if verdict_of(case) == "failed"]
+    for case in failed[:most]:
+        print(f"--- {case.get('name')}")
+        texts = [text for part in case for text in (part.get("message"), part.text) if text and text.strip()]
+        for text in texts[:3]:
+            lines = text.strip().splitlines()
+            print("\n".join(lines[:5] + ["..."] + lines[-25:] if len(lines) > 30 else lines))
+    if len(failed) > most:
+        print(f"--- and {len(failed) - most} more")
 
 
 def write(path, lines):
@@ -37,5 +55,7 @@ def write(path, lines):
 if __name__ == "__main__":
     if sys.argv[1] == "--write":
         write(sys.argv[2], sys.stdin)
+    elif sys.argv[1] == "--failures":
+        failures(sys.argv[2])
     else:
         print(*counts(sys.argv[1]))

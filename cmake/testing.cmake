@@ -2,8 +2,9 @@
 #
 # One Catch2 program whose test cases become ctest tests, native and, through Node, as WebAssembly. Catch2's main is
 # compiled once for all.
+find_package(Python3 REQUIRED COMPONENTS Interpreter)
+
 if(EMSCRIPTEN)
-  include(/usr/lib/cmake/Catch2/Catch.cmake)
   # Header-only packages get an include directory of their own: /usr/include itself would shadow the sysroot.
   set(RR_TEST_INCLUDE "/usr/include" CACHE PATH "Directory that holds catch2/ and nlohmann/ (for the wasm build)")
   file(MAKE_DIRECTORY "${PROJECT_BINARY_DIR}/test-include")
@@ -21,7 +22,6 @@ if(EMSCRIPTEN)
                                                 -sENVIRONMENT=node)
 else()
   find_package(Catch2 2.13 REQUIRED)
-  include(Catch)
   find_package(nlohmann_json 3.11 REQUIRED)
   add_library(rr_test_headers INTERFACE)
   target_link_libraries(rr_test_headers INTERFACE Catch2::Catch2 nlohmann_json::nlohmann_json)
@@ -35,5 +35,21 @@ function(rr_add_test name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "LIBRARIES;SOURCES")
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE rr_test_main ${arg_LIBRARIES})
-  catch_discover_tests(${name} TEST_PREFIX "${name}/" EXTRA_ARGS --use-colour no PROPERTIES TIMEOUT 300)
+  # A cross-compiled program is started by its emulator, whose words are a list.
+  get_target_property(emulator ${name} CROSSCOMPILING_EMULATOR)
+  set(starter)
+  if(emulator)
+    set(starter ${emulator} $<TARGET_FILE:${name}>)
+  endif()
+  set(list "${CMAKE_CURRENT_BINARY_DIR}/${name}_tests.cmake")
+  add_custom_command(
+    TARGET ${name} POST_BUILD
+    COMMAND Python3::Interpreter "${PROJECT_SOURCE_DIR}/cmake/discover_tests.py" "${list}" "${name}/"
+            $<TARGET_FILE:${name}> ${starter}
+    BYPRODUCTS "${list}"
+    VERBATIM)
+  # A program that is not built has one test, which says so.
+  set(include_file "${CMAKE_CURRENT_BINARY_DIR}/${name}_include.cmake")
+  file(WRITE "${include_file}" "if(EXISTS \"${list}\")\n  include(\"${list}\")\nelse()\n  add_test(${name}_not_built ${name}_not_built)\nendif()\n")
+  set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES "${include_file}")
 endfunction()

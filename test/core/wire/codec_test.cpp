@@ -128,6 +128,20 @@ TEST_CASE("errors name the field, the offset, what was found and what was expect
   CHECK(decode_error("trailing_4_v4").find("4 bytes left behind the last of 1 entries") != std::string::npos);
 }
 
+TEST_CASE("a size that ends inside its own field is refused") {
+  const auto decode_error = [](const char* hex) {
+    Message message;
+    const auto decoded = decode(from_hex(hex), {}, message);
+    return decoded ? std::string("decoded") : decoded.error().message;
+  };
+  CHECK(decode_error("52524143 14000000 0400 fe0c000000 00 05000000") ==
+        "HeaderSize at byte 10: 12 ends inside itself");
+  CHECK(decode_error("52524143 15000000 0400 0c 00 fe04000000 00000000") ==
+        "EntrySize at byte 12: 4 is less than its own field");
+  CHECK(decode_error("52524143 16000000 0400 0c 00 0a 00 5804 01 fe04000000") ==
+        "ElementSize at byte 17: 4 is less than its own field");
+}
+
 TEST_CASE("the nesting bound is configurable") {
   const auto& vector = message_vector("nesting_64_v4");
   Message message;
