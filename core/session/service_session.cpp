@@ -374,6 +374,9 @@ Result<> ServiceSession::answer_wire(const MessageEntry& entry, const HostedServ
     send_outgoing(now);
     return {};
   }
+  if (wires_.size() >= options_.max_wires && !wires_.contains(key))
+    return make_error(ErrorCode::out_of_system_resource,
+                      "this client has " + std::to_string(options_.max_wires) + " wires connected already");
   // A second request of a connected client is accepted: it is the same connection.
   const bool is_new = wires_.try_emplace(key, WireConnection{WireState::connected, &member}).second;
   begin_reply(entry);

@@ -25,6 +25,7 @@ struct ServiceSessionOptions {
   std::chrono::milliseconds connect_timeout{30'000};    ///< a connection that opens no session is closed
   std::chrono::milliseconds endpoint_timeout{600'000};  ///< without a session message
   std::size_t max_open_calls = 1024;                    ///< not answered yet; above: out_of_system_resource
+  std::size_t max_wires = 4096;                         ///< connected by one client; above: out_of_system_resource
 };
 
 using CallId = std::uint64_t;

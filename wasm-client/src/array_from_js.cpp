@@ -6,7 +6,9 @@ namespace rr {
 
 namespace {
 
-std::string array_text(DataType type) { return std::string(data_type_name(type)) + "[]"; }
+std::string array_text(DataType type) {
+  return std::string(data_type_name(type)) + "[]";
+}
 
 }  // namespace
 
@@ -17,18 +19,30 @@ bool FromJs::read_array(const FieldPath& path, const JsValue& js, DataType type,
   std::size_t count = 0;
   if (!read_length(path, js, count)) return false;
   switch (type) {
-    case DataType::double_t: return read_numbers<double>(path, js, count, out);
-    case DataType::single_t: return read_numbers<float>(path, js, count, out);
-    case DataType::int8_t: return read_numbers<std::int8_t>(path, js, count, out);
-    case DataType::uint8_t: return read_numbers<std::uint8_t>(path, js, count, out);
-    case DataType::int16_t: return read_numbers<std::int16_t>(path, js, count, out);
-    case DataType::uint16_t: return read_numbers<std::uint16_t>(path, js, count, out);
-    case DataType::int32_t: return read_numbers<std::int32_t>(path, js, count, out);
-    case DataType::uint32_t: return read_numbers<std::uint32_t>(path, js, count, out);
-    case DataType::int64_t: return read_numbers<std::int64_t>(path, js, count, out);
-    case DataType::uint64_t: return read_numbers<std::uint64_t>(path, js, count, out);
-    case DataType::bool_t: return read_booleans(path, js, count, out);
-    default: return fail(ErrorCode::data_type_error, path, array_text(type) + " is not the type of a value");
+    case DataType::double_t:
+      return read_numbers<double>(path, js, count, out);
+    case DataType::single_t:
+      return read_numbers<float>(path, js, count, out);
+    case DataType::int8_t:
+      return read_numbers<std::int8_t>(path, js, count, out);
+    case DataType::uint8_t:
+      return read_numbers<std::uint8_t>(path, js, count, out);
+    case DataType::int16_t:
+      return read_numbers<std::int16_t>(path, js, count, out);
+    case DataType::uint16_t:
+      return read_numbers<std::uint16_t>(path, js, count, out);
+    case DataType::int32_t:
+      return read_numbers<std::int32_t>(path, js, count, out);
+    case DataType::uint32_t:
+      return read_numbers<std::uint32_t>(path, js, count, out);
+    case DataType::int64_t:
+      return read_numbers<std::int64_t>(path, js, count, out);
+    case DataType::uint64_t:
+      return read_numbers<std::uint64_t>(path, js, count, out);
+    case DataType::bool_t:
+      return read_booleans(path, js, count, out);
+    default:
+      return fail(ErrorCode::data_type_error, path, array_text(type) + " is not the type of a value");
   }
 }
 

@@ -8,8 +8,12 @@
 #ifdef BOOST_NO_EXCEPTIONS
 /// Boost reports what cannot happen (a Result read without looking) by throwing; without exceptions the module ends.
 namespace boost {
-BOOST_NORETURN void throw_exception(const std::exception&) { std::abort(); }
-BOOST_NORETURN void throw_exception(const std::exception&, const boost::source_location&) { std::abort(); }
+BOOST_NORETURN void throw_exception(const std::exception&) {
+  std::abort();
+}
+BOOST_NORETURN void throw_exception(const std::exception&, const boost::source_location&) {
+  std::abort();
+}
 }  // namespace boost
 #endif
 

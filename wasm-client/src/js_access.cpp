@@ -48,8 +48,12 @@ std::optional<JsValue> take(EM_VAL handle) {
 
 }  // namespace
 
-JsKind JsValue::kind() const { return static_cast<JsKind>(rr_js_kind(value_.as_handle())); }
-double JsValue::number() const { return rr_js_number(value_.as_handle()); }
+JsKind JsValue::kind() const {
+  return static_cast<JsKind>(rr_js_kind(value_.as_handle()));
+}
+double JsValue::number() const {
+  return rr_js_number(value_.as_handle());
+}
 
 std::optional<std::int64_t> JsValue::int64() const {
   std::int64_t number = 0;
@@ -86,8 +90,12 @@ std::optional<JsValue> JsValue::field(std::string_view name) const {
   return take(rr_js_field(value_.as_handle(), name.data(), name.size()));
 }
 
-std::optional<JsValue> JsValue::keys() const { return take(rr_js_keys(value_.as_handle())); }
-std::optional<JsValue> JsValue::map_items() const { return take(rr_js_map_items(value_.as_handle())); }
+std::optional<JsValue> JsValue::keys() const {
+  return take(rr_js_keys(value_.as_handle()));
+}
+std::optional<JsValue> JsValue::map_items() const {
+  return take(rr_js_map_items(value_.as_handle()));
+}
 
 std::optional<std::string> JsValue::type_mark() const {
   const auto mark = take(rr_js_type_mark(value_.as_handle()));
@@ -95,8 +103,12 @@ std::optional<std::string> JsValue::type_mark() const {
   return mark->text();
 }
 
-DataType JsValue::items_type() const { return static_cast<DataType>(rr_js_items_type(value_.as_handle())); }
-void JsValue::copy_items(void* to) const { rr_js_copy_items(value_.as_handle(), to); }
+DataType JsValue::items_type() const {
+  return static_cast<DataType>(rr_js_items_type(value_.as_handle()));
+}
+void JsValue::copy_items(void* to) const {
+  rr_js_copy_items(value_.as_handle(), to);
+}
 
 int JsValue::read_numbers(double* to, std::size_t count) const {
   return rr_js_read_numbers(value_.as_handle(), to, count);
@@ -108,24 +120,40 @@ int JsValue::read_booleans(std::uint8_t* to, std::size_t count) const {
 
 std::string_view JsValue::kind_text() const {
   switch (kind()) {
-    case JsKind::undefined: return "undefined";
-    case JsKind::null: return "null";
-    case JsKind::boolean: return "a boolean";
-    case JsKind::number: return "a number";
-    case JsKind::bigint: return "a bigint";
-    case JsKind::text: return "a string";
-    case JsKind::array: return "an array";
-    case JsKind::items: return "a TypedArray";
-    case JsKind::map: return "a Map";
-    case JsKind::exact: return "an rrValue";
-    case JsKind::object: return "an object";
-    case JsKind::other: break;
+    case JsKind::undefined:
+      return "undefined";
+    case JsKind::null:
+      return "null";
+    case JsKind::boolean:
+      return "a boolean";
+    case JsKind::number:
+      return "a number";
+    case JsKind::bigint:
+      return "a bigint";
+    case JsKind::text:
+      return "a string";
+    case JsKind::array:
+      return "an array";
+    case JsKind::items:
+      return "a TypedArray";
+    case JsKind::map:
+      return "a Map";
+    case JsKind::exact:
+      return "an rrValue";
+    case JsKind::object:
+      return "an object";
+    case JsKind::other:
+      break;
   }
   return "something that is no value";
 }
 
-val make_js_text(std::string_view text) { return val::take_ownership(rr_js_make_text(text.data(), text.size())); }
-val make_js_number(double value) { return val::take_ownership(rr_js_make_number(value)); }
+val make_js_text(std::string_view text) {
+  return val::take_ownership(rr_js_make_text(text.data(), text.size()));
+}
+val make_js_number(double value) {
+  return val::take_ownership(rr_js_make_number(value));
+}
 val make_js_boolean(bool value) {
   return val::take_ownership(EM_VAL(value ? emscripten::internal::_EMVAL_TRUE : emscripten::internal::_EMVAL_FALSE));
 }
@@ -135,22 +163,34 @@ val make_js_bigint(const void* bytes, bool is_unsigned) {
 val make_js_items(DataType type, ByteSpan bytes) {
   return val::take_ownership(rr_js_make_items(static_cast<int>(type), bytes.data(), bytes.size()));
 }
-val make_js_booleans(ByteSpan bytes) { return val::take_ownership(rr_js_make_booleans(bytes.data(), bytes.size())); }
+val make_js_booleans(ByteSpan bytes) {
+  return val::take_ownership(rr_js_make_booleans(bytes.data(), bytes.size()));
+}
 val make_js_parts(DataType type, ByteSpan bytes, int part) {
   const bool is_double = type == DataType::cdouble_t;
   const auto part_type = is_double ? DataType::double_t : DataType::single_t;
   return val::take_ownership(
       rr_js_make_parts(static_cast<int>(part_type), bytes.data(), bytes.size() / item_size(type), part));
 }
-val make_js_object() { return val::take_ownership(rr_js_make_object()); }
-val make_js_array() { return val::take_ownership(rr_js_make_array()); }
-val make_js_map() { return val::take_ownership(rr_js_make_map()); }
-val make_js_view(ByteSpan bytes) { return val::take_ownership(rr_js_make_view(bytes.data(), bytes.size())); }
+val make_js_object() {
+  return val::take_ownership(rr_js_make_object());
+}
+val make_js_array() {
+  return val::take_ownership(rr_js_make_array());
+}
+val make_js_map() {
+  return val::take_ownership(rr_js_make_map());
+}
+val make_js_view(ByteSpan bytes) {
+  return val::take_ownership(rr_js_make_view(bytes.data(), bytes.size()));
+}
 
 void set_js_field(const val& object, std::string_view name, const val& value) {
   rr_js_set_field(object.as_handle(), name.data(), name.size(), value.as_handle());
 }
-void push_js(const val& array, const val& value) { rr_js_push(array.as_handle(), value.as_handle()); }
+void push_js(const val& array, const val& value) {
+  rr_js_push(array.as_handle(), value.as_handle());
+}
 void set_js_key(const val& map, const val& key, const val& value) {
   rr_js_set_key(map.as_handle(), key.as_handle(), value.as_handle());
 }

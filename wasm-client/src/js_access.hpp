@@ -22,11 +22,11 @@ enum class JsKind : std::uint8_t {
   bigint,
   text,
   array,
-  items,   ///< a TypedArray
-  map,     ///< a Map
-  exact,   ///< what rrValue() makes
+  items,  ///< a TypedArray
+  map,    ///< a Map
+  exact,  ///< what rrValue() makes
   object,
-  other,   ///< functions, symbols, dates, buffers without item type, revoked proxies
+  other,  ///< functions, symbols, dates, buffers without item type, revoked proxies
 };
 
 using emscripten::val;

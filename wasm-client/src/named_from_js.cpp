@@ -51,7 +51,8 @@ bool FromJs::read_named(const FieldPath& path, const JsValue& js, const TypeDefi
 
 bool FromJs::read_fields(const FieldPath& path, const JsValue& js, const EntityDefinition& entity,
                          std::string_view type_name, Structure& out) {
-  if (js.kind() != JsKind::object) return fail_mismatch(path, js, "an object with the fields of " + std::string(type_name));
+  if (js.kind() != JsKind::object)
+    return fail_mismatch(path, js, "an object with the fields of " + std::string(type_name));
   out.fields.reserve(entity.members.size());
   for (const auto& member : entity.members) {
     const auto at = path.field(member.name, type_name);
@@ -65,8 +66,8 @@ bool FromJs::read_fields(const FieldPath& path, const JsValue& js, const EntityD
 
 /// A field that may be null may also be left out.
 bool FromJs::check_there(const FieldPath& path, const JsValue& js, const TypeDefinition& type) {
-  const bool may_be_null = type.container != ContainerKind::none || type.type == DataType::structure_t ||
-                           type.type == DataType::varvalue_t;
+  const bool may_be_null =
+      type.container != ContainerKind::none || type.type == DataType::structure_t || type.type == DataType::varvalue_t;
   if (may_be_null || js.kind() != JsKind::undefined) return true;
   return fail(ErrorCode::data_type_error, path, "is missing, expected " + format_type(type));
 }
@@ -132,8 +133,9 @@ bool FromJs::flatten(const FieldPath& path, const JsValue& js, const EntityDefin
     Array array;
     if (!read_array(path, js, entity.namedarray_type, array)) return false;
     if (array.size() != entity.namedarray_count)
-      return fail(ErrorCode::data_type_error, path,
-                  "has " + std::to_string(array.size()) + " numbers, expected " + std::to_string(entity.namedarray_count));
+      return fail(
+          ErrorCode::data_type_error, path,
+          "has " + std::to_string(array.size()) + " numbers, expected " + std::to_string(entity.namedarray_count));
     out.insert(out.end(), array.bytes().begin(), array.bytes().end());
     return true;
   }

@@ -28,15 +28,19 @@ class OptionReader {
     std::string text;
     read(name, text);
     if (text.empty()) return;
-    if (const auto id = parse_node_id(text); id.has_value()) to = *id;
-    else refuse(name, id.error().message);
+    if (const auto id = parse_node_id(text); id.has_value())
+      to = *id;
+    else
+      refuse(name, id.error().message);
   }
   void read(std::string_view name, std::chrono::milliseconds& to) {
     auto number = static_cast<double>(to.count());
     read(name, number);
     constexpr double a_month = 31.0 * 24 * 3600 * 1000;  // "never" for a page; further would overflow somewhere
-    if (number > 0) to = std::chrono::milliseconds(static_cast<std::int64_t>(number < a_month ? number : a_month));
-    else refuse(name, "is not above 0");
+    if (number > 0)
+      to = std::chrono::milliseconds(static_cast<std::int64_t>(number < a_month ? number : a_month));
+    else
+      refuse(name, "is not above 0");
   }
   void read(std::string_view name, Value& to) {
     TypeDefinition type;
@@ -45,7 +49,8 @@ class OptionReader {
     to = find(name, type);
   }
   void refuse(std::string_view name, std::string_view why) {
-    if (!error_) error_ = make_error(ErrorCode::invalid_argument, "option '" + std::string(name) + "': " + std::string(why));
+    if (!error_)
+      error_ = make_error(ErrorCode::invalid_argument, "option '" + std::string(name) + "': " + std::string(why));
   }
   const std::optional<Error>& error() const { return error_; }
 
@@ -88,8 +93,10 @@ Result<ClientOptions> read_session_options(const JsValue& js) {
 
   double version = 4;
   reader.read("version", version);
-  if (version == 2) connection.features.v4 = false;
-  else if (version != 4) reader.refuse("version", "is neither 2 nor 4");
+  if (version == 2)
+    connection.features.v4 = false;
+  else if (version != 4)
+    reader.refuse("version", "is neither 2 nor 4");
   bool has_string_table = true;
   reader.read("stringTable", has_string_table);
   if (!has_string_table || version == 2) connection.features.string_table = {.local = false, .standard = false};
@@ -98,8 +105,10 @@ Result<ClientOptions> read_session_options(const JsValue& js) {
   reader.read("maxMessageSize", limit);
   constexpr double smallest = 64 * 1024;
   constexpr double largest = 512.0 * 1024 * 1024;  // the heap of a page ends at 2 GB
-  if (limit >= smallest && limit <= largest) connection.max_message_size = static_cast<std::size_t>(limit);
-  else reader.refuse("maxMessageSize", "is not between 65536 and 536870912 bytes");
+  if (limit >= smallest && limit <= largest)
+    connection.max_message_size = static_cast<std::size_t>(limit);
+  else
+    reader.refuse("maxMessageSize", "is not between 65536 and 536870912 bytes");
   if (connection.max_queued_bytes < 2 * connection.max_message_size)
     connection.max_queued_bytes = 2 * connection.max_message_size;
 

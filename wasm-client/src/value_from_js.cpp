@@ -22,19 +22,25 @@ bool FromJs::read(const FieldPath& path, const JsValue& js, const TypeDefinition
     return read_item(at, item, type, to);
   };
   switch (type.container) {
-    case ContainerKind::list: return read_list(path, js, out, read_one);
-    case ContainerKind::map_int32: return read_map_int32(path, js, out, read_one);
-    case ContainerKind::map_string: return read_map_string(path, js, out, read_one);
+    case ContainerKind::list:
+      return read_list(path, js, out, read_one);
+    case ContainerKind::map_int32:
+      return read_map_int32(path, js, out, read_one);
+    case ContainerKind::map_string:
+      return read_map_string(path, js, out, read_one);
     case ContainerKind::none:
-    case ContainerKind::generator: break;
+    case ContainerKind::generator:
+      break;
   }
   return read_item(path, js, type, out);
 }
 
 bool FromJs::read_item(const FieldPath& path, const JsValue& js, const TypeDefinition& type, Value& out) {
   switch (type.type) {
-    case DataType::varvalue_t: return infer(path, js, out);
-    case DataType::enum_t: return read_enum(path, js, type, out);
+    case DataType::varvalue_t:
+      return infer(path, js, out);
+    case DataType::enum_t:
+      return read_enum(path, js, type, out);
     case DataType::string_t: {
       std::string text;
       if (!read_text(path, js, text)) return false;
@@ -43,8 +49,10 @@ bool FromJs::read_item(const FieldPath& path, const JsValue& js, const TypeDefin
     }
     case DataType::structure_t:
     case DataType::pod_t:
-    case DataType::namedarray_t: return read_named(path, js, type, out);
-    default: break;
+    case DataType::namedarray_t:
+      return read_named(path, js, type, out);
+    default:
+      break;
   }
   if (!is_numeric(type.type))
     return fail(ErrorCode::data_type_error, path, item_type_text(type) + " is not the type of a value");
@@ -57,8 +65,7 @@ bool FromJs::read_item(const FieldPath& path, const JsValue& js, const TypeDefin
   if (is_multidim(type)) {
     MultiDimArray value;
     auto data = JsValue::undefined();
-    if (!read_shape(path, js, value.dims, data) ||
-        !read_array(path.field("data", {}), data, type.type, value.array))
+    if (!read_shape(path, js, value.dims, data) || !read_array(path.field("data", {}), data, type.type, value.array))
       return false;
     out = std::move(value);
     return true;
@@ -100,17 +107,22 @@ bool FromJs::read_scalar(const FieldPath& path, const JsValue& js, DataType type
       return fail(ErrorCode::out_of_range, path,
                   number_text(found) + " is beyond the safe integers; give a bigint for " + expected);
   } else if (kind == JsKind::bigint) {
-    if (const auto number = js.int64()) found = Scalar::of(*number);
-    else if (const auto large = js.uint64()) found = Scalar::of(*large);
-    else return fail(ErrorCode::out_of_range, path, "a bigint of more than 64 bits does not fit " + expected);
+    if (const auto number = js.int64())
+      found = Scalar::of(*number);
+    else if (const auto large = js.uint64())
+      found = Scalar::of(*large);
+    else
+      return fail(ErrorCode::out_of_range, path, "a bigint of more than 64 bits does not fit " + expected);
   } else {
     return fail_mismatch(path, js, expected);
   }
   switch (convert_number(found, type, out)) {
-    case Conversion::ok: return true;
+    case Conversion::ok:
+      return true;
     case Conversion::wrong_kind:
       return fail(ErrorCode::data_type_mismatch, path, number_text(found) + " is no " + expected);
-    case Conversion::out_of_range: break;
+    case Conversion::out_of_range:
+      break;
   }
   return fail(ErrorCode::out_of_range, path, number_text(found) + " does not fit " + expected);
 }

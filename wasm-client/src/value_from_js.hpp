@@ -56,8 +56,8 @@ class FromJs {
 
   // named_from_js.cpp
   bool read_named(const FieldPath& path, const JsValue& js, const TypeDefinition& type, Value& out);
-  bool read_fields(const FieldPath& path, const JsValue& js, const EntityDefinition& entity,
-                   std::string_view type_name, Structure& out);
+  bool read_fields(const FieldPath& path, const JsValue& js, const EntityDefinition& entity, std::string_view type_name,
+                   Structure& out);
   bool read_pods(const FieldPath& path, const JsValue& js, const EntityDefinition& entity, std::string_view type_name,
                  PodArray& out);
   bool read_named_arrays(const FieldPath& path, const JsValue& js, const EntityDefinition& entity,
@@ -65,8 +65,7 @@ class FromJs {
   bool flatten(const FieldPath& path, const JsValue& js, const EntityDefinition& entity, std::string_view type_name,
                Bytes& out);
   bool check_there(const FieldPath& path, const JsValue& js, const TypeDefinition& type);
-  bool check_keys(const FieldPath& path, const JsValue& js, const EntityDefinition& entity,
-                  std::string_view type_name);
+  bool check_keys(const FieldPath& path, const JsValue& js, const EntityDefinition& entity, std::string_view type_name);
 
   // varvalue_from_js.cpp
   bool infer_number(const FieldPath& path, const JsValue& js, Value& out);

@@ -32,7 +32,8 @@ class ToJs {
     const std::size_t each = entity->namedarray_count * item_size(entity->namedarray_type);
     if (named.is_scalar && bytes.size() == each) return named_array(*entity, bytes);
     const val items = make_js_array();
-    for (std::size_t at = 0; at + each <= bytes.size(); at += each) push_js(items, named_array(*entity, bytes.subspan(at, each)));
+    for (std::size_t at = 0; at + each <= bytes.size(); at += each)
+      push_js(items, named_array(*entity, bytes.subspan(at, each)));
     return marked(named.is_multidim ? shaped(named.dims, items) : items, named.type_name,
                   named.is_multidim ? "[*]" : "[]");
   }
@@ -58,30 +59,48 @@ class ToJs {
  private:
   static val number(DataType type, const std::uint8_t* at) {
     switch (type) {
-      case DataType::double_t: return make_js_number(load<double>(at));
-      case DataType::single_t: return make_js_number(load<float>(at));
-      case DataType::int8_t: return make_js_number(load<std::int8_t>(at));
-      case DataType::uint8_t: return make_js_number(load<std::uint8_t>(at));
-      case DataType::int16_t: return make_js_number(load<std::int16_t>(at));
-      case DataType::uint16_t: return make_js_number(load<std::uint16_t>(at));
-      case DataType::int32_t: return make_js_number(load<std::int32_t>(at));
-      case DataType::uint32_t: return make_js_number(load<std::uint32_t>(at));
-      case DataType::int64_t: return make_js_bigint(at, false);
-      case DataType::uint64_t: return make_js_bigint(at, true);
-      case DataType::cdouble_t: return complex(make_js_number(load<double>(at)), make_js_number(load<double>(at + 8)));
-      case DataType::csingle_t: return complex(make_js_number(load<float>(at)), make_js_number(load<float>(at + 4)));
-      case DataType::bool_t: return make_js_boolean(*at != 0);
-      default: return val::null();
+      case DataType::double_t:
+        return make_js_number(load<double>(at));
+      case DataType::single_t:
+        return make_js_number(load<float>(at));
+      case DataType::int8_t:
+        return make_js_number(load<std::int8_t>(at));
+      case DataType::uint8_t:
+        return make_js_number(load<std::uint8_t>(at));
+      case DataType::int16_t:
+        return make_js_number(load<std::int16_t>(at));
+      case DataType::uint16_t:
+        return make_js_number(load<std::uint16_t>(at));
+      case DataType::int32_t:
+        return make_js_number(load<std::int32_t>(at));
+      case DataType::uint32_t:
+        return make_js_number(load<std::uint32_t>(at));
+      case DataType::int64_t:
+        return make_js_bigint(at, false);
+      case DataType::uint64_t:
+        return make_js_bigint(at, true);
+      case DataType::cdouble_t:
+        return complex(make_js_number(load<double>(at)), make_js_number(load<double>(at + 8)));
+      case DataType::csingle_t:
+        return complex(make_js_number(load<float>(at)), make_js_number(load<float>(at + 4)));
+      case DataType::bool_t:
+        return make_js_boolean(*at != 0);
+      default:
+        return val::null();
     }
   }
 
   static val numbers(DataType type, ByteSpan bytes) {
     switch (type) {
-      case DataType::void_t: return make_js_array();
-      case DataType::bool_t: return make_js_booleans(bytes);
+      case DataType::void_t:
+        return make_js_array();
+      case DataType::bool_t:
+        return make_js_booleans(bytes);
       case DataType::cdouble_t:
-      case DataType::csingle_t: return complex(make_js_parts(type, bytes, 0), make_js_parts(type, bytes, 1));
-      default: return make_js_items(type, bytes);
+      case DataType::csingle_t:
+        return complex(make_js_parts(type, bytes, 0), make_js_parts(type, bytes, 1));
+      default:
+        return make_js_items(type, bytes);
     }
   }
 
@@ -120,14 +139,15 @@ class ToJs {
       std::size_t count = 1;
       for (const auto size : member.type.sizes) count *= static_cast<std::size_t>(size);
       const bool is_array = member.type.array != ArrayKind::none;
-      const auto* inner = member.type.type == DataType::namedarray_t ? types_.find_entity(member.type.qualified_name)
-                                                                     : nullptr;
+      const auto* inner =
+          member.type.type == DataType::namedarray_t ? types_.find_entity(member.type.qualified_name) : nullptr;
       const std::size_t size = count * number_size * (inner ? inner->namedarray_count : 1);
       if (size > bytes.size()) break;
       const auto part = bytes.first(size);
       bytes = bytes.subspan(size);
       if (!inner) {
-        const val items = is_array ? numbers(entity.namedarray_type, part) : number(entity.namedarray_type, part.data());
+        const val items =
+            is_array ? numbers(entity.namedarray_type, part) : number(entity.namedarray_type, part.data());
         set_js_field(object, member.name, shaped_like(member.type, items));
       } else if (!is_array) {
         set_js_field(object, member.name, named_array(*inner, part));

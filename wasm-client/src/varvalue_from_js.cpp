@@ -27,8 +27,8 @@ Result<TypeDefinition> parse_type_text(std::string_view text, const TypeRegistry
   if (text.empty() || !std::all_of(text.begin(), text.end(), is_type_character))
     return refuse("is not written as in a service definition");
   // The parser reads definitions: the type gets one around it.
-  const auto parsed = parse_service_definition("service t\nobject o\nproperty " + std::string(text) + " p\nend\n",
-                                               RobdefMode::compat);
+  const auto parsed =
+      parse_service_definition("service t\nobject o\nproperty " + std::string(text) + " p\nend\n", RobdefMode::compat);
   if (!parsed.ok() || parsed.definition.entities.size() != 1 || parsed.definition.entities[0].members.size() != 1)
     return refuse("is not written as in a service definition");
   auto type = parsed.definition.entities[0].members[0].type;
@@ -44,10 +44,17 @@ Result<TypeDefinition> parse_type_text(std::string_view text, const TypeRegistry
   const auto* entity = types.find_entity(type.name);
   if (!entity) return refuse("is not known; write named types with their service, as in \"com.example.Pose\"");
   switch (entity->kind) {
-    case EntityKind::structure: type.type = DataType::structure_t; break;
-    case EntityKind::pod: type.type = DataType::pod_t; break;
-    case EntityKind::namedarray: type.type = DataType::namedarray_t; break;
-    case EntityKind::object: return refuse("is an object, not the type of a value");
+    case EntityKind::structure:
+      type.type = DataType::structure_t;
+      break;
+    case EntityKind::pod:
+      type.type = DataType::pod_t;
+      break;
+    case EntityKind::namedarray:
+      type.type = DataType::namedarray_t;
+      break;
+    case EntityKind::object:
+      return refuse("is an object, not the type of a value");
   }
   return type;
 }
@@ -57,10 +64,14 @@ bool FromJs::infer(const FieldPath& path, const JsValue& js, Value& out) {
   if (depth_ > max_depth) return fail(ErrorCode::data_type_error, path, "is nested too deeply, or holds itself");
   switch (js.kind()) {
     case JsKind::undefined:
-    case JsKind::null: return true;
-    case JsKind::boolean: out = js.is_true(); return true;
+    case JsKind::null:
+      return true;
+    case JsKind::boolean:
+      out = js.is_true();
+      return true;
     case JsKind::number:
-    case JsKind::bigint: return infer_number(path, js, out);
+    case JsKind::bigint:
+      return infer_number(path, js, out);
     case JsKind::text: {
       std::string text;
       if (!read_text(path, js, text)) return false;
@@ -75,7 +86,8 @@ bool FromJs::infer(const FieldPath& path, const JsValue& js, Value& out) {
     }
     case JsKind::array:
     case JsKind::object:
-    case JsKind::exact: break;
+    case JsKind::exact:
+      break;
     case JsKind::map: {
       const auto items = js.map_items();
       if (!items) return fail_throwing(path);
@@ -86,7 +98,8 @@ bool FromJs::infer(const FieldPath& path, const JsValue& js, Value& out) {
       type.container = has_numbers ? ContainerKind::map_int32 : ContainerKind::map_string;
       return read(path, js, type, out);
     }
-    case JsKind::other: return fail_mismatch(path, js, "a value");
+    case JsKind::other:
+      return fail_mismatch(path, js, "a value");
   }
 
   std::optional<std::string> type_text;
@@ -95,7 +108,8 @@ bool FromJs::infer(const FieldPath& path, const JsValue& js, Value& out) {
     std::optional<JsValue> given_type;
     std::optional<JsValue> given_value;
     if (!field_of(path, js, "type", given_type) || !field_of(path, js, "value", given_value)) return false;
-    if (given_type->kind() != JsKind::text) return fail_mismatch(path, *given_type, "the type of rrValue() as a string");
+    if (given_type->kind() != JsKind::text)
+      return fail_mismatch(path, *given_type, "the type of rrValue() as a string");
     type_text = given_type->text();
     if (!type_text) type_text = "";
     value = std::move(*given_value);
@@ -114,13 +128,18 @@ bool FromJs::infer(const FieldPath& path, const JsValue& js, Value& out) {
 bool FromJs::infer_number(const FieldPath& path, const JsValue& js, Value& out) {
   if (js.kind() == JsKind::number) {
     const double number = js.number();
-    if (is_int32(number)) out = static_cast<std::int32_t>(number);
-    else out = number;
+    if (is_int32(number))
+      out = static_cast<std::int32_t>(number);
+    else
+      out = number;
     return true;
   }
-  if (const auto number = js.int64()) out = *number;
-  else if (const auto large = js.uint64()) out = *large;
-  else return fail(ErrorCode::out_of_range, path, "a bigint of more than 64 bits fits no type");
+  if (const auto number = js.int64())
+    out = *number;
+  else if (const auto large = js.uint64())
+    out = *large;
+  else
+    return fail(ErrorCode::out_of_range, path, "a bigint of more than 64 bits fits no type");
   return true;
 }
 

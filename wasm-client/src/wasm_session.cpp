@@ -24,7 +24,9 @@ Now make_now(double steady, double utc) {
   return now;
 }
 
-std::string text_of(const val& js) { return JsValue(js).text().value_or(std::string()); }
+std::string text_of(const val& js) {
+  return JsValue(js).text().value_or(std::string());
+}
 
 val make_event(std::string_view kind) {
   const val event = make_js_object();
@@ -39,17 +41,23 @@ val make_member_event(std::string_view kind, std::string_view path, std::string_
   return event;
 }
 
-bool is_varvalue(const TypeDefinition& type) { return type.type == DataType::varvalue_t; }
+bool is_varvalue(const TypeDefinition& type) {
+  return type.type == DataType::varvalue_t;
+}
 
 }  // namespace
 
 WasmSession::WasmSession(val options, double steady, double utc) : now_(make_now(steady, utc)) {
   auto read = read_session_options(JsValue(std::move(options)));
-  if (read.has_value()) session_.emplace(std::move(*read), now_);
-  else failure_ = read.error();
+  if (read.has_value())
+    session_.emplace(std::move(*read), now_);
+  else
+    failure_ = read.error();
 }
 
-void WasmSession::set_now(double steady, double utc) { now_ = make_now(steady, utc); }
+void WasmSession::set_now(double steady, double utc) {
+  now_ = make_now(steady, utc);
+}
 
 // --- told ---
 
@@ -79,7 +87,8 @@ void WasmSession::handle_closed(val reason) {
 void WasmSession::set_request_timeout(double milliseconds) {
   constexpr double a_month = 31.0 * 24 * 3600 * 1000;
   if (session_ && milliseconds > 0)
-    session_->set_request_timeout(std::chrono::milliseconds(static_cast<std::int64_t>(std::min(milliseconds, a_month))));
+    session_->set_request_timeout(
+        std::chrono::milliseconds(static_cast<std::int64_t>(std::min(milliseconds, a_month))));
 }
 
 RequestId WasmSession::get_property(val path, val member) {
@@ -179,7 +188,9 @@ val WasmSession::poll_transmit(std::size_t limit) {
   return make_js_view(slices.front().first(std::min(limit, slices.front().size())));
 }
 
-bool WasmSession::wants_close() const { return !session_ || session_->wants_close(); }
+bool WasmSession::wants_close() const {
+  return !session_ || session_->wants_close();
+}
 
 double WasmSession::poll_timeout() const {
   const auto at = session_ ? session_->poll_timeout() : TimePoint::max();
@@ -211,8 +222,10 @@ val WasmSession::event_to_js(const ClientEvent& event) {
     const bool is_ok = completed->result.has_value();
     const val js = make_event(is_ok ? "completed" : "failed");
     set_js_field(js, "id", make_js_number(completed->id));
-    if (is_ok) set_js_field(js, "value", to_js(*completed->result, types, brings_type));
-    else set_js_field(js, "error", to_js(completed->result.error(), types));
+    if (is_ok)
+      set_js_field(js, "value", to_js(*completed->result, types, brings_type));
+    else
+      set_js_field(js, "error", to_js(completed->result.error(), types));
     return js;
   }
   if (const auto* received = std::get_if<EventReceived>(&event)) {
@@ -254,7 +267,9 @@ val WasmSession::take_error() {
 
 // --- looked at ---
 
-std::size_t WasmSession::queued_bytes() const { return session_ ? session_->connection().queued_bytes() : 0; }
+std::size_t WasmSession::queued_bytes() const {
+  return session_ ? session_->connection().queued_bytes() : 0;
+}
 
 val WasmSession::stats() const {
   const auto stats = session_ ? session_->connection().stats() : ConnectionStats{};

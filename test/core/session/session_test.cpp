@@ -280,6 +280,18 @@ TEST_CASE("a slow stream replaces wire values instead of queueing them") {
   CHECK(last == big(99));
 }
 
+TEST_CASE("one client connects a bounded number of wires") {
+  Loopback pair;
+  ServiceSessionOptions options;
+  options.max_wires = 1;
+  pair.service = std::make_unique<ServiceSession>(pair.directory, options, pair.now);
+  pair.connect();
+  CHECK(pair.completion(pair.client->connect_wire("arm", "torque", pair.now)).has_value());
+  CHECK(pair.completion(pair.client->connect_wire("arm", "state", pair.now)).error().code ==
+        ErrorCode::out_of_system_resource);
+  CHECK(pair.completion(pair.client->connect_wire("arm", "torque", pair.now)).has_value());
+}
+
 TEST_CASE("members that are not there yet answer NotImplemented") {
   Loopback pair;
   pair.connect();

@@ -12,8 +12,12 @@
 
 #ifdef BOOST_NO_EXCEPTIONS
 namespace boost {
-BOOST_NORETURN void throw_exception(const std::exception&) { std::abort(); }
-BOOST_NORETURN void throw_exception(const std::exception&, const boost::source_location&) { std::abort(); }
+BOOST_NORETURN void throw_exception(const std::exception&) {
+  std::abort();
+}
+BOOST_NORETURN void throw_exception(const std::exception&, const boost::source_location&) {
+  std::abort();
+}
 }  // namespace boost
 #endif
 
@@ -54,7 +58,8 @@ class TestService {
   val error() const { return make_js_text(error_); }
 
   void set_now(double steady) {
-    now_.steady = TimePoint(std::chrono::duration_cast<TimePoint::duration>(std::chrono::duration<double, std::milli>(steady)));
+    now_.steady =
+        TimePoint(std::chrono::duration_cast<TimePoint::duration>(std::chrono::duration<double, std::milli>(steady)));
     now_.utc.seconds = static_cast<std::int64_t>(steady / 1000);
     now_.utc.nanoseconds = static_cast<std::int32_t>(std::fmod(steady, 1000) * 1e6);
   }
@@ -134,7 +139,8 @@ class TestService {
         const auto found = values.find(name);
         return found != values.end() ? found->second : default_value(called.member->type, *types_);
       }
-      case CallKind::function: return call(name, called.arguments, called.member->type);
+      case CallKind::function:
+        return call(name, called.arguments, called.member->type);
     }
     return Value{};
   }
