@@ -7,6 +7,7 @@ const gateway = loadEnv("", ".", "RRGATE_")["RRGATE_URL"] ?? "http://127.0.0.1:8
 
 export default defineConfig({
   base: "./",
+  cacheDir: "node_modules/.vite",
   oxc: { jsx: { runtime: "automatic", importSource: "preact" } },
   build: {
     outDir: "dist",
@@ -24,8 +25,8 @@ export default defineConfig({
     },
   },
   test: {
-    root: "..",
-    include: ["test/web/**/*.test.ts"],
+    dir: "../test/web",
+    include: ["**/*.test.ts"],
     globals: true,
   },
 });

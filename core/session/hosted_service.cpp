@@ -34,6 +34,11 @@ Result<> check_index(const MemberDefinition& objref, const std::optional<std::st
 
 }  // namespace
 
+std::string_view implements_name(const EntityDefinition& type, const ImplementsDefinition& base) {
+  const auto [definition, name] = split_qualified_name(base.qualified_name);
+  return definition == split_qualified_name(type.qualified_name).first ? name : std::string_view(base.qualified_name);
+}
+
 Result<std::shared_ptr<HostedService>> HostedService::make(std::string name, std::shared_ptr<ServiceObject> root,
                                                            std::shared_ptr<const TypeRegistry> types,
                                                            MapString attributes,

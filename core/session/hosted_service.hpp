@@ -30,6 +30,10 @@ class ServiceObject {
                                                             const std::optional<std::string>& index) = 0;
 };
 
+/// A direct base of `type` as peers expect its name: objects of the same definition without it, all others with theirs
+/// (also where the definition names them by an alias).
+std::string_view implements_name(const EntityDefinition& type, const ImplementsDefinition& base);
+
 /// One service of a node.
 class HostedService {
  public:

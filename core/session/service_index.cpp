@@ -42,7 +42,8 @@ class ServiceIndexObject : public ServiceObject {
 Value describe(const HostedService& service, const NodeIdentity& node, std::string_view base_url) {
   MapInt32 implements;
   for (const auto& base : service.root_type().implements)
-    implements.items.emplace_back(static_cast<std::int32_t>(implements.items.size()), Value(base.name));
+    implements.items.emplace_back(static_cast<std::int32_t>(implements.items.size()),
+                                  Value(implements_name(service.root_type(), base)));
   std::string url(base_url);
   url += "?nodeid=" + format_node_id(node.id, NodeIdFormat::dashes) + "&service=" + service.name();
   MapInt32 urls;

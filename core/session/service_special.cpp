@@ -46,26 +46,19 @@ std::string type_for_client(const HostedService& service, const Version& client)
   return {};
 }
 
-/// Direct implements as a definition writes them: local names without, others with their definition.
-void add_implements(Message& message, const EntityDefinition& type) {
-  if (type.implements.empty()) return;
-  const auto home = split_qualified_name(type.qualified_name).first;
-  message.begin_nested("objectimplements", DataType::list_t);
-  std::int32_t number = 0;
-  for (const auto& base : type.implements) {
-    const auto [definition, name] = split_qualified_name(base.qualified_name);
-    const std::string_view shown = definition == home ? name : std::string_view(base.qualified_name);
-    message.add_numbered(number++, DataType::string_t, static_cast<std::uint32_t>(shown.size()), as_bytes(shown));
-  }
-  message.end_nested();
-}
-
 void add_text_list(Message& message, std::string_view name, const std::vector<std::string_view>& texts) {
   message.begin_nested(name, DataType::list_t);
   std::int32_t number = 0;
   for (const auto text : texts)
     message.add_numbered(number++, DataType::string_t, static_cast<std::uint32_t>(text.size()), as_bytes(text));
   message.end_nested();
+}
+
+void add_implements(Message& message, const EntityDefinition& type) {
+  if (type.implements.empty()) return;
+  std::vector<std::string_view> names;
+  for (const auto& base : type.implements) names.push_back(implements_name(type, base));
+  add_text_list(message, "objectimplements", names);
 }
 
 }  // namespace

@@ -437,6 +437,19 @@ TEST_CASE("the service index lists services with their URLs") {
   CHECK(pair.completion(routed).value().get_if<MapInt32>()->items.empty());
 }
 
+TEST_CASE("bases are named with their definition, local ones without, aliases never") {
+  TypeRegistry types;
+  types
+      .add({"service x.base\nstdver 0.10\nobject Base\nend\n",
+            "service x.top\nstdver 0.10\nimport x.base\nusing x.base.Base as B\nobject Local\nend\n"
+            "object Top\nimplements B\nimplements Local\nend\n"},
+           RobdefMode::strict)
+      .value();
+  const auto& top = *types.find_entity("x.top.Top");
+  CHECK(implements_name(top, top.implements[0]) == "x.base.Base");
+  CHECK(implements_name(top, top.implements[1]) == "Local");
+}
+
 TEST_CASE("messages above the limit are refused: before login 512 KiB, then the configured size") {
   Loopback pair;
   pair.connect();

@@ -29,7 +29,7 @@ test("opens an object behind a reference, and shows the service's own error for 
   await expect(page.locator('[data-member="CaptureFrame"] output')).toContainText("width: 320");
 
   await page.goto(`${lab.url}#/devices/webcams/Webcam/Webcams%5B99%5D`);
-  await expect(page.locator("main").getByRole("alert")).toContainText("Webcams[99]");
+  await expect(page.locator("main").getByRole("alert")).toContainText("RobotRaconteur.");
 });
 
 test("a service that the device does not have is said, not shown as loading for ever", async ({ page, lab }) => {

@@ -8,7 +8,7 @@ import { useStore } from "../app/store";
 import { devices_of, relay_url } from "../gateway/devices";
 import type { DeviceList } from "../gateway/devices";
 import { Link } from "../robot/link";
-import { open_remote } from "../robot/remote";
+import { explain, open_remote } from "../robot/remote";
 import type { Remote } from "../robot/remote";
 import { is_create } from "../robot/robot_model";
 import { LinkStrip } from "../ui/link_strip";
@@ -95,7 +95,7 @@ function MembersPage({ link, route, path }: { link: Link; route: ServiceRoute; p
     set_failure(null);
     walk(remote, path).then(
       (object) => current && set_found({ object, of: remote }),
-      (error: unknown) => current && set_failure((error as Error).message),
+      (error: unknown) => current && set_failure(explain(error)),
     );
     return () => void (current = false);
   }, [remote, key]);
