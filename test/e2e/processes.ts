@@ -10,6 +10,7 @@ import { fileURLToPath } from "node:url";
 
 const repository = path.resolve(path.dirname(fileURLToPath(import.meta.url)), "../..");
 export const rrgate = process.env["RRGATE"] ?? path.join(repository, "build/release/server/rrgate");
+export const repository_root = repository;
 const web_root = process.env["RRGATE_WEB_ROOT"] ?? path.join(repository, "web/dist");
 
 /** A device's program: beside the gateway (installed) or in the build tree. */
@@ -34,7 +35,7 @@ export class Program {
   start(): void {
     if (this.#child) throw new Error(`${this.#file} runs already`);
     this.#output = "";
-    const child = spawn(this.#file, this.#args, { stdio: ["ignore", "pipe", "pipe"] });
+    const child = spawn(this.#file, this.#args, { stdio: ["pipe", "pipe", "pipe"] });
     const keep = (chunk: Buffer): void => void (this.#output = (this.#output + chunk.toString()).slice(-20_000));
     child.stdout.on("data", keep);
     child.stderr.on("data", keep);
@@ -67,6 +68,22 @@ export class Program {
   get output(): string {
     return this.#output;
   }
+}
+
+/** A gateway of its own to one device. */
+export async function start_gateway(device: string, device_url: string, site: string): Promise<{ program: Program; url: string }> {
+  const port = await free_port();
+  const config = path.join(mkdtempSync(path.join(tmpdir(), "rrgate-e2e-")), "gateway.json");
+  writeFileSync(config, JSON.stringify({ listen: [`127.0.0.1:${port}`], web_root: site, devices: [{ name: device, url: device_url }] }));
+  const program = new Program(rrgate, ["serve", "--config", config]);
+  program.start();
+  const url = `http://127.0.0.1:${port}/`;
+  const give_up = Date.now() + 30_000;
+  while (!(await (await fetch(`${url}api/v1/devices`).catch(() => null))?.text())?.includes('"online"')) {
+    if (Date.now() > give_up) throw new Error(`${device} is not online:\n${program.output}`);
+    await pause(100);
+  }
+  return { program, url };
 }
 
 /** The demo robot, its cameras, and a gateway to both, each a process of its own. */

@@ -53,9 +53,8 @@ std::size_t count_field(const Value& value, std::string_view field) {
 
 TEST_CASE("the counter counts") {
   const auto before = allocations;
-  const std::vector<int> one(1);
-  const auto counted = allocations - before;
-  CHECK(counted == 1);
+  ::operator delete(::operator new(16));  // called by name: a compiler may leave out a new expression
+  CHECK(allocations - before == 1);
 }
 
 TEST_CASE("steady packing allocates nothing") {

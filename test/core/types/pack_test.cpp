@@ -33,13 +33,15 @@ void check_refused(const Value& value, const TypeDefinition& type, ErrorCode cod
 }
 
 /// Packs and gives the message, for a look at the elements.
+/// A packed value; it is kept, because the message borrows from it.
 struct Packed {
-  Packed(const Value& value, const TypeDefinition& type) {
+  Packed(Value given, const TypeDefinition& type) : value(std::move(given)) {
     message.begin_entry(EntryType::property_get_res, "svc", "d1", 5);
     const auto packed = pack(message, "value", value, type, test_types());
     if (!packed) FAIL(packed.error().message);
   }
   const MessageElement& element() const { return message.elements.at(0); }
+  Value value;
   Message message;
 };
 
