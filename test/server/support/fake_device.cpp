@@ -134,7 +134,8 @@ FakeDevice::FakeDevice(asio::io_context& io, std::string node_name, std::uint16_
       acceptor_(std::make_shared<tcp::acceptor>(io, tcp::endpoint(asio::ip::make_address("127.0.0.1"), port))),
       port_(acceptor_->local_endpoint().port()) {
   state_->node_name = std::move(node_name);
-  for (std::size_t i = 0; i < 16; ++i) state_->node_id.bytes[i] = static_cast<std::uint8_t>(i + port_);
+  for (std::size_t i = 0; i < 16; ++i)  // the whole port: two devices of a test never share an id
+    state_->node_id.bytes[i] = static_cast<std::uint8_t>(i + (i % 2 ? port_ >> 8 : port_));
   asio::co_spawn(io_, accept_all(acceptor_, state_), asio::detached);
 }
 
