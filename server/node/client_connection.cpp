@@ -13,7 +13,7 @@ namespace rr {
 namespace asio = boost::asio;
 
 ClientConnection::ClientConnection(asio::ip::tcp::socket socket, ClientOptions options, Opened opened)
-    : TcpDriver(std::move(socket)), session_(std::move(options), read_clocks()), opened_(std::move(opened)) {}
+    : SessionDriver(std::move(socket), std::move(options), read_clocks()), opened_(std::move(opened)) {}
 
 void ClientConnection::open(asio::io_context& io, std::string_view url, ClientOptions options, Opened done) {
   const auto refuse = [&](ErrorCode code, std::string why) {

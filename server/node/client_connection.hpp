@@ -19,7 +19,7 @@ namespace rr {
 /// One connection to a service. All callbacks run on the thread of the io_context. Each completion is called exactly
 /// once, when the reply is there or the connection has ended; for a request that cannot be sent, maybe before the
 /// function returns.
-class ClientConnection final : public TcpDriver {
+class ClientConnection final : public SessionDriver<ClientSession> {
  public:
   using Opened = std::function<void(Result<std::shared_ptr<ClientConnection>>)>;
   using Completion = std::function<void(Result<Value>)>;
@@ -61,13 +61,6 @@ class ClientConnection final : public TcpDriver {
  private:
   using MemberKey = std::pair<std::string, std::string>;  // path, member
 
-  void handle_bytes(ByteSpan input, Now now) override { session_.handle_bytes(input, now); }
-  void handle_transmitted(std::size_t bytes, Now now) override { session_.handle_transmitted(bytes, now); }
-  void handle_timeout(Now now) override { session_.handle_timeout(now); }
-  void handle_closed(Error reason, Now now) override { session_.handle_closed(std::move(reason), now); }
-  std::span<const ByteSpan> poll_transmit() override { return session_.poll_transmit(); }
-  bool wants_close() const override { return session_.wants_close(); }
-  TimePoint poll_timeout() const override { return session_.poll_timeout(); }
   bool handle_event(Now now) override;
   void ended() override {}
 
@@ -80,7 +73,6 @@ class ClientConnection final : public TcpDriver {
   void handle(SessionClosed&& closed);
   void expect(RequestId id, Completion done);
 
-  ClientSession session_;
   Opened opened_;
   std::unordered_map<RequestId, Completion> completions_;
   std::map<MemberKey, std::shared_ptr<EventHandler>> event_handlers_;

@@ -17,7 +17,7 @@ Error error_of(const std::exception& exception) {
 
 ServiceClient::ServiceClient(ClientId id, ServiceClientOwner& owner, ServiceDirectory& directory,
                              ServiceSessionOptions options, boost::asio::ip::tcp::socket socket)
-    : TcpDriver(std::move(socket)), id_(id), owner_(&owner), session_(directory, std::move(options), read_clocks()) {}
+    : SessionDriver(std::move(socket), directory, std::move(options), read_clocks()), id_(id), owner_(&owner) {}
 
 void ServiceClient::send_event(const std::string& path, const MemberDefinition& event,
                                std::span<const Value> arguments) {

@@ -25,7 +25,7 @@ class ServiceClientOwner {
   ~ServiceClientOwner() = default;
 };
 
-class ServiceClient final : public TcpDriver {
+class ServiceClient final : public SessionDriver<ServiceSession> {
  public:
   ServiceClient(ClientId id, ServiceClientOwner& owner, ServiceDirectory& directory, ServiceSessionOptions options,
                 boost::asio::ip::tcp::socket socket);
@@ -42,13 +42,6 @@ class ServiceClient final : public TcpDriver {
   void abandon();
 
  private:
-  void handle_bytes(ByteSpan input, Now now) override { session_.handle_bytes(input, now); }
-  void handle_transmitted(std::size_t bytes, Now now) override { session_.handle_transmitted(bytes, now); }
-  void handle_timeout(Now now) override { session_.handle_timeout(now); }
-  void handle_closed(Error reason, Now now) override { session_.handle_closed(std::move(reason), now); }
-  std::span<const ByteSpan> poll_transmit() override { return session_.poll_transmit(); }
-  bool wants_close() const override { return session_.wants_close(); }
-  TimePoint poll_timeout() const override { return session_.poll_timeout(); }
   bool handle_event(Now now) override;
   void ended() override;
 
@@ -61,7 +54,6 @@ class ServiceClient final : public TcpDriver {
   ClientId id_;
   ServiceClientOwner* owner_;
   Service* service_ = nullptr;
-  ServiceSession session_;
 };
 
 }  // namespace rr

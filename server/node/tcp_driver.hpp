@@ -6,6 +6,7 @@
 #include <boost/asio/steady_timer.hpp>
 #include <memory>
 #include <span>
+#include <utility>
 
 #include "core/support/bytes.hpp"
 #include "core/support/error.hpp"
@@ -13,7 +14,7 @@
 
 namespace rr {
 
-/// One socket and, in the derived class, one session. Everything runs on the thread of the socket's io_context and a
+/// One socket and, in SessionDriver, one session. Everything runs on the thread of the socket's io_context and a
 /// message is handled to the end where it was read: read, decode, handler, reply, write, without a hop, a lock, or a
 /// timer operation. Writes are tried at once and gather all that is queued; only a full socket waits.
 ///
@@ -64,6 +65,26 @@ class TcpDriver : public std::enable_shared_from_this<TcpDriver> {
   bool is_settling_ = false;
   bool is_waiting_for_room_ = false;
   bool is_closed_ = false;
+};
+
+/// The driver of one ClientSession or ServiceSession. What it leaves to the derived class are the session's events.
+template <class Session>
+class SessionDriver : public TcpDriver {
+ protected:
+  template <class... Args>
+  explicit SessionDriver(boost::asio::ip::tcp::socket socket, Args&&... session_arguments)
+      : TcpDriver(std::move(socket)), session_(std::forward<Args>(session_arguments)...) {}
+
+  Session session_;
+
+ private:
+  void handle_bytes(ByteSpan input, Now now) final { session_.handle_bytes(input, now); }
+  void handle_transmitted(std::size_t bytes, Now now) final { session_.handle_transmitted(bytes, now); }
+  void handle_timeout(Now now) final { session_.handle_timeout(now); }
+  void handle_closed(Error reason, Now now) final { session_.handle_closed(std::move(reason), now); }
+  std::span<const ByteSpan> poll_transmit() final { return session_.poll_transmit(); }
+  bool wants_close() const final { return session_.wants_close(); }
+  TimePoint poll_timeout() const final { return session_.poll_timeout(); }
 };
 
 }  // namespace rr
