@@ -74,9 +74,13 @@ Result<Value> answer_service_index_call(std::string_view function, const Service
   if (function != "GetLocalNodeServices")
     return make_error(ErrorCode::member_not_found, "the service index has no function " + quoted(function));
   if (base_url.empty()) return make_error(ErrorCode::service_error, "this transport has no URL");
-  for (const auto& [name, service] : directory.services())
+  const auto add = [&](const HostedService& service) {
     answer.items.emplace_back(static_cast<std::int32_t>(answer.items.size()),
-                              describe(*service, directory.identity(), base_url));
+                              describe(service, directory.identity(), base_url));
+  };
+  for (const auto& [name, service] : directory.services())
+    if (name != service_index_name) add(*service);
+  add(*directory.find(service_index_name));  // last, as the reference has it
   return Value(std::move(answer));
 }
 

@@ -191,6 +191,16 @@ void ServiceSession::flush_wires(Now now) {
   }
 }
 
+void ServiceSession::close_wire(std::string_view path, const MemberDefinition& member, Now now) {
+  const auto wire = wires_.find(PathMemberView{path, member.name});
+  if (wire == wires_.end()) return;
+  wires_.erase(wire);
+  connection_.begin_message(outgoing_);
+  outgoing_.header.metadata = unreliable_metadata;
+  outgoing_.begin_entry(EntryType::wire_closed, path, member.name);
+  send_outgoing(now);
+}
+
 void ServiceSession::release_path(std::string_view path, Now now) {
   if (!service_) return;
   std::erase_if(wires_, [path](const auto& wire) { return is_within(wire.first.path, path); });

@@ -86,6 +86,8 @@ class ServiceSession {
   Result<> send_event(std::string_view path, const MemberDefinition& member, std::span<const Value> arguments, Now now);
   /// Sends InValue if the client has connected this wire; a value that waits for a slow stream is replaced.
   Result<> send_wire(std::string_view path, const MemberDefinition& member, const Value& value, Now now);
+  /// Ends the client's connection to this wire, if it has one, and tells the client.
+  void close_wire(std::string_view path, const MemberDefinition& member, Now now);
   /// Tells the client to look up `path` again.
   void release_path(std::string_view path, Now now);
   /// Tells the client that its service is gone (ServiceClosed), then closes.

@@ -11,8 +11,13 @@ namespace rr {
 
 namespace {
 
+// The names that 1.2.8 gives these two, against its own table: clients may know them by name.
 Error service_not_found() {
-  return {ErrorCode::service_not_found, "Service not found"};
+  return {ErrorCode::service_not_found, "Service not found", "RobotRaconteur.ServiceNotFoundException"};
+}
+
+Error object_not_found() {
+  return {ErrorCode::object_not_found, "Object not found", "RobotRaconteur.ObjectNotFoundException"};
 }
 
 const MessageElement* find_text(const Message& message, const MessageEntry& entry, std::string_view name) {
@@ -139,17 +144,16 @@ Result<> ServiceSession::write_service_desc(const Message& message, const Messag
 
 /// ObjectTypeName without a session: every failure is "Object not found".
 Result<> ServiceSession::write_root_type(const Message& message, const MessageEntry& entry) {
-  const auto not_found = make_error(ErrorCode::object_not_found, "Object not found");
   const auto version = read_client_version(message, entry);
   if (!version) return version.error();
   const auto service = directory_.find(entry.service_path.substr(0, entry.service_path.find('.')));
-  if (!service) return not_found;
+  if (!service) return object_not_found();
   const auto found = service->find_object(entry.service_path);
-  if (!found) return not_found;
+  if (!found) return object_not_found();
   const bool is_root = found->type == &service->root_type();
   const auto name = is_root ? type_for_client(*service, *version) : found->type->qualified_name;
   const auto* type = service->types().find_entity(name);
-  if (!type) return not_found;
+  if (!type) return object_not_found();
   outgoing_.add_text("objecttype", outgoing_.store(std::string_view(name)));
   add_implements(outgoing_, *type);
   return {};
