@@ -4,22 +4,12 @@
 #include "core/robdef/canonical_names.hpp"
 #include "core/robdef/names.hpp"
 #include "core/robdef/robdef.hpp"
+#include "core/robdef/statement_text.hpp"
 #include "core/robdef/version_levels.hpp"
 
 namespace rr {
 
 namespace {
-
-std::string hex_text(std::int32_t value) {
-  constexpr std::string_view digits = "0123456789abcdef";
-  auto magnitude = static_cast<std::uint64_t>(value < 0 ? -static_cast<std::int64_t>(value) : value);
-  std::string reversed;
-  do {
-    reversed += digits[magnitude % 16];
-    magnitude /= 16;
-  } while (magnitude != 0);
-  return (value < 0 ? "-0x" : "0x") + std::string(reversed.rbegin(), reversed.rend());
-}
 
 class Writer {
  public:
@@ -32,9 +22,6 @@ class Writer {
   void write_options();
   void write_enum(const EnumDefinition& item);
   void write_entity(const EntityDefinition& item);
-  void write_member(const MemberDefinition& item);
-  void write_constant(const ConstantDefinition& item, std::string_view indent);
-  std::string type_text(const TypeDefinition& type) const { return format_type(names_.type(type)); }
 
   const ServiceDefinition& definition_;
   CanonicalNames names_;
@@ -48,14 +35,10 @@ std::string Writer::write() {
   write_version();
   for (const auto& item : definition_.imports) out_ += "import " + item.name + '\n';
   if (!definition_.imports.empty()) out_ += '\n';
-  for (const auto& item : definition_.usings) {
-    out_ += "using " + item.qualified_name;
-    if (split_qualified(item.qualified_name).name != item.alias) out_ += " as " + item.alias;
-    out_ += '\n';
-  }
+  for (const auto& item : definition_.usings) out_ += using_text(item) + '\n';
   if (!definition_.usings.empty()) out_ += '\n';
   if (!options_first) write_options();
-  for (const auto& item : definition_.constants) write_constant(item, {});
+  for (const auto& item : definition_.constants) out_ += constant_text(item) + '\n';
   if (!definition_.constants.empty()) out_ += '\n';
   for (const auto& item : definition_.enums) write_enum(item);
   if (!definition_.enums.empty()) out_ += '\n';
@@ -80,51 +63,22 @@ void Writer::write_options() {
   if (!definition_.options.empty()) out_ += '\n';
 }
 
-void Writer::write_constant(const ConstantDefinition& item, std::string_view indent) {
-  // Aliases do not apply to the type word of a constant.
-  out_ += std::string(indent) + "constant " + format_type(item.type) + ' ' + item.name + ' ' + item.value_text + '\n';
-}
-
 void Writer::write_enum(const EnumDefinition& item) {
   out_ += "enum " + item.name + '\n';
   for (std::size_t i = 0; i < item.values.size(); ++i) {
-    const auto& value = item.values[i];
-    out_ += "    " + value.name;
-    if (!value.is_implicit) out_ += " = " + (value.is_hex ? hex_text(value.value) : std::to_string(value.value));
-    out_ += i + 1 < item.values.size() ? ",\n" : "\n";
+    out_ += "    " + enum_value_text(item.values[i]) + (i + 1 < item.values.size() ? ",\n" : "\n");
   }
   if (item.values.empty()) out_ += '\n';
   out_ += "end\n\n";
 }
 
 void Writer::write_entity(const EntityDefinition& item) {
-  constexpr std::string_view keywords[] = {"struct", "pod", "namedarray", "object"};
-  out_ += std::string(keywords[static_cast<std::size_t>(item.kind)]) + ' ' + item.name + '\n';
+  out_ += entity_header_text(item) + '\n';
   for (const auto& base : item.implements) out_ += "    implements " + std::string(names_.name(base.name)) + '\n';
   for (const auto& option : item.options) out_ += "    option " + option.text + '\n';
-  for (const auto& constant : item.constants) write_constant(constant, "    ");
-  for (const auto& member : item.members) write_member(member);
+  for (const auto& constant : item.constants) out_ += "    " + constant_text(constant) + '\n';
+  for (const auto& member : item.members) out_ += "    " + member_text(member, &names_) + '\n';
   out_ += "end\n\n";
-}
-
-void Writer::write_member(const MemberDefinition& item) {
-  out_ += "    " + std::string(member_kind_name(item.kind)) + ' ';
-  if (item.kind != MemberKind::event) out_ += type_text(item.type) + ' ';
-  out_ += item.name;
-  if (item.kind == MemberKind::function || item.kind == MemberKind::callback || item.kind == MemberKind::event) {
-    out_ += '(';
-    for (std::size_t i = 0; i < item.parameters.size(); ++i) {
-      if (i != 0) out_ += ", ";
-      out_ += type_text(item.parameters[i].type) + ' ' + item.parameters[i].name;
-    }
-    out_ += ')';
-  }
-  for (std::size_t i = 0; i < item.modifiers.size(); ++i) {
-    const auto& modifier = item.modifiers[i];
-    out_ += i == 0 ? " [" : ",";
-    out_ += modifier.text.empty() ? modifier.name : modifier.text;
-  }
-  out_ += item.modifiers.empty() ? "\n" : "]\n";
 }
 
 template <class Item, class Same>

@@ -50,7 +50,10 @@ int run_command_line(std::span<const Command> commands, Arguments arguments) {
   return exit_usage;
 }
 
-ParsedArguments parse_arguments(Arguments arguments, std::span<const std::string_view> known_options) {
+ParsedArguments parse_arguments(Arguments arguments, const KnownOptions& known) {
+  const auto is_one_of = [](std::string_view name, std::span<const std::string_view> names) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
   ParsedArguments out;
   for (std::size_t i = 0; i < arguments.size(); ++i) {
     const auto argument = arguments[i];
@@ -58,9 +61,18 @@ ParsedArguments parse_arguments(Arguments arguments, std::span<const std::string
       out.operands.emplace_back(argument);
       continue;
     }
+    if (is_one_of(argument, known.flags)) {
+      out.flags.emplace(argument);
+      continue;
+    }
     const auto equals = argument.find('=');
     const auto name = argument.substr(0, equals);
-    if (std::find(known_options.begin(), known_options.end(), name) == known_options.end()) {
+    if (is_one_of(name, known.flags)) {
+      out.error = "option " + std::string(name) + " takes no value";
+      return out;
+    }
+    const bool is_repeated = is_one_of(name, known.repeated);
+    if (!is_repeated && !is_one_of(name, known.options)) {
       out.error = "unknown option " + rr::quoted(name);
       return out;
     }
@@ -69,7 +81,9 @@ ParsedArguments parse_arguments(Arguments arguments, std::span<const std::string
       return out;
     }
     const auto value = equals == std::string_view::npos ? arguments[++i] : argument.substr(equals + 1);
-    if (!out.options.emplace(name, value).second) {
+    if (is_repeated) {
+      out.repeated.emplace_back(value);
+    } else if (!out.options.emplace(name, value).second) {
       out.error = "option " + std::string(name) + " is given twice";
       return out;
     }

@@ -3,6 +3,7 @@
 
 #include <map>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -25,13 +26,21 @@ struct Command {
 /// Runs the command that the arguments name, or answers --help and --version.
 int run_command_line(std::span<const Command> commands, Arguments arguments);
 
-/// Options of one subcommand, all of the form "--name VALUE" or "--name=VALUE"; the rest are operands.
+/// What a subcommand takes beside operands.
+struct KnownOptions {
+  std::span<const std::string_view> options = {};   ///< "--name VALUE" or "--name=VALUE", once
+  std::span<const std::string_view> flags = {};     ///< "--name" alone
+  std::span<const std::string_view> repeated = {};  ///< as options, any number of times
+};
+
 struct ParsedArguments {
   std::map<std::string, std::string, std::less<>> options;
+  std::set<std::string, std::less<>> flags;
+  std::vector<std::string> repeated;  ///< the values of all repeated options, in order
   std::vector<std::string> operands;
   std::string error;  ///< not empty: what wasn't understood
 };
-ParsedArguments parse_arguments(Arguments arguments, std::span<const std::string_view> known_options);
+ParsedArguments parse_arguments(Arguments arguments, const KnownOptions& known);
 
 /// Prints "rrgate NAME: what" and how to get help to stderr; returns exit_usage.
 int usage_error(std::string_view command, std::string_view what);
@@ -40,5 +49,7 @@ int usage_error(std::string_view command, std::string_view what);
 int run_serve(Arguments arguments);
 int run_check_config(Arguments arguments);
 int run_demo(Arguments arguments);
+int run_check(Arguments arguments);
+int run_fmt(Arguments arguments);
 
 }  // namespace rrgate

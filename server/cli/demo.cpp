@@ -147,7 +147,7 @@ Config make_config(const std::vector<DemoDevice>& devices, std::uint16_t port) {
 
 int run_demo(Arguments arguments) {
   constexpr std::string_view options[] = {"--port"};
-  const auto parsed = parse_arguments(arguments, options);
+  const auto parsed = parse_arguments(arguments, {options});
   if (!parsed.error.empty()) return usage_error("demo", parsed.error);
   if (!parsed.operands.empty()) return usage_error("demo", "unexpected " + rr::quoted(parsed.operands.front()));
   auto port = is_port_free(preferred_port) ? preferred_port : std::uint16_t{0};

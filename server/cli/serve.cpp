@@ -9,7 +9,7 @@ namespace rrgate {
 
 int run_serve(Arguments arguments) {
   constexpr std::string_view options[] = {"--config"};
-  const auto parsed = parse_arguments(arguments, options);
+  const auto parsed = parse_arguments(arguments, {options});
   if (!parsed.error.empty()) return usage_error("serve", parsed.error);
   if (!parsed.operands.empty()) return usage_error("serve", "unexpected " + rr::quoted(parsed.operands.front()));
   const auto file = parsed.options.find("--config");

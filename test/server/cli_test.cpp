@@ -7,13 +7,26 @@ using namespace rrgate;
 
 TEST_CASE("options are taken in both spellings, unknown ones are named") {
   constexpr std::string_view known[] = {"--config", "--port"};
-  const auto parse = [&](std::vector<std::string_view> arguments) { return parse_arguments(arguments, known); };
+  const auto parse = [&](std::vector<std::string_view> arguments) { return parse_arguments(arguments, {known}); };
   CHECK(parse({"--config", "a"}).options.at("--config") == "a");
   CHECK(parse({"--config=a=b"}).options.at("--config") == "a=b");
   CHECK(parse({"file", "--port=1"}).operands == std::vector<std::string>{"file"});
   CHECK_THAT(parse({"--confg", "a"}).error, Catch::Contains("unknown option '--confg'"));
   CHECK_THAT(parse({"--config"}).error, Catch::Contains("needs a value"));
   CHECK_THAT(parse({"--port=1", "--port=2"}).error, Catch::Contains("twice"));
+
+  constexpr std::string_view flags[] = {"--quiet"};
+  constexpr std::string_view repeated[] = {"-I"};
+  const auto parse_more = [&](std::vector<std::string_view> arguments) {
+    return parse_arguments(arguments, {known, flags, repeated});
+  };
+  const auto parsed = parse_more({"-I", "a", "--quiet", "file", "-I=b", "--port", "1"});
+  CHECK(parsed.error.empty());
+  CHECK(parsed.repeated == std::vector<std::string>{"a", "b"});
+  CHECK(parsed.flags.count("--quiet") == 1);
+  CHECK(parsed.operands == std::vector<std::string>{"file"});
+  CHECK_THAT(parse_more({"--quiet=1"}).error, Catch::Contains("takes no value"));
+  CHECK_THAT(parse_more({"-I"}).error, Catch::Contains("needs a value"));
 }
 
 TEST_CASE("commands are found by name; help and mistakes have their exit codes") {
