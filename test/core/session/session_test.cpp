@@ -426,8 +426,8 @@ TEST_CASE("the service index lists services with their URLs") {
   std::vector<std::string> names;
   for (const auto& [key, info] : services->items)
     names.emplace_back(info.get_if<Structure>()->find("Name")->to_text().value());
-  CHECK(names == std::vector<std::string>{"RobotRaconteurServiceIndex", "arm"});
-  const auto* arm = services->items[1].second.get_if<Structure>();
+  CHECK(names == std::vector<std::string>{"arm", "RobotRaconteurServiceIndex"});
+  const auto* arm = services->items[0].second.get_if<Structure>();
   CHECK(arm->find("RootObjectType")->to_text().value() == "experimental.loopback.Arm");
   const auto* urls = arm->find("ConnectionURL")->get_if<MapInt32>();
   CHECK(urls->items.front().first == 1);
