@@ -1,24 +1,13 @@
 #include "core/session/service_path.hpp"
 
+#include "core/support/hex.hpp"
+
 namespace rr {
 
 namespace {
 
 bool is_alnum(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
-}
-
-int hex_value(char digit) {
-  if (digit >= '0' && digit <= '9') return digit - '0';
-  if (digit >= 'a' && digit <= 'f') return digit - 'a' + 10;
-  if (digit >= 'A' && digit <= 'F') return digit - 'A' + 10;
-  return -1;
-}
-
-/// The byte at the start of `text` behind a '%', or -1.
-int hex_byte(std::string_view text) {
-  if (text.size() < 2 || hex_value(text[0]) < 0 || hex_value(text[1]) < 0) return -1;
-  return hex_value(text[0]) << 4 | hex_value(text[1]);
 }
 
 bool is_name(std::string_view name) {
@@ -77,19 +66,7 @@ Result<std::vector<PathSegment>> parse_service_path(std::string_view path) {
 }
 
 std::string encode_path_index(std::string_view index) {
-  constexpr std::string_view digits = "0123456789abcdef";
-  std::string out;
-  for (const char c : index) {
-    if (is_alnum(c)) {
-      out += c;
-    } else {
-      const auto byte = static_cast<unsigned char>(c);
-      out += '%';
-      out += digits[byte >> 4];
-      out += digits[byte & 15];
-    }
-  }
-  return out;
+  return escape_bytes(index, lower_hex_digits, is_alnum);
 }
 
 std::string child_path(std::string_view parent, std::string_view member, std::optional<std::string_view> index) {

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/support/hex.hpp"
+
 namespace rr {
 
 namespace {
@@ -12,13 +14,6 @@ Error bad_url(std::string_view text, std::string what) {
 
 Error bad_value(std::string_view text, std::string what) {
   return make_error(ErrorCode::invalid_argument, "URL " + quoted(text, 200) + ": " + std::move(what));
-}
-
-int hex_value(char digit) {
-  if (digit >= '0' && digit <= '9') return digit - '0';
-  if (digit >= 'a' && digit <= 'f') return digit - 'a' + 10;
-  if (digit >= 'A' && digit <= 'F') return digit - 'A' + 10;
-  return -1;
 }
 
 bool is_word(char c) {
@@ -301,31 +296,18 @@ Result<std::string> percent_decode(std::string_view text) {
       out += text[i];
       continue;
     }
-    const int high = i + 1 < text.size() ? hex_value(text[i + 1]) : -1;
-    const int low = i + 2 < text.size() ? hex_value(text[i + 2]) : -1;
-    if (high < 0 || low < 0)
+    const int byte = hex_byte(text.substr(i + 1));
+    if (byte < 0)
       return make_error(ErrorCode::invalid_argument,
                         "escape in " + quoted(text) + ": expected two hex digits after '%'");
-    out += static_cast<char>(high << 4 | low);
+    out += static_cast<char>(byte);
     i += 2;
   }
   return out;
 }
 
 std::string percent_encode(std::string_view text) {
-  constexpr std::string_view digits = "0123456789ABCDEF";
-  std::string out;
-  for (const char c : text) {
-    if (is_word(c) || c == '-' || c == '.' || c == '~') {
-      out += c;
-    } else {
-      const auto byte = static_cast<unsigned char>(c);
-      out += '%';
-      out += digits[byte >> 4];
-      out += digits[byte & 15];
-    }
-  }
-  return out;
+  return escape_bytes(text, upper_hex_digits, [](char c) { return is_word(c) || c == '-' || c == '.' || c == '~'; });
 }
 
 }  // namespace rr

@@ -1,17 +1,10 @@
 #include "core/support/node_id.hpp"
 
+#include "core/support/hex.hpp"
+
 namespace rr {
 
 namespace {
-
-constexpr std::string_view hex_digits = "0123456789abcdef";
-
-int hex_value(char digit) {
-  if (digit >= '0' && digit <= '9') return digit - '0';
-  if (digit >= 'a' && digit <= 'f') return digit - 'a' + 10;
-  if (digit >= 'A' && digit <= 'F') return digit - 'A' + 10;
-  return -1;
-}
 
 bool is_ascii_letter(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
@@ -34,8 +27,8 @@ std::string format_node_id(const NodeId& id, NodeIdFormat format) {
   if (format == NodeIdFormat::braces) out += '{';
   for (std::size_t i = 0; i < id.bytes.size(); ++i) {
     if (format != NodeIdFormat::plain && (i == 4 || i == 6 || i == 8 || i == 10)) out += '-';
-    out += hex_digits[id.bytes[i] >> 4];
-    out += hex_digits[id.bytes[i] & 15];
+    out += lower_hex_digits[id.bytes[i] >> 4];
+    out += lower_hex_digits[id.bytes[i] & 15];
   }
   if (format == NodeIdFormat::braces) out += '}';
   return out;
