@@ -51,5 +51,6 @@ int run_check_config(Arguments arguments);
 int run_demo(Arguments arguments);
 int run_check(Arguments arguments);
 int run_fmt(Arguments arguments);
+int run_generate(Arguments arguments);
 
 }  // namespace rrgate

@@ -110,9 +110,10 @@ export interface FunctionMember<A extends unknown[] = never[], R = RrValue> {
   (...args: [...A, CallOptions]): Promise<R>;
 }
 
-export interface PropertyMember<T = RrValue> {
+/** `S`: what may be sent, where that is more than what is received (varvalue: also rrValue()). */
+export interface PropertyMember<T = RrValue, S = T> {
   get(options?: CallOptions): Promise<T>;
-  set(value: T, options?: CallOptions): Promise<void>;
+  set(value: S, options?: CallOptions): Promise<void>;
 }
 
 export interface EventMember<A extends unknown[] = RrValue[]> extends AsyncIterable<A> {
@@ -137,25 +138,53 @@ export interface WireTime {
  * A connected wire. Iterating gives the newest value each time; values that came in between are skipped. Leaving the
  * loop closes the connection.
  */
-export interface WireConnection<T = RrValue> extends AsyncIterable<T> {
+export interface WireConnection<T = RrValue, S = T> extends AsyncIterable<T> {
   /** The newest value; undefined before the first. */
   readonly value: T | undefined;
   readonly time: WireTime | undefined;
   /** When the service has agreed; rejects where it refuses. */
   readonly ready: Promise<void>;
   /** Sends the OutValue; one that waits for a slow network is replaced by a newer one. */
-  send(value: T): Promise<void>;
+  send(value: S): Promise<void>;
   close(): Promise<void>;
 }
 
-export interface WireMember<T = RrValue> {
-  connect(options?: CallOptions): WireConnection<T>;
+export interface WireMember<T = RrValue, S = T> {
+  connect(options?: CallOptions): WireConnection<T, S>;
   /** The InValue, without connection. */
   peek(options?: CallOptions): Promise<T>;
   /** The OutValue as the service has it. */
   peekOut(options?: CallOptions): Promise<T>;
   /** Sets the OutValue, without connection. */
-  poke(value: T, options?: CallOptions): Promise<void>;
+  poke(value: S, options?: CallOptions): Promise<void>;
+}
+
+/** One end of a pipe. Iterating gives every packet, in order; leaving the loop closes the endpoint. */
+export interface PipeEndpoint<T = RrValue, S = T> extends AsyncIterable<T> {
+  send(packet: S): Promise<void>;
+  close(): Promise<void>;
+}
+
+export interface PipeMember<T = RrValue, S = T> {
+  /** `index`: the endpoint's, any free one where not given. */
+  connect(index?: number): Promise<PipeEndpoint<T, S>>;
+}
+
+/** What the service asks of this client. */
+export interface CallbackMember<A extends unknown[] = RrValue[], R = unknown> {
+  handler: ((...args: A) => R | Promise<R>) | null;
+}
+
+/** Positions and counts have one number a dimension. */
+export interface MemoryMember<A = RrValue> {
+  dimensions(options?: CallOptions): Promise<number[]>;
+  read(position: readonly number[], count: readonly number[], options?: CallOptions): Promise<A>;
+  write(position: readonly number[], value: A, options?: CallOptions): Promise<void>;
+}
+
+/** A function whose results come one after another; `P` goes to the service with each. Leaving the loop ends it. */
+export interface GeneratorMember<A extends unknown[] = never[], R = RrValue, P = void> {
+  (...args: A): AsyncGenerator<R, void, P>;
 }
 
 /** A member where no type is known: everything that any member can do. What this one cannot do is missing on it. */

@@ -1,0 +1,105 @@
+// What programs do with generated types. Compiled, never run: each line marked as an error must be one.
+import { connect, rrValue } from "rrgate-client";
+import type { Complex, RemoteObject, RrValue } from "rrgate-client";
+import type { SimulatedCreate } from "generated/create.js";
+import type * as declared from "generated/interop.js";
+import { Color } from "generated/interop_module.js";
+import * as words from "generated/words_module.js";
+
+/** Compiles where A and B are the same type. */
+function same<A, B>(_same: (<T>() => T extends A ? 1 : 2) extends <T>() => T extends B ? 1 : 2 ? true : false): void {}
+
+export async function drive(): Promise<number> {
+  const robot = await connect<SimulatedCreate>("ws://localhost/?service=Create");
+  await robot.Drive(100, 5000);
+  await robot.Drive(100, 5000, { timeout: 100 });
+  // @ts-expect-error a number is missing
+  await robot.Drive(100);
+  // @ts-expect-error not a number
+  await robot.Drive("fast", 5000);
+  // @ts-expect-error there is no such member
+  await robot.Fly();
+  // @ts-expect-error readonly
+  await robot.DistanceTraveled.set(3);
+  robot.Bump.on(() => robot.reset());
+  for await (const packet of robot.packets.connect()) return packet?.Data.byteLength ?? 0;
+  // @ts-expect-error readonly
+  await robot.packets.poke(null);
+  robot.play_callback.handler = (distance, angle) => new Uint8Array([distance, angle]);
+  robot.play_callback.handler = null;
+  // @ts-expect-error the callback answers bytes
+  robot.play_callback.handler = () => "song";
+  await robot.$.close();
+  return robot.DistanceTraveled.get();
+}
+
+export async function values(): Promise<void> {
+  const interop = await connect<declared.Interop>("ws://localhost/?service=interop");
+  same<Awaited<ReturnType<typeof interop.p_double.get>>, number>(true);
+  same<Awaited<ReturnType<typeof interop.p_uint64.get>>, bigint>(true);
+  same<Awaited<ReturnType<typeof interop.p_cdouble.get>>, Complex>(true);
+  same<Awaited<ReturnType<typeof interop.p_pose_map.get>>, Map<string, declared.Pose | null> | null>(true);
+  same<Awaited<ReturnType<typeof interop.p_any.get>>, RrValue>(true);
+  // @ts-expect-error these are not the same
+  same<Awaited<ReturnType<typeof interop.p_int8s.get>>, Uint8Array>(true);
+  await interop.p_any.set(rrValue("int16[]", [1, 2]));
+  await interop.p_any.set([1, "two"]);
+  const pose = await interop.shift({ px: 1, py: 2, label: "here" }, 1, 1);
+  // @ts-expect-error a structure may be null
+  pose.px;
+  // @ts-expect-error a field is missing
+  await interop.p_pose.set({ px: 1, py: 2 });
+  const part: declared.Part = await interop.parts.get(3);
+  await part.inner.get();
+  same<typeof part.$.type, string>(true);
+  const other: RemoteObject = await interop.anything.get();
+  await interop.named.get(other.$.path);
+  // @ts-expect-error the index is a number
+  await interop.parts.get("left");
+  interop.changed.on((value, why) => why.repeat(value));
+  await interop.p_color.set(Color.green);
+  await interop.p_color.set(77);
+  // @ts-expect-error not a value of the enum, and not a number
+  await interop.p_color.set("green");
+  same<typeof Color.blue, -3>(true);
+  try {
+    await interop.fail("custom", "text");
+  } catch (error) {
+    if ((error as declared.InteropError).name === "experimental.interop.InteropError") throw error;
+  }
+}
+
+export async function every_kind(): Promise<void> {
+  const object = await connect<words.Object_>("ws://localhost/?service=words");
+  same<words.test_words_more_delete, { text: string }>(true);
+  same<typeof words.largest, 9223372036854775807n>(true);
+  same<typeof words.test_words_delete, "test.words.delete">(true);
+  const three: readonly number[] = words.three;
+  const text: string = words.both.first + words.interface_.pair.b;
+  for await (const number of object.count(three.length)) same<typeof number, number>(true);
+  const lines = object.collect();
+  await lines.next(text);
+  // @ts-expect-error lines are strings
+  await lines.next(5);
+  const sums = object.both_ways(1);
+  const first = await sums.next(2);
+  if (!first.done) same<typeof first.value, number>(true);
+  const endpoint = await object.samples.connect();
+  for await (const samples of endpoint) await endpoint.send(samples.subarray(1));
+  for await (const frame of await object.frames.connect(3)) frame?.children?.at(0);
+  await (await object.commands.connect()).send(rrValue("int8", 1));
+  object.ask.handler = async (question, how) => question.length + how;
+  const block = await object.image.read([0, 0], [2, 2]);
+  same<typeof block.data, Uint8Array>(true);
+  same<Awaited<ReturnType<typeof object.image.dimensions>>, number[]>(true);
+  // @ts-expect-error readonly
+  await object.image.write([0, 0], block);
+  await object.numbers.write([3], new Float64Array(3));
+  const next: words.switch_ | null = await object.constructor({ ...((await object.switch_value.get()) as words.switch_) }, 5);
+  next?.next?.next?.pod_grid.data.at(0)?.corners.at(0)?.static.at(0);
+  // @ts-expect-error JavaScript would take the object for a promise
+  object.then;
+  await object.$.member("then")(5);
+  await object.$.member("toString")();
+  await object.operator(1, "", words.enumeration.private);
+}
