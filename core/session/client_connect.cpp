@@ -215,6 +215,7 @@ void ClientSession::become_connected(Now) {
     return fail(make_error(ErrorCode::service_error, "the root object of " + quoted(options_.service) +
                                                          " has the unknown type " + quoted(*chosen)));
   objects_.emplace(options_.service, type);
+  options_.credentials = {};  // nothing needs the secret any more
   state_ = ClientState::connected;
   emit(Connected{*chosen});
 }

@@ -118,9 +118,7 @@ void ClientSession::scan_deadlines(Now now) {
 
 Result<const MemberDefinition*> ClientSession::find_member(std::string_view path, std::string_view member,
                                                            MemberKind kind) const {
-  if (state_ != ClientState::connected)
-    return connection_error(state_ == ClientState::connecting ? "the session is not connected yet"
-                                                              : connection_.close_reason().message);
+  if (state_ != ClientState::connected) return not_connected();
   const auto* type = object_type(path);
   if (!type) return make_error(ErrorCode::object_not_found, "object " + quoted(path) + " was not looked up");
   const auto* definition = type->find_member(member);
@@ -131,6 +129,11 @@ Result<const MemberDefinition*> ClientSession::find_member(std::string_view path
                                                        std::string(member_kind_name(definition->kind)) + ", not a " +
                                                        std::string(member_kind_name(kind)));
   return definition;
+}
+
+Error ClientSession::not_connected() const {
+  return connection_error(state_ == ClientState::connecting ? "the session is not connected yet"
+                                                            : connection_.close_reason().message);
 }
 
 const EntityDefinition* ClientSession::object_type(std::string_view path) const {
@@ -359,6 +362,8 @@ void ClientSession::handle_reply(const Message& message, const MessageEntry& ent
   }
   if (pending.type == EntryType::object_type_name)
     return handle_type_name_reply(entry, id, std::move(pending.path), now);
+  if (pending.type == EntryType::client_session_op_req)
+    return handle_session_op_reply(message, entry, id, std::move(pending.path), now);
   emit(Completed{id, read_reply(message, entry, pending)});
   if (pending.type == EntryType::wire_connect_req) handle_wire_connected(pending);
 }

@@ -26,7 +26,7 @@ namespace rr {
 struct ClientOptions {
   ConnectionOptions connection;
   std::string service;           ///< service name, e.g. "Create"
-  std::string username = {};     ///< with credentials: logs in
+  std::string username = {};     ///< with credentials: logs in while connecting (see authenticate() for later)
   Value credentials = {};        ///< MapString, e.g. {"password": ...}; null for none
   std::string object_type = {};  ///< the type to use the root object as; empty: the service's own
   std::chrono::milliseconds request_timeout{15'000};
@@ -72,6 +72,9 @@ struct SessionClosed {
 using ClientEvent = std::variant<Connected, Completed, EventReceived, WireValueReceived, WireClosedByService,
                                  PathReleased, SessionClosed>;
 
+/// What an object lock keeps out: other users, or all other clients.
+enum class LockKind : std::uint8_t { user, client };
+
 enum class ClientState : std::uint8_t { connecting, connected, closing, closed };
 
 /// One client session. Every request returns an id at once and ends in exactly one Completed event with that id, in
@@ -107,6 +110,21 @@ class ClientSession {
   RequestId poke_out_value(std::string_view path, std::string_view member, const Value& value, Now now);  ///< null
   /// Sends OutValue on a connected wire. A value that still waits for a slow stream is replaced by a newer one.
   Result<> send_wire(std::string_view path, std::string_view member, const Value& value, Now now);
+
+  /// Logs in, or in as another user. `credentials` a MapString, {"password": ...} for most services. Completes with
+  /// null. A service that requires a user for everything takes the login of ClientOptions, in connecting; one that does
+  /// not takes only this one.
+  RequestId authenticate(std::string_view username, const Value& credentials, Now now);
+  RequestId logout(Now now);  ///< completes with null
+  /// Locks the object at `path` and all below it, until unlock() or until the client, or the user's last one, has gone.
+  /// Completes with null.
+  RequestId lock(std::string_view path, LockKind kind, Now now);
+  RequestId unlock(std::string_view path, Now now);  ///< completes with null
+  /// Waits for the monitor lock of the object at `path` and takes it. `timeout` negative: no limit. Completes with
+  /// null. A service frees a monitor whose owner sends no request on the object for 30 s.
+  RequestId enter_monitor(std::string_view path, std::chrono::milliseconds timeout, Now now);
+  RequestId exit_monitor(std::string_view path, Now now);  ///< completes with null
+
   /// Forgets a request: its late reply is ignored, no event follows. Nothing is sent: the service still runs it.
   void cancel(RequestId id);
   /// How long requests from now on may take; those that wait already keep their deadline.
@@ -137,7 +155,7 @@ class ClientSession {
   struct Pending {
     EntryType type = EntryType::null;
     const MemberDefinition* member = nullptr;
-    std::string path;  ///< find_object and wires only: calls and properties allocate nothing here
+    std::string path;  ///< find_object, wires, session operations: calls, properties allocate nothing here
     TimePoint deadline;
   };
   /// Definitions that are fetched, with all their imports, before the connect sequence or a lookup can go on.
@@ -181,6 +199,12 @@ class ClientSession {
   RequestId fail_request(RequestId id, Error error);
   Result<> send_outgoing(Now now);
   Result<> send_wire_packet(const PathMember& key, WireConnection& wire, const Value& value, Now now);
+
+  template <class AddElements>
+  RequestId request_session_op(std::string_view path, std::string_view command, Now now, AddElements&& add_elements);
+  Error not_connected() const;
+  void handle_session_op_reply(const Message& message, const MessageEntry& entry, RequestId id, std::string path,
+                               Now now);
 
   // received
   void handle_message(const Message& message, Now now);

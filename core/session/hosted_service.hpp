@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/session/authenticator.hpp"
 #include "core/session/connection.hpp"
 #include "core/types/type_registry.hpp"
 #include "core/types/value.hpp"
@@ -51,6 +52,10 @@ class HostedService {
   /// A MapString of numbers and texts.
   const Value& attributes() const { return attributes_; }
   const std::vector<std::string>& extra_imports() const { return extra_imports_; }
+  /// Who may do what; to be set before clients come.
+  const SecurityPolicy& policy() const { return policy_; }
+  void set_policy(SecurityPolicy policy) { policy_ = std::move(policy); }
+  LoginLimit& login_limit() { return login_limit_; }
   /// The definition that holds the root type.
   const ServiceDefinition& root_definition() const;
   /// What a client needs: the root's definition, the extra imports and all that these import; in order of names.
@@ -78,6 +83,8 @@ class HostedService {
   const EntityDefinition* root_type_ = nullptr;
   Value attributes_;
   std::vector<std::string> extra_imports_;
+  SecurityPolicy policy_;
+  LoginLimit login_limit_;
   std::map<std::string, Found, std::less<>> objects_;
   static constexpr std::size_t max_cached_objects = 4096;  ///< hostile paths may not grow it; the root always stays
 };

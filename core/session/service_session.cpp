@@ -106,6 +106,8 @@ void ServiceSession::leave(Error reason, Now now) {
   is_gone_ = true;
   closing_deadline_ = now.steady + linger;
   service_.reset();
+  user_.reset();
+  login_.reset();
   calls_.clear();
   wires_.clear();
   events_.push_back(ClientGone{std::move(reason)});
@@ -154,6 +156,7 @@ void ServiceSession::reply(CallId id, const Result<Value>& result, Now now) {
 Result<> ServiceSession::send_event(std::string_view path, const MemberDefinition& member,
                                     std::span<const Value> arguments, Now now) {
   if (!service_) return make_error(ErrorCode::connection_error, "no client is connected");
+  if (!may_use_service()) return {};
   connection_.begin_message(outgoing_);
   outgoing_.begin_entry(EntryType::event_req, path, member.name);
   if (auto written = write_arguments(outgoing_, arguments, member, service_->types()); !written) return written;
@@ -163,7 +166,7 @@ Result<> ServiceSession::send_event(std::string_view path, const MemberDefinitio
 
 Result<> ServiceSession::send_wire(std::string_view path, const MemberDefinition& member, const Value& value, Now now) {
   const auto found = wires_.find(PathMemberView{path, member.name});
-  if (!service_ || found == wires_.end()) return {};
+  if (!may_use_service() || found == wires_.end()) return {};
   if (connection_.queued_bytes() >= wire_high_mark) {
     found->second.waiting = value;
     return {};
@@ -184,7 +187,7 @@ Result<> ServiceSession::send_wire_packet(const PathMember& key, WireConnection&
 
 void ServiceSession::flush_wires(Now now) {
   for (auto& [key, wire] : wires_) {
-    if (!wire.waiting || !service_) continue;
+    if (!wire.waiting || !may_use_service()) continue;
     const Value value = std::move(*wire.waiting);
     // A value that does not fit its definition was refused or not when it was set; here only the stream counts.
     if (!send_wire_packet(key, wire, value, now) || connection_.queued_bytes() >= wire_high_mark) return;
@@ -271,11 +274,17 @@ void ServiceSession::handle_message(const Message& message, Now now) {
 }
 
 void ServiceSession::handle_entry(const Message& message, const MessageEntry& entry, Now now) {
+  if (auto allowed = check_login(entry.type); !allowed) {
+    if (is_request(entry.type) && !is_packet(entry.type)) send_error(entry, allowed.error(), now);
+    return;
+  }
   if (entry.type == EntryType::wire_packet) return handle_wire_packet(message, entry);
   if (!is_request(entry.type) || is_packet(entry.type)) return;
   Result<> done;
   if (find_member_request(entry.type)) {
     done = dispatch_member(message, entry, now);
+  } else if (entry.type == EntryType::client_session_op_req) {
+    done = answer_session_op(message, entry, now);
   } else {
     begin_reply(entry);
     done = answer_session_request(message, entry);
@@ -299,13 +308,6 @@ Result<> ServiceSession::answer_session_request(const Message& message, const Me
       outgoing_.add_text("objecttype", found->type->qualified_name);
       return {};
     }
-    case EntryType::client_session_op_req:
-      if (entry.member_name.substr(0, 7) != "Monitor")
-        return make_error(ErrorCode::invalid_operation, "User authentication not activated for this service");
-      if (entry.member_name == "MonitorEnter" || entry.member_name == "MonitorContinueEnter" ||
-          entry.member_name == "MonitorExit")
-        return make_error(ErrorCode::invalid_argument, "Object is not monitor lockable");
-      return protocol_error("Invalid ClientSessionOp command");
     default:
       (void)message;
       return protocol_error("Unknown request type");

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/member/wire.hpp"
+#include "core/session/authenticator.hpp"
 #include "core/session/connection.hpp"
 #include "core/session/hosted_service.hpp"
 #include "core/session/service_path.hpp"
@@ -24,8 +25,10 @@ struct ServiceSessionOptions {
   std::string base_url = {};     ///< "rr+tcp://127.0.0.1:52222/": what the service index says of this connection
   std::chrono::milliseconds connect_timeout{30'000};    ///< a connection that opens no session is closed
   std::chrono::milliseconds endpoint_timeout{600'000};  ///< without a session message
-  std::size_t max_open_calls = 1024;                    ///< not answered yet; above: out_of_system_resource
-  std::size_t max_wires = 4096;                         ///< connected by one client; above: out_of_system_resource
+  /// The client's NodeID, where the transport vouches for it (a certificate; the local machine).
+  std::optional<NodeId> verified_node_id = {};
+  std::size_t max_open_calls = 1024;  ///< not answered yet; above: out_of_system_resource
+  std::size_t max_wires = 4096;       ///< connected by one client; above: out_of_system_resource
 };
 
 using CallId = std::uint64_t;
@@ -44,6 +47,15 @@ struct Called {
 struct ClientConnected {
   HostedService* service = nullptr;
 };
+using LoginId = std::uint64_t;
+
+/// A login to be judged by `authenticator`, which may be slow, and to be answered exactly once with answer_login().
+struct LoginRequested {
+  LoginId id = 0;
+  std::shared_ptr<const Authenticator> authenticator;
+  LoginAttempt attempt;
+  LoginLimit::Ticket ticket;  ///< to be kept until the answer
+};
 /// A wire was connected: send the current value, if there is one.
 struct WireConnected {
   std::string path;
@@ -61,7 +73,7 @@ struct WireReceived {
 struct ClientGone {
   Error reason;
 };
-using ServiceEvent = std::variant<Called, ClientConnected, WireConnected, WireReceived, ClientGone>;
+using ServiceEvent = std::variant<Called, ClientConnected, LoginRequested, WireConnected, WireReceived, ClientGone>;
 
 /// One client of a node. Node-level requests (definitions, attributes, the service index) are answered in here.
 class ServiceSession {
@@ -82,6 +94,9 @@ class ServiceSession {
   /// Answers a call. Property set, poke and void functions ignore the value. A value that does not fit the definition
   /// becomes an error reply that says so. Unknown ids (the client is gone) are ignored.
   void reply(CallId id, const Result<Value>& result, Now now);
+  /// Ends a login. Unknown ids (the client is gone) are ignored.
+  void answer_login(LoginId id, Result<AuthenticatedUser> result, Now now);
+  /// Clients that still have to log in are sent nothing.
   /// Errors   those of packing; connection_error.
   Result<> send_event(std::string_view path, const MemberDefinition& member, std::span<const Value> arguments, Now now);
   /// Sends InValue if the client has connected this wire; a value that waits for a slow stream is replaced.
@@ -107,6 +122,10 @@ class ServiceSession {
   /// The service that the client is connected to; nullptr before and after.
   HostedService* service() const { return service_.get(); }
   bool has_wire(std::string_view path, std::string_view member) const;
+  /// Who has logged in; nullptr while nobody has.
+  const AuthenticatedUser* user() const { return user_ ? &*user_ : nullptr; }
+  /// This side's number of the session; 0 before the client is connected.
+  std::uint32_t endpoint() const { return endpoint_; }
 
  private:
   struct OpenCall {
@@ -115,6 +134,21 @@ class ServiceSession {
     std::uint32_t request_id = 0;
     std::string path;
     const MemberDefinition* member = nullptr;
+  };
+
+  /// A login that is being judged.
+  struct OpenLogin {
+    LoginId id = 0;
+    EntryType type = EntryType::null;  ///< of the request: connect_client_combined or client_session_op_req
+    std::uint32_t request_id = 0;
+    std::string path;
+    std::string member;
+    std::shared_ptr<HostedService> service;
+    // connect_client_combined
+    NodeIdentity client;
+    std::uint32_t client_endpoint = 0;
+    const EntityDefinition* type_for_client = nullptr;
+    bool wants_definitions = true;
   };
 
   void handle_message(const Message& message, Now now);
@@ -127,8 +161,20 @@ class ServiceSession {
   Result<> write_service_desc(const Message& message, const MessageEntry& entry);
   Result<> write_root_type(const Message& message, const MessageEntry& entry);
   Result<> write_combined(const Message& message, const MessageEntry& entry, Now now);
-  Result<> connect(const MessageEntry& entry, const MessageHeader& header, Now now);
+  Result<> accept_combined(const OpenLogin& request, std::optional<AuthenticatedUser> user, Now now);
+  Result<> connect(std::shared_ptr<HostedService> service, std::uint32_t client_endpoint,
+                   std::optional<AuthenticatedUser> user, Now now);
   Result<> disconnect(const Message& message, const MessageEntry& entry, Now now);
+
+  // logins (service_login.cpp)
+  bool may_use_service() const;
+  Result<> check_login(EntryType type) const;
+  Result<> begin_login(const Message& message, const MessageEntry& entry, std::shared_ptr<HostedService> service,
+                       Now now);
+  void finish_combined(const OpenLogin& login, Result<AuthenticatedUser> result, Now now);
+  void finish_authenticate(const OpenLogin& login, Result<AuthenticatedUser> result, Now now);
+  void set_user(std::optional<AuthenticatedUser> user, Now now);
+  Result<> answer_session_op(const Message& message, const MessageEntry& entry, Now now);
 
   // requests of the session
   void handle_entry(const Message& message, const MessageEntry& entry, Now now);
@@ -156,6 +202,11 @@ class ServiceSession {
   bool is_gone_ = false;
 
   Message outgoing_;
+  std::optional<AuthenticatedUser> user_;
+  std::optional<OpenLogin> login_;
+  LoginId last_login_id_ = 0;
+  std::size_t failed_logins_ = 0;
+
   CallId last_call_id_ = 0;
   std::vector<OpenCall> calls_;
   std::map<PathMember, WireConnection, PathMemberLess> wires_;

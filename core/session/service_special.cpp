@@ -20,6 +20,14 @@ Error object_not_found() {
   return {ErrorCode::object_not_found, "Object not found", "RobotRaconteur.ObjectNotFoundException"};
 }
 
+Error login_failed() {
+  return {ErrorCode::authentication_error, "Authentication Failed"};
+}
+
+Error has_session_already() {
+  return {ErrorCode::invalid_operation, "this connection has a session already"};
+}
+
 const MessageElement* find_text(const Message& message, const MessageEntry& entry, std::string_view name) {
   const auto* element = message.elements_of(entry).find(name);
   return element && element->type == DataType::string_t ? element : nullptr;
@@ -82,6 +90,7 @@ void ServiceSession::handle_special(const Message& message, Now now) {
   for (const auto& entry : message.entries) {
     if (static_cast<std::uint16_t>(entry.type) % 2 == 0) continue;  // replies are not for a service
     outgoing_.begin_entry(reply_type(entry.type), entry.service_path, entry.member_name, entry.request_id);
+    const bool had_login = login_.has_value();
     const Result<> done = is_for_us ? answer_special(message, entry, now)
                                     : make_error(ErrorCode::node_not_found, "Could not find route to remote node");
     if (!done) {
@@ -90,6 +99,8 @@ void ServiceSession::handle_special(const Message& message, Now now) {
       outgoing_.entries.pop_back();
       outgoing_.begin_entry(reply_type(entry.type), entry.service_path, entry.member_name, entry.request_id);
       write_error(outgoing_, done.error());
+    } else if (login_ && !had_login) {
+      outgoing_.entries.pop_back();  // it is answered once the login is judged
     }
   }
   if (!outgoing_.entries.empty()) send_outgoing(now);
@@ -102,7 +113,7 @@ Result<> ServiceSession::answer_special(const Message& message, const MessageEnt
     case EntryType::object_type_name:
       return write_root_type(message, entry);
     case EntryType::connect_client:
-      return connect(entry, message.header, now);
+      return connect(directory_.find(entry.service_path), message.header.sender_endpoint, std::nullopt, now);
     case EntryType::connect_client_combined:
       return write_combined(message, entry, now);
     case EntryType::disconnect_client:
@@ -148,6 +159,7 @@ Result<> ServiceSession::write_root_type(const Message& message, const MessageEn
   if (!version) return version.error();
   const auto service = directory_.find(entry.service_path.substr(0, entry.service_path.find('.')));
   if (!service) return object_not_found();
+  if (service->policy().require_valid_user && entry.service_path != service->name()) return object_not_found();
   const auto found = service->find_object(entry.service_path);
   if (!found) return object_not_found();
   const bool is_root = found->type == &service->root_type();
@@ -167,16 +179,36 @@ Result<> ServiceSession::write_combined(const Message& message, const MessageEnt
   const auto type_name = type_for_client(*service, *version);
   const auto* type = service->types().find_entity(type_name);
   if (!type) return service_not_found();
-  // No service has an authenticator yet: a login cannot succeed.
-  const auto elements = message.elements_of(entry);
-  if (elements.find("username") && elements.find("credentials"))
-    return make_error(ErrorCode::authentication_error, "Authentication Failed");
-  if (auto connected = connect(entry, message.header, now); !connected) return connected;
-
-  outgoing_.add_text("objecttype", type->qualified_name);
-  add_implements(outgoing_, *type);
+  OpenLogin request;
+  request.service = service;
+  request.client = {message.header.sender_node_id, std::string(message.header.sender_node_name)};
+  request.client_endpoint = message.header.sender_endpoint;
+  request.type_for_client = type;
   const auto* flag = find_text(message, entry, "returnservicedefs");
-  if (!flag || (flag->text() != "0" && flag->text() != "false" && flag->text() != "False" && flag->text() != "FALSE")) {
+  request.wants_definitions =
+      !flag || (flag->text() != "0" && flag->text() != "false" && flag->text() != "False" && flag->text() != "FALSE");
+
+  const auto elements = message.elements_of(entry);
+  const bool has_login = elements.find("username") && elements.find("credentials");
+  const auto& policy = service->policy();
+  // As the reference does: where no user is required, a login in this request fails; AuthenticateUser is for that.
+  if (has_login != policy.require_valid_user || (has_login && !policy.authenticator)) return login_failed();
+  if (!has_login) return accept_combined(request, std::nullopt, now);
+  if (service_) return has_session_already();
+  if (auto begun = begin_login(message, entry, service, now); !begun) return begun;
+  login_->client = std::move(request.client);
+  login_->client_endpoint = request.client_endpoint;
+  login_->type_for_client = request.type_for_client;
+  login_->wants_definitions = request.wants_definitions;
+  return {};
+}
+
+Result<> ServiceSession::accept_combined(const OpenLogin& request, std::optional<AuthenticatedUser> user, Now now) {
+  const auto& service = request.service;
+  if (auto connected = connect(service, request.client_endpoint, std::move(user), now); !connected) return connected;
+  outgoing_.add_text("objecttype", request.type_for_client->qualified_name);
+  add_implements(outgoing_, *request.type_for_client);
+  if (request.wants_definitions) {
     std::vector<std::string_view> texts;
     for (const auto* definition : service->definitions_for_client()) texts.push_back(definition->text);
     add_text_list(outgoing_, "servicedefs", texts);
@@ -184,19 +216,35 @@ Result<> ServiceSession::write_combined(const Message& message, const MessageEnt
   return pack_varvalue(outgoing_, "attributes", service->attributes(), service->types());
 }
 
-Result<> ServiceSession::connect(const MessageEntry& entry, const MessageHeader& header, Now now) {
-  auto service = directory_.find(entry.service_path);
-  if (!service) return service_not_found();
-  if (service_) {
-    connection_.close(protocol_error("a second session was asked for on one connection"));
-    return protocol_error("this connection has a session already");
+void ServiceSession::finish_combined(const OpenLogin& login, Result<AuthenticatedUser> result, Now now) {
+  const auto begin = [&] {
+    outgoing_.clear();
+    outgoing_.header.receiver_node_id = login.client.id;
+    outgoing_.header.receiver_node_name = login.client.name;
+    outgoing_.header.receiver_endpoint = login.client_endpoint;
+    outgoing_.begin_entry(reply_type(login.type), login.path, login.member, login.request_id);
+  };
+  begin();
+  const Result<> done = result ? accept_combined(login, std::move(*result), now) : login_failed();
+  if (!done) {
+    begin();
+    write_error(outgoing_, done.error());
   }
+  send_outgoing(now);
+}
+
+/// `service` may be null.
+Result<> ServiceSession::connect(std::shared_ptr<HostedService> service, std::uint32_t client_endpoint,
+                                 std::optional<AuthenticatedUser> user, Now now) {
+  if (!service) return service_not_found();
+  if (service_) return has_session_already();
   service_ = std::move(service);
   endpoint_ = random_endpoint();
   last_session_message_ = now.steady;
-  connection_.set_endpoints(endpoint_, header.sender_endpoint);
-  if (header.sender_endpoint != 0) connection_.authorise();
+  connection_.set_endpoints(endpoint_, client_endpoint);
   outgoing_.header.sender_endpoint = endpoint_;
+  set_user(std::move(user), now);
+  if (client_endpoint != 0 && may_use_service()) connection_.authorise();
   events_.push_back(ClientConnected{service_.get()});
   return {};
 }

@@ -19,6 +19,12 @@ class Running {
   bool& flag_;
 };
 
+Value password_credentials(std::string_view password) {
+  MapString credentials;
+  credentials.items.emplace_back("password", Value(password));
+  return Value(std::move(credentials));
+}
+
 }  // namespace
 
 BlockingConnection::BlockingConnection(std::string_view url, ClientOptions options) {
@@ -69,6 +75,26 @@ void BlockingConnection::close() {
   connection_->disconnect();
   if (!run_until([this] { return is_closed(); }, std::chrono::seconds(1)))
     connection_->close(make_error(ErrorCode::connection_error, "closed by the client"));
+}
+
+void BlockingConnection::authenticate(std::string_view username, std::string_view password) {
+  wait_for([&](ClientConnection& connection, auto done) {
+    connection.authenticate(username, password_credentials(password), std::move(done));
+  });
+}
+
+void BlockingConnection::logout() {
+  wait_for([](ClientConnection& connection, auto done) { connection.logout(std::move(done)); });
+}
+
+MonitorGuard::~MonitorGuard() {
+  if (connection_ && !connection_->is_closed()) connection_->asynchronous().exit_monitor(path_, [](const auto&) {});
+}
+
+void MonitorGuard::exit() {
+  if (!connection_) return;
+  const auto connection = std::move(connection_);
+  connection->wait_for([this](ClientConnection& session, auto done) { session.exit_monitor(path_, std::move(done)); });
 }
 
 Value RemoteObject::call_values(std::string_view function, std::span<const Value> arguments) const {
@@ -134,6 +160,21 @@ void RemoteObject::on_event(std::string_view event, ClientConnection::EventHandl
   connection_->asynchronous().on_event(path_, event, std::move(handler));
 }
 
+void RemoteObject::lock(LockKind kind) const {
+  connection_->wait_for(
+      [&](ClientConnection& connection, auto done) { connection.lock(path_, kind, std::move(done)); });
+}
+
+void RemoteObject::unlock() const {
+  connection_->wait_for([&](ClientConnection& connection, auto done) { connection.unlock(path_, std::move(done)); });
+}
+
+MonitorGuard RemoteObject::enter_monitor(std::chrono::milliseconds timeout) const {
+  connection_->wait_for(
+      [&](ClientConnection& connection, auto done) { connection.enter_monitor(path_, timeout, std::move(done)); });
+  return {connection_, path_};
+}
+
 const std::string& RemoteObject::type_name() const {
   const EntityDefinition* type = connection_->asynchronous().session().object_type(path_);
   if (!type) throw ClientException(make_error(ErrorCode::object_not_found, "object " + path_ + " was replaced"));
@@ -144,6 +185,13 @@ RemoteObject connect(std::string_view url, ClientOptions options) {
   auto connection = std::make_shared<BlockingConnection>(url, std::move(options));
   const std::string root = connection->asynchronous().root_path();
   return {std::move(connection), root};
+}
+
+RemoteObject connect(std::string_view url, std::string_view username, std::string_view password) {
+  ClientOptions options;
+  options.username = username;
+  options.credentials = password_credentials(password);
+  return connect(url, std::move(options));
 }
 
 }  // namespace rr

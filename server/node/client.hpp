@@ -46,6 +46,11 @@ class BlockingConnection {
   bool run_until(const std::function<bool()>& is_done, std::chrono::milliseconds timeout);
   /// Starts a request and waits for its completion. Throws ClientException.
   Value wait_for(const std::function<void(ClientConnection&, ClientConnection::Completion)>& start);
+  /// Logs in to a service that does not require it, or in as another user. Throws ClientException.
+  void authenticate(std::string_view username, std::string_view password);
+  void logout();
+  /// What the service says of itself.
+  const MapString& attributes() const { return connection_->session().attributes(); }
   void close();
   bool is_closed() const { return close_reason_.has_value(); }
   ClientConnection& asynchronous() { return *connection_; }
@@ -55,6 +60,23 @@ class BlockingConnection {
   std::shared_ptr<ClientConnection> connection_;
   std::optional<Error> close_reason_;
   bool is_running_ = false;
+};
+
+/// Holds the monitor lock of an object for as long as it lives.
+class MonitorGuard {
+ public:
+  MonitorGuard(std::shared_ptr<BlockingConnection> connection, std::string path)
+      : connection_(std::move(connection)), path_(std::move(path)) {}
+  MonitorGuard(MonitorGuard&& other) noexcept = default;
+  MonitorGuard& operator=(MonitorGuard&&) = delete;
+  /// Gives the lock back without waiting for the answer.
+  ~MonitorGuard();
+  /// Gives it back now, and waits. Throws ClientException: it was lost meanwhile.
+  void exit();
+
+ private:
+  std::shared_ptr<BlockingConnection> connection_;  ///< null once the lock is given back
+  std::string path_;
 };
 
 /// An object of the service: a handle that is cheap to copy. Everything throws ClientException.
@@ -82,6 +104,12 @@ class RemoteObject {
   void send_wire(std::string_view wire, const Value& value) const;
   void on_event(std::string_view event, ClientConnection::EventHandler handler) const;
 
+  /// Keeps others out of this object and all below it, until unlock() or until this client has gone.
+  void lock(LockKind kind = LockKind::user) const;
+  void unlock() const;
+  /// Waits for the monitor lock. `timeout` negative: for ever.
+  [[nodiscard]] MonitorGuard enter_monitor(std::chrono::milliseconds timeout = std::chrono::milliseconds(-1)) const;
+
   /// Qualified.
   const std::string& type_name() const;
   const std::string& path() const { return path_; }
@@ -92,7 +120,9 @@ class RemoteObject {
   std::string path_;
 };
 
-/// The root object of the service that `url` names.
+/// The root object of the service that `url` names. A service that requires a user takes options.username and
+/// options.credentials, or those given here.
 RemoteObject connect(std::string_view url, ClientOptions options = {});
+RemoteObject connect(std::string_view url, std::string_view username, std::string_view password);
 
 }  // namespace rr

@@ -95,6 +95,30 @@ void ClientConnection::on_event(std::string_view path, std::string_view event, E
   event_handlers_[{std::string(path), std::string(event)}] = std::make_shared<EventHandler>(std::move(handler));
 }
 
+void ClientConnection::authenticate(std::string_view username, const Value& credentials, Completion done) {
+  expect(session_.authenticate(username, credentials, read_clocks()), std::move(done));
+}
+
+void ClientConnection::logout(Completion done) {
+  expect(session_.logout(read_clocks()), std::move(done));
+}
+
+void ClientConnection::lock(std::string_view path, LockKind kind, Completion done) {
+  expect(session_.lock(path, kind, read_clocks()), std::move(done));
+}
+
+void ClientConnection::unlock(std::string_view path, Completion done) {
+  expect(session_.unlock(path, read_clocks()), std::move(done));
+}
+
+void ClientConnection::enter_monitor(std::string_view path, std::chrono::milliseconds timeout, Completion done) {
+  expect(session_.enter_monitor(path, timeout, read_clocks()), std::move(done));
+}
+
+void ClientConnection::exit_monitor(std::string_view path, Completion done) {
+  expect(session_.exit_monitor(path, read_clocks()), std::move(done));
+}
+
 void ClientConnection::disconnect() {
   session_.disconnect(read_clocks());
   settle();

@@ -46,6 +46,13 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   void disconnect_wire(std::string_view path, std::string_view wire, Completion done);
   /// Errors   the wire is not connected; those of packing.
   Result<> send_wire(std::string_view path, std::string_view wire, const Value& value);
+  // Session operations; see ClientSession.
+  void authenticate(std::string_view username, const Value& credentials, Completion done);
+  void logout(Completion done);
+  void lock(std::string_view path, LockKind kind, Completion done);
+  void unlock(std::string_view path, Completion done);
+  void enter_monitor(std::string_view path, std::chrono::milliseconds timeout, Completion done);
+  void exit_monitor(std::string_view path, Completion done);
   /// One handler an event; a second replaces the first.
   void on_event(std::string_view path, std::string_view event, EventHandler handler);
   /// Called once, when the session has ended for whatever reason; not after a failed open().

@@ -5,6 +5,7 @@
 #include <boost/asio/post.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
+#include <boost/asio/thread_pool.hpp>
 #include <iostream>
 #include <map>
 #include <optional>
@@ -76,6 +77,10 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
         stop_timer_(io_) {}
 
   ~Implementation() {
+    if (judges_) {
+      judges_->stop();
+      judges_->join();
+    }
     close_listeners();
     stop_timer_.cancel();
     for (const auto& service : services_) service->detach();
@@ -166,6 +171,13 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     for_clients_of(service, [&](ServiceClient& client) { client.release_path(path); });
   }
   ClientId current_client() const override { return current_client_; }
+  Caller find_client(ClientId id) const override {
+    const auto found = clients_.find(id);
+    if (found == clients_.end() || !found->second->service()) return {};
+    const ServiceSession& session = found->second->session();
+    const auto* user = session.user();
+    return {id, user ? user->name : std::string(), session.endpoint(), session.connection().peer()};
+  }
 
   // ServiceClientOwner: from clients
 
@@ -180,6 +192,21 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
       options_.report(problem);
     else
       std::cerr << identity().name << ": " << problem << '\n';
+  }
+  void judge_login(const LoginRequested& login, const std::shared_ptr<ServiceClient>& client) override {
+    // A good password hash takes long: what the node does for its other clients must not wait for it.
+    if (!judges_) judges_ = std::make_unique<asio::thread_pool>(1);
+    asio::post(*judges_, [&io = io_, login, weak = std::weak_ptr(client)] {
+      Result<AuthenticatedUser> result = make_error(ErrorCode::authentication_error, "Authentication Failed");
+      try {
+        result = login.authenticator->authenticate(login.attempt);
+      } catch (const std::exception&) {
+        // Its text may hold anything: the client only hears that it failed.
+      }
+      asio::post(io, [login, weak, result = std::move(result)]() mutable {
+        if (const auto still_there = weak.lock()) still_there->answer_login(login.id, std::move(result));
+      });
+    });
   }
   void client_ended(ServiceClient& client) override {
     clients_.erase(client.id());
@@ -257,6 +284,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   bool is_stopping_ = false;
   asio::steady_timer stop_timer_;
   asio::signal_set* signals_ = nullptr;
+  std::unique_ptr<asio::thread_pool> judges_;  ///< of logins; there once somebody has tried to log in
 };
 
 Node::Node(std::string name, NodeOptions options)

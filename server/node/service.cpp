@@ -293,6 +293,13 @@ void Service::set_attribute(std::string key, Value value) {
   attributes_.items.emplace_back(std::move(key), std::move(value));
 }
 
+void Service::set_security(SecurityPolicy policy) {
+  if (host_) refuse("service " + quoted(name_) + ": security is set before the service is added to a node");
+  if (policy.require_valid_user && !policy.authenticator)
+    refuse("service " + quoted(name_) + " requires a user, but has no authenticator: nobody could log in");
+  security_ = std::move(policy);
+}
+
 std::shared_ptr<HostedService> Service::attach(ServiceHost& host) {
   if (hosted_) refuse("service " + quoted(name_) + " was added to a node before");
   std::string missing;
@@ -303,6 +310,7 @@ std::shared_ptr<HostedService> Service::attach(ServiceHost& host) {
   auto hosted = HostedService::make(name_, root_, types_, attributes_);
   if (!hosted) refuse("service " + quoted(name_) + ": " + hosted.error().message);
   hosted_ = std::move(*hosted);
+  hosted_->set_policy(security_);
   host_ = &host;
   return hosted_;
 }

@@ -39,6 +39,14 @@ class Service;
 /// One client of a node, for as long as it is connected; never 0, never used again.
 using ClientId = std::uint64_t;
 
+/// Who sent the request that a handler works on.
+struct Caller {
+  ClientId id = 0;             ///< 0: there is none
+  std::string user = {};       ///< the name it has logged in by; empty while it has not
+  std::uint32_t endpoint = 0;  ///< the service's number of the session, as the reference names clients
+  NodeIdentity node = {};      ///< as the client says
+};
+
 /// Thrown by a handler: the client gets this error.
 class ServiceException : public std::runtime_error {
  public:
@@ -154,6 +162,7 @@ class ServiceHost {
                          const Value& value) = 0;
   virtual void release_path(const Service& service, const std::string& path) = 0;
   virtual ClientId current_client() const = 0;
+  virtual Caller find_client(ClientId id) const = 0;
 
  protected:
   ~ServiceHost() = default;
@@ -184,8 +193,15 @@ class Service {
   /// A number, text or array that clients find with the service. Before Node::add().
   void set_attribute(std::string key, Value value);
 
+  /// Who may use the service, and how users log in. Before Node::add().
+  void set_security(SecurityPolicy policy);
+
   /// Which client's request is being handled; 0 outside of handlers.
   ClientId current_client() const { return host_ ? host_->current_client() : 0; }
+  /// The same with user and endpoint.
+  Caller current_caller() const { return find_client(current_client()); }
+  /// Any client that is connected now; its id is 0 where it is not.
+  Caller find_client(ClientId id) const { return host_ ? host_->find_client(id) : Caller{}; }
   void on_client_connected(std::function<void(ClientId)> handler) { on_connected_ = std::move(handler); }
   /// Also when the connection broke. Not called any more when the node stops.
   void on_client_gone(std::function<void(ClientId)> handler) { on_gone_ = std::move(handler); }
@@ -227,6 +243,7 @@ class Service {
   std::shared_ptr<Object> root_;
   std::vector<std::weak_ptr<Object>> objects_;
   MapString attributes_;
+  SecurityPolicy security_;
   std::shared_ptr<HostedService> hosted_;
   ServiceHost* host_ = nullptr;
   std::function<void(ClientId)> on_connected_;

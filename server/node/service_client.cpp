@@ -76,6 +76,15 @@ void ServiceClient::handle(const ClientConnected& connected, Now) {
   if (service_ && service_->on_connected_) service_->on_connected_(id_);
 }
 
+void ServiceClient::handle(const LoginRequested& login, Now) {
+  owner_->judge_login(login, std::static_pointer_cast<ServiceClient>(shared_from_this()));
+}
+
+void ServiceClient::answer_login(LoginId id, Result<AuthenticatedUser> result) {
+  session_.answer_login(id, std::move(result), read_clocks());
+  settle();
+}
+
 void ServiceClient::handle(const WireConnected& connected, Now now) {
   const Value* value = static_cast<Object&>(*connected.object).in_value(*connected.member);
   if (value) (void)session_.send_wire(connected.path, *connected.member, *value, now);  // checked when it was set

@@ -19,6 +19,8 @@ class ServiceClientOwner {
   virtual void set_current_client(ClientId id) = 0;  ///< 0: no handler runs
   /// A handler failed and no client waits for the answer.
   virtual void report(const std::string& problem) = 0;
+  /// Has the login judged, away from the node's thread, and answers it with client.answer_login() unless that is gone.
+  virtual void judge_login(const LoginRequested& login, const std::shared_ptr<ServiceClient>& client) = 0;
   virtual void client_ended(ServiceClient& client) = 0;
 
  protected:
@@ -31,6 +33,8 @@ class ServiceClient final : public SessionDriver<ServiceSession> {
                 boost::asio::ip::tcp::socket socket);
 
   ClientId id() const { return id_; }
+  const ServiceSession& session() const { return session_; }
+  void answer_login(LoginId id, Result<AuthenticatedUser> result);
   /// Null while the client is in no service of ours.
   Service* service() const { return service_; }
   void send_event(const std::string& path, const MemberDefinition& event, std::span<const Value> arguments);
@@ -47,6 +51,7 @@ class ServiceClient final : public SessionDriver<ServiceSession> {
 
   void handle(const Called& called, Now now);
   void handle(const ClientConnected& connected, Now now);
+  void handle(const LoginRequested& login, Now now);
   void handle(const WireConnected& connected, Now now);
   void handle(const WireReceived& received, Now now);
   void handle(const ClientGone& gone, Now now);

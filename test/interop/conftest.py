@@ -28,6 +28,16 @@ def pytest_generate_tests(metafunc):
                              ids=[f"{direction.name}-{level}" for direction, level in pairs])
 
 
+def pytest_collection_modifyitems(config, items):
+    """Scenarios whose steps a client does not know are not its tests."""
+    def is_known(item):
+        scenario, link = (item.callspec.params.get(name) for name in ("scenario", "link"))
+        return not scenario or not link or link[0].client in scenario.clients
+
+    config.hook.pytest_deselected(items=[item for item in items if not is_known(item)])
+    items[:] = filter(is_known, items)
+
+
 @pytest.fixture(scope="module")
 def link(request, tmp_path_factory):
     """A running service, behind the gateway where the direction says so: (direction, level, port)."""

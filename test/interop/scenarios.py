@@ -10,6 +10,10 @@ from dataclasses import dataclass
 class Scenario:
     name: str
     steps: list
+    clients: tuple = ("reference", "ours", "browser")  # those that know its steps
+
+
+NATIVE = ("reference", "ours")
 
 
 def plain_of(tagged):
@@ -207,4 +211,39 @@ SCENARIOS = [
         {"poke_out": "both", "value": {"double": 5.5}, "expect": None},
         {"peek_out": "both", "expect": 5.5},
         {"peek_in": "both", "expect": 11.0}]),
+]
+
+
+def opened(name, username, password, service="guarded"):
+    return {"open": name, "service": service, "username": username, "password": password, "expect": None}
+
+
+AUTHENTICATION = "RobotRaconteur.AuthenticationError"
+LOCKED = "RobotRaconteur.ObjectLockedError"
+
+SCENARIOS += [
+    Scenario("login", clients=NATIVE, steps=[
+        {"open": "nobody", "service": "guarded", "expect_error": AUTHENTICATION},
+        {"open": "wrong", "service": "guarded", "username": "alice", "password": "hunter2", "expect_error": AUTHENTICATION},
+        {"open": "mallory", "service": "guarded", "username": "mallory", "password": "secret", "expect_error": AUTHENTICATION},
+        opened("a", "alice", "secret"),
+        opened("b", "bob", "hunter2"),
+        {"by": "a", "call": "who", "expect": "alice"},
+        {"by": "b", "call": "who", "expect": "bob"},
+        {"by": "a", "set": "level", "value": {"double": 2.5}, "expect": None},
+        {"by": "b", "get": "level", "expect": 2.5},
+        {"by": "b", "on": ["head"], "call": "identify", "expect": "part head"},
+        # A login within the connect request fails where no user is required.
+        {"open": "o", "service": "open", "username": "alice", "password": "secret", "expect_error": AUTHENTICATION},
+        {"open": "o", "service": "open", "expect": None},
+        {"by": "o", "call": "who", "expect": ""},
+        {"leave": "o", "expect": None}]),
+    Scenario("login later", clients=("ours",), steps=[  # the reference's Python client cannot
+        {"open": "o", "service": "open", "expect": None},
+        {"by": "o", "login": "alice", "password": "hunter2", "expect_error": AUTHENTICATION},
+        {"by": "o", "login": "bob", "password": "hunter2", "expect": None},
+        {"by": "o", "call": "who", "expect": "bob"},
+        {"by": "o", "logout": "now", "expect": None},
+        {"by": "o", "get": "level", "expect": 1.5},
+        {"by": "o", "call": "who", "expect": ""}]),
 ]

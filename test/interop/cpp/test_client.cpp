@@ -14,7 +14,7 @@ constexpr std::chrono::seconds patience{10};
 
 class Client {
  public:
-  explicit Client(const std::string& url) : root_(rr::connect(url)) {}
+  explicit Client(const std::string& url) : url_(url), root_(rr::connect(url)) {}
 
   json carry_out(const json& step) {
     const rr::RemoteObject target = find(step);
@@ -33,12 +33,16 @@ class Client {
                                                    {"connect", &Client::connect},   {"close", &Client::close},
                                                    {"in_value", &Client::in_value}, {"out_value", &Client::out_value},
                                                    {"peek_in", &Client::peek_in},   {"peek_out", &Client::peek_out},
-                                                   {"poke_out", &Client::poke_out}};
+                                                   {"poke_out", &Client::poke_out}, {"open", &Client::open},
+                                                   {"leave", &Client::leave},       {"login", &Client::login},
+                                                   {"logout", &Client::logout},     {"lock", &Client::lock},
+                                                   {"unlock", &Client::unlock},     {"enter", &Client::enter},
+                                                   {"exit", &Client::exit}};
     return table;
   }
 
   rr::RemoteObject find(const json& step) const {
-    rr::RemoteObject object = root_;
+    rr::RemoteObject object = step.contains("by") ? others_.at(step.at("by").get<std::string>()) : root_;
     for (const auto& part : step.value("on", json::array())) {
       if (part.is_string())
         object = object.object(part.get<std::string>());
@@ -133,9 +137,60 @@ class Client {
     return nullptr;
   }
 
+  // further clients, logins, locks
+
+  json open(const rr::RemoteObject&, const std::string& name, const json& step) {
+    std::string url = url_;
+    url.replace(url.find("service=interop"), std::string::npos, "service=" + step.at("service").get<std::string>());
+    others_.insert_or_assign(name, step.contains("username") ? rr::connect(url, step.at("username").get<std::string>(),
+                                                                           step.at("password").get<std::string>())
+                                                             : rr::connect(url));
+    return nullptr;
+  }
+
+  json leave(const rr::RemoteObject&, const std::string& name, const json&) {
+    others_.at(name).connection().close();
+    others_.erase(name);
+    return nullptr;
+  }
+
+  json login(const rr::RemoteObject& target, const std::string& username, const json& step) {
+    target.connection().authenticate(username, step.at("password").get<std::string>());
+    return nullptr;
+  }
+
+  json logout(const rr::RemoteObject& target, const std::string&, const json&) {
+    target.connection().logout();
+    return nullptr;
+  }
+
+  json lock(const rr::RemoteObject& target, const std::string& kind, const json&) {
+    target.lock(kind == "user" ? rr::LockKind::user : rr::LockKind::client);
+    return nullptr;
+  }
+
+  json unlock(const rr::RemoteObject& target, const std::string&, const json&) {
+    target.unlock();
+    return nullptr;
+  }
+
+  json enter(const rr::RemoteObject& target, const std::string& name, const json& step) {
+    monitors_.emplace(name, target.enter_monitor(std::chrono::milliseconds(step.at("timeout").get<int>())));
+    return nullptr;
+  }
+
+  json exit(const rr::RemoteObject&, const std::string& name, const json&) {
+    auto monitor = std::move(monitors_.extract(name).mapped());
+    monitor.exit();
+    return nullptr;
+  }
+
+  std::string url_;
   rr::RemoteObject root_;
-  std::map<std::string, json> events_;     ///< by event
-  std::map<std::string, json> in_values_;  ///< by wire
+  std::map<std::string, rr::RemoteObject> others_;    ///< roots of further clients
+  std::map<std::string, rr::MonitorGuard> monitors_;  ///< by the name that the scenario gives
+  std::map<std::string, json> events_;                ///< by event
+  std::map<std::string, json> in_values_;             ///< by wire
 };
 
 json error_of(const rr::ClientException& exception) {

@@ -9,6 +9,7 @@
 
 #include "core/types/pack.hpp"
 #include "server/node/node.hpp"
+#include "server/security/password_file.hpp"
 
 namespace {
 
@@ -138,6 +139,67 @@ class Interop {
   Parts named_;
 };
 
+/// The services `guarded` and `open`.
+class Guarded {
+ public:
+  Guarded(rr::Node& node, const std::string& name, rr::SecurityPolicy security)
+      : service_(rr::Service::from_file(RR_INTEROP_ROBDEF, name, "Guarded")) {
+    for (const auto& [member, begin] : {std::pair{"level", 1.5}, std::pair{"shown", 0.0}, std::pair{"quick", 0.0}}) {
+      const auto value = std::make_shared<double>(begin);
+      service_->property(member).get([value] { return *value; }).set([value](double newer) { *value = newer; });
+    }
+    service_->property("status").get([this] { return status_; }).set([this](std::int32_t value) { status_ = value; });
+    service_->property("own").get([this] { return own_[service_->current_client()]; }).set([this](double value) {
+      own_[service_->current_client()] = value;
+    });
+    service_->on_client_gone([this](rr::ClientId id) { own_.erase(id); });
+    service_->function("who", [this] { return service_->current_caller().user; });
+    service_->function("touch", [this] { return 1.5; });
+    service_->set_wire("position", rr::Value(1.0));
+    service_->set_wire("free_position", rr::Value(2.0));
+    service_->objref("head", make_part("head"));
+    service_->objref("parts",
+                     [parts = std::map<std::string, std::shared_ptr<rr::Object>, std::less<>>{
+                          {"1", make_part("number 1")}, {"10", make_part("number 10")}}](std::string_view index) {
+                       return parts.at(std::string(index));
+                     });
+    service_->set_security(std::move(security));
+    node.add(service_);
+  }
+
+ private:
+  std::shared_ptr<rr::Object> make_part(const std::string& name) {
+    auto part = service_->make_object("Part");
+    part->property("name").get([name] { return name; });
+    const auto size = std::make_shared<double>(1);
+    part->property("size").get([size] { return *size; }).set([size](double value) { *size = value; });
+    part->function("identify", [name] { return "part " + name; });
+    part->objref("inner", std::shared_ptr<rr::Object>());
+    return part;
+  }
+
+  std::shared_ptr<rr::Service> service_;
+  std::int32_t status_ = 7;
+  std::map<rr::ClientId, double> own_;
+};
+
+/// Name, hash of the password (secret, hunter2, toor, secret), privileges; bob's as our own files have it.
+rr::SecurityPolicy make_security(bool require_valid_user) {
+  const auto bob = rr::PasswordHash::make_scrypt("hunter2", {10, 8, 1}).value().text();
+  const std::string users =
+      "alice 5ebe2294ecd0e0f08eab7690d2a6ee69 objectlock\n"
+      "bob " +
+      bob +
+      " objectlock\n"
+      "root 7b24afc8bc80e548d66c4e7ff72171c5 objectlock,objectlockoverride\n"
+      "guest 5ebe2294ecd0e0f08eab7690d2a6ee69 _\n";
+  rr::SecurityPolicy policy;
+  policy.authenticator = rr::PasswordFileAuthenticator::from_text(users, {.accepts_md5 = true}).value();
+  policy.require_valid_user = require_valid_user;
+  policy.allow_object_lock = true;
+  return policy;
+}
+
 rr::NodeOptions parse_options(int argc, char** argv) {
   rr::NodeOptions options;
   for (int i = 1; i < argc; ++i) {
@@ -166,6 +228,8 @@ int main(int argc, char** argv) {
   try {
     rr::Node node("interop.service", parse_options(argc, argv));
     const Interop interop(node);
+    const Guarded guarded(node, "guarded", make_security(true));
+    const Guarded open(node, "open", make_security(false));
     const std::string port = std::to_string(node.listen("rr+tcp://127.0.0.1:0"));
     std::cout << R"({"port": )" << port << R"(, "url": "rr+tcp://127.0.0.1:)" << port << R"(/?service=interop"})"
               << std::endl;

@@ -12,23 +12,26 @@ import RobotRaconteur as RR
 import quiet_node
 from values import Values, plain
 
+NO_VERBS = ("by", "on", "value", "args", "count", "until", "digest", "service", "username", "password", "timeout")
 PATIENCE = 10.0  # seconds for anything that has to come by itself
 
 
 class Client:
     def __init__(self, url):
+        self._url = url
         self._root = RR.RobotRaconteurNode.s.ConnectService(url)
+        self._others = {}  # roots of further clients, by name
         self._values = Values(self._root)
         self._news = threading.Condition()
         self._events = {}
         self._wires = {}
 
     def carry_out(self, step):
-        target = self._root
+        target = self._others[step["by"]] if "by" in step else self._root
         for part in step.get("on", []):
             name, *index = [part] if isinstance(part, str) else part
             target = getattr(target, "get_" + name)(*index)
-        verb = next(iter(key for key in step if key not in ("on", "value", "args", "count", "until", "digest")))
+        verb = next(iter(key for key in step if key not in NO_VERBS))
         return getattr(self, "do_" + verb)(target, step[verb], step)
 
     def do_get(self, target, member, step):
@@ -53,6 +56,29 @@ class Client:
 
     def do_type_of(self, target, member, step):
         return target.rrobjecttype if hasattr(target, "rrobjecttype") else RR.RobotRaconteurNode.s.GetObjectType(target)
+
+    # further clients, locks
+
+    def do_open(self, target, name, step):
+        url = self._url.replace("service=interop", "service=" + step["service"])
+        login = [step["username"], {"password": RR.VarValue(step["password"], "string")}] if "username" in step else []
+        self._others[name] = RR.RobotRaconteurNode.s.ConnectService(url, *login)
+
+    def do_leave(self, target, name, step):
+        RR.RobotRaconteurNode.s.DisconnectService(self._others.pop(name))
+
+    def do_lock(self, target, kind, step):
+        flags = {"user": RR.RobotRaconteurObjectLockFlags_USER_LOCK, "client": RR.RobotRaconteurObjectLockFlags_CLIENT_LOCK}
+        RR.RobotRaconteurNode.s.RequestObjectLock(target, flags[kind])
+
+    def do_unlock(self, target, what, step):
+        RR.RobotRaconteurNode.s.ReleaseObjectLock(target)
+
+    def do_enter(self, target, what, step):
+        RR.RobotRaconteurNode.s.MonitorEnter(target, step["timeout"])
+
+    def do_exit(self, target, what, step):
+        RR.RobotRaconteurNode.s.MonitorExit(target)
 
     # events
 

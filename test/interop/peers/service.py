@@ -166,6 +166,50 @@ class Interop:
         return parts[index], TYPE + ".Part"
 
 
+class Guarded:
+    def __init__(self):
+        self.level = 1.5
+        self.shown = self.quick = self.own = 0.0
+        self.status = 7
+        self._head = Part("head")
+        self._parts = {index: Part(f"number {index}") for index in (1, 10)}
+
+    def RRServiceObjectInit(self, context, path):
+        self.position.OutValue = 1.0
+        self.free_position.OutValue = 2.0
+
+    def who(self):
+        try:
+            return RR.ServerEndpoint.GetCurrentAuthenticatedUser().Username
+        except RR.RobotRaconteurException:
+            return ""
+
+    def touch(self):
+        return self.level
+
+    def get_head(self):
+        return self._head, TYPE + ".Part"
+
+    def get_parts(self, index):
+        return self._parts[int(index)], TYPE + ".Part"
+
+
+# name, MD5 of the password (secret, hunter2, toor, secret), privileges
+USERS = """
+alice 5ebe2294ecd0e0f08eab7690d2a6ee69 objectlock
+bob 2ab96390c7dbe3439de74d0c9b0b1767 objectlock
+root 7b24afc8bc80e548d66c4e7ff72171c5 objectlock,objectlockoverride
+guest 5ebe2294ecd0e0f08eab7690d2a6ee69 _
+"""
+
+
+def register_guarded(node):
+    users = RR.PasswordFileUserAuthenticator(USERS)
+    for name, policies in (("guarded", {"requirevaliduser": "true", "allowobjectlock": "true"}),
+                           ("open", {"allowobjectlock": "true"})):
+        node.RegisterService(name, TYPE + ".Guarded", Guarded(), RR.ServiceSecurityPolicy(users, policies))
+
+
 STORED_OBJECTS = """
     doubles singles int8s uint8s int16s uint16s int32s uint32s int64s uint64s cdoubles csingles bools three_doubles
     up_to_four grid two_by_three image pose everything vector vectors vector_grid transform sample samples sample_grid
@@ -178,6 +222,7 @@ def main():
     with RR.ServerNodeSetup("interop.service", 0, argv=quiet_node.arguments(server=True)) as setup:
         node.RegisterServiceType(DEFINITION.read_text(encoding="ascii"))
         node.RegisterService("interop", TYPE + ".Interop", Interop())
+        register_guarded(node)
         port = setup.tcp_transport.GetListenPort()
         print(json.dumps({"port": port, "url": f"rr+tcp://127.0.0.1:{port}/?service=interop"}), flush=True)
         sys.stdin.buffer.read()
