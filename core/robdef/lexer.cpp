@@ -1,10 +1,10 @@
 #include "core/robdef/lexer.hpp"
 
 #include <algorithm>
-#include <cstdio>
 #include <utility>
 
 #include "core/robdef/names.hpp"
+#include "core/support/hex.hpp"
 
 namespace rr {
 
@@ -109,10 +109,9 @@ bool LineReader::check_characters(const PhysicalLine& physical, std::uint32_t st
   const auto bad = std::find_if_not(physical.text.begin(), physical.text.end(), is_text_character);
   if (bad == physical.text.end()) return true;
   const auto column = static_cast<std::uint32_t>(bad - physical.text.begin()) + 1;
-  char message[96];
-  std::snprintf(message, sizeof(message), "found the byte 0x%02x, expected printable ASCII characters and tabs only",
-                static_cast<unsigned>(static_cast<unsigned char>(*bad)));
-  reporter_->error("bad-character", {statement_line, physical.number, column, column + 1}, message);
+  const auto byte = static_cast<unsigned char>(*bad);
+  reporter_->error("bad-character", {statement_line, physical.number, column, column + 1},
+                   "found the byte 0x" + hex_text(byte, 2) + ", expected printable ASCII characters and tabs only");
   return false;
 }
 

@@ -1,11 +1,13 @@
-// Number literals, independent of the locale and rounded once, in their own width. Layer: robdef.
+// Number literals, rounded once, in their own width. Layer: robdef.
 // Source: service definitions spec sections 5.3, 5.5.2.
 #include "core/robdef/number_literal.hpp"
 
 #include <algorithm>
-#include <cstdlib>
+#include <bit>
+#include <cmath>
 #include <limits>
-#include <string>
+#include <utility>
+#include <vector>
 
 #include "core/robdef/constant_value.hpp"
 #include "core/robdef/names.hpp"
@@ -58,30 +60,71 @@ bool split_float(std::string_view text, FloatParts& out) {
   return read_exponent(text, position, out.exponent) && position == text.size();
 }
 
-/// The same number as "DDDe±N": without a decimal point there is nothing a locale could change.
-std::string normalised(const FloatParts& parts) {
-  std::string digits;
-  std::int64_t exponent = parts.exponent;
-  bool has_more = false;
-  const auto append = [&](std::string_view part, bool is_fraction) {
-    for (const char c : part) {
-      const bool is_leading_zero = digits.empty() && c == '0';
-      const bool is_kept = digits.size() < max_significant_digits;
-      if (!is_leading_zero && is_kept) digits += c;
-      if (!is_kept && c != '0') has_more = true;
-      if (is_fraction && (is_leading_zero || is_kept)) --exponent;
-      if (!is_fraction && !is_leading_zero && !is_kept) ++exponent;
+/// A whole number of any size.
+class BigNumber {
+ public:
+  bool is_zero() const { return words_.empty(); }
+
+  void multiply_add(std::uint32_t factor, std::uint32_t summand) {
+    std::uint64_t carry = summand;
+    for (auto& word : words_) {
+      carry += std::uint64_t{word} * factor;
+      word = static_cast<std::uint32_t>(carry);
+      carry >>= 32;
     }
-  };
-  append(parts.whole, false);
-  append(parts.fraction, true);
-  if (digits.empty()) digits = "0";
-  if (has_more) {
-    digits += '1';
-    --exponent;
+    if (carry != 0) words_.push_back(static_cast<std::uint32_t>(carry));
   }
-  exponent = std::clamp<std::int64_t>(exponent, -100000, 100000);
-  return (parts.is_negative ? "-" : "") + digits + 'e' + std::to_string(exponent);
+
+  /// Returns  whether there is a remainder.
+  bool divide(std::uint32_t divisor) {
+    std::uint64_t rest = 0;
+    for (auto word = words_.rbegin(); word != words_.rend(); ++word) {
+      rest = rest << 32 | *word;
+      *word = static_cast<std::uint32_t>(rest / divisor);
+      rest %= divisor;
+    }
+    while (!words_.empty() && words_.back() == 0) words_.pop_back();
+    return rest != 0;
+  }
+
+  /// Multiplies by 2^32 so many times.
+  void shift_left(std::size_t words) { words_.insert(words_.begin(), words, 0); }
+
+  std::int64_t bit_count() const {
+    if (words_.empty()) return 0;
+    return static_cast<std::int64_t>(words_.size()) * 32 - std::countl_zero(words_.back());
+  }
+  bool bit(std::int64_t position) const {
+    return (words_[static_cast<std::size_t>(position / 32)] >> (position % 32) & 1) != 0;
+  }
+
+ private:
+  std::vector<std::uint32_t> words_ = {};  ///< lowest first; the last is not 0
+};
+
+/// `number` * 10^`exponent`, rounded once to `precision` bits, none of them below 2^`lowest_bit`. Exact: neither the
+/// locale nor the C library has a part in it.
+double round_to_real(BigNumber number, std::int64_t exponent, std::int64_t precision, std::int64_t lowest_bit) {
+  constexpr std::uint32_t billion = 1'000'000'000;
+  for (; exponent >= 9; exponent -= 9) number.multiply_add(billion, 0);
+  for (; exponent > 0; --exponent) number.multiply_add(10, 0);
+  // The quotient keeps more bits than a double has: 10 is below 2^(32/9).
+  const std::int64_t fraction_words = exponent < 0 ? 3 - exponent / 9 : 0;
+  number.shift_left(static_cast<std::size_t>(fraction_words));
+  bool has_rest = false;
+  for (; exponent <= -9; exponent += 9) has_rest = number.divide(billion) || has_rest;
+  for (; exponent < 0; ++exponent) has_rest = number.divide(10) || has_rest;
+
+  const auto bits = number.bit_count();
+  const auto unit = -32 * fraction_words;  // the power of two that bit 0 stands for
+  const auto first = std::max({bits - precision, lowest_bit - unit, std::int64_t{0}});  // the lowest bit that is kept
+  if (first > bits) return 0;
+  std::uint64_t kept = 0;
+  for (auto i = bits - 1; i >= first; --i) kept = kept << 1 | (number.bit(i) ? 1 : 0);
+  for (std::int64_t i = 0; i + 1 < first && !has_rest; ++i) has_rest = number.bit(i);
+  const bool is_half = first > 0 && number.bit(first - 1);
+  if (is_half && (has_rest || (kept & 1) != 0)) ++kept;
+  return std::ldexp(static_cast<double>(kept), static_cast<int>(first + unit));
 }
 
 }  // namespace
@@ -121,8 +164,34 @@ bool is_number_literal(std::string_view text) {
 double parse_float_literal(std::string_view text, bool is_single) {
   FloatParts parts;
   split_float(text, parts);
-  const auto plain = normalised(parts);
-  return is_single ? static_cast<double>(std::strtof(plain.c_str(), nullptr)) : std::strtod(plain.c_str(), nullptr);
+  BigNumber number;
+  std::size_t digit_count = 0;  // of `number`
+  std::int64_t exponent = parts.exponent;
+  bool has_more = false;
+  const auto append = [&](std::string_view part, bool is_fraction) {
+    for (const char c : part) {
+      const bool is_kept = digit_count < max_significant_digits;
+      if (is_kept) number.multiply_add(10, static_cast<std::uint32_t>(c - '0'));
+      if (is_kept && !number.is_zero()) ++digit_count;
+      if (!is_kept && c != '0') has_more = true;
+      if (is_fraction && is_kept) --exponent;
+      if (!is_fraction && !is_kept) ++exponent;
+    }
+  };
+  append(parts.whole, false);
+  append(parts.fraction, true);
+  if (has_more) {
+    number.multiply_add(10, 1);
+    --exponent;
+  }
+  double value = 0;
+  const auto magnitude = static_cast<std::int64_t>(digit_count) + exponent;  // below 10^magnitude
+  if (!number.is_zero() && magnitude > 400) value = std::numeric_limits<double>::infinity();
+  if (!number.is_zero() && magnitude >= -400 && magnitude <= 400)
+    value = is_single ? round_to_real(std::move(number), exponent, 24, -149)
+                      : round_to_real(std::move(number), exponent, 53, -1074);
+  if (is_single && value > std::numeric_limits<float>::max()) value = std::numeric_limits<double>::infinity();
+  return parts.is_negative ? -value : value;
 }
 
 }  // namespace rr

@@ -1,7 +1,8 @@
 #include "core/session/capabilities.hpp"
 
-#include <cstdio>
 #include <optional>
+
+#include "core/support/hex.hpp"
 
 namespace rr {
 
@@ -42,9 +43,7 @@ Words sort_pages(std::span<const std::uint32_t> words) {
 }
 
 std::string hex(std::uint32_t word) {
-  char text[11];
-  std::snprintf(text, sizeof(text), "0x%08x", word);
-  return text;
+  return "0x" + hex_text(word, 8);
 }
 
 }  // namespace

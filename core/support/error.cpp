@@ -1,10 +1,11 @@
 #include "core/support/error.hpp"
 
-#include <cstdio>
 #include <cstdlib>
 #ifdef __cpp_exceptions
 #include <stdexcept>
 #endif
+
+#include "core/support/hex.hpp"
 
 namespace rr {
 
@@ -120,7 +121,7 @@ void throw_exception_from_error(const Error& error, const boost::source_location
 #ifdef __cpp_exceptions
   throw std::logic_error("value() of a failed Result: " + error.qualified_name() + ": " + error.message);
 #else
-  std::fprintf(stderr, "value() of a failed Result: %s\n", error.message.c_str());
+  static_cast<void>(error);
   std::abort();
 #endif
 }
@@ -130,9 +131,7 @@ std::string quoted(std::string_view text, std::size_t limit) {
   for (const char character : text.substr(0, limit)) {
     const auto byte = static_cast<unsigned char>(character);
     if (byte < 0x20 || byte == 0x7f) {
-      char escape[5];
-      std::snprintf(escape, sizeof(escape), "\\x%02x", byte);
-      out += escape;
+      out += "\\x" + hex_text(byte, 2);
     } else {
       if (character == '\'' || character == '\\') out += '\\';
       out += character;

@@ -24,6 +24,13 @@ constexpr int hex_byte(std::string_view text) {
 inline constexpr std::string_view lower_hex_digits = "0123456789abcdef";
 inline constexpr std::string_view upper_hex_digits = "0123456789ABCDEF";
 
+/// The lowest `digits` hexadecimal digits of `value`: hex_text(10, 2) is "0a".
+inline std::string hex_text(std::uint32_t value, int digits) {
+  std::string text;
+  for (int at = digits - 1; at >= 0; --at) text += lower_hex_digits[value >> (4 * at) & 15];
+  return text;
+}
+
 /// Writes every byte for which `is_plain(char)` does not hold as '%' and two of `digits`.
 template <class IsPlain>
 std::string escape_bytes(std::string_view text, std::string_view digits, IsPlain is_plain) {

@@ -1,7 +1,6 @@
 #include "core/types/number.hpp"
 
 #include <cmath>
-#include <cstdio>
 
 namespace rr {
 
@@ -121,10 +120,30 @@ Conversion from_integer(Integer integer, DataType to, Scalar& out) {
   return write_parts({real, 0}, to, out);
 }
 
+/// Nine significant digits as printf's "%.9g" writes them in the C locale. printf itself would bring the whole
+/// formatting of the C library into the browser's module.
 std::string real_text(double value) {
-  char text[40];
-  std::snprintf(text, sizeof(text), "%.9g", value);
-  return text;
+  if (std::isnan(value)) return "nan";
+  const std::string sign = std::signbit(value) ? "-" : "";
+  double rest = std::fabs(value);
+  if (std::isinf(rest)) return sign + "inf";
+  if (rest == 0) return sign + "0";
+  int exponent = 0;
+  for (; rest >= 10; rest /= 10) ++exponent;
+  for (; rest < 1; rest *= 10) --exponent;
+  std::string digits = std::to_string(static_cast<std::uint32_t>(std::nearbyint(rest * 1e8)));
+  if (digits.size() > 9) ++exponent;  // 9.999999999 became 10
+  digits.erase(digits.find_last_not_of('0') + 1);
+  const auto point = [](std::string text, std::size_t position) {
+    if (text.size() > position) text.insert(position, ".");
+    return text;
+  };
+  if (exponent < -4) return sign + point(digits, 1) + (exponent > -10 ? "e-0" : "e-") + std::to_string(-exponent);
+  if (exponent >= 9) return sign + point(digits, 1) + (exponent < 10 ? "e+0" : "e+") + std::to_string(exponent);
+  if (exponent < 0) return sign + "0." + std::string(static_cast<std::size_t>(-1 - exponent), '0') + digits;
+  const auto whole = static_cast<std::size_t>(exponent) + 1;
+  if (digits.size() < whole) digits.resize(whole, '0');
+  return sign + point(digits, whole);
 }
 
 }  // namespace

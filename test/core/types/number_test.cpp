@@ -2,7 +2,10 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <cstdio>
+#include <cstring>
 #include <limits>
+#include <random>
 
 using namespace rr;
 
@@ -95,4 +98,33 @@ TEST_CASE("bool is a kind of its own") {
   CHECK(convert<bool>(1.0) == "wrong kind");
   Scalar out;
   CHECK(convert_number(Scalar::of(1.0), DataType::string_t, out) == Conversion::wrong_kind);
+}
+
+TEST_CASE("floating values are written like those of C") {
+  std::mt19937_64 random(20240607);
+  const auto check = [](double value) {
+    char expected[40];
+    std::snprintf(expected, sizeof(expected), "%.9g", value);
+    CHECK(number_text(Scalar::of(value)) == expected);
+  };
+  for (const double value : {0.0,          -0.0,
+                             1.0,          -1.5,
+                             100.0,        123456789.0,
+                             999999999.0,  999999999.6,
+                             1234567890.0, 1e9,
+                             0.1,          1e-4,
+                             0.00012345,   9.9999999996e-5,
+                             1e-5,         1e-10,
+                             1e100,        1.7976931348623157e308,
+                             5e-324,       2.5e-310,
+                             HUGE_VAL,     -HUGE_VAL,
+                             0.5})
+    check(value);
+  CHECK(number_text(Scalar::of(std::nan(""))) == "nan");
+  for (int i = 0; i < 20'000; ++i) {
+    const auto bits = random();
+    double value = 0;
+    std::memcpy(&value, &bits, sizeof(value));
+    if (!std::isnan(value)) check(value);
+  }
 }
