@@ -11,25 +11,26 @@
 // Service "test", node "test.service", attribute site = "dock".
 import { readFileSync } from "node:fs";
 import { connect } from "../../wasm-client/dist/index.js";
+import { JsValues } from "../../wasm-client/dist/js_values.js";
+import type { CoreExports, Handle } from "../../wasm-client/dist/js_values.js";
 import type { ConnectOptions, OpenTransport, RemoteObject, TransportListener } from "../../wasm-client/dist/index.js";
 
-interface WasmService {
-  error(): string;
+interface WasmService extends CoreExports {
+  _initialize(): void;
+  open(options: Handle, steady: number): Handle;
   set_now(steady: number): void;
   receive_buffer(size: number): number;
   handle_bytes(): void;
-  release(path: string): void;
+  release(path: Handle): void;
   stop(): void;
-  wants_close(): boolean;
-  poll_transmit(): Uint8Array | undefined;
+  wants_close(): number;
+  poll_transmit(): number;
+  transmit_address(): number;
   handle_transmitted(size: number): void;
-}
-interface WasmModule {
-  HEAPU8: Uint8Array;
-  Service: new (options: object, steady: number) => WasmService;
 }
 
 const built = new URL("../../build/wasm/test/wasm-client/service/", import.meta.url);
+let compiled: Promise<WebAssembly.Module> | undefined;
 
 export interface ServiceOptions {
   definitions: string[];
@@ -54,27 +55,23 @@ export class TestService {
   #is_delivering = false;
 
   static async start(options: ServiceOptions): Promise<TestService> {
-    const { default: create } = (await import(/* @vite-ignore */ new URL("test_service.js", built).href)) as {
-      default(options: object): Promise<WasmModule>;
-    };
-    const code = await WebAssembly.compile(readFileSync(new URL("test_service.wasm", built)));
-    const module = await create({
-      instantiateWasm(imports: WebAssembly.Imports, done: (instance: WebAssembly.Instance) => void) {
-        void WebAssembly.instantiate(code, imports).then(done);
-        return {};
-      },
-    });
-    return new TestService(module, options);
+    compiled ??= WebAssembly.compile(readFileSync(new URL("test_service.wasm", built)));
+    const values = new JsValues();
+    const { exports } = await WebAssembly.instantiate(await compiled, values.imports);
+    return new TestService(values, exports as unknown as WasmService, options);
   }
 
   private constructor(
-    private readonly module: WasmModule,
+    private readonly values: JsValues,
+    private readonly service: WasmService,
     private readonly options: ServiceOptions,
   ) {
-    this.service = new module.Service({ version: 4, stringTable: true, ...options }, performance.now());
-    if (this.service.error()) throw new Error(this.service.error());
+    values.attach(service);
+    service._initialize();
+    const all = { version: 4, stringTable: true, ...options };
+    const error = values.take(service.open(values.give(all), performance.now()));
+    if (error) throw new Error(String(error));
   }
-  private readonly service: WasmService;
 
   connect(options: ConnectOptions = {}): Promise<RemoteObject> {
     return connect("ws://test.example/?service=test", { transport: this.transport, ...options });
@@ -111,7 +108,7 @@ export class TestService {
   }
 
   release(path: string): void {
-    this.service.release(path);
+    this.service.release(this.values.give(path));
     this.#poll();
   }
 
@@ -120,13 +117,15 @@ export class TestService {
     if (this.is_mute) return;
     this.service.set_now(performance.now());
     const address = this.service.receive_buffer(bytes.length);
-    this.module.HEAPU8.set(bytes, address);
+    this.values.bytes.set(bytes, address);
     this.service.handle_bytes();
     this.#poll();
   }
 
   #poll(): void {
-    for (let bytes = this.service.poll_transmit(); bytes; bytes = this.service.poll_transmit()) {
+    for (let length = this.service.poll_transmit(); length > 0; length = this.service.poll_transmit()) {
+      const address = this.service.transmit_address();
+      const bytes = this.values.bytes.slice(address, address + length);
       const size = this.options.pieces ?? bytes.length;
       for (let from = 0; from < bytes.length; from += size) this.#deliveries.push(bytes.slice(from, from + size));
       this.service.handle_transmitted(bytes.length);

@@ -1,56 +1,141 @@
-// The names under which JavaScript finds the session: those of wasm_session.hpp. Layer: wasm-client/src.
-#include <emscripten/bind.h>
-
-#include <cstdlib>
-
+// The names under which ts/wasm_module.ts finds the session: those of wasm_session.hpp. Layer: wasm-client/src.
+// One instance of the module holds one session; its memory goes with the instance.
+#include "wasm-client/src/session_options.hpp"
+#include "wasm-client/src/value_to_js.hpp"
 #include "wasm-client/src/wasm_session.hpp"
 
-#ifdef BOOST_NO_EXCEPTIONS
-/// Boost reports what cannot happen (a Result read without looking) by throwing; without exceptions the module ends.
-namespace boost {
-BOOST_NORETURN void throw_exception(const std::exception&) {
-  std::abort();
-}
-BOOST_NORETURN void throw_exception(const std::exception&, const boost::source_location&) {
-  std::abort();
-}
-}  // namespace boost
-#endif
+#define RR_EXPORT(name) extern "C" __attribute__((export_name(#name)))
 
-EMSCRIPTEN_BINDINGS(rrgate) {
-  using emscripten::val;
-  using rr::WasmSession;
-  emscripten::class_<WasmSession>("Session")
-      .constructor<val, double, double>()
-      .function("set_now", &WasmSession::set_now)
-      .function("receive_buffer", &WasmSession::receive_buffer)
-      .function("handle_bytes", &WasmSession::handle_bytes)
-      .function("handle_transmitted", &WasmSession::handle_transmitted)
-      .function("handle_timeout", &WasmSession::handle_timeout)
-      .function("handle_closed", &WasmSession::handle_closed)
-      .function("set_request_timeout", &WasmSession::set_request_timeout)
-      .function("get_property", &WasmSession::get_property)
-      .function("set_property", &WasmSession::set_property)
-      .function("call_function", &WasmSession::call_function)
-      .function("find_object", &WasmSession::find_object)
-      .function("connect_wire", &WasmSession::connect_wire)
-      .function("disconnect_wire", &WasmSession::disconnect_wire)
-      .function("peek_in_value", &WasmSession::peek_in_value)
-      .function("peek_out_value", &WasmSession::peek_out_value)
-      .function("poke_out_value", &WasmSession::poke_out_value)
-      .function("send_wire", &WasmSession::send_wire)
-      .function("cancel", &WasmSession::cancel)
-      .function("disconnect", &WasmSession::disconnect)
-      .function("poll_transmit", &WasmSession::poll_transmit)
-      .function("wants_close", &WasmSession::wants_close)
-      .function("poll_timeout", &WasmSession::poll_timeout)
-      .function("poll_event", &WasmSession::poll_event)
-      .function("take_error", &WasmSession::take_error)
-      .function("queued_bytes", &WasmSession::queued_bytes)
-      .function("stats", &WasmSession::stats)
-      .function("peer", &WasmSession::peer)
-      .function("attributes", &WasmSession::attributes)
-      .function("definitions", &WasmSession::definitions)
-      .function("members", &WasmSession::members)
-      .function("child_path", &WasmSession::child_path);
+namespace {
+
+using rr::ClientSession;
+using rr::JsHandle;
+using rr::JsValue;
+using rr::RequestId;
+
+rr::WasmSession* session = nullptr;
+rr::ByteSpan transmitting;
+
+}  // namespace
+
+/// Memory for bytes and texts that JavaScript hands over. An instance that has no more ends with a trap.
+RR_EXPORT(allocate) void* rr_allocate(std::size_t size) {
+  return ::operator new(size);
+}
+/// The session, once; or what is wrong with the options.
+RR_EXPORT(open) JsHandle rr_open(JsHandle options, double steady, double utc) {
+  auto read = rr::read_session_options(JsValue(options));
+  if (read.has_error()) return rr::to_js(read.error(), rr::TypeRegistry()).release();
+  session = new rr::WasmSession(std::move(*read), steady, utc);
+  return JsHandle::undefined;
+}
+RR_EXPORT(set_now) void rr_set_now(double steady, double utc) {
+  session->set_now(steady, utc);
+}
+
+// --- told ---
+
+RR_EXPORT(receive_buffer) std::uint8_t* rr_receive_buffer(std::size_t size) {
+  return session->receive_buffer(size);
+}
+RR_EXPORT(handle_bytes) void rr_handle_bytes(std::size_t size) {
+  session->handle_bytes(size);
+}
+RR_EXPORT(handle_transmitted) void rr_handle_transmitted(std::size_t size) {
+  session->handle_transmitted(size);
+}
+RR_EXPORT(handle_timeout) void rr_handle_timeout() {
+  session->handle_timeout();
+}
+RR_EXPORT(handle_closed) void rr_handle_closed(JsHandle reason) {
+  session->handle_closed(JsValue(reason));
+}
+
+// --- asked ---
+
+RR_EXPORT(set_request_timeout) void rr_set_request_timeout(double milliseconds) {
+  session->set_request_timeout(milliseconds);
+}
+RR_EXPORT(get_property) RequestId rr_get_property(JsHandle path, JsHandle member) {
+  return session->ask(&ClientSession::get_property, JsValue(path), JsValue(member));
+}
+RR_EXPORT(set_property) RequestId rr_set_property(JsHandle path, JsHandle member, JsHandle value) {
+  return session->ask(&ClientSession::set_property, JsValue(path), JsValue(member), JsValue(value));
+}
+RR_EXPORT(call_function) RequestId rr_call_function(JsHandle path, JsHandle member, JsHandle arguments) {
+  return session->call_function(JsValue(path), JsValue(member), JsValue(arguments));
+}
+RR_EXPORT(find_object) RequestId rr_find_object(JsHandle path) {
+  return session->find_object(JsValue(path));
+}
+RR_EXPORT(connect_wire) RequestId rr_connect_wire(JsHandle path, JsHandle member) {
+  return session->ask(&ClientSession::connect_wire, JsValue(path), JsValue(member));
+}
+RR_EXPORT(disconnect_wire) RequestId rr_disconnect_wire(JsHandle path, JsHandle member) {
+  return session->ask(&ClientSession::disconnect_wire, JsValue(path), JsValue(member));
+}
+RR_EXPORT(peek_in_value) RequestId rr_peek_in_value(JsHandle path, JsHandle member) {
+  return session->ask(&ClientSession::peek_in_value, JsValue(path), JsValue(member));
+}
+RR_EXPORT(peek_out_value) RequestId rr_peek_out_value(JsHandle path, JsHandle member) {
+  return session->ask(&ClientSession::peek_out_value, JsValue(path), JsValue(member));
+}
+RR_EXPORT(poke_out_value) RequestId rr_poke_out_value(JsHandle path, JsHandle member, JsHandle value) {
+  return session->ask(&ClientSession::poke_out_value, JsValue(path), JsValue(member), JsValue(value));
+}
+RR_EXPORT(send_wire) bool rr_send_wire(JsHandle path, JsHandle member, JsHandle value) {
+  return session->send_wire(JsValue(path), JsValue(member), JsValue(value));
+}
+RR_EXPORT(cancel) void rr_cancel(RequestId id) {
+  session->cancel(id);
+}
+RR_EXPORT(disconnect) void rr_disconnect() {
+  session->disconnect();
+}
+
+// --- answers ---
+
+RR_EXPORT(poll_transmit) std::size_t rr_poll_transmit(std::size_t limit) {
+  transmitting = session->poll_transmit(limit);
+  return transmitting.size();
+}
+/// Where those bytes lie.
+RR_EXPORT(transmit_address) const std::uint8_t* rr_transmit_address() {
+  return transmitting.data();
+}
+RR_EXPORT(wants_close) bool rr_wants_close() {
+  return session->wants_close();
+}
+RR_EXPORT(poll_timeout) double rr_poll_timeout() {
+  return session->poll_timeout();
+}
+RR_EXPORT(poll_event) JsHandle rr_poll_event() {
+  return session->poll_event().release();
+}
+RR_EXPORT(take_error) JsHandle rr_take_error() {
+  return session->take_error().release();
+}
+
+// --- looked at ---
+
+RR_EXPORT(queued_bytes) std::size_t rr_queued_bytes() {
+  return session->queued_bytes();
+}
+RR_EXPORT(stats) JsHandle rr_stats() {
+  return session->stats().release();
+}
+RR_EXPORT(peer) JsHandle rr_peer() {
+  return session->peer().release();
+}
+RR_EXPORT(attributes) JsHandle rr_attributes() {
+  return session->attributes().release();
+}
+RR_EXPORT(definitions) JsHandle rr_definitions() {
+  return session->definitions().release();
+}
+RR_EXPORT(members) JsHandle rr_members(JsHandle path) {
+  return session->members(JsValue(path)).release();
+}
+RR_EXPORT(child_path) JsHandle rr_child_path(JsHandle parent, JsHandle member, JsHandle index) {
+  return session->child_path(JsValue(parent), JsValue(member), JsValue(index)).release();
 }

@@ -2,74 +2,89 @@
 
 #include <cstdlib>
 
-using emscripten::EM_VAL;
+using rr::JsHandle;
+
+/// Functions that ts/js_values.ts brings.
+#define RR_JS(name) __attribute__((import_module("js"), import_name(#name)))
 
 extern "C" {
-int rr_js_kind(EM_VAL value);
-int rr_js_items_type(EM_VAL value);
-double rr_js_number(EM_VAL value);
-int rr_js_bigint(EM_VAL value, int is_unsigned, void* to);
-char* rr_js_text(EM_VAL value, std::size_t* length);
-int rr_js_length(EM_VAL value);
-EM_VAL rr_js_item(EM_VAL value, int index);
-EM_VAL rr_js_field(EM_VAL value, const char* name, std::size_t length);
-EM_VAL rr_js_keys(EM_VAL value);
-EM_VAL rr_js_map_items(EM_VAL value);
-EM_VAL rr_js_type_mark(EM_VAL value);
-void rr_js_copy_items(EM_VAL value, void* to);
-int rr_js_read_numbers(EM_VAL value, double* to, std::size_t count);
-int rr_js_read_booleans(EM_VAL value, std::uint8_t* to, std::size_t count);
+RR_JS(copy) JsHandle rr_js_copy(JsHandle value);
+RR_JS(release) void rr_js_release(JsHandle value);
 
-EM_VAL rr_js_make_text(const char* text, std::size_t length);
-EM_VAL rr_js_make_number(double value);
-EM_VAL rr_js_make_bigint(const void* bytes, int is_unsigned);
-EM_VAL rr_js_make_items(int type, const void* bytes, std::size_t length);
-EM_VAL rr_js_make_booleans(const void* bytes, std::size_t length);
-EM_VAL rr_js_make_parts(int type, const void* bytes, std::size_t count, int part);
-EM_VAL rr_js_make_object();
-EM_VAL rr_js_make_array();
-EM_VAL rr_js_make_map();
-EM_VAL rr_js_make_view(const void* bytes, std::size_t length);
-void rr_js_set_field(EM_VAL object, const char* name, std::size_t length, EM_VAL value);
-void rr_js_push(EM_VAL array, EM_VAL value);
-void rr_js_set_key(EM_VAL map, EM_VAL key, EM_VAL value);
-void rr_js_mark_type(EM_VAL object, const char* name, std::size_t length);
+RR_JS(kind) int rr_js_kind(JsHandle value);
+RR_JS(items_type) int rr_js_items_type(JsHandle value);
+RR_JS(number) double rr_js_number(JsHandle value);
+RR_JS(bigint) int rr_js_bigint(JsHandle value, int is_unsigned, void* to);
+RR_JS(text) char* rr_js_text(JsHandle value, std::size_t* length);
+RR_JS(length) int rr_js_length(JsHandle value);
+RR_JS(item) JsHandle rr_js_item(JsHandle value, int index);
+RR_JS(field) JsHandle rr_js_field(JsHandle value, const char* name, std::size_t length);
+RR_JS(keys) JsHandle rr_js_keys(JsHandle value);
+RR_JS(map_items) JsHandle rr_js_map_items(JsHandle value);
+RR_JS(type_mark) JsHandle rr_js_type_mark(JsHandle value);
+RR_JS(copy_items) void rr_js_copy_items(JsHandle value, void* to);
+RR_JS(read_numbers) int rr_js_read_numbers(JsHandle value, double* to, std::size_t count);
+RR_JS(read_booleans) int rr_js_read_booleans(JsHandle value, std::uint8_t* to, std::size_t count);
+
+RR_JS(make_text) JsHandle rr_js_make_text(const char* text, std::size_t length);
+RR_JS(make_number) JsHandle rr_js_make_number(double value);
+RR_JS(make_bigint) JsHandle rr_js_make_bigint(const void* bytes, int is_unsigned);
+RR_JS(make_items) JsHandle rr_js_make_items(int type, const void* bytes, std::size_t length);
+RR_JS(make_booleans) JsHandle rr_js_make_booleans(const void* bytes, std::size_t length);
+RR_JS(make_parts) JsHandle rr_js_make_parts(int type, const void* bytes, std::size_t count, int part);
+RR_JS(make_object) JsHandle rr_js_make_object();
+RR_JS(make_array) JsHandle rr_js_make_array();
+RR_JS(make_map) JsHandle rr_js_make_map();
+RR_JS(set_field) void rr_js_set_field(JsHandle object, const char* name, std::size_t length, JsHandle value);
+RR_JS(push) void rr_js_push(JsHandle array, JsHandle value);
+RR_JS(set_key) void rr_js_set_key(JsHandle map, JsHandle key, JsHandle value);
+RR_JS(mark_type) void rr_js_mark_type(JsHandle object, const char* name, std::size_t length);
 }
 
 namespace rr {
 
 namespace {
 
-/// Handle 0 stands for "reading failed".
-std::optional<JsValue> take(EM_VAL handle) {
-  if (!handle) return std::nullopt;
-  return JsValue(val::take_ownership(handle));
+std::optional<JsValue> take(JsHandle handle) {
+  if (handle == JsHandle::failed) return std::nullopt;
+  return JsValue(handle);
+}
+
+bool is_constant(JsHandle handle) {
+  return handle <= JsHandle::last_constant;
 }
 
 }  // namespace
 
+JsValue::JsValue(const JsValue& other)
+    : handle_(is_constant(other.handle_) ? other.handle_ : rr_js_copy(other.handle_)) {}
+
+JsValue::~JsValue() {
+  if (!is_constant(handle_)) rr_js_release(handle_);
+}
+
 JsKind JsValue::kind() const {
-  return static_cast<JsKind>(rr_js_kind(value_.as_handle()));
+  return static_cast<JsKind>(rr_js_kind(handle_));
 }
 double JsValue::number() const {
-  return rr_js_number(value_.as_handle());
+  return rr_js_number(handle_);
 }
 
 std::optional<std::int64_t> JsValue::int64() const {
   std::int64_t number = 0;
-  if (!rr_js_bigint(value_.as_handle(), false, &number)) return std::nullopt;
+  if (!rr_js_bigint(handle_, false, &number)) return std::nullopt;
   return number;
 }
 
 std::optional<std::uint64_t> JsValue::uint64() const {
   std::uint64_t number = 0;
-  if (!rr_js_bigint(value_.as_handle(), true, &number)) return std::nullopt;
+  if (!rr_js_bigint(handle_, true, &number)) return std::nullopt;
   return number;
 }
 
 std::optional<std::string> JsValue::text() const {
   std::size_t length = 0;
-  char* text = rr_js_text(value_.as_handle(), &length);
+  char* text = rr_js_text(handle_, &length);
   if (!text) return std::nullopt;
   std::string copy(text, length);
   std::free(text);
@@ -77,45 +92,45 @@ std::optional<std::string> JsValue::text() const {
 }
 
 std::optional<std::size_t> JsValue::length() const {
-  const int length = rr_js_length(value_.as_handle());
+  const int length = rr_js_length(handle_);
   if (length < 0) return std::nullopt;
   return static_cast<std::size_t>(length);
 }
 
 std::optional<JsValue> JsValue::at(std::size_t index) const {
-  return take(rr_js_item(value_.as_handle(), static_cast<int>(index)));
+  return take(rr_js_item(handle_, static_cast<int>(index)));
 }
 
 std::optional<JsValue> JsValue::field(std::string_view name) const {
-  return take(rr_js_field(value_.as_handle(), name.data(), name.size()));
+  return take(rr_js_field(handle_, name.data(), name.size()));
 }
 
 std::optional<JsValue> JsValue::keys() const {
-  return take(rr_js_keys(value_.as_handle()));
+  return take(rr_js_keys(handle_));
 }
 std::optional<JsValue> JsValue::map_items() const {
-  return take(rr_js_map_items(value_.as_handle()));
+  return take(rr_js_map_items(handle_));
 }
 
 std::optional<std::string> JsValue::type_mark() const {
-  const auto mark = take(rr_js_type_mark(value_.as_handle()));
+  const auto mark = take(rr_js_type_mark(handle_));
   if (!mark || mark->is_nullish()) return std::nullopt;
   return mark->text();
 }
 
 DataType JsValue::items_type() const {
-  return static_cast<DataType>(rr_js_items_type(value_.as_handle()));
+  return static_cast<DataType>(rr_js_items_type(handle_));
 }
 void JsValue::copy_items(void* to) const {
-  rr_js_copy_items(value_.as_handle(), to);
+  rr_js_copy_items(handle_, to);
 }
 
 int JsValue::read_numbers(double* to, std::size_t count) const {
-  return rr_js_read_numbers(value_.as_handle(), to, count);
+  return rr_js_read_numbers(handle_, to, count);
 }
 
 int JsValue::read_booleans(std::uint8_t* to, std::size_t count) const {
-  return rr_js_read_booleans(value_.as_handle(), to, count);
+  return rr_js_read_booleans(handle_, to, count);
 }
 
 std::string_view JsValue::kind_text() const {
@@ -148,54 +163,50 @@ std::string_view JsValue::kind_text() const {
   return "something that is no value";
 }
 
-val make_js_text(std::string_view text) {
-  return val::take_ownership(rr_js_make_text(text.data(), text.size()));
+JsValue make_js_text(std::string_view text) {
+  return JsValue(rr_js_make_text(text.data(), text.size()));
 }
-val make_js_number(double value) {
-  return val::take_ownership(rr_js_make_number(value));
+JsValue make_js_number(double value) {
+  return JsValue(rr_js_make_number(value));
 }
-val make_js_boolean(bool value) {
-  return val::take_ownership(EM_VAL(value ? emscripten::internal::_EMVAL_TRUE : emscripten::internal::_EMVAL_FALSE));
+JsValue make_js_boolean(bool value) {
+  return JsValue(value ? JsHandle::yes : JsHandle::no);
 }
-val make_js_bigint(const void* bytes, bool is_unsigned) {
-  return val::take_ownership(rr_js_make_bigint(bytes, is_unsigned));
+JsValue make_js_bigint(const void* bytes, bool is_unsigned) {
+  return JsValue(rr_js_make_bigint(bytes, is_unsigned));
 }
-val make_js_items(DataType type, ByteSpan bytes) {
-  return val::take_ownership(rr_js_make_items(static_cast<int>(type), bytes.data(), bytes.size()));
+JsValue make_js_items(DataType type, ByteSpan bytes) {
+  return JsValue(rr_js_make_items(static_cast<int>(type), bytes.data(), bytes.size()));
 }
-val make_js_booleans(ByteSpan bytes) {
-  return val::take_ownership(rr_js_make_booleans(bytes.data(), bytes.size()));
+JsValue make_js_booleans(ByteSpan bytes) {
+  return JsValue(rr_js_make_booleans(bytes.data(), bytes.size()));
 }
-val make_js_parts(DataType type, ByteSpan bytes, int part) {
+JsValue make_js_parts(DataType type, ByteSpan bytes, int part) {
   const bool is_double = type == DataType::cdouble_t;
   const auto part_type = is_double ? DataType::double_t : DataType::single_t;
-  return val::take_ownership(
-      rr_js_make_parts(static_cast<int>(part_type), bytes.data(), bytes.size() / item_size(type), part));
+  return JsValue(rr_js_make_parts(static_cast<int>(part_type), bytes.data(), bytes.size() / item_size(type), part));
 }
-val make_js_object() {
-  return val::take_ownership(rr_js_make_object());
+JsValue make_js_object() {
+  return JsValue(rr_js_make_object());
 }
-val make_js_array() {
-  return val::take_ownership(rr_js_make_array());
+JsValue make_js_array() {
+  return JsValue(rr_js_make_array());
 }
-val make_js_map() {
-  return val::take_ownership(rr_js_make_map());
-}
-val make_js_view(ByteSpan bytes) {
-  return val::take_ownership(rr_js_make_view(bytes.data(), bytes.size()));
+JsValue make_js_map() {
+  return JsValue(rr_js_make_map());
 }
 
-void set_js_field(const val& object, std::string_view name, const val& value) {
-  rr_js_set_field(object.as_handle(), name.data(), name.size(), value.as_handle());
+void set_js_field(const JsValue& object, std::string_view name, const JsValue& value) {
+  rr_js_set_field(object.handle(), name.data(), name.size(), value.handle());
 }
-void push_js(const val& array, const val& value) {
-  rr_js_push(array.as_handle(), value.as_handle());
+void push_js(const JsValue& array, const JsValue& value) {
+  rr_js_push(array.handle(), value.handle());
 }
-void set_js_key(const val& map, const val& key, const val& value) {
-  rr_js_set_key(map.as_handle(), key.as_handle(), value.as_handle());
+void set_js_key(const JsValue& map, const JsValue& key, const JsValue& value) {
+  rr_js_set_key(map.handle(), key.handle(), value.handle());
 }
-void mark_js_type(const val& object, std::string_view type) {
-  rr_js_mark_type(object.as_handle(), type.data(), type.size());
+void mark_js_type(const JsValue& object, std::string_view type) {
+  rr_js_mark_type(object.handle(), type.data(), type.size());
 }
 
 }  // namespace rr

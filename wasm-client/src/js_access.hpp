@@ -1,19 +1,28 @@
 // JavaScript values as the bindings see them: a handle that is always released, and operations that never throw.
-// Layer: wasm-client/src. The other half is js_access.js.
+// Layer: wasm-client/src. The other half is ts/js_values.ts.
 #pragma once
-
-#include <emscripten/val.h>
 
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "core/wire/message.hpp"
 
 namespace rr {
 
-/// The numbers are shared with js_access.js.
+/// A place in the table of ts/js_values.ts. The first ones are the same for everybody and never released.
+enum class JsHandle : std::uint32_t {
+  failed,  ///< what reading gives where application code threw
+  undefined,
+  null,
+  yes,
+  no,
+  last_constant = no,
+};
+
+/// The numbers are shared with ts/js_values.ts.
 enum class JsKind : std::uint8_t {
   undefined,
   null,
@@ -29,17 +38,24 @@ enum class JsKind : std::uint8_t {
   other,  ///< functions, symbols, dates, buffers without item type, revoked proxies
 };
 
-using emscripten::val;
-
 /// One value of JavaScript. Reading never throws: what application code throws on the way reads as "failed".
 class JsValue {
  public:
-  explicit JsValue(val value) : value_(std::move(value)) {}
-  static JsValue undefined() { return JsValue(val::undefined()); }
+  /// Takes the handle over.
+  explicit JsValue(JsHandle handle) : handle_(handle) {}
+  JsValue(const JsValue& other);
+  JsValue(JsValue&& other) noexcept : handle_(other.release()) {}
+  JsValue& operator=(JsValue other) noexcept {
+    std::swap(handle_, other.handle_);
+    return *this;
+  }
+  ~JsValue();
+  static JsValue undefined() { return JsValue(JsHandle::undefined); }
+  static JsValue null() { return JsValue(JsHandle::null); }
 
   JsKind kind() const;
-  bool is_nullish() const { return value_.isUndefined() || value_.isNull(); }
-  bool is_true() const { return value_.isTrue(); }
+  bool is_nullish() const { return handle_ == JsHandle::undefined || handle_ == JsHandle::null; }
+  bool is_true() const { return handle_ == JsHandle::yes; }
   /// Only for numbers.
   double number() const;
   /// Only for bigints; nothing where it does not fit 64 bits.
@@ -69,31 +85,31 @@ class JsValue {
 
   /// "a string", "an array", ...: for messages.
   std::string_view kind_text() const;
-  const val& handle() const { return value_; }
+  JsHandle handle() const { return handle_; }
+  /// Gives the handle away: to JavaScript, as what an exported function returns.
+  JsHandle release() { return std::exchange(handle_, JsHandle::undefined); }
 
  private:
-  val value_;
+  JsHandle handle_;
 };
 
 /// Making values.
-val make_js_text(std::string_view text);
-val make_js_number(double value);
-val make_js_boolean(bool value);
-val make_js_bigint(const void* bytes, bool is_unsigned);
+JsValue make_js_text(std::string_view text);
+JsValue make_js_number(double value);
+JsValue make_js_boolean(bool value);
+JsValue make_js_bigint(const void* bytes, bool is_unsigned);
 /// A TypedArray with a copy of the bytes; `type` is one of 1..10.
-val make_js_items(DataType type, ByteSpan bytes);
-val make_js_booleans(ByteSpan bytes);
+JsValue make_js_items(DataType type, ByteSpan bytes);
+JsValue make_js_booleans(ByteSpan bytes);
 /// Every second number of complex ones, as TypedArray; `part` 0: real, 1: imaginary.
-val make_js_parts(DataType type, ByteSpan bytes, int part);
-val make_js_object();
-val make_js_array();
-val make_js_map();
-/// A Uint8Array on the heap itself: valid until the heap grows, so until the next call into the module.
-val make_js_view(ByteSpan bytes);
+JsValue make_js_parts(DataType type, ByteSpan bytes, int part);
+JsValue make_js_object();
+JsValue make_js_array();
+JsValue make_js_map();
 
-void set_js_field(const val& object, std::string_view name, const val& value);
-void push_js(const val& array, const val& value);
-void set_js_key(const val& map, const val& key, const val& value);
-void mark_js_type(const val& object, std::string_view type);
+void set_js_field(const JsValue& object, std::string_view name, const JsValue& value);
+void push_js(const JsValue& array, const JsValue& value);
+void set_js_key(const JsValue& map, const JsValue& key, const JsValue& value);
+void mark_js_type(const JsValue& object, std::string_view type);
 
 }  // namespace rr

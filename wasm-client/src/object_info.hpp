@@ -7,6 +7,6 @@
 namespace rr {
 
 /// [{name, kind, type, parameters: [{name, type}], modifiers: [text], documentation}]
-val make_js_members(const EntityDefinition& entity);
+JsValue make_js_members(const EntityDefinition& entity);
 
 }  // namespace rr

@@ -8,56 +8,56 @@ class ToJs {
  public:
   ToJs(const TypeRegistry& types, bool is_varvalue) : types_(types), is_varvalue_(is_varvalue) {}
 
-  val operator()(std::monostate) const { return val::null(); }
-  val operator()(const Scalar& scalar) const { return number(scalar.type, scalar.bytes().data()); }
-  val operator()(const std::string& text) const { return make_js_text(text); }
-  val operator()(const Array& array) const { return numbers(array.type(), array.bytes()); }
-  val operator()(const MultiDimArray& value) const { return shaped(value.dims, (*this)(value.array)); }
+  JsValue operator()(std::monostate) const { return JsValue::null(); }
+  JsValue operator()(const Scalar& scalar) const { return number(scalar.type, scalar.bytes().data()); }
+  JsValue operator()(const std::string& text) const { return make_js_text(text); }
+  JsValue operator()(const Array& array) const { return numbers(array.type(), array.bytes()); }
+  JsValue operator()(const MultiDimArray& value) const { return shaped(value.dims, (*this)(value.array)); }
 
-  val operator()(const Structure& structure) const {
+  JsValue operator()(const Structure& structure) const {
     return marked(fields(structure, types_.find_entity(structure.type_name)), structure.type_name, "");
   }
 
-  val operator()(const PodArray& pods) const {
+  JsValue operator()(const PodArray& pods) const {
     if (pods.is_scalar && pods.items.size() == 1) return fields(pods.items.front());
-    const val items = make_js_array();
+    const JsValue items = make_js_array();
     for (const auto& item : pods.items) push_js(items, fields(item));
     return marked(pods.is_multidim ? shaped(pods.dims, items) : items, pods.type_name, pods.is_multidim ? "[*]" : "[]");
   }
 
-  val operator()(const NamedArray& named) const {
+  JsValue operator()(const NamedArray& named) const {
     const auto* entity = types_.find_entity(named.type_name);
     const auto bytes = named.array.bytes();
     if (!entity || entity->namedarray_count == 0) return (*this)(named.array);
     const std::size_t each = entity->namedarray_count * item_size(entity->namedarray_type);
     if (named.is_scalar && bytes.size() == each) return named_array(*entity, bytes);
-    const val items = make_js_array();
+    const JsValue items = make_js_array();
     for (std::size_t at = 0; at + each <= bytes.size(); at += each)
       push_js(items, named_array(*entity, bytes.subspan(at, each)));
     return marked(named.is_multidim ? shaped(named.dims, items) : items, named.type_name,
                   named.is_multidim ? "[*]" : "[]");
   }
 
-  val operator()(const List& list) const {
-    const val items = make_js_array();
+  JsValue operator()(const List& list) const {
+    const JsValue items = make_js_array();
     for (const auto& item : list.items) push_js(items, convert(item));
     return items;
   }
-  val operator()(const MapInt32& map) const {
-    const val items = make_js_map();
+  JsValue operator()(const MapInt32& map) const {
+    const JsValue items = make_js_map();
     for (const auto& [key, item] : map.items) set_js_key(items, make_js_number(key), convert(item));
     return items;
   }
-  val operator()(const MapString& map) const {
-    const val items = make_js_map();
+  JsValue operator()(const MapString& map) const {
+    const JsValue items = make_js_map();
     for (const auto& [key, item] : map.items) set_js_key(items, make_js_text(key), convert(item));
     return items;
   }
 
-  val convert(const Value& value) const { return std::visit(*this, value.storage()); }
+  JsValue convert(const Value& value) const { return std::visit(*this, value.storage()); }
 
  private:
-  static val number(DataType type, const std::uint8_t* at) {
+  static JsValue number(DataType type, const std::uint8_t* at) {
     switch (type) {
       case DataType::double_t:
         return make_js_number(load<double>(at));
@@ -86,11 +86,11 @@ class ToJs {
       case DataType::bool_t:
         return make_js_boolean(*at != 0);
       default:
-        return val::null();
+        return JsValue::null();
     }
   }
 
-  static val numbers(DataType type, ByteSpan bytes) {
+  static JsValue numbers(DataType type, ByteSpan bytes) {
     switch (type) {
       case DataType::void_t:
         return make_js_array();
@@ -104,16 +104,16 @@ class ToJs {
     }
   }
 
-  static val complex(const val& real, const val& imaginary) {
-    const val object = make_js_object();
+  static JsValue complex(const JsValue& real, const JsValue& imaginary) {
+    const JsValue object = make_js_object();
     set_js_field(object, "re", real);
     set_js_field(object, "im", imaginary);
     return object;
   }
 
-  static val shaped(const std::vector<std::uint32_t>& dims, const val& data) {
-    const val object = make_js_object();
-    const val sizes = make_js_array();
+  static JsValue shaped(const std::vector<std::uint32_t>& dims, const JsValue& data) {
+    const JsValue object = make_js_object();
+    const JsValue sizes = make_js_array();
     for (const auto size : dims) push_js(sizes, make_js_number(size));
     set_js_field(object, "dims", sizes);
     set_js_field(object, "data", data);
@@ -121,8 +121,8 @@ class ToJs {
   }
 
   /// `entity`  tells which fields are varvalues; nullptr where none can be.
-  val fields(const Structure& structure, const EntityDefinition* entity = nullptr) const {
-    const val object = make_js_object();
+  JsValue fields(const Structure& structure, const EntityDefinition* entity = nullptr) const {
+    const JsValue object = make_js_object();
     for (const auto& field : structure.fields) {
       const auto* member = entity ? entity->find_member(field.name) : nullptr;
       const bool is_varvalue = member && member->type.type == DataType::varvalue_t;
@@ -132,8 +132,8 @@ class ToJs {
   }
 
   /// One value of a named array: its numbers, flattened in field order, as an object.
-  val named_array(const EntityDefinition& entity, ByteSpan bytes) const {
-    const val object = make_js_object();
+  JsValue named_array(const EntityDefinition& entity, ByteSpan bytes) const {
+    const JsValue object = make_js_object();
     const std::size_t number_size = item_size(entity.namedarray_type);
     for (const auto& member : entity.members) {
       std::size_t count = 1;
@@ -146,13 +146,13 @@ class ToJs {
       const auto part = bytes.first(size);
       bytes = bytes.subspan(size);
       if (!inner) {
-        const val items =
+        const JsValue items =
             is_array ? numbers(entity.namedarray_type, part) : number(entity.namedarray_type, part.data());
         set_js_field(object, member.name, shaped_like(member.type, items));
       } else if (!is_array) {
         set_js_field(object, member.name, named_array(*inner, part));
       } else {
-        const val items = make_js_array();
+        const JsValue items = make_js_array();
         for (std::size_t i = 0; i < count; ++i)
           push_js(items, named_array(*inner, part.subspan(i * size / count, size / count)));
         set_js_field(object, member.name, shaped_like(member.type, items));
@@ -161,12 +161,12 @@ class ToJs {
     return object;
   }
 
-  static val shaped_like(const TypeDefinition& type, const val& items) {
+  static JsValue shaped_like(const TypeDefinition& type, const JsValue& items) {
     if (type.array != ArrayKind::fixed_multidim) return items;
     return shaped(std::vector<std::uint32_t>(type.sizes.begin(), type.sizes.end()), items);
   }
 
-  val marked(const val& object, std::string_view type_name, std::string_view array) const {
+  JsValue marked(const JsValue& object, std::string_view type_name, std::string_view array) const {
     if (is_varvalue_ && !type_name.empty()) mark_js_type(object, std::string(type_name).append(array));
     return object;
   }
@@ -177,16 +177,16 @@ class ToJs {
 
 }  // namespace
 
-val to_js(const Value& value, const TypeRegistry& types, bool is_varvalue) {
+JsValue to_js(const Value& value, const TypeRegistry& types, bool is_varvalue) {
   return ToJs(types, is_varvalue).convert(value);
 }
 
-val to_js(const Error& error, const TypeRegistry& types) {
-  const val object = make_js_object();
+JsValue to_js(const Error& error, const TypeRegistry& types) {
+  const JsValue object = make_js_object();
   set_js_field(object, "code", make_js_number(static_cast<double>(error.code)));
   set_js_field(object, "name", make_js_text(error.qualified_name()));
   set_js_field(object, "subName", make_js_text(error.sub_name));
-  set_js_field(object, "param", error.param ? to_js(*error.param, types, true) : val::null());
+  set_js_field(object, "param", error.param ? to_js(*error.param, types, true) : JsValue::null());
   set_js_field(object, "message", make_js_text(error.message));
   return object;
 }

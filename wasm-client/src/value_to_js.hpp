@@ -11,9 +11,9 @@ namespace rr {
 /// `types` tells the fields of named arrays.
 /// `is_varvalue`  the value brought its type along: what JavaScript cannot tell from the value alone (the name of a
 ///                structure, pod or named array) is marked on the object, so that it can be sent back.
-val to_js(const Value& value, const TypeRegistry& types, bool is_varvalue = false);
+JsValue to_js(const Value& value, const TypeRegistry& types, bool is_varvalue = false);
 
 /// {code, name, subName, param, message}
-val to_js(const Error& error, const TypeRegistry& types);
+JsValue to_js(const Error& error, const TypeRegistry& types);
 
 }  // namespace rr

@@ -6,7 +6,6 @@
 
 #include "core/session/service_path.hpp"
 #include "wasm-client/src/object_info.hpp"
-#include "wasm-client/src/session_options.hpp"
 #include "wasm-client/src/value_from_js.hpp"
 #include "wasm-client/src/value_to_js.hpp"
 
@@ -24,18 +23,18 @@ Now make_now(double steady, double utc) {
   return now;
 }
 
-std::string text_of(const val& js) {
-  return JsValue(js).text().value_or(std::string());
+std::string text_of(const JsValue& js) {
+  return js.text().value_or(std::string());
 }
 
-val make_event(std::string_view kind) {
-  const val event = make_js_object();
+JsValue make_event(std::string_view kind) {
+  const JsValue event = make_js_object();
   set_js_field(event, "kind", make_js_text(kind));
   return event;
 }
 
-val make_member_event(std::string_view kind, std::string_view path, std::string_view member) {
-  const val event = make_event(kind);
+JsValue make_member_event(std::string_view kind, std::string_view path, std::string_view member) {
+  const JsValue event = make_event(kind);
   set_js_field(event, "path", make_js_text(path));
   set_js_field(event, "member", make_js_text(member));
   return event;
@@ -47,13 +46,8 @@ bool is_varvalue(const TypeDefinition& type) {
 
 }  // namespace
 
-WasmSession::WasmSession(val options, double steady, double utc) : now_(make_now(steady, utc)) {
-  auto read = read_session_options(JsValue(std::move(options)));
-  if (read.has_value())
-    session_.emplace(std::move(*read), now_);
-  else
-    failure_ = read.error();
-}
+WasmSession::WasmSession(ClientOptions options, double steady, double utc)
+    : now_(make_now(steady, utc)), session_(std::move(options), now_) {}
 
 void WasmSession::set_now(double steady, double utc) {
   now_ = make_now(steady, utc);
@@ -61,166 +55,119 @@ void WasmSession::set_now(double steady, double utc) {
 
 // --- told ---
 
-std::uintptr_t WasmSession::receive_buffer(std::size_t size) {
+std::uint8_t* WasmSession::receive_buffer(std::size_t size) {
   if (received_.size() < size) received_.resize(size);
-  return reinterpret_cast<std::uintptr_t>(received_.data());
+  return received_.data();
 }
 
 void WasmSession::handle_bytes(std::size_t size) {
-  if (session_ && size <= received_.size()) session_->handle_bytes({received_.data(), size}, now_);
+  if (size <= received_.size()) session_.handle_bytes({received_.data(), size}, now_);
 }
 
 void WasmSession::handle_transmitted(std::size_t size) {
-  if (session_) session_->handle_transmitted(size, now_);
+  session_.handle_transmitted(size, now_);
 }
 
 void WasmSession::handle_timeout() {
-  if (session_) session_->handle_timeout(now_);
+  session_.handle_timeout(now_);
 }
 
-void WasmSession::handle_closed(val reason) {
-  if (session_) session_->handle_closed(make_error(ErrorCode::connection_error, text_of(reason)), now_);
+void WasmSession::handle_closed(const JsValue& reason) {
+  session_.handle_closed(make_error(ErrorCode::connection_error, text_of(reason)), now_);
 }
 
 // --- asked ---
 
 void WasmSession::set_request_timeout(double milliseconds) {
   constexpr double a_month = 31.0 * 24 * 3600 * 1000;
-  if (session_ && milliseconds > 0)
-    session_->set_request_timeout(
-        std::chrono::milliseconds(static_cast<std::int64_t>(std::min(milliseconds, a_month))));
+  if (milliseconds > 0)
+    session_.set_request_timeout(std::chrono::milliseconds(static_cast<std::int64_t>(std::min(milliseconds, a_month))));
 }
 
-RequestId WasmSession::get_property(val path, val member) {
-  if (!session_) return refuse({}, {});
-  const auto object = text_of(path);
-  const auto name = text_of(member);
-  return remember(session_->get_property(object, name, now_), object, name);
+RequestId WasmSession::ask(MemberRequest request, const JsValue& path, const JsValue& member) {
+  const auto target = find_target(path, member);
+  if (!target) return 0;
+  return remember((session_.*request)(target->path, target->member, now_), target->definition->type);
 }
 
-RequestId WasmSession::set_property(val path, val member, val value) {
-  const auto object = text_of(path);
-  const auto name = text_of(member);
-  const auto* definition = find_member(object, name);
-  if (!definition) return refuse(object, name);
-  const auto read = read_value(JsValue(std::move(value)), definition->type, name);
-  return read ? session_->set_property(object, name, *read, now_) : 0;
+RequestId WasmSession::ask(ValueRequest request, const JsValue& path, const JsValue& member, const JsValue& value) {
+  const auto target = find_target(path, member);
+  if (!target) return 0;
+  const auto read = read_value(value, target->definition->type, target->member);
+  return read ? (session_.*request)(target->path, target->member, *read, now_) : 0;
 }
 
-RequestId WasmSession::call_function(val path, val member, val arguments) {
-  const auto object = text_of(path);
-  const auto name = text_of(member);
-  const auto* definition = find_member(object, name);
-  if (!definition) return refuse(object, name);
-  const JsValue given(std::move(arguments));
+RequestId WasmSession::call_function(const JsValue& path, const JsValue& member, const JsValue& arguments) {
+  const auto target = find_target(path, member);
+  if (!target) return 0;
+  const auto& parameters = target->definition->parameters;
   std::vector<Value> values;
-  values.reserve(definition->parameters.size());
-  for (std::size_t i = 0; i < definition->parameters.size(); ++i) {
-    const auto& parameter = definition->parameters[i];
-    auto value = read_value(given.at(i).value_or(JsValue::undefined()), parameter.type, parameter.name);
+  values.reserve(parameters.size());
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    auto value = read_value(arguments.at(i).value_or(JsValue::undefined()), parameters[i].type, parameters[i].name);
     if (!value) return 0;
     values.push_back(std::move(*value));
   }
-  return remember(session_->call_function(object, name, values, now_), object, name);
+  return remember(session_.call_function(target->path, target->member, values, now_), target->definition->type);
 }
 
-RequestId WasmSession::find_object(val path) {
-  return session_ ? session_->find_object(text_of(path), now_) : refuse({}, {});
+RequestId WasmSession::find_object(const JsValue& path) {
+  return session_.find_object(text_of(path), now_);
 }
 
-RequestId WasmSession::connect_wire(val path, val member) {
-  return session_ ? session_->connect_wire(text_of(path), text_of(member), now_) : refuse({}, {});
-}
-
-RequestId WasmSession::disconnect_wire(val path, val member) {
-  return session_ ? session_->disconnect_wire(text_of(path), text_of(member), now_) : refuse({}, {});
-}
-
-RequestId WasmSession::peek_in_value(val path, val member) {
-  if (!session_) return refuse({}, {});
-  const auto object = text_of(path);
-  const auto name = text_of(member);
-  return remember(session_->peek_in_value(object, name, now_), object, name);
-}
-
-RequestId WasmSession::peek_out_value(val path, val member) {
-  if (!session_) return refuse({}, {});
-  const auto object = text_of(path);
-  const auto name = text_of(member);
-  return remember(session_->peek_out_value(object, name, now_), object, name);
-}
-
-RequestId WasmSession::poke_out_value(val path, val member, val value) {
-  const auto object = text_of(path);
-  const auto name = text_of(member);
-  const auto* definition = find_member(object, name);
-  if (!definition) return refuse(object, name);
-  const auto read = read_value(JsValue(std::move(value)), definition->type, name);
-  return read ? session_->poke_out_value(object, name, *read, now_) : 0;
-}
-
-bool WasmSession::send_wire(val path, val member, val value) {
-  const auto object = text_of(path);
-  const auto name = text_of(member);
-  const auto* definition = find_member(object, name);
-  if (!definition) return refuse(object, name) != 0;
-  const auto read = read_value(JsValue(std::move(value)), definition->type, name);
+bool WasmSession::send_wire(const JsValue& path, const JsValue& member, const JsValue& value) {
+  const auto target = find_target(path, member);
+  if (!target) return false;
+  const auto read = read_value(value, target->definition->type, target->member);
   if (!read) return false;
-  const auto sent = session_->send_wire(object, name, *read, now_);
+  const auto sent = session_.send_wire(target->path, target->member, *read, now_);
   if (sent.has_error()) error_ = sent.error();
   return sent.has_value();
 }
 
 void WasmSession::cancel(RequestId id) {
   varvalue_replies_.erase(id);
-  if (session_) session_->cancel(id);
+  session_.cancel(id);
 }
 
 void WasmSession::disconnect() {
-  if (session_) session_->disconnect(now_);
+  session_.disconnect(now_);
 }
 
 // --- answers ---
 
-val WasmSession::poll_transmit(std::size_t limit) {
-  const auto slices = session_ ? session_->poll_transmit() : std::span<const ByteSpan>{};
-  if (slices.empty()) return val::undefined();
-  return make_js_view(slices.front().first(std::min(limit, slices.front().size())));
+ByteSpan WasmSession::poll_transmit(std::size_t limit) {
+  const auto slices = session_.poll_transmit();
+  if (slices.empty()) return {};
+  return slices.front().first(std::min(limit, slices.front().size()));
 }
 
 bool WasmSession::wants_close() const {
-  return !session_ || session_->wants_close();
+  return session_.wants_close();
 }
 
 double WasmSession::poll_timeout() const {
-  const auto at = session_ ? session_->poll_timeout() : TimePoint::max();
+  const auto at = session_.poll_timeout();
   if (at == TimePoint::max()) return std::numeric_limits<double>::infinity();
   return std::chrono::duration<double, std::milli>(at.time_since_epoch()).count();
 }
 
-val WasmSession::poll_event() {
-  if (failure_) {
-    const val event = make_event("closed");
-    set_js_field(event, "error", to_js(*failure_, TypeRegistry()));
-    failure_.reset();
-    return event;
-  }
-  if (!session_) return val::undefined();
-  const auto event = session_->poll_event();
-  return event ? event_to_js(*event) : val::undefined();
+JsValue WasmSession::poll_event() {
+  const auto event = session_.poll_event();
+  return event ? event_to_js(*event) : JsValue::undefined();
 }
 
-val WasmSession::event_to_js(const ClientEvent& event) {
-  const auto& types = session_->types();
+JsValue WasmSession::event_to_js(const ClientEvent& event) {
+  const auto& types = session_.types();
   if (const auto* connected = std::get_if<Connected>(&event)) {
-    const val js = make_event("connected");
+    const JsValue js = make_event("connected");
     set_js_field(js, "type", make_js_text(connected->object_type));
     return js;
   }
   if (const auto* completed = std::get_if<Completed>(&event)) {
     const bool brings_type = varvalue_replies_.erase(completed->id) > 0;
     const bool is_ok = completed->result.has_value();
-    const val js = make_event(is_ok ? "completed" : "failed");
+    const JsValue js = make_event(is_ok ? "completed" : "failed");
     set_js_field(js, "id", make_js_number(completed->id));
     if (is_ok)
       set_js_field(js, "value", to_js(*completed->result, types, brings_type));
@@ -229,9 +176,9 @@ val WasmSession::event_to_js(const ClientEvent& event) {
     return js;
   }
   if (const auto* received = std::get_if<EventReceived>(&event)) {
-    const val js = make_member_event("event", received->path, received->member);
+    const JsValue js = make_member_event("event", received->path, received->member);
     const auto* member = find_member(received->path, received->member);
-    const val arguments = make_js_array();
+    const JsValue arguments = make_js_array();
     for (std::size_t i = 0; i < received->arguments.size(); ++i) {
       const bool brings_type = member && i < member->parameters.size() && is_varvalue(member->parameters[i].type);
       push_js(arguments, to_js(received->arguments[i], types, brings_type));
@@ -240,7 +187,7 @@ val WasmSession::event_to_js(const ClientEvent& event) {
     return js;
   }
   if (const auto* received = std::get_if<WireValueReceived>(&event)) {
-    const val js = make_member_event("wire", received->path, received->member);
+    const JsValue js = make_member_event("wire", received->path, received->member);
     const auto* member = find_member(received->path, received->member);
     set_js_field(js, "seconds", make_js_number(static_cast<double>(received->time.seconds)));
     set_js_field(js, "nanoseconds", make_js_number(received->time.nanoseconds));
@@ -250,30 +197,30 @@ val WasmSession::event_to_js(const ClientEvent& event) {
   if (const auto* closed = std::get_if<WireClosedByService>(&event))
     return make_member_event("wire_closed", closed->path, closed->member);
   if (const auto* released = std::get_if<PathReleased>(&event)) {
-    const val js = make_event("path_released");
+    const JsValue js = make_event("path_released");
     set_js_field(js, "path", make_js_text(released->path));
     return js;
   }
-  const val js = make_event("closed");
+  const JsValue js = make_event("closed");
   set_js_field(js, "error", to_js(std::get_if<SessionClosed>(&event)->reason, types));
   return js;
 }
 
-val WasmSession::take_error() {
+JsValue WasmSession::take_error() {
   const auto error = error_.value_or(make_error(ErrorCode::internal_error, "the request failed without a reason"));
   error_.reset();
-  return session_ ? to_js(error, session_->types()) : to_js(error, TypeRegistry());
+  return to_js(error, session_.types());
 }
 
 // --- looked at ---
 
 std::size_t WasmSession::queued_bytes() const {
-  return session_ ? session_->connection().queued_bytes() : 0;
+  return session_.connection().queued_bytes();
 }
 
-val WasmSession::stats() const {
-  const auto stats = session_ ? session_->connection().stats() : ConnectionStats{};
-  const val js = make_js_object();
+JsValue WasmSession::stats() const {
+  const auto stats = session_.connection().stats();
+  const JsValue js = make_js_object();
   set_js_field(js, "messagesReceived", make_js_number(static_cast<double>(stats.messages_received)));
   set_js_field(js, "messagesSent", make_js_number(static_cast<double>(stats.messages_sent)));
   set_js_field(js, "bytesReceived", make_js_number(static_cast<double>(stats.bytes_received)));
@@ -281,59 +228,60 @@ val WasmSession::stats() const {
   return js;
 }
 
-val WasmSession::peer() const {
-  const auto peer = session_ ? session_->connection().peer() : NodeIdentity{};
-  const val js = make_js_object();
+JsValue WasmSession::peer() const {
+  const auto peer = session_.connection().peer();
+  const JsValue js = make_js_object();
   set_js_field(js, "id", make_js_text(format_node_id(peer.id, NodeIdFormat::dashes)));
   set_js_field(js, "name", make_js_text(peer.name));
   return js;
 }
 
-val WasmSession::attributes() const {
-  return session_ ? to_js(Value(session_->attributes()), session_->types(), true) : make_js_map();
+JsValue WasmSession::attributes() const {
+  return to_js(Value(session_.attributes()), session_.types(), true);
 }
 
-val WasmSession::definitions() const {
-  const val texts = make_js_array();
-  if (session_)
-    for (const auto& definition : session_->types().definitions()) push_js(texts, make_js_text(definition->text));
+JsValue WasmSession::definitions() const {
+  const JsValue texts = make_js_array();
+  for (const auto& definition : session_.types().definitions()) push_js(texts, make_js_text(definition->text));
   return texts;
 }
 
-val WasmSession::members(val path) const {
-  const auto* type = session_ ? session_->object_type(text_of(path)) : nullptr;
-  return type ? make_js_members(*type) : val::undefined();
+JsValue WasmSession::members(const JsValue& path) const {
+  const auto* type = session_.object_type(text_of(path));
+  return type ? make_js_members(*type) : JsValue::undefined();
 }
 
-val WasmSession::child_path(val parent, val member, val index) const {
-  const JsValue given(std::move(index));
-  if (given.kind() != JsKind::text) return make_js_text(rr::child_path(text_of(parent), text_of(member)));
-  return make_js_text(rr::child_path(text_of(parent), text_of(member), text_of(given.handle())));
+JsValue WasmSession::child_path(const JsValue& parent, const JsValue& member, const JsValue& index) const {
+  if (index.kind() != JsKind::text) return make_js_text(rr::child_path(text_of(parent), text_of(member)));
+  return make_js_text(rr::child_path(text_of(parent), text_of(member), text_of(index)));
+}
+
+std::optional<WasmSession::Target> WasmSession::find_target(const JsValue& path, const JsValue& member) {
+  Target target{text_of(path), text_of(member), nullptr};
+  target.definition = find_member(target.path, target.member);
+  if (target.definition) return target;
+  if (session_.state() != ClientState::connected)
+    error_ = make_error(ErrorCode::connection_error, "the session is not connected");
+  else
+    error_ = make_error(ErrorCode::object_not_found, "object " + quoted(target.path) + " with member " +
+                                                         quoted(target.member) + " is not known (any more)");
+  return std::nullopt;
 }
 
 const MemberDefinition* WasmSession::find_member(std::string_view path, std::string_view member) const {
-  const auto* type = session_ ? session_->object_type(path) : nullptr;
+  const auto* type = session_.object_type(path);
   return type ? type->find_member(member) : nullptr;
 }
 
 std::optional<Value> WasmSession::read_value(const JsValue& js, const TypeDefinition& type, std::string_view name) {
-  auto value = from_js(js, type, session_->types(), FieldPath{nullptr, FieldPath::Step::field, 0, name, {}});
+  auto value = from_js(js, type, session_.types(), FieldPath{nullptr, FieldPath::Step::field, 0, name, {}});
   if (value.has_value()) return std::move(*value);
   error_ = value.error();
   return std::nullopt;
 }
 
-RequestId WasmSession::refuse(std::string_view path, std::string_view member) {
-  error_ = !session_ || session_->state() != ClientState::connected
-               ? make_error(ErrorCode::connection_error, "the session is not connected")
-               : make_error(ErrorCode::object_not_found,
-                            "object " + quoted(path) + " with member " + quoted(member) + " is not known (any more)");
-  return 0;
-}
-
-RequestId WasmSession::remember(RequestId id, std::string_view path, std::string_view member) {
-  if (const auto* definition = find_member(path, member); definition && is_varvalue(definition->type))
-    varvalue_replies_.insert(id);
+RequestId WasmSession::remember(RequestId id, const TypeDefinition& type) {
+  if (is_varvalue(type)) varvalue_replies_.insert(id);
   return id;
 }
 

@@ -199,8 +199,7 @@ export class Session {
       }
     });
     this.#is_pumping = false;
-    if (this.#is_closed) this.core.dispose();
-    else this.#arm_timer();
+    if (!this.#is_closed) this.#arm_timer();
   }
 
   #transmit(): void {

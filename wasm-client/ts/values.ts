@@ -1,4 +1,4 @@
-// Values that say their type. Layer: wasm-client/ts. The marks are read in src/js_access.js.
+// Values that say their type. Layer: wasm-client/ts. The marks are read in js_values.ts.
 
 const exact_mark = Symbol.for("rrgate.exactValue");
 const type_mark = Symbol.for("rrgate.type");

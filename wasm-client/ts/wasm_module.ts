@@ -3,8 +3,8 @@
 import { load_wasm } from "#load-wasm";
 import { RobotRaconteurError } from "./errors.js";
 import type { ErrorFields } from "./errors.js";
-import createRrgate from "./rrgate.js";
-import type { WasmModule, WasmSession } from "./rrgate.js";
+import { JsValues } from "./js_values.js";
+import type { CoreExports, Handle } from "./js_values.js";
 import type { MemberInfo, RrValue, SessionStats } from "./types.js";
 
 export interface CoreOptions {
@@ -37,6 +37,45 @@ const frame_limit = 65_535;
 /** Bytes that go into the core at once; its receive buffer stays as small. */
 const receive_limit = 1024 * 1024;
 
+/** What src/bindings.cpp exports. */
+interface WasmSession extends CoreExports {
+  /** Runs what C++ runs before main(). */
+  _initialize(): void;
+  open(options: Handle, steady: number, utc: number): Handle;
+  set_now(steady: number, utc: number): void;
+  receive_buffer(size: number): number;
+  handle_bytes(size: number): void;
+  handle_transmitted(size: number): void;
+  handle_timeout(): void;
+  handle_closed(reason: Handle): void;
+  set_request_timeout(milliseconds: number): void;
+  get_property(path: Handle, member: Handle): number;
+  set_property(path: Handle, member: Handle, value: Handle): number;
+  call_function(path: Handle, member: Handle, args: Handle): number;
+  find_object(path: Handle): number;
+  connect_wire(path: Handle, member: Handle): number;
+  disconnect_wire(path: Handle, member: Handle): number;
+  peek_in_value(path: Handle, member: Handle): number;
+  peek_out_value(path: Handle, member: Handle): number;
+  poke_out_value(path: Handle, member: Handle, value: Handle): number;
+  send_wire(path: Handle, member: Handle, value: Handle): number;
+  cancel(id: number): void;
+  disconnect(): void;
+  poll_transmit(limit: number): number;
+  transmit_address(): number;
+  wants_close(): number;
+  poll_timeout(): number;
+  poll_event(): Handle;
+  take_error(): Handle;
+  queued_bytes(): number;
+  stats(): Handle;
+  peer(): Handle;
+  attributes(): Handle;
+  definitions(): Handle;
+  members(path: Handle): Handle;
+  child_path(parent: Handle, member: Handle, index: Handle): Handle;
+}
+
 let compiled: Promise<WebAssembly.Module> | undefined;
 
 /**
@@ -44,28 +83,28 @@ let compiled: Promise<WebAssembly.Module> | undefined;
  * All methods follow the order of the sans-IO contract: after whatever is told or asked, poll.
  */
 export class Core {
-  readonly #module: WasmModule;
+  readonly #values: JsValues;
   readonly #session: WasmSession;
 
-  /** @throws Error where the WebAssembly file cannot be loaded. */
+  /** @throws Error where the WebAssembly file cannot be loaded, RobotRaconteurError for options that make no sense. */
   static async create(options: CoreOptions): Promise<Core> {
     compiled ??= load_wasm().catch((error: unknown) => {
       compiled = undefined; // the next connect() tries again
       throw error;
     });
     const code = await compiled;
-    const wasm = await createRrgate({
-      instantiateWasm(imports, done) {
-        void WebAssembly.instantiate(code, imports).then(done);
-        return {};
-      },
-    });
-    return new Core(wasm, options);
+    const values = new JsValues();
+    const { exports } = await WebAssembly.instantiate(code, values.imports);
+    return new Core(values, exports as unknown as WasmSession, options);
   }
 
-  private constructor(wasm: WasmModule, options: CoreOptions) {
-    this.#module = wasm;
-    this.#session = new wasm.Session(options, performance.now(), Date.now());
+  private constructor(values: JsValues, session: WasmSession, options: CoreOptions) {
+    this.#values = values;
+    this.#session = session;
+    values.attach(session);
+    session._initialize();
+    const error = values.take(session.open(values.give(options), performance.now(), Date.now()));
+    if (error) throw new RobotRaconteurError(error as ErrorFields);
   }
 
   // --- told ---
@@ -75,7 +114,7 @@ export class Core {
       const part = bytes.subarray(from, from + receive_limit);
       const session = this.#at_now();
       const address = session.receive_buffer(part.length);
-      this.#module.HEAPU8.set(part, address);
+      this.#values.bytes.set(part, address);
       session.handle_bytes(part.length);
     }
   }
@@ -89,7 +128,7 @@ export class Core {
   }
 
   handle_closed(reason: string): void {
-    this.#at_now().handle_closed(reason);
+    this.#at_now().handle_closed(this.#values.give(reason));
   }
 
   // --- asked: the number of the request; throws RobotRaconteurError for values that do not fit ---
@@ -99,43 +138,43 @@ export class Core {
   }
 
   get_property(path: string, member: string): number {
-    return this.#checked(this.#at_now().get_property(path, member));
+    return this.#ask("get_property", path, member);
   }
 
   set_property(path: string, member: string, value: unknown): number {
-    return this.#checked(this.#at_now().set_property(path, member, value));
+    return this.#ask("set_property", path, member, value);
   }
 
   call_function(path: string, member: string, args: readonly unknown[]): number {
-    return this.#checked(this.#at_now().call_function(path, member, args));
+    return this.#ask("call_function", path, member, args);
   }
 
   find_object(path: string): number {
-    return this.#checked(this.#at_now().find_object(path));
+    return this.#ask("find_object", path);
   }
 
   connect_wire(path: string, member: string): number {
-    return this.#checked(this.#at_now().connect_wire(path, member));
+    return this.#ask("connect_wire", path, member);
   }
 
   disconnect_wire(path: string, member: string): number {
-    return this.#checked(this.#at_now().disconnect_wire(path, member));
+    return this.#ask("disconnect_wire", path, member);
   }
 
   peek_in_value(path: string, member: string): number {
-    return this.#checked(this.#at_now().peek_in_value(path, member));
+    return this.#ask("peek_in_value", path, member);
   }
 
   peek_out_value(path: string, member: string): number {
-    return this.#checked(this.#at_now().peek_out_value(path, member));
+    return this.#ask("peek_out_value", path, member);
   }
 
   poke_out_value(path: string, member: string, value: unknown): number {
-    return this.#checked(this.#at_now().poke_out_value(path, member, value));
+    return this.#ask("poke_out_value", path, member, value);
   }
 
   send_wire(path: string, member: string, value: unknown): void {
-    this.#checked(this.#at_now().send_wire(path, member, value) ? 1 : 0);
+    this.#ask("send_wire", path, member, value);
   }
 
   cancel(id: number): void {
@@ -150,11 +189,14 @@ export class Core {
 
   /** Bytes to send now, in the core's own memory: copy them, then call handle_transmitted() before anything else. */
   poll_transmit(): Uint8Array | undefined {
-    return this.#session.poll_transmit(frame_limit);
+    const size = this.#session.poll_transmit(frame_limit);
+    if (size === 0) return undefined;
+    const address = this.#session.transmit_address();
+    return this.#values.bytes.subarray(address, address + size);
   }
 
   wants_close(): boolean {
-    return this.#session.wants_close();
+    return this.#session.wants_close() !== 0;
   }
 
   /** By performance.now(); Infinity for never. */
@@ -163,38 +205,38 @@ export class Core {
   }
 
   poll_event(): CoreEvent | undefined {
-    return this.#session.poll_event() as CoreEvent | undefined;
+    return this.#values.take(this.#session.poll_event()) as CoreEvent | undefined;
   }
 
   // --- looked at ---
 
   stats(): SessionStats {
-    return this.#session.stats() as SessionStats;
+    return this.#values.take(this.#session.stats()) as SessionStats;
   }
 
   peer(): { id: string; name: string } {
-    return this.#session.peer() as { id: string; name: string };
+    return this.#values.take(this.#session.peer()) as { id: string; name: string };
   }
 
   attributes(): Map<string, RrValue> {
-    return this.#session.attributes() as Map<string, RrValue>;
+    return this.#values.take(this.#session.attributes()) as Map<string, RrValue>;
   }
 
   definitions(): string[] {
-    return this.#session.definitions() as string[];
+    return this.#values.take(this.#session.definitions()) as string[];
   }
 
   /** Of an object that was found. */
   members(path: string): MemberInfo[] {
-    return (this.#session.members(path) as MemberInfo[] | undefined) ?? [];
+    const values = this.#values;
+    return (values.take(this.#session.members(values.give(path))) as MemberInfo[] | undefined) ?? [];
   }
 
   child_path(parent: string, member: string, index: string | undefined): string {
-    return this.#session.child_path(parent, member, index);
-  }
-
-  dispose(): void {
-    this.#session.delete();
+    const values = this.#values;
+    return values.take(
+      this.#session.child_path(values.give(parent), values.give(member), values.give(index)),
+    ) as string;
   }
 
   #at_now(): WasmSession {
@@ -202,8 +244,25 @@ export class Core {
     return this.#session;
   }
 
-  #checked(id: number): number {
-    if (id === 0) throw new RobotRaconteurError(this.#session.take_error() as ErrorFields);
+  /** Makes a request of the core with `args`. */
+  #ask(request: MemberRequest, ...args: unknown[]): number {
+    const session = this.#at_now();
+    const handles = args.map((arg) => this.#values.give(arg)) as [Handle, Handle, Handle];
+    const id = session[request](...handles);
+    if (id === 0) throw new RobotRaconteurError(this.#values.take(session.take_error()) as ErrorFields);
     return id;
   }
 }
+
+/** Those that take handles alone and give the number of a request, or 0. */
+type MemberRequest =
+  | "get_property"
+  | "set_property"
+  | "call_function"
+  | "find_object"
+  | "connect_wire"
+  | "disconnect_wire"
+  | "peek_in_value"
+  | "peek_out_value"
+  | "poke_out_value"
+  | "send_wire";

@@ -1,8 +1,5 @@
 // A service that gives back what it is given, for any definition; ../service.ts says what each member does.
-#include <emscripten/bind.h>
-
 #include <cmath>
-#include <cstdlib>
 #include <map>
 #include <optional>
 
@@ -10,20 +7,8 @@
 #include "core/support/random.hpp"
 #include "wasm-client/src/js_access.hpp"
 
-#ifdef BOOST_NO_EXCEPTIONS
-namespace boost {
-BOOST_NORETURN void throw_exception(const std::exception&) {
-  std::abort();
-}
-BOOST_NORETURN void throw_exception(const std::exception&, const boost::source_location&) {
-  std::abort();
-}
-}  // namespace boost
-#endif
-
 namespace {
 
-using emscripten::val;
 using namespace rr;
 
 class TestObject : public ServiceObject {
@@ -49,13 +34,13 @@ class TestObject : public ServiceObject {
 class TestService {
  public:
   /// `options`: {definitions: [text], root: qualified type, version, stringTable}
-  TestService(val options, double steady) : directory_(NodeIdentity{random_node_id(), "test.service"}) {
+  TestService(const JsValue& options, double steady) : directory_(NodeIdentity{random_node_id(), "test.service"}) {
     set_now(steady);
-    if (const auto started = start(JsValue(std::move(options))); started.has_error())
+    if (const auto started = start(options); started.has_error())
       error_ = started.error().qualified_name() + ": " + started.error().message;
   }
 
-  val error() const { return make_js_text(error_); }
+  const std::string& error() const { return error_; }
 
   void set_now(double steady) {
     now_.steady =
@@ -64,21 +49,21 @@ class TestService {
     now_.utc.nanoseconds = static_cast<std::int32_t>(std::fmod(steady, 1000) * 1e6);
   }
 
-  std::uintptr_t receive_buffer(std::size_t size) {
+  std::uint8_t* receive_buffer(std::size_t size) {
     received_.resize(size);
-    return reinterpret_cast<std::uintptr_t>(received_.data());
+    return received_.data();
   }
   void handle_bytes() {
     session_->handle_bytes(received_, now_);
     carry_out();
   }
-  void release(val path) { session_->release_path(JsValue(std::move(path)).text().value(), now_); }
+  void release(const JsValue& path) { session_->release_path(path.text().value(), now_); }
   void stop() { session_->close_service(now_); }
   bool wants_close() const { return session_->wants_close(); }
 
-  val poll_transmit() {
+  ByteSpan poll_transmit() {
     const auto slices = session_->poll_transmit();
-    return slices.empty() ? val::undefined() : make_js_view(slices.front());
+    return slices.empty() ? ByteSpan{} : slices.front();
   }
   void handle_transmitted(std::size_t size) {
     session_->handle_transmitted(size, now_);
@@ -176,18 +161,46 @@ class TestService {
   Bytes received_;
 };
 
+TestService* service = nullptr;
+ByteSpan transmitting;
+
 }  // namespace
 
-EMSCRIPTEN_BINDINGS(rrgate_test_service) {
-  emscripten::class_<TestService>("Service")
-      .constructor<val, double>()
-      .function("error", &TestService::error)
-      .function("set_now", &TestService::set_now)
-      .function("receive_buffer", &TestService::receive_buffer)
-      .function("handle_bytes", &TestService::handle_bytes)
-      .function("release", &TestService::release)
-      .function("stop", &TestService::stop)
-      .function("wants_close", &TestService::wants_close)
-      .function("poll_transmit", &TestService::poll_transmit)
-      .function("handle_transmitted", &TestService::handle_transmitted);
+#define RR_EXPORT(name) extern "C" __attribute__((export_name(#name)))
+
+RR_EXPORT(allocate) void* rr_allocate(std::size_t size) {
+  return ::operator new(size);
+}
+/// "" or what is wrong with the options.
+RR_EXPORT(open) JsHandle rr_open(JsHandle options, double steady) {
+  service = new TestService(JsValue(options), steady);
+  return make_js_text(service->error()).release();
+}
+RR_EXPORT(set_now) void rr_set_now(double steady) {
+  service->set_now(steady);
+}
+RR_EXPORT(receive_buffer) std::uint8_t* rr_receive_buffer(std::size_t size) {
+  return service->receive_buffer(size);
+}
+RR_EXPORT(handle_bytes) void rr_handle_bytes() {
+  service->handle_bytes();
+}
+RR_EXPORT(release) void rr_release(JsHandle path) {
+  service->release(JsValue(path));
+}
+RR_EXPORT(stop) void rr_stop() {
+  service->stop();
+}
+RR_EXPORT(wants_close) bool rr_wants_close() {
+  return service->wants_close();
+}
+RR_EXPORT(poll_transmit) std::size_t rr_poll_transmit() {
+  transmitting = service->poll_transmit();
+  return transmitting.size();
+}
+RR_EXPORT(transmit_address) const std::uint8_t* rr_transmit_address() {
+  return transmitting.data();
+}
+RR_EXPORT(handle_transmitted) void rr_handle_transmitted(std::size_t size) {
+  service->handle_transmitted(size);
 }

@@ -1,0 +1,271 @@
+// JavaScript values as the core sees them: numbers of places in a table, and what it does with them. Layer: wasm-client/ts.
+// The other half is src/js_access.cpp, which declares the functions below; numbers of kinds and types are shared with it.
+// No exception may cross frames of WebAssembly (they would not be unwound): whatever can run code of the application,
+// a getter or a Proxy, is caught in here and reported as handle 0 or a negative number.
+
+/** A place in the table. */
+export type Handle = number;
+const failed: Handle = 0;
+
+const exact_mark = Symbol.for("rrgate.exactValue");
+const type_mark = Symbol.for("rrgate.type");
+const decoder = new TextDecoder("utf-8", { ignoreBOM: true });
+const encoder = new TextEncoder();
+
+/** By rr::DataType, from 1 on. */
+const item_types = [
+  Float64Array,
+  Float32Array,
+  Int8Array,
+  Uint8Array,
+  Int16Array,
+  Uint16Array,
+  Int32Array,
+  Uint32Array,
+  BigInt64Array,
+  BigUint64Array,
+];
+const item_names = item_types.map((type) => type.name);
+/** The engine's own getter: knows arrays of other realms (frames, vm contexts), runs no foreign code, never throws. */
+const name_of_items = Object.getOwnPropertyDescriptor(
+  Object.getPrototypeOf(Uint8Array.prototype) as object,
+  Symbol.toStringTag,
+)!.get!;
+
+type Dictionary = Record<PropertyKey, unknown>;
+
+/** 0 for what is no TypedArray. */
+function items_type(value: unknown): number {
+  const name = name_of_items.call(value) as string | undefined;
+  return name === undefined ? 0 : 1 + item_names.indexOf(name === "Uint8ClampedArray" ? "Uint8Array" : name);
+}
+
+/** As rr::JsKind. */
+function kind_of(value: unknown): number {
+  switch (typeof value) {
+    case "undefined":
+      return 0;
+    case "boolean":
+      return 2;
+    case "number":
+      return 3;
+    case "bigint":
+      return 4;
+    case "string":
+      return 5;
+    case "object":
+      break;
+    default:
+      return 11;
+  }
+  if (value === null) return 1;
+  if (Array.isArray(value)) return 6;
+  if (items_type(value)) return 7;
+  const tag = Object.prototype.toString.call(value);
+  if (tag === "[object Map]") return 8;
+  if ((value as Dictionary)[exact_mark] === true) return 9;
+  return tag === "[object ArrayBuffer]" || tag === "[object Date]" || ArrayBuffer.isView(value) ? 11 : 10;
+}
+
+/** Members that the object or its class brings; not what every object has ("constructor"). */
+function field_of(object: Dictionary, name: string): unknown {
+  if (Object.prototype.hasOwnProperty.call(object, name)) return object[name];
+  return name in object && !(name in Object.prototype) ? object[name] : undefined;
+}
+
+export interface CoreExports {
+  readonly memory: WebAssembly.Memory;
+  allocate(size: number): number;
+}
+
+/** The table of one instance of the core. */
+export class JsValues {
+  /** The first ones as rr::JsHandle says; 0 stands for what could not be read. */
+  readonly #values: unknown[] = [undefined, undefined, null, true, false];
+  readonly #free: Handle[] = [];
+  #core!: CoreExports;
+  #bytes: Uint8Array<ArrayBuffer> = new Uint8Array(0);
+
+  /** Once, before anything else: the instance that was made with `imports`. */
+  attach(core: CoreExports): void {
+    this.#core = core;
+  }
+
+  /** A view on the core's memory as it is now. */
+  get bytes(): Uint8Array<ArrayBuffer> {
+    // Growing detaches the buffer; then its views are empty.
+    if (this.#bytes.length === 0) this.#bytes = new Uint8Array(this.#core.memory.buffer as ArrayBuffer);
+    return this.#bytes;
+  }
+
+  /** The core takes the handle over. */
+  give(value: unknown): Handle {
+    if (value === undefined) return 1;
+    if (value === null) return 2;
+    if (value === true) return 3;
+    if (value === false) return 4;
+    const handle = this.#free.pop() ?? this.#values.length;
+    this.#values[handle] = value;
+    return handle;
+  }
+
+  /** What the core gave away. */
+  take(handle: Handle): unknown {
+    const value = this.#values[handle];
+    this.#release(handle);
+    return value;
+  }
+
+  #release(handle: Handle): void {
+    if (handle <= 4) return;
+    this.#values[handle] = undefined;
+    this.#free.push(handle);
+  }
+
+  #text(at: number, length: number): string {
+    const bytes = this.bytes;
+    if (length > 32) return decoder.decode(bytes.subarray(at, at + length));
+    // Names: cheaper than the decoder.
+    let text = "";
+    for (let i = at; i < at + length; ++i) {
+      if (bytes[i]! > 127) return decoder.decode(bytes.subarray(at, at + length));
+      text += String.fromCharCode(bytes[i]!);
+    }
+    return text;
+  }
+
+  /** A handle for what `read` gives, unless it throws. */
+  #attempt(read: () => unknown): Handle {
+    try {
+      return this.give(read());
+    } catch {
+      return failed;
+    }
+  }
+
+  /** Reads `count` items of an array: -1, or the index of the first that `write` does not take, or -2 on a throw. */
+  #read_items(handle: Handle, count: number, write: (item: unknown, index: number) => boolean): number {
+    try {
+      const items = this.#values[handle] as ArrayLike<unknown>;
+      for (let i = 0; i < count; ++i) if (!write(items[i], i)) return i;
+      return -1;
+    } catch {
+      return -2;
+    }
+  }
+
+  readonly imports = {
+    js: {
+      copy: (handle: Handle) => this.give(this.#values[handle]),
+      release: (handle: Handle) => this.#release(handle),
+
+      kind: (handle: Handle): number => {
+        try {
+          return kind_of(this.#values[handle]);
+        } catch {
+          return 11;
+        }
+      },
+      items_type: (handle: Handle) => items_type(this.#values[handle]),
+      number: (handle: Handle) => this.#values[handle] as number,
+      bigint: (handle: Handle, is_unsigned: number, to: number): number => {
+        const value = this.#values[handle] as bigint;
+        if (value !== (is_unsigned ? BigInt.asUintN(64, value) : BigInt.asIntN(64, value))) return 0;
+        new DataView(this.bytes.buffer).setBigUint64(to, BigInt.asUintN(64, value), true);
+        return 1;
+      },
+      /** Allocates; 0 where a surrogate stands alone: such text has no UTF-8. */
+      text: (handle: Handle, length_to: number): number => {
+        const text = this.#values[handle] as string;
+        if (/\p{Surrogate}/u.test(text)) return 0;
+        const encoded = encoder.encode(text);
+        const at = this.#core.allocate(encoded.length + 1);
+        this.bytes.set(encoded, at);
+        new DataView(this.bytes.buffer).setUint32(length_to, encoded.length, true);
+        return at;
+      },
+      length: (handle: Handle): number => {
+        try {
+          const { length } = this.#values[handle] as { length: unknown };
+          return typeof length === "number" && length >= 0 && length <= 0x7fffffff ? length : -1;
+        } catch {
+          return -1;
+        }
+      },
+      item: (handle: Handle, index: number) => this.#attempt(() => (this.#values[handle] as unknown[])[index]),
+      field: (handle: Handle, name: number, length: number) =>
+        this.#attempt(() => field_of(this.#values[handle] as Dictionary, this.#text(name, length))),
+      keys: (handle: Handle) => this.#attempt(() => Object.keys(this.#values[handle] as object)),
+      /** [key, value, key, value, ...] */
+      map_items: (handle: Handle) =>
+        this.#attempt(() => {
+          const items: unknown[] = [];
+          Map.prototype.forEach.call(this.#values[handle], (value, key) => items.push(key, value));
+          return items;
+        }),
+      type_mark: (handle: Handle) =>
+        this.#attempt(() => {
+          const mark = (this.#values[handle] as Dictionary)[type_mark];
+          return typeof mark === "string" ? mark : undefined;
+        }),
+      copy_items: (handle: Handle, to: number) => {
+        const { buffer, byteOffset, byteLength } = this.#values[handle] as Uint8Array;
+        this.bytes.set(new Uint8Array(buffer, byteOffset, byteLength), to);
+      },
+      read_numbers: (handle: Handle, to: number, count: number) => {
+        let view = new DataView(this.bytes.buffer);
+        return this.#read_items(handle, count, (item, index) => {
+          if (typeof item !== "number") return false;
+          // A getter may have made the memory grow.
+          if (view.buffer !== this.bytes.buffer) view = new DataView(this.bytes.buffer);
+          view.setFloat64(to + 8 * index, item, true);
+          return true;
+        });
+      },
+      read_booleans: (handle: Handle, to: number, count: number) =>
+        this.#read_items(handle, count, (item, index) => {
+          if (typeof item !== "boolean") return false;
+          this.bytes[to + index] = item ? 1 : 0;
+          return true;
+        }),
+
+      make_text: (at: number, length: number) => this.give(this.#text(at, length)),
+      make_number: (value: number) => this.give(value),
+      make_bigint: (at: number, is_unsigned: number) => {
+        const view = new DataView(this.bytes.buffer);
+        return this.give(is_unsigned ? view.getBigUint64(at, true) : view.getBigInt64(at, true));
+      },
+      make_items: (type: number, at: number, size: number) =>
+        this.give(new item_types[type - 1]!(this.bytes.slice(at, at + size).buffer)),
+      make_booleans: (at: number, count: number) => this.give(Array.from(this.bytes.subarray(at, at + count), Boolean)),
+      /** Parts of complex numbers: every second one. */
+      make_parts: (type: number, at: number, count: number, part: number) => {
+        const View = type === 1 ? Float64Array : Float32Array;
+        const pairs = new View(this.bytes.buffer, at, 2 * count);
+        return this.give(new View(count).map((_, index) => pairs[2 * index + part]!));
+      },
+      make_object: () => this.give({}),
+      make_array: () => this.give([]),
+      make_map: () => this.give(new Map()),
+      set_field: (object: Handle, name: number, length: number, value: Handle) => {
+        const key = this.#text(name, length);
+        const target = this.#values[object] as Dictionary;
+        // Always an own property: assigning to "__proto__" would replace the prototype.
+        if (key === "__proto__") {
+          const rights = { enumerable: true, writable: true, configurable: true };
+          Object.defineProperty(target, key, { value: this.#values[value], ...rights });
+        } else {
+          target[key] = this.#values[value];
+        }
+      },
+      push: (array: Handle, value: Handle) => void (this.#values[array] as unknown[]).push(this.#values[value]),
+      set_key: (map: Handle, key: Handle, value: Handle) =>
+        void (this.#values[map] as Map<unknown, unknown>).set(this.#values[key], this.#values[value]),
+      mark_type: (object: Handle, name: number, length: number) => {
+        Object.defineProperty(this.#values[object], type_mark, { value: this.#text(name, length) });
+      },
+
+      random: (to: number, size: number) => void crypto.getRandomValues(this.bytes.subarray(to, to + size)),
+    },
+  };
+}
