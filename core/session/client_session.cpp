@@ -14,6 +14,8 @@ namespace {
 
 constexpr std::chrono::seconds keep_alive_period{60};
 constexpr std::chrono::milliseconds disconnect_timeout{500};
+/// For so long a connect reply that comes too late for its request still closes the pipe endpoint that it names.
+constexpr std::chrono::seconds late_reply_period{60};
 /// Above this many bytes waiting for the stream, wire values are replaced instead of queued.
 constexpr std::size_t wire_high_mark = 64 * 1024;
 
@@ -103,7 +105,12 @@ void ClientSession::scan_deadlines(Now now) {
     if (found == pending_.end()) continue;
     const auto member = found->second.member ? "'" + found->second.member->name + "'" : std::string("the service");
     auto error = make_error(ErrorCode::request_timeout, "no answer from " + member + " in time");
-    pending_.erase(found);
+    if (found->second.is_abandoned) {
+      end_pipe_request(found->second);
+      pending_.erase(found);
+      continue;
+    }
+    if (!abandon_pipe_request(id, now.steady + late_reply_period)) pending_.erase(found);
     if (const auto fetch = fetches_.extract(id)) {
       fail_fetch(fetch.mapped(), std::move(error));
     } else if (state_ == ClientState::connecting) {
@@ -177,8 +184,19 @@ RequestId ClientSession::request(EntryType type, MemberKind kind, std::string_vi
   const auto id = begin_request(type, path, member);
   if (auto written = write(**definition); !written) return fail_request(id, written.error());
   if (auto sent = send_outgoing(now); !sent) return fail_request(id, sent.error());
-  add_pending(id, type, *definition, kind == MemberKind::wire ? path : std::string_view{}, now);
+  const bool has_state = kind == MemberKind::wire || kind == MemberKind::pipe;
+  add_pending(id, type, *definition, has_state ? path : std::string_view{}, now);
   return id;
+}
+
+RequestId ClientSession::request_pipe(EntryType type, std::string_view path, std::string_view member,
+                                      std::int32_t index, Now now) {
+  return request(type, MemberKind::pipe, path, member, now, [&](const MemberDefinition& definition) -> Result<> {
+    write_pipe_index(outgoing_, index);
+    if (type == EntryType::pipe_connect_req && object_type(path)->is_unreliable_pipe(definition))
+      write_unreliable(outgoing_);
+    return {};
+  });
 }
 
 namespace {
@@ -249,7 +267,7 @@ RequestId ClientSession::poke_out_value(std::string_view path, std::string_view 
 
 Result<> ClientSession::send_wire(std::string_view path, std::string_view member, const Value& value, Now now) {
   const auto found = wires_.find(PathMemberView{path, member});
-  if (found == wires_.end() || found->second.state != WireState::connected)
+  if (state_ == ClientState::closed || found == wires_.end() || found->second.state != WireState::connected)
     return make_error(ErrorCode::invalid_operation, "wire " + quoted(member) + " is not connected");
   if (auto allowed = check_direction(EntryType::wire_packet, *found->second.member); !allowed) return allowed;
   if (connection_.queued_bytes() >= wire_high_mark) {
@@ -271,7 +289,7 @@ Result<> ClientSession::send_wire_packet(const PathMember& key, WireConnection& 
 
 void ClientSession::flush_wires(Now now) {
   for (auto& [key, wire] : wires_) {
-    if (!wire.waiting) continue;
+    if (!wire.waiting || state_ == ClientState::closed) continue;
     const Value value = std::move(*wire.waiting);
     // The value was checked when it came in; what can fail here is the connection, and that ends the session elsewhere.
     if (!send_wire_packet(key, wire, value, now) || connection_.queued_bytes() >= wire_high_mark) return;
@@ -279,6 +297,8 @@ void ClientSession::flush_wires(Now now) {
 }
 
 void ClientSession::cancel(RequestId id) {
+  if (const auto found = pending_.find(id); found != pending_.end() && abandon_pipe_request(id, found->second.deadline))
+    return;
   pending_.erase(id);
   fetches_.erase(id);
 }
@@ -321,6 +341,12 @@ void ClientSession::handle_entry(const Message& message, const MessageEntry& ent
       return handle_wire_packet(message, entry);
     case EntryType::wire_closed:
       return handle_wire_closed(entry);
+    case EntryType::pipe_packet:
+      return handle_pipe_packets(message, entry, now);
+    case EntryType::pipe_packet_ret:
+      return handle_pipe_acks(message, entry);
+    case EntryType::pipe_closed:
+      return handle_pipe_closed(message, entry);
     case EntryType::service_path_released_req:
       return handle_path_released(entry.service_path);
     case EntryType::service_closed:
@@ -354,6 +380,8 @@ void ClientSession::handle_reply(const Message& message, const MessageEntry& ent
   if (auto fetch = fetches_.extract(id)) return handle_fetch_reply(entry, std::move(fetch.mapped()), now);
   if (state_ == ClientState::connecting) return handle_connect_reply(entry, pending.type, now);
   if (pending.type == EntryType::disconnect_client) return fail(connection_error("closed by this side"));
+  if (pending.type == EntryType::pipe_connect_req || pending.type == EntryType::pipe_disconnect_req)
+    return handle_pipe_reply(message, entry, id, pending, now);
   if (entry.error != ErrorCode::none) {
     if (pending.type == EntryType::wire_connect_req && pending.member)
       if (const auto wire = wires_.find(PathMemberView{pending.path, pending.member->name}); wire != wires_.end())
@@ -436,6 +464,7 @@ void ClientSession::handle_path_released(std::string_view path) {
     emit(WireClosedByService{wire->first.path, wire->first.member});
     wire = wires_.erase(wire);
   }
+  release_pipes(path);
   emit(PathReleased{std::string(path)});
 }
 
@@ -454,12 +483,12 @@ void ClientSession::fail(Error reason) {
   for (const auto& [id, pending] : pending_)
     if (const auto fetch = fetches_.find(id); fetch != fetches_.end())
       waiting.push_back(fetch->second.lookup);
-    else if (has_started_)
+    else if (has_started_ && !pending.is_abandoned)
       waiting.push_back(id);
   std::sort(waiting.begin(), waiting.end());
   pending_.clear();
   fetches_.clear();
-  wires_.clear();
+  // Wires and pipes stay, unused: what emits an event may be in the middle of one.
   const Error lost{ErrorCode::connection_error, reason.message};
   for (const auto id : waiting)
     if (id != 0) emit(Completed{id, lost});

@@ -1,5 +1,5 @@
 // The client's half of a session: one service over one connection. Layer: session.
-// Source: sessions spec sections 2.3..2.9, 2.12, 2.13. The sans-IO contract stands in connection.hpp.
+// Source: sessions spec sections 2.3..2.9, 2.11..2.13. The sans-IO contract stands in connection.hpp.
 #pragma once
 
 #include <chrono>
@@ -15,6 +15,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/member/pipe.hpp"
 #include "core/member/wire.hpp"
 #include "core/session/connection.hpp"
 #include "core/session/protocol_level.hpp"
@@ -32,6 +33,7 @@ struct ClientOptions {
   std::chrono::milliseconds request_timeout{15'000};
   std::chrono::milliseconds connect_timeout{30'000};  ///< from construction to the event Connected
   std::size_t max_events = 65'536;  ///< not polled; more close the session: nothing is dropped silently
+  std::size_t max_pipe_queued_bytes = 32u * 1024 * 1024;  ///< waiting for the stream; above, pipes take no packets
 };
 
 using RequestId = std::uint32_t;
@@ -61,6 +63,25 @@ struct WireClosedByService {
   std::string path;
   std::string member;
 };
+struct PipePacketReceived {
+  std::string path;
+  std::string member;
+  std::int32_t index = 0;
+  Value value;
+};
+/// Packets that were sent with wants_ack have arrived.
+struct PipePacketsAcknowledged {
+  std::string path;
+  std::string member;
+  std::int32_t index = 0;
+  std::vector<std::uint32_t> numbers;
+};
+/// The service closed the endpoint, or what it sent on it cannot be read.
+struct PipeClosedByService {
+  std::string path;
+  std::string member;
+  std::int32_t index = 0;
+};
 /// The service replaced the object: every object at or below `path` must be looked up again.
 struct PathReleased {
   std::string path;
@@ -69,8 +90,9 @@ struct PathReleased {
 struct SessionClosed {
   Error reason;
 };
-using ClientEvent = std::variant<Connected, Completed, EventReceived, WireValueReceived, WireClosedByService,
-                                 PathReleased, SessionClosed>;
+using ClientEvent =
+    std::variant<Connected, Completed, EventReceived, WireValueReceived, WireClosedByService, PipePacketReceived,
+                 PipePacketsAcknowledged, PipeClosedByService, PathReleased, SessionClosed>;
 
 /// What an object lock keeps out: other users, or all other clients.
 enum class LockKind : std::uint8_t { user, client };
@@ -110,6 +132,16 @@ class ClientSession {
   RequestId poke_out_value(std::string_view path, std::string_view member, const Value& value, Now now);  ///< null
   /// Sends OutValue on a connected wire. A value that still waits for a slow stream is replaced by a newer one.
   Result<> send_wire(std::string_view path, std::string_view member, const Value& value, Now now);
+  /// Completes with the index in use, which may differ from the one asked for; any_pipe_index asks for any. Packets
+  /// follow as PipePacketReceived, maybe at once.
+  RequestId connect_pipe(std::string_view path, std::string_view member, std::int32_t index, Now now);
+  /// Completes with null, also where the service has closed the endpoint already. No packets follow.
+  RequestId disconnect_pipe(std::string_view path, std::string_view member, std::int32_t index, Now now);
+  /// Returns  the packet's number, which PipePacketsAcknowledged names where `wants_ack`.
+  /// Errors   invalid_operation: not connected; read_only_member; out_of_system_resource: too much waits for the stream
+  ///          (see queued_bytes()), nothing was sent; those of pack().
+  Result<std::uint32_t> send_pipe_packet(std::string_view path, std::string_view member, std::int32_t index,
+                                         const Value& value, Now now, bool wants_ack = false);
 
   /// Logs in, or in as another user. `credentials` a MapString, {"password": ...} for most services. Completes with
   /// null. A service that requires a user for everything takes the login of ClientOptions, in connecting; one that does
@@ -150,13 +182,24 @@ class ClientSession {
   /// The type of an object that was looked up; nullptr if it was not. The root's path is the service name.
   const EntityDefinition* object_type(std::string_view path) const;
   std::size_t pending_requests() const { return pending_.size(); }
+  /// What waits for the stream: a sender of many pipe packets waits until this is small.
+  std::size_t queued_bytes() const { return connection_.queued_bytes(); }
 
  private:
   struct Pending {
     EntryType type = EntryType::null;
     const MemberDefinition* member = nullptr;
-    std::string path;  ///< find_object, wires, session operations: calls, properties allocate nothing here
+    std::string path;  ///< find_object, wires, pipes, session operations: calls, properties allocate nothing here
     TimePoint deadline;
+    std::int32_t pipe_index = 0;  ///< pipes only
+    bool is_abandoned = false;    ///< pipes only: nobody waits any more, but the reply must be acted on
+  };
+  /// The endpoints of one pipe. While a connect is pending, packets of unknown endpoints are kept: they may be its own.
+  struct ClientPipe {
+    const MemberDefinition* member = nullptr;
+    std::map<std::int32_t, PipeEndpointState> endpoints = {};
+    std::size_t connects = 0;                  ///< pending
+    std::set<std::int32_t> closed_early = {};  ///< closed by the service before its connect reply came
   };
   /// Definitions that are fetched, with all their imports, before the connect sequence or a lookup can go on.
   struct Fetch {
@@ -196,6 +239,7 @@ class ClientSession {
   template <class Write>
   RequestId request(EntryType type, MemberKind kind, std::string_view path, std::string_view member, Now now,
                     Write&& write);
+  RequestId request_pipe(EntryType type, std::string_view path, std::string_view member, std::int32_t index, Now now);
   RequestId fail_request(RequestId id, Error error);
   Result<> send_outgoing(Now now);
   Result<> send_wire_packet(const PathMember& key, WireConnection& wire, const Value& value, Now now);
@@ -217,6 +261,23 @@ class ClientSession {
   void handle_wire_packet(const Message& message, const MessageEntry& entry);
   void handle_wire_closed(const MessageEntry& entry);
   void handle_path_released(std::string_view path);
+
+  // pipes (client_pipe.cpp)
+  ClientPipe* find_pipe(std::string_view path, std::string_view member);
+  void handle_pipe_reply(const Message& message, const MessageEntry& entry, RequestId id, const Pending& pending,
+                         Now now);
+  Result<std::int32_t> open_pipe(const Message& message, const MessageEntry& entry, RequestId id,
+                                 const Pending& pending, Now now);
+  void handle_pipe_packets(const Message& message, const MessageEntry& entry, Now now);
+  Result<> handle_pipe_packet(const Message& message, const MessageElement& element, const MessageEntry& entry,
+                              PipeEndpointState& endpoint, std::int32_t index);
+  void send_pipe_acks(const MessageEntry& entry, bool is_unreliable, Now now);
+  void handle_pipe_acks(const Message& message, const MessageEntry& entry);
+  void handle_pipe_closed(const Message& message, const MessageEntry& entry);
+  void release_pipes(std::string_view path);
+  void request_silent_disconnect(const std::string& path, const MemberDefinition& member, std::int32_t index, Now now);
+  void end_pipe_request(const Pending& pending);
+  bool abandon_pipe_request(RequestId id, TimePoint deadline);
   void answer_error(const MessageEntry& entry, const Error& error, Now now);
 
   void emit(ClientEvent event);
@@ -245,6 +306,9 @@ class ClientSession {
 
   std::map<std::string, const EntityDefinition*, std::less<>> objects_;
   std::map<PathMember, WireConnection, PathMemberLess> wires_;
+  PipeStore pipe_store_;  ///< outlives pipes_
+  std::map<PathMember, ClientPipe, PathMemberLess> pipes_;
+  std::vector<std::pair<std::int32_t, std::uint32_t>> pipe_acks_;  ///< index and number, to be sent; reused
   std::deque<ClientEvent> events_;
 };
 

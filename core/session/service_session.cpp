@@ -110,6 +110,8 @@ void ServiceSession::leave(Error reason, Now now) {
   login_.reset();
   calls_.clear();
   wires_.clear();
+  pipes_.clear();
+  pipe_indices_.clear();
   events_.push_back(ClientGone{std::move(reason)});
 }
 
@@ -207,6 +209,7 @@ void ServiceSession::close_wire(std::string_view path, const MemberDefinition& m
 void ServiceSession::release_path(std::string_view path, Now now) {
   if (!service_) return;
   std::erase_if(wires_, [path](const auto& wire) { return is_within(wire.first.path, path); });
+  release_pipes(path);
   connection_.begin_message(outgoing_);
   outgoing_.begin_entry(EntryType::service_path_released_req, path, {});
   send_outgoing(now);
@@ -279,6 +282,8 @@ void ServiceSession::handle_entry(const Message& message, const MessageEntry& en
     return;
   }
   if (entry.type == EntryType::wire_packet) return handle_wire_packet(message, entry);
+  if (entry.type == EntryType::pipe_packet) return handle_pipe_packets(message, entry, now);
+  if (entry.type == EntryType::pipe_packet_ret) return handle_pipe_acks(message, entry);
   if (!is_request(entry.type) || is_packet(entry.type)) return;
   Result<> done;
   if (find_member_request(entry.type)) {
@@ -342,6 +347,10 @@ Result<> ServiceSession::dispatch_member(const Message& message, const MessageEn
     case EntryType::wire_connect_req:
     case EntryType::wire_disconnect_req:
       return answer_wire(entry, *found, *member, now);
+    case EntryType::pipe_connect_req:
+      return connect_pipe(message, entry, *found, *member);
+    case EntryType::pipe_disconnect_req:
+      return disconnect_pipe(message, entry, *member, now);
     default:
       return not_available_yet(*member);
   }

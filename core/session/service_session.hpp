@@ -1,5 +1,5 @@
 // The service's half of a session: one client on one connection. Layer: session.
-// Source: sessions spec sections 2.2..2.9, 2.12. The sans-IO contract stands in connection.hpp.
+// Source: sessions spec sections 2.2..2.9, 2.11, 2.12. The sans-IO contract stands in connection.hpp.
 #pragma once
 
 #include <cstdint>
@@ -9,9 +9,11 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 #include <variant>
 #include <vector>
 
+#include "core/member/pipe.hpp"
 #include "core/member/wire.hpp"
 #include "core/session/authenticator.hpp"
 #include "core/session/connection.hpp"
@@ -27,8 +29,10 @@ struct ServiceSessionOptions {
   std::chrono::milliseconds endpoint_timeout{600'000};  ///< without a session message
   /// The client's NodeID, where the transport vouches for it (a certificate; the local machine).
   std::optional<NodeId> verified_node_id = {};
-  std::size_t max_open_calls = 1024;  ///< not answered yet; above: out_of_system_resource
-  std::size_t max_wires = 4096;       ///< connected by one client; above: out_of_system_resource
+  std::size_t max_open_calls = 1024;                      ///< not answered yet; above: out_of_system_resource
+  std::size_t max_wires = 4096;                           ///< connected by one client; above: out_of_system_resource
+  std::size_t max_pipe_endpoints = 4096;                  ///< of one client; above: out_of_system_resource
+  std::size_t max_pipe_queued_bytes = 32u * 1024 * 1024;  ///< waiting for the stream; above, pipes take no packets
 };
 
 using CallId = std::uint64_t;
@@ -69,11 +73,35 @@ struct WireReceived {
   TimeSpec time;
   Value value;
 };
+/// A pipe endpoint of one client; never used again in its session.
+using PipeId = std::uint64_t;
+/// A client wants a pipe endpoint: to be answered exactly once, with accept_pipe() or refuse_pipe().
+struct PipeConnected {
+  PipeId id = 0;
+  std::shared_ptr<ServiceObject> object;
+  const MemberDefinition* member = nullptr;
+  std::int32_t index = 0;
+};
+struct PipeReceived {
+  PipeId id = 0;
+  Value value;
+};
+/// Packets that were sent with wants_ack have arrived.
+struct PipeAcknowledged {
+  PipeId id = 0;
+  std::vector<std::uint32_t> numbers;
+};
+/// The client closed the endpoint, or sent what cannot be read, or its object was released. Endpoints that still live
+/// when the client goes end with it: there is only ClientGone.
+struct PipeClosed {
+  PipeId id = 0;
+};
 /// The last event.
 struct ClientGone {
   Error reason;
 };
-using ServiceEvent = std::variant<Called, ClientConnected, LoginRequested, WireConnected, WireReceived, ClientGone>;
+using ServiceEvent = std::variant<Called, ClientConnected, LoginRequested, WireConnected, WireReceived, PipeConnected,
+                                  PipeReceived, PipeAcknowledged, PipeClosed, ClientGone>;
 
 /// One client of a node. Node-level requests (definitions, attributes, the service index) are answered in here.
 class ServiceSession {
@@ -103,6 +131,16 @@ class ServiceSession {
   Result<> send_wire(std::string_view path, const MemberDefinition& member, const Value& value, Now now);
   /// Ends the client's connection to this wire, if it has one, and tells the client.
   void close_wire(std::string_view path, const MemberDefinition& member, Now now);
+  /// Answers PipeConnected. Unknown ids, answered and closed ones are ignored.
+  void accept_pipe(PipeId id, Now now);
+  void refuse_pipe(PipeId id, const Error& error, Now now);
+  /// Sends a packet; accepts the endpoint first where that was not done yet.
+  /// Returns  the packet's number, which PipeAcknowledged names where `wants_ack`.
+  /// Errors   invalid_operation: closed; write_only_member; out_of_system_resource: too much waits for the stream (see
+  ///          queued_bytes()), nothing was sent; those of pack().
+  Result<std::uint32_t> send_pipe_packet(PipeId id, const Value& value, Now now, bool wants_ack = false);
+  /// Closes the endpoint and tells the client; no event follows.
+  void close_pipe(PipeId id, Now now);
   /// Tells the client to look up `path` again.
   void release_path(std::string_view path, Now now);
   /// Tells the client that its service is gone (ServiceClosed), then closes.
@@ -126,6 +164,8 @@ class ServiceSession {
   const AuthenticatedUser* user() const { return user_ ? &*user_ : nullptr; }
   /// This side's number of the session; 0 before the client is connected.
   std::uint32_t endpoint() const { return endpoint_; }
+  /// What waits for the stream: a sender of many pipe packets waits until this is small.
+  std::size_t queued_bytes() const { return connection_.queued_bytes(); }
 
  private:
   struct OpenCall {
@@ -150,6 +190,17 @@ class ServiceSession {
     const EntityDefinition* type_for_client = nullptr;
     bool wants_definitions = true;
   };
+  struct ServicePipe {
+    ServicePipe(const MemberDefinition& member, PipeStore& store) : state(member, store, PipeState::connecting) {}
+
+    PipeEndpointState state;
+    PipeId id = 0;
+    const PathMember* key = nullptr;  ///< in pipe_indices_
+    std::int32_t index = 0;
+    std::uint32_t request_id = 0;  ///< of the connect
+    bool is_unreliable = false;    ///< defined and asked for
+  };
+  using PipeIndices = std::map<std::int32_t, ServicePipe*>;
 
   void handle_message(const Message& message, Now now);
   void send_outgoing(Now now);
@@ -186,6 +237,19 @@ class ServiceSession {
                        Now now);
   Result<> answer_service_index(const MessageEntry& entry, const MemberDefinition& member, Now now);
   void handle_wire_packet(const Message& message, const MessageEntry& entry);
+
+  // pipes (service_pipe.cpp)
+  Result<> connect_pipe(const Message& message, const MessageEntry& entry, const HostedService::Found& found,
+                        const MemberDefinition& member);
+  Result<> disconnect_pipe(const Message& message, const MessageEntry& entry, const MemberDefinition& member, Now now);
+  void handle_pipe_packets(const Message& message, const MessageEntry& entry, Now now);
+  Result<> handle_pipe_packet(const Message& message, const MessageElement& element, ServicePipe& pipe);
+  void handle_pipe_acks(const Message& message, const MessageEntry& entry);
+  void release_pipes(std::string_view path);
+  ServicePipe* find_pipe(PipeId id);
+  ServicePipe* find_pipe(const MessageEntry& entry, std::int32_t index);
+  void forget_pipe(PipeId id);
+
   void begin_reply(const MessageEntry& request);
   void send_error(const MessageEntry& request, const Error& error, Now now);
   Result<> send_wire_packet(const PathMember& key, WireConnection& wire, const Value& value, Now now);
@@ -210,6 +274,11 @@ class ServiceSession {
   CallId last_call_id_ = 0;
   std::vector<OpenCall> calls_;
   std::map<PathMember, WireConnection, PathMemberLess> wires_;
+  PipeStore pipe_store_;  ///< outlives pipes_
+  PipeId last_pipe_id_ = 0;
+  std::unordered_map<PipeId, ServicePipe> pipes_;
+  std::map<PathMember, PipeIndices, PathMemberLess> pipe_indices_;  ///< the same pipes
+  std::vector<std::pair<std::int32_t, std::uint32_t>> pipe_acks_;   ///< index and number, to be sent; reused
   std::deque<ServiceEvent> events_;
 };
 

@@ -45,6 +45,10 @@ object Arm
   wire double torque
   wire Pose state [readonly]
   pipe double samples
+  pipe Pose poses [readonly]
+  pipe double orders [writeonly]
+  pipe double quick [unreliable]
+  memory double[] calibration
 end
 )";
 

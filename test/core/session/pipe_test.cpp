@@ -1,0 +1,469 @@
+// Pipes between client and service sessions; and against a peer that does what ours does not, written by hand.
+#include <catch2/catch.hpp>
+
+#include "core/member/error_entry.hpp"
+#include "test/core/session/loopback.hpp"
+#include "test/support/print.hpp"
+
+using namespace rr;
+using namespace rr::test;
+
+namespace {
+
+/// A message as the other side would send it; `write` fills in its entries.
+Bytes encode_from(const Connection& receiver, const std::function<void(Message&)>& write) {
+  Message message;
+  message.header.version = 4;
+  message.header.sender_node_id = receiver.peer().id;
+  message.header.receiver_node_id = receiver.self().id;
+  message.header.sender_endpoint = receiver.remote_endpoint();
+  message.header.receiver_endpoint = receiver.local_endpoint();
+  write(message);
+  EncodedMessage encoded;
+  encode(message, {}, encoded).value();
+  Bytes bytes;
+  for (const auto slice : encoded.slices()) bytes.insert(bytes.end(), slice.begin(), slice.end());
+  return bytes;
+}
+
+/// Adds one packet of `samples` (or a pipe of the same type), whose value the message keeps.
+void add_packet(Message& message, std::int32_t index, std::uint32_t number, double value, bool wants_ack = false) {
+  static const MemberDefinition samples{MemberKind::pipe, "samples", TypeDefinition{.type = DataType::double_t}};
+  const auto kept = std::make_shared<const Value>(value);
+  message.keep_alive(kept);
+  write_pipe_packet(message, index, number, *kept, wants_ack, samples, {}).value();
+}
+
+/// A service by hand: it answers nothing by itself.
+class ByHand {
+ public:
+  ByHand() { pair.connect(); }
+
+  void say(const std::function<void(Message&)>& write) {
+    pair.client->handle_bytes(encode_from(pair.client->connection(), write), pair.now);
+  }
+  void say_packet(std::int32_t index, std::uint32_t number, double value, std::string_view pipe = "samples") {
+    say([&](Message& message) {
+      message.begin_entry(EntryType::pipe_packet, "arm", pipe);
+      add_packet(message, index, number, value);
+    });
+  }
+  void say_connected(RequestId request, std::int32_t index) {
+    say([&](Message& message) {
+      message.begin_entry(EntryType::pipe_connect_ret, "arm", "samples", request);
+      write_pipe_index(message, index);
+    });
+  }
+  void say_closed(std::int32_t index) {
+    say([&](Message& message) {
+      message.begin_entry(EntryType::pipe_closed, "arm", "samples");
+      write_pipe_index(message, index);
+    });
+  }
+  /// What the client sends, one line a message: type, and the elements' names.
+  std::vector<std::string> heard() {
+    Bytes bytes;
+    for (const auto slice : pair.client->poll_transmit()) bytes.insert(bytes.end(), slice.begin(), slice.end());
+    pair.client->handle_transmitted(bytes.size(), pair.now);
+    std::vector<std::string> lines;
+    FrameScanner scanner(1u << 20);
+    for (ByteSpan left = bytes; !left.empty();) {
+      left = left.subspan(scanner.feed(left).value());
+      if (!scanner.message()) continue;
+      Message message;
+      decode(*scanner.message(), {}, message).value();
+      for (const auto& entry : message.entries) {
+        std::string line(entry_type_name(entry.type));
+        for (const auto& element : message.elements_of(entry))
+          line +=
+              " " + (element.key_kind == KeyKind::name ? std::string(element.name) : std::to_string(element.number));
+        lines.push_back(line);
+      }
+    }
+    return lines;
+  }
+  void expect_packet(std::int32_t index, double value) {
+    const auto packet = pair.next_client<PipePacketReceived>();
+    CHECK(packet.path == "arm");
+    CHECK(packet.member == "samples");
+    CHECK(packet.index == index);
+    CHECK(packet.value == Value(value));
+  }
+  void expect_connected(RequestId request, std::int32_t index) {
+    const auto done = pair.next_client<Completed>();
+    CHECK(done.id == request);
+    CHECK(done.result.value() == Value(index));
+  }
+  RequestId connect(std::int32_t index = any_pipe_index) {
+    const auto id = pair.client->connect_pipe("arm", "samples", index, pair.now);
+    CHECK(heard() == Lines{"PipeConnectReq index"});
+    return id;
+  }
+
+  using Lines = std::vector<std::string>;
+  Loopback pair{[] {
+    Features features;
+    features.string_table = {.local = false, .standard = false};
+    return features;
+  }()};
+};
+
+using Lines = ByHand::Lines;
+
+/// An endpoint of `samples` between both sessions.
+struct Pipe : Loopback {
+  explicit Pipe(std::string name = "samples", Features client_features = {}) : Loopback(client_features) {
+    member = std::move(name);
+    connect();
+    const auto request = client->connect_pipe("arm", member, any_pipe_index, now);
+    pump();
+    const auto wanted = next_service<PipeConnected>();
+    CHECK(wanted.object == root);
+    CHECK(wanted.member->name == member);
+    id = wanted.id;
+    service->accept_pipe(id, now);
+    index = completion(request).value().to<std::int32_t>().value();
+    CHECK(index == wanted.index);
+  }
+  Result<std::uint32_t> send(double value, bool wants_ack = false) {
+    return client->send_pipe_packet("arm", member, index, Value(value), now, wants_ack);
+  }
+
+  std::string member;
+  PipeId id = 0;
+  std::int32_t index = 0;
+};
+
+Features only_version_2() {
+  Features features;
+  features.v4 = false;
+  return features;
+}
+
+}  // namespace
+
+TEST_CASE("packets go both ways, with numbers and acknowledgements, in both versions") {
+  for (const auto& features : {Features{}, only_version_2()}) {
+    Pipe pair("samples", features);
+    CHECK(pair.send(1.5).value() == 1);
+    CHECK(pair.send(2.5, true).value() == 2);
+    pair.pump();
+    auto received = pair.next_service<PipeReceived>();
+    CHECK(received.id == pair.id);
+    CHECK(received.value == Value(1.5));
+    CHECK(pair.next_service<PipeReceived>().value == Value(2.5));
+    const auto arrived = pair.next_client<PipePacketsAcknowledged>();
+    CHECK(arrived.index == pair.index);
+    CHECK(arrived.numbers == std::vector<std::uint32_t>{2});
+
+    CHECK(pair.service->send_pipe_packet(pair.id, Value(7.0), pair.now, true).value() == 1);
+    pair.pump();
+    const auto packet = pair.next_client<PipePacketReceived>();
+    CHECK(packet.member == "samples");
+    CHECK(packet.index == pair.index);
+    CHECK(packet.value == Value(7.0));
+    const auto acknowledged = pair.next_service<PipeAcknowledged>();
+    CHECK(acknowledged.id == pair.id);
+    CHECK(acknowledged.numbers == std::vector<std::uint32_t>{1});
+  }
+}
+
+TEST_CASE("indices are assigned as the reference assigns them") {
+  Loopback pair;
+  pair.connect();
+  const auto index_for = [&](std::int32_t asked) {
+    const auto request = pair.client->connect_pipe("arm", "samples", asked, pair.now);
+    pair.pump();
+    pair.service->accept_pipe(pair.next_service<PipeConnected>().id, pair.now);
+    return pair.completion(request).value().to<std::int32_t>().value();
+  };
+  CHECK(index_for(-1) == 1);
+  CHECK(index_for(1) == 2);
+  CHECK(index_for(10) == 10);
+  CHECK(index_for(3) == 11);
+  CHECK(index_for(-1) == 12);
+  CHECK(index_for(INT32_MAX) == INT32_MAX);
+  const auto request = pair.client->connect_pipe("arm", "samples", -1, pair.now);
+  CHECK(pair.completion(request).error().code == ErrorCode::out_of_range);
+}
+
+TEST_CASE("the application may refuse an endpoint; its first packet lets the client in") {
+  Loopback pair;
+  pair.connect();
+  auto request = pair.client->connect_pipe("arm", "samples", any_pipe_index, pair.now);
+  pair.pump();
+  auto id = pair.next_service<PipeConnected>().id;
+  pair.service->refuse_pipe(id, {ErrorCode::operation_failed, "not today"}, pair.now);
+  pair.service->accept_pipe(id, pair.now);  // too late
+  CHECK(pair.completion(request).error().message == "not today");
+  CHECK_FALSE(pair.service->send_pipe_packet(id, Value(1.0), pair.now));
+
+  request = pair.client->connect_pipe("arm", "samples", any_pipe_index, pair.now);
+  pair.pump();
+  id = pair.next_service<PipeConnected>().id;
+  REQUIRE(pair.service->send_pipe_packet(id, Value(1.0), pair.now));
+  pair.service->refuse_pipe(id, {ErrorCode::operation_failed, "too late"}, pair.now);
+  CHECK(pair.completion(request).value() == Value(1));
+  CHECK(pair.next_client<PipePacketReceived>().value == Value(1.0));
+}
+
+TEST_CASE("the client closes an endpoint: both sides forget it") {
+  Pipe pair;
+  const auto request = pair.client->disconnect_pipe("arm", "samples", pair.index, pair.now);
+  CHECK(pair.send(1.0).error().code == ErrorCode::invalid_operation);
+  REQUIRE(pair.service->send_pipe_packet(pair.id, Value(1.0), pair.now));  // crosses the request
+  pair.pump();
+  CHECK(pair.next_service<PipeClosed>().id == pair.id);
+  CHECK(pair.completion(request).value().is_null());
+  CHECK_FALSE(pair.client->poll_event());
+  CHECK(pair.service->send_pipe_packet(pair.id, Value(1.0), pair.now).error().code == ErrorCode::invalid_operation);
+  CHECK(pair.completion(pair.client->disconnect_pipe("arm", "samples", pair.index, pair.now)).value().is_null());
+  CHECK(pair.client->pending_requests() == 0);
+}
+
+TEST_CASE("the service closes an endpoint: the client is told, and its own close is good as well") {
+  Pipe pair;
+  SECTION("alone") {
+    pair.service->close_pipe(pair.id, pair.now);
+    pair.pump();
+    const auto closed = pair.next_client<PipeClosedByService>();
+    CHECK(closed.member == "samples");
+    CHECK(closed.index == pair.index);
+  }
+  SECTION("while the client's request is on its way") {
+    const auto request = pair.client->disconnect_pipe("arm", "samples", pair.index, pair.now);
+    pair.service->close_pipe(pair.id, pair.now);
+    CHECK(pair.completion(request).value().is_null());
+  }
+  CHECK(pair.send(1.0).error().code == ErrorCode::invalid_operation);
+  CHECK_FALSE(pair.client->poll_event());
+  CHECK_FALSE(pair.service->poll_event());
+}
+
+TEST_CASE("directions: nobody sends against them, and what comes against them is acknowledged and dropped") {
+  Pipe poses("poses");
+  CHECK(poses.send(1.0).error().code == ErrorCode::read_only_member);
+  Pipe orders("orders");
+  CHECK(orders.service->send_pipe_packet(orders.id, Value(1.0), orders.now).error().code ==
+        ErrorCode::write_only_member);
+  const auto packet = [](Loopback& pair, std::string_view pipe, std::int32_t index) {
+    return [&pair, pipe, index](Message& message) {
+      message.begin_entry(EntryType::pipe_packet, "arm", pipe);
+      add_packet(message, index, 1, 1.0, true);
+    };
+  };
+  orders.client->handle_bytes(encode_from(orders.client->connection(), packet(orders, "orders", orders.index)),
+                              orders.now);
+  orders.pump();
+  CHECK_FALSE(orders.client->poll_event());
+  CHECK(orders.next_service<PipeAcknowledged>().numbers == std::vector<std::uint32_t>{1});
+  poses.service->handle_bytes(encode_from(poses.service->connection(), packet(poses, "poses", poses.index)), poses.now);
+  poses.pump();
+  CHECK_FALSE(poses.service->poll_event());
+  CHECK(poses.next_client<PipePacketsAcknowledged>().numbers == std::vector<std::uint32_t>{1});
+}
+
+TEST_CASE("an unreliable pipe is agreed on where the definition says so") {
+  Pipe pair("quick");
+  const auto packet = [&](std::uint32_t number, double value) {
+    pair.service->handle_bytes(encode_from(pair.service->connection(),
+                                           [&](Message& message) {
+                                             message.begin_entry(EntryType::pipe_packet, "arm", "quick");
+                                             add_packet(message, pair.index, number, value);
+                                           }),
+                               pair.now);
+  };
+  packet(3, 3.0);
+  packet(2, 2.0);
+  CHECK(pair.next_service<PipeReceived>().value == Value(3.0));
+  CHECK(pair.next_service<PipeReceived>().value == Value(2.0));
+}
+
+TEST_CASE("a service's packets in the wrong order, repeated, and for endpoints that nobody knows") {
+  ByHand service;
+  const auto request = service.connect();
+  service.say_connected(request, 1);
+  service.expect_connected(request, 1);
+  service.say_packet(1, 2, 2.0);
+  service.say_packet(1, 3, 3.0);
+  service.say_packet(9, 1, 9.0);
+  CHECK_FALSE(service.pair.client->poll_event());
+  service.say_packet(1, 1, 1.0);
+  service.say_packet(1, 2, 2.0);
+  service.expect_packet(1, 1.0);
+  service.expect_packet(1, 2.0);
+  service.expect_packet(1, 3.0);
+  CHECK_FALSE(service.pair.client->poll_event());
+  CHECK(service.heard().empty());
+}
+
+TEST_CASE("packets before the connect reply wait for it, whatever index it names") {
+  ByHand service;
+  const auto request = service.connect(5);
+  service.say_packet(11, 2, 2.0);
+  service.say_packet(11, 1, 1.0);
+  service.say_packet(5, 1, 5.0);  // of an endpoint that does not come to be
+  CHECK_FALSE(service.pair.client->poll_event());
+  service.say_connected(request, 11);
+  service.expect_connected(request, 11);
+  service.expect_packet(11, 1.0);
+  service.expect_packet(11, 2.0);
+  service.say_packet(5, 2, 6.0);
+  CHECK_FALSE(service.pair.client->poll_event());
+}
+
+TEST_CASE("an endpoint that is closed before its connect reply opens and closes") {
+  ByHand service;
+  const auto request = service.connect();
+  service.say_packet(1, 1, 1.0);
+  service.say_closed(1);
+  service.say_connected(request, 1);
+  service.expect_connected(request, 1);
+  service.expect_packet(1, 1.0);
+  CHECK(service.pair.next_client<PipeClosedByService>().index == 1);
+}
+
+TEST_CASE("several packets in one entry reach several endpoints, and are acknowledged together") {
+  ByHand service;
+  for (const std::int32_t index : {1, 2}) {
+    const auto request = service.connect();
+    service.say_connected(request, index);
+    service.expect_connected(request, index);
+  }
+  service.say([&](Message& message) {
+    message.begin_entry(EntryType::pipe_packet, "arm", "samples");
+    for (const std::int32_t index : {2, 7, 1}) add_packet(message, index, 1, 1.0 * index, true);
+  });
+  service.expect_packet(2, 2.0);
+  service.expect_packet(1, 1.0);
+  CHECK(service.heard() == Lines{"PipePacketRet 2 1"});
+}
+
+TEST_CASE("a packet that can never be made up for closes the endpoint on both sides") {
+  ByHand service;
+  const auto request = service.connect();
+  service.say_connected(request, 1);
+  service.expect_connected(request, 1);
+  SECTION("too far ahead") {
+    service.say_packet(1, 5000, 1.0);
+  }
+  SECTION("of another type") {
+    service.say([&](Message& message) {
+      message.begin_entry(EntryType::pipe_packet, "arm", "samples");
+      message.begin_nested("1", DataType::map_string_t);
+      message.add_scalar("packetnumber", DataType::uint32_t, std::uint32_t{1});
+      message.add_text("packet", "text");
+      message.end_nested();
+    });
+  }
+  CHECK(service.pair.next_client<PipeClosedByService>().index == 1);
+  CHECK(service.heard() == Lines{"PipeDisconnectReq index"});
+  service.say_packet(1, 1, 1.0);
+  CHECK_FALSE(service.pair.client->poll_event());
+}
+
+TEST_CASE("a client's packet that can never be made up for closes its endpoint, too") {
+  Pipe pair;
+  pair.service->handle_bytes(encode_from(pair.service->connection(),
+                                         [&](Message& message) {
+                                           message.begin_entry(EntryType::pipe_packet, "arm", "samples");
+                                           add_packet(message, pair.index, 5000, 1.0);
+                                         }),
+                             pair.now);
+  CHECK(pair.next_service<PipeClosed>().id == pair.id);
+  pair.pump();
+  CHECK(pair.next_client<PipeClosedByService>().index == pair.index);
+}
+
+TEST_CASE("a connect reply that comes too late closes the endpoint that it names") {
+  ByHand service;
+  const auto request = service.connect();
+  SECTION("after its time") {
+    service.pair.advance(std::chrono::seconds(16));
+    service.pair.client->handle_timeout(service.pair.now);
+    CHECK(service.pair.next_client<Completed>().result.error().code == ErrorCode::request_timeout);
+    (void)service.heard();  // a heartbeat
+  }
+  SECTION("after it was cancelled") {
+    service.pair.client->cancel(request);
+  }
+  service.say_connected(request, 4);
+  CHECK(service.heard() == Lines{"PipeDisconnectReq index"});
+  CHECK_FALSE(service.pair.client->poll_event());
+}
+
+TEST_CASE("a request that nobody waits for is forgotten in the end") {
+  ByHand service;
+  service.pair.client->cancel(service.connect());
+  CHECK(service.pair.client->pending_requests() == 1);
+  service.pair.advance(std::chrono::seconds(16));
+  service.pair.client->handle_timeout(service.pair.now);
+  CHECK(service.pair.client->pending_requests() == 0);
+  CHECK_FALSE(service.pair.client->poll_event());
+}
+
+TEST_CASE("a stalled stream is the sender's error, and nothing is lost") {
+  Loopback pair;
+  pair.connect();
+  ClientOptions options;
+  options.connection.self = {client_id, ""};
+  options.service = "arm";
+  options.max_pipe_queued_bytes = 1000;
+  pair.client = std::make_unique<ClientSession>(options, pair.now);
+  ServiceSessionOptions service_options;
+  service_options.max_pipe_queued_bytes = 1000;
+  pair.service = std::make_unique<ServiceSession>(pair.directory, service_options, pair.now);
+  pair.connect();
+  const auto request = pair.client->connect_pipe("arm", "samples", any_pipe_index, pair.now);
+  pair.pump();
+  const auto id = pair.next_service<PipeConnected>().id;
+  pair.service->accept_pipe(id, pair.now);
+  REQUIRE(pair.completion(request));
+
+  std::uint32_t sent = 0;
+  Result<std::uint32_t> last = sent;
+  while ((last = pair.client->send_pipe_packet("arm", "samples", 1, Value(1.0 * sent), pair.now))) ++sent;
+  CHECK(last.error().code == ErrorCode::out_of_system_resource);
+  CHECK(pair.client->queued_bytes() >= 1000);
+  pair.pump();
+  CHECK(pair.client->queued_bytes() == 0);
+  REQUIRE(pair.client->send_pipe_packet("arm", "samples", 1, Value(1.0 * sent), pair.now).value() == sent + 1);
+  pair.pump();
+  for (std::uint32_t number = 0; number <= sent; ++number)
+    CHECK(pair.next_service<PipeReceived>().value == Value(1.0 * number));
+
+  sent = 0;
+  while ((last = pair.service->send_pipe_packet(id, Value(1.0 * sent), pair.now))) ++sent;
+  CHECK(last.error().code == ErrorCode::out_of_system_resource);
+  pair.pump();
+  REQUIRE(pair.service->send_pipe_packet(id, Value(1.0 * sent), pair.now));
+  pair.pump();
+  for (std::uint32_t number = 0; number <= sent; ++number)
+    CHECK(pair.next_client<PipePacketReceived>().value == Value(1.0 * number));
+}
+
+TEST_CASE("a client has no more endpoints than it may") {
+  Loopback pair;
+  ServiceSessionOptions options;
+  options.max_pipe_endpoints = 2;
+  pair.service = std::make_unique<ServiceSession>(pair.directory, options, pair.now);
+  pair.connect();
+  std::vector<RequestId> requests;
+  for (int i = 0; i < 3; ++i) requests.push_back(pair.client->connect_pipe("arm", "samples", -1, pair.now));
+  CHECK(pair.completion(requests[2]).error().code == ErrorCode::out_of_system_resource);
+}
+
+TEST_CASE("a value that does not fit is refused where it is sent, and takes no number") {
+  Pipe pair;
+  CHECK(pair.client->send_pipe_packet("arm", "samples", pair.index, Value("text"), pair.now).error().message ==
+        "pipe 'samples': pack 'packet': found string, expected double");
+  CHECK(pair.send(1.0).value() == 1);
+  CHECK(pair.service->send_pipe_packet(pair.id, Value("text"), pair.now).error().code == ErrorCode::data_type_mismatch);
+  CHECK(pair.service->send_pipe_packet(pair.id, Value(1.0), pair.now).value() == 1);
+}
+
+TEST_CASE("a path that is released takes its endpoints along") {
+  Pipe pair;
+  pair.service->release_path("arm", pair.now);
+  CHECK(pair.next_service<PipeClosed>().id == pair.id);
+}
