@@ -6,6 +6,10 @@ namespace rrgate::demo {
 
 namespace {
 
+constexpr std::chrono::milliseconds frame_period{100};
+/// Frames on their way to one client; one that is slower than the camera misses some, and sees the newest.
+constexpr std::int32_t max_frames_under_way = 2;
+
 rr::Value to_value(Image image) {
   return rr::Structure{
       "experimental.createwebcam2.WebcamImage",
@@ -29,7 +33,7 @@ WebcamsDevice::WebcamsDevice(rr::Node& node, std::function<Pose()> robot_pose)
   Camera right;
   right.offset = {90, -60};
   right.yaw = -0.15;
-  webcams_ = {{"Left", left, {}}, {"Right", right, {}}};
+  webcams_ = {{"Left", left}, {"Right", right}};
   for (Webcam& webcam : webcams_) webcam.object = make_object(webcam);
 
   service_->property("WebcamNames").get([this] {
@@ -44,15 +48,27 @@ WebcamsDevice::WebcamsDevice(rr::Node& node, std::function<Pose()> robot_pose)
     return nullptr;
   });
   node.add(service_);
+  node.every(frame_period, [this] { stream_frames(); });
 }
 
-std::shared_ptr<rr::Object> WebcamsDevice::make_object(const Webcam& webcam) {
+rr::Value WebcamsDevice::capture(const Camera& camera) const {
+  return to_value(render(world_, robot_pose_(), camera));
+}
+
+void WebcamsDevice::stream_frames() {
+  for (const Webcam& webcam : webcams_) {
+    if (!webcam.is_streaming) continue;
+    auto frames = webcam.object->pipe("FrameStream");
+    if (!frames.endpoints().empty()) frames.broadcast(capture(webcam.camera), max_frames_under_way);
+  }
+}
+
+std::shared_ptr<rr::Object> WebcamsDevice::make_object(Webcam& webcam) {
   auto object = service_->make_object("Webcam");
   object->property("Name").get([name = webcam.name] { return name; });
-  object->function("CaptureFrame",
-                   [this, camera = webcam.camera] { return to_value(render(world_, robot_pose_(), camera)); });
-  object->function("StartStreaming", [] { refuse("FrameStream"); });
-  object->function("StopStreaming", [] { refuse("FrameStream"); });
+  object->function("CaptureFrame", [this, camera = webcam.camera] { return capture(camera); });
+  object->function("StartStreaming", [&webcam] { webcam.is_streaming = true; });
+  object->function("StopStreaming", [&webcam] { webcam.is_streaming = false; });
   object->function("CaptureFrameToBuffer", []() -> rr::Value { refuse("buffer"); });
   return object;
 }

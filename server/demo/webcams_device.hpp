@@ -25,10 +25,13 @@ class WebcamsDevice {
   struct Webcam {
     std::string name;
     Camera camera;
-    std::shared_ptr<rr::Object> object;
+    std::shared_ptr<rr::Object> object = {};
+    bool is_streaming = false;
   };
 
-  std::shared_ptr<rr::Object> make_object(const Webcam& webcam);
+  std::shared_ptr<rr::Object> make_object(Webcam& webcam);
+  rr::Value capture(const Camera& camera) const;
+  void stream_frames();
 
   World world_;
   std::function<Pose()> robot_pose_;

@@ -6,6 +6,10 @@ namespace rr {
 
 namespace {
 
+/// A sender of pipe packets that met a full stream goes on when no more than this waits.
+constexpr std::size_t room_for_packets = 1024 * 1024;
+constexpr std::chrono::seconds wait_for_room{15};
+
 /// Marks that handlers run; refuses to wait in one.
 class Running {
  public:
@@ -154,6 +158,37 @@ void RemoteObject::disconnect_wire(std::string_view wire) const {
 
 void RemoteObject::send_wire(std::string_view wire, const Value& value) const {
   if (auto sent = connection_->asynchronous().send_wire(path_, wire, value); !sent) throw ClientException(sent.error());
+}
+
+RemotePipe RemoteObject::connect_pipe(std::string_view pipe, std::function<void(Value)> received,
+                                      std::int32_t index) const {
+  RemotePipe endpoint(connection_, path_, std::string(pipe));
+  ClientConnection::PipeHandlers handlers{std::move(received), [state = endpoint.state_] { state->is_open = false; }};
+  const Value connected = connection_->wait_for([&](ClientConnection& connection, auto done) {
+    connection.connect_pipe(path_, pipe, index, std::move(handlers), std::move(done));
+  });
+  endpoint.state_->index = connected.to<std::int32_t>().value();
+  return endpoint;
+}
+
+void RemotePipe::send(const Value& packet) const {
+  ClientConnection& connection = connection_->asynchronous();
+  auto sent = connection.send_pipe(path_, pipe_, index(), packet);
+  if (!sent && sent.error().code == ErrorCode::out_of_system_resource && !connection_->is_running()) {
+    const auto has_room = [&] {
+      return connection_->is_closed() || connection.session().queued_bytes() < room_for_packets;
+    };
+    if (connection_->run_until(has_room, wait_for_room)) sent = connection.send_pipe(path_, pipe_, index(), packet);
+  }
+  if (!sent) throw ClientException(sent.error());
+}
+
+void RemotePipe::close() const {
+  if (!is_open()) return;
+  state_->is_open = false;
+  connection_->wait_for([&](ClientConnection& connection, auto done) {
+    connection.disconnect_pipe(path_, pipe_, index(), std::move(done));
+  });
 }
 
 void RemoteObject::on_event(std::string_view event, ClientConnection::EventHandler handler) const {

@@ -53,6 +53,8 @@ class BlockingConnection {
   const MapString& attributes() const { return connection_->session().attributes(); }
   void close();
   bool is_closed() const { return close_reason_.has_value(); }
+  /// Whether a handler runs: nothing can wait.
+  bool is_running() const { return is_running_; }
   ClientConnection& asynchronous() { return *connection_; }
 
  private:
@@ -79,6 +81,30 @@ class MonitorGuard {
   std::string path_;
 };
 
+/// An endpoint of a pipe: a handle that is cheap to copy. Everything throws ClientException.
+class RemotePipe {
+ public:
+  /// Waits while the stream is full, as long as a request may take; not in handlers: there it throws instead.
+  void send(const Value& packet) const;
+  void close() const;
+  std::int32_t index() const { return state_->index; }
+  bool is_open() const { return state_->is_open && !connection_->is_closed(); }
+
+ private:
+  friend class RemoteObject;
+  struct State {
+    std::int32_t index = 0;
+    bool is_open = true;
+  };
+  RemotePipe(std::shared_ptr<BlockingConnection> connection, std::string path, std::string pipe)
+      : connection_(std::move(connection)), path_(std::move(path)), pipe_(std::move(pipe)) {}
+
+  std::shared_ptr<BlockingConnection> connection_;
+  std::string path_;
+  std::string pipe_;
+  std::shared_ptr<State> state_ = std::make_shared<State>();
+};
+
 /// An object of the service: a handle that is cheap to copy. Everything throws ClientException.
 class RemoteObject {
  public:
@@ -102,6 +128,9 @@ class RemoteObject {
   void connect_wire(std::string_view wire, ClientConnection::WireHandler handler) const;
   void disconnect_wire(std::string_view wire) const;
   void send_wire(std::string_view wire, const Value& value) const;
+  /// `received` gets every packet, in order, until the endpoint is closed.
+  RemotePipe connect_pipe(std::string_view pipe, std::function<void(Value packet)> received,
+                          std::int32_t index = any_pipe_index) const;
   void on_event(std::string_view event, ClientConnection::EventHandler handler) const;
 
   /// Keeps others out of this object and all below it, until unlock() or until this client has gone.

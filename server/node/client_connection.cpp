@@ -91,6 +91,32 @@ Result<> ClientConnection::send_wire(std::string_view path, std::string_view wir
   return sent;
 }
 
+void ClientConnection::connect_pipe(std::string_view path, std::string_view pipe, std::int32_t index,
+                                    PipeHandlers handlers, Completion done) {
+  // Packets follow right behind the completion: only there the index is known.
+  auto connected = [this, path = std::string(path), pipe = std::string(pipe),
+                    handlers = std::make_shared<PipeHandlers>(std::move(handlers)),
+                    done = std::move(done)](Result<Value> result) {
+    if (result) pipe_handlers_[{path, pipe, result->to<std::int32_t>().value()}] = handlers;
+    if (done) done(std::move(result));
+  };
+  expect(session_.connect_pipe(path, pipe, index, read_clocks()), std::move(connected));
+}
+
+void ClientConnection::disconnect_pipe(std::string_view path, std::string_view pipe, std::int32_t index,
+                                       Completion done) {
+  pipe_handlers_.erase({std::string(path), std::string(pipe), index});
+  expect(session_.disconnect_pipe(path, pipe, index, read_clocks()), std::move(done));
+}
+
+Result<> ClientConnection::send_pipe(std::string_view path, std::string_view pipe, std::int32_t index,
+                                     const Value& packet) {
+  auto sent = session_.send_pipe_packet(path, pipe, index, packet, read_clocks());
+  settle();
+  if (!sent) return sent.error();
+  return {};
+}
+
 void ClientConnection::on_event(std::string_view path, std::string_view event, EventHandler handler) {
   event_handlers_[{std::string(path), std::string(event)}] = std::make_shared<EventHandler>(std::move(handler));
 }
@@ -159,6 +185,18 @@ void ClientConnection::handle(WireClosedByService&& closed) {
   wire_handlers_.erase({std::move(closed.path), std::move(closed.member)});
 }
 
+void ClientConnection::handle(PipePacketReceived&& received) {
+  const auto found = pipe_handlers_.find({std::move(received.path), std::move(received.member), received.index});
+  if (found == pipe_handlers_.end()) return;
+  const auto handlers = found->second;  // it may disconnect
+  if (handlers->received) handlers->received(std::move(received.value));
+}
+
+void ClientConnection::handle(PipeClosedByService&& closed) {
+  const auto found = pipe_handlers_.extract({std::move(closed.path), std::move(closed.member), closed.index});
+  if (found && found.mapped()->closed) found.mapped()->closed();
+}
+
 /// Whoever uses objects below the path hears of it when the next request fails; their handlers have to go now.
 void ClientConnection::handle(PathReleased&& released) {
   const auto is_released = [&](const auto& item) { return is_within(item.first.first, released.path); };
@@ -169,6 +207,7 @@ void ClientConnection::handle(PathReleased&& released) {
 void ClientConnection::handle(SessionClosed&& closed) {
   event_handlers_.clear();
   wire_handlers_.clear();
+  pipe_handlers_.clear();
   if (const Opened opened = std::exchange(opened_, nullptr)) return opened(std::move(closed.reason));
   if (const auto handler = std::exchange(on_closed_, nullptr)) handler(closed.reason);
 }

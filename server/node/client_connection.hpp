@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <unordered_map>
 #include <vector>
 
@@ -25,6 +26,10 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   using Completion = std::function<void(Result<Value>)>;
   using EventHandler = std::function<void(std::span<const Value> arguments)>;
   using WireHandler = std::function<void(const Value& value, TimeSpec time)>;
+  struct PipeHandlers {
+    std::function<void(Value packet)> received;
+    std::function<void()> closed = {};  ///< by the service; not for disconnect_pipe() and the session's end
+  };
 
   /// Resolves, connects (all addresses, side by side) and opens the session, all within options.connect_timeout.
   /// `url`      rr+tcp://host:port/?service=NAME, with nodeid or nodename where that node alone will do.
@@ -46,6 +51,13 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   void disconnect_wire(std::string_view path, std::string_view wire, Completion done);
   /// Errors   the wire is not connected; those of packing.
   Result<> send_wire(std::string_view path, std::string_view wire, const Value& value);
+  /// Completes with the index of the endpoint, which may be another than the one asked for. Packets follow.
+  void connect_pipe(std::string_view path, std::string_view pipe, std::int32_t index, PipeHandlers handlers,
+                    Completion done);
+  void disconnect_pipe(std::string_view path, std::string_view pipe, std::int32_t index, Completion done);
+  /// Errors   the endpoint is not connected; out_of_system_resource: too much waits for the stream, nothing was sent
+  ///          (see ClientSession::queued_bytes()); those of packing.
+  Result<> send_pipe(std::string_view path, std::string_view pipe, std::int32_t index, const Value& packet);
   // Session operations; see ClientSession.
   void authenticate(std::string_view username, const Value& credentials, Completion done);
   void logout(Completion done);
@@ -66,7 +78,8 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   ClientConnection(boost::asio::ip::tcp::socket socket, ClientOptions options, Opened opened);
 
  private:
-  using MemberKey = std::pair<std::string, std::string>;  // path, member
+  using MemberKey = std::pair<std::string, std::string>;               // path, member
+  using PipeKey = std::tuple<std::string, std::string, std::int32_t>;  // path, member, index
 
   bool handle_event(Now now) override;
   void ended() override {}
@@ -76,6 +89,9 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   void handle(EventReceived&& received);
   void handle(WireValueReceived&& received);
   void handle(WireClosedByService&& closed);
+  void handle(PipePacketReceived&& received);
+  void handle(PipePacketsAcknowledged&&) {}  // nothing here asks for acknowledgements
+  void handle(PipeClosedByService&& closed);
   void handle(PathReleased&& released);
   void handle(SessionClosed&& closed);
   void expect(RequestId id, Completion done);
@@ -84,6 +100,7 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   std::unordered_map<RequestId, Completion> completions_;
   std::map<MemberKey, std::shared_ptr<EventHandler>> event_handlers_;
   std::map<MemberKey, std::shared_ptr<WireHandler>> wire_handlers_;
+  std::map<PipeKey, std::shared_ptr<PipeHandlers>> pipe_handlers_;
   std::function<void(const Error&)> on_closed_;
 };
 

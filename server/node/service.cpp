@@ -5,15 +5,11 @@
 #include <sstream>
 
 #include "core/session/service_path.hpp"
-#include "core/types/pack.hpp"
+#include "server/node/refusal.hpp"
 
 namespace rr {
 
 namespace {
-
-[[noreturn]] void refuse(const std::string& what) {
-  throw std::invalid_argument(what);
-}
 
 /// Kinds whose members need no handler yet: calls of them are answered with NotImplementedError.
 bool may_be_absent(const MemberDefinition& member) {
@@ -57,14 +53,6 @@ void check_parameters(const std::string& where, const Handler& handler,
 void check_result(const std::string& where, const Handler& handler, const TypeDefinition& type) {
   if (!returns(handler.result, type))
     refuse(where + ": is " + format_type(type) + ", the handler returns " + handler_type_text(handler.result));
-}
-
-/// Whether a value can be sent, found out by packing it: a device learns of a wrong value where it sets it, also while
-/// no client is connected.
-void check_value(const std::string& where, const Value& value, const TypeDefinition& type, const TypeRegistry& types) {
-  Message scratch;
-  scratch.begin_entry(EntryType::null, {}, {});
-  if (auto packed = pack(scratch, "value", value, type, types); !packed) refuse(where + ": " + packed.error().message);
 }
 
 }  // namespace

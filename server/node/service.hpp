@@ -31,13 +31,11 @@
 #include "core/session/hosted_service.hpp"
 #include "core/session/service_session.hpp"
 #include "server/node/handler.hpp"
+#include "server/node/pipe_endpoint.hpp"
 
 namespace rr {
 
 class Service;
-
-/// One client of a node, for as long as it is connected; never 0, never used again.
-using ClientId = std::uint64_t;
 
 /// Who sent the request that a handler works on.
 struct Caller {
@@ -84,12 +82,53 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
     std::string name_;
   };
 
+  /// What the service does with the endpoints that clients open on a pipe. Without handlers clients are let in, and
+  /// their packets dropped.
+  class Pipe {
+   public:
+    /// handler(PipeEndpoint); may send. What it throws refuses the client.
+    Pipe& on_connect(std::function<void(PipeEndpoint)> handler) {
+      object_->set_pipe_handler(name_, &Member::pipe_connected, std::move(handler));
+      return *this;
+    }
+    /// handler(PipeEndpoint, Value), or the pipe's C++ type as second parameter.
+    template <class F>
+    Pipe& on_packet(F&& handler) {
+      using Packet = detail::PacketOf<std::remove_cvref_t<F>>;
+      object_->set_packet_handler(name_, detail::handler_type<Packet>(),
+                                  detail::make_packet_handler<Packet>(std::forward<F>(handler)));
+      return *this;
+    }
+    /// handler(PipeEndpoint): the client closed it, or is gone. Not for endpoints that the service closed.
+    Pipe& on_close(std::function<void(PipeEndpoint)> handler) {
+      object_->set_pipe_handler(name_, &Member::pipe_closed, std::move(handler));
+      return *this;
+    }
+    /// Sends to every endpoint of the pipe. An endpoint misses the packet where more than `max_backlog` packets of
+    /// earlier broadcasts with a backlog are not acknowledged yet (no_backlog_limit: acknowledgements are not asked
+    /// for), or its stream is full. PipeEndpoint::missed() counts.
+    /// Returns  how many endpoints it was sent to. Throws std::invalid_argument: no such pipe, one that is writeonly, a
+    ///          value that does not fit its type.
+    std::size_t broadcast(const Value& value, std::int32_t max_backlog = no_backlog_limit) {
+      return object_->broadcast(name_, value, max_backlog);
+    }
+    /// Those that are open now.
+    const std::vector<PipeEndpoint>& endpoints() const { return object_->endpoints(name_); }
+
+   private:
+    friend class Object;
+    Pipe(Object* object, std::string name) : object_(object), name_(std::move(name)) {}
+    Object* object_;
+    std::string name_;
+  };
+
   /// The function's parameters in definition order; may return a value.
   template <class F>
   void function(std::string_view name, F&& handler) {
     set_handler(name, HandlerSlot::call, make_handler(std::forward<F>(handler)));
   }
   Property property(std::string_view name) { return {this, std::string(name)}; }
+  Pipe pipe(std::string_view name) { return {this, std::string(name)}; }
 
   /// Fires an event to every client of the service.
   /// Throws   std::invalid_argument: no such event, wrong number of arguments or types.
@@ -133,11 +172,20 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
     std::optional<Value> in_value = {};                                  ///< wires: what clients receive
     std::optional<Value> out_value = {};                                 ///< wires: the newest that a client sent
     std::function<std::shared_ptr<Object>(std::string_view)> find = {};  ///< objrefs
+    std::function<void(PipeEndpoint)> pipe_connected = {};
+    PacketHandler pipe_received = {};
+    std::function<void(PipeEndpoint)> pipe_closed = {};
+    std::vector<PipeEndpoint> endpoints = {};  ///< pipes: open ones
   };
 
   Object(Service& service, const EntityDefinition& type) : service_(service), type_(&type) {}
   const MemberDefinition& require_member(std::string_view name, MemberKind kind) const;
   void set_handler(std::string_view name, HandlerSlot slot, Handler handler);
+  void set_pipe_handler(std::string_view name, std::function<void(PipeEndpoint)> Member::*slot,
+                        std::function<void(PipeEndpoint)> handler);
+  void set_packet_handler(std::string_view name, HandlerType packet, PacketHandler handler);
+  std::size_t broadcast(std::string_view pipe, const Value& value, std::int32_t max_backlog);
+  const std::vector<PipeEndpoint>& endpoints(std::string_view pipe);
   std::vector<std::string> paths() const;
   void release_path(const std::string& path);
   /// Texts like "function Drive", for functions, property accessors and objrefs without handler.
@@ -146,6 +194,9 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   // Requests of clients; handlers run in here and may throw.
   Result<Value> answer(const Called& called);
   void receive_wire(const WireReceived& received);
+  void connect_pipe(const MemberDefinition& pipe, const PipeEndpoint& endpoint);
+  Result<> receive_packet(const MemberDefinition& pipe, const PipeEndpoint& endpoint, const Value& packet);
+  void close_pipe(const MemberDefinition& pipe, const PipeEndpoint& endpoint, bool tells_handler);
   const Value* in_value(const MemberDefinition& wire) const;
 
   Service& service_;
@@ -212,6 +263,7 @@ class Service {
     root_->function(member, std::forward<F>(handler));
   }
   Object::Property property(std::string_view member) { return root_->property(member); }
+  Object::Pipe pipe(std::string_view member) { return root_->pipe(member); }
   template <class... Args>
   void fire(std::string_view event, Args&&... arguments) {
     root_->fire(event, std::forward<Args>(arguments)...);

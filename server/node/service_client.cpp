@@ -1,6 +1,8 @@
 #include "server/node/service_client.hpp"
 
 #include <exception>
+#include <optional>
+#include <stdexcept>
 #include <variant>
 
 namespace rr {
@@ -45,6 +47,7 @@ void ServiceClient::close_service() {
 
 void ServiceClient::abandon() {
   owner_ = nullptr;
+  while (!pipes_.empty()) end_pipe(pipes_.begin()->first, false);
   close(make_error(ErrorCode::connection_error, "the node was destroyed"));
 }
 
@@ -90,17 +93,93 @@ void ServiceClient::handle(const WireConnected& connected, Now now) {
   if (value) (void)session_.send_wire(connected.path, *connected.member, *value, now);  // checked when it was set
 }
 
-void ServiceClient::handle(const WireReceived& received, Now) {
+template <class F>
+void ServiceClient::run_handler(const char* kind, const std::string& member, F&& handler) {
   owner_->set_current_client(id_);
   try {
-    static_cast<Object&>(*received.object).receive_wire(received);
+    handler();
   } catch (const std::exception& exception) {
-    owner_->report("wire '" + received.member->name + "': its handler failed: " + exception.what());
+    if (owner_) owner_->report(std::string(kind) + " '" + member + "': its handler failed: " + exception.what());
   }
   if (owner_) owner_->set_current_client(0);
 }
 
+void ServiceClient::handle(const WireReceived& received, Now) {
+  run_handler("wire", received.member->name, [&] { static_cast<Object&>(*received.object).receive_wire(received); });
+}
+
+// --- pipes ---
+
+void ServiceClient::handle(const PipeConnected& connected, Now now) {
+  const PipeEndpoint endpoint({.sender = this,
+                               .id = connected.id,
+                               .client = id_,
+                               .object = connected.object,
+                               .member = connected.member,
+                               .index = connected.index});
+  pipes_.emplace(connected.id, endpoint);
+  std::optional<Error> refusal;
+  owner_->set_current_client(id_);
+  try {
+    static_cast<Object&>(*connected.object).connect_pipe(*connected.member, endpoint);
+  } catch (const std::exception& exception) {
+    refusal = error_of(exception);
+  }
+  if (owner_) owner_->set_current_client(0);
+  if (!refusal) return session_.accept_pipe(connected.id, now);
+  session_.refuse_pipe(connected.id, *refusal, now);
+  close_pipe(connected.id);  // where the handler has sent something, which lets the client in
+}
+
+void ServiceClient::handle(const PipeReceived& received, Now) {
+  const auto found = pipes_.find(received.id);
+  if (found == pipes_.end()) return;
+  const PipeEndpoint endpoint = found->second;  // the handler may close it
+  const auto& member = *endpoint.state_->member;
+  run_handler("pipe", member.name, [&] {
+    auto& object = static_cast<Object&>(*endpoint.state_->object);
+    if (auto fits = object.receive_packet(member, endpoint, received.value); !fits)
+      throw std::invalid_argument(fits.error().message);
+  });
+}
+
+void ServiceClient::handle(const PipeAcknowledged& acknowledged, Now) {
+  if (const auto found = pipes_.find(acknowledged.id); found != pipes_.end())
+    found->second.acknowledge(acknowledged.numbers);
+}
+
+void ServiceClient::handle(const PipeClosed& closed, Now) {
+  end_pipe(closed.id, true);
+}
+
+Result<std::uint32_t> ServiceClient::send_pipe_packet(PipeId id, const Value& value, bool wants_ack) {
+  auto sent = session_.send_pipe_packet(id, value, read_clocks(), wants_ack);
+  settle();
+  return sent;
+}
+
+void ServiceClient::close_pipe(PipeId id) {
+  session_.close_pipe(id, read_clocks());
+  end_pipe(id, false);
+  settle();
+}
+
+void ServiceClient::end_pipe(PipeId id, bool tells_handler) {
+  auto found = pipes_.extract(id);
+  if (!found) return;
+  const auto& state = *found.mapped().state_;
+  found.mapped().state_->sender = nullptr;
+  // The endpoint, which handlers may keep, keeps its object no longer.
+  const auto object = std::exchange(found.mapped().state_->object, nullptr);
+  const auto close = [&] { static_cast<Object&>(*object).close_pipe(*state.member, found.mapped(), tells_handler); };
+  if (tells_handler)
+    run_handler("pipe", state.member->name, close);
+  else
+    close();
+}
+
 void ServiceClient::handle(const ClientGone&, Now) {
+  while (owner_ && !pipes_.empty()) end_pipe(pipes_.begin()->first, true);
   Service* const left = std::exchange(service_, nullptr);
   if (left && left->on_gone_) left->on_gone_(id_);
 }

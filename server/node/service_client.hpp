@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string_view>
+#include <unordered_map>
 
 #include "core/session/service_session.hpp"
 #include "server/node/service.hpp"
@@ -27,7 +28,7 @@ class ServiceClientOwner {
   ~ServiceClientOwner() = default;
 };
 
-class ServiceClient final : public SessionDriver<ServiceSession> {
+class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSender {
  public:
   ServiceClient(ClientId id, ServiceClientOwner& owner, ServiceDirectory& directory, ServiceSessionOptions options,
                 boost::asio::ip::tcp::socket socket);
@@ -54,11 +55,25 @@ class ServiceClient final : public SessionDriver<ServiceSession> {
   void handle(const LoginRequested& login, Now now);
   void handle(const WireConnected& connected, Now now);
   void handle(const WireReceived& received, Now now);
+  void handle(const PipeConnected& connected, Now now);
+  void handle(const PipeReceived& received, Now now);
+  void handle(const PipeAcknowledged& acknowledged, Now now);
+  void handle(const PipeClosed& closed, Now now);
   void handle(const ClientGone& gone, Now now);
+
+  // PipeSender: from endpoints
+  Result<std::uint32_t> send_pipe_packet(PipeId id, const Value& value, bool wants_ack) override;
+  void close_pipe(PipeId id) override;
+  std::size_t queued_bytes() const override { return session_.queued_bytes(); }
+  void end_pipe(PipeId id, bool tells_handler);
+  /// Runs a handler whose failure no client waits for.
+  template <class F>
+  void run_handler(const char* kind, const std::string& member, F&& handler);
 
   ClientId id_;
   ServiceClientOwner* owner_;
   Service* service_ = nullptr;
+  std::unordered_map<PipeId, PipeEndpoint> pipes_;
 };
 
 }  // namespace rr

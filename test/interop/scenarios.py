@@ -54,6 +54,10 @@ SAMPLE = {"Sample": {"id": {"int32": -7}, "reading": {"double[]": [1.0, 2.0, 3.0
 OTHER_SAMPLE = {"Sample": {"id": {"int32": 2147483647}, "reading": {"double[]": [-1.0, 0.0, 1.0]}, "tag": {"uint8[]": []},
                            "position": {"Vector3": [4.0, 5.0, 6.0]}}}
 TRANSFORM = {"Transform": [1.0, 0.0, 0.0, 0.0, 10.0, 20.0, 30.0]}
+def poses(*px):
+    return [{**plain_of(POSE), "px": float(x)} for x in px]
+
+
 EVERYTHING = {"Everything": {
     "first": POSE,
     "missing": None,
@@ -211,6 +215,50 @@ SCENARIOS = [
         {"poke_out": "both", "value": {"double": 5.5}, "expect": None},
         {"peek_out": "both", "expect": 5.5},
         {"peek_in": "both", "expect": 11.0}]),
+    Scenario("pipes", [
+        {"open_pipe": "doubled", "as": "a", "expect": 1},
+        {"send": "a", "values": [{"double": 1.5}, {"double": 2.0}], "expect": None},
+        {"packets": "a", "count": 2, "expect": {"list": [3.0, 4.0]}},
+        {"open_pipe": "doubled", "as": "b", "index": 5, "expect": 5},
+        {"open_pipe": "doubled", "as": "c", "index": 3, "expect": 6},
+        {"send": "c", "values": [{"double": 10.0}], "expect": None},
+        {"packets": "c", "count": 1, "expect": {"list": [20.0]}},
+        {"send": "a", "values": [{"double": float(n)} for n in range(100)], "expect": None},
+        {"packets": "a", "count": 102, "expect": {"list": [3.0, 4.0] + [2.0 * n for n in range(100)]}},
+        {"close_pipe": "a", "expect": None},
+        {"send": "b", "values": [{"double": -1.0}], "expect": None},
+        {"closed": "b", "expect": True},
+        {"packets": "b", "count": 0, "expect": {"list": []}},
+        {"send": "c", "values": [{"double": 11.0}], "expect": None},
+        {"packets": "c", "count": 2, "expect": {"list": [20.0, 22.0]}},
+        {"close_pipe": "c", "expect": None}], clients=NATIVE),
+    Scenario("pipe_early_packets", [
+        {"open_pipe": "greetings", "as": "g", "expect": 1},
+        {"packets": "g", "count": 2, "expect": {"list": ["hello", "world"]}},
+        {"close_pipe": "g", "expect": None}], clients=NATIVE),
+    Scenario("pipe_unreliable", [
+        {"open_pipe": "quick", "as": "q", "expect": 1},
+        {"send": "q", "values": [{"double": 1.0}, {"double": 2.0}, {"double": 3.0}], "expect": None},
+        {"packets": "q", "count": 3, "any_order": True, "expect": {"list": [2.0, 4.0, 6.0]}},
+        {"close_pipe": "q", "expect": None}], clients=NATIVE),
+    Scenario("pipe_broadcast", [
+        {"open_pipe": "poses", "as": "left", "expect": 1},
+        {"open_pipe": "poses", "as": "right", "expect": 2},
+        {"call": "publish_poses", "args": [POSE, {"int32": 3}], "expect": None},
+        {"packets": "left", "count": 3, "expect": {"list": poses(0, 1, 2)}},
+        {"packets": "right", "count": 3, "expect": {"list": poses(0, 1, 2)}},
+        {"close_pipe": "left", "expect": None},
+        {"call": "publish_poses", "args": [POSE, {"int32": 1}], "expect": None},
+        {"packets": "right", "count": 4, "expect": {"list": poses(0, 1, 2, 0)}}], clients=NATIVE),
+    # More packets than the broadcaster lets wait: an endpoint that does not acknowledge misses some.
+    Scenario("pipe_acknowledgements", [{"open_pipe": "poses", "as": "p", "expect": 1}] + [
+        step for number in range(8) for step in (
+            {"call": "publish_poses", "args": [POSE, {"int32": 1}], "expect": None},
+            {"packets": "p", "count": number + 1, "expect": {"list": poses(*[0] * (number + 1))}})], clients=NATIVE),
+    Scenario("pipe_large_packets", [
+        {"open_pipe": "taken", "as": "t", "expect": 1},
+        {"send": "t", "values": [{"ramp": 1310720}, {"double[]": [0.5]}, {"ramp": 1310720}], "expect": None},
+        {"get_until": "seen_sum", "until": 1717985607680.5, "expect": 1717985607680.5}], clients=NATIVE),
 ]
 
 

@@ -27,17 +27,32 @@ class Client {
   using Verb = json (Client::*)(const rr::RemoteObject&, const std::string&, const json&);
 
   static const std::map<std::string, Verb>& verbs() {
-    static const std::map<std::string, Verb> table{{"get", &Client::get},           {"set", &Client::set},
-                                                   {"call", &Client::call},         {"get_until", &Client::get_until},
-                                                   {"listen", &Client::listen},     {"events", &Client::events},
-                                                   {"connect", &Client::connect},   {"close", &Client::close},
-                                                   {"in_value", &Client::in_value}, {"out_value", &Client::out_value},
-                                                   {"peek_in", &Client::peek_in},   {"peek_out", &Client::peek_out},
-                                                   {"poke_out", &Client::poke_out}, {"open", &Client::open},
-                                                   {"leave", &Client::leave},       {"login", &Client::login},
-                                                   {"logout", &Client::logout},     {"lock", &Client::lock},
-                                                   {"unlock", &Client::unlock},     {"enter", &Client::enter},
-                                                   {"exit", &Client::exit}};
+    static const std::map<std::string, Verb> table{{"get", &Client::get},
+                                                   {"set", &Client::set},
+                                                   {"call", &Client::call},
+                                                   {"get_until", &Client::get_until},
+                                                   {"listen", &Client::listen},
+                                                   {"events", &Client::events},
+                                                   {"connect", &Client::connect},
+                                                   {"close", &Client::close},
+                                                   {"in_value", &Client::in_value},
+                                                   {"out_value", &Client::out_value},
+                                                   {"peek_in", &Client::peek_in},
+                                                   {"peek_out", &Client::peek_out},
+                                                   {"poke_out", &Client::poke_out},
+                                                   {"open", &Client::open},
+                                                   {"leave", &Client::leave},
+                                                   {"login", &Client::login},
+                                                   {"logout", &Client::logout},
+                                                   {"lock", &Client::lock},
+                                                   {"unlock", &Client::unlock},
+                                                   {"enter", &Client::enter},
+                                                   {"exit", &Client::exit},
+                                                   {"open_pipe", &Client::open_pipe},
+                                                   {"send", &Client::send},
+                                                   {"packets", &Client::packets},
+                                                   {"close_pipe", &Client::close_pipe},
+                                                   {"closed", &Client::closed}};
     return table;
   }
 
@@ -137,6 +152,42 @@ class Client {
     return nullptr;
   }
 
+  // pipes
+
+  json open_pipe(const rr::RemoteObject& target, const std::string& member, const json& step) {
+    Pipe& pipe = pipes_[step.at("as").get<std::string>()];
+    pipe.packets = json::array();
+    pipe.endpoint = target.connect_pipe(
+        member, [&pipe](const rr::Value& packet) { pipe.packets.push_back(to_plain(packet)); },
+        step.value("index", rr::any_pipe_index));
+    return pipe.endpoint->index();
+  }
+
+  json send(const rr::RemoteObject&, const std::string& name, const json& step) {
+    for (const auto& value : step.at("values")) pipes_.at(name).endpoint->send(from_scenario(value));
+    return nullptr;
+  }
+
+  json packets(const rr::RemoteObject&, const std::string& name, const json& step) {
+    const json& seen = pipes_.at(name).packets;
+    wait([&] { return seen.size() >= step.at("count").get<std::size_t>(); });
+    return {{"list", seen}};
+  }
+
+  json close_pipe(const rr::RemoteObject&, const std::string& name, const json&) {
+    pipes_.at(name).endpoint->close();
+    return nullptr;
+  }
+
+  json closed(const rr::RemoteObject&, const std::string& name, const json&) {
+    return wait([&] { return !pipes_.at(name).endpoint->is_open(); });
+  }
+
+  struct Pipe {
+    std::optional<rr::RemotePipe> endpoint;
+    json packets;
+  };
+
   // further clients, logins, locks
 
   json open(const rr::RemoteObject&, const std::string& name, const json& step) {
@@ -189,6 +240,7 @@ class Client {
   rr::RemoteObject root_;
   std::map<std::string, rr::RemoteObject> others_;    ///< roots of further clients
   std::map<std::string, rr::MonitorGuard> monitors_;  ///< by the name that the scenario gives
+  std::map<std::string, Pipe> pipes_;                 ///< by the name that the scenario gives
   std::map<std::string, json> events_;                ///< by event
   std::map<std::string, json> in_values_;             ///< by wire
 };

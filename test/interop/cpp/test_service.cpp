@@ -23,6 +23,7 @@ class Interop {
     add_functions();
     add_objects();
     add_wires();
+    add_pipes();
     node.add(service_);
   }
 
@@ -131,7 +132,33 @@ class Interop {
     service_->on_wire("both", [this](double value) { service_->set_wire("both", 2 * value); });
   }
 
+  void add_pipes() {
+    for (const char* pipe : {"doubled", "quick"})
+      service_->pipe(pipe).on_packet([](const rr::PipeEndpoint& endpoint, double value) {
+        if (value < 0) return endpoint.close();
+        endpoint.send(rr::Value(2 * value)).value();
+      });
+    service_->pipe("greetings").on_connect([](const rr::PipeEndpoint& endpoint) {
+      for (const char* word : {"hello", "world"}) endpoint.send(rr::Value(word)).value();
+    });
+    service_->pipe("taken")
+        .on_connect([this](const rr::PipeEndpoint&) { sum_ = 0; })
+        .on_packet([this](const rr::PipeEndpoint&, const rr::Value& packet) {
+          const auto items = packet.to_items<double>().value();
+          sum_ = std::accumulate(items.begin(), items.end(), sum_);
+        });
+    service_->property("seen_sum").get([this] { return sum_; });
+    service_->function("publish_poses", [this](rr::Value pose, std::int32_t count) {
+      for (std::int32_t i = 0; i < count; ++i) {
+        for (auto& field : pose.get_if<rr::Structure>()->fields)
+          if (field.name == "px") field.value = static_cast<double>(i);
+        service_->pipe("poses").broadcast(pose, 3);
+      }
+    });
+  }
+
   std::shared_ptr<rr::Service> service_;
+  double sum_ = 0;
   std::map<std::string, rr::Value> stored_;
   double secret_ = 0;
   double target_ = 0;

@@ -12,7 +12,8 @@ import RobotRaconteur as RR
 import quiet_node
 from values import Values, plain
 
-NO_VERBS = ("by", "on", "value", "args", "count", "until", "digest", "service", "username", "password", "timeout")
+NO_VERBS = ("by", "on", "value", "args", "count", "until", "digest", "service", "username", "password", "timeout",
+            "as", "index", "values")
 PATIENCE = 10.0  # seconds for anything that has to come by itself
 
 
@@ -25,6 +26,7 @@ class Client:
         self._news = threading.Condition()
         self._events = {}
         self._wires = {}
+        self._pipes = {}
 
     def carry_out(self, step):
         target = self._others[step["by"]] if "by" in step else self._root
@@ -135,6 +137,59 @@ class Client:
 
     def do_poke_out(self, target, member, step):
         getattr(target, member).PokeOutValue(self._values.build(step["value"]))
+
+    # pipes
+
+    def do_open_pipe(self, target, member, step):
+        endpoint = getattr(target, member).Connect(step.get("index", -1))
+        pipe = self._pipes[step["as"]] = Pipe(endpoint)
+
+        def arrived(endpoint):
+            with self._news:
+                self._news.notify_all()
+
+        def closed(endpoint):
+            with self._news:
+                pipe.is_closed = True
+                self._news.notify_all()
+
+        endpoint.PacketReceivedEvent += arrived
+        endpoint.PipeEndpointClosedCallback = closed
+        return endpoint.Index
+
+    def do_send(self, target, name, step):
+        endpoint = self._pipes[name].endpoint
+        for value in step["values"]:
+            if endpoint.IsUnreliable:  # the blocking call never returns there
+                endpoint.AsyncSendPacket(self._values.build(value), lambda number, error: None)
+            else:
+                endpoint.SendPacket(self._values.build(value))
+
+    def do_packets(self, target, name, step):
+        pipe = self._pipes[name]
+        with self._news:
+            self._news.wait_for(lambda: len(pipe.take()) >= step["count"], PATIENCE)
+            return {"list": list(pipe.take())}
+
+    def do_close_pipe(self, target, name, step):
+        self._pipes.pop(name).endpoint.Close()
+
+    def do_closed(self, target, name, step):
+        with self._news:
+            return self._news.wait_for(lambda: self._pipes[name].is_closed, PATIENCE)
+
+
+class Pipe:
+    def __init__(self, endpoint):
+        self.endpoint = endpoint
+        self.is_closed = False
+        self._packets = []
+
+    def take(self):
+        """Everything that has come until now."""
+        while self.endpoint.Available:
+            self._packets.append(plain(self.endpoint.ReceivePacket()))
+        return self._packets
 
 
 def error_of(exception):

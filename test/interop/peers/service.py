@@ -60,6 +60,7 @@ class Interop:
         self.version = "1"
         self.seen_secret = 0.0
         self.seen_target = 0.0
+        self.seen_sum = 0.0
         self.changed = RR.EventHook()
         self.cleared = RR.EventHook()
         self._head = Part("head")
@@ -75,6 +76,11 @@ class Interop:
         self.both.PeekInValueCallback = lambda endpoint: 2 * self._both
         self.both.PeekOutValueCallback = lambda endpoint: self._both
         self.both.PokeOutValueCallback = self._poke_both
+        self.doubled.PipeConnectCallback = self._double
+        self.quick.PipeConnectCallback = self._double
+        self.greetings.PipeConnectCallback = self._greet
+        self.taken.PipeConnectCallback = self._take
+        self.poses.MaxBacklog = 3
 
     # wires
 
@@ -96,6 +102,36 @@ class Interop:
 
     def publish_pose(self, value):
         self.pose.OutValue = value
+
+    # pipes
+
+    def _double(self, endpoint):
+        def receive(endpoint):
+            while endpoint.Available:
+                value = endpoint.ReceivePacket()
+                if value < 0:
+                    return endpoint.Close()
+                endpoint.AsyncSendPacket(2 * value, lambda number, error: None)
+
+        endpoint.PacketReceivedEvent += receive
+
+    def _greet(self, endpoint):
+        for word in ("hello", "world"):
+            endpoint.AsyncSendPacket(word, lambda number, error: None)
+
+    def _take(self, endpoint):
+        self.seen_sum = 0.0
+
+        def receive(endpoint):
+            while endpoint.Available:
+                self.seen_sum += float(numpy.sum(endpoint.ReceivePacket()))
+
+        endpoint.PacketReceivedEvent += receive
+
+    def publish_poses(self, pose, count):
+        for number in range(count):
+            pose.px = float(number)
+            self.poses.AsyncSendPacket(pose, lambda: None)
 
     # property with a rule
 

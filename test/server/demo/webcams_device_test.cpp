@@ -40,7 +40,37 @@ TEST_CASE("two cameras look out from the pose that they are given") {
 
   CHECK(rr::error_of([&] { host.object("Webcams", "2"); }).code == rr::ErrorCode::service_error);
   CHECK(rr::error_of([&] { left.call("CaptureFrameToBuffer"); }).code == rr::ErrorCode::not_implemented_error);
-  CHECK(rr::error_of([&] { left.call("StartStreaming"); }).code == rr::ErrorCode::not_implemented_error);
+}
+
+TEST_CASE("frames flow to every endpoint of a camera's pipe while it streams") {
+  std::unique_ptr<WebcamsDevice> webcams;
+  rr::RunningNode node([&](rr::Node& made) { webcams = std::make_unique<WebcamsDevice>(made, [] { return Pose{}; }); });
+  const auto host = rr::connect(node.url("Webcam"));
+  const auto left = host.object("Webcams", "0");
+  int first = 0, second = 0, of_right = 0;
+  const auto still = left.call("CaptureFrame");
+  const auto endpoint = left.connect_pipe("FrameStream", [&](const rr::Value& frame) {
+    ++first;
+    CHECK(frame == still);
+  });
+  left.connect_pipe("FrameStream", [&](const rr::Value&) { ++second; });
+  host.object("Webcams", "1").connect_pipe("FrameStream", [&](const rr::Value&) { ++of_right; });
+  left.call("StartStreaming");
+  // More than may be under way without acknowledgement.
+  REQUIRE(host.connection().run_until([&] { return first >= 4 && second >= 4; }, 20s));
+
+  endpoint.close();
+  const int closed_at = first;
+  const int after = second + 2;
+  REQUIRE(host.connection().run_until([&] { return second >= after; }, 20s));
+  CHECK(first == closed_at);
+  CHECK(of_right == 0);
+
+  left.call("StopStreaming");
+  const int stopped_at = second;
+  host.object("Webcams", "1").call("StartStreaming");
+  REQUIRE(host.connection().run_until([&] { return of_right >= 2; }, 20s));
+  CHECK(second == stopped_at);
 }
 
 TEST_CASE("the cameras follow the robot, and turn by themselves while there is none") {
