@@ -51,6 +51,12 @@ export const ErrorCode = {
   PermissionDenied: 152,
 } as const;
 
+/**
+ * The `subName` of ConnectionError where a connection that was up broke: calls that were under way may have been
+ * carried out or not.
+ */
+export const connection_lost = "connection_lost";
+
 export interface ErrorFields {
   code: number;
   name: string;
@@ -63,7 +69,7 @@ export interface ErrorFields {
 export class RobotRaconteurError extends Error {
   /** The protocol's number, as in {@link ErrorCode}; 100 for exceptions that a service definition declares. */
   readonly code: number;
-  /** What a service adds to the name; usually "". */
+  /** What a service adds to the name; usually "". "connection_lost": this call was under way when the session broke. */
   readonly subName: string;
   /** What a service adds to the message, as a varvalue; usually null. */
   readonly param: unknown;
@@ -89,4 +95,13 @@ export function report(error: unknown): void {
   const { reportError } = globalThis as { reportError?: (error: unknown) => void };
   if (reportError) reportError(error);
   else console.error(error);
+}
+
+/** Calls application code; what it throws is reported and disturbs nothing else. */
+export function call_safely(what: () => void): void {
+  try {
+    what();
+  } catch (error) {
+    report(error);
+  }
 }

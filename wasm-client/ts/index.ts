@@ -2,10 +2,14 @@
  * rrgate-client: Robot Raconteur services in browsers, workers and Node, over WebSocket.
  * @module
  */
+export type { Clock } from "./clock.js";
 export { connect } from "./connect.js";
 export type { ConnectOptions } from "./connect.js";
 export { ErrorCode, RobotRaconteurError } from "./errors.js";
 export type { ErrorFields } from "./errors.js";
+export type { MemberSubscriptionOptions, WireSubscription } from "./member_subscription.js";
+export { subscribe } from "./subscribe.js";
+export type { SubscribeOptions, Subscription } from "./subscribe.js";
 export type { OpenTransport, Transport, TransportListener } from "./transport.js";
 export type * from "./types.js";
 export { rrValue, typeOf } from "./values.js";

@@ -1,5 +1,6 @@
 // Objects of a service, built from the definition that the service sent. Layer: wasm-client/ts.
-import { make_error, report, RobotRaconteurError } from "./errors.js";
+import { call_safely, make_error } from "./errors.js";
+import type { RobotRaconteurError } from "./errors.js";
 import { make_event } from "./members/event.js";
 import { make_function } from "./members/function.js";
 import { make_later } from "./members/later.js";
@@ -49,7 +50,10 @@ export class ObjectTree {
   }
 
   root(path: string, type: string): RemoteObject {
-    return this.#build(path, type, []);
+    const released: (() => void)[] = [];
+    const object = this.#build(path, type, released);
+    this.#objects.set(path, { object: Promise.resolve(object), released });
+    return object;
   }
 
   find(path: string, options: CallOptions = {}): Promise<RemoteObject> {
@@ -90,7 +94,7 @@ export class ObjectTree {
     for (const [name, handle] of handles) {
       if (!implicit_names.has(name)) Object.defineProperty(object, name, { value: handle, enumerable: true });
     }
-    Object.defineProperty(object, "$", { value: new Info(session, type, path, members, handles, released) });
+    Object.defineProperty(object, "$", { value: new Info(this, session, type, path, members, handles, released) });
     Object.defineProperty(object, Symbol.toStringTag, { value: type });
     return Object.freeze(object) as RemoteObject;
   }
@@ -98,6 +102,7 @@ export class ObjectTree {
 
 class Info implements ObjectInfo {
   #is_released = false;
+  readonly #tree: ObjectTree;
   readonly #session: Session;
   readonly #handles: ReadonlyMap<string, DynamicMember>;
   readonly #closers = new Set<(reason?: RobotRaconteurError) => void>();
@@ -107,6 +112,7 @@ class Info implements ObjectInfo {
   #types: string[] = [];
 
   constructor(
+    tree: ObjectTree,
     session: Session,
     readonly type: string,
     readonly path: string,
@@ -114,6 +120,7 @@ class Info implements ObjectInfo {
     handles: ReadonlyMap<string, DynamicMember>,
     released: (() => void)[],
   ) {
+    this.#tree = tree;
     this.#session = session;
     this.#handles = handles;
     this.#attributes = session.look((core) => core.attributes()) ?? new Map<string, RrValue>();
@@ -148,6 +155,11 @@ class Info implements ObjectInfo {
     return handle;
   }
 
+  find(path: string, options: CallOptions = {}): Promise<RemoteObject> {
+    const service = this.path.split(".", 1)[0]!;
+    return this.#tree.find(path.replace(/^\*(?=\.|$)/, () => service), options);
+  }
+
   close(): Promise<void> {
     return this.#session.close();
   }
@@ -173,13 +185,8 @@ class Info implements ObjectInfo {
     this.#is_released = true;
     const closers = [...this.#closers];
     this.#closers.clear();
-    for (const closed of closers) {
-      try {
-        closed(make_error("ObjectNotFound", `the service released object "${this.path}": look it up again`));
-      } catch (error) {
-        report(error);
-      }
-    }
+    const reason = make_error("ObjectNotFound", `the service released object "${this.path}": look it up again`);
+    for (const closed of closers) call_safely(() => closed(reason));
   }
 }
 

@@ -1,5 +1,6 @@
 // Drives the core: bytes in and out, timers, and which promise a request belongs to. Layer: wasm-client/ts.
-import { make_error, report, RobotRaconteurError } from "./errors.js";
+import { call_safely, connection_lost, ErrorCode, make_error, RobotRaconteurError } from "./errors.js";
+import type { ErrorFields } from "./errors.js";
 import type { Transport } from "./transport.js";
 import type { CallOptions, RrValue } from "./types.js";
 import type { Core, CoreEvent } from "./wasm_module.js";
@@ -25,6 +26,7 @@ export interface MemberListener {
 export class Session {
   /** Set by close(), or by whatever ended the session. */
   #end: { reason: RobotRaconteurError; is_local: boolean } | undefined;
+  #was_connected = false;
   #is_closed = false;
   #is_pumping = false;
   #timer: ReturnType<typeof setTimeout> | undefined;
@@ -214,13 +216,14 @@ export class Session {
   #dispatch(event: CoreEvent): void {
     switch (event.kind) {
       case "connected":
+        this.#was_connected = true;
         this.#settle_connected.resolve(event.type);
         break;
       case "completed":
         this.#take_pending(event.id)?.resolve(event.value);
         break;
       case "failed":
-        this.#take_pending(event.id)?.reject(new RobotRaconteurError(event.error));
+        this.#take_pending(event.id)?.reject(this.#error(event.error));
         break;
       case "event":
         this.#tell(event.path, event.member, (listener) => listener.on_event?.(event.arguments));
@@ -237,9 +240,15 @@ export class Session {
         for (const released of [...this.#release_listeners]) call_safely(() => released(event.path));
         break;
       case "closed":
-        this.#finish(new RobotRaconteurError(event.error));
+        this.#finish(this.#error(event.error));
         break;
     }
+  }
+
+  /** A connection that was up and is no more has a mark of its own: what was under way may have been carried out. */
+  #error(fields: ErrorFields): RobotRaconteurError {
+    const is_loss = this.#was_connected && fields.code === ErrorCode.ConnectionError && this.core.wants_close();
+    return new RobotRaconteurError(is_loss ? { ...fields, subName: fields.subName || connection_lost } : fields);
   }
 
   #take_pending(id: number): Pending | undefined {
@@ -284,12 +293,4 @@ export class Session {
 function check_timeout(milliseconds: number): number {
   if (milliseconds > 0) return milliseconds;
   throw make_error("InvalidArgument", `timeout ${String(milliseconds)}: expected milliseconds above 0`);
-}
-
-function call_safely(what: () => void): void {
-  try {
-    what();
-  } catch (error) {
-    report(error);
-  }
 }

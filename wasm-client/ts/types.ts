@@ -93,6 +93,11 @@ export interface ObjectInfo {
   readonly stats: SessionStats;
   /** A member by name: the way to those whose names JavaScript itself calls ("then", "toString"). */
   member(name: string): DynamicMember;
+  /**
+   * The object that a service path leads to, such as "Create.Webcams[0]"; "*" stands for the service's name.
+   * @throws RobotRaconteurError (rejects) ObjectNotFound, ServiceNotFound, ...
+   */
+  find(path: string, options?: CallOptions): Promise<RemoteObject>;
   /** Ends the session of this object and of all others that came from it. Repeated calls do nothing. */
   close(): Promise<void>;
   /**

@@ -1,0 +1,238 @@
+// Subscriptions: connections come and go, the waits between are in the hands of the test.
+import { ErrorCode, RobotRaconteurError, subscribe } from "../../wasm-client/dist/index.js";
+import type { Clock, OpenTransport, RemoteObject, SubscribeOptions } from "../../wasm-client/dist/index.js";
+import { failure, settle, TestService } from "./service.js";
+
+const definition = `service test.subscribe
+stdver 0.10
+object Part
+  property string name
+  wire double level
+end
+object Root
+  property double speed
+  wire double both
+  wire double other
+  objref Part part
+  function double twice(double x)
+  function void publish_both(double x)
+  function void hang()
+end`;
+
+const url = "ws://one/?service=test";
+const start = () => TestService.start({ definitions: [definition], root: "test.subscribe.Root" });
+
+/** Waits that end when the test says so. */
+class ManualClock implements Clock {
+  readonly waits: { milliseconds: number; due: () => void }[] = [];
+
+  after(milliseconds: number, due: () => void): () => void {
+    const wait = { milliseconds, due };
+    this.waits.push(wait);
+    return () => void (this.waits.includes(wait) && this.waits.splice(this.waits.indexOf(wait), 1));
+  }
+
+  /** Ends the only wait. @returns how long it was. */
+  fire(): number {
+    expect(this.waits).toHaveLength(1);
+    const wait = this.waits.shift()!;
+    wait.due();
+    return wait.milliseconds;
+  }
+}
+
+/** One service for each connection, in turn; an Error refuses the connection. */
+function in_turn(...services: (TestService | Error)[]): OpenTransport {
+  return (to, listener) => {
+    const service = services.shift() ?? new Error("nobody is there");
+    if (service instanceof Error) throw service;
+    return service.transport(to, listener);
+  };
+}
+
+let clock: ManualClock;
+const follow = (transport: OpenTransport, options: SubscribeOptions = {}) =>
+  subscribe<RemoteObject>(url, { transport, clock, random: () => 0.5, ...options });
+
+beforeEach(() => {
+  clock = new ManualClock();
+});
+
+it("connects, and again after a loss; what was under way rejects as lost", async () => {
+  const first = await start();
+  const subscription = follow(in_turn(first, await start()));
+  const lost: RobotRaconteurError[] = [];
+  const connected: unknown[] = [];
+  subscription.onLost((reason) => lost.push(reason));
+  subscription.onConnected((client) => connected.push(client));
+  expect(subscription.defaultClient).toBeUndefined();
+  const client = await subscription.client();
+  expect(subscription.defaultClient).toBe(client);
+  expect(await client["twice"]!(4)).toBe(4);
+
+  const under_way = failure(client["hang"]!());
+  await settle();
+  first.drop("the cable is out");
+  const error = await under_way;
+  expect(error).toBeInstanceOf(RobotRaconteurError);
+  expect(error.code).toBe(ErrorCode.ConnectionError);
+  expect(error.subName).toBe("connection_lost");
+  expect(error.message).toContain("the cable is out");
+  expect(lost.map(({ subName }) => subName)).toEqual(["connection_lost"]);
+  expect(subscription.defaultClient).toBeUndefined();
+  expect((await failure(client["twice"]!(1))).subName).toBe("connection_lost");
+
+  const waiting = subscription.client();
+  expect(clock.fire()).toBe(375);
+  const next = await waiting;
+  expect(next).not.toBe(client);
+  expect(await next["twice"]!(5)).toBe(5);
+  expect(connected).toEqual([client, next]);
+  await subscription.close();
+});
+
+it("waits longer after each failure, up to a limit, and starts again after a success", async () => {
+  const chances = [0, 0.999];
+  let turn = 0;
+  const service = await start();
+  const refused = Array.from({ length: 9 }, (_, index) => new Error(`refused ${index}`));
+  const subscription = follow(in_turn(...refused, service, new Error("gone")), { random: () => chances[turn++ % 2]! });
+  const failed: string[] = [];
+  subscription.onFailed((error, to) => failed.push(`${to} ${(error as Error).message}`));
+  const waits: number[] = [];
+  for (let i = 0; i < 9; ++i) {
+    await vi.waitUntil(() => clock.waits.length > 0);
+    waits.push(Math.round(clock.fire()));
+  }
+  expect(waits).toEqual([250, 1000, 1000, 3998, 4000, 15992, 15000, 29985, 15000]);
+  await subscription.client();
+  expect(failed).toHaveLength(9);
+  expect(failed[8]).toBe(`${url} refused 8`);
+  service.drop("gone");
+  await settle();
+  expect(Math.round(clock.fire())).toBe(500);
+  await subscription.close();
+});
+
+it("tries the ways to a service in order", async () => {
+  const tried: string[] = [];
+  const service = await start();
+  const transport: OpenTransport = (to, listener) => {
+    tried.push(to.host);
+    if (to.host !== "three") throw new Error("refused");
+    return service.transport(to, listener);
+  };
+  const urls = ["ws://one/?service=test", "ws://two/?service=test", "ws://three/?service=test"];
+  const subscription = subscribe(urls, { transport, clock });
+  await subscription.client();
+  expect(tried).toEqual(["one", "two", "three"]);
+  await subscription.close();
+  expect(() => subscribe(["ws://one/?service=a", "ws://two/?service=b"])).toThrow("the services a, b");
+  expect(() => subscribe([])).toThrow("no URL");
+});
+
+it("ends with close(), whatever it is doing", async () => {
+  const service = await start();
+  const subscription = follow(in_turn(service));
+  const client = await subscription.client();
+  const closing = subscription.close();
+  expect(subscription.close()).toBe(closing);
+  await closing;
+  expect(client.$.state).toBe("closed");
+  expect(subscription.defaultClient).toBeUndefined();
+  expect((await failure(subscription.client())).code).toBe(ErrorCode.InvalidOperation);
+  expect(clock.waits).toHaveLength(0);
+
+  const waiting = follow(in_turn());
+  const wanted = failure(waiting.client());
+  await vi.waitUntil(() => clock.waits.length > 0);
+  await waiting.close();
+  expect(clock.waits).toHaveLength(0);
+  expect((await wanted).code).toBe(ErrorCode.InvalidOperation);
+
+  const abort = new AbortController();
+  const connecting = follow(() => new Promise(() => undefined), { signal: abort.signal });
+  abort.abort();
+  expect(connecting.isClosed).toBe(true);
+  await settle();
+  expect(clock.waits).toHaveLength(0);
+  expect(follow(in_turn(), { signal: AbortSignal.abort() }).isClosed).toBe(true);
+});
+
+it("gives the client within limits", async () => {
+  const subscription = follow(() => new Promise(() => undefined));
+  const abort = new AbortController();
+  const aborted = failure(subscription.client({ signal: abort.signal }));
+  abort.abort(new Error("enough"));
+  expect((await aborted).message).toBe("enough");
+  const late = failure(subscription.client({ timeout: 100 }));
+  expect(clock.fire()).toBe(100);
+  expect((await late).code).toBe(ErrorCode.RequestTimeout);
+  await subscription.close();
+});
+
+it("keeps a wire over connections", async () => {
+  const first = await start();
+  const second = await start();
+  const subscription = follow(in_turn(first, second));
+  const wire = subscription.wire("both");
+  expect((await failure(wire.send(1))).code).toBe(ErrorCode.InvalidOperation);
+  const seen: unknown[] = [];
+  const loop = (async () => {
+    for await (const value of wire) seen.push(value);
+  })();
+  const client = await subscription.client();
+  await vi.waitUntil(() => wire.isConnected);
+  await client["publish_both"]!(1);
+  await vi.waitUntil(() => seen.length === 1);
+  first.drop("gone");
+  await vi.waitUntil(() => !wire.isConnected);
+  expect(wire.value).toBe(1);
+  clock.fire();
+  const next = await subscription.client();
+  await vi.waitUntil(() => wire.isConnected);
+  await next["publish_both"]!(2);
+  await vi.waitUntil(() => seen.length === 2);
+  await wire.send(3);
+  expect(await vi.waitUntil(async () => (await next["both"]!.peekOut()) === 3)).toBe(true);
+  await subscription.close();
+  await loop;
+  expect(seen).toEqual([1, 2]);
+  expect(wire.value).toBe(2);
+});
+
+it("finds the object of a member, and tries again where that fails", async () => {
+  const service = await start();
+  const subscription = follow(in_turn(service));
+  const level = subscription.wire("level", { path: "*.part" });
+  const wrong = subscription.wire("level", { path: "*" });
+  const failures: unknown[] = [];
+  wrong.onFailed((error) => failures.push(error));
+  await subscription.client();
+  await vi.waitUntil(() => level.isConnected && clock.waits.length === 1);
+  expect((failures[0] as RobotRaconteurError).code).toBe(ErrorCode.MemberNotFound);
+  expect(clock.fire()).toBe(2_500);
+  await vi.waitUntil(() => clock.waits.length === 1);
+  expect(failures).toHaveLength(2);
+  await wrong.close();
+  expect(clock.waits).toHaveLength(0);
+  for await (const _ of wrong) throw new Error("it is closed");
+  await subscription.close();
+  expect(level.isConnected).toBe(false);
+});
+
+it("ends a wire with the loop over it", async () => {
+  const service = await start();
+  const subscription = follow(in_turn(service));
+  const wire = subscription.wire("both");
+  const client = await subscription.client();
+  await vi.waitUntil(() => wire.isConnected);
+  await client["publish_both"]!(1);
+  for await (const value of wire) {
+    expect(value).toBe(1);
+    break;
+  }
+  await vi.waitUntil(() => !wire.isConnected);
+  expect(client.$.state).toBe("connected");
+  await subscription.close();
+});

@@ -1,0 +1,159 @@
+// Wires that outlive connections. Layer: wasm-client/ts. Source: sessions spec section 2.17.
+import type { Clock } from "./clock.js";
+import { call_safely, make_error } from "./errors.js";
+import { ValueQueue } from "./members/queue.js";
+import type { Subscription } from "./subscribe.js";
+import type { RemoteObject, RrValue, WireConnection, WireTime } from "./types.js";
+
+export interface MemberSubscriptionOptions {
+  /** The object that the member belongs to: "*" is the root, "*.arm" one of its object references; "*". */
+  path?: string | undefined;
+}
+
+/** To the next attempt, where a member could not be connected or the service closed it. */
+const retry_ms = 2_500;
+
+interface Connection {
+  send(value: unknown): Promise<void>;
+  close(): Promise<void>;
+}
+
+/** Follows a subscription from one connection to the next, and connects its member there. */
+abstract class MemberSubscription<C extends Connection> implements AsyncIterable<RrValue> {
+  protected connection: C | undefined;
+  readonly #loops = new Set<ValueQueue<RrValue>>();
+  readonly #failed = new Set<(error: unknown) => void>();
+  readonly #stops: (() => void)[];
+  #stop_waiting: (() => void) | undefined;
+  #closed: Promise<void> | undefined;
+
+  constructor(
+    subscription: Subscription<unknown>,
+    private readonly clock: Clock,
+    protected readonly member: string,
+    private readonly path: string,
+  ) {
+    const attach = (client: unknown) => void this.#attach(client as RemoteObject);
+    this.#stops = [subscription.onConnected(attach), subscription.onClosed(() => void this.close())];
+    if (subscription.isClosed) void this.close();
+  }
+
+  get isConnected(): boolean {
+    return this.connection !== undefined;
+  }
+
+  /** Calls `failed` each time the member could not be connected, or its connection ended; it is tried again. */
+  onFailed(failed: (error: unknown) => void): () => void {
+    this.#failed.add(failed);
+    return () => void this.#failed.delete(failed);
+  }
+
+  /**
+   * Sends over the connection that is up.
+   * @throws RobotRaconteurError InvalidOperation (rejects) while there is none: nothing is kept for later.
+   */
+  send(value: unknown): Promise<void> {
+    if (this.connection) return this.connection.send(value);
+    return Promise.reject(make_error("InvalidOperation", `${this.member}: is not connected at the moment`));
+  }
+
+  /** Leaving the loop closes this subscription of the member. */
+  [Symbol.asyncIterator](): AsyncIterator<RrValue, undefined> {
+    const queue = this.make_queue(() => {
+      this.#loops.delete(queue);
+      void this.close();
+    });
+    if (this.#closed) queue.end();
+    else this.#loops.add(queue);
+    return queue;
+  }
+
+  /** Ends all loops; they still give what came before. Repeated calls do nothing. */
+  close(): Promise<void> {
+    return (this.#closed ??= this.#end());
+  }
+
+  protected abstract make_queue(on_return: () => void): ValueQueue<RrValue>;
+  /** Connects the member of `object`. */
+  protected abstract connect(object: RemoteObject): Promise<C>;
+  /** Takes what comes until the connection ends. */
+  protected abstract follow(connection: C): Promise<void>;
+
+  protected receive(value: RrValue): void {
+    for (const loop of [...this.#loops]) loop.push(value);
+  }
+
+  async #end(): Promise<void> {
+    for (const stop of this.#stops) stop();
+    this.#stop_waiting?.();
+    for (const loop of this.#loops) loop.end();
+    this.#loops.clear();
+    await this.connection?.close();
+  }
+
+  async #attach(client: RemoteObject): Promise<void> {
+    this.#stop_waiting?.();
+    let connection: C | undefined;
+    try {
+      const object = this.path === "*" ? client : await client.$.find(this.path);
+      connection = await this.connect(object);
+      if (this.#closed) return void connection.close();
+      this.connection = connection;
+      await this.follow(connection);
+      throw make_error("InvalidOperation", `${this.member}: the service closed the connection of this member`);
+    } catch (error) {
+      if (this.#closed) return;
+      for (const failed of [...this.#failed]) call_safely(() => failed(error));
+    } finally {
+      if (connection && this.connection === connection) this.connection = undefined;
+    }
+    // Without its client this waits for the next one instead.
+    if (client.$.state !== "connected") return;
+    this.#stop_waiting = this.clock.after(retry_ms, () => void this.#attach(client));
+  }
+}
+
+/** The newest value of a wire, by arrival. */
+export class WireSubscription extends MemberSubscription<WireConnection> {
+  #value: RrValue | undefined;
+  #time: WireTime | undefined;
+
+  /** Use Subscription.wire(). */
+  constructor(
+    subscription: Subscription<unknown>,
+    clock: Clock,
+    member: string,
+    options: MemberSubscriptionOptions,
+  ) {
+    super(subscription, clock, member, options.path ?? "*");
+  }
+
+  /** The newest value; it stays while there is no connection. */
+  get value(): RrValue | undefined {
+    return this.#value;
+  }
+
+  get time(): WireTime | undefined {
+    return this.#time;
+  }
+
+  protected make_queue(on_return: () => void): ValueQueue<RrValue> {
+    const queue = new ValueQueue<RrValue>(1, on_return);
+    if (this.#value !== undefined) queue.push(this.#value);
+    return queue;
+  }
+
+  protected async connect(object: RemoteObject): Promise<WireConnection> {
+    const connection = object.$.member(this.member).connect() as WireConnection;
+    await connection.ready;
+    return connection;
+  }
+
+  protected async follow(connection: WireConnection): Promise<void> {
+    for await (const value of connection) {
+      this.#value = value;
+      this.#time = connection.time;
+      this.receive(value);
+    }
+  }
+}

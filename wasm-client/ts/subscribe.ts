@@ -1,0 +1,200 @@
+// subscribe(): a service for as long as it is wanted, whatever becomes of connections. Layer: wasm-client/ts.
+// Source: sessions spec section 2.17.
+import { Backoff, system_clock } from "./clock.js";
+import type { Clock } from "./clock.js";
+import { connect } from "./connect.js";
+import type { ConnectOptions } from "./connect.js";
+import { call_safely, make_error } from "./errors.js";
+import type { RobotRaconteurError } from "./errors.js";
+import { WireSubscription } from "./member_subscription.js";
+import type { MemberSubscriptionOptions } from "./member_subscription.js";
+import type { CallOptions, ObjectInfo, RemoteObject } from "./types.js";
+import { parse_service_url } from "./url.js";
+
+export interface SubscribeOptions extends ConnectOptions {
+  /** Ends the subscription. */
+  signal?: AbortSignal | undefined;
+  /** Milliseconds from the first failure to the next attempt, about: half of it is left to chance. 500. */
+  firstRetry?: number | undefined;
+  /** Each further wait is twice as long, up to this; 30,000. */
+  longestRetry?: number | undefined;
+  /** Waits; for tests. */
+  clock?: Clock | undefined;
+  /** 0 up to 1, as Math.random; for tests. */
+  random?: (() => number) | undefined;
+}
+
+type Client<T> = T & { readonly $: ObjectInfo };
+
+/**
+ * Stays connected to a service: connects, and connects again after each loss, until close().
+ * @param urls  one service, or several ways to it; each attempt tries them in order. As for connect().
+ * @throws      RobotRaconteurError InvalidArgument (URLs that name different services, no URL). What fails later is told
+ *              to onFailed() and tried again.
+ */
+export function subscribe<T = RemoteObject>(
+  urls: string | URL | readonly (string | URL)[],
+  options: SubscribeOptions = {},
+): Subscription<T> {
+  const list = [urls].flat() as (string | URL)[];
+  const services = new Set(list.map((url) => parse_service_url(url).service));
+  if (services.size !== 1) {
+    const found = services.size === 0 ? "no URL" : `the services ${[...services].join(", ")}`;
+    throw make_error("InvalidArgument", `subscribe: found ${found}, expected URLs of one service`);
+  }
+  return new Subscription<T>(list, options);
+}
+
+/** One service that is wanted. Calls that are under way when a connection is lost reject: they are not repeated. */
+export class Subscription<T = RemoteObject> {
+  readonly #urls: readonly (string | URL)[];
+  readonly #options: SubscribeOptions;
+  readonly #clock: Clock;
+  readonly #backoff: Backoff;
+  readonly #ending = new AbortController();
+  #client: Client<T> | undefined;
+  #stop_waiting: (() => void) | undefined;
+  #closed: Promise<void> | undefined;
+  readonly #connected = new Set<(client: Client<T>) => void>();
+  readonly #lost = new Set<(reason: RobotRaconteurError) => void>();
+  readonly #failed = new Set<(error: unknown, url: string) => void>();
+  readonly #ended = new Set<() => void>();
+
+  /** Use subscribe(). */
+  constructor(urls: readonly (string | URL)[], options: SubscribeOptions) {
+    this.#urls = urls;
+    this.#options = options;
+    this.#clock = options.clock ?? system_clock;
+    this.#backoff = new Backoff(options.firstRetry ?? 500, options.longestRetry ?? 30_000, options.random ?? Math.random);
+    const { signal } = options;
+    if (signal?.aborted) void this.close();
+    else signal?.addEventListener("abort", () => void this.close(), { once: true, signal: this.#ending.signal });
+    void this.#connect();
+  }
+
+  /** The root object of the connection that is up; undefined while there is none. Another one after each loss. */
+  get defaultClient(): Client<T> | undefined {
+    return this.#client;
+  }
+
+  get isClosed(): boolean {
+    return this.#closed !== undefined;
+  }
+
+  /**
+   * The root object, as soon as there is a connection.
+   * @throws RobotRaconteurError RequestTimeout, InvalidOperation (closed); the reason of `signal`.
+   */
+  client(options: CallOptions = {}): Promise<Client<T>> {
+    const { signal, timeout } = options;
+    if (signal?.aborted) return Promise.reject(signal.reason);
+    if (this.isClosed) return Promise.reject(closed_error());
+    if (this.#client) return Promise.resolve(this.#client);
+    return new Promise((resolve, reject) => {
+      const end = () => {
+        stops.forEach((stop) => stop());
+        signal?.removeEventListener("abort", abort);
+      };
+      const abort = () => (end(), reject(signal?.reason));
+      const stops = [
+        this.onConnected((client) => (end(), resolve(client))),
+        this.#on(this.#ended, () => (end(), reject(closed_error()))),
+      ];
+      signal?.addEventListener("abort", abort, { once: true });
+      if (timeout === undefined) return;
+      const late = () => (end(), reject(make_error("RequestTimeout", `no connection within ${timeout} ms`)));
+      stops.push(this.#clock.after(timeout, late));
+    });
+  }
+
+  /** Calls `connected` with each new root object, also with the one that is there. @returns a function that ends it. */
+  onConnected(connected: (client: Client<T>) => void): () => void {
+    let is_wanted = true;
+    const stop = this.#on(this.#connected, connected);
+    const client = this.#client;
+    if (client) queueMicrotask(() => is_wanted && this.#client === client && call_safely(() => connected(client)));
+    return () => {
+      is_wanted = false;
+      stop();
+    };
+  }
+
+  /** Calls `lost` with the reason each time a connection ends that close() did not end. */
+  onLost(lost: (reason: RobotRaconteurError) => void): () => void {
+    return this.#on(this.#lost, lost);
+  }
+
+  /** Calls `failed` for each URL that an attempt could not connect to. */
+  onFailed(failed: (error: unknown, url: string) => void): () => void {
+    return this.#on(this.#failed, failed);
+  }
+
+  /** The newest value of a wire, over all connections. `options.path`: of the object, "*" for the root. */
+  wire(member: string, options: MemberSubscriptionOptions = {}): WireSubscription {
+    return new WireSubscription(this as Subscription<unknown>, this.#clock, member, options);
+  }
+
+  /** Ends the connection and all attempts. Repeated calls do nothing. */
+  close(): Promise<void> {
+    return (this.#closed ??= this.#end());
+  }
+
+  /** For what belongs to this subscription: calls once when it is closed. */
+  onClosed(closed: () => void): () => void {
+    return this.#on(this.#ended, closed);
+  }
+
+  async #end(): Promise<void> {
+    const client = this.#client;
+    this.#client = undefined;
+    this.#stop_waiting?.();
+    this.#ending.abort(closed_error());
+    await Promise.resolve(); // whoever closes has the promise before anybody hears of it
+    for (const ended of [...this.#ended]) call_safely(ended);
+    for (const listeners of [this.#connected, this.#lost, this.#failed, this.#ended]) listeners.clear();
+    await client?.$.close();
+  }
+
+  /** One attempt: the first URL that works. Without any, the next attempt follows after a while. */
+  async #connect(): Promise<void> {
+    const { signal: _, ...options } = this.#options;
+    for (const url of this.#urls) {
+      if (this.isClosed) return;
+      try {
+        this.#take(await connect<T>(url, { ...options, signal: this.#ending.signal }));
+        return;
+      } catch (error) {
+        if (this.isClosed) return;
+        for (const failed of [...this.#failed]) call_safely(() => failed(error, String(url)));
+      }
+    }
+    this.#retry();
+  }
+
+  #take(client: Client<T>): void {
+    if (this.isClosed) return void client.$.close();
+    this.#client = client;
+    this.#backoff.reset();
+    client.$.onClose((reason) => {
+      if (this.#client !== client) return;
+      this.#client = undefined;
+      const why = reason ?? make_error("ConnectionError", "the client was closed by this side");
+      for (const lost of [...this.#lost]) call_safely(() => lost(why));
+      this.#retry();
+    });
+    for (const connected of [...this.#connected]) call_safely(() => connected(client));
+  }
+
+  #retry(): void {
+    if (this.isClosed) return;
+    this.#stop_waiting = this.#clock.after(this.#backoff.next(), () => void this.#connect());
+  }
+
+  #on<F>(listeners: Set<F>, listener: F): () => void {
+    if (this.isClosed) return () => undefined;
+    listeners.add(listener);
+    return () => void listeners.delete(listener);
+  }
+}
+
+const closed_error = () => make_error("InvalidOperation", "the subscription is closed");
