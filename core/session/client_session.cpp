@@ -199,6 +199,12 @@ RequestId ClientSession::request_pipe(EntryType type, std::string_view path, std
   });
 }
 
+RequestId ClientSession::request_elements(EntryType type, MemberKind kind, std::string_view path,
+                                          std::string_view member, Now now,
+                                          const std::function<Result<>(const MemberDefinition&)>& write) {
+  return request(type, kind, path, member, now, write);
+}
+
 namespace {
 constexpr auto no_elements = [](const MemberDefinition&) -> Result<> { return {}; };
 }
@@ -218,8 +224,8 @@ RequestId ClientSession::call_function(std::string_view path, std::string_view m
   return request(EntryType::function_call_req, MemberKind::function, path, member, now,
                  [&](const MemberDefinition& definition) -> Result<> {
                    if (definition.is_generator())
-                     return make_error(ErrorCode::not_implemented_error,
-                                       "'" + definition.name + "' is a generator: not available yet");
+                     return make_error(ErrorCode::invalid_operation,
+                                       "'" + definition.name + "' is a generator function: use open_generator");
                    return write_arguments(outgoing_, arguments, definition, types_);
                  });
 }
@@ -402,7 +408,13 @@ Result<Value> ClientSession::read_reply(const Message& message, const MessageEnt
     case EntryType::property_get_req:
       return read_property(message, entry, *pending.member, types_);
     case EntryType::function_call_req:
+      if (pending.member->is_generator()) {
+        const auto index = read_generator_index(message, entry, *pending.member);
+        return index ? Result<Value>(Value(*index)) : Result<Value>(index.error());
+      }
       return read_return(message, entry, *pending.member, types_);
+    case EntryType::generator_next_req:
+      return read_generator_return(message, entry, pending.step, *pending.member, types_);
     case EntryType::wire_peek_in_value_req:
     case EntryType::wire_peek_out_value_req: {
       auto read = read_wire_value(message, entry, *pending.member, types_);

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -15,6 +16,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/member/generator.hpp"
 #include "core/member/pipe.hpp"
 #include "core/member/wire.hpp"
 #include "core/session/connection.hpp"
@@ -121,6 +123,15 @@ class ClientSession {
   RequestId set_property(std::string_view path, std::string_view member, const Value& value, Now now);  ///< null
   /// Completes with the return value; null for void functions.
   RequestId call_function(std::string_view path, std::string_view member, std::span<const Value> arguments, Now now);
+  /// Calls a generator function; completes with int32, the generator's index, which next, close and abort take.
+  RequestId open_generator(std::string_view path, std::string_view function, std::span<const Value> arguments, Now now);
+  /// Completes with the next value (null where the generator has none); after the last one with the error
+  /// stop_iteration. After any error the generator is gone. `parameter` there where the generator takes one.
+  RequestId next_generator(std::string_view path, std::string_view function, std::int32_t index,
+                           const std::optional<Value>& parameter, Now now);
+  /// Ends a generator early, in order or not; complete with null.
+  RequestId close_generator(std::string_view path, std::string_view function, std::int32_t index, Now now);
+  RequestId abort_generator(std::string_view path, std::string_view function, std::int32_t index, Now now);
   /// Looks up the object at `path` (see child_path()); completes with its qualified type as text. Its definition is
   /// fetched if it is not known yet. Members of an object can be used from then on.
   RequestId find_object(std::string_view path, Now now);
@@ -191,8 +202,9 @@ class ClientSession {
     const MemberDefinition* member = nullptr;
     std::string path;  ///< find_object, wires, pipes, session operations: calls, properties allocate nothing here
     TimePoint deadline;
-    std::int32_t pipe_index = 0;  ///< pipes only
-    bool is_abandoned = false;    ///< pipes only: nobody waits any more, but the reply must be acted on
+    std::int32_t pipe_index = 0;               ///< pipes only
+    bool is_abandoned = false;                 ///< pipes only: nobody waits any more, but the reply must be acted on
+    GeneratorStep step = GeneratorStep::next;  ///< generator steps only
   };
   /// The endpoints of one pipe. While a connect is pending, packets of unknown endpoints are kept: they may be its own.
   struct ClientPipe {
@@ -240,6 +252,11 @@ class ClientSession {
   RequestId request(EntryType type, MemberKind kind, std::string_view path, std::string_view member, Now now,
                     Write&& write);
   RequestId request_pipe(EntryType type, std::string_view path, std::string_view member, std::int32_t index, Now now);
+  /// request() for other files than that of its definition.
+  RequestId request_elements(EntryType type, MemberKind kind, std::string_view path, std::string_view member, Now now,
+                             const std::function<Result<>(const MemberDefinition&)>& write);
+  RequestId step_generator(GeneratorStep step, std::string_view path, std::string_view function, std::int32_t index,
+                           const std::optional<Value>& parameter, Now now);
   RequestId fail_request(RequestId id, Error error);
   Result<> send_outgoing(Now now);
   Result<> send_wire_packet(const PathMember& key, WireConnection& wire, const Value& value, Now now);

@@ -34,9 +34,8 @@ ConnectionOptions with_identity(ConnectionOptions options, const NodeIdentity& i
 }
 
 Error not_available_yet(const MemberDefinition& member) {
-  const auto kind = member.is_generator() ? std::string_view("generator") : member_kind_name(member.kind);
   return {ErrorCode::not_implemented_error,
-          std::string(kind) + " '" + member.name + "' is not available from this service yet"};
+          std::string(member_kind_name(member.kind)) + " '" + member.name + "' is not available from this service yet"};
 }
 
 }  // namespace
@@ -46,7 +45,8 @@ ServiceSession::ServiceSession(ServiceDirectory& directory, ServiceSessionOption
       options_(std::move(options)),
       connection_(ConnectionRole::service, with_identity(options_.connection, directory.identity()), now),
       opened_(now.steady),
-      last_session_message_(now.steady) {}
+      last_session_message_(now.steady),
+      generators_(options_.max_generators) {}
 
 // --- told ---
 
@@ -77,6 +77,7 @@ void ServiceSession::handle_timeout(Now now) {
     return;
   }
   if (auto alive = connection_.handle_timeout(now); !alive) return leave(alive.error(), now);
+  end_generators(generators_.remove_idle(now));
   const bool is_late = service_ ? now.steady - last_session_message_ >= options_.endpoint_timeout
                                 : now.steady - opened_ >= options_.connect_timeout;
   if (!is_late) return;
@@ -89,8 +90,8 @@ void ServiceSession::handle_timeout(Now now) {
 TimePoint ServiceSession::poll_timeout() const {
   if (wants_close()) return TimePoint::max();
   if (closing_deadline_) return *closing_deadline_;
-  return std::min(connection_.poll_timeout(),
-                  service_ ? last_session_message_ + options_.endpoint_timeout : opened_ + options_.connect_timeout);
+  return std::min({connection_.poll_timeout(), generators_.deadline(),
+                   service_ ? last_session_message_ + options_.endpoint_timeout : opened_ + options_.connect_timeout});
 }
 
 std::optional<ServiceEvent> ServiceSession::poll_event() {
@@ -109,6 +110,7 @@ void ServiceSession::leave(Error reason, Now now) {
   user_.reset();
   login_.reset();
   calls_.clear();
+  generators_.clear();
   wires_.clear();
   pipes_.clear();
   pipe_indices_.clear();
@@ -138,7 +140,9 @@ void ServiceSession::reply(CallId id, const Result<Value>& result, Now now) {
         written = write_property(outgoing_, *result, *call.member, types);
         break;
       case EntryType::function_call_req:
-        written = write_return(outgoing_, *result, *call.member, types);
+      case EntryType::generator_next_req:
+        written = call.generator != 0 ? write_generator_reply(call, *result, now)
+                                      : write_return(outgoing_, *result, *call.member, types);
         break;
       case EntryType::wire_peek_in_value_req:
       case EntryType::wire_peek_out_value_req:
@@ -153,6 +157,7 @@ void ServiceSession::reply(CallId id, const Result<Value>& result, Now now) {
     write_error(outgoing_, written.error());
   }
   send_outgoing(now);
+  if (call.generator != 0) finish_generator_call(call, !written, now);
 }
 
 Result<> ServiceSession::send_event(std::string_view path, const MemberDefinition& member,
@@ -208,8 +213,10 @@ void ServiceSession::close_wire(std::string_view path, const MemberDefinition& m
 
 void ServiceSession::release_path(std::string_view path, Now now) {
   if (!service_) return;
-  std::erase_if(wires_, [path](const auto& wire) { return is_within(wire.first.path, path); });
+  const auto is_released = [path](std::string_view other) { return is_within(other, path); };
+  std::erase_if(wires_, [&](const auto& wire) { return is_released(wire.first.path); });
   release_pipes(path);
+  end_generators(generators_.remove_released(is_released));
   connection_.begin_message(outgoing_);
   outgoing_.begin_entry(EntryType::service_path_released_req, path, {});
   send_outgoing(now);
@@ -336,8 +343,10 @@ Result<> ServiceSession::dispatch_member(const Message& message, const MessageEn
       return add_call(message, entry, CallKind::property_set, std::move(*found), *member);
     case EntryType::function_call_req:
       if (service_->name() == service_index_name) return answer_service_index(entry, *member, now);
-      if (member->is_generator()) return not_available_yet(*member);
+      if (member->is_generator()) return open_generator(message, entry, std::move(*found), *member);
       return add_call(message, entry, CallKind::function, std::move(*found), *member);
+    case EntryType::generator_next_req:
+      return step_generator(message, entry, std::move(*found), *member, now);
     case EntryType::wire_peek_in_value_req:
       return add_call(message, entry, CallKind::peek_in, std::move(*found), *member);
     case EntryType::wire_peek_out_value_req:
@@ -356,18 +365,22 @@ Result<> ServiceSession::dispatch_member(const Message& message, const MessageEn
   }
 }
 
+Result<> ServiceSession::check_room_for_call() const {
+  if (calls_.size() < options_.max_open_calls) return {};
+  return make_error(ErrorCode::out_of_system_resource,
+                    std::to_string(options_.max_open_calls) + " requests of this client wait for an answer already");
+}
+
 Result<> ServiceSession::add_call(const Message& message, const MessageEntry& entry, CallKind kind,
                                   HostedService::Found found, const MemberDefinition& member) {
-  if (calls_.size() >= options_.max_open_calls)
-    return make_error(ErrorCode::out_of_system_resource,
-                      std::to_string(options_.max_open_calls) + " requests of this client wait for an answer already");
+  if (auto room = check_room_for_call(); !room) return room;
   const auto& types = service_->types();
   Called called;
   if (kind == CallKind::property_set) {
     auto value = read_property(message, entry, member, types);
     if (!value) return value.error();
     called.arguments.push_back(std::move(*value));
-  } else if (kind == CallKind::function) {
+  } else if (kind == CallKind::function || kind == CallKind::generator_open) {
     auto arguments = read_arguments(message, entry, member, types);
     if (!arguments) return arguments.error();
     called.arguments = std::move(*arguments);

@@ -13,6 +13,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/member/generator.hpp"
 #include "core/member/pipe.hpp"
 #include "core/member/wire.hpp"
 #include "core/session/authenticator.hpp"
@@ -30,6 +31,7 @@ struct ServiceSessionOptions {
   /// The client's NodeID, where the transport vouches for it (a certificate; the local machine).
   std::optional<NodeId> verified_node_id = {};
   std::size_t max_open_calls = 1024;                      ///< not answered yet; above: out_of_system_resource
+  std::size_t max_generators = 256;                       ///< run by one client; above: out_of_system_resource
   std::size_t max_wires = 4096;                           ///< connected by one client; above: out_of_system_resource
   std::size_t max_pipe_endpoints = 4096;                  ///< of one client; above: out_of_system_resource
   std::size_t max_pipe_queued_bytes = 32u * 1024 * 1024;  ///< waiting for the stream; above, pipes take no packets
@@ -37,7 +39,18 @@ struct ServiceSessionOptions {
 
 using CallId = std::uint64_t;
 
-enum class CallKind : std::uint8_t { property_get, property_set, function, peek_in, peek_out, poke_out };
+enum class CallKind : std::uint8_t {
+  property_get,
+  property_set,
+  function,
+  peek_in,
+  peek_out,
+  poke_out,
+  generator_open,   ///< a call of a generator function; any value answers it
+  generator_next,   ///< answered with the next value, or with the error stop_iteration after the last one
+  generator_close,  ///< the client has enough: any value answers it
+  generator_abort,  ///< the client wants it to stop at once: any value answers it
+};
 
 /// A request for the application, to be answered exactly once with reply().
 struct Called {
@@ -45,8 +58,10 @@ struct Called {
   CallKind kind = CallKind::function;
   std::shared_ptr<ServiceObject> object;
   const MemberDefinition* member = nullptr;
-  std::vector<Value> arguments;  ///< function: parameters; property_set, poke_out: the value
+  std::vector<Value> arguments;  ///< function, generator_open: parameters; property_set, poke_out: the value;
+                                 ///< generator_next: the parameter, where the generator takes one
   TimeSpec time = {};            ///< poke_out
+  GeneratorId generator = 0;     ///< generator_...
 };
 struct ClientConnected {
   HostedService* service = nullptr;
@@ -96,12 +111,17 @@ struct PipeAcknowledged {
 struct PipeClosed {
   PipeId id = 0;
 };
+/// Nothing more comes for this generator: it ended, was closed or aborted, was left alone for ten minutes, or its
+/// object was released. Generators that still run when the client goes end with it: there is only ClientGone.
+struct GeneratorEnded {
+  GeneratorId id = 0;
+};
 /// The last event.
 struct ClientGone {
   Error reason;
 };
 using ServiceEvent = std::variant<Called, ClientConnected, LoginRequested, WireConnected, WireReceived, PipeConnected,
-                                  PipeReceived, PipeAcknowledged, PipeClosed, ClientGone>;
+                                  PipeReceived, PipeAcknowledged, PipeClosed, GeneratorEnded, ClientGone>;
 
 /// One client of a node. Node-level requests (definitions, attributes, the service index) are answered in here.
 class ServiceSession {
@@ -174,6 +194,8 @@ class ServiceSession {
     std::uint32_t request_id = 0;
     std::string path;
     const MemberDefinition* member = nullptr;
+    GeneratorId generator = 0;
+    GeneratorStep step = GeneratorStep::next;
   };
 
   /// A login that is being judged.
@@ -233,6 +255,7 @@ class ServiceSession {
   Result<> dispatch_member(const Message& message, const MessageEntry& entry, Now now);
   Result<> add_call(const Message& message, const MessageEntry& entry, CallKind kind, HostedService::Found found,
                     const MemberDefinition& member);
+  Result<> check_room_for_call() const;
   Result<> answer_wire(const MessageEntry& entry, const HostedService::Found& found, const MemberDefinition& member,
                        Now now);
   Result<> answer_service_index(const MessageEntry& entry, const MemberDefinition& member, Now now);
@@ -249,6 +272,15 @@ class ServiceSession {
   ServicePipe* find_pipe(PipeId id);
   ServicePipe* find_pipe(const MessageEntry& entry, std::int32_t index);
   void forget_pipe(PipeId id);
+
+  // generators (service_generator.cpp)
+  Result<> open_generator(const Message& message, const MessageEntry& entry, HostedService::Found found,
+                          const MemberDefinition& member);
+  Result<> step_generator(const Message& message, const MessageEntry& entry, HostedService::Found found,
+                          const MemberDefinition& member, Now now);
+  Result<> write_generator_reply(const OpenCall& call, const Value& value, Now now);
+  void finish_generator_call(const OpenCall& call, bool has_failed, Now now);
+  void end_generators(const std::vector<GeneratorId>& ended);
 
   void begin_reply(const MessageEntry& request);
   void send_error(const MessageEntry& request, const Error& error, Now now);
@@ -273,6 +305,7 @@ class ServiceSession {
 
   CallId last_call_id_ = 0;
   std::vector<OpenCall> calls_;
+  GeneratorTable generators_;
   std::map<PathMember, WireConnection, PathMemberLess> wires_;
   PipeStore pipe_store_;  ///< outlives pipes_
   PipeId last_pipe_id_ = 0;

@@ -106,6 +106,13 @@ Value RemoteObject::call_values(std::string_view function, std::span<const Value
       [&](ClientConnection& connection, auto done) { connection.call(path_, function, arguments, std::move(done)); });
 }
 
+RemoteGenerator RemoteObject::generator_values(std::string_view function, std::span<const Value> arguments) const {
+  const Value index = connection_->wait_for([&](ClientConnection& connection, auto done) {
+    connection.open_generator(path_, function, arguments, std::move(done));
+  });
+  return {connection_, path_, std::string(function), *index.to<std::int32_t>()};
+}
+
 Value RemoteObject::get(std::string_view property) const {
   return connection_->wait_for(
       [&](ClientConnection& connection, auto done) { connection.get(path_, property, std::move(done)); });

@@ -17,6 +17,7 @@
 
 #include "server/node/client_connection.hpp"
 #include "server/node/handler.hpp"
+#include "server/node/remote_generator.hpp"
 
 namespace rr {
 
@@ -117,6 +118,13 @@ class RemoteObject {
     return call_values(function, values);
   }
   Value call_values(std::string_view function, std::span<const Value> arguments) const;
+  /// Calls a generator function.
+  template <class... Args>
+  RemoteGenerator generator(std::string_view function, Args&&... arguments) const {
+    const std::array<Value, sizeof...(Args)> values{to_value(std::forward<Args>(arguments))...};
+    return generator_values(function, values);
+  }
+  RemoteGenerator generator_values(std::string_view function, std::span<const Value> arguments) const;
   Value get(std::string_view property) const;
   void set(std::string_view property, const Value& value) const;
   RemoteObject object(std::string_view objref) const;

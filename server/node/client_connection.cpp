@@ -50,6 +50,26 @@ void ClientConnection::call(std::string_view path, std::string_view function, st
   expect(session_.call_function(path, function, arguments, read_clocks()), std::move(done));
 }
 
+void ClientConnection::open_generator(std::string_view path, std::string_view function,
+                                      std::span<const Value> arguments, Completion done) {
+  expect(session_.open_generator(path, function, arguments, read_clocks()), std::move(done));
+}
+
+void ClientConnection::next_generator(std::string_view path, std::string_view function, std::int32_t index,
+                                      const std::optional<Value>& parameter, Completion done) {
+  expect(session_.next_generator(path, function, index, parameter, read_clocks()), std::move(done));
+}
+
+void ClientConnection::close_generator(std::string_view path, std::string_view function, std::int32_t index,
+                                       Completion done) {
+  expect(session_.close_generator(path, function, index, read_clocks()), std::move(done));
+}
+
+void ClientConnection::abort_generator(std::string_view path, std::string_view function, std::int32_t index,
+                                       Completion done) {
+  expect(session_.abort_generator(path, function, index, read_clocks()), std::move(done));
+}
+
 void ClientConnection::get(std::string_view path, std::string_view property, Completion done) {
   expect(session_.get_property(path, property, read_clocks()), std::move(done));
 }

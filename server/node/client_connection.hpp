@@ -40,6 +40,13 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   // complete with.
   const std::string& root_path() const { return session_.service(); }
   void call(std::string_view path, std::string_view function, std::span<const Value> arguments, Completion done);
+  /// Completes with the generator's index, for the others; next with the error stop_iteration after the last value.
+  void open_generator(std::string_view path, std::string_view function, std::span<const Value> arguments,
+                      Completion done);
+  void next_generator(std::string_view path, std::string_view function, std::int32_t index,
+                      const std::optional<Value>& parameter, Completion done);
+  void close_generator(std::string_view path, std::string_view function, std::int32_t index, Completion done);
+  void abort_generator(std::string_view path, std::string_view function, std::int32_t index, Completion done);
   void get(std::string_view path, std::string_view property, Completion done);
   void set(std::string_view path, std::string_view property, const Value& value, Completion done);
   void find_object(std::string_view path, Completion done);

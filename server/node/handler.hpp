@@ -105,24 +105,35 @@ Value to_value(T&& value) {
 
 namespace detail {
 
-template <class R, class... Args, class F, std::size_t... Index>
-Handler make_typed_handler(F function, std::index_sequence<Index...>) {
+/// Converts each argument to its C++ type and returns what `use` makes of them, or the error of the first that does not
+/// convert.
+template <class... Args, std::size_t... Index, class Use>
+auto with_arguments(std::span<const Value> arguments, std::index_sequence<Index...>, Use&& use)
+    -> decltype(use(std::declval<std::remove_cvref_t<Args>>()...)) {
+  if (arguments.size() != sizeof...(Args))
+    return make_error(ErrorCode::invalid_argument, "wrong number of arguments for the handler");
+  [[maybe_unused]] std::tuple converted{from_value<std::remove_cvref_t<Args>>(arguments[Index])...};
+  std::optional<Error> failure;
+  ((std::get<Index>(converted).has_error() ? void(failure = std::get<Index>(converted).error()) : void()), ...);
+  if (failure) return std::move(*failure);
+  return use(std::move(*std::get<Index>(converted))...);
+}
+
+template <class R, class... Args, class F>
+Handler make_typed_handler(F function) {
   Handler handler;
   handler.parameters = {handler_type<Args>()...};
   handler.result = handler_type<R>();
-  handler.call = [function = std::move(function)](std::span<const Value> arguments) mutable -> Result<Value> {
-    if (arguments.size() != sizeof...(Args))
-      return make_error(ErrorCode::invalid_argument, "wrong number of arguments for the handler");
-    [[maybe_unused]] std::tuple converted{from_value<std::remove_cvref_t<Args>>(arguments[Index])...};
-    std::optional<Error> failure;
-    ((std::get<Index>(converted).has_error() ? void(failure = std::get<Index>(converted).error()) : void()), ...);
-    if (failure) return std::move(*failure);
-    if constexpr (std::is_void_v<R>) {
-      function(std::move(*std::get<Index>(converted))...);
-      return Value{};
-    } else {
-      return to_value(function(std::move(*std::get<Index>(converted))...));
-    }
+  handler.call = [function = std::move(function)](std::span<const Value> arguments) mutable {
+    return with_arguments<Args...>(arguments, std::index_sequence_for<Args...>{},
+                                   [&](std::remove_cvref_t<Args>... converted) -> Result<Value> {
+                                     if constexpr (std::is_void_v<R>) {
+                                       function(std::move(converted)...);
+                                       return Value{};
+                                     } else {
+                                       return to_value(function(std::move(converted)...));
+                                     }
+                                   });
   };
   return handler;
 }
@@ -133,7 +144,7 @@ template <class R, class... Args>
 struct Signature<R (*)(Args...)> {
   template <class F>
   static Handler make(F function) {
-    return make_typed_handler<R, Args...>(std::move(function), std::index_sequence_for<Args...>{});
+    return make_typed_handler<R, Args...>(std::move(function));
   }
 };
 template <class R, class... Args>

@@ -13,8 +13,15 @@ namespace {
 
 /// Kinds whose members need no handler yet: calls of them are answered with NotImplementedError.
 bool may_be_absent(const MemberDefinition& member) {
-  return member.is_generator() || (member.kind != MemberKind::function && member.kind != MemberKind::property &&
-                                   member.kind != MemberKind::objref);
+  return member.kind != MemberKind::function && member.kind != MemberKind::property &&
+         member.kind != MemberKind::objref;
+}
+
+/// What one step of a generator carries; void for any other type.
+TypeDefinition step_type(TypeDefinition type) {
+  if (type.container != ContainerKind::generator) return {};
+  type.container = ContainerKind::none;
+  return type;
 }
 
 bool is_indexed(const MemberDefinition& objref) {
@@ -39,20 +46,20 @@ std::string read_file(const std::string& path) {
   return text.str();
 }
 
-void check_parameters(const std::string& where, const Handler& handler,
+void check_parameters(const std::string& where, const std::vector<HandlerType>& taken,
                       const std::vector<ParameterDefinition>& parameters) {
-  if (handler.parameters.size() != parameters.size())
-    refuse(where + ": the handler takes " + std::to_string(handler.parameters.size()) +
-           " parameters, the definition has " + std::to_string(parameters.size()));
+  if (taken.size() != parameters.size())
+    refuse(where + ": the handler takes " + std::to_string(taken.size()) + " parameters, the definition has " +
+           std::to_string(parameters.size()));
   for (std::size_t i = 0; i < parameters.size(); ++i)
-    if (!accepts(handler.parameters[i], parameters[i].type))
+    if (!accepts(taken[i], parameters[i].type))
       refuse(where + ": parameter '" + parameters[i].name + "' is " + format_type(parameters[i].type) +
-             ", the handler takes " + handler_type_text(handler.parameters[i]));
+             ", the handler takes " + handler_type_text(taken[i]));
 }
 
-void check_result(const std::string& where, const Handler& handler, const TypeDefinition& type) {
-  if (!returns(handler.result, type))
-    refuse(where + ": is " + format_type(type) + ", the handler returns " + handler_type_text(handler.result));
+void check_result(const std::string& where, const HandlerType& result, const TypeDefinition& type) {
+  if (!returns(result, type))
+    refuse(where + ": is " + format_type(type) + ", the handler returns " + handler_type_text(result));
 }
 
 }  // namespace
@@ -83,28 +90,46 @@ void Object::set_handler(std::string_view name, HandlerSlot slot, Handler handle
   Member& mine = members_[&member];
   switch (slot) {
     case HandlerSlot::call:
-      if (member.is_generator()) refuse(where + ": generator functions are not available yet");
-      check_parameters(where, handler, member.parameters);
-      check_result(where, handler, member.type);
+      if (member.is_generator()) refuse(where + " is a generator function: it takes a handler of generator()");
+      check_parameters(where, handler.parameters, member.parameters);
+      check_result(where, handler.result, member.type);
       mine.call = std::move(handler);
       break;
     case HandlerSlot::get:
       if (direction == MemberDirection::writeonly) refuse(where + " is writeonly: it takes no get handler");
-      check_parameters(where + " (get)", handler, {});
-      check_result(where, handler, member.type);
+      check_parameters(where + " (get)", handler.parameters, {});
+      check_result(where, handler.result, member.type);
       mine.get = std::move(handler);
       break;
     case HandlerSlot::set:
       if (direction == MemberDirection::readonly) refuse(where + " is readonly: it takes no set handler");
-      check_parameters(where + " (set)", handler, {{"value", member.type}});
+      check_parameters(where + " (set)", handler.parameters, {{"value", member.type}});
       mine.set = std::move(handler);
       break;
     case HandlerSlot::wire_received:
       if (direction == MemberDirection::readonly) refuse(where + " is readonly: clients send nothing on it");
-      check_parameters(where, handler, {{"value", member.type}});
+      check_parameters(where, handler.parameters, {{"value", member.type}});
       mine.wire_received = std::move(handler);
       break;
   }
+}
+
+void Object::set_generator(std::string_view name, GeneratorHandler handler) {
+  const MemberDefinition& member = require_member(name, MemberKind::function);
+  const std::string where = type_name() + "." + member.name;
+  if (!member.is_generator()) refuse(where + " is no generator function: it takes a handler of function()");
+  auto parameters = member.parameters;
+  std::vector<ParameterDefinition> step_parameters;
+  if (!parameters.empty() && parameters.back().type.container == ContainerKind::generator) {
+    step_parameters = {{parameters.back().name, step_type(parameters.back().type)}};
+    parameters.pop_back();
+  }
+  check_parameters(where, handler.parameters, parameters);
+  if (!handler.checks_itself) {
+    check_parameters(where + ", each step", handler.step_parameters, step_parameters);
+    check_result(where + ", each step", handler.value, step_type(member.type));
+  }
+  members_[&member].generator = std::move(handler);
 }
 
 void Object::fire_values(std::string_view event, std::span<const Value> arguments) {
@@ -171,7 +196,8 @@ std::vector<std::string> Object::missing_handlers() const {
       if (!is_there) missing.push_back(std::string(what) + " " + type_->name + "." + member.name);
     };
     const MemberDirection direction = member.direction();
-    if (member.kind == MemberKind::function) report(mine && mine->call.call, "function");
+    if (member.kind == MemberKind::function)
+      report(mine && (member.is_generator() ? bool(mine->generator.open) : bool(mine->call.call)), "function");
     if (member.kind == MemberKind::objref) report(mine && mine->find, "objref");
     if (member.kind != MemberKind::property) continue;
     if (direction != MemberDirection::writeonly) report(mine && mine->get.call, "get of property");
@@ -226,8 +252,19 @@ Result<Value> Object::answer(const Called& called) {
       wire.out_value = called.arguments.front();
       return wire.wire_received.call ? wire.wire_received.call(called.arguments) : Value{};
     }
+    case CallKind::generator_open:
+    case CallKind::generator_next:
+    case CallKind::generator_close:
+    case CallKind::generator_abort:
+      break;  // ServiceClient keeps generators and answers for them
   }
   return missing("member");
+}
+
+Result<Generator> Object::open_generator(const Called& called) {
+  const auto found = members_.find(called.member);
+  if (found != members_.end() && found->second.generator.open) return found->second.generator.open(called.arguments);
+  return make_error(ErrorCode::not_implemented_error, "generator '" + called.member->name + "' has no handler");
 }
 
 void Object::receive_wire(const WireReceived& received) {

@@ -30,6 +30,7 @@
 
 #include "core/session/hosted_service.hpp"
 #include "core/session/service_session.hpp"
+#include "server/node/generator.hpp"
 #include "server/node/handler.hpp"
 #include "server/node/pipe_endpoint.hpp"
 
@@ -127,6 +128,11 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   void function(std::string_view name, F&& handler) {
     set_handler(name, HandlerSlot::call, make_handler(std::forward<F>(handler)));
   }
+  /// A generator function: generator.hpp says what the handler is.
+  template <class F>
+  void generator(std::string_view name, F&& handler) {
+    set_generator(name, make_generator_handler(std::forward<F>(handler)));
+  }
   Property property(std::string_view name) { return {this, std::string(name)}; }
   Pipe pipe(std::string_view name) { return {this, std::string(name)}; }
 
@@ -165,7 +171,8 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
 
   /// What the service has for one member.
   struct Member {
-    Handler call;  ///< functions
+    Handler call;                ///< functions
+    GeneratorHandler generator;  ///< generator functions
     Handler get;
     Handler set;
     Handler wire_received;
@@ -186,6 +193,7 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   void set_packet_handler(std::string_view name, HandlerType packet, PacketHandler handler);
   std::size_t broadcast(std::string_view pipe, const Value& value, std::int32_t max_backlog);
   const std::vector<PipeEndpoint>& endpoints(std::string_view pipe);
+  void set_generator(std::string_view name, GeneratorHandler handler);
   std::vector<std::string> paths() const;
   void release_path(const std::string& path);
   /// Texts like "function Drive", for functions, property accessors and objrefs without handler.
@@ -193,6 +201,7 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
 
   // Requests of clients; handlers run in here and may throw.
   Result<Value> answer(const Called& called);
+  Result<Generator> open_generator(const Called& called);
   void receive_wire(const WireReceived& received);
   void connect_pipe(const MemberDefinition& pipe, const PipeEndpoint& endpoint);
   Result<> receive_packet(const MemberDefinition& pipe, const PipeEndpoint& endpoint, const Value& packet);
@@ -261,6 +270,10 @@ class Service {
   template <class F>
   void function(std::string_view member, F&& handler) {
     root_->function(member, std::forward<F>(handler));
+  }
+  template <class F>
+  void generator(std::string_view member, F&& handler) {
+    root_->generator(member, std::forward<F>(handler));
   }
   Object::Property property(std::string_view member) { return root_->property(member); }
   Object::Pipe pipe(std::string_view member) { return root_->pipe(member); }

@@ -15,6 +15,19 @@ Error error_of(const std::exception& exception) {
   return {ErrorCode::remote_error, exception.what(), "rrgate.UnhandledException"};
 }
 
+/// As reply() wants it: the end, and whatever else is no value, is an error.
+Result<Value> next_value(const Generator& generator, std::span<const Value> arguments) {
+  Result<std::optional<Value>> value = std::nullopt;
+  try {
+    value = generator.next(arguments.empty() ? Value{} : arguments.front());
+  } catch (const std::exception& exception) {
+    return error_of(exception);
+  }
+  if (!value) return value.error();
+  if (!*value) return make_error(ErrorCode::stop_iteration, {});
+  return std::move(**value);
+}
+
 }  // namespace
 
 ServiceClient::ServiceClient(ClientId id, ServiceClientOwner& owner, ServiceDirectory& directory,
@@ -66,12 +79,42 @@ void ServiceClient::handle(const Called& called, Now now) {
   owner_->set_current_client(id_);
   Result<Value> answer = Value{};
   try {
-    answer = static_cast<Object&>(*called.object).answer(called);
+    answer = called.generator != 0 ? answer_generator(called) : static_cast<Object&>(*called.object).answer(called);
   } catch (const std::exception& exception) {
     answer = error_of(exception);
   }
   if (owner_) owner_->set_current_client(0);
   session_.reply(called.id, answer, now);
+}
+
+/// Generators end here when they say so, and in GeneratorEnded when the session does.
+Result<Value> ServiceClient::answer_generator(const Called& called) {
+  if (called.kind == CallKind::generator_open) {
+    auto opened = static_cast<Object&>(*called.object).open_generator(called);
+    if (!opened) return opened.error();
+    generators_.emplace(called.generator, std::move(*opened));
+    return Value{};
+  }
+  if (called.kind == CallKind::generator_next) {
+    const auto found = generators_.find(called.generator);
+    if (found == generators_.end()) return make_error(ErrorCode::invalid_operation, "Invalid generator");
+    auto value = next_value(found->second, called.arguments);
+    if (!value) generators_.erase(found);
+    return value;
+  }
+  auto ended = generators_.extract(called.generator);
+  if (ended.empty()) return Value{};
+  const auto& handler = called.kind == CallKind::generator_close ? ended.mapped().close : ended.mapped().abort;
+  if (handler) handler();
+  return Value{};
+}
+
+void ServiceClient::abandon_generator(const Generator& generator) {
+  if (generator.abort) run_handler("a generator's", "abort", generator.abort);
+}
+
+void ServiceClient::handle(const GeneratorEnded& ended, Now) {
+  if (const auto left = generators_.extract(ended.id)) abandon_generator(left.mapped());
 }
 
 void ServiceClient::handle(const ClientConnected& connected, Now) {
@@ -180,6 +223,8 @@ void ServiceClient::end_pipe(PipeId id, bool tells_handler) {
 
 void ServiceClient::handle(const ClientGone&, Now) {
   while (owner_ && !pipes_.empty()) end_pipe(pipes_.begin()->first, true);
+  for (const auto& [id, generator] : std::exchange(generators_, {}))
+    if (owner_) abandon_generator(generator);
   Service* const left = std::exchange(service_, nullptr);
   if (left && left->on_gone_) left->on_gone_(id_);
 }

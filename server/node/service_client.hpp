@@ -51,6 +51,9 @@ class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSe
   void ended() override;
 
   void handle(const Called& called, Now now);
+  Result<Value> answer_generator(const Called& called);
+  /// Tells a generator that nobody will ask it any more.
+  void abandon_generator(const Generator& generator);
   void handle(const ClientConnected& connected, Now now);
   void handle(const LoginRequested& login, Now now);
   void handle(const WireConnected& connected, Now now);
@@ -59,6 +62,7 @@ class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSe
   void handle(const PipeReceived& received, Now now);
   void handle(const PipeAcknowledged& acknowledged, Now now);
   void handle(const PipeClosed& closed, Now now);
+  void handle(const GeneratorEnded& ended, Now now);
   void handle(const ClientGone& gone, Now now);
 
   // PipeSender: from endpoints
@@ -74,6 +78,7 @@ class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSe
   ServiceClientOwner* owner_;
   Service* service_ = nullptr;
   std::unordered_map<PipeId, PipeEndpoint> pipes_;
+  std::unordered_map<GeneratorId, Generator> generators_;  ///< as many as the session allows
 };
 
 }  // namespace rr

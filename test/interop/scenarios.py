@@ -54,6 +54,9 @@ SAMPLE = {"Sample": {"id": {"int32": -7}, "reading": {"double[]": [1.0, 2.0, 3.0
 OTHER_SAMPLE = {"Sample": {"id": {"int32": 2147483647}, "reading": {"double[]": [-1.0, 0.0, 1.0]}, "tag": {"uint8[]": []},
                            "position": {"Vector3": [4.0, 5.0, 6.0]}}}
 TRANSFORM = {"Transform": [1.0, 0.0, 0.0, 0.0, 10.0, 20.0, 30.0]}
+STOP = "RobotRaconteur.StopIteration"
+
+
 def poses(*px):
     return [{**plain_of(POSE), "px": float(x)} for x in px]
 
@@ -259,6 +262,48 @@ SCENARIOS = [
         {"open_pipe": "taken", "as": "t", "expect": 1},
         {"send": "t", "values": [{"ramp": 1310720}, {"double[]": [0.5]}, {"ramp": 1310720}], "expect": None},
         {"get_until": "seen_sum", "until": 1717985607680.5, "expect": 1717985607680.5}], clients=NATIVE),
+    Scenario("generators", [
+        {"generate": "count_up", "as": "g", "args": [{"double": 0.5}, {"int32": 3}], "expect": None},
+        {"next": "g", "expect": 0.5},
+        {"next": "g", "expect": 1.5},
+        {"next": "g", "expect": 2.5},
+        {"next": "g", "expect_error": STOP},
+        {"generate": "count_up", "as": "none", "args": [{"double": 0.0}, {"int32": 0}], "expect": None},
+        {"next": "none", "expect_error": STOP},
+        {"generate": "walk", "as": "a", "args": [POSE, {"int32": 2}], "expect": None},
+        {"generate": "walk", "as": "b", "args": [OTHER_POSE, {"int32": 1}], "expect": None},
+        {"next": "a", "expect": {**plain_of(POSE), "px": 2.5}},
+        {"next": "b", "expect": {**plain_of(OTHER_POSE), "px": 1.0}},
+        {"next": "b", "expect_error": STOP},
+        {"next": "a", "expect": {**plain_of(POSE), "px": 3.5}},
+        {"next": "a", "expect_error": STOP}], clients=NATIVE),
+    Scenario("generators_with_parameter", [
+        {"generate": "scale", "as": "s", "args": [{"double": 2.0}], "expect": None},
+        {"next": "s", "value": {"double": 1.5}, "expect": 3.0},
+        {"next": "s", "value": {"double": -4.0}, "expect": -8.0},
+        {"close_generator": "s", "expect": None},
+        {"next": "s", "value": {"double": 1.0}, "expect_error": STOP},
+        {"generate": "collect", "as": "c", "expect": None},
+        {"next": "c", "value": {"double[]": [1.0, 2.0]}, "expect": None},
+        {"next": "c", "value": {"double[]": []}, "expect": None},
+        {"next": "c", "value": {"double[]": [3.0]}, "expect": None},
+        {"close_generator": "c", "expect": None},
+        {"get": "collected", "expect": [1.0, 2.0, 3.0]}], clients=NATIVE),
+    Scenario("generators_that_are_stopped", [
+        {"generate": "count_up", "as": "c", "args": [{"double": 0.0}, {"int32": 1000000}], "expect": None},
+        {"next": "c", "expect": 0.0},
+        {"close_generator": "c", "expect": None},
+        {"get": "generator_end", "expect": "closed"},
+        {"next": "c", "expect_error": STOP},
+        {"generate": "count_up", "as": "a", "args": [{"double": 7.0}, {"int32": 1000000}], "expect": None},
+        {"next": "a", "expect": 7.0},
+        {"abort_generator": "a", "expect": None},
+        {"get": "generator_end", "expect": "aborted"},
+        {"next": "a", "expect_error": "RobotRaconteur.OperationAborted"},
+        {"generate": "count_up", "as": "f", "args": [{"double": 1.0}, {"int32": -1}], "expect": None},
+        {"next": "f", "expect": 1.0},
+        {"next": "f", "expect_error": "RobotRaconteur.OutOfRange", "message": "no more"},
+        {"next": "f", "expect_error": "RobotRaconteur.InvalidOperation"}], clients=NATIVE),
 ]
 
 

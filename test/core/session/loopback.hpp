@@ -6,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/member/error_entry.hpp"
 #include "core/session/client_session.hpp"
 #include "core/session/service_session.hpp"
 
@@ -37,6 +38,8 @@ object Arm
   function void stop()
   function void jam()
   function int32{generator} count()
+  function double{generator} scale(double factor, double{generator} values)
+  function void sink(string{generator} lines)
   event bumped(int32 side, string what)
   objref Tool tool
   objref Tool{string} tools
@@ -121,6 +124,36 @@ class Loopback {
     auto done = next_client<Completed>();
     if (done.id != id) throw std::runtime_error("completed another request");
     return done.result;
+  }
+
+  /// What a peer of another make might send: `write` adds entries to a message of the sender's session, which carry()
+  /// then takes across.
+  template <class Session, class Write>
+  void forge(Session& sender, Write&& write) {
+    auto& connection = const_cast<Connection&>(sender.connection());
+    Message message;
+    connection.begin_message(message);
+    write(message);
+    connection.send(message, now).value();
+  }
+  /// Drops what the client has sent: the test answers in the service's place.
+  void lose_requests() {
+    std::size_t size = 0;
+    for (const auto slice : client->poll_transmit()) size += slice.size();
+    client->handle_transmitted(size, now);
+  }
+  /// The error of the service's answer to such a message; none where it is no error.
+  template <class Write>
+  Error answer_to(Write&& write) {
+    forge(*client, write);
+    carry(*client, *service, 1u << 20);
+    Bytes bytes;
+    for (const auto slice : service->poll_transmit()) bytes.insert(bytes.end(), slice.begin(), slice.end());
+    service->handle_transmitted(bytes.size(), now);
+    Message answer;
+    decode(bytes, {.string_table = {true, true}}, answer).value();
+    if (answer.entries.front().error == ErrorCode::none) return {ErrorCode::none, {}};
+    return read_error(answer, answer.entries.front(), TypeRegistry{});
   }
 
   template <class From, class To>

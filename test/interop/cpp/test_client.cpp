@@ -52,7 +52,11 @@ class Client {
                                                    {"send", &Client::send},
                                                    {"packets", &Client::packets},
                                                    {"close_pipe", &Client::close_pipe},
-                                                   {"closed", &Client::closed}};
+                                                   {"closed", &Client::closed},
+                                                   {"generate", &Client::generate},
+                                                   {"next", &Client::next},
+                                                   {"close_generator", &Client::close_generator},
+                                                   {"abort_generator", &Client::abort_generator}};
     return table;
   }
 
@@ -82,10 +86,14 @@ class Client {
     return nullptr;
   }
 
-  json call(const rr::RemoteObject& target, const std::string& member, const json& step) {
+  static std::vector<rr::Value> arguments_of(const json& step) {
     std::vector<rr::Value> arguments;
     for (const auto& argument : step.value("args", json::array())) arguments.push_back(from_scenario(argument));
-    const rr::Value result = target.call_values(member, arguments);
+    return arguments;
+  }
+
+  json call(const rr::RemoteObject& target, const std::string& member, const json& step) {
+    const rr::Value result = target.call_values(member, arguments_of(step));
     return step.value("digest", false) ? to_digest(result) : to_plain(result);
   }
 
@@ -95,6 +103,30 @@ class Client {
     do value = to_plain(target.get(member));
     while (value != step.at("until") && std::chrono::steady_clock::now() < deadline);
     return value;
+  }
+
+  // generators
+
+  json generate(const rr::RemoteObject& target, const std::string& member, const json& step) {
+    generators_.insert_or_assign(step.at("as").get<std::string>(), target.generator_values(member, arguments_of(step)));
+    return nullptr;
+  }
+
+  json next(const rr::RemoteObject&, const std::string& name, const json& step) {
+    rr::RemoteGenerator& generator = generators_.at(name);
+    const auto value = step.contains("value") ? generator.next(from_scenario(step.at("value"))) : generator.next();
+    if (!value) throw rr::ClientException({rr::ErrorCode::stop_iteration, {}});
+    return to_plain(*value);
+  }
+
+  json close_generator(const rr::RemoteObject&, const std::string& name, const json&) {
+    generators_.at(name).close();
+    return nullptr;
+  }
+
+  json abort_generator(const rr::RemoteObject&, const std::string& name, const json&) {
+    generators_.at(name).abort();
+    return nullptr;
   }
 
   // events
@@ -243,6 +275,7 @@ class Client {
   std::map<std::string, Pipe> pipes_;                 ///< by the name that the scenario gives
   std::map<std::string, json> events_;                ///< by event
   std::map<std::string, json> in_values_;             ///< by wire
+  std::map<std::string, rr::RemoteGenerator> generators_;
 };
 
 json error_of(const rr::ClientException& exception) {

@@ -24,6 +24,7 @@ class Interop {
     add_objects();
     add_wires();
     add_pipes();
+    add_generators();
     node.add(service_);
   }
 
@@ -157,11 +158,46 @@ class Interop {
     });
   }
 
+  void add_generators() {
+    service_->property("collected").get([this] { return collected_; });
+    service_->property("generator_end").get([this] { return generator_end_; });
+    service_->generator("count_up", [this](double first, std::int32_t count) {
+      rr::Generator generator;
+      generator.next = [first, count, i = 0](const rr::Value&) mutable -> rr::Result<std::optional<rr::Value>> {
+        if (i < std::abs(count)) return std::optional<rr::Value>(first + i++);
+        if (count < 0) throw rr::ServiceException("no more", rr::ErrorCode::out_of_range);
+        return std::optional<rr::Value>();
+      };
+      generator.close = [this] { generator_end_ = "closed"; };
+      generator.abort = [this] { generator_end_ = "aborted"; };
+      return generator;
+    });
+    service_->generator("walk", [](rr::Value pose, std::int32_t count) {
+      return [pose = std::move(pose), count]() mutable -> std::optional<rr::Value> {
+        if (count-- == 0) return std::nullopt;
+        rr::Value& px = pose.get_if<rr::Structure>()->fields[0].value;
+        px = px.to<double>().value() + 1;
+        return pose;
+      };
+    });
+    service_->generator("scale", [](double factor) {
+      return [factor](double value) -> std::optional<double> { return factor * value; };
+    });
+    service_->generator("collect", [this] {
+      collected_.clear();
+      return [this](const std::vector<double>& values) {
+        collected_.insert(collected_.end(), values.begin(), values.end());
+      };
+    });
+  }
+
   std::shared_ptr<rr::Service> service_;
   double sum_ = 0;
   std::map<std::string, rr::Value> stored_;
   double secret_ = 0;
   double target_ = 0;
+  std::vector<double> collected_;
+  std::string generator_end_;
   Parts parts_;
   Parts named_;
 };

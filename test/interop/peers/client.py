@@ -27,6 +27,7 @@ class Client:
         self._events = {}
         self._wires = {}
         self._pipes = {}
+        self._generators = {}
 
     def carry_out(self, step):
         target = self._others[step["by"]] if "by" in step else self._root
@@ -81,6 +82,22 @@ class Client:
 
     def do_exit(self, target, what, step):
         RR.RobotRaconteurNode.s.MonitorExit(target)
+
+    # generators
+
+    def do_generate(self, target, member, step):
+        arguments = (self._values.build(value) for value in step.get("args", []))
+        self._generators[step["as"]] = getattr(target, member)(*arguments)
+
+    def do_next(self, target, name, step):
+        given = [self._values.build(step["value"])] if "value" in step else []
+        return plain(self._generators[name].Next(*given))
+
+    def do_close_generator(self, target, name, step):
+        self._generators[name].Close()
+
+    def do_abort_generator(self, target, name, step):
+        self._generators[name].Abort()
 
     # events
 

@@ -45,6 +45,28 @@ class SpecialPart(Part):
         self.feature = "none"
 
 
+class Steps:
+    """A generator: `step` makes each value, until the client stops it."""
+
+    def __init__(self, service, step):
+        self._service = service
+        self._step = step
+        self._end = None
+
+    def Next(self, *parameter):
+        if self._end == "closed":
+            raise RR.StopIterationException("")
+        if self._end == "aborted":
+            raise RR.OperationAbortedException("aborted")
+        return self._step(*parameter)
+
+    def Close(self):
+        self._end = self._service.generator_end = "closed"
+
+    def Abort(self):
+        self._end = self._service.generator_end = "aborted"
+
+
 class Interop:
     """Properties that only store are plain attributes; those with a rule are written out below."""
 
@@ -61,6 +83,8 @@ class Interop:
         self.seen_secret = 0.0
         self.seen_target = 0.0
         self.seen_sum = 0.0
+        self.collected = []
+        self.generator_end = ""
         self.changed = RR.EventHook()
         self.cleared = RR.EventHook()
         self._head = Part("head")
@@ -172,6 +196,36 @@ class Interop:
         if kind == "custom":
             raise RR.RobotRaconteurNode.s.GetExceptionType(TYPE + ".InteropError")(text)
         raise ERRORS[kind](text)
+
+    # generators
+
+    def count_up(self, first, count):
+        numbers = iter(range(abs(count)))
+
+        def step():
+            for number in numbers:
+                return first + number
+            if count < 0:
+                raise RR.OutOfRangeException("no more")
+            raise RR.StopIterationException("")
+
+        return Steps(self, step)
+
+    def walk(self, start, count):
+        for _ in range(count):
+            start.px += 1
+            yield start
+
+    def scale(self, factor):
+        return Steps(self, lambda value: factor * value)
+
+    def collect(self):
+        self.collected = []
+
+        def step(values):
+            self.collected = numpy.concatenate((self.collected, values))
+
+        return Steps(self, step)
 
     # events
 

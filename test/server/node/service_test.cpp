@@ -65,6 +65,7 @@ std::shared_ptr<Service> make_complete_lamp() {
   lamp->property("secret").set([](std::int32_t) {});
   lamp->function("blink", [](std::int16_t, std::vector<double>) {});
   lamp->function("total", [] { return 3; });
+  lamp->generator("scan", [] { return [] { return std::optional<double>(); }; });
   lamp->objref("bulb", std::shared_ptr<Object>());
   lamp->objref("bulbs", [](std::string_view) { return std::shared_ptr<Object>(); });
   return lamp;
@@ -122,7 +123,8 @@ TEST_CASE("a node names every handler that is missing, and leaves out kinds that
   lamp->function("total", [] { return 3; });
   CHECK_THAT(refusal([&] { node.add(lamp); }),
              Equals("service 'lamp': no handler for set of property Lamp.brightness, get of property Lamp.name, "
-                    "set of property Lamp.secret, function Lamp.blink, objref Lamp.bulb, objref Lamp.bulbs"));
+                    "set of property Lamp.secret, function Lamp.blink, objref Lamp.bulb, objref Lamp.bulbs, "
+                    "function Lamp.scan"));
 
   const auto complete = make_complete_lamp();
   const auto bulb = complete->make_object("Bulb");
