@@ -234,16 +234,16 @@ SCENARIOS = [
         {"packets": "b", "count": 0, "expect": {"list": []}},
         {"send": "c", "values": [{"double": 11.0}], "expect": None},
         {"packets": "c", "count": 2, "expect": {"list": [20.0, 22.0]}},
-        {"close_pipe": "c", "expect": None}], clients=NATIVE),
+        {"close_pipe": "c", "expect": None}]),
     Scenario("pipe_early_packets", [
         {"open_pipe": "greetings", "as": "g", "expect": 1},
         {"packets": "g", "count": 2, "expect": {"list": ["hello", "world"]}},
-        {"close_pipe": "g", "expect": None}], clients=NATIVE),
+        {"close_pipe": "g", "expect": None}]),
     Scenario("pipe_unreliable", [
         {"open_pipe": "quick", "as": "q", "expect": 1},
         {"send": "q", "values": [{"double": 1.0}, {"double": 2.0}, {"double": 3.0}], "expect": None},
         {"packets": "q", "count": 3, "any_order": True, "expect": {"list": [2.0, 4.0, 6.0]}},
-        {"close_pipe": "q", "expect": None}], clients=NATIVE),
+        {"close_pipe": "q", "expect": None}]),
     Scenario("pipe_broadcast", [
         {"open_pipe": "poses", "as": "left", "expect": 1},
         {"open_pipe": "poses", "as": "right", "expect": 2},
@@ -252,16 +252,16 @@ SCENARIOS = [
         {"packets": "right", "count": 3, "expect": {"list": poses(0, 1, 2)}},
         {"close_pipe": "left", "expect": None},
         {"call": "publish_poses", "args": [POSE, {"int32": 1}], "expect": None},
-        {"packets": "right", "count": 4, "expect": {"list": poses(0, 1, 2, 0)}}], clients=NATIVE),
+        {"packets": "right", "count": 4, "expect": {"list": poses(0, 1, 2, 0)}}]),
     # More packets than the broadcaster lets wait: an endpoint that does not acknowledge misses some.
     Scenario("pipe_acknowledgements", [{"open_pipe": "poses", "as": "p", "expect": 1}] + [
         step for number in range(8) for step in (
             {"call": "publish_poses", "args": [POSE, {"int32": 1}], "expect": None},
-            {"packets": "p", "count": number + 1, "expect": {"list": poses(*[0] * (number + 1))}})], clients=NATIVE),
+            {"packets": "p", "count": number + 1, "expect": {"list": poses(*[0] * (number + 1))}})]),
     Scenario("pipe_large_packets", [
         {"open_pipe": "taken", "as": "t", "expect": 1},
         {"send": "t", "values": [{"ramp": 1310720}, {"double[]": [0.5]}, {"ramp": 1310720}], "expect": None},
-        {"get_until": "seen_sum", "until": 1717985607680.5, "expect": 1717985607680.5}], clients=NATIVE),
+        {"get_until": "seen_sum", "until": 1717985607680.5, "expect": 1717985607680.5}]),
     Scenario("generators", [
         {"generate": "count_up", "as": "g", "args": [{"double": 0.5}, {"int32": 3}], "expect": None},
         {"next": "g", "expect": 0.5},

@@ -4,9 +4,13 @@
 //   functions                return their first argument; these do something besides:
 //     fire_EVENT(...)        fires EVENT with the same arguments
 //     publish_WIRE(value)    sends the InValue of WIRE
+//     stream_PIPE(value, n)  sends the value n times to each endpoint of PIPE
+//     close_PIPE()           closes all endpoints of PIPE
 //     release(path)          releases an object
 //     fail(name, text)       raises the exception `name` with sub name "detail" and the parameter int32[] 1, 2
 //     hang(), stop()         never answers; closes the service
+//   pipes                    send packets back; "greeting" says hello, world while it is connected; "refused" refuses;
+//                            "mute" never answers
 //   objrefs                  of every index but "missing" and 99; a property `name` tells which
 // Service "test", node "test.service", attribute site = "dock".
 import { readFileSync } from "node:fs";

@@ -13,10 +13,13 @@ object Root
   property double speed
   wire double both
   wire double other
+  pipe double echo
   objref Part part
   function double twice(double x)
   function void publish_both(double x)
   function void hang()
+  function void stream_echo(double x, int32 count)
+  function void close_echo()
 end`;
 
 const url = "ws://one/?service=test";
@@ -234,5 +237,52 @@ it("ends a wire with the loop over it", async () => {
   }
   await vi.waitUntil(() => !wire.isConnected);
   expect(client.$.state).toBe("connected");
+  await subscription.close();
+});
+
+it("keeps a pipe over connections, without losing what came", async () => {
+  const first = await start();
+  const subscription = follow(in_turn(first, await start()));
+  const pipe = subscription.pipe("echo", { limit: 100 });
+  const seen: unknown[] = [];
+  const loop = (async () => {
+    for await (const packet of pipe) seen.push(packet);
+  })();
+  const client = await subscription.client();
+  await vi.waitUntil(() => pipe.isConnected);
+  await client["stream_echo"]!(1, 50);
+  await vi.waitUntil(() => seen.length === 50);
+
+  await client["close_echo"]!();
+  await vi.waitUntil(() => clock.waits.length === 1);
+  expect(clock.fire()).toBe(2_500);
+  await vi.waitUntil(() => pipe.isConnected);
+  await pipe.send(2);
+  await vi.waitUntil(() => seen.length === 51);
+
+  first.drop("gone");
+  await vi.waitUntil(() => !pipe.isConnected);
+  clock.fire();
+  const next = await subscription.client();
+  await vi.waitUntil(() => pipe.isConnected);
+  await next["stream_echo"]!(3, 1);
+  await vi.waitUntil(() => seen.length === 52);
+  expect(seen.slice(49)).toEqual([1, 2, 3]);
+  await pipe.close();
+  await loop;
+  expect(next.$.state).toBe("connected");
+  await subscription.close();
+});
+
+it("ends a loop over a pipe that is too far behind", async () => {
+  const subscription = follow(in_turn(await start()));
+  const pipe = subscription.pipe("echo", { limit: 10 });
+  const packets = pipe[Symbol.asyncIterator]();
+  const client = await subscription.client();
+  await vi.waitUntil(() => pipe.isConnected);
+  await client["stream_echo"]!(1, 11);
+  await settle();
+  for (let i = 0; i < 10; ++i) expect((await packets.next()).value).toBe(1);
+  expect((await failure(packets.next())).code).toBe(ErrorCode.OutOfSystemResource);
   await subscription.close();
 });

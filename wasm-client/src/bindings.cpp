@@ -86,6 +86,16 @@ RR_EXPORT(poke_out_value) RequestId rr_poke_out_value(JsHandle path, JsHandle me
 RR_EXPORT(send_wire) bool rr_send_wire(JsHandle path, JsHandle member, JsHandle value) {
   return session->send_wire(JsValue(path), JsValue(member), JsValue(value));
 }
+RR_EXPORT(connect_pipe) RequestId rr_connect_pipe(JsHandle path, JsHandle member, std::int32_t index) {
+  return session->connect_pipe(JsValue(path), JsValue(member), index);
+}
+RR_EXPORT(disconnect_pipe) RequestId rr_disconnect_pipe(JsHandle path, JsHandle member, std::int32_t index) {
+  return session->disconnect_pipe(JsValue(path), JsValue(member), index);
+}
+RR_EXPORT(send_pipe_packet)
+double rr_send_pipe_packet(JsHandle path, JsHandle member, std::int32_t index, JsHandle value, bool wants_ack) {
+  return session->send_pipe_packet(JsValue(path), JsValue(member), index, JsValue(value), wants_ack);
+}
 RR_EXPORT(cancel) void rr_cancel(RequestId id) {
   session->cancel(id);
 }

@@ -40,6 +40,14 @@ JsValue make_member_event(std::string_view kind, std::string_view path, std::str
   return event;
 }
 
+/// `event` one of those of pipe endpoints.
+template <class Event>
+JsValue make_pipe_event(std::string_view kind, const Event& event) {
+  const JsValue js = make_member_event(kind, event.path, event.member);
+  set_js_field(js, "index", make_js_number(event.index));
+  return js;
+}
+
 bool is_varvalue(const TypeDefinition& type) {
   return type.type == DataType::varvalue_t;
 }
@@ -125,6 +133,27 @@ bool WasmSession::send_wire(const JsValue& path, const JsValue& member, const Js
   return sent.has_value();
 }
 
+RequestId WasmSession::connect_pipe(const JsValue& path, const JsValue& member, std::int32_t index) {
+  const auto target = find_target(path, member);
+  return target ? session_.connect_pipe(target->path, target->member, index, now_) : 0;
+}
+
+RequestId WasmSession::disconnect_pipe(const JsValue& path, const JsValue& member, std::int32_t index) {
+  return session_.disconnect_pipe(text_of(path), text_of(member), index, now_);
+}
+
+double WasmSession::send_pipe_packet(const JsValue& path, const JsValue& member, std::int32_t index,
+                                     const JsValue& value, bool wants_ack) {
+  const auto target = find_target(path, member);
+  if (!target) return -1;
+  const auto read = read_value(value, target->definition->type, target->member);
+  if (!read) return -1;
+  const auto sent = session_.send_pipe_packet(target->path, target->member, index, *read, now_, wants_ack);
+  if (sent) return *sent;
+  error_ = sent.error();
+  return -1;
+}
+
 void WasmSession::cancel(RequestId id) {
   varvalue_replies_.erase(id);
   session_.cancel(id);
@@ -196,6 +225,20 @@ JsValue WasmSession::event_to_js(const ClientEvent& event) {
   }
   if (const auto* closed = std::get_if<WireClosedByService>(&event))
     return make_member_event("wire_closed", closed->path, closed->member);
+  if (const auto* received = std::get_if<PipePacketReceived>(&event)) {
+    const JsValue js = make_pipe_event("pipe", *received);
+    const auto* member = find_member(received->path, received->member);
+    set_js_field(js, "value", to_js(received->value, types, member && is_varvalue(member->type)));
+    return js;
+  }
+  if (const auto* acknowledged = std::get_if<PipePacketsAcknowledged>(&event)) {
+    const JsValue js = make_pipe_event("pipe_acks", *acknowledged);
+    const JsValue numbers = make_js_array();
+    for (const auto number : acknowledged->numbers) push_js(numbers, make_js_number(number));
+    set_js_field(js, "numbers", numbers);
+    return js;
+  }
+  if (const auto* closed = std::get_if<PipeClosedByService>(&event)) return make_pipe_event("pipe_closed", *closed);
   if (const auto* released = std::get_if<PathReleased>(&event)) {
     const JsValue js = make_event("path_released");
     set_js_field(js, "path", make_js_text(released->path));

@@ -43,6 +43,11 @@ class WasmSession {
   RequestId find_object(const JsValue& path);
   /// Returns  whether it was sent or queued.
   bool send_wire(const JsValue& path, const JsValue& member, const JsValue& value);
+  RequestId connect_pipe(const JsValue& path, const JsValue& member, std::int32_t index);
+  RequestId disconnect_pipe(const JsValue& path, const JsValue& member, std::int32_t index);
+  /// Returns  the packet's number, or -1: take_error() then says why.
+  double send_pipe_packet(const JsValue& path, const JsValue& member, std::int32_t index, const JsValue& value,
+                          bool wants_ack);
   void cancel(RequestId id);
   void disconnect();
 

@@ -7,7 +7,12 @@ export { connect } from "./connect.js";
 export type { ConnectOptions } from "./connect.js";
 export { ErrorCode, RobotRaconteurError } from "./errors.js";
 export type { ErrorFields } from "./errors.js";
-export type { MemberSubscriptionOptions, WireSubscription } from "./member_subscription.js";
+export type {
+  MemberSubscriptionOptions,
+  PipeSubscription,
+  PipeSubscriptionOptions,
+  WireSubscription,
+} from "./member_subscription.js";
 export { subscribe } from "./subscribe.js";
 export type { SubscribeOptions, Subscription } from "./subscribe.js";
 export type { OpenTransport, Transport, TransportListener } from "./transport.js";

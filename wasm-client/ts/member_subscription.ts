@@ -1,13 +1,18 @@
-// Wires that outlive connections. Layer: wasm-client/ts. Source: sessions spec section 2.17.
+// Wires and pipes that outlive connections. Layer: wasm-client/ts. Source: sessions spec section 2.17.
 import type { Clock } from "./clock.js";
 import { call_safely, make_error } from "./errors.js";
 import { ValueQueue } from "./members/queue.js";
 import type { Subscription } from "./subscribe.js";
-import type { RemoteObject, RrValue, WireConnection, WireTime } from "./types.js";
+import type { PipeEndpoint, RemoteObject, RrValue, WireConnection, WireTime } from "./types.js";
 
 export interface MemberSubscriptionOptions {
   /** The object that the member belongs to: "*" is the root, "*.arm" one of its object references; "*". */
   path?: string | undefined;
+}
+
+export interface PipeSubscriptionOptions extends MemberSubscriptionOptions {
+  /** Packets that a loop may be behind; more end it with an error. 10,000. */
+  limit?: number | undefined;
 }
 
 /** To the next attempt, where a member could not be connected or the service closed it. */
@@ -155,5 +160,30 @@ export class WireSubscription extends MemberSubscription<WireConnection> {
       this.#time = connection.time;
       this.receive(value);
     }
+  }
+}
+
+/** All packets of a pipe, in order for each connection. */
+export class PipeSubscription extends MemberSubscription<PipeEndpoint> {
+  readonly #limit: number;
+
+  /** Use Subscription.pipe(). */
+  constructor(subscription: Subscription<unknown>, clock: Clock, member: string, options: PipeSubscriptionOptions) {
+    super(subscription, clock, member, options.path ?? "*");
+    this.#limit = options.limit ?? 10_000;
+  }
+
+  protected make_queue(on_return: () => void): ValueQueue<RrValue> {
+    return new ValueQueue<RrValue>(this.#limit, on_return, () =>
+      make_error("OutOfSystemResource", `${this.#limit} packets of pipe ${this.member} wait and nobody takes them`),
+    );
+  }
+
+  protected async connect(object: RemoteObject): Promise<PipeEndpoint> {
+    return object.$.member(this.member).connect(-1);
+  }
+
+  protected async follow(endpoint: PipeEndpoint): Promise<void> {
+    for await (const packet of endpoint) this.receive(packet);
   }
 }

@@ -6,6 +6,7 @@ import { make_function } from "./members/function.js";
 import { make_later } from "./members/later.js";
 import type { MemberContext } from "./members/member.js";
 import { make_objref } from "./members/objref.js";
+import { make_pipe } from "./members/pipe.js";
 import { make_property } from "./members/property.js";
 import { make_wire } from "./members/wire.js";
 import type { Session } from "./session.js";
@@ -28,7 +29,7 @@ const faces: Record<MemberKind, (context: MemberContext) => unknown> = {
   event: make_event,
   objref: make_objref,
   wire: make_wire,
-  pipe: (context) => make_later(context, "pipe"),
+  pipe: make_pipe,
   callback: (context) => make_later(context, "callback"),
   memory: (context) => make_later(context, "memory"),
 };

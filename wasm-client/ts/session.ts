@@ -21,6 +21,9 @@ export interface MemberListener {
   on_event?(args: RrValue[]): void;
   on_wire_value?(value: RrValue, seconds: number, nanoseconds: number): void;
   on_wire_closed?(): void;
+  on_pipe_packet?(index: number, value: RrValue): void;
+  on_pipe_acks?(index: number, numbers: number[]): void;
+  on_pipe_closed?(index: number): void;
 }
 
 export class Session {
@@ -32,6 +35,8 @@ export class Session {
   #timer: ReturnType<typeof setTimeout> | undefined;
   #timer_at = Infinity;
   readonly #pending = new Map<number, Pending>();
+  /** Those that wait for room. */
+  #senders: { resolve(): void; reject(reason: unknown): void }[] = [];
   readonly #listeners = new Map<string, Set<MemberListener>>();
   readonly #closers = new Set<(reason?: RobotRaconteurError) => void>();
   readonly #release_listeners = new Set<(path: string) => void>();
@@ -80,9 +85,9 @@ export class Session {
 
   /**
    * @param ask   makes the request in the core and returns its number.
-   * @param late  called with what a request brings after its caller gave it up.
+   * @param done  called with the value before anything else is heard of; the promise follows later.
    */
-  request(ask: (core: Core) => number, options: CallOptions = {}): Promise<RrValue> {
+  request(ask: (core: Core) => number, options: CallOptions = {}, done?: (value: RrValue) => void): Promise<RrValue> {
     const { signal } = options;
     if (signal?.aborted) return Promise.reject(signal.reason);
     if (this.#end) return Promise.reject(this.#end.reason);
@@ -94,10 +99,10 @@ export class Session {
         if (!this.#is_closed) this.core.cancel(id);
         reject(signal?.reason);
       };
-      const done = () => signal?.removeEventListener("abort", abort);
+      const forget = () => signal?.removeEventListener("abort", abort);
       this.#pending.set(id, {
-        resolve: (value) => (done(), resolve(value)),
-        reject: (reason) => (done(), reject(reason)),
+        resolve: (value) => (forget(), done?.(value), resolve(value)),
+        reject: (reason) => (forget(), reject(reason)),
       });
       signal?.addEventListener("abort", abort, { once: true });
       this.#pump();
@@ -105,10 +110,17 @@ export class Session {
   }
 
   /** Something without an answer. @throws RobotRaconteurError */
-  tell(what: (core: Core) => void): void {
+  tell<T>(what: (core: Core) => T): T {
     if (this.#end) throw this.#end.reason;
-    what(this.core);
+    const result = what(this.core);
     this.#pump();
+    return result;
+  }
+
+  /** Nothing where there is room for more to send; else what resolves when there is. */
+  room(): Promise<void> | undefined {
+    if (this.#end || this.#has_room()) return undefined;
+    return new Promise((resolve, reject) => this.#senders.push({ resolve, reject }));
   }
 
   /** Something that sends nothing; undefined once the session is over. */
@@ -164,6 +176,7 @@ export class Session {
     this.#pending.clear();
     this.#settle_connected.reject(reason);
     for (const { reject } of waiting) reject(reason);
+    for (const { reject } of this.#senders.splice(0)) reject(reason);
   }
 
   #finish(reason: RobotRaconteurError): void {
@@ -201,7 +214,13 @@ export class Session {
       }
     });
     this.#is_pumping = false;
-    if (!this.#is_closed) this.#arm_timer();
+    if (this.#is_closed) return;
+    if (this.#senders.length > 0 && this.#has_room()) for (const { resolve } of this.#senders.splice(0)) resolve();
+    this.#arm_timer();
+  }
+
+  #has_room(): boolean {
+    return this.transport.buffered < high_mark && this.core.queued_bytes() < high_mark;
   }
 
   #transmit(): void {
@@ -235,6 +254,15 @@ export class Session {
         break;
       case "wire_closed":
         this.#tell(event.path, event.member, (listener) => listener.on_wire_closed?.());
+        break;
+      case "pipe":
+        this.#tell(event.path, event.member, (listener) => listener.on_pipe_packet?.(event.index, event.value));
+        break;
+      case "pipe_acks":
+        this.#tell(event.path, event.member, (listener) => listener.on_pipe_acks?.(event.index, event.numbers));
+        break;
+      case "pipe_closed":
+        this.#tell(event.path, event.member, (listener) => listener.on_pipe_closed?.(event.index));
         break;
       case "path_released":
         for (const released of [...this.#release_listeners]) call_safely(() => released(event.path));

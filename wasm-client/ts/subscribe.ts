@@ -6,8 +6,8 @@ import { connect } from "./connect.js";
 import type { ConnectOptions } from "./connect.js";
 import { call_safely, make_error } from "./errors.js";
 import type { RobotRaconteurError } from "./errors.js";
-import { WireSubscription } from "./member_subscription.js";
-import type { MemberSubscriptionOptions } from "./member_subscription.js";
+import { PipeSubscription, WireSubscription } from "./member_subscription.js";
+import type { MemberSubscriptionOptions, PipeSubscriptionOptions } from "./member_subscription.js";
 import type { CallOptions, ObjectInfo, RemoteObject } from "./types.js";
 import { parse_service_url } from "./url.js";
 
@@ -132,6 +132,11 @@ export class Subscription<T = RemoteObject> {
   /** The newest value of a wire, over all connections. `options.path`: of the object, "*" for the root. */
   wire(member: string, options: MemberSubscriptionOptions = {}): WireSubscription {
     return new WireSubscription(this as Subscription<unknown>, this.#clock, member, options);
+  }
+
+  /** The packets of a pipe, over all connections; those that the service sends meanwhile are not there. */
+  pipe(member: string, options: PipeSubscriptionOptions = {}): PipeSubscription {
+    return new PipeSubscription(this as Subscription<unknown>, this.#clock, member, options);
   }
 
   /** Ends the connection and all attempts. Repeated calls do nothing. */

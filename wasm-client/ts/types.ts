@@ -164,15 +164,46 @@ export interface WireMember<T = RrValue, S = T> {
   poke(value: S, options?: CallOptions): Promise<void>;
 }
 
-/** One end of a pipe. Iterating gives every packet, in order; leaving the loop closes the endpoint. */
+export interface PipeConnectOptions extends CallOptions {
+  /** Packets that may wait for the loop over the endpoint; one more closes it with an error. 10,000. */
+  limit?: number | undefined;
+  /** Bytes, about, that may wait so. 64 MiB. */
+  maxBytes?: number | undefined;
+}
+
+export interface PipeSendOptions extends CallOptions {
+  /** Whether to ask for an acknowledgement and wait for it. */
+  ack?: boolean | undefined;
+}
+
+/**
+ * One end of a pipe. Iterating gives every packet, in order, from the first; leaving the loop closes the endpoint. A
+ * second loop shares the packets with the first.
+ */
 export interface PipeEndpoint<T = RrValue, S = T> extends AsyncIterable<T> {
-  send(packet: S): Promise<void>;
+  /** As agreed with the service. */
+  readonly index: number;
+  readonly isClosed: boolean;
+  /**
+   * Sends a packet. Resolves when little waits for the network (who waits for it sends as fast as the network takes
+   * it), with `ack` when the packet has arrived. Giving up does not take the packet back.
+   * @throws RobotRaconteurError (rejects) InvalidOperation (closed), ReadOnlyMember, OutOfSystemResource (32 MiB wait for
+   *         the network: the packet is not sent), DataTypeMismatch, ConnectionError, ...
+   */
+  send(packet: S, options?: PipeSendOptions): Promise<void>;
+  /** Calls `closed` once when the endpoint ends, with the reason where it was not closed in order. */
+  onClose(closed: (reason?: unknown) => void): () => void;
+  /** What waits in send() rejects; what was received can still be taken. Repeated calls do nothing. */
   close(): Promise<void>;
 }
 
 export interface PipeMember<T = RrValue, S = T> {
-  /** `index`: the endpoint's, any free one where not given. */
-  connect(index?: number): Promise<PipeEndpoint<T, S>>;
+  /**
+   * @param index  the endpoint's; any free one where not given. The service may choose another: see the endpoint's.
+   * @throws RobotRaconteurError (rejects) what the service says, ConnectionError, RequestTimeout, ...
+   */
+  connect(index?: number, options?: PipeConnectOptions): Promise<PipeEndpoint<T, S>>;
+  connect(options: PipeConnectOptions): Promise<PipeEndpoint<T, S>>;
 }
 
 /** What the service asks of this client. */
@@ -200,7 +231,9 @@ export interface DynamicMember extends AsyncIterable<RrValue[]> {
   set(value: unknown, options?: CallOptions): Promise<void>;
   on(listener: (...args: RrValue[]) => void): () => void;
   once(options?: CallOptions): Promise<RrValue[]>;
-  connect(options?: CallOptions): WireConnection;
+  /** Of a wire the connection at once, of a pipe the promise of an endpoint. */
+  connect(options?: CallOptions): WireConnection & Promise<PipeEndpoint>;
+  connect(index: number, options?: PipeConnectOptions): Promise<PipeEndpoint>;
   peek(options?: CallOptions): Promise<RrValue>;
   peekOut(options?: CallOptions): Promise<RrValue>;
   poke(value: unknown, options?: CallOptions): Promise<void>;

@@ -29,6 +29,9 @@ export type CoreEvent =
   | { kind: "event"; path: string; member: string; arguments: RrValue[] }
   | { kind: "wire"; path: string; member: string; seconds: number; nanoseconds: number; value: RrValue }
   | { kind: "wire_closed"; path: string; member: string }
+  | { kind: "pipe"; path: string; member: string; index: number; value: RrValue }
+  | { kind: "pipe_acks"; path: string; member: string; index: number; numbers: number[] }
+  | { kind: "pipe_closed"; path: string; member: string; index: number }
   | { kind: "path_released"; path: string }
   | { kind: "closed"; error: ErrorFields };
 
@@ -59,6 +62,9 @@ interface WasmSession extends CoreExports {
   peek_out_value(path: Handle, member: Handle): number;
   poke_out_value(path: Handle, member: Handle, value: Handle): number;
   send_wire(path: Handle, member: Handle, value: Handle): number;
+  connect_pipe(path: Handle, member: Handle, index: number): number;
+  disconnect_pipe(path: Handle, member: Handle, index: number): number;
+  send_pipe_packet(path: Handle, member: Handle, index: number, value: Handle, wants_ack: boolean): number;
   cancel(id: number): void;
   disconnect(): void;
   poll_transmit(limit: number): number;
@@ -177,6 +183,22 @@ export class Core {
     this.#ask("send_wire", path, member, value);
   }
 
+  /** `index` -1: any. */
+  connect_pipe(path: string, member: string, index: number): number {
+    return this.#checked(this.#at_now().connect_pipe(this.#give(path), this.#give(member), index));
+  }
+
+  disconnect_pipe(path: string, member: string, index: number): number {
+    return this.#checked(this.#at_now().disconnect_pipe(this.#give(path), this.#give(member), index));
+  }
+
+  /** @returns the packet's number. */
+  send_pipe_packet(path: string, member: string, index: number, value: unknown, wants_ack: boolean): number {
+    const number = this.#at_now().send_pipe_packet(this.#give(path), this.#give(member), index, this.#give(value), wants_ack);
+    if (number < 0) this.#checked(0);
+    return number;
+  }
+
   cancel(id: number): void {
     this.#session.cancel(id);
   }
@@ -210,6 +232,11 @@ export class Core {
 
   // --- looked at ---
 
+  /** What waits for the transport. */
+  queued_bytes(): number {
+    return this.#session.queued_bytes();
+  }
+
   stats(): SessionStats {
     return this.#values.take(this.#session.stats()) as SessionStats;
   }
@@ -228,15 +255,12 @@ export class Core {
 
   /** Of an object that was found. */
   members(path: string): MemberInfo[] {
-    const values = this.#values;
-    return (values.take(this.#session.members(values.give(path))) as MemberInfo[] | undefined) ?? [];
+    return (this.#values.take(this.#session.members(this.#give(path))) as MemberInfo[] | undefined) ?? [];
   }
 
   child_path(parent: string, member: string, index: string | undefined): string {
-    const values = this.#values;
-    return values.take(
-      this.#session.child_path(values.give(parent), values.give(member), values.give(index)),
-    ) as string;
+    const path = this.#session.child_path(this.#give(parent), this.#give(member), this.#give(index));
+    return this.#values.take(path) as string;
   }
 
   #at_now(): WasmSession {
@@ -244,13 +268,20 @@ export class Core {
     return this.#session;
   }
 
+  #give(value: unknown): Handle {
+    return this.#values.give(value);
+  }
+
+  #checked(id: number): number {
+    if (id === 0) throw new RobotRaconteurError(this.#values.take(this.#session.take_error()) as ErrorFields);
+    return id;
+  }
+
   /** Makes a request of the core with `args`. */
   #ask(request: MemberRequest, ...args: unknown[]): number {
     const session = this.#at_now();
     const handles = args.map((arg) => this.#values.give(arg)) as [Handle, Handle, Handle];
-    const id = session[request](...handles);
-    if (id === 0) throw new RobotRaconteurError(this.#values.take(session.take_error()) as ErrorFields);
-    return id;
+    return this.#checked(session[request](...handles));
   }
 }
 

@@ -109,6 +109,7 @@ const equal = (left, right) => JSON.stringify(left) === JSON.stringify(right);
 class Client {
   #events = new Map();
   #wires = new Map();
+  #pipes = new Map();
 
   constructor(root) {
     this.root = root;
@@ -179,6 +180,33 @@ class Client {
     async out_value(target, member, step) {
       await this.#wires.get(member).connection.send(build(step.value));
       return null;
+    },
+    async open_pipe(target, member, step) {
+      const endpoint = await target[member].connect(step.index ?? -1);
+      const pipe = { endpoint, packets: [] };
+      this.#pipes.set(step.as, pipe);
+      (async () => {
+        for await (const packet of endpoint) pipe.packets.push(this.plainOf(target, member, packet));
+      })().catch(() => {});
+      return endpoint.index;
+    },
+    async send(target, name, step) {
+      const { endpoint } = this.#pipes.get(name);
+      for (const value of step.values) await endpoint.send(build(value));
+      return null;
+    },
+    async packets(target, name, step) {
+      const { packets } = this.#pipes.get(name);
+      await until(async () => packets.length >= step.count, true);
+      return { list: [...packets] };
+    },
+    async close_pipe(target, name) {
+      await this.#pipes.get(name).endpoint.close();
+      this.#pipes.delete(name);
+      return null;
+    },
+    async closed(target, name) {
+      return until(async () => this.#pipes.get(name).endpoint.isClosed, true);
     },
     async peek_in(target, member) {
       return this.plainOf(target, member, await target[member].peek());

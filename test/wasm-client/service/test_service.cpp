@@ -100,9 +100,24 @@ class TestService {
         if (const auto found = values.find(wire->member->name); found != values.end())
           (void)session_->send_wire(wire->path, *wire->member, found->second, now_);
       }
+      if (const auto* pipe = std::get_if<PipeConnected>(&*event)) connect_pipe(*pipe);
+      if (const auto* packet = std::get_if<PipeReceived>(&*event))
+        (void)session_->send_pipe_packet(packet->id, packet->value, now_);
+      if (const auto* closed = std::get_if<PipeClosed>(&*event))
+        for (auto& [name, ids] : pipes_) std::erase(ids, closed->id);
       if (const auto* wire = std::get_if<WireReceived>(&*event))
         static_cast<TestObject&>(*wire->object).values[wire->member->name] = wire->value;
     }
+  }
+
+  void connect_pipe(const PipeConnected& pipe) {
+    const auto& name = pipe.member->name;
+    if (name == "refused") return session_->refuse_pipe(pipe.id, make_error(ErrorCode::operation_failed, "no"), now_);
+    if (name == "mute") return;
+    if (name == "greeting")
+      for (const auto* word : {"hello", "world"}) (void)session_->send_pipe_packet(pipe.id, Value(word), now_);
+    session_->accept_pipe(pipe.id, now_);
+    pipes_[name].push_back(pipe.id);
   }
 
   void answer(const Called& called) {
@@ -147,6 +162,13 @@ class TestService {
     if (name.starts_with("publish_"))
       if (const auto* wire = root->find_member(name.substr(8)))
         (void)session_->send_wire("test", *wire, arguments.front(), now_);
+    if (name.starts_with("stream_")) {
+      const auto count = arguments[1].to<std::int32_t>();
+      for (const auto id : pipes_[std::string(name.substr(7))])
+        for (std::int32_t i = 0; i < *count; ++i) (void)session_->send_pipe_packet(id, arguments[0], now_);
+    }
+    if (name.starts_with("close_"))
+      for (const auto id : std::exchange(pipes_[std::string(name.substr(6))], {})) session_->close_pipe(id, now_);
     if (name == "release") session_->release_path(*arguments.front().to_text(), now_);
     if (type.type == DataType::void_t || arguments.empty()) return Value{};
     return arguments.front();
@@ -156,6 +178,7 @@ class TestService {
   std::shared_ptr<TestObject> root_;
   std::shared_ptr<const TypeRegistry> types_;
   std::optional<ServiceSession> session_;
+  std::map<std::string, std::vector<PipeId>, std::less<>> pipes_;  ///< open ones, by name
   std::string error_;
   Now now_;
   Bytes received_;

@@ -3,14 +3,20 @@
 /** Collects values for one consumer. `limit` 1: only the newest is kept. */
 export class ValueQueue<T> implements AsyncIterator<T, undefined> {
   readonly #values: T[] = [];
+  #bytes = 0; // of them, where there is a limit
   readonly #waiting: { resolve(result: IteratorResult<T, undefined>): void; reject(reason: unknown): void }[] = [];
   #end: { error?: unknown } | undefined;
 
-  /** `on_return`: the consumer left its loop. */
+  /**
+   * @param on_return    the consumer left its loop.
+   * @param on_overflow  what to fail with where a value is too much; without it the oldest goes.
+   * @param max_bytes    about as much memory may wait.
+   */
   constructor(
     private readonly limit: number,
     private readonly on_return: () => void,
     private readonly on_overflow?: () => unknown,
+    private readonly max_bytes = Infinity,
   ) {}
 
   push(value: T): void {
@@ -20,10 +26,11 @@ export class ValueQueue<T> implements AsyncIterator<T, undefined> {
       waiting.resolve({ done: false, value });
       return;
     }
-    if (this.#values.length >= this.limit) {
-      if (this.on_overflow) return this.fail(this.on_overflow());
-      this.#values.shift();
-    }
+    const size = this.max_bytes === Infinity ? 0 : rough_size(value);
+    const is_full = this.#values.length >= this.limit || (this.#bytes > 0 && this.#bytes + size > this.max_bytes);
+    if (is_full && this.on_overflow) return this.fail(this.on_overflow());
+    if (is_full) this.#values.shift();
+    this.#bytes += size;
     this.#values.push(value);
   }
 
@@ -38,7 +45,11 @@ export class ValueQueue<T> implements AsyncIterator<T, undefined> {
   }
 
   next(): Promise<IteratorResult<T, undefined>> {
-    if (this.#values.length > 0) return Promise.resolve({ done: false, value: this.#values.shift() as T });
+    if (this.#values.length > 0) {
+      const value = this.#values.shift() as T;
+      if (this.max_bytes !== Infinity) this.#bytes -= rough_size(value);
+      return Promise.resolve({ done: false, value });
+    }
     if (!this.#end) return new Promise((resolve, reject) => this.#waiting.push({ resolve, reject }));
     const end = this.#end;
     this.#end = {};
@@ -60,4 +71,15 @@ export class ValueQueue<T> implements AsyncIterator<T, undefined> {
     else first?.resolve({ done: true, value: undefined });
     for (const waiting of others) waiting.resolve({ done: true, value: undefined });
   }
+}
+
+/** About the bytes that a value takes, without its names. Received values are trees: nothing holds itself. */
+function rough_size(value: unknown): number {
+  if (typeof value === "string") return 2 * value.length;
+  if (typeof value !== "object" || value === null) return 8;
+  if (ArrayBuffer.isView(value)) return value.byteLength;
+  const items = value instanceof Map ? value.values() : Object.values(value);
+  let size = 16;
+  for (const item of items) size += rough_size(item);
+  return size;
 }

@@ -1,0 +1,24 @@
+// Limits for what has none of its own. Layer: wasm-client/ts.
+import { make_error } from "./errors.js";
+import type { CallOptions } from "./types.js";
+
+/**
+ * What `promise` brings, unless its signal or time comes first.
+ * @param late  what the error of a time-out says: "`late` within 100 ms".
+ */
+export function within<T>(promise: Promise<T>, { signal, timeout }: CallOptions, late: string): Promise<T> {
+  if (signal === undefined && timeout === undefined) return promise;
+  return new Promise((resolve, reject) => {
+    if (signal?.aborted) reject(signal.reason);
+    const abort = () => reject(signal?.reason);
+    signal?.addEventListener("abort", abort, { once: true });
+    const timer =
+      timeout === undefined
+        ? undefined
+        : setTimeout(() => reject(make_error("RequestTimeout", `${late} within ${timeout} ms`)), timeout);
+    void promise.then(resolve, reject).finally(() => {
+      clearTimeout(timer);
+      signal?.removeEventListener("abort", abort);
+    });
+  });
+}
