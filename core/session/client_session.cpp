@@ -183,7 +183,8 @@ RequestId ClientSession::request(EntryType type, MemberKind kind, std::string_vi
     return fail_request(next_request_id(), allowed.error());
   const auto id = begin_request(type, path, member);
   if (auto written = write(**definition); !written) return fail_request(id, written.error());
-  if (auto sent = send_outgoing(now); !sent) return fail_request(id, sent.error());
+  const bool is_urgent = (*definition)->has_modifier("urgent");
+  if (auto sent = send_outgoing(now, is_urgent); !sent) return fail_request(id, sent.error());
   const bool has_state = kind == MemberKind::wire || kind == MemberKind::pipe;
   add_pending(id, type, *definition, has_state ? path : std::string_view{}, now);
   return id;
@@ -320,9 +321,9 @@ void ClientSession::disconnect(Now now) {
   closing_deadline_ = now.steady + disconnect_timeout;
 }
 
-Result<> ClientSession::send_outgoing(Now now) {
+Result<> ClientSession::send_outgoing(Now now, bool is_urgent) {
   last_sent_ = now.steady;
-  return connection_.send(outgoing_, now);
+  return connection_.send(outgoing_, now, is_urgent);
 }
 
 // --- received ---

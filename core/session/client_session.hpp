@@ -258,7 +258,7 @@ class ClientSession {
   RequestId step_generator(GeneratorStep step, std::string_view path, std::string_view function, std::int32_t index,
                            const std::optional<Value>& parameter, Now now);
   RequestId fail_request(RequestId id, Error error);
-  Result<> send_outgoing(Now now);
+  Result<> send_outgoing(Now now, bool is_urgent = false);
   Result<> send_wire_packet(const PathMember& key, WireConnection& wire, const Value& value, Now now);
 
   template <class AddElements>

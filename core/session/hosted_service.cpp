@@ -19,6 +19,10 @@ bool is_decimal_int32(std::string_view text) {
   return parsed.ec == std::errc{} && parsed.ptr == end;
 }
 
+bool is_indexed(const MemberDefinition& objref) {
+  return objref.type.container != ContainerKind::none || objref.type.array != ArrayKind::none;
+}
+
 /// What the objref's type says about the index: required or not, number or text.
 Result<> check_index(const MemberDefinition& objref, const std::optional<std::string>& index) {
   const auto& type = objref.type;
@@ -112,6 +116,33 @@ Result<HostedService::Found> HostedService::find_object(std::string_view path) {
     if (objects_.size() < max_cached_objects) objects_.emplace(prefix, found);
   }
   return found;
+}
+
+Result<std::string> HostedService::canonical_path(std::string_view path) {
+  if (path == name_) return name_;
+  const auto segments = parse_service_path(path);
+  if (!segments) return segments.error();
+  std::string canonical = name_;
+  for (std::size_t i = 1; i < segments->size(); ++i) {
+    const auto& [name, index] = (*segments)[i];
+    const auto parent = find_object(canonical);
+    if (!parent) return parent.error();
+    const auto* objref = parent->type->find_member(name);
+    if (!objref || objref->kind != MemberKind::objref)
+      return make_error(ErrorCode::member_not_found, parent->type->name + " has no objref " + quoted(name));
+    if (auto valid = check_index(*objref, index); !valid) return valid.error();
+    if (!is_indexed(*objref)) {
+      canonical = child_path(canonical, name);
+    } else if (objref->type.container == ContainerKind::map_string) {
+      canonical = child_path(canonical, name, *index);
+    } else {
+      std::int32_t number = 0;
+      std::from_chars(index->data(), index->data() + index->size(), number);
+      canonical = child_path(canonical, name, std::to_string(number));
+    }
+  }
+  if (auto found = find_object(canonical); !found) return found.error();
+  return canonical;
 }
 
 bool HostedService::forget_path(std::string_view path) {

@@ -11,6 +11,8 @@
 
 #include "core/session/authenticator.hpp"
 #include "core/session/connection.hpp"
+#include "core/session/monitor_locks.hpp"
+#include "core/session/object_locks.hpp"
 #include "core/types/type_registry.hpp"
 #include "core/types/value.hpp"
 
@@ -29,6 +31,8 @@ class ServiceObject {
   /// Errors   object_not_found; service_error "Requested object is null".
   virtual Result<std::shared_ptr<ServiceObject>> find_child(const MemberDefinition& objref,
                                                             const std::optional<std::string>& index) = 0;
+  /// Whether clients may take turns at this object by its monitor lock.
+  virtual bool is_monitor_lockable() const { return false; }
 };
 
 /// A direct base of `type` as peers expect its name: objects of the same definition without it, all others with theirs
@@ -56,6 +60,9 @@ class HostedService {
   const SecurityPolicy& policy() const { return policy_; }
   void set_policy(SecurityPolicy policy) { policy_ = std::move(policy); }
   LoginLimit& login_limit() { return login_limit_; }
+  SessionId next_session_id() { return ++last_session_id_; }
+  ObjectLocks& object_locks() { return object_locks_; }
+  MonitorLocks& monitor_locks() { return monitor_locks_; }
   /// The definition that holds the root type.
   const ServiceDefinition& root_definition() const;
   /// What a client needs: the root's definition, the extra imports and all that these import; in order of names.
@@ -69,6 +76,8 @@ class HostedService {
   /// Errors   those of parse_service_path; object_not_found (not this service, null object); member_not_found;
   ///          invalid_argument (a missing or malformed index).
   Result<Found> find_object(std::string_view path);
+  /// The one spelling of `path` by which locks know its object. Errors as find_object().
+  Result<std::string> canonical_path(std::string_view path);
   /// Forgets `path` and everything below it. Returns whether anything was there.
   bool forget_path(std::string_view path);
   /// All paths under which `object` is known.
@@ -85,6 +94,9 @@ class HostedService {
   std::vector<std::string> extra_imports_;
   SecurityPolicy policy_;
   LoginLimit login_limit_;
+  SessionId last_session_id_ = 0;
+  ObjectLocks object_locks_;
+  MonitorLocks monitor_locks_;
   std::map<std::string, Found, std::less<>> objects_;
   static constexpr std::size_t max_cached_objects = 4096;  ///< hostile paths may not grow it; the root always stays
 };

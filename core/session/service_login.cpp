@@ -83,7 +83,7 @@ void ServiceSession::finish_authenticate(const OpenLogin& login, Result<Authenti
   connection_.begin_message(outgoing_);
   outgoing_.begin_entry(reply_type(login.type), login.path, login.member, login.request_id);
   if (result) {
-    set_user(std::move(*result), now);
+    set_user(std::move(*result));
     connection_.authorise();
     outgoing_.add_text("return", "OK");
   } else {
@@ -92,29 +92,30 @@ void ServiceSession::finish_authenticate(const OpenLogin& login, Result<Authenti
   send_outgoing(now);
 }
 
-void ServiceSession::set_user(std::optional<AuthenticatedUser> user, Now) {
-  user_ = std::move(user);
-}
-
 /// ClientSessionOpReq: logins and logouts here, locks and monitors elsewhere.
 Result<> ServiceSession::answer_session_op(const Message& message, const MessageEntry& entry, Now now) {
   const auto command = entry.member_name;
   if (command.substr(0, 7) == "Monitor") {
     if (!may_use_service()) return make_error(ErrorCode::authentication_error, "User is not authenticated");
-    if (command == "MonitorEnter" || command == "MonitorContinueEnter" || command == "MonitorExit")
-      return make_error(ErrorCode::invalid_argument, "Object is not monitor lockable");
-    return protocol_error("Invalid ClientSessionOp command");
+    return answer_monitor(message, entry, now);
   }
   if (!service_->policy().authenticator)
     return make_error(ErrorCode::invalid_operation, "User authentication not activated for this service");
   if (command == "AuthenticateUser") return begin_login(message, entry, service_, now);
   if (command == "LogoutUser") {
-    set_user(std::nullopt, now);
+    set_user(std::nullopt);
     begin_reply(entry);
     outgoing_.add_text("return", "OK");
     send_outgoing(now);
     return {};
   }
+  if (command == "RequestObjectLock" || command == "RequestClientObjectLock" || command == "ReleaseObjectLock") {
+    begin_reply(entry);
+    if (auto done = answer_object_lock(entry); !done) return done;
+    send_outgoing(now);
+    return {};
+  }
+  if (command == "ReleaseClientObjectLock") return make_error(ErrorCode::invalid_operation, "Invalid command");
   return protocol_error("Invalid ClientSessionOp command");
 }
 

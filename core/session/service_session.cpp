@@ -48,6 +48,10 @@ ServiceSession::ServiceSession(ServiceDirectory& directory, ServiceSessionOption
       last_session_message_(now.steady),
       generators_(options_.max_generators) {}
 
+ServiceSession::~ServiceSession() {
+  leave_locks();
+}
+
 // --- told ---
 
 void ServiceSession::handle_bytes(ByteSpan input, Now now) {
@@ -78,6 +82,7 @@ void ServiceSession::handle_timeout(Now now) {
   }
   if (auto alive = connection_.handle_timeout(now); !alive) return leave(alive.error(), now);
   end_generators(generators_.remove_idle(now));
+  handle_locks_changed(now);
   const bool is_late = service_ ? now.steady - last_session_message_ >= options_.endpoint_timeout
                                 : now.steady - opened_ >= options_.connect_timeout;
   if (!is_late) return;
@@ -90,8 +95,8 @@ void ServiceSession::handle_timeout(Now now) {
 TimePoint ServiceSession::poll_timeout() const {
   if (wants_close()) return TimePoint::max();
   if (closing_deadline_) return *closing_deadline_;
-  return std::min({connection_.poll_timeout(), generators_.deadline(),
-                   service_ ? last_session_message_ + options_.endpoint_timeout : opened_ + options_.connect_timeout});
+  const auto end = service_ ? last_session_message_ + options_.endpoint_timeout : opened_ + options_.connect_timeout;
+  return std::min({connection_.poll_timeout(), generators_.deadline(), next_enter_deadline(), end});
 }
 
 std::optional<ServiceEvent> ServiceSession::poll_event() {
@@ -106,8 +111,8 @@ void ServiceSession::leave(Error reason, Now now) {
   if (is_gone_) return;
   is_gone_ = true;
   closing_deadline_ = now.steady + linger;
+  leave_locks();
   service_.reset();
-  user_.reset();
   login_.reset();
   calls_.clear();
   generators_.clear();
@@ -156,7 +161,7 @@ void ServiceSession::reply(CallId id, const Result<Value>& result, Now now) {
     begin();
     write_error(outgoing_, written.error());
   }
-  send_outgoing(now);
+  send_outgoing(now, call.member->has_modifier("urgent"));
   if (call.generator != 0) finish_generator_call(call, !written, now);
 }
 
@@ -167,7 +172,7 @@ Result<> ServiceSession::send_event(std::string_view path, const MemberDefinitio
   connection_.begin_message(outgoing_);
   outgoing_.begin_entry(EntryType::event_req, path, member.name);
   if (auto written = write_arguments(outgoing_, arguments, member, service_->types()); !written) return written;
-  send_outgoing(now);
+  send_outgoing(now, member.has_modifier("urgent"));
   return {};
 }
 
@@ -234,8 +239,8 @@ bool ServiceSession::has_wire(std::string_view path, std::string_view member) co
   return wires_.find(PathMemberView{path, member}) != wires_.end();
 }
 
-void ServiceSession::send_outgoing(Now now) {
-  if (auto sent = connection_.send(outgoing_, now); sent)
+void ServiceSession::send_outgoing(Now now, bool is_urgent) {
+  if (auto sent = connection_.send(outgoing_, now, is_urgent); sent)
     return;
   else if (connection_.state() == ConnectionState::closed)
     leave(sent.error(), now);
@@ -335,6 +340,7 @@ Result<> ServiceSession::dispatch_member(const Message& message, const MessageEn
                       "Member not found: " + found->type->name + " has no " +
                           std::string(member_kind_name(find_member_request(entry.type)->kind)) + " " +
                           quoted(entry.member_name));
+  if (auto allowed = check_locks(entry, *found, *member, now); !allowed) return allowed;
   if (auto allowed = check_direction(entry.type, *member); !allowed) return allowed;
   switch (entry.type) {
     case EntryType::property_get_req:

@@ -116,12 +116,18 @@ struct PipeClosed {
 struct GeneratorEnded {
   GeneratorId id = 0;
 };
+/// This client gave up a monitor that others wait for: all sessions of the service are to be told so, with
+/// handle_locks_changed().
+struct LocksChanged {
+  HostedService* service = nullptr;
+};
 /// The last event.
 struct ClientGone {
   Error reason;
 };
-using ServiceEvent = std::variant<Called, ClientConnected, LoginRequested, WireConnected, WireReceived, PipeConnected,
-                                  PipeReceived, PipeAcknowledged, PipeClosed, GeneratorEnded, ClientGone>;
+using ServiceEvent =
+    std::variant<Called, ClientConnected, LoginRequested, LocksChanged, WireConnected, WireReceived, PipeConnected,
+                 PipeReceived, PipeAcknowledged, PipeClosed, GeneratorEnded, ClientGone>;
 
 /// One client of a node. Node-level requests (definitions, attributes, the service index) are answered in here.
 class ServiceSession {
@@ -129,6 +135,7 @@ class ServiceSession {
   ServiceSession(ServiceDirectory& directory, ServiceSessionOptions options, Now now);
   ServiceSession(const ServiceSession&) = delete;
   ServiceSession& operator=(const ServiceSession&) = delete;
+  ~ServiceSession();
 
   // --- told ---
 
@@ -136,6 +143,8 @@ class ServiceSession {
   void handle_transmitted(std::size_t bytes, Now now);
   void handle_timeout(Now now);
   void handle_closed(Error reason, Now now);
+  /// Another session of the service had the event LocksChanged.
+  void handle_locks_changed(Now now);
 
   // --- asked ---
 
@@ -198,6 +207,14 @@ class ServiceSession {
     GeneratorStep step = GeneratorStep::next;
   };
 
+  /// A MonitorEnter or MonitorContinueEnter that is not answered yet.
+  struct OpenEnter {
+    std::uint32_t request_id = 0;
+    std::string path;
+    std::string member;
+    std::shared_ptr<ServiceObject> object;
+    TimePoint answer_by;
+  };
   /// A login that is being judged.
   struct OpenLogin {
     LoginId id = 0;
@@ -225,7 +242,7 @@ class ServiceSession {
   using PipeIndices = std::map<std::int32_t, ServicePipe*>;
 
   void handle_message(const Message& message, Now now);
-  void send_outgoing(Now now);
+  void send_outgoing(Now now, bool is_urgent = false);
   void leave(Error reason, Now now);
 
   // node-level requests (service_special.cpp)
@@ -246,8 +263,19 @@ class ServiceSession {
                        Now now);
   void finish_combined(const OpenLogin& login, Result<AuthenticatedUser> result, Now now);
   void finish_authenticate(const OpenLogin& login, Result<AuthenticatedUser> result, Now now);
-  void set_user(std::optional<AuthenticatedUser> user, Now now);
   Result<> answer_session_op(const Message& message, const MessageEntry& entry, Now now);
+
+  // locks (service_locks.cpp)
+  Result<> check_locks(const MessageEntry& entry, const HostedService::Found& found, const MemberDefinition& member,
+                       Now now);
+  Result<> answer_object_lock(const MessageEntry& entry);
+  Result<> answer_monitor(const Message& message, const MessageEntry& entry, Now now);
+  void answer_enter(const OpenEnter& enter, const Result<std::string_view>& answer, Now now);
+  TimePoint next_enter_deadline() const;
+  void tell_others_of_monitors();
+  void leave_monitors();
+  void leave_locks();
+  void set_user(std::optional<AuthenticatedUser> user);
 
   // requests of the session
   void handle_entry(const Message& message, const MessageEntry& entry, Now now);
@@ -298,6 +326,8 @@ class ServiceSession {
   bool is_gone_ = false;
 
   Message outgoing_;
+  SessionId session_id_ = 0;  ///< while service_ is set
+  std::vector<OpenEnter> enters_;
   std::optional<AuthenticatedUser> user_;
   std::optional<OpenLogin> login_;
   LoginId last_login_id_ = 0;

@@ -243,7 +243,8 @@ Result<> ServiceSession::connect(std::shared_ptr<HostedService> service, std::ui
   last_session_message_ = now.steady;
   connection_.set_endpoints(endpoint_, client_endpoint);
   outgoing_.header.sender_endpoint = endpoint_;
-  set_user(std::move(user), now);
+  session_id_ = service_->next_session_id();
+  set_user(std::move(user));
   if (client_endpoint != 0 && may_use_service()) connection_.authorise();
   events_.push_back(ClientConnected{service_.get()});
   return {};

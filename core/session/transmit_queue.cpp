@@ -16,10 +16,13 @@ Result<> TransmitQueue::push(const Message& message, const EncodeOptions& option
   }
   if (auto done = encode(message, options, encoded); !done) return done;
   size_ += encoded.size();
-  if (is_urgent)
-    messages_.insert(messages_.begin() + static_cast<std::ptrdiff_t>(in_flight_), std::move(encoded));
-  else
+  if (is_urgent) {
+    const auto place = std::max(in_flight_, urgent_end_);
+    messages_.insert(messages_.begin() + static_cast<std::ptrdiff_t>(place), std::move(encoded));
+    urgent_end_ = place + 1;
+  } else {
     messages_.push_back(std::move(encoded));
+  }
   return {};
 }
 
@@ -54,6 +57,7 @@ void TransmitQueue::consume(std::size_t bytes) {
     }
     messages_.pop_front();
     if (in_flight_ > 0) --in_flight_;
+    if (urgent_end_ > 0) --urgent_end_;
   }
   // A message that is written in part stays in flight: nothing may be put before its rest.
   in_flight_ = std::max<std::size_t>(in_flight_, front_consumed_ > 0 ? 1 : 0);
@@ -62,7 +66,7 @@ void TransmitQueue::consume(std::size_t bytes) {
 void TransmitQueue::clear() {
   messages_.clear();
   slices_.clear();
-  size_ = front_consumed_ = in_flight_ = 0;
+  size_ = front_consumed_ = in_flight_ = urgent_end_ = 0;
 }
 
 }  // namespace rr

@@ -36,6 +36,7 @@ class TransmitQueue {
   std::size_t size_ = 0;
   std::size_t front_consumed_ = 0;  ///< bytes of the first message that are written already
   std::size_t in_flight_ = 0;       ///< messages whose slices were handed out
+  std::size_t urgent_end_ = 0;      ///< index behind the last urgent message: they keep their order
 };
 
 }  // namespace rr

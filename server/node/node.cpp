@@ -208,6 +208,9 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
       });
     });
   }
+  void locks_changed(const Service& service) override {
+    for_clients_of(service, [](ServiceClient& client) { client.handle_locks_changed(); });
+  }
   void client_ended(ServiceClient& client) override {
     clients_.erase(client.id());
     if (is_stopping_ && clients_.empty()) stopped();

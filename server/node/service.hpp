@@ -158,6 +158,10 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   void objref(std::string_view name, std::shared_ptr<Object> child);
   /// Indexed objref: find(index text) returns the object, or nullptr where there is none.
   void objref(std::string_view name, std::function<std::shared_ptr<Object>(std::string_view index)> find);
+  /// Clients may take turns at this object by its monitor lock: while one is in, requests of the others fail.
+  void allow_monitor() { has_monitor_ = true; }
+  bool is_monitor_lockable() const override { return has_monitor_; }
+
   /// The object behind an indexed objref was replaced: clients are told to look it up anew.
   void release(std::string_view objref, std::string_view index);
 
@@ -210,6 +214,7 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
 
   Service& service_;
   const EntityDefinition* type_;
+  bool has_monitor_ = false;
   std::unordered_map<const MemberDefinition*, Member> members_;
 };
 

@@ -126,6 +126,15 @@ void ServiceClient::handle(const LoginRequested& login, Now) {
   owner_->judge_login(login, std::static_pointer_cast<ServiceClient>(shared_from_this()));
 }
 
+void ServiceClient::handle(const LocksChanged&, Now) {
+  if (service_) owner_->locks_changed(*service_);
+}
+
+void ServiceClient::handle_locks_changed() {
+  session_.handle_locks_changed(read_clocks());
+  settle();
+}
+
 void ServiceClient::answer_login(LoginId id, Result<AuthenticatedUser> result) {
   session_.answer_login(id, std::move(result), read_clocks());
   settle();

@@ -22,6 +22,7 @@ class ServiceClientOwner {
   virtual void report(const std::string& problem) = 0;
   /// Has the login judged, away from the node's thread, and answers it with client.answer_login() unless that is gone.
   virtual void judge_login(const LoginRequested& login, const std::shared_ptr<ServiceClient>& client) = 0;
+  virtual void locks_changed(const Service& service) = 0;
   virtual void client_ended(ServiceClient& client) = 0;
 
  protected:
@@ -35,6 +36,7 @@ class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSe
 
   ClientId id() const { return id_; }
   const ServiceSession& session() const { return session_; }
+  void handle_locks_changed();
   void answer_login(LoginId id, Result<AuthenticatedUser> result);
   /// Null while the client is in no service of ours.
   Service* service() const { return service_; }
@@ -56,6 +58,7 @@ class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSe
   void abandon_generator(const Generator& generator);
   void handle(const ClientConnected& connected, Now now);
   void handle(const LoginRequested& login, Now now);
+  void handle(const LocksChanged& changed, Now now);
   void handle(const WireConnected& connected, Now now);
   void handle(const WireReceived& received, Now now);
   void handle(const PipeConnected& connected, Now now);

@@ -29,10 +29,12 @@ def pytest_generate_tests(metafunc):
 
 
 def pytest_collection_modifyitems(config, items):
-    """Scenarios whose steps a client does not know are not its tests."""
+    """Scenarios that a client or a service cannot carry out are not its tests."""
     def is_known(item):
         scenario, link = (item.callspec.params.get(name) for name in ("scenario", "link"))
-        return not scenario or not link or link[0].client in scenario.clients
+        if not scenario or not link:
+            return True
+        return link[0].client in scenario.clients and link[0].service in scenario.services
 
     config.hook.pytest_deselected(items=[item for item in items if not is_known(item)])
     items[:] = filter(is_known, items)

@@ -11,6 +11,7 @@ class Scenario:
     name: str
     steps: list
     clients: tuple = ("reference", "ours", "browser")  # those that know its steps
+    services: tuple = ("reference", "ours")  # those that can do what it asks
 
 
 NATIVE = ("reference", "ours")
@@ -331,6 +332,75 @@ SCENARIOS += [
         {"open": "o", "service": "open", "expect": None},
         {"by": "o", "call": "who", "expect": ""},
         {"leave": "o", "expect": None}]),
+    Scenario("user lock", clients=NATIVE, steps=[
+        opened("a", "alice", "secret"),
+        opened("b", "bob", "hunter2"),
+        {"by": "b", "on": ["head"], "call": "identify", "expect": "part head"},
+        {"by": "a", "lock": "user", "expect": None},
+        {"by": "a", "set": "level", "value": {"double": 2.0}, "expect": None},
+        {"by": "b", "get": "level", "expect_error": LOCKED, "message": "Object locked by alice"},
+        {"by": "b", "set": "level", "value": {"double": 3.0}, "expect_error": LOCKED},
+        {"by": "b", "call": "who", "expect_error": LOCKED},
+        {"by": "b", "on": ["head"], "get": "size", "expect_error": LOCKED},
+        {"by": "b", "connect": "position", "expect_error": LOCKED},
+        {"by": "b", "peek_in": "position", "expect_error": LOCKED},
+        {"by": "b", "get": "shown", "expect": 0.0},  # nolockread
+        {"by": "b", "set": "shown", "value": {"double": 3.0}, "expect_error": LOCKED},
+        {"by": "b", "get": "status", "expect": 7},  # nolock
+        {"by": "b", "set": "status", "value": {"int32": 8}, "expect": None},
+        {"by": "b", "set": "status", "value": {"int32": 7}, "expect": None},
+        {"by": "b", "connect": "free_position", "expect": None},
+        {"by": "b", "close": "free_position", "expect": None},
+        {"by": "b", "lock": "user", "expect_error": LOCKED, "message": "Object already locked"},
+        {"by": "b", "unlock": "object", "expect_error": LOCKED},
+        opened("a2", "alice", "secret"),
+        {"by": "a2", "get": "level", "expect": 2.0},
+        {"by": "a", "unlock": "object", "expect": None},
+        {"by": "b", "get": "level", "expect": 2.0},
+        {"by": "b", "set": "level", "value": {"double": 1.5}, "expect": None}]),
+    Scenario("lock of a child", clients=NATIVE, steps=[
+        opened("a", "alice", "secret"),
+        opened("b", "bob", "hunter2"),
+        {"by": "b", "on": [["parts", 1]], "call": "identify", "expect": "part number 1"},
+        {"by": "a", "on": [["parts", 1]], "lock": "user", "expect": None},
+        {"by": "b", "on": [["parts", 1]], "call": "identify", "expect_error": LOCKED},
+        {"by": "b", "call": "who", "expect": "bob"},
+        {"by": "b", "on": ["head"], "call": "identify", "expect": "part head"},
+        {"by": "b", "lock": "user", "expect_error": LOCKED},
+        # The last session of its user ends: so does the lock.
+        {"leave": "a", "expect": None},
+        {"by": "b", "on": [["parts", 1]], "call": "identify", "expect": "part number 1"}]),
+    Scenario("client lock", clients=NATIVE, steps=[
+        opened("a", "alice", "secret"),
+        opened("a2", "alice", "secret"),
+        opened("r", "root", "toor"),
+        {"by": "a", "lock": "client", "expect": None},
+        {"by": "a", "call": "who", "expect": "alice"},
+        {"by": "a2", "get": "level", "expect_error": LOCKED},
+        {"by": "r", "get": "level", "expect_error": LOCKED},
+        {"by": "r", "unlock": "object", "expect": None},
+        {"by": "a2", "call": "who", "expect": "alice"},
+        {"by": "a", "lock": "client", "expect": None},
+        {"leave": "a", "expect": None},
+        {"by": "a2", "call": "who", "expect": "alice"}]),
+    Scenario("lock refused", clients=NATIVE, steps=[
+        opened("g", "guest", "secret"),
+        {"by": "g", "lock": "user", "expect_error": LOCKED},
+        {"by": "g", "call": "who", "expect": "guest"},
+        {"open": "o", "service": "open", "expect": None},
+        {"by": "o", "lock": "user", "expect_error": AUTHENTICATION}]),
+    Scenario("monitor", clients=NATIVE, services=("ours",), steps=[  # Python services cannot
+        {"open": "first", "service": "open", "expect": None},
+        {"open": "second", "service": "open", "expect": None},
+        {"by": "first", "enter": "m1", "timeout": -1, "expect": None},
+        {"by": "first", "get": "level", "expect": 1.5},
+        {"by": "second", "get": "level", "expect_error": "RobotRaconteur.InvalidOperation"},
+        {"by": "second", "enter": "m2", "timeout": 10, "expect_error": "RobotRaconteur.OperationTimeout"},
+        {"by": "first", "exit": "m1", "expect": None},
+        {"by": "second", "enter": "m2", "timeout": 1000, "expect": None},
+        {"by": "first", "get": "level", "expect_error": "RobotRaconteur.InvalidOperation"},
+        {"leave": "second", "expect": None},
+        {"by": "first", "get": "level", "expect": 1.5}]),
     Scenario("login later", clients=("ours",), steps=[  # the reference's Python client cannot
         {"open": "o", "service": "open", "expect": None},
         {"by": "o", "login": "alice", "password": "hunter2", "expect_error": AUTHENTICATION},

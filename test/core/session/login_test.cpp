@@ -203,6 +203,29 @@ TEST_CASE("a client that still has to log in can do that, and nothing else") {
   CHECK_FALSE(pair.service->poll_transmit().empty());
 }
 
+TEST_CASE("whoever logs out of a service that requires a user has nothing connected any more") {
+  Guarded pair(true);
+  pair.start(login("alice", password("secret")));
+  pair.judge();
+  pair.next_client<Connected>();
+  pair.next_service<ClientConnected>();
+  const auto wire = pair.client->connect_wire("arm", "torque", pair.now);
+  CHECK(pair.completion(wire));
+  pair.next_service<WireConnected>();
+  const auto pipe = pair.client->connect_pipe("arm", "samples", -1, pair.now);
+  pair.pump();
+  const auto connected = pair.next_service<PipeConnected>();
+  pair.service->accept_pipe(connected.id, pair.now);
+  CHECK(pair.completion(pipe));
+  CHECK(pair.completion(pair.client->logout(pair.now)));
+  CHECK(pair.next_service<PipeClosed>().id == connected.id);
+  CHECK_FALSE(pair.service->has_wire("arm", "torque"));
+  CHECK_FALSE(pair.service->send_pipe_packet(connected.id, Value(1.0), pair.now));
+  const auto& torque = *pair.service->service()->root_type().find_member("torque");
+  REQUIRE(pair.service->send_wire("arm", torque, Value(1.0), pair.now));
+  CHECK(pair.service->poll_transmit().empty());
+}
+
 TEST_CASE("guessing ends: a connection is closed, then the service waits") {
   Guarded pair(false);
   pair.start(login("", {}));

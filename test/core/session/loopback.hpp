@@ -33,6 +33,9 @@ object Arm
   property double speed
   property int32 serial [readonly]
   property int32 secret [writeonly]
+  property int32 status [nolock]
+  property double shown [nolockread]
+  property int32 alarm [urgent]
   property Pose pose
   function double add(double a, double b)
   function void stop()
@@ -41,6 +44,7 @@ object Arm
   function double{generator} scale(double factor, double{generator} values)
   function void sink(string{generator} lines)
   event bumped(int32 side, string what)
+  event alarmed(int32 number) [urgent]
   objref Tool tool
   objref Tool{string} tools
   objref Tool[] slots
@@ -66,7 +70,9 @@ class PlainObject : public ServiceObject {
     if (index == "none") return std::shared_ptr<ServiceObject>();
     return std::shared_ptr<ServiceObject>(std::make_shared<PlainObject>("experimental.loopback.Tool"));
   }
+  bool is_monitor_lockable() const override { return has_monitor; }
   std::vector<std::string> asked;
+  bool has_monitor = true;
 
  private:
   std::string type_;

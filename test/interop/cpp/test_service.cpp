@@ -226,6 +226,7 @@ class Guarded {
                           {"1", make_part("number 1")}, {"10", make_part("number 10")}}](std::string_view index) {
                        return parts.at(std::string(index));
                      });
+    service_->root().allow_monitor();
     service_->set_security(std::move(security));
     node.add(service_);
   }

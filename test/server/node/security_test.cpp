@@ -57,6 +57,7 @@ std::shared_ptr<Service> make_vault(const std::string& name, SecurityPolicy poli
     const auto caller = weak.lock()->current_caller();
     return caller.user + "/" + (caller.endpoint != 0 && caller.id != 0 ? "there" : "not there");
   });
+  service->root().allow_monitor();
   service->set_security(std::move(policy));
   return service;
 }
@@ -67,6 +68,9 @@ struct Vaults {
     SecurityPolicy policy;
     policy.authenticator = authenticator;
     target.add(make_vault("public", policy));
+    policy.allow_object_lock = true;
+    target.add(make_vault("shared", policy));
+    policy.allow_object_lock = false;
     policy.require_valid_user = true;
     target.add(make_vault("vault", policy));
   }};
@@ -108,6 +112,39 @@ TEST_CASE("a slow login holds nobody up") {
   vaults.authenticator->release();
   slow.join();
   CHECK(who == Value("slow/there"));
+}
+
+TEST_CASE("object locks over real connections") {
+  Vaults vaults;
+  const auto alice = connect(vaults.node.url("vault"), "alice", "secret");
+  const auto bob = connect(vaults.node.url("vault"), "bob", "secret");
+  CHECK(error_of([&] { alice.lock(); }).code == ErrorCode::permission_denied);
+  const auto open = connect(vaults.node.url("shared"));
+  open.connection().authenticate("alice", "secret");
+  open.lock();
+  const auto other = connect(vaults.node.url("shared"));
+  CHECK(error_of([&] { other.get("level"); }).message == "Object locked by alice");
+  CHECK(error_of([&] { other.unlock(); }).code == ErrorCode::authentication_error);
+  open.unlock();
+  CHECK(other.get("level") == Value(1.5));
+}
+
+TEST_CASE("a client that waits for a monitor is told when it is free") {
+  Vaults vaults;
+  const auto first = connect(vaults.node.url("public"));
+  const auto second = connect(vaults.node.url("public"));
+  std::optional<Result<Value>> entered;
+  {
+    const auto guard = first.enter_monitor();
+    second.connection().asynchronous().enter_monitor(second.path(), std::chrono::milliseconds(-1),
+                                                     [&](Result<Value> result) { entered = std::move(result); });
+    CHECK(error_of([&] { (void)second.get("level"); }).code == ErrorCode::invalid_operation);
+    CHECK_FALSE(entered);
+  }
+  // Well below the 5 s after which it would be told that it still has to wait.
+  CHECK(second.connection().run_until([&] { return entered.has_value(); }, std::chrono::seconds(4)));
+  CHECK(*entered);
+  CHECK(error_of([&] { (void)first.get("level"); }).code == ErrorCode::invalid_operation);
 }
 
 TEST_CASE("a service that nobody could use is refused") {
