@@ -277,7 +277,7 @@ SCENARIOS = [
         {"next": "b", "expect": {**plain_of(OTHER_POSE), "px": 1.0}},
         {"next": "b", "expect_error": STOP},
         {"next": "a", "expect": {**plain_of(POSE), "px": 3.5}},
-        {"next": "a", "expect_error": STOP}], clients=NATIVE),
+        {"next": "a", "expect_error": STOP}]),
     Scenario("generators_with_parameter", [
         {"generate": "scale", "as": "s", "args": [{"double": 2.0}], "expect": None},
         {"next": "s", "value": {"double": 1.5}, "expect": 3.0},
@@ -289,7 +289,7 @@ SCENARIOS = [
         {"next": "c", "value": {"double[]": []}, "expect": None},
         {"next": "c", "value": {"double[]": [3.0]}, "expect": None},
         {"close_generator": "c", "expect": None},
-        {"get": "collected", "expect": [1.0, 2.0, 3.0]}], clients=NATIVE),
+        {"get": "collected", "expect": [1.0, 2.0, 3.0]}]),
     Scenario("generators_that_are_stopped", [
         {"generate": "count_up", "as": "c", "args": [{"double": 0.0}, {"int32": 1000000}], "expect": None},
         {"next": "c", "expect": 0.0},
@@ -300,6 +300,14 @@ SCENARIOS = [
         {"next": "a", "expect": 7.0},
         {"abort_generator": "a", "expect": None},
         {"get": "generator_end", "expect": "aborted"},
+        {"generate": "count_up", "as": "f", "args": [{"double": 1.0}, {"int32": -1}], "expect": None},
+        {"next": "f", "expect": 1.0},
+        {"next": "f", "expect_error": "RobotRaconteur.OutOfRange", "message": "no more"}]),
+    # A generator of JavaScript does not ask the service again: after its end it says so itself.
+    Scenario("generators_after_their_end", [
+        {"generate": "count_up", "as": "a", "args": [{"double": 7.0}, {"int32": 1000000}], "expect": None},
+        {"next": "a", "expect": 7.0},
+        {"abort_generator": "a", "expect": None},
         {"next": "a", "expect_error": "RobotRaconteur.OperationAborted"},
         {"generate": "count_up", "as": "f", "args": [{"double": 1.0}, {"int32": -1}], "expect": None},
         {"next": "f", "expect": 1.0},

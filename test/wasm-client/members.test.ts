@@ -146,10 +146,6 @@ describe("functions", () => {
     expect(String(error)).toBe("test.members.Jammed: it is stuck");
   });
 
-  it("that are generators say that they are not available", async () => {
-    expect((await failure(m("ramp")(3))).code).toBe(ErrorCode.NotImplementedError);
-  });
-
   it("run side by side", async () => {
     expect(await Promise.all(Array.from({ length: 100 }, (_, index) => m("add")(index, 0)))).toEqual(
       Array.from({ length: 100 }, (_, index) => index),

@@ -11,6 +11,9 @@
 //     hang(), stop()         never answers; closes the service
 //   pipes                    send packets back; "greeting" says hello, world while it is connected; "refused" refuses;
 //                            "mute" never answers
+//   generator functions      give each value back that they are given; those that take none count to their first
+//                            argument from 0 (if it is negative, OutOfRange "no more" follows); "refuse" refuses,
+//                            "hang_on" never answers a step; the property generator_end says how the last one ended
 //   objrefs                  of every index but "missing" and 99; a property `name` tells which
 // Service "test", node "test.service", attribute site = "dock".
 import { readFileSync } from "node:fs";

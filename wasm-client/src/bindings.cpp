@@ -65,6 +65,15 @@ RR_EXPORT(set_property) RequestId rr_set_property(JsHandle path, JsHandle member
 RR_EXPORT(call_function) RequestId rr_call_function(JsHandle path, JsHandle member, JsHandle arguments) {
   return session->call_function(JsValue(path), JsValue(member), JsValue(arguments));
 }
+RR_EXPORT(open_generator) RequestId rr_open_generator(JsHandle path, JsHandle member, JsHandle arguments) {
+  return session->open_generator(JsValue(path), JsValue(member), JsValue(arguments));
+}
+/// `step` a rr::GeneratorStep.
+RR_EXPORT(step_generator)
+RequestId rr_step_generator(int step, JsHandle path, JsHandle member, std::int32_t index, JsHandle parameter) {
+  return session->step_generator(static_cast<rr::GeneratorStep>(step), JsValue(path), JsValue(member), index,
+                                 JsValue(parameter));
+}
 RR_EXPORT(find_object) RequestId rr_find_object(JsHandle path) {
   return session->find_object(JsValue(path));
 }

@@ -107,16 +107,36 @@ RequestId WasmSession::ask(ValueRequest request, const JsValue& path, const JsVa
 
 RequestId WasmSession::call_function(const JsValue& path, const JsValue& member, const JsValue& arguments) {
   const auto target = find_target(path, member);
+  const auto values = target ? read_arguments(arguments, *target->definition) : std::nullopt;
+  if (!values) return 0;
+  return remember(session_.call_function(target->path, target->member, *values, now_), target->definition->type);
+}
+
+RequestId WasmSession::open_generator(const JsValue& path, const JsValue& member, const JsValue& arguments) {
+  const auto target = find_target(path, member);
+  const auto values = target ? read_arguments(arguments, *target->definition) : std::nullopt;
+  return values ? session_.open_generator(target->path, target->member, *values, now_) : 0;
+}
+
+RequestId WasmSession::step_generator(GeneratorStep step, const JsValue& path, const JsValue& member,
+                                      std::int32_t index, const JsValue& parameter) {
+  const auto target = find_target(path, member);
   if (!target) return 0;
-  const auto& parameters = target->definition->parameters;
-  std::vector<Value> values;
-  values.reserve(parameters.size());
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    auto value = read_value(arguments.at(i).value_or(JsValue::undefined()), parameters[i].type, parameters[i].name);
-    if (!value) return 0;
-    values.push_back(std::move(*value));
+  switch (step) {
+    case GeneratorStep::close:
+      return session_.close_generator(target->path, target->member, index, now_);
+    case GeneratorStep::abort:
+      return session_.abort_generator(target->path, target->member, index, now_);
+    case GeneratorStep::next:
+      break;
   }
-  return remember(session_.call_function(target->path, target->member, values, now_), target->definition->type);
+  std::optional<Value> value;
+  const auto& parameters = target->definition->parameters;
+  if (!parameters.empty() && parameters.back().type.container == ContainerKind::generator) {
+    value = read_value(parameter, parameters.back().type, parameters.back().name);
+    if (!value) return 0;
+  }
+  return remember(session_.next_generator(target->path, target->member, index, value, now_), target->definition->type);
 }
 
 RequestId WasmSession::find_object(const JsValue& path) {
@@ -321,6 +341,20 @@ std::optional<Value> WasmSession::read_value(const JsValue& js, const TypeDefini
   if (value.has_value()) return std::move(*value);
   error_ = value.error();
   return std::nullopt;
+}
+
+std::optional<std::vector<Value>> WasmSession::read_arguments(const JsValue& arguments,
+                                                              const MemberDefinition& function) {
+  std::vector<Value> values;
+  values.reserve(function.parameters.size());
+  for (const auto& parameter : function.parameters) {
+    if (parameter.type.container == ContainerKind::generator) break;  // comes with each step
+    const auto given = arguments.at(values.size()).value_or(JsValue::undefined());
+    auto value = read_value(given, parameter.type, parameter.name);
+    if (!value) return std::nullopt;
+    values.push_back(std::move(*value));
+  }
+  return values;
 }
 
 RequestId WasmSession::remember(RequestId id, const TypeDefinition& type) {

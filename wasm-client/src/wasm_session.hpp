@@ -40,6 +40,10 @@ class WasmSession {
   /// A request that hands over a value of the member's type.
   RequestId ask(ValueRequest request, const JsValue& path, const JsValue& member, const JsValue& value);
   RequestId call_function(const JsValue& path, const JsValue& member, const JsValue& arguments);
+  RequestId open_generator(const JsValue& path, const JsValue& member, const JsValue& arguments);
+  /// `parameter` for GeneratorStep::next, undefined where the generator takes none.
+  RequestId step_generator(GeneratorStep step, const JsValue& path, const JsValue& member, std::int32_t index,
+                           const JsValue& parameter);
   RequestId find_object(const JsValue& path);
   /// Returns  whether it was sent or queued.
   bool send_wire(const JsValue& path, const JsValue& member, const JsValue& value);
@@ -89,6 +93,8 @@ class WasmSession {
   const MemberDefinition* find_member(std::string_view path, std::string_view member) const;
   /// Nothing: error_ says why.
   std::optional<Value> read_value(const JsValue& js, const TypeDefinition& type, std::string_view name);
+  /// Those of a function that a call hands over; nothing: error_ says why.
+  std::optional<std::vector<Value>> read_arguments(const JsValue& arguments, const MemberDefinition& function);
   /// Returns `id`, whose reply holds a value of the type.
   RequestId remember(RequestId id, const TypeDefinition& type);
   JsValue event_to_js(const ClientEvent& event);

@@ -218,14 +218,21 @@ export interface MemoryMember<A = RrValue> {
   write(position: readonly number[], value: A, options?: CallOptions): Promise<void>;
 }
 
-/** A function whose results come one after another; `P` goes to the service with each. Leaving the loop ends it. */
+/**
+ * A function whose results come one after another; where it takes values (`P`), each `next(value)` hands one over, also
+ * the first. The service hears of a run with its first `next()`. `return()`, and so leaving the loop, closes it;
+ * `throw()` aborts it. What fails ends it. CallOptions stand for each step: a step that takes too long, or is given up,
+ * aborts the run.
+ */
 export interface GeneratorMember<A extends unknown[] = never[], R = RrValue, P = void> {
   (...args: A): AsyncGenerator<R, void, P>;
+  (...args: [...A, CallOptions]): AsyncGenerator<R, void, P>;
 }
 
 /** A member where no type is known: everything that any member can do. What this one cannot do is missing on it. */
 export interface DynamicMember extends AsyncIterable<RrValue[]> {
-  (...args: unknown[]): Promise<RrValue>;
+  /** Of a generator function an AsyncGenerator instead. */
+  (...args: unknown[]): Promise<RrValue> & AsyncGenerator<RrValue, void, unknown>;
   get(options?: CallOptions): Promise<RrValue>;
   get(index?: number | string, options?: CallOptions): Promise<RemoteObject>;
   set(value: unknown, options?: CallOptions): Promise<void>;

@@ -35,6 +35,10 @@ export type CoreEvent =
   | { kind: "path_released"; path: string }
   | { kind: "closed"; error: ErrorFields };
 
+/** As rr::GeneratorStep. */
+const generator_steps = ["next", "close", "abort"] as const;
+export type GeneratorStep = (typeof generator_steps)[number];
+
 /** Native peers take WebSocket frames of at most this many bytes. */
 const frame_limit = 65_535;
 /** Bytes that go into the core at once; its receive buffer stays as small. */
@@ -55,6 +59,8 @@ interface WasmSession extends CoreExports {
   get_property(path: Handle, member: Handle): number;
   set_property(path: Handle, member: Handle, value: Handle): number;
   call_function(path: Handle, member: Handle, args: Handle): number;
+  open_generator(path: Handle, member: Handle, args: Handle): number;
+  step_generator(step: number, path: Handle, member: Handle, index: number, parameter: Handle): number;
   find_object(path: Handle): number;
   connect_wire(path: Handle, member: Handle): number;
   disconnect_wire(path: Handle, member: Handle): number;
@@ -153,6 +159,19 @@ export class Core {
 
   call_function(path: string, member: string, args: readonly unknown[]): number {
     return this.#ask("call_function", path, member, args);
+  }
+
+  /** Without the generator parameter, which comes with each step. */
+  open_generator(path: string, member: string, args: readonly unknown[]): number {
+    return this.#ask("open_generator", path, member, args);
+  }
+
+  step_generator(step: GeneratorStep, path: string, member: string, index: number, parameter: unknown): number {
+    const number = generator_steps.indexOf(step);
+    const handle = this.#give(parameter);
+    return this.#checked(
+      this.#at_now().step_generator(number, this.#give(path), this.#give(member), index, handle),
+    );
   }
 
   find_object(path: string): number {
@@ -290,6 +309,7 @@ type MemberRequest =
   | "get_property"
   | "set_property"
   | "call_function"
+  | "open_generator"
   | "find_object"
   | "connect_wire"
   | "disconnect_wire"

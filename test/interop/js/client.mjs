@@ -110,6 +110,7 @@ class Client {
   #events = new Map();
   #wires = new Map();
   #pipes = new Map();
+  #generators = new Map();
 
   constructor(root) {
     this.root = root;
@@ -207,6 +208,30 @@ class Client {
     },
     async closed(target, name) {
       return until(async () => this.#pipes.get(name).endpoint.isClosed, true);
+    },
+    async generate(target, member, step) {
+      const { type } = target.$.members.find(({ name }) => name === member);
+      const run = target[member](...(step.args ?? []).map(build));
+      this.#generators.set(step.as, { run, target, member, type: type.replace("{generator}", "") });
+      return null;
+    },
+    async next(target, name, step) {
+      const { run, target: object, member, type } = this.#generators.get(name);
+      const { done, value } = await run.next(...("value" in step ? [build(step.value)] : []));
+      // The end is no error in JavaScript; the scenarios know it as one.
+      if (done) throw Object.assign(new Error(""), { name: "RobotRaconteur.StopIteration" });
+      return this.plainOf(object, member, value, type);
+    },
+    async close_generator(target, name) {
+      await this.#generators.get(name).run.return();
+      return null;
+    },
+    async abort_generator(target, name) {
+      const reason = new Error("enough");
+      await this.#generators.get(name).run.throw(reason).catch((error) => {
+        if (error !== reason) throw error;
+      });
+      return null;
     },
     async peek_in(target, member) {
       return this.plainOf(target, member, await target[member].peek());

@@ -141,8 +141,33 @@ class TestService {
       }
       case CallKind::function:
         return call(name, called.arguments, called.member->type);
+      case CallKind::generator_open:
+        if (name == "refuse") return make_error(ErrorCode::operation_failed, "no");
+        runs_[called.generator] = {called.arguments, 0};
+        return Value{};
+      case CallKind::generator_next:
+        return step(called);
+      case CallKind::generator_close:
+      case CallKind::generator_abort:
+        values["generator_end"] = Value(called.kind == CallKind::generator_close ? "closed" : "aborted");
+        runs_.erase(called.generator);
+        return Value{};
     }
     return Value{};
+  }
+
+  /// The next value of a generator: what it is given, else 0, 1 ... as often as its first argument says.
+  std::optional<Result<Value>> step(const Called& called) {
+    if (called.member->name == "hang_on") return std::nullopt;
+    if (!called.arguments.empty()) {
+      static_cast<TestObject&>(*called.object).values["generator_value"] = called.arguments.front();
+      return called.arguments.front();
+    }
+    auto& run = runs_[called.generator];
+    const double count = run.arguments.empty() ? 0 : run.arguments.front().to<double>().value();
+    if (run.step < std::abs(count)) return Value(static_cast<double>(run.step++));
+    if (count < 0) return make_error(ErrorCode::out_of_range, "no more");
+    return make_error(ErrorCode::stop_iteration, "");
   }
 
   std::optional<Result<Value>> call(std::string_view name, const std::vector<Value>& arguments,
@@ -178,6 +203,11 @@ class TestService {
   std::shared_ptr<TestObject> root_;
   std::shared_ptr<const TypeRegistry> types_;
   std::optional<ServiceSession> session_;
+  struct Run {
+    std::vector<Value> arguments;
+    int step = 0;
+  };
+  std::map<GeneratorId, Run> runs_;
   std::map<std::string, std::vector<PipeId>, std::less<>> pipes_;  ///< open ones, by name
   std::string error_;
   Now now_;

@@ -1,33 +1,35 @@
 // Functions: called by position. Layer: wasm-client/ts/members. Source: sessions spec section 2.9.
 import { make_error } from "../errors.js";
 import type { CallOptions, RrValue } from "../types.js";
+import { is_generator, make_generator_function } from "./generator.js";
 import { signature } from "./member.js";
 import type { MemberContext } from "./member.js";
 
-type Call = (...args: unknown[]) => Promise<RrValue | undefined>;
+type Call = (...args: unknown[]) => Promise<RrValue | undefined> | AsyncGenerator<RrValue | undefined>;
 
-export function make_function({ session, path, info }: MemberContext): Call {
+export function make_function(context: MemberContext): Call {
+  const { session, path, info } = context;
+  if (is_generator(info)) return make_generator_function(context);
   const count = info.parameters.length;
   const is_void = info.type === "void";
   const call = async (...args: unknown[]) => {
-    if (is_generator(info.type, info.parameters)) {
-      throw make_error("NotImplementedError", `${info.name} is a generator function: not available yet`);
-    }
-    const options = args.length === count + 1 ? check_options(signature(info), args[count]) : {};
-    if (args.length < count || args.length > count + 1) {
-      throw make_error("InvalidArgument", `${signature(info)}: got ${args.length} arguments, expected ${count}`);
-    }
-    const value = await session.request(
-      (core) => core.call_function(path, info.name, args.slice(0, count)),
-      options,
-    );
+    const { values, options } = split_arguments(signature(info), count, args);
+    const value = await session.request((core) => core.call_function(path, info.name, values), options);
     return is_void ? undefined : value;
   };
   return Object.defineProperty(call, "name", { value: info.name });
 }
 
-function is_generator(type: string, parameters: readonly { type: string }[]): boolean {
-  return type.endsWith("{generator}") || (parameters.at(-1)?.type.endsWith("{generator}") ?? false);
+/** Arguments by position, then CallOptions where wanted. @throws RobotRaconteurError InvalidArgument */
+export function split_arguments(
+  what: string,
+  count: number,
+  args: readonly unknown[],
+): { values: readonly unknown[]; options: CallOptions } {
+  if (args.length < count || args.length > count + 1) {
+    throw make_error("InvalidArgument", `${what}: got ${args.length} arguments, expected ${count}`);
+  }
+  return { values: args.slice(0, count), options: check_options(what, args[count]) };
 }
 
 /** The argument behind the last parameter; anything else there is one argument too many. */
