@@ -8,6 +8,7 @@
 //     close_PIPE()           closes all endpoints of PIPE
 //     release(path)          releases an object
 //     fail(name, text)       raises the exception `name` with sub name "detail" and the parameter int32[] 1, 2
+//     who()                  the user, or "nobody"
 //     hang(), stop()         never answers; closes the service
 //   pipes                    send packets back; "greeting" says hello, world while it is connected; "refused" refuses;
 //                            "mute" never answers
@@ -44,6 +45,8 @@ export interface ServiceOptions {
   root: string;
   version?: 2 | 4;
   stringTable?: boolean;
+  /** Users alice and bob (password "secret") may log in; whether they have to. */
+  requireUser?: boolean;
   /** The service's bytes arrive in pieces of this size. */
   pieces?: number;
 }

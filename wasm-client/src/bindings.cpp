@@ -105,6 +105,24 @@ RR_EXPORT(send_pipe_packet)
 double rr_send_pipe_packet(JsHandle path, JsHandle member, std::int32_t index, JsHandle value, bool wants_ack) {
   return session->send_pipe_packet(JsValue(path), JsValue(member), index, JsValue(value), wants_ack);
 }
+RR_EXPORT(authenticate) RequestId rr_authenticate(JsHandle username, JsHandle credentials) {
+  return session->authenticate(JsValue(username), JsValue(credentials));
+}
+RR_EXPORT(logout) RequestId rr_logout() {
+  return session->logout();
+}
+RR_EXPORT(lock) RequestId rr_lock(JsHandle path, bool is_for_client) {
+  return session->lock(JsValue(path), is_for_client ? rr::LockKind::client : rr::LockKind::user);
+}
+RR_EXPORT(unlock) RequestId rr_unlock(JsHandle path) {
+  return session->unlock(JsValue(path));
+}
+RR_EXPORT(enter_monitor) RequestId rr_enter_monitor(JsHandle path, double milliseconds) {
+  return session->enter_monitor(JsValue(path), milliseconds);
+}
+RR_EXPORT(exit_monitor) RequestId rr_exit_monitor(JsHandle path) {
+  return session->exit_monitor(JsValue(path));
+}
 RR_EXPORT(cancel) void rr_cancel(RequestId id) {
   session->cancel(id);
 }

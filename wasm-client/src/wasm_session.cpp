@@ -23,6 +23,12 @@ Now make_now(double steady, double utc) {
   return now;
 }
 
+/// A month at most: "never" for a page; further would overflow somewhere.
+std::chrono::milliseconds to_milliseconds(double number) {
+  constexpr double a_month = 31.0 * 24 * 3600 * 1000;
+  return std::chrono::milliseconds(static_cast<std::int64_t>(std::min(number, a_month)));
+}
+
 std::string text_of(const JsValue& js) {
   return js.text().value_or(std::string());
 }
@@ -87,9 +93,7 @@ void WasmSession::handle_closed(const JsValue& reason) {
 // --- asked ---
 
 void WasmSession::set_request_timeout(double milliseconds) {
-  constexpr double a_month = 31.0 * 24 * 3600 * 1000;
-  if (milliseconds > 0)
-    session_.set_request_timeout(std::chrono::milliseconds(static_cast<std::int64_t>(std::min(milliseconds, a_month))));
+  if (milliseconds > 0) session_.set_request_timeout(to_milliseconds(milliseconds));
 }
 
 RequestId WasmSession::ask(MemberRequest request, const JsValue& path, const JsValue& member) {
@@ -172,6 +176,34 @@ double WasmSession::send_pipe_packet(const JsValue& path, const JsValue& member,
   if (sent) return *sent;
   error_ = sent.error();
   return -1;
+}
+
+RequestId WasmSession::authenticate(const JsValue& username, const JsValue& credentials) {
+  TypeDefinition type;
+  type.type = DataType::varvalue_t;
+  type.container = ContainerKind::map_string;
+  const auto read = read_value(credentials, type, "credentials");
+  return read ? session_.authenticate(text_of(username), *read, now_) : 0;
+}
+
+RequestId WasmSession::logout() {
+  return session_.logout(now_);
+}
+
+RequestId WasmSession::lock(const JsValue& path, LockKind kind) {
+  return session_.lock(text_of(path), kind, now_);
+}
+
+RequestId WasmSession::unlock(const JsValue& path) {
+  return session_.unlock(text_of(path), now_);
+}
+
+RequestId WasmSession::enter_monitor(const JsValue& path, double milliseconds) {
+  return session_.enter_monitor(text_of(path), to_milliseconds(milliseconds), now_);
+}
+
+RequestId WasmSession::exit_monitor(const JsValue& path) {
+  return session_.exit_monitor(text_of(path), now_);
 }
 
 void WasmSession::cancel(RequestId id) {

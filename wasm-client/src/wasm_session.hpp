@@ -52,6 +52,14 @@ class WasmSession {
   /// Returns  the packet's number, or -1: take_error() then says why.
   double send_pipe_packet(const JsValue& path, const JsValue& member, std::int32_t index, const JsValue& value,
                           bool wants_ack);
+  /// `credentials` an object or Map, as varvalues.
+  RequestId authenticate(const JsValue& username, const JsValue& credentials);
+  RequestId logout();
+  RequestId lock(const JsValue& path, LockKind kind);
+  RequestId unlock(const JsValue& path);
+  /// `milliseconds` below 0: no limit.
+  RequestId enter_monitor(const JsValue& path, double milliseconds);
+  RequestId exit_monitor(const JsValue& path);
   void cancel(RequestId id);
   void disconnect();
 

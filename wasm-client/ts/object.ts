@@ -10,6 +10,7 @@ import { make_pipe } from "./members/pipe.js";
 import { make_property } from "./members/property.js";
 import { make_wire } from "./members/wire.js";
 import type { Session } from "./session.js";
+import { within } from "./within.js";
 import type {
   CallOptions,
   DynamicMember,
@@ -159,6 +160,52 @@ class Info implements ObjectInfo {
   find(path: string, options: CallOptions = {}): Promise<RemoteObject> {
     const service = this.path.split(".", 1)[0]!;
     return this.#tree.find(path.replace(/^\*(?=\.|$)/, () => service), options);
+  }
+
+  async login(
+    username: string,
+    credentials: string | Record<string, unknown> | ReadonlyMap<string, unknown>,
+    options: CallOptions = {},
+  ): Promise<void> {
+    const given = typeof credentials === "string" ? { password: credentials } : credentials;
+    await this.#session.request((core) => core.authenticate(username, given), options);
+  }
+
+  async logout(options: CallOptions = {}): Promise<void> {
+    await this.#session.request((core) => core.logout(), options);
+  }
+
+  async lock(kind: "user" | "client" = "user", options: CallOptions = {}): Promise<void> {
+    if (kind !== "user" && kind !== "client") {
+      throw make_error("InvalidArgument", `lock: found "${String(kind)}", expected "user" or "client"`);
+    }
+    await this.#session.request((core) => core.lock(this.path, kind), options);
+  }
+
+  async unlock(options: CallOptions = {}): Promise<void> {
+    await this.#session.request((core) => core.unlock(this.path), options);
+  }
+
+  async monitor<R>(action: () => R | Promise<R>, { signal, timeout }: CallOptions = {}): Promise<R> {
+    const session = this.#session;
+    const entering = session.request((core) => core.enter_monitor(this.path, timeout ?? -1));
+    const leave = () => session.request((core) => core.exit_monitor(this.path));
+    try {
+      await within(entering, { signal }, "");
+    } catch (error) {
+      // Who gave up may get the monitor later, and must not keep it.
+      void entering.then(leave).catch(() => undefined);
+      throw error;
+    }
+    let result: R;
+    try {
+      result = await action();
+    } catch (error) {
+      await leave().catch(() => undefined); // the first error is the one to tell
+      throw error;
+    }
+    await leave();
+    return result;
   }
 
   close(): Promise<void> {

@@ -98,6 +98,30 @@ export interface ObjectInfo {
    * @throws RobotRaconteurError (rejects) ObjectNotFound, ServiceNotFound, ...
    */
   find(path: string, options?: CallOptions): Promise<RemoteObject>;
+  /**
+   * Logs in, or in as another user: for the whole session.
+   * @param credentials  what the service's authenticator wants to see; a string stands for `{password}`.
+   * @throws RobotRaconteurError (rejects) AuthenticationError, ...
+   */
+  login(
+    username: string,
+    credentials: string | Record<string, unknown> | ReadonlyMap<string, unknown>,
+    options?: CallOptions,
+  ): Promise<void>;
+  logout(options?: CallOptions): Promise<void>;
+  /**
+   * Locks this object and all below it, until unlock() or the end of the session.
+   * @param kind  whom it keeps out: "user" all other users (the default), "client" all other sessions.
+   * @throws RobotRaconteurError (rejects) ObjectLockedError, AuthenticationError (not logged in), ...
+   */
+  lock(kind?: "user" | "client", options?: CallOptions): Promise<void>;
+  unlock(options?: CallOptions): Promise<void>;
+  /**
+   * Runs `action` while this object is this session's alone, then leaves it to others.
+   * @param options.timeout  milliseconds to wait for it; without limit where not given.
+   * @throws RobotRaconteurError (rejects) OperationTimeout, ...; what `action` throws.
+   */
+  monitor<R>(action: () => R | Promise<R>, options?: CallOptions): Promise<R>;
   /** Ends the session of this object and of all others that came from it. Repeated calls do nothing. */
   close(): Promise<void>;
   /**

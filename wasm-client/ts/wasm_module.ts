@@ -71,6 +71,12 @@ interface WasmSession extends CoreExports {
   connect_pipe(path: Handle, member: Handle, index: number): number;
   disconnect_pipe(path: Handle, member: Handle, index: number): number;
   send_pipe_packet(path: Handle, member: Handle, index: number, value: Handle, wants_ack: boolean): number;
+  authenticate(username: Handle, credentials: Handle): number;
+  logout(): number;
+  lock(path: Handle, is_for_client: boolean): number;
+  unlock(path: Handle): number;
+  enter_monitor(path: Handle, milliseconds: number): number;
+  exit_monitor(path: Handle): number;
   cancel(id: number): void;
   disconnect(): void;
   poll_transmit(limit: number): number;
@@ -218,6 +224,31 @@ export class Core {
     return number;
   }
 
+  authenticate(username: string, credentials: unknown): number {
+    return this.#ask("authenticate", username, credentials);
+  }
+
+  logout(): number {
+    return this.#ask("logout");
+  }
+
+  lock(path: string, kind: "user" | "client"): number {
+    return this.#checked(this.#at_now().lock(this.#give(path), kind === "client"));
+  }
+
+  unlock(path: string): number {
+    return this.#ask("unlock", path);
+  }
+
+  /** `milliseconds` below 0: no limit. */
+  enter_monitor(path: string, milliseconds: number): number {
+    return this.#checked(this.#at_now().enter_monitor(this.#give(path), milliseconds));
+  }
+
+  exit_monitor(path: string): number {
+    return this.#ask("exit_monitor", path);
+  }
+
   cancel(id: number): void {
     this.#session.cancel(id);
   }
@@ -311,6 +342,10 @@ type MemberRequest =
   | "call_function"
   | "open_generator"
   | "find_object"
+  | "authenticate"
+  | "logout"
+  | "unlock"
+  | "exit_monitor"
   | "connect_wire"
   | "disconnect_wire"
   | "peek_in_value"

@@ -31,6 +31,16 @@ class TestObject : public ServiceObject {
   std::string type_;
 };
 
+/// Knows alice and bob, whose password is "secret".
+class TestAuthenticator : public Authenticator {
+  Result<AuthenticatedUser> authenticate(const LoginAttempt& attempt) const override {
+    for (const auto& [key, value] : attempt.credentials.items)
+      if (key == "password" && value == Value("secret") && (attempt.username == "alice" || attempt.username == "bob"))
+        return AuthenticatedUser{.name = attempt.username, .privileges = {"objectlock"}};
+    return make_error(ErrorCode::authentication_error, "Invalid username or password");
+  }
+};
+
 class TestService {
  public:
   /// `options`: {definitions: [text], root: qualified type, version, stringTable}
@@ -82,6 +92,8 @@ class TestService {
     attributes.items.emplace_back("site", Value("dock"));
     auto service = HostedService::make("test", root_, types, std::move(attributes));
     if (service.has_error()) return service.error();
+    const bool requires_user = options.field("requireUser")->is_true();
+    (*service)->set_policy({std::make_shared<TestAuthenticator>(), requires_user, true});
     if (auto added = directory_.add(*service); added.has_error()) return added;
     types_ = std::move(types);
     ServiceSessionOptions session_options;
@@ -95,6 +107,8 @@ class TestService {
   void carry_out() {
     while (auto event = session_->poll_event()) {
       if (const auto* called = std::get_if<Called>(&*event)) answer(*called);
+      if (const auto* login = std::get_if<LoginRequested>(&*event))
+        session_->answer_login(login->id, login->authenticator->authenticate(login->attempt), now_);
       if (const auto* wire = std::get_if<WireConnected>(&*event)) {
         auto& values = static_cast<TestObject&>(*wire->object).values;
         if (const auto found = values.find(wire->member->name); found != values.end())
@@ -173,6 +187,7 @@ class TestService {
   std::optional<Result<Value>> call(std::string_view name, const std::vector<Value>& arguments,
                                     const TypeDefinition& type) {
     if (name == "hang") return std::nullopt;
+    if (name == "who") return Value(session_->user() ? session_->user()->name : "nobody");
     if (name == "stop") return session_->close_service(now_), std::nullopt;
     if (name == "fail") {
       Error error{ErrorCode::remote_error, std::string(*arguments[1].to_text()), std::string(*arguments[0].to_text())};

@@ -1,0 +1,51 @@
+// Users and locks.
+import { ErrorCode } from "../../wasm-client/dist/index.js";
+import type { ConnectOptions, RemoteObject } from "../../wasm-client/dist/index.js";
+import { failure, TestService } from "./service.js";
+
+const definition = `service test.login
+stdver 0.10
+object Part
+  property double size
+end
+object Root
+  property double speed
+  objref Part part
+  function string who()
+end`;
+
+let robot: RemoteObject;
+const start = async (requireUser: boolean, options: ConnectOptions = {}) => {
+  const service = await TestService.start({ definitions: [definition], root: "test.login.Root", requireUser });
+  return (robot = await service.connect(options));
+};
+afterEach(() => robot.$.close());
+
+it("logs in while it connects", async () => {
+  await start(true, { username: "alice", password: "secret" });
+  expect(await robot["who"]!()).toBe("alice");
+  await robot.$.close();
+  await start(true, { username: "bob", credentials: { password: "secret" } });
+  expect(await robot["who"]!()).toBe("bob");
+});
+
+it("rejects a wrong login, and none where one is needed", async () => {
+  expect((await failure(start(true, { username: "alice", password: "guess" }))).code).toBe(ErrorCode.AuthenticationError);
+  const service = await TestService.start({ definitions: [definition], root: "test.login.Root", requireUser: true });
+  expect((await failure(service.connect())).code).toBe(ErrorCode.AuthenticationError);
+});
+
+it("logs in and out later", async () => {
+  await start(false);
+  expect(await robot["who"]!()).toBe("nobody");
+  await robot.$.login("alice", "secret");
+  expect(await robot["who"]!()).toBe("alice");
+  await robot.$.login("bob", new Map([["password", "secret"]]));
+  expect(await robot["who"]!()).toBe("bob");
+  const error = await failure(robot.$.login("bob", { password: "guess" }));
+  expect(error.code).toBe(ErrorCode.AuthenticationError);
+  expect(await robot["who"]!()).toBe("bob");
+  await robot.$.logout();
+  expect(await robot["who"]!()).toBe("nobody");
+  expect((await failure(robot.$.login("bob", Symbol() as never))).code).toBe(ErrorCode.DataTypeMismatch);
+});
