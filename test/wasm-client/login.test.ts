@@ -49,3 +49,33 @@ it("logs in and out later", async () => {
   expect(await robot["who"]!()).toBe("nobody");
   expect((await failure(robot.$.login("bob", Symbol() as never))).code).toBe(ErrorCode.DataTypeMismatch);
 });
+
+it("locks an object, where a user has logged in", async () => {
+  await start(false);
+  expect((await failure(robot.$.lock())).code).toBe(ErrorCode.AuthenticationError);
+  await robot.$.login("alice", "secret");
+  await robot.$.lock();
+  expect((await failure(robot.$.lock("client"))).code).toBe(ErrorCode.ObjectLockedError);
+  await robot.$.unlock();
+  const part = (await robot["part"]!.get()) as unknown as RemoteObject;
+  await part.$.lock("client");
+  await part.$.unlock();
+  expect((await failure(robot.$.lock("mine" as never))).message).toContain('found "mine"');
+});
+
+it("runs a function while it has the monitor", async () => {
+  await start(false);
+  expect(await robot.$.monitor(() => robot["who"]!())).toBe("nobody");
+  const error = await failure(robot.$.monitor(() => Promise.reject(new Error("it went wrong")), { timeout: 1_000 }));
+  expect(error.message).toBe("it went wrong");
+  expect(await robot.$.monitor(() => 1)).toBe(1);
+});
+
+it("does not keep a monitor that it gave up", async () => {
+  await start(false);
+  const abort = new AbortController();
+  const entering = failure(robot.$.monitor(() => 1, { signal: abort.signal }));
+  abort.abort(new Error("enough"));
+  expect((await entering).message).toBe("enough");
+  expect(await robot.$.monitor(() => 2, { timeout: 1_000 })).toBe(2);
+});

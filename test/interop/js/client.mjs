@@ -112,8 +112,14 @@ class Client {
   #pipes = new Map();
   #generators = new Map();
 
+  #others = new Map(); // roots of further clients, by name
+
   constructor(root) {
     this.root = root;
+  }
+
+  async leaveAll() {
+    for (const client of [this.root, ...this.#others.values()]) await client.$.close();
   }
 
   /** A value of a member as plain JSON; `type` where it is not the member's own. */
@@ -122,7 +128,7 @@ class Client {
   }
 
   async carryOut(step) {
-    let target = this.root;
+    let target = "by" in step ? this.#others.get(step.by) : this.root;
     for (const part of step.on ?? []) {
       const [name, ...index] = [part].flat();
       target = await target[name].get(...index);
@@ -143,6 +149,32 @@ class Client {
       const result = await target[member](...(step.args ?? []).map(build));
       if (!step.digest) return this.plainOf(target, member, result);
       return { count: result.length, first: result[0], last: result.at(-1), sum: result.reduce((sum, item) => sum + item, 0) };
+    },
+    async open(_target, name, { service, username, password }) {
+      const url = process.argv[2].replace("service=interop", `service=${service}`);
+      this.#others.set(name, await connect(url, { username, password }));
+      return null;
+    },
+    async leave(_target, name) {
+      await this.#others.get(name).$.close();
+      this.#others.delete(name);
+      return null;
+    },
+    async login(target, username, { password }) {
+      await target.$.login(username, password);
+      return null;
+    },
+    async logout(target) {
+      await target.$.logout();
+      return null;
+    },
+    async lock(target, kind) {
+      await target.$.lock(kind);
+      return null;
+    },
+    async unlock(target) {
+      await target.$.unlock();
+      return null;
     },
     async get_until(target, member, step) {
       return until(async () => this.plainOf(target, member, await target[member].get()), step.until);
@@ -275,7 +307,7 @@ if (robot) {
       results.push({ error: errorOf(error) });
     }
   }
-  await robot.$.close();
+  await client.leaveAll();
   // No process.exit(): it would cut what is still on its way through the pipe.
   console.log(JSON.stringify({ results }));
 }

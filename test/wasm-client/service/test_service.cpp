@@ -15,6 +15,7 @@ class TestObject : public ServiceObject {
  public:
   explicit TestObject(std::string type) : type_(std::move(type)) {}
   const std::string& type_name() const override { return type_; }
+  bool is_monitor_lockable() const override { return true; }
 
   Result<std::shared_ptr<ServiceObject>> find_child(const MemberDefinition& objref,
                                                     const std::optional<std::string>& index) override {
