@@ -10,7 +10,7 @@ int main(int count, char** values) {
       {"check-config", "check-config FILE", "say what is wrong with a configuration", rrgate::run_check_config},
       {"check", "check [--compat] [-I DIR] FILE...", "say what is wrong with service definitions", rrgate::run_check},
       {"fmt", "fmt [--in-place | --check | --compat] FILE...", "print or lay out service definitions", rrgate::run_fmt},
-      {"generate", "generate ts FILE...|URL [-o OUT] [-I DIR]", "write types for programs from service definitions",
+      {"generate", "generate ts|cpp FILE...|URL [-o OUT] [-I DIR]", "write TypeScript types or C++ classes",
        rrgate::run_generate},
   };
   const std::vector<std::string_view> arguments(values + 1, values + count);

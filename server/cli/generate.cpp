@@ -1,6 +1,7 @@
 // rrgate generate: source code from service definitions. Layer: server/cli.
 #include "server/cli/command.hpp"
 #include "server/cli/diagnostics.hpp"
+#include "server/definitions/generate_cpp.hpp"
 #include "server/definitions/generate_typescript.hpp"
 #include "server/definitions/text_file.hpp"
 #include "server/node/client.hpp"
@@ -40,6 +41,19 @@ int generate_ts(const ParsedArguments& parsed, const DefinitionSet& set) {
       out, generate_typescript(set, is_module ? TypeScriptFlavour::module : TypeScriptFlavour::declarations));
 }
 
+/// The files that were named, or all that the service has; a header and a source each.
+int generate_cpp_files(const ParsedArguments& parsed, const DefinitionSet& set) {
+  const auto option = parsed.options.find("-o");
+  const auto folder = std::filesystem::path(option == parsed.options.end() ? "." : option->second);
+  for (const auto* definition : set.requested()) {
+    const auto files = generate_cpp(set, *definition);
+    if (write_output((folder / (files.name + ".hpp")).string(), files.header) != exit_ok ||
+        write_output((folder / (files.name + ".cpp")).string(), files.source) != exit_ok)
+      return exit_failed;
+  }
+  return exit_ok;
+}
+
 }  // namespace
 
 int run_generate(Arguments arguments) {
@@ -48,9 +62,10 @@ int run_generate(Arguments arguments) {
   constexpr std::string_view repeated[] = {"-I"};
   auto parsed = parse_arguments(arguments, {options, flags, repeated});
   if (!parsed.error.empty()) return usage_error("generate", parsed.error);
-  if (parsed.operands.size() < 2) return usage_error("generate", "expected a language (ts) and a FILE or several");
-  if (parsed.operands.front() != "ts")
-    return usage_error("generate", "unknown language " + rr::quoted(parsed.operands.front()) + ", expected ts");
+  if (parsed.operands.size() < 2) return usage_error("generate", "expected a language (ts, cpp) and a FILE or several");
+  const auto language = parsed.operands.front();
+  if (language != "ts" && language != "cpp")
+    return usage_error("generate", "unknown language " + rr::quoted(language) + ", expected ts or cpp");
   parsed.operands.erase(parsed.operands.begin());
   const auto urls = std::count_if(parsed.operands.begin(), parsed.operands.end(), is_url);
   if (urls != 0 && parsed.operands.size() != 1) return usage_error("generate", "expected files, or one URL alone");
@@ -58,7 +73,7 @@ int run_generate(Arguments arguments) {
     const auto set = urls != 0 ? definitions_of_service(parsed.operands.front())
                                : DefinitionSet::from_files(parsed.operands, parsed.repeated, mode_of(parsed));
     if (!report_diagnostics(set)) return exit_failed;
-    return generate_ts(parsed, set);
+    return language == "ts" ? generate_ts(parsed, set) : generate_cpp_files(parsed, set);
   } catch (const rr::ClientException& failure) {
     std::cerr << "rrgate generate: " << parsed.operands.front() << ": " << failure.what() << "\n";
     return exit_failed;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <functional>
+#include <limits>
 #include <set>
 
 #include "core/robdef/names.hpp"
@@ -115,6 +116,34 @@ std::string string_literal(std::string_view text, bool for_cpp) {
 std::string typescript_constant(const rr::ConstantDefinition& item, std::span<const rr::ConstantDefinition> scope) {
   int budget = 1000;
   return typescript_value(item, scope, budget);
+}
+
+std::string cpp_constant(const rr::ConstantDefinition& item, std::string_view name) {
+  const auto value = value_of(item);
+  if (const auto* text = std::get_if<std::string>(&value.data))
+    return "std::string_view " + std::string(name) + "{" + string_literal(*text, true) + ", " +
+           std::to_string(text->size()) + "}";
+  std::vector<std::string> items;
+  if (const auto* numbers = std::get_if<std::vector<std::int64_t>>(&value.data))
+    for (const auto number : *numbers)
+      items.push_back(number == std::numeric_limits<std::int64_t>::min() ? "-9223372036854775807 - 1"
+                                                                         : std::to_string(number));
+  if (const auto* numbers = std::get_if<std::vector<std::uint64_t>>(&value.data))
+    for (const auto number : *numbers) items.push_back(std::to_string(number) + "u");
+  const bool is_single = item.type.type == rr::DataType::single_t;
+  if (const auto* numbers = std::get_if<std::vector<double>>(&value.data))
+    for (const auto number : *numbers) {
+      auto text = is_single ? float_literal(static_cast<float>(number)) : float_literal(number);
+      if (text.find_first_of(".e") == std::string::npos) text += ".0";
+      items.push_back(text + (is_single ? "f" : ""));
+    }
+  const std::string type = is_single ? "float"
+                           : item.type.type == rr::DataType::double_t
+                               ? "double"
+                               : "std::" + std::string(data_type_name(item.type.type)) + "_t";
+  if (!value.is_array) return type + ' ' + std::string(name) + " = " + joined(items);
+  return "std::array<" + type + ", " + std::to_string(items.size()) + "> " + std::string(name) + "{" + joined(items) +
+         "}";
 }
 
 }  // namespace rrgate

@@ -30,4 +30,7 @@ std::string string_literal(std::string_view text, bool for_cpp);
 /// An expression. Struct constants are written out whole, up to a bound; `scope` is what their fields refer to.
 std::string typescript_constant(const rr::ConstantDefinition& item, std::span<const rr::ConstantDefinition> scope);
 
+/// A constexpr variable, without `constexpr`: "std::int16_t NAME = 5". Of what is not a struct constant.
+std::string cpp_constant(const rr::ConstantDefinition& item, std::string_view name);
+
 }  // namespace rrgate

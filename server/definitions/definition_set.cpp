@@ -102,4 +102,11 @@ const rr::EntityDefinition* DefinitionSet::find_entity(std::string_view qualifie
   return definition ? definition->find_entity(name) : nullptr;
 }
 
+bool DefinitionSet::has_service_within(std::string_view name) const {
+  const auto inner = std::string(name) + '.';
+  return std::any_of(definitions_.begin(), definitions_.end(), [&](const auto& definition) {
+    return definition.name == name || definition.name.starts_with(inner);
+  });
+}
+
 }  // namespace rrgate

@@ -35,6 +35,8 @@ class DefinitionSet {
   /// Nullptr where there is none.
   const rr::ServiceDefinition* find_service(std::string_view name) const;
   const rr::EntityDefinition* find_entity(std::string_view qualified_name) const;
+  /// Whether a service is called `name`, or `name` and a dot and more.
+  bool has_service_within(std::string_view name) const;
 
  private:
   explicit DefinitionSet(rr::RobdefMode mode) : mode_(mode) {}

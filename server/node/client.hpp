@@ -16,19 +16,16 @@
 #include <string_view>
 
 #include "server/node/client_connection.hpp"
+#include "server/node/exception.hpp"
 #include "server/node/handler.hpp"
 #include "server/node/remote_generator.hpp"
 
 namespace rr {
 
 /// A request that failed, or a connection that could not be opened.
-class ClientException : public std::runtime_error {
+class ClientException : public Exception {
  public:
-  explicit ClientException(Error error) : std::runtime_error(error.message), error_(std::move(error)) {}
-  const Error& error() const { return error_; }
-
- private:
-  Error error_;
+  using Exception::Exception;
 };
 
 /// A connection and the io_context that it runs on, which runs only while one of the functions here waits: handlers of

@@ -150,4 +150,9 @@ GeneratorHandler make_generator_handler(F&& function) {
   return detail::OpenSignature<std::remove_cvref_t<F>>::make(std::forward<F>(function));
 }
 
+/// One that was put together by hand.
+inline GeneratorHandler make_generator_handler(GeneratorHandler handler) {
+  return handler;
+}
+
 }  // namespace rr

@@ -162,4 +162,9 @@ Handler make_handler(F&& function) {
   return detail::Signature<std::remove_cvref_t<F>>::make(std::forward<F>(function));
 }
 
+/// One that was put together by hand.
+inline Handler make_handler(Handler handler) {
+  return handler;
+}
+
 }  // namespace rr

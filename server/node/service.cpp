@@ -64,11 +64,6 @@ void check_result(const std::string& where, const HandlerType& result, const Typ
 
 }  // namespace
 
-ServiceException::ServiceException(std::string qualified_name, std::string message, std::string sub_name, Value param)
-    : std::runtime_error(message),
-      error_{ErrorCode::remote_error, std::move(message), std::move(qualified_name), std::move(sub_name),
-             param.is_null() ? nullptr : std::make_shared<const Value>(std::move(param))} {}
-
 // --- Object: what the device says ---
 
 const MemberDefinition& Object::require_member(std::string_view name, MemberKind kind) const {
@@ -165,6 +160,12 @@ void Object::objref(std::string_view name, std::shared_ptr<Object> child) {
   for (const std::string& path : paths()) release_path(child_path(path, member.name));
 }
 
+void Object::objref(std::string_view name, std::function<std::shared_ptr<Object>()> find) {
+  const MemberDefinition& member = require_member(name, MemberKind::objref);
+  if (is_indexed(member)) refuse(type_name() + "." + member.name + " is indexed: it takes a function of the index");
+  members_[&member].find = [find = std::move(find)](std::string_view) { return find(); };
+}
+
 void Object::objref(std::string_view name, std::function<std::shared_ptr<Object>(std::string_view index)> find) {
   const MemberDefinition& member = require_member(name, MemberKind::objref);
   if (!is_indexed(member)) refuse(type_name() + "." + member.name + " has no index: it takes an object");
@@ -216,7 +217,7 @@ Result<std::shared_ptr<ServiceObject>> Object::find_child(const MemberDefinition
   std::shared_ptr<Object> child;
   try {
     child = found->second.find(index ? std::string_view(*index) : std::string_view{});
-  } catch (const ServiceException& exception) {
+  } catch (const Exception& exception) {
     return exception.error();
   } catch (const std::exception& exception) {
     return make_error(ErrorCode::object_not_found, exception.what());

@@ -10,7 +10,8 @@
 //
 // Handlers take and return C++ numbers, bool, enums, std::string, std::vector of numbers, or rr::Value for anything
 // else (Value accepts all of them). They run on the node's thread. A handler may throw rr::ServiceException to send an
-// error to the client; other exceptions reach it as code 100, "rrgate.UnhandledException", with their text.
+// error to the client; exceptions that are no rr::Exception reach it as code 100, "rrgate.UnhandledException", with
+// their text.
 //
 // Handlers are checked against the definition before anything listens: one that does not fit (no such member, wrong
 // kind, wrong parameter type or count) is a std::invalid_argument where it is set, one that is missing where the
@@ -30,6 +31,7 @@
 
 #include "core/session/hosted_service.hpp"
 #include "core/session/service_session.hpp"
+#include "server/node/exception.hpp"
 #include "server/node/generator.hpp"
 #include "server/node/handler.hpp"
 #include "server/node/pipe_endpoint.hpp"
@@ -47,16 +49,13 @@ struct Caller {
 };
 
 /// Thrown by a handler: the client gets this error.
-class ServiceException : public std::runtime_error {
+class ServiceException : public Exception {
  public:
   explicit ServiceException(std::string message, ErrorCode code = ErrorCode::operation_failed)
-      : std::runtime_error(message), error_{code, std::move(message)} {}
+      : Exception({code, std::move(message)}) {}
   /// A custom exception of a service definition: its qualified name, "com.x.MyException".
-  ServiceException(std::string qualified_name, std::string message, std::string sub_name = {}, Value param = {});
-  const Error& error() const { return error_; }
-
- private:
-  Error error_;
+  ServiceException(std::string qualified_name, std::string message, std::string sub_name = {}, Value param = {})
+      : Exception(declared_error(qualified_name, std::move(message), std::move(sub_name), std::move(param))) {}
 };
 
 /// One object of a service. The root comes with the service; others are made by Service::make_object and handed out by
@@ -156,6 +155,8 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
 
   /// objref without index. Set again, clients are told to look it up anew.
   void objref(std::string_view name, std::shared_ptr<Object> child);
+  /// objref without index: find() is asked when a client looks it up first; nullptr where there is no object.
+  void objref(std::string_view name, std::function<std::shared_ptr<Object>()> find);
   /// Indexed objref: find(index text) returns the object, or nullptr where there is none.
   void objref(std::string_view name, std::function<std::shared_ptr<Object>(std::string_view index)> find);
   /// Clients may take turns at this object by its monitor lock: while one is in, requests of the others fail.

@@ -10,8 +10,7 @@ namespace rr {
 namespace {
 
 Error error_of(const std::exception& exception) {
-  if (const auto* service_exception = dynamic_cast<const ServiceException*>(&exception))
-    return service_exception->error();
+  if (const auto* known = dynamic_cast<const Exception*>(&exception)) return known->error();
   return {ErrorCode::remote_error, exception.what(), "rrgate.UnhandledException"};
 }
 

@@ -1,0 +1,324 @@
+// A generated service and a generated client of it, over TCP. The definition: test/definitions/test.words.robdef.
+#include <catch2/catch.hpp>
+
+#include "experimental__interop.hpp"
+#include "experimental__simulatedcreate.hpp"
+#include "test/server/node/node_fixture.hpp"
+#include "test__words.hpp"
+
+using namespace rr;
+using namespace std::chrono_literals;
+using namespace test::words;
+using Catch::Matchers::Contains;
+
+namespace {
+
+class Friend : public interfaceService {
+ public:
+  explicit Friend(std::string name, std::shared_ptr<Friend> friend_of_it = nullptr)
+      : name_(std::move(name)), friend_(std::move(friend_of_it)) {
+    level(7);
+  }
+
+ private:
+  double get_long() override { return long_; }
+  void set_long(double value) override { long_ = value; }
+  std::string who() override { return name_; }
+  std::shared_ptr<baseService> get_parent() override { return friend_; }
+  void set_level(std::int32_t value) override { level(value + 1); }
+  void f() override {
+    if (name_ == "left") throw delete_("it is gone", "why", Value(3));
+    moved(5);
+  }
+
+  std::string name_;
+  std::shared_ptr<Friend> friend_;
+  double long_ = 0;
+};
+
+class Everything : public ObjectService {
+ public:
+  std::optional<union_> received_target;
+  std::vector<std::string> lines;
+
+ private:
+  std::int32_t get_auto() override { return auto_; }
+  void set_auto(std::int32_t value) override { auto_ = value; }
+  Nullable<switch_> get_switch_value() override { return switch__; }
+  void set_switch_value(Nullable<switch_> value) override { switch__ = std::move(value); }
+  void set_any(Value value) override { auto_ = value.to<std::int32_t>().value(); }
+  enumeration get_goto() override { return static_cast<enumeration>(auto_); }
+  std::vector<template_> get_pods() override { return pods_; }
+  void set_pods(std::vector<template_> value) override { pods_ = std::move(value); }
+  union_ get_point() override { return point_; }
+  void set_point(union_ value) override { point_ = value; }
+
+  double operator_(double in, std::string delete_, enumeration while_) override {
+    explicit_(in, std::vector<std::string>{delete_, "more"});
+    return in + static_cast<int>(while_);
+  }
+  void then(std::int32_t) override { throw more::thrown("other"); }
+  std::string toString() override { throw std::runtime_error("no text"); }
+  Nullable<switch_> constructor(Nullable<switch_> value, Value) override { return value; }
+  void void_function(Map, Nullable<more::Shared> shared) override {
+    if (!shared) throw Exception(make_error(ErrorCode::null_value, "nothing shared"));
+    happened();
+  }
+
+  std::function<std::optional<std::int32_t>()> count(std::int32_t to) override {
+    return [to, at = 0]() mutable { return at < to ? std::optional(at++) : std::nullopt; };
+  }
+  std::function<bool(std::string)> collect() override {
+    return [this](const std::string& line) {
+      if (line == "broken") throw delete_("it is broken");
+      lines.push_back(line);
+      return lines.size() < 2;
+    };
+  }
+  std::function<std::optional<double>(double)> both_ways(double first) override {
+    return [first](double next) { return next > 0 ? std::optional(first + next) : std::nullopt; };
+  }
+  void set_samples(const PipeEndpoint& from, std::vector<double> packet) override {
+    packet.push_back(from.index());
+    if (!from.send(pack_value(packet))) throw std::runtime_error("the client reads too slowly");
+  }
+  void set_commands(const PipeEndpoint&, Value packet) override {
+    Nullable<switch_> frame = switch_{};
+    frame->anything = std::vector<Value>{packet};
+    frames(frame);
+  }
+
+  std::shared_ptr<baseService> get_friend() override { return friend_; }
+  std::shared_ptr<interfaceService> get_many(std::int32_t index) override {
+    return index < 3 ? std::make_shared<Friend>("many " + std::to_string(index)) : nullptr;
+  }
+  std::shared_ptr<interfaceService> get_numbered(std::int32_t index) override {
+    return std::make_shared<Friend>("number " + std::to_string(index));
+  }
+  std::shared_ptr<ObjectService> get_named(std::string) override { return std::make_shared<Everything>(); }
+  std::shared_ptr<ServiceStub> get_whatever() override { return friend_; }
+  void set_target(union_ value) override {
+    received_target = value;
+    position(value.this_one);
+  }
+  void set_status(Nullable<switch_> value) override { status(value); }
+
+  std::int32_t auto_ = 0;
+  Nullable<switch_> switch__;
+  std::vector<template_> pods_;
+  union_ point_;
+  std::shared_ptr<Friend> friend_ = std::make_shared<Friend>("friend", std::make_shared<Friend>("left"));
+};
+
+template_ make_pod(std::int32_t number) {
+  template_ pod;
+  pod.new_ = number;
+  pod.corners[1] = {{1.5, 2.5}, 3.5};
+  pod.some = {1, 2, 3};
+  pod.grid.data = {1, 2, 3, 4};
+  pod.many[1999] = 7;
+  pod.flag = true;
+  return pod;
+}
+
+switch_ make_struct() {
+  switch_ value;
+  value.next = switch_{};
+  value.next->enumeration = enumeration::private_;
+  value.children = std::vector<Nullable<switch_>>{switch_{}, nullptr};
+  value.by_name = std::map<std::string, Nullable<switch_>>{{"a", switch_{}}, {"b", nullptr}};
+  value.shared = more::Shared{5};
+  value.enumeration = enumeration::while_;
+  value.pod_one = make_pod(1);
+  value.pods = {make_pod(2), make_pod(3)};
+  value.pod_grid = {{1, 2}, {make_pod(4), make_pod(5)}};
+  value.held = {make_pod(6), {make_pod(7), make_pod(8)}, {make_pod(9)}};
+  value.points = {{{1, 2}, 3}, {{4, 5}, 6}};
+  value.point_grid = {{2, 1}, value.points};
+  value.nest.b[1].this_one = 9;
+  value.nests[1] = value.nest;
+  value.by_number = std::map<std::int32_t, enumeration>{{-5, enumeration::while_}, {7, enumeration(99)}};
+  value.complex_array = {{1, 2}, {3, 4}};
+  value.complex_grid = {{1, 1}, {{5, 6}}};
+  value.bools = {true, false, true};
+  value.bool_grid = {{2, 1}, {false, true}};
+  value.texts = std::vector<std::string>{"one", ""};
+  value.grids = std::vector<MultiDim<std::int64_t>>{{{1, 2}, {3, -4}}};
+  value.fixed_grid.data[5] = 0.5;
+  value.anything = std::vector<Value>{Value(std::vector<std::int32_t>{1}), Value("text"), Value()};
+  return value;
+}
+
+struct Session {
+  std::shared_ptr<Everything> everything = std::make_shared<Everything>();
+  RunningNode node{[this](Node& owner) { owner.add(make_service("words", everything)); }};
+  ObjectClient client{connect(node.url("words"))};
+
+  bool wait_until(const std::function<bool()>& is_done) { return client.rr_object.connection().run_until(is_done, 5s); }
+};
+
+}  // namespace
+
+TEST_CASE("generated: values of every type go to the service and come back as they were") {
+  Session session;
+  const auto& client = session.client;
+  CHECK_FALSE(client.switch_value().get());
+  const auto value = make_struct();
+  client.switch_value().set(value);
+  CHECK(client.switch_value().get() == value);
+  CHECK(*client.constructor(value, "any") == value);
+  CHECK_FALSE(client.constructor(nullptr, {}));
+  client.pods().set({make_pod(1), make_pod(2)});
+  CHECK(client.pods().get() == std::vector{make_pod(1), make_pod(2)});
+  client.point().set({{1, 2}, 3});
+  CHECK(client.point().get() == union_{{1, 2}, 3});
+  client.auto_().set(-16);
+  CHECK(client.goto_().get() == enumeration::private_);
+  client.any().set(Value(std::int32_t{5}));
+  CHECK(client.auto_().get() == 5);
+}
+
+TEST_CASE("generated: functions, events and wires") {
+  Session session;
+  const auto& client = session.client;
+  std::vector<std::string> heard;
+  client.explicit_().on([&](double number, const Nullable<std::vector<std::string>>& texts) {
+    heard.push_back(std::to_string(static_cast<int>(number)) + texts->at(0) + texts->at(1));
+  });
+  CHECK(client.operator_(3, "words", enumeration::while_) == 4);
+  REQUIRE(session.wait_until([&] { return !heard.empty(); }));
+  CHECK(heard.front() == "3wordsmore");
+
+  std::vector<double> positions;
+  client.position().connect([&](double value) { positions.push_back(value); });
+  client.target().poke({{1, 2}, 3});
+  CHECK(client.target().peek_out() == union_{{1, 2}, 3});
+  REQUIRE(session.wait_until([&] { return !positions.empty(); }));
+  CHECK(positions == std::vector{3.0});
+  CHECK(client.position().peek() == 3.0);
+  client.target().connect();
+  client.target().send({{0, 0}, 4});
+  REQUIRE(session.wait_until([&] { return positions.size() == 2; }));
+  CHECK(session.node.ask([&](Node&) { return session.everything->received_target; })->this_one == 4);
+
+  std::optional<TimeSpec> time;
+  std::optional<switch_> status;
+  client.status().connect([&](const Nullable<switch_>& value, TimeSpec at) {
+    status = *value;
+    time = at;
+  });
+  client.status().send(make_struct());
+  REQUIRE(session.wait_until([&] { return status.has_value(); }));
+  CHECK(*status == make_struct());
+  CHECK(time->seconds > 0);
+  client.status().disconnect();
+}
+
+TEST_CASE("generated: objects are found by objrefs, as their type or a base of it") {
+  Session session;
+  const auto& client = session.client;
+  const auto base = client.friend_();
+  CHECK(base.who() == "friend");
+  CHECK(base.rr_object.type_name() == "test.words.interface");
+  const interfaceClient whole(base.rr_object);
+  whole.long_().set(2.5);
+  CHECK(base.long_().get() == 2.5);
+  std::int32_t moved_by = 0;
+  base.moved().on([&](std::int32_t by) { moved_by = by; });
+  whole.f();
+  REQUIRE(session.wait_until([&] { return moved_by != 0; }));
+  CHECK(moved_by == 5);
+  // The wire's value was set before any client looked the object up.
+  CHECK(base.level().peek() == 7);
+  base.level().poke(8);
+  CHECK(base.level().peek() == 9);
+
+  CHECK(client.many(2).who() == "many 2");
+  CHECK(error_of([&] { client.many(3); }).code == ErrorCode::service_error);
+  CHECK(client.numbered(-4).who() == "number -4");
+  CHECK(client.named("a.b").named("c").auto_().get() == 0);
+  CHECK(baseClient(client.whatever()).who() == "friend");
+  CHECK_THAT(error_of([&] { ObjectClient wrong(base.rr_object); }).message,
+             Contains("is a test.words.interface, which is no test.words.Object"));
+}
+
+TEST_CASE("generated: declared exceptions arrive as their classes, others as ClientException") {
+  Session session;
+  const interfaceClient left(session.client.friend_().parent().rr_object);
+  try {
+    left.f();
+    FAIL("no exception");
+  } catch (const delete_& exception) {
+    CHECK(std::string(exception.what()) == "it is gone");
+    CHECK(exception.error().sub_name == "why");
+    CHECK(exception.error().param->to<std::int32_t>().value() == 3);
+  }
+  CHECK_THROWS_AS(session.client.then(1), more::thrown);
+  CHECK(error_of([&] { session.client.void_function(Map::register_, nullptr); }).code == ErrorCode::null_value);
+  CHECK(error_of([&] { session.client.toString(); }).name == "rrgate.UnhandledException");
+  CHECK(error_of([&] { session.client.position().peek(); }).code == ErrorCode::value_not_set);
+}
+
+TEST_CASE("generated: generators") {
+  Session session;
+  auto numbers = session.client.count(3);
+  std::vector<std::int32_t> counted;
+  while (const auto number = numbers.next()) counted.push_back(*number);
+  CHECK(counted == std::vector{0, 1, 2});
+  CHECK_FALSE(numbers.next());
+
+  auto lines = session.client.collect();
+  CHECK(lines.next("one"));
+  CHECK_FALSE(lines.next("two"));
+  CHECK(session.node.ask([&](Node&) { return session.everything->lines; }) == std::vector<std::string>{"one", "two"});
+  CHECK_THROWS_AS(session.client.collect().next("broken"), delete_);
+
+  auto sums = session.client.both_ways(1);
+  CHECK(sums.next(2) == 3.0);
+  CHECK(sums.next(4) == 5.0);
+  sums.close();
+  CHECK_FALSE(sums.next(1));
+}
+
+TEST_CASE("generated: pipes") {
+  Session session;
+  std::vector<std::vector<double>> packets;
+  const auto samples =
+      session.client.samples().connect([&](std::vector<double> packet) { packets.push_back(packet); }, 7);
+  samples.send({1, 2});
+  samples.send({3});
+  REQUIRE(session.wait_until([&] { return packets.size() == 2; }));
+  CHECK(packets == std::vector<std::vector<double>>{{1, 2, 7}, {3, 7}});
+  samples.close();
+  CHECK_FALSE(samples.is_open());
+
+  std::string heard;
+  const auto frames = session.client.frames().connect(
+      [&](const Nullable<switch_>& frame) { heard = *frame->anything->at(0).to_text(); });
+  session.client.commands().connect().send("take one");
+  REQUIRE(session.wait_until([&] { return !heard.empty(); }));
+  CHECK(heard == "take one");
+}
+
+TEST_CASE("generated: stubs that are used too early or twice say so") {
+  Friend alone("alone");
+  CHECK_THROWS_WITH(alone.rr_service(), Contains("test.words.interface is in no service yet"));
+  CHECK_NOTHROW(alone.moved(1));
+  const auto root = std::make_shared<Friend>("root");
+  const auto service = make_service("one", root);
+  CHECK(&root->rr_service() == service.get());
+  CHECK_THROWS_WITH(make_service("two", root), Contains("belongs to service 'one'"));
+}
+
+TEST_CASE("generated: constants and names") {
+  CHECK(class_ == 5);
+  CHECK(smallest == std::numeric_limits<std::int64_t>::min());
+  CHECK(huge == std::numeric_limits<std::uint64_t>::max());
+  CHECK(three == std::array<std::int16_t, 3>{-1, 16, 3});
+  CHECK(text == std::string_view("a \"quoted\" \\ text\n\x01\xc3\xa9"));
+  CHECK(both::second::third == 0.33333334f);
+  CHECK(interface::pair::b == "interface");
+  CHECK(experimental::create2::Create::DRIVE_STRAIGHT == 32767);
+  CHECK(experimental::interop::Everything{}.color == experimental::interop::Color::red);
+  CHECK(experimental::simulatedcreate::rr_definitions().size() == 2);
+}
