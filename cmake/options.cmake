@@ -2,9 +2,11 @@
 add_library(rr_options INTERFACE)
 add_library(rr::options ALIAS rr_options)
 target_compile_features(rr_options INTERFACE cxx_std_20)
-target_include_directories(rr_options INTERFACE "${PROJECT_SOURCE_DIR}")
-target_compile_options(rr_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
-                                            -Wno-missing-field-initializers)
+target_include_directories(rr_options INTERFACE "$<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>"
+                                                "$<INSTALL_INTERFACE:include/rrgate>")
+# Warnings are ours; who uses the installed package has their own.
+target_compile_options(rr_options INTERFACE
+  "$<BUILD_INTERFACE:-Wall;-Wextra;-Wpedantic;-Wshadow;-Wconversion;-Wno-sign-conversion;-Wno-missing-field-initializers>")
 
 set(RR_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize= (address,undefined or thread)")
 if(RR_SANITIZE)

@@ -1,0 +1,24 @@
+# cmake --install: headers and libraries of the C++ API, the programs, and the package that find_package(rrgate) reads.
+include(CMakePackageConfigHelpers)
+include(GNUInstallDirs)
+
+set_target_properties(rr_node PROPERTIES EXPORT_NAME node)
+install(
+  TARGETS rr_options rr_boost rr_support rr_wire rr_robdef rr_types rr_member rr_session rrgate_asio rr_node rrgate
+  EXPORT rrgateTargets
+  RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}"
+  ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")
+install(TARGETS rrgate-demo-create rrgate-demo-webcams RUNTIME DESTINATION "${CMAKE_INSTALL_LIBEXECDIR}/rrgate")
+
+set(include_dir "${CMAKE_INSTALL_INCLUDEDIR}/rrgate")
+install(DIRECTORY core DESTINATION "${include_dir}" FILES_MATCHING PATTERN "*.hpp")
+install(DIRECTORY server/node DESTINATION "${include_dir}/server" FILES_MATCHING PATTERN "*.hpp")
+
+set(package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/rrgate")
+install(EXPORT rrgateTargets NAMESPACE rrgate:: DESTINATION "${package_dir}")
+configure_package_config_file(cmake/rrgateConfig.cmake.in "${PROJECT_BINARY_DIR}/rrgateConfig.cmake"
+                              INSTALL_DESTINATION "${package_dir}")
+write_basic_package_version_file("${PROJECT_BINARY_DIR}/rrgateConfigVersion.cmake" COMPATIBILITY SameMinorVersion)
+install(FILES "${PROJECT_BINARY_DIR}/rrgateConfig.cmake" "${PROJECT_BINARY_DIR}/rrgateConfigVersion.cmake"
+              cmake/rrgate_generate.cmake
+        DESTINATION "${package_dir}")
