@@ -45,6 +45,8 @@ int generate_ts(const ParsedArguments& parsed, const DefinitionSet& set) {
 int generate_cpp_files(const ParsedArguments& parsed, const DefinitionSet& set) {
   const auto option = parsed.options.find("-o");
   const auto folder = std::filesystem::path(option == parsed.options.end() ? "." : option->second);
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);  // where it fails, writing does
   for (const auto* definition : set.requested()) {
     const auto files = generate_cpp(set, *definition);
     if (write_output((folder / (files.name + ".hpp")).string(), files.header) != exit_ok ||

@@ -70,7 +70,8 @@ void CppTypes::enter(const EntityDefinition* entity) {
 }
 
 std::string CppTypes::parameter_name(std::string_view name) const {
-  const auto chosen = cpp_word(name);
+  // Compat mode lets numbers through as names.
+  const auto chosen = (is_digit(name.front()) ? "p" : "") + cpp_word(name);
   // The types of later parameters would be looked up in it.
   return chosen + (has_name(definition_, chosen) ? "_" : "");
 }
@@ -151,6 +152,8 @@ std::string CppTypes::scalar(const TypeDefinition& type) const {
     case DataType::string_t:
       return "std::string";
     case DataType::varvalue_t:
+    case DataType::varobject_t:  // values of unknown type, in compat mode
+    case DataType::object_t:
       return "rr::Value";
     case DataType::structure_t:
       return "rr::Nullable<" + type_name(type.qualified_name) + ">";

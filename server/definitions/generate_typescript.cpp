@@ -6,6 +6,7 @@
 #include <set>
 
 #include "core/robdef/constant_value.hpp"
+#include "core/robdef/names.hpp"
 #include "core/types/multidim.hpp"
 #include "core/types/value.hpp"
 #include "server/definitions/constant_literal.hpp"
@@ -310,6 +311,8 @@ std::string TypeScriptEmitter::scalar_text(const TypeDefinition& type, Way way) 
     case DataType::csingle_t:
       return from_client("Complex");
     case DataType::varvalue_t:
+    case DataType::varobject_t:  // values of unknown type, in compat mode
+    case DataType::object_t:
       return from_client("RrValue") + (way == Way::sent ? " | " + from_client("ExactValue") : "");
     case DataType::structure_t:
       return names_.at(type.qualified_name) + " | null";
@@ -344,7 +347,8 @@ std::string TypeScriptEmitter::parameters_text(std::span<const ParameterDefiniti
   std::vector<std::string> items;
   for (const auto& parameter : parameters) {
     const std::string suffix = contains(words_of_the_language, parameter.name) ? "_: " : ": ";
-    items.push_back(parameter.name + suffix + type_text(parameter.type, way));
+    const std::string prefix = is_digit(parameter.name.front()) ? "p" : "";  // compat mode lets numbers through
+    items.push_back(prefix + parameter.name + suffix + type_text(parameter.type, way));
   }
   return "[" + joined(items) + "]";
 }

@@ -57,6 +57,33 @@ TEST_CASE("generate ts: types of a live service") {
   CHECK_THAT(none.errors, Contains("Candle"));
 }
 
+TEST_CASE("generate cpp: a header and a source for each file, none for imports") {
+  const Folder folder;
+  folder.write("test.light.robdef", light);
+  const auto file = folder.write("lamp.robdef", lamp);
+  CHECK(run_command(run_generate, {"cpp", file, "-o", folder.path("out/deep")}).code == exit_ok);
+  const auto header = folder.read("out/deep/test__lamp.hpp");
+  CHECK_THAT(header, Contains("#include \"test__light.hpp\"\n") && Contains("\nnamespace test::lamp {\n"));
+  CHECK_THAT(header, Contains("  virtual rr::Nullable<::test::light::Colour> get_colour() = 0;\n"));
+  CHECK_THAT(folder.read("out/deep/test__lamp.cpp"), Contains("R\"robdef(service test.lamp\n"));
+  CHECK(folder.read("out/deep/test__light.hpp") == "(no file)");
+  CHECK(run_command(run_generate, {"cpp", file, "-o", folder.write("taken", "")}).code == exit_failed);
+}
+
+TEST_CASE("generate: what only compat mode takes becomes code all the same") {
+  const Folder folder;
+  const auto file = folder.write("old.robdef",
+                                 "service test.class\noption version 0.9\noption constant int16 A.B 1\nobject X\n"
+                                 "    function void f(int32 5, varobject in)\nend object\n");
+  CHECK(run_command(run_generate, {"cpp", file, "-o", folder.path("")}).code == exit_failed);
+  CHECK(run_command(run_generate, {"cpp", "--compat", file, "-o", folder.path("")}).code == exit_ok);
+  const auto header = folder.read("test__class.hpp");
+  CHECK_THAT(header, Contains("namespace test::class_ {") && Contains("inline constexpr std::int16_t A_B = 1;") &&
+                         Contains("virtual void f(std::int32_t p5, rr::Value in) = 0;"));
+  CHECK_THAT(run_command(run_generate, {"ts", "--compat", file}).output,
+             Contains("f: FunctionMember<[p5: number, in_: RrValue | ExactValue], void>;"));
+}
+
 TEST_CASE("generate: mistakes") {
   const Folder folder;
   const auto bad = folder.write("bad.robdef", "service a\nstdver 0.10\nimport b\n");

@@ -58,6 +58,17 @@ class CommandLine(Files):
         result = run("check-config", self.file({"listen": ["127.0.0.1:1"], "devices": []}))
         self.assertEqual((result.returncode, result.stderr), (0, ""))
 
+    def test_definitions_are_checked(self):
+        path = os.path.join(self.folder.name, "lamp.robdef")
+        for body, code in [("object Lamp\nend\n", 0), ("object\nend\n", 1)]:
+            with open(path, "w") as out:
+                out.write("service test.lamp\nstdver 0.10\n" + body)
+            result = run("check", path)
+            self.assertEqual(result.returncode, code)
+            self.assertEqual(result.stderr.startswith(path + ":3:"), code == 1, result.stderr)
+        for arguments in [("check",), ("fmt", "--in", path), ("generate", "ts"), ("generate", "cobol", path)]:
+            self.assertEqual(run(*arguments).returncode, 2)
+
     def test_an_address_in_use_ends_with_1(self):
         with socket.create_server(("127.0.0.1", 0)) as taken:
             port = taken.getsockname()[1]
