@@ -359,7 +359,7 @@ void ClientSession::handle_entry(const Message& message, const MessageEntry& ent
     case EntryType::service_closed:
       return fail(connection_error("the service was closed"));
     case EntryType::callback_call_req:
-      return answer_error(entry, {ErrorCode::invalid_operation, "Callback function not set"}, now);
+      return handle_callback(message, entry, now);
     case EntryType::endpoint_check_capability:
       connection_.begin_message(outgoing_);
       outgoing_.begin_entry(reply_type(entry.type), entry.service_path, entry.member_name, entry.request_id);
@@ -501,6 +501,7 @@ void ClientSession::fail(Error reason) {
   std::sort(waiting.begin(), waiting.end());
   pending_.clear();
   fetches_.clear();
+  callbacks_.clear();
   // Wires and pipes stay, unused: what emits an event may be in the middle of one.
   const Error lost{ErrorCode::connection_error, reason.message};
   for (const auto id : waiting)

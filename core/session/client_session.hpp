@@ -16,6 +16,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/member/callback.hpp"
 #include "core/member/generator.hpp"
 #include "core/member/pipe.hpp"
 #include "core/member/wire.hpp"
@@ -34,7 +35,8 @@ struct ClientOptions {
   std::string object_type = {};  ///< the type to use the root object as; empty: the service's own
   std::chrono::milliseconds request_timeout{15'000};
   std::chrono::milliseconds connect_timeout{30'000};  ///< from construction to the event Connected
-  std::size_t max_events = 65'536;  ///< not polled; more close the session: nothing is dropped silently
+  std::size_t max_events = 65'536;        ///< not polled; more close the session: nothing is dropped silently
+  std::size_t max_open_callbacks = 1024;  ///< not answered yet; above: out_of_system_resource
   std::size_t max_pipe_queued_bytes = 32u * 1024 * 1024;  ///< waiting for the stream; above, pipes take no packets
 };
 
@@ -84,6 +86,13 @@ struct PipeClosedByService {
   std::string member;
   std::int32_t index = 0;
 };
+/// The service asks: to be answered exactly once, with reply_callback().
+struct CallbackCalled {
+  CallbackId id = 0;
+  std::string path;
+  std::string member;
+  std::vector<Value> arguments;
+};
 /// The service replaced the object: every object at or below `path` must be looked up again.
 struct PathReleased {
   std::string path;
@@ -94,7 +103,7 @@ struct SessionClosed {
 };
 using ClientEvent =
     std::variant<Connected, Completed, EventReceived, WireValueReceived, WireClosedByService, PipePacketReceived,
-                 PipePacketsAcknowledged, PipeClosedByService, PathReleased, SessionClosed>;
+                 PipePacketsAcknowledged, PipeClosedByService, CallbackCalled, PathReleased, SessionClosed>;
 
 /// What an object lock keeps out: other users, or all other clients.
 enum class LockKind : std::uint8_t { user, client };
@@ -168,6 +177,10 @@ class ClientSession {
   RequestId enter_monitor(std::string_view path, std::chrono::milliseconds timeout, Now now);
   RequestId exit_monitor(std::string_view path, Now now);  ///< completes with null
 
+  /// Answers CallbackCalled; a void callback ignores the value. A value that does not fit the definition becomes an
+  /// error that says so. For a callback that nobody takes: invalid_operation, "Callback function not set". Unknown ids
+  /// are ignored.
+  void reply_callback(CallbackId id, const Result<Value>& result, Now now);
   /// Forgets a request: its late reply is ignored, no event follows. Nothing is sent: the service still runs it.
   void cancel(RequestId id);
   /// How long requests from now on may take; those that wait already keep their deadline.
@@ -205,6 +218,11 @@ class ClientSession {
     std::int32_t pipe_index = 0;               ///< pipes only
     bool is_abandoned = false;                 ///< pipes only: nobody waits any more, but the reply must be acted on
     GeneratorStep step = GeneratorStep::next;  ///< generator steps only
+  };
+  struct OpenCallback {
+    std::uint32_t request_id = 0;  ///< the service's
+    std::string path;
+    const MemberDefinition* member = nullptr;
   };
   /// The endpoints of one pipe. While a connect is pending, packets of unknown endpoints are kept: they may be its own.
   struct ClientPipe {
@@ -279,6 +297,8 @@ class ClientSession {
   void handle_wire_closed(const MessageEntry& entry);
   void handle_path_released(std::string_view path);
 
+  void handle_callback(const Message& message, const MessageEntry& entry, Now now);
+
   // pipes (client_pipe.cpp)
   ClientPipe* find_pipe(std::string_view path, std::string_view member);
   void handle_pipe_reply(const Message& message, const MessageEntry& entry, RequestId id, const Pending& pending,
@@ -326,6 +346,8 @@ class ClientSession {
   PipeStore pipe_store_;  ///< outlives pipes_
   std::map<PathMember, ClientPipe, PathMemberLess> pipes_;
   std::vector<std::pair<std::int32_t, std::uint32_t>> pipe_acks_;  ///< index and number, to be sent; reused
+  CallbackId last_callback_id_ = 0;
+  std::map<CallbackId, OpenCallback> callbacks_;
   std::deque<ClientEvent> events_;
 };
 

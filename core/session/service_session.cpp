@@ -83,6 +83,7 @@ void ServiceSession::handle_timeout(Now now) {
   if (auto alive = connection_.handle_timeout(now); !alive) return leave(alive.error(), now);
   end_generators(generators_.remove_idle(now));
   handle_locks_changed(now);
+  expire_callbacks(now);
   const bool is_late = service_ ? now.steady - last_session_message_ >= options_.endpoint_timeout
                                 : now.steady - opened_ >= options_.connect_timeout;
   if (!is_late) return;
@@ -96,7 +97,8 @@ TimePoint ServiceSession::poll_timeout() const {
   if (wants_close()) return TimePoint::max();
   if (closing_deadline_) return *closing_deadline_;
   const auto end = service_ ? last_session_message_ + options_.endpoint_timeout : opened_ + options_.connect_timeout;
-  return std::min({connection_.poll_timeout(), generators_.deadline(), next_enter_deadline(), end});
+  const auto callback = callbacks_.empty() ? TimePoint::max() : callbacks_.begin()->second.deadline;
+  return std::min({connection_.poll_timeout(), generators_.deadline(), next_enter_deadline(), callback, end});
 }
 
 std::optional<ServiceEvent> ServiceSession::poll_event() {
@@ -119,6 +121,7 @@ void ServiceSession::leave(Error reason, Now now) {
   wires_.clear();
   pipes_.clear();
   pipe_indices_.clear();
+  end_callbacks(reason);
   events_.push_back(ClientGone{std::move(reason)});
 }
 
@@ -295,6 +298,7 @@ void ServiceSession::handle_entry(const Message& message, const MessageEntry& en
   }
   if (entry.type == EntryType::wire_packet) return handle_wire_packet(message, entry);
   if (entry.type == EntryType::pipe_packet) return handle_pipe_packets(message, entry, now);
+  if (entry.type == EntryType::callback_call_ret) return handle_callback_reply(message, entry);
   if (entry.type == EntryType::pipe_packet_ret) return handle_pipe_acks(message, entry);
   if (!is_request(entry.type) || is_packet(entry.type)) return;
   Result<> done;

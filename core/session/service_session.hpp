@@ -13,6 +13,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/member/callback.hpp"
 #include "core/member/generator.hpp"
 #include "core/member/pipe.hpp"
 #include "core/member/wire.hpp"
@@ -30,9 +31,11 @@ struct ServiceSessionOptions {
   std::chrono::milliseconds endpoint_timeout{600'000};  ///< without a session message
   /// The client's NodeID, where the transport vouches for it (a certificate; the local machine).
   std::optional<NodeId> verified_node_id = {};
-  std::size_t max_open_calls = 1024;                      ///< not answered yet; above: out_of_system_resource
-  std::size_t max_generators = 256;                       ///< run by one client; above: out_of_system_resource
-  std::size_t max_wires = 4096;                           ///< connected by one client; above: out_of_system_resource
+  std::size_t max_open_calls = 1024;  ///< not answered yet; above: out_of_system_resource
+  std::size_t max_generators = 256;   ///< run by one client; above: out_of_system_resource
+  std::size_t max_wires = 4096;       ///< connected by one client; above: out_of_system_resource
+  std::chrono::milliseconds callback_timeout{15'000};
+  std::size_t max_open_callbacks = 1024;                  ///< not answered yet; above: out_of_system_resource
   std::size_t max_pipe_endpoints = 4096;                  ///< of one client; above: out_of_system_resource
   std::size_t max_pipe_queued_bytes = 32u * 1024 * 1024;  ///< waiting for the stream; above, pipes take no packets
 };
@@ -121,13 +124,18 @@ struct GeneratorEnded {
 struct LocksChanged {
   HostedService* service = nullptr;
 };
+/// A call of the client's callback ended: with its answer, or because it took too long or the client is gone.
+struct CallbackCompleted {
+  CallbackId id = 0;
+  Result<Value> result;
+};
 /// The last event.
 struct ClientGone {
   Error reason;
 };
 using ServiceEvent =
     std::variant<Called, ClientConnected, LoginRequested, LocksChanged, WireConnected, WireReceived, PipeConnected,
-                 PipeReceived, PipeAcknowledged, PipeClosed, GeneratorEnded, ClientGone>;
+                 PipeReceived, PipeAcknowledged, PipeClosed, GeneratorEnded, CallbackCompleted, ClientGone>;
 
 /// One client of a node. Node-level requests (definitions, attributes, the service index) are answered in here.
 class ServiceSession {
@@ -170,6 +178,11 @@ class ServiceSession {
   Result<std::uint32_t> send_pipe_packet(PipeId id, const Value& value, Now now, bool wants_ack = false);
   /// Closes the endpoint and tells the client; no event follows.
   void close_pipe(PipeId id, Now now);
+  /// Calls a callback of the client. Every call that begins ends in exactly one CallbackCompleted; its value is null
+  /// for void callbacks. Errors   connection_error; out_of_system_resource: too many calls are not answered yet; those
+  /// of packing.
+  Result<CallbackId> call_callback(std::string_view path, const MemberDefinition& member,
+                                   std::span<const Value> arguments, Now now);
   /// Tells the client to look up `path` again.
   void release_path(std::string_view path, Now now);
   /// Tells the client that its service is gone (ServiceClosed), then closes.
@@ -228,6 +241,10 @@ class ServiceSession {
     std::uint32_t client_endpoint = 0;
     const EntityDefinition* type_for_client = nullptr;
     bool wants_definitions = true;
+  };
+  struct OpenCallback {
+    const MemberDefinition* member = nullptr;
+    TimePoint deadline;
   };
   struct ServicePipe {
     ServicePipe(const MemberDefinition& member, PipeStore& store) : state(member, store, PipeState::connecting) {}
@@ -289,6 +306,11 @@ class ServiceSession {
   Result<> answer_service_index(const MessageEntry& entry, const MemberDefinition& member, Now now);
   void handle_wire_packet(const Message& message, const MessageEntry& entry);
 
+  // callbacks (service_callback.cpp)
+  void handle_callback_reply(const Message& message, const MessageEntry& entry);
+  void expire_callbacks(Now now);
+  void end_callbacks(const Error& reason);
+
   // pipes (service_pipe.cpp)
   Result<> connect_pipe(const Message& message, const MessageEntry& entry, const HostedService::Found& found,
                         const MemberDefinition& member);
@@ -337,7 +359,9 @@ class ServiceSession {
   std::vector<OpenCall> calls_;
   GeneratorTable generators_;
   std::map<PathMember, WireConnection, PathMemberLess> wires_;
-  PipeStore pipe_store_;  ///< outlives pipes_
+  CallbackId last_callback_id_ = 0;
+  std::map<CallbackId, OpenCallback> callbacks_;  ///< in order of their deadlines, which are equally far
+  PipeStore pipe_store_;                          ///< outlives pipes_
   PipeId last_pipe_id_ = 0;
   std::unordered_map<PipeId, ServicePipe> pipes_;
   std::map<PathMember, PipeIndices, PathMemberLess> pipe_indices_;  ///< the same pipes

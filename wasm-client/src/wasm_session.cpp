@@ -234,8 +234,13 @@ double WasmSession::poll_timeout() const {
 }
 
 JsValue WasmSession::poll_event() {
-  const auto event = session_.poll_event();
-  return event ? event_to_js(*event) : JsValue::undefined();
+  auto event = session_.poll_event();
+  for (; event; event = session_.poll_event()) {
+    const auto* called = std::get_if<CallbackCalled>(&*event);
+    if (!called) return event_to_js(*event);
+    session_.reply_callback(called->id, make_error(ErrorCode::invalid_operation, "Callback function not set"), now_);
+  }
+  return JsValue::undefined();
 }
 
 JsValue WasmSession::event_to_js(const ClientEvent& event) {

@@ -56,6 +56,8 @@ object Arm
   pipe double orders [writeonly]
   pipe double quick [unreliable]
   memory double[] calibration
+  callback double ask(string question)
+  callback void notice(int32 number)
 end
 )";
 
