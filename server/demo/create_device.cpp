@@ -72,7 +72,9 @@ void CreateDevice::add_members_of_create() {
   });
   // A robot that drives on after its driver is gone runs into things.
   service_->on_client_gone([this](rr::ClientId client) {
-    if (client == driver_) robot_.drive(0, drive_straight);
+    if (client != driver_) return;
+    robot_.drive(0, drive_straight);
+    driver_ = 0;
   });
   service_->function("StartStreaming", [this] { is_streaming_ = true; });
   service_->function("StopStreaming", [this] { is_streaming_ = false; });
@@ -86,6 +88,19 @@ void CreateDevice::add_members_of_simulation() {
   service_->property("walls").get([this] { return to_list(robot_.world().walls); });
   service_->property("obstacles").get([this] { return to_list(robot_.world().obstacles); });
   service_->function("reset", [this] { robot_.place({}); });
+  service_->function("press_play", [this] { press_play(); });
+  service_->property("song").get([this] { return song_; });
+}
+
+void CreateDevice::press_play() {
+  const rr::ClientId asked = driver_ != 0 ? driver_ : service_->current_client();
+  service_->call_callback(asked, "play_callback",
+                          {rounded(robot_.distance()), rounded(robot_.angle() * 180 / std::numbers::pi)},
+                          [this](const rr::Result<rr::Value>& answer) {
+                            if (!answer) return;  // a client that knows no song: the robot stays silent
+                            const auto notes = answer->to_items<std::uint8_t>().value();
+                            song_.assign(notes.begin(), notes.end());
+                          });
 }
 
 void CreateDevice::publish() {

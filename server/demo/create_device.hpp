@@ -23,11 +23,13 @@ class CreateDevice {
   void add_members_of_create();
   void add_members_of_simulation();
   void publish();
+  void press_play();
 
   Robot robot_;
   SensorStream sensors_;
   bool is_streaming_ = true;
-  rr::ClientId driver_ = 0;  ///< who sent the last Drive
+  rr::ClientId driver_ = 0;  ///< who sent the last Drive and is still there
+  std::vector<std::uint8_t> song_;
   std::shared_ptr<rr::Service> service_;
 };
 

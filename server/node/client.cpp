@@ -198,6 +198,10 @@ void RemotePipe::close() const {
   });
 }
 
+void RemoteObject::on_callback_values(std::string_view callback, ClientConnection::CallbackHandler handler) const {
+  connection_->asynchronous().on_callback(path_, callback, std::move(handler));
+}
+
 void RemoteObject::on_event(std::string_view event, ClientConnection::EventHandler handler) const {
   connection_->asynchronous().on_event(path_, event, std::move(handler));
 }

@@ -136,6 +136,12 @@ class RemoteObject {
   /// `received` gets every packet, in order, until the endpoint is closed.
   RemotePipe connect_pipe(std::string_view pipe, std::function<void(Value packet)> received,
                           std::int32_t index = any_pipe_index) const;
+  /// handler of the callback's C++ types, or Value; returns the answer. What it throws, the service gets as an error.
+  template <class F>
+  void on_callback(std::string_view callback, F&& handler) const {
+    on_callback_values(callback, make_handler(std::forward<F>(handler)).call);
+  }
+  void on_callback_values(std::string_view callback, ClientConnection::CallbackHandler handler) const;
   void on_event(std::string_view event, ClientConnection::EventHandler handler) const;
 
   /// Keeps others out of this object and all below it, until unlock() or until this client has gone.

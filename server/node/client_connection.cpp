@@ -137,6 +137,11 @@ Result<> ClientConnection::send_pipe(std::string_view path, std::string_view pip
   return {};
 }
 
+void ClientConnection::on_callback(std::string_view path, std::string_view callback, CallbackHandler handler) {
+  callback_handlers_[{std::string(path), std::string(callback)}] =
+      std::make_shared<CallbackHandler>(std::move(handler));
+}
+
 void ClientConnection::on_event(std::string_view path, std::string_view event, EventHandler handler) {
   event_handlers_[{std::string(path), std::string(event)}] = std::make_shared<EventHandler>(std::move(handler));
 }
@@ -217,16 +222,32 @@ void ClientConnection::handle(PipeClosedByService&& closed) {
   if (found && found.mapped()->closed) found.mapped()->closed();
 }
 
+void ClientConnection::handle(CallbackCalled&& called) {
+  Result<Value> answer = make_error(ErrorCode::invalid_operation, "Callback function not set");
+  if (const auto found = callback_handlers_.find({std::move(called.path), std::move(called.member)});
+      found != callback_handlers_.end()) {
+    const auto handler = found->second;  // it may replace itself
+    try {
+      answer = (*handler)(called.arguments);
+    } catch (const std::exception& exception) {
+      answer = Error{ErrorCode::remote_error, exception.what(), "rrgate.UnhandledException"};
+    }
+  }
+  session_.reply_callback(called.id, answer, read_clocks());
+}
+
 /// Whoever uses objects below the path hears of it when the next request fails; their handlers have to go now.
 void ClientConnection::handle(PathReleased&& released) {
   const auto is_released = [&](const auto& item) { return is_within(item.first.first, released.path); };
   std::erase_if(event_handlers_, is_released);
   std::erase_if(wire_handlers_, is_released);
+  std::erase_if(callback_handlers_, is_released);
 }
 
 void ClientConnection::handle(SessionClosed&& closed) {
   event_handlers_.clear();
   wire_handlers_.clear();
+  callback_handlers_.clear();
   pipe_handlers_.clear();
   if (const Opened opened = std::exchange(opened_, nullptr)) return opened(std::move(closed.reason));
   if (const auto handler = std::exchange(on_closed_, nullptr)) handler(closed.reason);

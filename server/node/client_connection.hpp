@@ -26,6 +26,7 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   using Completion = std::function<void(Result<Value>)>;
   using EventHandler = std::function<void(std::span<const Value> arguments)>;
   using WireHandler = std::function<void(const Value& value, TimeSpec time)>;
+  using CallbackHandler = std::function<Result<Value>(std::span<const Value> arguments)>;
   struct PipeHandlers {
     std::function<void(Value packet)> received;
     std::function<void()> closed = {};  ///< by the service; not for disconnect_pipe() and the session's end
@@ -72,6 +73,9 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   void unlock(std::string_view path, Completion done);
   void enter_monitor(std::string_view path, std::chrono::milliseconds timeout, Completion done);
   void exit_monitor(std::string_view path, Completion done);
+  /// What the service gets when it calls: a value, null for void callbacks, or an error; an exception reaches it as
+  /// one. One handler a callback; a second replaces the first.
+  void on_callback(std::string_view path, std::string_view callback, CallbackHandler handler);
   /// One handler an event; a second replaces the first.
   void on_event(std::string_view path, std::string_view event, EventHandler handler);
   /// Called once, when the session has ended for whatever reason; not after a failed open().
@@ -99,6 +103,7 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   void handle(PipePacketReceived&& received);
   void handle(PipePacketsAcknowledged&&) {}  // nothing here asks for acknowledgements
   void handle(PipeClosedByService&& closed);
+  void handle(CallbackCalled&& called);
   void handle(PathReleased&& released);
   void handle(SessionClosed&& closed);
   void expect(RequestId id, Completion done);
@@ -107,6 +112,7 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   std::unordered_map<RequestId, Completion> completions_;
   std::map<MemberKey, std::shared_ptr<EventHandler>> event_handlers_;
   std::map<MemberKey, std::shared_ptr<WireHandler>> wire_handlers_;
+  std::map<MemberKey, std::shared_ptr<CallbackHandler>> callback_handlers_;
   std::map<PipeKey, std::shared_ptr<PipeHandlers>> pipe_handlers_;
   std::function<void(const Error&)> on_closed_;
 };

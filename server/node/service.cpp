@@ -127,16 +127,30 @@ void Object::set_generator(std::string_view name, GeneratorHandler handler) {
   members_[&member].generator = std::move(handler);
 }
 
-void Object::fire_values(std::string_view event, std::span<const Value> arguments) {
-  const MemberDefinition& member = require_member(event, MemberKind::event);
+void Object::check_arguments(const MemberDefinition& member, const char* verb, std::span<const Value> arguments) const {
   if (arguments.size() != member.parameters.size())
-    refuse(type_name() + "." + member.name + ": fired with " + std::to_string(arguments.size()) +
+    refuse(type_name() + "." + member.name + ": " + verb + " with " + std::to_string(arguments.size()) +
            " arguments, the definition has " + std::to_string(member.parameters.size()));
   for (std::size_t i = 0; i < arguments.size(); ++i)
     check_value(type_name() + "." + member.name + ", argument '" + member.parameters[i].name + "'", arguments[i],
                 member.parameters[i].type, *service_.types_);
+}
+
+void Object::fire_values(std::string_view event, std::span<const Value> arguments) {
+  const MemberDefinition& member = require_member(event, MemberKind::event);
+  check_arguments(member, "fired", arguments);
   if (!service_.host_) return;
   for (const std::string& path : paths()) service_.host_->send_event(service_, path, member, arguments);
+}
+
+void Object::call_callback(ClientId client, std::string_view callback, const std::vector<Value>& arguments,
+                           CallbackDone done) {
+  const MemberDefinition& member = require_member(callback, MemberKind::callback);
+  check_arguments(member, "called", arguments);
+  if (!service_.host_) refuse(type_name() + "." + member.name + ": the service is in no node");
+  const auto known_as = paths();
+  service_.host_->call_callback(service_, client, known_as.empty() ? service_.name_ : known_as.front(), member,
+                                arguments, std::move(done));
 }
 
 void Object::set_wire(std::string_view wire, Value value) {

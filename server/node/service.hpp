@@ -48,6 +48,8 @@ struct Caller {
   NodeIdentity node = {};      ///< as the client says
 };
 
+using CallbackDone = std::function<void(Result<Value> answer)>;
+
 /// Thrown by a handler: the client gets this error.
 class ServiceException : public Exception {
  public:
@@ -144,6 +146,13 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   }
   void fire_values(std::string_view event, std::span<const Value> arguments);
 
+  /// Calls a callback of one client. `done` is called once, on the node's thread and not before this returns: with the
+  /// client's answer (null for void callbacks) or error, or when it took too long or the client is gone; not any more
+  /// when the node is destroyed. An object that is known by several paths is called by the first.
+  /// Throws   std::invalid_argument: no such callback, wrong number of arguments or types.
+  void call_callback(ClientId client, std::string_view callback, const std::vector<Value>& arguments,
+                     CallbackDone done);
+
   /// Sets a wire's InValue: sent to every client that has connected it, to later ones when they connect, and to peeks.
   /// Throws   std::invalid_argument: no such wire, one that is writeonly, a value that does not fit its type.
   void set_wire(std::string_view wire, Value value);
@@ -199,6 +208,7 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   std::size_t broadcast(std::string_view pipe, const Value& value, std::int32_t max_backlog);
   const std::vector<PipeEndpoint>& endpoints(std::string_view pipe);
   void set_generator(std::string_view name, GeneratorHandler handler);
+  void check_arguments(const MemberDefinition& member, const char* verb, std::span<const Value> arguments) const;
   std::vector<std::string> paths() const;
   void release_path(const std::string& path);
   /// Texts like "function Drive", for functions, property accessors and objrefs without handler.
@@ -227,6 +237,8 @@ class ServiceHost {
   virtual void send_wire(const Service& service, const std::string& path, const MemberDefinition& wire,
                          const Value& value) = 0;
   virtual void release_path(const Service& service, const std::string& path) = 0;
+  virtual void call_callback(const Service& service, ClientId client, const std::string& path,
+                             const MemberDefinition& callback, std::span<const Value> arguments, CallbackDone done) = 0;
   virtual ClientId current_client() const = 0;
   virtual Caller find_client(ClientId id) const = 0;
 
@@ -286,6 +298,10 @@ class Service {
   template <class... Args>
   void fire(std::string_view event, Args&&... arguments) {
     root_->fire(event, std::forward<Args>(arguments)...);
+  }
+  void call_callback(ClientId client, std::string_view callback, const std::vector<Value>& arguments,
+                     CallbackDone done) {
+    root_->call_callback(client, callback, arguments, std::move(done));
   }
   void set_wire(std::string_view wire, Value value) { root_->set_wire(wire, std::move(value)); }
   template <class F>

@@ -229,6 +229,28 @@ void ServiceClient::end_pipe(PipeId id, bool tells_handler) {
     close();
 }
 
+// --- callbacks ---
+
+void ServiceClient::call_callback(const std::string& path, const MemberDefinition& callback,
+                                  std::span<const Value> arguments, CallbackDone done) {
+  auto called = session_.call_callback(path, callback, arguments, read_clocks());
+  if (called) {
+    callbacks_.emplace(*called, CalledCallback{&callback, std::move(done)});
+  } else {
+    // Not before the caller has returned: nobody expects an answer in the middle of a call.
+    post([this, self = shared_from_this(), name = callback.name, done = std::move(done), error = called.error()] {
+      if (owner_) run_handler("callback", name, [&] { done(error); });
+    });
+  }
+  settle();
+}
+
+void ServiceClient::handle(const CallbackCompleted& completed, Now) {
+  auto found = callbacks_.extract(completed.id);
+  if (!found || !found.mapped().done) return;
+  run_handler("callback", found.mapped().member->name, [&] { found.mapped().done(completed.result); });
+}
+
 void ServiceClient::handle(const ClientGone&, Now) {
   while (owner_ && !pipes_.empty()) end_pipe(pipes_.begin()->first, true);
   for (const auto& [id, generator] : std::exchange(generators_, {}))

@@ -43,6 +43,8 @@ class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSe
   void send_event(const std::string& path, const MemberDefinition& event, std::span<const Value> arguments);
   void send_wire(const std::string& path, const MemberDefinition& wire, const Value& value);
   void release_path(const std::string& path);
+  void call_callback(const std::string& path, const MemberDefinition& callback, std::span<const Value> arguments,
+                     CallbackDone done);
   /// Tells the client that its service ends, then closes.
   void close_service();
   /// The owner goes away: nothing is told to it or to handlers any more.
@@ -66,6 +68,7 @@ class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSe
   void handle(const PipeAcknowledged& acknowledged, Now now);
   void handle(const PipeClosed& closed, Now now);
   void handle(const GeneratorEnded& ended, Now now);
+  void handle(const CallbackCompleted& completed, Now now);
   void handle(const ClientGone& gone, Now now);
 
   // PipeSender: from endpoints
@@ -82,6 +85,11 @@ class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSe
   Service* service_ = nullptr;
   std::unordered_map<PipeId, PipeEndpoint> pipes_;
   std::unordered_map<GeneratorId, Generator> generators_;  ///< as many as the session allows
+  struct CalledCallback {
+    const MemberDefinition* member = nullptr;
+    CallbackDone done;
+  };
+  std::unordered_map<CallbackId, CalledCallback> callbacks_;
 };
 
 }  // namespace rr

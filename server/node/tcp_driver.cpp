@@ -1,6 +1,7 @@
 #include "server/node/tcp_driver.hpp"
 
 #include <boost/asio/buffer.hpp>
+#include <boost/asio/post.hpp>
 #include <boost/container/static_vector.hpp>
 #include <chrono>
 
@@ -96,6 +97,10 @@ void TcpDriver::arm_timer() {
     if (poll_timeout() <= now.steady) handle_timeout(now);
     settle(now);
   });
+}
+
+void TcpDriver::post(std::function<void()> work) {
+  asio::post(socket_.get_executor(), std::move(work));
 }
 
 void TcpDriver::close(Error reason) {

@@ -4,6 +4,7 @@
 
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
+#include <functional>
 #include <memory>
 #include <span>
 #include <utility>
@@ -34,6 +35,10 @@ class TcpDriver : public std::enable_shared_from_this<TcpDriver> {
   /// Closes the socket at once. The session hears `reason` unless it has ended already.
   void close(Error reason);
   bool is_closed() const { return is_closed_; }
+
+ protected:
+  /// Runs `work` on the thread of the socket, later.
+  void post(std::function<void()> work);
 
  private:
   // The session's half of the contract.

@@ -259,6 +259,25 @@ SCENARIOS = [
         step for number in range(8) for step in (
             {"call": "publish_poses", "args": [POSE, {"int32": 1}], "expect": None},
             {"packets": "p", "count": number + 1, "expect": {"list": poses(*[0] * (number + 1))}})]),
+    Scenario("callbacks", [
+        {"answer": "ask", "value": {"double": 12.5}, "expect": None},
+        {"answer": "notice", "value": None, "expect": None},
+        {"call": "start_ask", "args": ["how much?"], "expect": None},
+        {"asked": "ask", "count": 1, "expect": {"list": [["how much?"]]}},
+        {"get_until": "answered", "until": 12.5, "expect": 12.5},
+        {"get": "answer_error", "expect": ""},
+        {"call": "start_notice", "args": [{"int32": 7}], "expect": None},
+        {"asked": "notice", "count": 1, "expect": {"list": [[7]]}},
+        {"get_until": "answered", "until": 7.0, "expect": 7.0},
+        {"answer": "ask", "fail": "no idea", "expect": None},
+        {"call": "start_ask", "args": ["Zürich?"], "expect": None},
+        {"asked": "ask", "count": 2, "expect": {"list": [["how much?"], ["Zürich?"]]}},
+        {"get_until": "answer_error", "until": "RobotRaconteur.OperationFailed", "expect": "RobotRaconteur.OperationFailed"},
+        {"get": "answered", "expect": 0.0}], clients=NATIVE),
+    Scenario("callback_not_set", [  # the reference's Python clients turn this into OperationFailed
+        {"call": "start_ask", "args": ["anybody?"], "expect": None},
+        {"get_until": "answer_error", "until": "RobotRaconteur.InvalidOperation", "expect": "RobotRaconteur.InvalidOperation"}],
+        clients=("ours",)),
     Scenario("pipe_large_packets", [
         {"open_pipe": "taken", "as": "t", "expect": 1},
         {"send": "t", "values": [{"ramp": 1310720}, {"double[]": [0.5]}, {"ramp": 1310720}], "expect": None},

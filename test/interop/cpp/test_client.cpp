@@ -56,7 +56,9 @@ class Client {
                                                    {"generate", &Client::generate},
                                                    {"next", &Client::next},
                                                    {"close_generator", &Client::close_generator},
-                                                   {"abort_generator", &Client::abort_generator}};
+                                                   {"abort_generator", &Client::abort_generator},
+                                                   {"answer", &Client::answer},
+                                                   {"asked", &Client::asked}};
     return table;
   }
 
@@ -184,6 +186,27 @@ class Client {
     return nullptr;
   }
 
+  // callbacks
+
+  json answer(const rr::RemoteObject& target, const std::string& member, const json& step) {
+    json& seen = callbacks_.try_emplace(member, json::array()).first->second;
+    target.on_callback_values(member, [&seen, step](std::span<const rr::Value> arguments) -> rr::Result<rr::Value> {
+      json called = json::array();
+      for (const auto& argument : arguments) called.push_back(to_plain(argument));
+      seen.push_back(std::move(called));
+      if (step.contains("fail"))
+        return rr::make_error(rr::ErrorCode::operation_failed, step.at("fail").get<std::string>());
+      return from_scenario(step.at("value"));
+    });
+    return nullptr;
+  }
+
+  json asked(const rr::RemoteObject&, const std::string& member, const json& step) {
+    const json& seen = callbacks_.at(member);
+    wait([&] { return seen.size() >= step.at("count").get<std::size_t>(); });
+    return {{"list", seen}};
+  }
+
   // pipes
 
   json open_pipe(const rr::RemoteObject& target, const std::string& member, const json& step) {
@@ -272,6 +295,7 @@ class Client {
   rr::RemoteObject root_;
   std::map<std::string, rr::RemoteObject> others_;    ///< roots of further clients
   std::map<std::string, rr::MonitorGuard> monitors_;  ///< by the name that the scenario gives
+  std::map<std::string, json> callbacks_;             ///< calls, by callback
   std::map<std::string, Pipe> pipes_;                 ///< by the name that the scenario gives
   std::map<std::string, json> events_;                ///< by event
   std::map<std::string, json> in_values_;             ///< by wire

@@ -25,6 +25,7 @@ class Interop {
     add_wires();
     add_pipes();
     add_generators();
+    add_callbacks();
     node.add(service_);
   }
 
@@ -133,6 +134,30 @@ class Interop {
     service_->on_wire("both", [this](double value) { service_->set_wire("both", 2 * value); });
   }
 
+  void add_callbacks() {
+    service_->function("start_ask", [this](const std::string& question) {
+      start("ask", question, [](const rr::Value& answer) { return answer.to<double>().value(); });
+    });
+    service_->function("start_notice", [this](std::int32_t number) {
+      start("notice", number, [number](const rr::Value&) { return static_cast<double>(number); });
+    });
+    service_->property("answered").get([this] { return answered_; });
+    service_->property("answer_error").get([this] { return answer_error_; });
+  }
+
+  template <class Read>
+  void start(const char* callback, rr::Value argument, Read read) {
+    answered_ = 0;
+    answer_error_.clear();
+    service_->call_callback(service_->current_client(), callback, {std::move(argument)},
+                            [this, read](const rr::Result<rr::Value>& answer) {
+                              if (answer)
+                                answered_ = read(*answer);
+                              else
+                                answer_error_ = answer.error().qualified_name();
+                            });
+  }
+
   void add_pipes() {
     for (const char* pipe : {"doubled", "quick"})
       service_->pipe(pipe).on_packet([](const rr::PipeEndpoint& endpoint, double value) {
@@ -193,6 +218,8 @@ class Interop {
 
   std::shared_ptr<rr::Service> service_;
   double sum_ = 0;
+  double answered_ = 0;
+  std::string answer_error_;
   std::map<std::string, rr::Value> stored_;
   double secret_ = 0;
   double target_ = 0;

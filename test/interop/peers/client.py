@@ -13,7 +13,7 @@ import quiet_node
 from values import Values, plain
 
 NO_VERBS = ("by", "on", "value", "args", "count", "until", "digest", "service", "username", "password", "timeout",
-            "as", "index", "values")
+            "as", "index", "values", "fail")
 PATIENCE = 10.0  # seconds for anything that has to come by itself
 
 
@@ -28,6 +28,7 @@ class Client:
         self._wires = {}
         self._pipes = {}
         self._generators = {}
+        self._callbacks = {}
 
     def carry_out(self, step):
         target = self._others[step["by"]] if "by" in step else self._root
@@ -154,6 +155,27 @@ class Client:
 
     def do_poke_out(self, target, member, step):
         getattr(target, member).PokeOutValue(self._values.build(step["value"]))
+
+    # callbacks
+
+    def do_answer(self, target, member, step):
+        seen = self._callbacks.setdefault(member, [])
+
+        def called(*arguments):
+            with self._news:
+                seen.append([plain(argument) for argument in arguments])
+                self._news.notify_all()
+            if "fail" in step:
+                raise RR.OperationFailedException(step["fail"])
+            return self._values.build(step["value"])
+
+        getattr(target, member).Function = called
+
+    def do_asked(self, target, member, step):
+        seen = self._callbacks[member]
+        with self._news:
+            self._news.wait_for(lambda: len(seen) >= step["count"], PATIENCE)
+            return {"list": list(seen)}
 
     # pipes
 

@@ -85,6 +85,8 @@ class Interop:
         self.seen_sum = 0.0
         self.collected = []
         self.generator_end = ""
+        self.answered = 0.0
+        self.answer_error = ""
         self.changed = RR.EventHook()
         self.cleared = RR.EventHook()
         self._head = Part("head")
@@ -126,6 +128,33 @@ class Interop:
 
     def publish_pose(self, value):
         self.pose.OutValue = value
+
+    # callbacks
+
+    def start_ask(self, question):
+        function = self.ask.GetClientFunction(RR.ServerEndpoint.GetCurrentEndpoint())
+        self._start(lambda: function(question))
+
+    def start_notice(self, number):
+        function = self.notice.GetClientFunction(RR.ServerEndpoint.GetCurrentEndpoint())
+
+        def notice():
+            function(number)
+            return float(number)
+
+        self._start(notice)
+
+    def _start(self, ask):
+        self.answered = 0.0
+        self.answer_error = ""
+
+        def work():
+            try:
+                self.answered = ask()
+            except RR.RobotRaconteurException as error:
+                self.answer_error = error.errorname
+
+        threading.Thread(target=work, daemon=True).start()
 
     # pipes
 

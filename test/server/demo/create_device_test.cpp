@@ -88,3 +88,28 @@ TEST_CASE("the robot stops when the client that drove it is gone, and not for an
   }
   REQUIRE(watcher.connection().run_until([&] { return velocity == 0; }, 5s));
 }
+
+TEST_CASE("the play button asks the driver for a song, or who presses it while nobody drives") {
+  const RunningCreate create;
+  const auto driver = create.connect();
+  const auto other = create.connect();
+  using Notes = std::vector<std::uint8_t>;
+  const auto song_is = [](const rr::RemoteObject& robot, const Notes& notes) {
+    const auto deadline = std::chrono::steady_clock::now() + 5s;
+    while (std::chrono::steady_clock::now() < deadline)
+      if (robot.get("song") == rr::Value(notes)) return true;
+    return false;
+  };
+  other.on_callback("play_callback", [](std::int32_t, std::int32_t) { return Notes{72, 16}; });
+  other.call("press_play");
+  CHECK(song_is(other, {72, 16}));
+
+  driver.on_callback("play_callback", [](std::int32_t distance, std::int32_t angle) {
+    CHECK(distance == 0);
+    CHECK(angle == 0);
+    return Notes{60, 32, 64, 32};
+  });
+  driver.call("Drive", 0, drive_straight);
+  other.call("press_play");
+  CHECK(song_is(driver, {60, 32, 64, 32}));
+}
