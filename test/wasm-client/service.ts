@@ -6,6 +6,7 @@
 //     publish_WIRE(value)    sends the InValue of WIRE
 //     stream_PIPE(value, n)  sends the value n times to each endpoint of PIPE
 //     close_PIPE()           closes all endpoints of PIPE
+//     ask_CALLBACK(...)      calls CALLBACK of the client with the same arguments; its answer is the function's
 //     release(path)          releases an object
 //     fail(name, text)       raises the exception `name` with sub name "detail" and the parameter int32[] 1, 2
 //     who()                  the user, or "nobody"

@@ -123,6 +123,12 @@ RR_EXPORT(enter_monitor) RequestId rr_enter_monitor(JsHandle path, double millis
 RR_EXPORT(exit_monitor) RequestId rr_exit_monitor(JsHandle path) {
   return session->exit_monitor(JsValue(path));
 }
+RR_EXPORT(reply_callback) JsHandle rr_reply_callback(double id, JsHandle path, JsHandle member, JsHandle value) {
+  return session->reply_callback(id, JsValue(path), JsValue(member), JsValue(value)).release();
+}
+RR_EXPORT(fail_callback) void rr_fail_callback(double id, JsHandle error) {
+  session->fail_callback(id, JsValue(error));
+}
 RR_EXPORT(cancel) void rr_cancel(RequestId id) {
   session->cancel(id);
 }

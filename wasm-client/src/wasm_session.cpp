@@ -58,6 +58,16 @@ bool is_varvalue(const TypeDefinition& type) {
   return type.type == DataType::varvalue_t;
 }
 
+/// What came with an event or callback. `member` nullptr where it is not known any more.
+JsValue make_arguments(const std::vector<Value>& values, const MemberDefinition* member, const TypeRegistry& types) {
+  JsValue arguments = make_js_array();
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const bool brings_type = member && i < member->parameters.size() && is_varvalue(member->parameters[i].type);
+    push_js(arguments, to_js(values[i], types, brings_type));
+  }
+  return arguments;
+}
+
 }  // namespace
 
 WasmSession::WasmSession(ClientOptions options, double steady, double utc)
@@ -206,6 +216,30 @@ RequestId WasmSession::exit_monitor(const JsValue& path) {
   return session_.exit_monitor(text_of(path), now_);
 }
 
+JsValue WasmSession::reply_callback(double id, const JsValue& path, const JsValue& member, const JsValue& value) {
+  const auto call = static_cast<CallbackId>(id);
+  const auto target = find_target(path, member);
+  std::optional<Value> read;
+  if (target)
+    read = target->definition->type.type == DataType::void_t
+               ? Value{}
+               : read_value(value, target->definition->type, target->member);
+  session_.reply_callback(call, read ? Result<Value>(std::move(*read)) : Result<Value>(*error_), now_);
+  return read ? JsValue::undefined() : take_error();
+}
+
+void WasmSession::fail_callback(double id, const JsValue& error) {
+  const auto text = [&](std::string_view field) {
+    const auto found = error.field(field);
+    return found && found->kind() == JsKind::text ? text_of(*found) : std::string();
+  };
+  Error failure{ErrorCode::unknown_error, text("message"), text("name")};
+  failure.sub_name = text("subName");
+  if (const auto code = error.field("code"); code && code->kind() == JsKind::number)
+    failure.code = static_cast<ErrorCode>(code->number());
+  session_.reply_callback(static_cast<CallbackId>(id), failure, now_);
+}
+
 void WasmSession::cancel(RequestId id) {
   varvalue_replies_.erase(id);
   session_.cancel(id);
@@ -234,13 +268,8 @@ double WasmSession::poll_timeout() const {
 }
 
 JsValue WasmSession::poll_event() {
-  auto event = session_.poll_event();
-  for (; event; event = session_.poll_event()) {
-    const auto* called = std::get_if<CallbackCalled>(&*event);
-    if (!called) return event_to_js(*event);
-    session_.reply_callback(called->id, make_error(ErrorCode::invalid_operation, "Callback function not set"), now_);
-  }
-  return JsValue::undefined();
+  const auto event = session_.poll_event();
+  return event ? event_to_js(*event) : JsValue::undefined();
 }
 
 JsValue WasmSession::event_to_js(const ClientEvent& event) {
@@ -264,12 +293,14 @@ JsValue WasmSession::event_to_js(const ClientEvent& event) {
   if (const auto* received = std::get_if<EventReceived>(&event)) {
     const JsValue js = make_member_event("event", received->path, received->member);
     const auto* member = find_member(received->path, received->member);
-    const JsValue arguments = make_js_array();
-    for (std::size_t i = 0; i < received->arguments.size(); ++i) {
-      const bool brings_type = member && i < member->parameters.size() && is_varvalue(member->parameters[i].type);
-      push_js(arguments, to_js(received->arguments[i], types, brings_type));
-    }
-    set_js_field(js, "arguments", arguments);
+    set_js_field(js, "arguments", make_arguments(received->arguments, member, types));
+    return js;
+  }
+  if (const auto* called = std::get_if<CallbackCalled>(&event)) {
+    const JsValue js = make_member_event("callback", called->path, called->member);
+    const auto* member = find_member(called->path, called->member);
+    set_js_field(js, "id", make_js_number(static_cast<double>(called->id)));
+    set_js_field(js, "arguments", make_arguments(called->arguments, member, types));
     return js;
   }
   if (const auto* received = std::get_if<WireValueReceived>(&event)) {

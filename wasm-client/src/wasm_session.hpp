@@ -60,6 +60,11 @@ class WasmSession {
   /// `milliseconds` below 0: no limit.
   RequestId enter_monitor(const JsValue& path, double milliseconds);
   RequestId exit_monitor(const JsValue& path);
+  /// Answers a callback with what its handler returned. Returns undefined, or why that does not fit: the service is
+  /// told so, too.
+  JsValue reply_callback(double id, const JsValue& path, const JsValue& member, const JsValue& value);
+  /// `error` {code, name, subName, message}
+  void fail_callback(double id, const JsValue& error);
   void cancel(RequestId id);
   void disconnect();
 

@@ -1,6 +1,7 @@
 // Objects of a service, built from the definition that the service sent. Layer: wasm-client/ts.
 import { call_safely, make_error } from "./errors.js";
 import type { RobotRaconteurError } from "./errors.js";
+import { make_callback } from "./members/callback.js";
 import { make_event } from "./members/event.js";
 import { make_function } from "./members/function.js";
 import { make_later } from "./members/later.js";
@@ -31,7 +32,7 @@ const faces: Record<MemberKind, (context: MemberContext) => unknown> = {
   objref: make_objref,
   wire: make_wire,
   pipe: make_pipe,
-  callback: (context) => make_later(context, "callback"),
+  callback: make_callback,
   memory: (context) => make_later(context, "memory"),
 };
 

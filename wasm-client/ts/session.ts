@@ -26,6 +26,8 @@ export interface MemberListener {
   on_pipe_closed?(index: number): void;
 }
 
+export type CallbackHandler = (...args: RrValue[]) => unknown;
+
 export class Session {
   /** Set by close(), or by whatever ended the session. */
   #end: { reason: RobotRaconteurError; is_local: boolean } | undefined;
@@ -38,6 +40,7 @@ export class Session {
   /** Those that wait for room. */
   #senders: { resolve(): void; reject(reason: unknown): void }[] = [];
   readonly #listeners = new Map<string, Set<MemberListener>>();
+  readonly #handlers = new Map<string, CallbackHandler>();
   readonly #closers = new Set<(reason?: RobotRaconteurError) => void>();
   readonly #release_listeners = new Set<(path: string) => void>();
   readonly #connected: Promise<string>;
@@ -142,6 +145,17 @@ export class Session {
     };
   }
 
+  /** Who answers a callback; null for nobody. One for all objects of a path: the last one that is set. */
+  set_handler(path: string, member: string, handler: CallbackHandler | null): void {
+    const key = `${path} ${member}`;
+    if (handler) this.#handlers.set(key, handler);
+    else this.#handlers.delete(key);
+  }
+
+  handler(path: string, member: string): CallbackHandler | null {
+    return this.#handlers.get(`${path} ${member}`) ?? null;
+  }
+
   on_release(released: (path: string) => void): () => void {
     this.#release_listeners.add(released);
     return () => void this.#release_listeners.delete(released);
@@ -190,6 +204,7 @@ export class Session {
     this.#closers.clear();
     this.#listeners.clear();
     this.#release_listeners.clear();
+    this.#handlers.clear();
     for (const closed of closers) this.#tell_closed(closed);
     this.#settle_closed();
   }
@@ -264,7 +279,14 @@ export class Session {
       case "pipe_closed":
         this.#tell(event.path, event.member, (listener) => listener.on_pipe_closed?.(event.index));
         break;
+      case "callback":
+        void this.#answer(event);
+        break;
       case "path_released":
+        for (const key of this.#handlers.keys()) {
+          const [path] = key.split(" ", 1) as [string];
+          if (path === event.path || path.startsWith(`${event.path}.`)) this.#handlers.delete(key);
+        }
         for (const released of [...this.#release_listeners]) call_safely(() => released(event.path));
         break;
       case "closed":
@@ -277,6 +299,20 @@ export class Session {
   #error(fields: ErrorFields): RobotRaconteurError {
     const is_loss = this.#was_connected && fields.code === ErrorCode.ConnectionError && this.core.wants_close();
     return new RobotRaconteurError(is_loss ? { ...fields, subName: fields.subName || connection_lost } : fields);
+  }
+
+  /** Asks the handler of a callback, and tells the service what it said. */
+  async #answer({ id, path, member, arguments: args }: CoreEvent & { kind: "callback" }): Promise<void> {
+    try {
+      const handler = this.#handlers.get(`${path} ${member}`);
+      if (!handler) throw make_error("InvalidOperation", "Callback function not set");
+      const value = await handler(...args);
+      if (this.#end) return;
+      // A value that does not fit is this side's mistake: whoever wrote the handler should see it, too.
+      call_safely(() => this.tell((core) => core.reply_callback(id, path, member, value)));
+    } catch (error) {
+      if (!this.#end) this.tell((core) => core.fail_callback(id, error_fields(error)));
+    }
   }
 
   #take_pending(id: number): Pending | undefined {
@@ -316,6 +352,16 @@ export class Session {
       this.#finish(make_error("InternalError", `the session failed: ${text}`));
     }
   }
+}
+
+/** What a service hears of an exception: errors of the protocol as they are, others by name, as from Python. */
+function error_fields(error: unknown): Partial<ErrorFields> {
+  if (error instanceof RobotRaconteurError) {
+    const { code, name, message, subName } = error;
+    return { code, name, message, subName };
+  }
+  if (error instanceof Error) return { code: ErrorCode.UnknownError, name: error.name, message: error.message };
+  return { code: ErrorCode.UnknownError, message: String(error) };
 }
 
 function check_timeout(milliseconds: number): number {

@@ -230,7 +230,11 @@ export interface PipeMember<T = RrValue, S = T> {
   connect(options: PipeConnectOptions): Promise<PipeEndpoint<T, S>>;
 }
 
-/** What the service asks of this client. */
+/**
+ * What the service asks of this client. The handler may return a promise. What it throws travels to the service:
+ * RobotRaconteurError as it is, also with an exception that the definition declares (code 100 and its qualified name).
+ * While there is no handler, the service gets InvalidOperation.
+ */
 export interface CallbackMember<A extends unknown[] = RrValue[], R = unknown> {
   handler: ((...args: A) => R | Promise<R>) | null;
 }
@@ -262,6 +266,7 @@ export interface DynamicMember extends AsyncIterable<RrValue[]> {
   set(value: unknown, options?: CallOptions): Promise<void>;
   on(listener: (...args: RrValue[]) => void): () => void;
   once(options?: CallOptions): Promise<RrValue[]>;
+  handler: ((...args: RrValue[]) => unknown) | null;
   /** Of a wire the connection at once, of a pipe the promise of an endpoint. */
   connect(options?: CallOptions): WireConnection & Promise<PipeEndpoint>;
   connect(index: number, options?: PipeConnectOptions): Promise<PipeEndpoint>;

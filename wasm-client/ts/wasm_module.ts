@@ -32,6 +32,7 @@ export type CoreEvent =
   | { kind: "pipe"; path: string; member: string; index: number; value: RrValue }
   | { kind: "pipe_acks"; path: string; member: string; index: number; numbers: number[] }
   | { kind: "pipe_closed"; path: string; member: string; index: number }
+  | { kind: "callback"; id: number; path: string; member: string; arguments: RrValue[] }
   | { kind: "path_released"; path: string }
   | { kind: "closed"; error: ErrorFields };
 
@@ -77,6 +78,8 @@ interface WasmSession extends CoreExports {
   unlock(path: Handle): number;
   enter_monitor(path: Handle, milliseconds: number): number;
   exit_monitor(path: Handle): number;
+  reply_callback(id: number, path: Handle, member: Handle, value: Handle): Handle;
+  fail_callback(id: number, error: Handle): void;
   cancel(id: number): void;
   disconnect(): void;
   poll_transmit(limit: number): number;
@@ -247,6 +250,17 @@ export class Core {
 
   exit_monitor(path: string): number {
     return this.#ask("exit_monitor", path);
+  }
+
+  /** @throws RobotRaconteurError where the value does not fit; the service has been told so, too. */
+  reply_callback(id: number, path: string, member: string, value: unknown): void {
+    const handles = [this.#give(path), this.#give(member), this.#give(value)] as const;
+    const error = this.#values.take(this.#at_now().reply_callback(id, ...handles));
+    if (error) throw new RobotRaconteurError(error as ErrorFields);
+  }
+
+  fail_callback(id: number, error: Partial<ErrorFields>): void {
+    this.#at_now().fail_callback(id, this.#give(error));
   }
 
   cancel(id: number): void {

@@ -2,7 +2,7 @@
 //
 //   node client.mjs URL     reads {"steps": [...]} from standard input, prints {"results": [...]}
 import { readFileSync } from "node:fs";
-import { connect, rrValue, typeOf } from "../../../wasm-client/dist/index.js";
+import { connect, ErrorCode, RobotRaconteurError, rrValue, typeOf } from "../../../wasm-client/dist/index.js";
 
 const patience = 10_000; // ms for anything that has to come by itself
 
@@ -111,6 +111,7 @@ class Client {
   #wires = new Map();
   #pipes = new Map();
   #generators = new Map();
+  #callbacks = new Map();
 
   #others = new Map(); // roots of further clients, by name
 
@@ -265,6 +266,22 @@ class Client {
       });
       return null;
     },
+    async answer(target, member, step) {
+      const asked = this.#callbacks.get(member) ?? [];
+      this.#callbacks.set(member, asked);
+      const { parameters } = target.$.members.find(({ name }) => name === member);
+      target[member].handler = (...values) => {
+        asked.push(values.map((value, index) => this.plainOf(target, member, value, parameters[index].type)));
+        if ("fail" in step) throw failed(step.fail);
+        return build(step.value);
+      };
+      return null;
+    },
+    async asked(target, member, step) {
+      const asked = this.#callbacks.get(member);
+      await until(async () => asked.length >= step.count, true);
+      return { list: [...asked] };
+    },
     async peek_in(target, member) {
       return this.plainOf(target, member, await target[member].peek());
     },
@@ -287,6 +304,9 @@ async function until(ask, wanted) {
     await new Promise((resolve) => setTimeout(resolve, 10));
   }
 }
+
+const failed = (message) =>
+  new RobotRaconteurError({ code: ErrorCode.OperationFailed, name: "RobotRaconteur.OperationFailed", message });
 
 const errorOf = (error) => ({ name: error.name, message: error.message });
 

@@ -108,6 +108,8 @@ class TestService {
   void carry_out() {
     while (auto event = session_->poll_event()) {
       if (const auto* called = std::get_if<Called>(&*event)) answer(*called);
+      if (auto* completed = std::get_if<CallbackCompleted>(&*event))
+        if (auto asked = asks_.extract(completed->id)) session_->reply(asked.mapped(), completed->result, now_);
       if (const auto* login = std::get_if<LoginRequested>(&*event))
         session_->answer_login(login->id, login->authenticator->authenticate(login->attempt), now_);
       if (const auto* wire = std::get_if<WireConnected>(&*event)) {
@@ -155,6 +157,7 @@ class TestService {
         return found != values.end() ? found->second : default_value(called.member->type, *types_);
       }
       case CallKind::function:
+        if (name.starts_with("ask_")) return ask(called);
         return call(name, called.arguments, called.member->type);
       case CallKind::generator_open:
         if (name == "refuse") return make_error(ErrorCode::operation_failed, "no");
@@ -169,6 +172,15 @@ class TestService {
         return Value{};
     }
     return Value{};
+  }
+
+  /// The answer of the client's callback is the function's own.
+  std::optional<Result<Value>> ask(const Called& called) {
+    const auto* callback = types_->find_entity(called.object->type_name())->find_member(called.member->name.substr(4));
+    const auto asked = session_->call_callback("test", *callback, called.arguments, now_);
+    if (!asked) return asked.error();
+    asks_[*asked] = called.id;
+    return std::nullopt;
   }
 
   /// The next value of a generator: what it is given, else 0, 1 ... as often as its first argument says.
@@ -219,6 +231,7 @@ class TestService {
   std::shared_ptr<TestObject> root_;
   std::shared_ptr<const TypeRegistry> types_;
   std::optional<ServiceSession> session_;
+  std::map<CallbackId, CallId> asks_;
   struct Run {
     std::vector<Value> arguments;
     int step = 0;

@@ -3,7 +3,6 @@ import { make_error } from "../errors.js";
 import type { MemberContext } from "./member.js";
 
 const operations = {
-  callback: ["set"],
   memory: ["read", "write", "length"],
 } as const;
 
