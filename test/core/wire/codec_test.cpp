@@ -2,7 +2,9 @@
 
 #include "core/wire/codec.hpp"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
+#include <cstring>
 #include <string>
 
 #include "test/core/wire/message_tree.hpp"
@@ -317,6 +319,33 @@ TEST_CASE("counts end at 65535 where the format has no more bits") {
     CHECK(encode_error(message) ==
           (version == 2 ? "ProtocolError: encode: entry 0: more than 65535 elements" : "encoded"));
   }
+}
+
+TEST_CASE("65536 entries that are really there are refused by their count") {
+  Message message = make_message();
+  while (message.entries.size() < 65535) message.begin_entry(EntryType::null, "", "");
+  EncodedMessage encoded;
+  REQUIRE(encode(message, {}, encoded));
+  auto bytes = encoded.to_bytes();
+  REQUIRE(decode(bytes, {}, message));
+  CHECK(message.entries.size() == 65535);
+
+  const auto entry_size = (bytes.size() - bytes[10]) / 65535;
+  const Bytes entry(bytes.end() - static_cast<std::ptrdiff_t>(entry_size), bytes.end());
+  const auto count = from_hex("fdffff");  // 65535 as EntryCount, the last field of the header
+  const auto at = std::search(bytes.begin(), bytes.end(), count.begin(), count.end());
+  REQUIRE(at - bytes.begin() == bytes[10] - 3);
+  const auto grown = from_hex("fe00000100");
+  const auto offset = at - bytes.begin();
+  bytes.erase(at, at + 3);
+  bytes.insert(bytes.begin() + offset, grown.begin(), grown.end());
+  bytes.insert(bytes.end(), entry.begin(), entry.end());
+  bytes[10] += 2;
+  const auto size = static_cast<std::uint32_t>(bytes.size());
+  std::memcpy(bytes.data() + 4, &size, sizeof(size));
+  const auto decoded = decode(bytes, {}, message);
+  REQUIRE(!decoded);
+  CHECK(decoded.error().message.find("65536 is above 65535") != std::string::npos);
 }
 
 TEST_CASE("the message size limit is exact") {
