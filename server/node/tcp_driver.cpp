@@ -48,10 +48,10 @@ void TcpDriver::settle() {
 }
 
 void TcpDriver::settle(Now now) {
-  if (is_settling_ || is_closed_) return;
+  if (is_settling_) return;
   is_settling_ = true;
   const auto self = shared_from_this();
-  while (handle_event(now) && !is_closed_) {
+  while (handle_event(now)) {  // also behind the end: what is asked of a closed session fails by an event
   }
   if (!is_closed_) write(now);
   is_settling_ = false;

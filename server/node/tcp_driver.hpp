@@ -35,6 +35,7 @@ class TcpDriver : public std::enable_shared_from_this<TcpDriver> {
   /// Closes the socket at once. The session hears `reason` unless it has ended already.
   void close(Error reason);
   bool is_closed() const { return is_closed_; }
+  boost::asio::any_io_executor executor() { return socket_.get_executor(); }
 
  protected:
   /// Runs `work` on the thread of the socket, later.
