@@ -320,10 +320,13 @@ void CppEmitter::emit_client_member(const std::string& client, const MemberDefin
       return emit_handle("rr::TypedProperty<" + types_.value(member.type) + direction(member) + ">");
     case MemberKind::wire:
       return emit_handle("rr::TypedWire<" + types_.value(member.type) + direction(member) + ">");
-    case MemberKind::event: {
+    case MemberKind::event:
+    case MemberKind::callback: {
       std::vector<std::string> arguments;
+      if (member.kind == MemberKind::callback) arguments.push_back(types_.value(member.type));
       for (const auto& parameter : member.parameters) arguments.push_back(types_.value(parameter.type));
-      return emit_handle("rr::TypedEvent<" + joined(arguments) + ">");
+      const std::string handle = member.kind == MemberKind::event ? "rr::TypedEvent<" : "rr::TypedCallback<";
+      return emit_handle(handle + joined(arguments) + ">");
     }
     case MemberKind::objref: {
       const bool is_any = member.type.type == DataType::varobject_t;
@@ -344,10 +347,11 @@ void CppEmitter::emit_client_member(const std::string& client, const MemberDefin
       return emit_function(type, parameters(member),
                            "rr_call<" + type + ">(\"" + member.name + "\"" + arguments(member) + ")");
     }
-    default:
+    case MemberKind::memory:
+      return header_.line("// memory " + member.name + ": by rr_object");
+    case MemberKind::field:
       break;
   }
-  header_.line("// " + std::string(member_kind_name(member.kind)) + ' ' + member.name + ": by rr_object");
 }
 
 void CppEmitter::emit_service(const EntityDefinition& item) {
@@ -436,10 +440,19 @@ void CppEmitter::emit_service_member(const EntityDefinition& item, const MemberD
       return emit_virtual(
           "std::shared_ptr<" + child + "> get_" + member.name + "(" + index_parameter(member.type) + ")", " = 0;");
     }
-    default:
+    case MemberKind::callback: {
+      const auto taken = parameters(member);
+      return emit_telling(
+          "void",
+          "rr::ClientId rr_client, " + taken + (taken.empty() ? "" : ", ") + "std::function<void(rr::Result<" + type +
+              ">)> rr_done",
+          "rr_ask<" + type + ">(rr_client, \"" + member.name + "\", std::move(rr_done)" + arguments(member) + ");");
+    }
+    case MemberKind::memory:
+      return header_.line("// memory " + member.name + ": by rr_object()");
+    case MemberKind::field:
       break;
   }
-  header_.line("// " + std::string(member_kind_name(member.kind)) + ' ' + member.name + ": by rr_service()");
 }
 
 void CppEmitter::emit_binding(const EntityDefinition& item) {

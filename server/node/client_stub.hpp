@@ -200,6 +200,36 @@ class TypedPipe : public MemberHandle {
   }
 };
 
+/// What the service asks of this client.
+template <class R, class... Args>
+class TypedCallback : public MemberHandle {
+ public:
+  using MemberHandle::MemberHandle;
+  /// handler(Args...) returns an R. A second one replaces the first. What it throws, the service gets as an error.
+  /// Called while one of the functions of rr_object.connection() runs.
+  template <class F>
+  void on(F handler) const {
+    ask([&](const RemoteObject& object, const char* name) {
+      object.on_callback_values(name, [handler = std::move(handler)](std::span<const Value> arguments) mutable {
+        return answer(handler, arguments, std::index_sequence_for<Args...>{});
+      });
+    });
+  }
+
+ private:
+  template <class F, std::size_t... index>
+  static Result<Value> answer(F& handler, std::span<const Value> arguments, std::index_sequence<index...>) {
+    if (arguments.size() != sizeof...(Args))
+      return make_error(ErrorCode::invalid_argument, "wrong number of arguments");
+    if constexpr (std::is_void_v<R>) {
+      handler(unpack_value<Args>(arguments[index])...);
+      return Value{};
+    } else {
+      return pack_value<R>(handler(unpack_value<Args>(arguments[index])...));
+    }
+  }
+};
+
 /// A running generator: a handle that can be copied. T void: it returns nothing; Parameter void: it takes nothing.
 template <class T, class Parameter = void>
 class TypedGenerator {

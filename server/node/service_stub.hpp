@@ -92,6 +92,15 @@ class ServiceStub : public std::enable_shared_from_this<ServiceStub> {
         });
   }
 
+  template <class R, class... Args>
+  void rr_ask(ClientId client, const char* callback, std::function<void(Result<R>)> done, Args... arguments) {
+    const auto object = object_.lock();
+    if (!object) throw std::logic_error(std::string(rr_object_type()) + " has no clients: none has asked for it");
+    object->call_callback(client, callback, {pack_value(std::move(arguments))...},
+                          [done = std::move(done)](Result<Value> answer) {
+                            done(answer ? try_unpack_value<R>(*answer) : Result<R>(answer.error()));
+                          });
+  }
   template <class... Args>
   void rr_fire(std::string_view event, Args... arguments) {
     const std::array<Value, sizeof...(Args)> values{pack_value(std::move(arguments))...};

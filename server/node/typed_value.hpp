@@ -266,6 +266,19 @@ T unpack_value(const Value& value) {
   if constexpr (!std::is_void_v<T>) return detail::Typed<T>::unpack(value);
 }
 
+/// The same without exceptions.
+template <class T>
+Result<T> try_unpack_value(const Value& value) {
+  try {
+    if constexpr (std::is_void_v<T>)
+      return {};
+    else
+      return unpack_value<T>(value);
+  } catch (const Exception& failure) {
+    return failure.error();
+  }
+}
+
 /// For rr_pack() of generated code: the fields of a struct or pod, in definition order.
 class FieldPacker {
  public:

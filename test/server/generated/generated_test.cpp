@@ -40,9 +40,13 @@ class Everything : public ObjectService {
  public:
   std::optional<union_> received_target;
   std::vector<std::string> lines;
+  ClientId last_client = 0;
 
  private:
-  std::int32_t get_auto() override { return auto_; }
+  std::int32_t get_auto() override {
+    last_client = rr_service().current_client();
+    return auto_;
+  }
   void set_auto(std::int32_t value) override { auto_ = value; }
   Nullable<switch_> get_switch_value() override { return switch__; }
   void set_switch_value(Nullable<switch_> value) override { switch__ = std::move(value); }
@@ -298,6 +302,31 @@ TEST_CASE("generated: pipes") {
   session.client.commands().connect().send("take one");
   REQUIRE(session.wait_until([&] { return !heard.empty(); }));
   CHECK(heard == "take one");
+}
+
+TEST_CASE("generated: callbacks") {
+  Session session;
+  const auto& client = session.client;
+  std::vector<std::string> answers;
+  const auto ask = [&](std::string question) {
+    session.node.ask([&](Node&) {
+      session.everything->ask(session.everything->last_client, question, enumeration::private_,
+                              [&](const Result<std::int32_t>& answer) {
+                                answers.push_back(answer ? std::to_string(*answer) : answer.error().message);
+                              });
+      return true;
+    });
+  };
+  client.ask().on([](const std::string& question, enumeration how) {
+    if (question.empty()) throw delete_("nothing was asked");
+    return static_cast<std::int32_t>(question.size()) + static_cast<std::int32_t>(how);
+  });
+  client.auto_().get();
+  ask("how many");
+  ask("");
+  const auto count = [&] { return session.node.ask([&](Node&) { return answers.size(); }); };
+  REQUIRE(session.wait_until([&] { return count() == 2; }));
+  CHECK(answers == std::vector<std::string>{"-8", "nothing was asked"});
 }
 
 TEST_CASE("generated: stubs that are used too early or twice say so") {
