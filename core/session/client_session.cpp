@@ -389,6 +389,7 @@ void ClientSession::handle_reply(const Message& message, const MessageEntry& ent
   if (pending.type == EntryType::disconnect_client) return fail(connection_error("closed by this side"));
   if (pending.type == EntryType::pipe_connect_req || pending.type == EntryType::pipe_disconnect_req)
     return handle_pipe_reply(message, entry, id, pending, now);
+  if (pending.memory) return handle_memory_reply(message, entry, id, std::move(pending), now);
   if (entry.error != ErrorCode::none) {
     if (pending.type == EntryType::wire_connect_req && pending.member)
       if (const auto wire = wires_.find(PathMemberView{pending.path, pending.member->name}); wire != wires_.end())
@@ -416,6 +417,10 @@ Result<Value> ClientSession::read_reply(const Message& message, const MessageEnt
       return read_return(message, entry, *pending.member, types_);
     case EntryType::generator_next_req:
       return read_generator_return(message, entry, pending.step, *pending.member, types_);
+    case EntryType::memory_get_param: {
+      auto shape = read_memory_shape(message, entry, *pending.member);
+      return shape ? Result<Value>(Value(std::move(*shape))) : Result<Value>(shape.error());
+    }
     case EntryType::wire_peek_in_value_req:
     case EntryType::wire_peek_out_value_req: {
       auto read = read_wire_value(message, entry, *pending.member, types_);
@@ -469,6 +474,7 @@ void ClientSession::handle_wire_closed(const MessageEntry& entry) {
 void ClientSession::handle_path_released(std::string_view path) {
   if (path == options_.service) return;  // the root cannot be released
   std::erase_if(objects_, [path](const auto& object) { return is_within(object.first, path); });
+  std::erase_if(memory_limits_, [path](const auto& memory) { return is_within(memory.first.path, path); });
   for (auto wire = wires_.begin(); wire != wires_.end();) {
     if (!is_within(wire->first.path, path)) {
       ++wire;

@@ -18,6 +18,7 @@
 
 #include "core/member/callback.hpp"
 #include "core/member/generator.hpp"
+#include "core/member/memory_transfer.hpp"
 #include "core/member/pipe.hpp"
 #include "core/member/wire.hpp"
 #include "core/session/connection.hpp"
@@ -35,6 +36,7 @@ struct ClientOptions {
   std::string object_type = {};  ///< the type to use the root object as; empty: the service's own
   std::chrono::milliseconds request_timeout{15'000};
   std::chrono::milliseconds connect_timeout{30'000};  ///< from construction to the event Connected
+  std::uint32_t max_memory_transfer = 1024 * 1024;    ///< bytes; larger reads and writes of memories are split
   std::size_t max_events = 65'536;        ///< not polled; more close the session: nothing is dropped silently
   std::size_t max_open_callbacks = 1024;  ///< not answered yet; above: out_of_system_resource
   std::size_t max_pipe_queued_bytes = 32u * 1024 * 1024;  ///< waiting for the stream; above, pipes take no packets
@@ -141,6 +143,16 @@ class ClientSession {
   /// Ends a generator early, in order or not; complete with null.
   RequestId close_generator(std::string_view path, std::string_view function, std::int32_t index, Now now);
   RequestId abort_generator(std::string_view path, std::string_view function, std::int32_t index, Now now);
+  /// Completes with a uint64 array: the dimensions of a memory, for a plain array its length.
+  RequestId get_memory_dimensions(std::string_view path, std::string_view member, Now now);
+  /// Completes with the items: Array, MultiDimArray, PodArray or NamedArray. Position and count have one number a
+  /// dimension; out_of_range where they are not within the memory. Split into requests below the transfer limit, each
+  /// with the time of a request: what others write meanwhile may be in some parts and not in others.
+  RequestId read_memory(std::string_view path, std::string_view member, std::span<const std::uint64_t> position,
+                        std::span<const std::uint64_t> count, Now now);
+  /// Writes all of `value`, split as read_memory(); completes with null. An error may leave a part written.
+  RequestId write_memory(std::string_view path, std::string_view member, std::span<const std::uint64_t> position,
+                         const Value& value, Now now);
   /// Looks up the object at `path` (see child_path()); completes with its qualified type as text. Its definition is
   /// fetched if it is not known yet. Members of an object can be used from then on.
   RequestId find_object(std::string_view path, Now now);
@@ -215,9 +227,10 @@ class ClientSession {
     const MemberDefinition* member = nullptr;
     std::string path;  ///< find_object, wires, pipes, session operations: calls, properties allocate nothing here
     TimePoint deadline;
-    std::int32_t pipe_index = 0;               ///< pipes only
-    bool is_abandoned = false;                 ///< pipes only: nobody waits any more, but the reply must be acted on
-    GeneratorStep step = GeneratorStep::next;  ///< generator steps only
+    std::int32_t pipe_index = 0;                  ///< pipes only
+    bool is_abandoned = false;                    ///< pipes only: nobody waits any more, but the reply must be acted on
+    GeneratorStep step = GeneratorStep::next;     ///< generator steps only
+    std::unique_ptr<MemoryTransfer> memory = {};  ///< memories only
   };
   struct OpenCallback {
     std::uint32_t request_id = 0;  ///< the service's
@@ -275,6 +288,15 @@ class ClientSession {
                              const std::function<Result<>(const MemberDefinition&)>& write);
   RequestId step_generator(GeneratorStep step, std::string_view path, std::string_view function, std::int32_t index,
                            const std::optional<Value>& parameter, Now now);
+  // memories (client_memory.cpp)
+  RequestId begin_memory(std::string_view path, std::string_view member, MemoryTransfer transfer, EntryType access,
+                         Now now);
+  void request_memory(RequestId id, const MemberDefinition& member, std::unique_ptr<MemoryTransfer> transfer, Now now);
+  void handle_memory_reply(const Message& message, const MessageEntry& entry, RequestId id, Pending pending, Now now);
+  Result<> take_memory_reply(const Message& message, const MessageEntry& entry, const MemberDefinition& member,
+                             MemoryTransfer& transfer);
+  void begin_memory_parts(const MemberDefinition& member, MemoryTransfer& transfer, std::uint32_t limit);
+
   RequestId fail_request(RequestId id, Error error);
   Result<> send_outgoing(Now now, bool is_urgent = false);
   Result<> send_wire_packet(const PathMember& key, WireConnection& wire, const Value& value, Now now);
@@ -343,7 +365,8 @@ class ClientSession {
 
   std::map<std::string, const EntityDefinition*, std::less<>> objects_;
   std::map<PathMember, WireConnection, PathMemberLess> wires_;
-  PipeStore pipe_store_;  ///< outlives pipes_
+  std::map<PathMember, std::uint32_t, PathMemberLess> memory_limits_;  ///< MaxTransferSize of memories that were used
+  PipeStore pipe_store_;                                               ///< outlives pipes_
   std::map<PathMember, ClientPipe, PathMemberLess> pipes_;
   std::vector<std::pair<std::int32_t, std::uint32_t>> pipe_acks_;  ///< index and number, to be sent; reused
   CallbackId last_callback_id_ = 0;

@@ -33,11 +33,6 @@ ConnectionOptions with_identity(ConnectionOptions options, const NodeIdentity& i
   return options;
 }
 
-Error not_available_yet(const MemberDefinition& member) {
-  return {ErrorCode::not_implemented_error,
-          std::string(member_kind_name(member.kind)) + " '" + member.name + "' is not available from this service yet"};
-}
-
 }  // namespace
 
 ServiceSession::ServiceSession(ServiceDirectory& directory, ServiceSessionOptions options, Now now)
@@ -155,6 +150,11 @@ void ServiceSession::reply(CallId id, const Result<Value>& result, Now now) {
       case EntryType::wire_peek_in_value_req:
       case EntryType::wire_peek_out_value_req:
         written = write_wire_value(outgoing_, *result, now.utc, *call.member, types);
+        break;
+      case EntryType::memory_get_param:
+      case EntryType::memory_read:
+      case EntryType::memory_write:
+        written = write_memory_reply(call, *result);
         break;
       default:
         break;  // property set, poke: the reply has no elements
@@ -357,6 +357,10 @@ Result<> ServiceSession::dispatch_member(const Message& message, const MessageEn
       return add_call(message, entry, CallKind::function, std::move(*found), *member);
     case EntryType::generator_next_req:
       return step_generator(message, entry, std::move(*found), *member, now);
+    case EntryType::memory_get_param:
+    case EntryType::memory_read:
+    case EntryType::memory_write:
+      return answer_memory(message, entry, std::move(*found), *member, now);
     case EntryType::wire_peek_in_value_req:
       return add_call(message, entry, CallKind::peek_in, std::move(*found), *member);
     case EntryType::wire_peek_out_value_req:
@@ -371,7 +375,7 @@ Result<> ServiceSession::dispatch_member(const Message& message, const MessageEn
     case EntryType::pipe_disconnect_req:
       return disconnect_pipe(message, entry, *member, now);
     default:
-      return not_available_yet(*member);
+      return protocol_error("Unknown request type");
   }
 }
 

@@ -15,6 +15,7 @@
 
 #include "core/member/callback.hpp"
 #include "core/member/generator.hpp"
+#include "core/member/memory.hpp"
 #include "core/member/pipe.hpp"
 #include "core/member/wire.hpp"
 #include "core/session/authenticator.hpp"
@@ -31,9 +32,10 @@ struct ServiceSessionOptions {
   std::chrono::milliseconds endpoint_timeout{600'000};  ///< without a session message
   /// The client's NodeID, where the transport vouches for it (a certificate; the local machine).
   std::optional<NodeId> verified_node_id = {};
-  std::size_t max_open_calls = 1024;  ///< not answered yet; above: out_of_system_resource
-  std::size_t max_generators = 256;   ///< run by one client; above: out_of_system_resource
-  std::size_t max_wires = 4096;       ///< connected by one client; above: out_of_system_resource
+  std::size_t max_open_calls = 1024;               ///< not answered yet; above: out_of_system_resource
+  std::size_t max_generators = 256;                ///< run by one client; above: out_of_system_resource
+  std::uint32_t max_memory_transfer = 100 * 1024;  ///< bytes: how clients are told to split; not enforced
+  std::size_t max_wires = 4096;                    ///< connected by one client; above: out_of_system_resource
   std::chrono::milliseconds callback_timeout{15'000};
   std::size_t max_open_callbacks = 1024;                  ///< not answered yet; above: out_of_system_resource
   std::size_t max_pipe_endpoints = 4096;                  ///< of one client; above: out_of_system_resource
@@ -49,10 +51,13 @@ enum class CallKind : std::uint8_t {
   peek_in,
   peek_out,
   poke_out,
-  generator_open,   ///< a call of a generator function; any value answers it
-  generator_next,   ///< answered with the next value, or with the error stop_iteration after the last one
-  generator_close,  ///< the client has enough: any value answers it
-  generator_abort,  ///< the client wants it to stop at once: any value answers it
+  generator_open,     ///< a call of a generator function; any value answers it
+  generator_next,     ///< answered with the next value, or with the error stop_iteration after the last one
+  generator_close,    ///< the client has enough: any value answers it
+  generator_abort,    ///< the client wants it to stop at once: any value answers it
+  memory_dimensions,  ///< answered with a uint64 array, one number a dimension
+  memory_read,        ///< answered with exactly that many items; the application checks the range against the memory
+  memory_write,       ///< as memory_read; any value answers it
 };
 
 /// A request for the application, to be answered exactly once with reply().
@@ -65,6 +70,7 @@ struct Called {
                                  ///< generator_next: the parameter, where the generator takes one
   TimeSpec time = {};            ///< poke_out
   GeneratorId generator = 0;     ///< generator_...
+  MemoryRange range = {};        ///< memory_read, memory_write; for the latter `arguments` holds the items
 };
 struct ClientConnected {
   HostedService* service = nullptr;
@@ -218,6 +224,8 @@ class ServiceSession {
     const MemberDefinition* member = nullptr;
     GeneratorId generator = 0;
     GeneratorStep step = GeneratorStep::next;
+    std::unique_ptr<const MemoryRange> range = {};  ///< reads and writes of memories
+    bool wants_dim_count = false;                   ///< memories: of the dimensions, only how many
   };
 
   /// A MonitorEnter or MonitorContinueEnter that is not answered yet.
@@ -331,6 +339,12 @@ class ServiceSession {
   Result<> write_generator_reply(const OpenCall& call, const Value& value, Now now);
   void finish_generator_call(const OpenCall& call, bool has_failed, Now now);
   void end_generators(const std::vector<GeneratorId>& ended);
+
+  // memories (service_memory.cpp)
+  Result<> answer_memory(const Message& message, const MessageEntry& entry, HostedService::Found found,
+                         const MemberDefinition& member, Now now);
+  Result<> check_memory_size(const MemoryRange& range, const MemberDefinition& member) const;
+  Result<> write_memory_reply(const OpenCall& call, const Value& value);
 
   void begin_reply(const MessageEntry& request);
   void send_error(const MessageEntry& request, const Error& error, Now now);

@@ -109,6 +109,12 @@ class Array {
     if (data_type_of<T>() != type_) return {};
     return {reinterpret_cast<const T*>(bytes_.data()), bytes_.size() / sizeof(T)};
   }
+  /// Items [first, first + count), which must be there; shares the payload.
+  Array slice(std::size_t first, std::size_t count) const {
+    Array part = *this;
+    part.bytes_ = bytes_.subspan(first * item_size(type_), count * item_size(type_));
+    return part;
+  }
   const std::shared_ptr<const void>& owner() const { return owner_; }
   bool operator==(const Array& other) const;  ///< same type, same bytes
 

@@ -16,9 +16,15 @@ rr::Value to_value(Image image) {
       {{"width", image.width}, {"height", image.height}, {"step", image.step}, {"data", std::move(image.data)}}};
 }
 
-[[noreturn]] void refuse(const char* what) {
-  throw rr::ServiceException(std::string(what) + " is not available yet; use CaptureFrame",
-                             rr::ErrorCode::not_implemented_error);
+/// The frame as the multi-dimensional memory has it: height x width x 3, red, green, blue; column-major.
+std::vector<std::uint8_t> to_planes(const Image& image) {
+  std::vector<std::uint8_t> planes;
+  planes.reserve(image.data.size());
+  for (int channel = 2; channel >= 0; --channel)
+    for (int column = 0; column < image.width; ++column)
+      for (int row = 0; row < image.height; ++row)
+        planes.push_back(image.data[static_cast<std::size_t>(row * image.step + column * 3 + channel)]);
+  return planes;
 }
 
 }  // namespace
@@ -69,7 +75,20 @@ std::shared_ptr<rr::Object> WebcamsDevice::make_object(Webcam& webcam) {
   object->function("CaptureFrame", [this, camera = webcam.camera] { return capture(camera); });
   object->function("StartStreaming", [&webcam] { webcam.is_streaming = true; });
   object->function("StopStreaming", [&webcam] { webcam.is_streaming = false; });
-  object->function("CaptureFrameToBuffer", []() -> rr::Value { refuse("buffer"); });
+  auto buffer = std::make_shared<rr::NumberMemory<std::uint8_t>>();
+  auto planes = std::make_shared<rr::NumberMemory<std::uint8_t>>();
+  planes->dimensions = {0, 0, 3};
+  object->memory("buffer", buffer);
+  object->memory("multidimbuffer", planes);
+  object->function("CaptureFrameToBuffer", [this, camera = webcam.camera, buffer, planes] {
+    Image image = render(world_, robot_pose_(), camera);
+    planes->items = to_planes(image);
+    planes->dimensions = {static_cast<std::uint64_t>(image.height), static_cast<std::uint64_t>(image.width), 3};
+    buffer->dimensions = {image.data.size()};
+    buffer->items = std::move(image.data);
+    return rr::Value(rr::Structure{"experimental.createwebcam2.WebcamImage_size",
+                                   {{"width", image.width}, {"height", image.height}, {"step", image.step}}});
+  });
   return object;
 }
 

@@ -19,6 +19,7 @@
 #include "server/node/exception.hpp"
 #include "server/node/handler.hpp"
 #include "server/node/remote_generator.hpp"
+#include "server/node/remote_memory.hpp"
 
 namespace rr {
 
@@ -122,6 +123,7 @@ class RemoteObject {
     return generator_values(function, values);
   }
   RemoteGenerator generator_values(std::string_view function, std::span<const Value> arguments) const;
+  RemoteMemory memory(std::string_view name) const { return {connection_, path_, std::string(name)}; }
   Value get(std::string_view property) const;
   void set(std::string_view property, const Value& value) const;
   RemoteObject object(std::string_view objref) const;

@@ -70,6 +70,20 @@ void ClientConnection::abort_generator(std::string_view path, std::string_view f
   expect(session_.abort_generator(path, function, index, read_clocks()), std::move(done));
 }
 
+void ClientConnection::get_memory_dimensions(std::string_view path, std::string_view memory, Completion done) {
+  expect(session_.get_memory_dimensions(path, memory, read_clocks()), std::move(done));
+}
+
+void ClientConnection::read_memory(std::string_view path, std::string_view memory, const MemoryRange& range,
+                                   Completion done) {
+  expect(session_.read_memory(path, memory, range.position, range.count, read_clocks()), std::move(done));
+}
+
+void ClientConnection::write_memory(std::string_view path, std::string_view memory,
+                                    std::span<const std::uint64_t> position, const Value& value, Completion done) {
+  expect(session_.write_memory(path, memory, position, value, read_clocks()), std::move(done));
+}
+
 void ClientConnection::get(std::string_view path, std::string_view property, Completion done) {
   expect(session_.get_property(path, property, read_clocks()), std::move(done));
 }

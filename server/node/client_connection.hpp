@@ -48,6 +48,10 @@ class ClientConnection final : public SessionDriver<ClientSession> {
                       const std::optional<Value>& parameter, Completion done);
   void close_generator(std::string_view path, std::string_view function, std::int32_t index, Completion done);
   void abort_generator(std::string_view path, std::string_view function, std::int32_t index, Completion done);
+  void get_memory_dimensions(std::string_view path, std::string_view memory, Completion done);
+  void read_memory(std::string_view path, std::string_view memory, const MemoryRange& range, Completion done);
+  void write_memory(std::string_view path, std::string_view memory, std::span<const std::uint64_t> position,
+                    const Value& value, Completion done);
   void get(std::string_view path, std::string_view property, Completion done);
   void set(std::string_view path, std::string_view property, const Value& value, Completion done);
   void find_object(std::string_view path, Completion done);

@@ -267,6 +267,10 @@ Result<Value> Object::answer(const Called& called) {
       wire.out_value = called.arguments.front();
       return wire.wire_received.call ? wire.wire_received.call(called.arguments) : Value{};
     }
+    case CallKind::memory_dimensions:
+    case CallKind::memory_read:
+    case CallKind::memory_write:
+      return answer_memory(called);
     case CallKind::generator_open:
     case CallKind::generator_next:
     case CallKind::generator_close:

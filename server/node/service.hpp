@@ -34,6 +34,7 @@
 #include "server/node/exception.hpp"
 #include "server/node/generator.hpp"
 #include "server/node/handler.hpp"
+#include "server/node/memory.hpp"
 #include "server/node/pipe_endpoint.hpp"
 
 namespace rr {
@@ -134,6 +135,13 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   void generator(std::string_view name, F&& handler) {
     set_generator(name, make_generator_handler(std::forward<F>(handler)));
   }
+  /// memory.hpp says what handlers and containers do.
+  void memory(std::string_view name, MemoryHandlers handlers);
+  template <Number T>
+  void memory(std::string_view name, std::shared_ptr<NumberMemory<T>> memory) {
+    this->memory(name, detail::make_memory_handlers(std::move(memory), memory_form(name, data_type_of<T>())));
+  }
+  void memory(std::string_view name, std::shared_ptr<PodMemory> memory);
   Property property(std::string_view name) { return {this, std::string(name)}; }
   Pipe pipe(std::string_view name) { return {this, std::string(name)}; }
 
@@ -187,6 +195,7 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   struct Member {
     Handler call;                ///< functions
     GeneratorHandler generator;  ///< generator functions
+    MemoryHandlers memory;
     Handler get;
     Handler set;
     Handler wire_received;
@@ -209,6 +218,7 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   const std::vector<PipeEndpoint>& endpoints(std::string_view pipe);
   void set_generator(std::string_view name, GeneratorHandler handler);
   void check_arguments(const MemberDefinition& member, const char* verb, std::span<const Value> arguments) const;
+  detail::MemoryForm memory_form(std::string_view name, DataType items) const;
   std::vector<std::string> paths() const;
   void release_path(const std::string& path);
   /// Texts like "function Drive", for functions, property accessors and objrefs without handler.
@@ -217,6 +227,7 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   // Requests of clients; handlers run in here and may throw.
   Result<Value> answer(const Called& called);
   Result<Generator> open_generator(const Called& called);
+  Result<Value> answer_memory(const Called& called);
   void receive_wire(const WireReceived& received);
   void connect_pipe(const MemberDefinition& pipe, const PipeEndpoint& endpoint);
   Result<> receive_packet(const MemberDefinition& pipe, const PipeEndpoint& endpoint, const Value& packet);
@@ -292,6 +303,10 @@ class Service {
   template <class F>
   void generator(std::string_view member, F&& handler) {
     root_->generator(member, std::forward<F>(handler));
+  }
+  template <class Memory>
+  void memory(std::string_view member, Memory&& memory) {
+    root_->memory(member, std::forward<Memory>(memory));
   }
   Object::Property property(std::string_view member) { return root_->property(member); }
   Object::Pipe pipe(std::string_view member) { return root_->pipe(member); }

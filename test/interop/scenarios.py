@@ -55,7 +55,25 @@ SAMPLE = {"Sample": {"id": {"int32": -7}, "reading": {"double[]": [1.0, 2.0, 3.0
 OTHER_SAMPLE = {"Sample": {"id": {"int32": 2147483647}, "reading": {"double[]": [-1.0, 0.0, 1.0]}, "tag": {"uint8[]": []},
                            "position": {"Vector3": [4.0, 5.0, 6.0]}}}
 TRANSFORM = {"Transform": [1.0, 0.0, 0.0, 0.0, 10.0, 20.0, 30.0]}
+ZERO_SAMPLE = {"id": 0, "reading": [0.0, 0.0, 0.0], "tag": [], "position": [0.0, 0.0, 0.0]}
 STOP = "RobotRaconteur.StopIteration"
+OUTSIDE = "RobotRaconteur.OutOfRange"
+
+
+def read(member, of, position, size, expect, **more):
+    return {"read_memory": member, "of": of, "position": position, "size": size, "expect": expect, **more}
+
+
+def digest(*arguments):
+    return read(*arguments, digest=True)
+
+
+def read_fails(member, of, position, size, error):
+    return {"read_memory": member, "of": of, "position": position, "size": size, "expect_error": error}
+
+
+def write(member, position, value):
+    return {"write_memory": member, "position": position, "value": value, "expect": None}
 
 
 def poses(*px):
@@ -332,6 +350,58 @@ SCENARIOS = [
         {"next": "f", "expect": 1.0},
         {"next": "f", "expect_error": "RobotRaconteur.OutOfRange", "message": "no more"},
         {"next": "f", "expect_error": "RobotRaconteur.InvalidOperation"}], clients=NATIVE),
+    Scenario("memories", [
+        {"dimensions": "m_numbers", "expect": [100]},
+        read("m_numbers", "double", [0], [4], [0.0, 1.0, 2.0, 3.0]),
+        write("m_numbers", [97], {"double[]": [-1.0, -2.0, -3.0]}),
+        read("m_numbers", "double", [96], [4], [96.0, -1.0, -2.0, -3.0]),
+        {"dimensions": "m_vectors", "expect": [5]},
+        read("m_vectors", "Vector3", [1], [2], [3.0, 4.0, 5.0, 6.0, 7.0, 8.0]),
+        write("m_vectors", [4], {"Vector3[]": [0.5, 0.25, 0.125]}),
+        read("m_vectors", "Vector3", [3], [2], [9.0, 10.0, 11.0, 0.5, 0.25, 0.125]),
+        {"dimensions": "m_samples", "expect": [4]},
+        read("m_samples", "Sample", [0], [1], [ZERO_SAMPLE]),
+        write("m_samples", [1], {"Sample[]": [SAMPLE["Sample"], OTHER_SAMPLE["Sample"]]}),
+        read("m_samples", "Sample", [0], [4], [ZERO_SAMPLE, plain_of(SAMPLE)[0], plain_of(OTHER_SAMPLE)[0], ZERO_SAMPLE]),
+        read("m_fixed", "uint8", [7], [3], [7, 8, 9])], clients=NATIVE),
+    Scenario("memories_of_dimensions", [
+        {"dimensions": "m_grid", "expect": [4, 3, 2]},
+        read("m_grid", "int16", [0, 0, 0], [4, 3, 2], {"dims": [4, 3, 2], "data": list(range(24))}),
+        read("m_grid", "int16", [1, 0, 1], [2, 3, 1], {"dims": [2, 3, 1], "data": [13, 14, 17, 18, 21, 22]}),
+        read("m_grid", "int16", [3, 2, 0], [1, 1, 2], {"dims": [1, 1, 2], "data": [11, 23]}),
+        write("m_grid", [2, 1, 0], {"int16[*]": {"dims": [2, 2, 1], "data": [-1, -2, -3, -4]}}),
+        read("m_grid", "int16", [0, 0, 0], [4, 3, 1],
+             {"dims": [4, 3, 1], "data": [0, 1, 2, 3, 4, 5, -1, -2, 8, 9, -3, -4]}),
+        read("m_vector_grid", "Vector3", [1, 1], [1, 2], {"dims": [1, 2], "data": [9.0, 10.0, 11.0, 15.0, 16.0, 17.0]}),
+        write("m_vector_grid", [0, 2], {"Vector3[*]": {"dims": [2, 1], "data": [1.5] * 6}}),
+        read("m_vector_grid", "Vector3", [0, 1], [1, 2], {"dims": [1, 2], "data": [6.0, 7.0, 8.0, 1.5, 1.5, 1.5]}),
+        write("m_sample_grid", [0, 1], {"Sample[*]": {"dims": [2, 1], "data": [SAMPLE["Sample"], OTHER_SAMPLE["Sample"]]}}),
+        read("m_sample_grid", "Sample", [1, 0], [1, 2], {"dims": [1, 2], "data": [ZERO_SAMPLE, plain_of(OTHER_SAMPLE)[0]]})],
+        clients=NATIVE),
+    # More than one request may carry, each way, from the beginning and from the middle of a dimension.
+    Scenario("large_memories", [
+        digest("m_large", "double", [0], [50000], {"count": 50000, "first": 0.0, "last": 49999.0, "sum": 1249975000.0}),
+        write("m_large", [1000], {"ramp": 40000}),
+        digest("m_large", "double", [999], [40002], {"count": 40002, "first": 999.0, "last": 41000.0, "sum": 800021999.0}),
+        digest("m_volume", "single", [0, 0, 0], [60, 50, 40],
+               {"count": 120000, "first": 0.0, "last": 119999.0, "sum": 7199940000.0}),
+        digest("m_volume", "single", [10, 0, 1], [50, 50, 39],
+               {"count": 97500, "first": 3010.0, "last": 119999.0, "sum": 5996688750.0}),
+        write("m_volume", [0, 5, 3], {"single[*]": {"dims": [60, 40, 30], "data": [0.5] * 72000}}),
+        digest("m_volume", "single", [0, 5, 3], [60, 40, 30], {"count": 72000, "first": 0.5, "last": 0.5, "sum": 36000.0}),
+        read("m_volume", "single", [59, 4, 3], [1, 2, 1], {"dims": [1, 2, 1], "data": [9299.0, 0.5]}),
+        read("m_volume", "single", [0, 44, 32], [1, 2, 2], {"dims": [1, 2, 2], "data": [0.5, 98700.0, 101640.0, 101700.0]})],
+        clients=NATIVE),
+    # The reference checks no ranges, neither as a client nor in a Python service.
+    Scenario("memory_bounds", [
+        read_fails("m_numbers", "double", [97], [4], OUTSIDE),
+        read_fails("m_numbers", "double", [18446744073709551615], [2], OUTSIDE),
+        read("m_numbers", "double", [100], [0], []),
+        read_fails("m_grid", "int16", [0, 2, 0], [4, 2, 1], OUTSIDE),
+        read_fails("m_grid", "int16", [0, 0], [1, 1], "RobotRaconteur.InvalidArgument"),
+        {"write_memory": "m_numbers", "position": [99], "value": {"double[]": [1.0, 2.0]}, "expect_error": OUTSIDE},
+        {"write_memory": "m_fixed", "position": [0], "value": {"uint8[]": [1]},
+         "expect_error": "RobotRaconteur.ReadOnlyMember"}], clients=("ours",)),
 ]
 
 

@@ -27,6 +27,7 @@ end
 
 object Tool
   property string name
+  memory double[] notes
 end
 
 object Arm
@@ -52,10 +53,13 @@ object Arm
   wire double torque
   wire Pose state [readonly]
   pipe double samples
+  memory double[] data
+  memory int16[*] grid
+  memory uint8[] log [readonly]
+  memory uint8[] command [writeonly]
   pipe Pose poses [readonly]
   pipe double orders [writeonly]
   pipe double quick [unreliable]
-  memory double[] calibration
   callback double ask(string question)
   callback void notice(int32 number)
 end

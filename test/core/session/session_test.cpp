@@ -288,25 +288,6 @@ TEST_CASE("one client connects a bounded number of wires") {
   CHECK(pair.completion(pair.client->connect_wire("arm", "torque", pair.now)).has_value());
 }
 
-TEST_CASE("members that are not there yet answer NotImplemented") {
-  Loopback pair;
-  pair.connect();
-  Message message;
-  // What a client of the reference sends for a memory.
-  auto& connection = const_cast<Connection&>(pair.client->connection());
-  connection.begin_message(message);
-  message.begin_entry(EntryType::memory_get_param, "arm", "calibration", 77);
-  REQUIRE(connection.send(message, pair.now));
-  pair.carry(*pair.client, *pair.service, 1000);
-  Bytes bytes;
-  for (const auto slice : pair.service->poll_transmit()) bytes.insert(bytes.end(), slice.begin(), slice.end());
-  Message reply;
-  REQUIRE(decode(bytes, {.string_table = {true, true}}, reply));
-  CHECK(reply.entries.front().type == EntryType::memory_get_param_ret);
-  CHECK(reply.entries.front().error == ErrorCode::not_implemented_error);
-  CHECK(reply.entries.front().request_id == 77);
-}
-
 TEST_CASE("an endpoint is bound to its connection") {
   Loopback pair;
   pair.connect();

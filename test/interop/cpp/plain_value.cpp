@@ -135,7 +135,8 @@ json to_plain(const rr::Value& value) {
 }
 
 json to_digest(const rr::Value& value) {
-  const json items = to_plain(value);
+  const json plain = to_plain(value);
+  const json& items = plain.is_object() ? plain.at("data") : plain;
   double sum = 0;
   for (const auto& item : items) sum += item.get<double>();
   return {{"count", items.size()}, {"first", items.front()}, {"last", items.back()}, {"sum", sum}};

@@ -58,7 +58,10 @@ class Client {
                                                    {"close_generator", &Client::close_generator},
                                                    {"abort_generator", &Client::abort_generator},
                                                    {"answer", &Client::answer},
-                                                   {"asked", &Client::asked}};
+                                                   {"asked", &Client::asked},
+                                                   {"dimensions", &Client::dimensions},
+                                                   {"read_memory", &Client::read_memory},
+                                                   {"write_memory", &Client::write_memory}};
     return table;
   }
 
@@ -128,6 +131,23 @@ class Client {
 
   json abort_generator(const rr::RemoteObject&, const std::string& name, const json&) {
     generators_.at(name).abort();
+    return nullptr;
+  }
+
+  // memories
+
+  json dimensions(const rr::RemoteObject& target, const std::string& member, const json&) {
+    return target.memory(member).dimensions();
+  }
+
+  json read_memory(const rr::RemoteObject& target, const std::string& member, const json& step) {
+    const rr::Value items =
+        target.memory(member).read(step.at("position").get<rr::MemoryShape>(), step.at("size").get<rr::MemoryShape>());
+    return step.value("digest", false) ? to_digest(items) : to_plain(items);
+  }
+
+  json write_memory(const rr::RemoteObject& target, const std::string& member, const json& step) {
+    target.memory(member).write(step.at("position").get<rr::MemoryShape>(), from_scenario(step.at("value")));
     return nullptr;
   }
 

@@ -3,6 +3,7 @@
 
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/posix/stream_descriptor.hpp>
+#include <functional>
 #include <iostream>
 #include <map>
 #include <numeric>
@@ -26,6 +27,7 @@ class Interop {
     add_pipes();
     add_generators();
     add_callbacks();
+    add_memories();
     node.add(service_);
   }
 
@@ -214,6 +216,41 @@ class Interop {
         collected_.insert(collected_.end(), values.begin(), values.end());
       };
     });
+  }
+
+  /// Numbers 0, 1, 2 ...; `each` in one item.
+  template <class T>
+  void add_numbers(const char* name, rr::MemoryShape dimensions, std::uint64_t each = 1) {
+    auto memory = std::make_shared<rr::NumberMemory<T>>();
+    memory->items.resize(std::accumulate(dimensions.begin(), dimensions.end(), each, std::multiplies<>()));
+    std::iota(memory->items.begin(), memory->items.end(), T{});
+    memory->dimensions = std::move(dimensions);
+    service_->memory(name, std::move(memory));
+  }
+
+  void add_samples(const char* name, rr::MemoryShape dimensions) {
+    const rr::NamedArray origin{type_prefix + "Vector3", rr::Array::take(std::vector<double>(3)), {}, true};
+    const rr::Structure zero{{},
+                             {{"id", rr::Value(std::int32_t{0})},
+                              {"reading", rr::Value(std::vector<double>(3))},
+                              {"tag", rr::Value(std::vector<std::uint8_t>())},
+                              {"position", rr::Value(origin)}}};
+    auto memory = std::make_shared<rr::PodMemory>();
+    memory->items.assign(4, zero);
+    memory->dimensions = std::move(dimensions);
+    service_->memory(name, std::move(memory));
+  }
+
+  void add_memories() {
+    add_numbers<double>("m_numbers", {100});
+    add_numbers<std::int16_t>("m_grid", {4, 3, 2});
+    add_numbers<double>("m_vectors", {5}, 3);
+    add_numbers<double>("m_vector_grid", {2, 3}, 3);
+    add_numbers<std::uint8_t>("m_fixed", {10});
+    add_numbers<double>("m_large", {50'000});
+    add_numbers<float>("m_volume", {60, 50, 40});
+    add_samples("m_samples", {4});
+    add_samples("m_sample_grid", {2, 2});
   }
 
   std::shared_ptr<rr::Service> service_;

@@ -7,13 +7,14 @@ import sys
 import threading
 import time
 
+import numpy
 import RobotRaconteur as RR
 
 import quiet_node
 from values import Values, plain
 
 NO_VERBS = ("by", "on", "value", "args", "count", "until", "digest", "service", "username", "password", "timeout",
-            "as", "index", "values", "fail")
+            "as", "index", "values", "fail", "of", "position", "size")
 PATIENCE = 10.0  # seconds for anything that has to come by itself
 
 
@@ -47,7 +48,7 @@ class Client:
     def do_call(self, target, member, step):
         result = getattr(target, member)(*(self._values.build(value) for value in step.get("args", [])))
         if step.get("digest"):
-            return {"count": len(result), "first": plain(result[0]), "last": plain(result[-1]), "sum": plain(result.sum())}
+            return digest(result)
         return plain(result)
 
     def do_get_until(self, target, member, step):
@@ -83,6 +84,28 @@ class Client:
 
     def do_exit(self, target, what, step):
         RR.RobotRaconteurNode.s.MonitorExit(target)
+
+    # memories
+
+    def do_dimensions(self, target, member, step):
+        memory = getattr(target, member)
+        return list(memory.Dimensions) if hasattr(memory, "Dimensions") else [memory.Length]
+
+    def do_read_memory(self, target, member, step):
+        memory, position, size = getattr(target, member), step["position"], step["size"]
+        data = numpy.zeros(size, self._values.item_type(step["of"]), order="F")
+        if hasattr(memory, "Dimensions"):
+            memory.Read(position, data, [0] * len(size), size)
+        else:
+            memory.Read(position[0], data, 0, size[0])
+        return digest(data.flatten(order="F")) if step.get("digest") else plain(data)
+
+    def do_write_memory(self, target, member, step):
+        memory, position, data = getattr(target, member), step["position"], self._values.build(step["value"])
+        if hasattr(memory, "Dimensions"):
+            memory.Write(position, data, [0] * data.ndim, list(data.shape))
+        else:
+            memory.Write(position[0], data, 0, len(data))
 
     # generators
 
@@ -229,6 +252,10 @@ class Pipe:
         while self.endpoint.Available:
             self._packets.append(plain(self.endpoint.ReceivePacket()))
         return self._packets
+
+
+def digest(items):
+    return {"count": len(items), "first": plain(items[0]), "last": plain(items[-1]), "sum": float(items.sum(dtype="float64"))}
 
 
 def error_of(exception):

@@ -87,6 +87,7 @@ class Interop:
         self.generator_end = ""
         self.answered = 0.0
         self.answer_error = ""
+        self._add_memories()
         self.changed = RR.EventHook()
         self.cleared = RR.EventHook()
         self._head = Part("head")
@@ -225,6 +226,25 @@ class Interop:
         if kind == "custom":
             raise RR.RobotRaconteurNode.s.GetExceptionType(TYPE + ".InteropError")(text)
         raise ERRORS[kind](text)
+
+    # memories
+
+    def _add_memories(self):
+        node = RR.RobotRaconteurNode.s
+        vector, sample = node.GetNamedArrayDType(TYPE + ".Vector3"), node.GetPodDType(TYPE + ".Sample")
+
+        def vectors(count):
+            return node.ArrayToNamedArray(numpy.arange(3.0 * count).reshape((-1, 3)), vector)
+
+        self.m_numbers = RR.ArrayMemory(numpy.arange(100.0))
+        self.m_grid = RR.MultiDimArrayMemory(numpy.arange(24, dtype=numpy.int16).reshape((4, 3, 2), order="F"))
+        self.m_vectors = RR.ArrayMemory(vectors(5))
+        self.m_vector_grid = RR.MultiDimArrayMemory(vectors(6).reshape((2, 3), order="F"))
+        self.m_samples = RR.ArrayMemory(numpy.zeros((4,), sample))
+        self.m_sample_grid = RR.MultiDimArrayMemory(numpy.zeros((2, 2), sample))
+        self.m_fixed = RR.ArrayMemory(numpy.arange(10, dtype=numpy.uint8))
+        self.m_large = RR.ArrayMemory(numpy.arange(50000.0))
+        self.m_volume = RR.MultiDimArrayMemory(numpy.arange(120000, dtype=numpy.float32).reshape((60, 50, 40), order="F"))
 
     # generators
 

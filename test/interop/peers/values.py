@@ -52,6 +52,14 @@ class Values:
             return items if rest else items.item()
         raise ValueError(f"scenario value has unknown type {tag!r}")
 
+    def item_type(self, word):
+        """The dtype of arrays of a number, pod or named array."""
+        if word in PODS:
+            return RR.RobotRaconteurNode.s.GetPodDType(f"{TYPE}.{word}", self._client)
+        if word in NAMED_ARRAYS:
+            return RR.RobotRaconteurNode.s.GetNamedArrayDType(f"{TYPE}.{word}", self._client)
+        return NUMBERS[word]
+
     def _shaped(self, rest, body, make):
         if not rest:
             return make([body])

@@ -39,7 +39,42 @@ TEST_CASE("two cameras look out from the pose that they are given") {
   CHECK_FALSE(left.call("CaptureFrame") == frame);
 
   CHECK(rr::error_of([&] { host.object("Webcams", "2"); }).code == rr::ErrorCode::service_error);
-  CHECK(rr::error_of([&] { left.call("CaptureFrameToBuffer"); }).code == rr::ErrorCode::not_implemented_error);
+}
+
+TEST_CASE("a frame is taken into the camera's memories, which hold it until the next") {
+  std::unique_ptr<WebcamsDevice> webcams;
+  Pose pose{{300, -200}, 0.4};
+  rr::RunningNode node([&](rr::Node& made) { webcams = std::make_unique<WebcamsDevice>(made, [&] { return pose; }); });
+  const auto host = rr::connect(node.url("Webcam"));
+  const auto left = host.object("Webcams", "0");
+  const auto buffer = left.memory("buffer");
+  const auto planes = left.memory("multidimbuffer");
+  CHECK(buffer.dimensions() == rr::MemoryShape{0});
+  CHECK(planes.dimensions() == rr::MemoryShape{0, 0, 3});
+  CHECK(buffer.read().get_if<rr::Array>()->size() == 0);
+
+  const auto frame = left.call("CaptureFrame");
+  const auto size = left.call("CaptureFrameToBuffer");
+  for (const char* field : {"width", "height", "step"}) CHECK(field_of(size, field) == field_of(frame, field));
+  REQUIRE(buffer.dimensions() == rr::MemoryShape{960 * 240});
+  REQUIRE(planes.dimensions() == rr::MemoryShape{240, 320, 3});
+  CHECK(buffer.read() == field_of(frame, "data"));
+
+  // Red, green and blue of the pixel in row 200, column 17; the frame has it the other way round.
+  const auto pixel = planes.read({200, 17, 0}, {1, 1, 3});
+  const auto bytes = field_of(frame, "data").get_if<rr::Array>()->bytes().subspan(200 * 960 + 17 * 3, 3);
+  CHECK(pixel == rr::Value(rr::MultiDimArray{
+                     {1, 1, 3}, rr::Array::take(std::vector<std::uint8_t>{bytes[2], bytes[1], bytes[0]})}));
+  CHECK(planes.read().get_if<rr::MultiDimArray>()->array.size() == 240u * 320 * 3);
+
+  const auto before = buffer.read();
+  node.ask([&](rr::Node&) { return pose.heading = 1.0; });
+  CHECK(buffer.read() == before);
+  left.call("CaptureFrameToBuffer");
+  CHECK_FALSE(buffer.read() == before);
+  CHECK(host.object("Webcams", "1").memory("buffer").dimensions() == rr::MemoryShape{0});
+  CHECK(rr::error_of([&] { buffer.write({0}, rr::Value(std::vector<std::uint8_t>{1})); }).code ==
+        rr::ErrorCode::read_only_member);
 }
 
 TEST_CASE("frames flow to every endpoint of a camera's pipe while it streams") {
