@@ -4,6 +4,7 @@
 #include <functional>
 #include <set>
 
+#include "core/types/multidim.hpp"
 #include "server/definitions/constant_literal.hpp"
 #include "server/definitions/cpp_types.hpp"
 #include "server/definitions/source_writer.hpp"
@@ -320,6 +321,8 @@ void CppEmitter::emit_client_member(const std::string& client, const MemberDefin
       return emit_handle("rr::TypedProperty<" + types_.value(member.type) + direction(member) + ">");
     case MemberKind::wire:
       return emit_handle("rr::TypedWire<" + types_.value(member.type) + direction(member) + ">");
+    case MemberKind::memory:
+      return emit_handle("rr::TypedMemory<" + types_.value(member.type) + direction(member) + ">");
     case MemberKind::event:
     case MemberKind::callback: {
       std::vector<std::string> arguments;
@@ -347,8 +350,6 @@ void CppEmitter::emit_client_member(const std::string& client, const MemberDefin
       return emit_function(type, parameters(member),
                            "rr_call<" + type + ">(\"" + member.name + "\"" + arguments(member) + ")");
     }
-    case MemberKind::memory:
-      return header_.line("// memory " + member.name + ": by rr_object");
     case MemberKind::field:
       break;
   }
@@ -448,8 +449,12 @@ void CppEmitter::emit_service_member(const EntityDefinition& item, const MemberD
               ">)> rr_done",
           "rr_ask<" + type + ">(rr_client, \"" + member.name + "\", std::move(rr_done)" + arguments(member) + ");");
     }
-    case MemberKind::memory:
-      return header_.line("// memory " + member.name + ": by rr_object()");
+    case MemberKind::memory: {
+      auto item = member.type;
+      item.array = ArrayKind::none;
+      return emit_virtual("std::shared_ptr<rr::MemoryBuffer<" + types_.value(item) + ">> get_" + member.name + "()",
+                          " = 0;");
+    }
     case MemberKind::field:
       break;
   }
@@ -470,6 +475,8 @@ void CppEmitter::emit_binding(const EntityDefinition& item) {
     if (member.kind == MemberKind::property && is_written) bind("rr_setter", "set_" + member.name);
     if (member.kind == MemberKind::wire && is_written) bind("rr_wire_setter", "set_" + member.name);
     if (member.kind == MemberKind::pipe && is_written) bind("rr_pipe_setter", "set_" + member.name);
+    if (member.kind == MemberKind::memory)
+      bind(is_multidim(member.type) ? "rr_multidim_memory" : "rr_memory", "get_" + member.name);
     if (member.kind == MemberKind::objref) bind("rr_objref", "get_" + member.name);
   }
   source_.close();

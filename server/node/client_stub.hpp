@@ -230,6 +230,30 @@ class TypedCallback : public MemberHandle {
   }
 };
 
+/// Positions and counts have one number a dimension. A: std::vector or MultiDim of the items.
+template <class A, MemberDirection direction = MemberDirection::both>
+class TypedMemory : public MemberHandle {
+ public:
+  using MemberHandle::MemberHandle;
+  MemoryShape dimensions() const {
+    return ask([](const RemoteObject& object, const char* name) { return object.memory(name).dimensions(); });
+  }
+  A read(const MemoryShape& position, const MemoryShape& count) const
+      requires(direction != MemberDirection::writeonly) {
+    return unpack_value<A>(
+        ask([&](const RemoteObject& object, const char* name) { return object.memory(name).read(position, count); }));
+  }
+  /// All of it.
+  A read() const requires(direction != MemberDirection::writeonly) {
+    return unpack_value<A>(
+        ask([](const RemoteObject& object, const char* name) { return object.memory(name).read(); }));
+  }
+  void write(const MemoryShape& position, A items) const requires(direction != MemberDirection::readonly) {
+    const Value packed = pack_value(std::move(items));
+    ask([&](const RemoteObject& object, const char* name) { object.memory(name).write(position, packed); });
+  }
+};
+
 /// A running generator: a handle that can be copied. T void: it returns nothing; Parameter void: it takes nothing.
 template <class T, class Parameter = void>
 class TypedGenerator {

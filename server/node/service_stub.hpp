@@ -18,6 +18,7 @@
 #include <string_view>
 #include <vector>
 
+#include "server/node/memory_buffer.hpp"
 #include "server/node/service.hpp"
 #include "server/node/typed_value.hpp"
 
@@ -90,6 +91,15 @@ class ServiceStub : public std::enable_shared_from_this<ServiceStub> {
         [stub = &rr_cast<Stub>(), self = shared_from_this(), set](const PipeEndpoint& from, const Value& packet) {
           (stub->*set)(from, unpack_value<T>(packet));
         });
+  }
+
+  template <class Stub, class T>
+  void rr_memory(Object& object, const char* name, std::shared_ptr<MemoryBuffer<T>> (Stub::*get)()) {
+    object.memory(name, detail::make_buffer_handlers((rr_cast<Stub>().*get)(), detail::ArrayForm::array));
+  }
+  template <class Stub, class T>
+  void rr_multidim_memory(Object& object, const char* name, std::shared_ptr<MemoryBuffer<T>> (Stub::*get)()) {
+    object.memory(name, detail::make_buffer_handlers((rr_cast<Stub>().*get)(), detail::ArrayForm::multidim));
   }
 
   template <class R, class... Args>

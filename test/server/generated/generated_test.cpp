@@ -41,6 +41,7 @@ class Everything : public ObjectService {
   std::optional<union_> received_target;
   std::vector<std::string> lines;
   ClientId last_client = 0;
+  std::shared_ptr<MemoryBuffer<double>> numbers = std::make_shared<MemoryBuffer<double>>();
 
  private:
   std::int32_t get_auto() override {
@@ -82,6 +83,11 @@ class Everything : public ObjectService {
   std::function<std::optional<double>(double)> both_ways(double first) override {
     return [first](double next) { return next > 0 ? std::optional(first + next) : std::nullopt; };
   }
+  std::shared_ptr<MemoryBuffer<double>> get_numbers() override { return numbers; }
+  std::shared_ptr<MemoryBuffer<std::uint8_t>> get_image() override { return image_; }
+  std::shared_ptr<MemoryBuffer<template_>> get_pod_memory() override { return pod_memory_; }
+  std::shared_ptr<MemoryBuffer<union_>> get_points() override { return points_; }
+
   void set_samples(const PipeEndpoint& from, std::vector<double> packet) override {
     packet.push_back(from.index());
     if (!from.send(pack_value(packet))) throw std::runtime_error("the client reads too slowly");
@@ -107,6 +113,12 @@ class Everything : public ObjectService {
   }
   void set_status(Nullable<switch_> value) override { status(value); }
 
+  std::shared_ptr<MemoryBuffer<std::uint8_t>> image_ =
+      std::make_shared<MemoryBuffer<std::uint8_t>>(MemoryBuffer<std::uint8_t>{{2, 3}, {1, 2, 3, 4, 5, 6}});
+  std::shared_ptr<MemoryBuffer<template_>> pod_memory_ =
+      std::make_shared<MemoryBuffer<template_>>(MemoryBuffer<template_>{{2}, std::vector<template_>(2)});
+  std::shared_ptr<MemoryBuffer<union_>> points_ =
+      std::make_shared<MemoryBuffer<union_>>(MemoryBuffer<union_>{{2, 1}, std::vector<union_>(2)});
   std::int32_t auto_ = 0;
   Nullable<switch_> switch__;
   std::vector<template_> pods_;
@@ -302,6 +314,24 @@ TEST_CASE("generated: pipes") {
   session.client.commands().connect().send("take one");
   REQUIRE(session.wait_until([&] { return !heard.empty(); }));
   CHECK(heard == "take one");
+}
+
+TEST_CASE("generated: memories") {
+  Session session;
+  const auto& client = session.client;
+  session.node.ask([&](Node&) { return *session.everything->numbers = {{1000}, std::vector<double>(1000)}; });
+  CHECK(client.numbers().dimensions() == MemoryShape{1000});
+  client.numbers().write({10}, {1.5, 2.5});
+  CHECK(client.numbers().read({9}, {4}) == std::vector<double>{0, 1.5, 2.5, 0});
+  CHECK(client.image().read() == MultiDim<std::uint8_t>{{2, 3}, {1, 2, 3, 4, 5, 6}});
+  CHECK(client.image().read({1, 1}, {1, 2}) == MultiDim<std::uint8_t>{{1, 2}, {4, 6}});
+  client.pod_memory().write({1}, {make_pod(5)});
+  CHECK(client.pod_memory().read() == std::vector{template_{}, make_pod(5)});
+  client.points().write({1, 0}, {{1, 1}, {{{1, 2}, 3}}});
+  CHECK(client.points().read() == MultiDim<union_>{{2, 1}, {{}, {{1, 2}, 3}}});
+  CHECK(error_of([&] { client.numbers().read({999}, {2}); }).code == ErrorCode::out_of_range);
+  session.node.ask([&](Node&) { return session.everything->numbers->items.resize(5), true; });
+  CHECK(error_of([&] { client.numbers().read({0}, {1}); }).code == ErrorCode::invalid_state);
 }
 
 TEST_CASE("generated: callbacks") {
