@@ -74,8 +74,11 @@ Value memory_slice(const Value& whole, std::uint64_t first, std::uint64_t items,
     const auto begin = pods->items.begin() + static_cast<std::ptrdiff_t>(first);
     return to_value({}, {begin, begin + static_cast<std::ptrdiff_t>(items)}, count, memory, entity);
   }
-  const auto each = entity ? entity->namedarray_count : 1;
-  return to_value(numbers_of(whole)->slice(first * each, items * each), {}, count, memory, entity);
+  const std::uint64_t each = entity ? entity->namedarray_count : 1;
+  // What is there is addressable: these fit.
+  auto numbers =
+      numbers_of(whole)->slice(static_cast<std::size_t>(first * each), static_cast<std::size_t>(items * each));
+  return to_value(std::move(numbers), {}, count, memory, entity);
 }
 
 void MemoryCollector::add(Value part) {

@@ -117,6 +117,28 @@ TEST_CASE("a container whose dimensions do not fit its items fails requests, not
   CHECK(memory.read() == Value(std::vector<std::int32_t>{1, 2, 3}));
 }
 
+TEST_CASE("the service checks ranges itself: a memory may have shrunk since the client asked") {
+  auto plain = std::make_shared<NumberMemory<std::int32_t>>();
+  RunningNode node([&](Node& it) {
+    auto store = make_store();
+    auto handlers = detail::make_memory_handlers(plain, {});
+    handlers.dimensions = [plain] {
+      plain->items.resize(plain->items.size() / 2);
+      return plain->dimensions = {plain->items.size()};
+    };
+    store->memory("plain", handlers);
+    it.add(store);
+  });
+  const auto memory = connect(node.url("Store")).memory("plain");
+  const auto grow = [&] { node.ask([&](Node&) { plain->items.resize(400); }); };
+  grow();  // 200 for the client's question, 100 for its request
+  CHECK(error_of([&] { memory.read({0}, {101}); }).code == ErrorCode::out_of_range);
+  grow();
+  CHECK(error_of([&] { memory.write({100}, Value(std::vector<std::int32_t>{1})); }).code == ErrorCode::out_of_range);
+  grow();
+  CHECK(memory.read({0}, {100}).to_items<std::int32_t>().value().size() == 100);
+}
+
 TEST_CASE("handlers see ranges that are within the memory, and may fail") {
   std::vector<std::uint8_t> written;
   RunningNode node([&](Node& it) {
