@@ -363,7 +363,7 @@ SCENARIOS = [
         read("m_samples", "Sample", [0], [1], [ZERO_SAMPLE]),
         write("m_samples", [1], {"Sample[]": [SAMPLE["Sample"], OTHER_SAMPLE["Sample"]]}),
         read("m_samples", "Sample", [0], [4], [ZERO_SAMPLE, plain_of(SAMPLE)[0], plain_of(OTHER_SAMPLE)[0], ZERO_SAMPLE]),
-        read("m_fixed", "uint8", [7], [3], [7, 8, 9])], clients=NATIVE),
+        read("m_fixed", "uint8", [7], [3], [7, 8, 9])]),
     Scenario("memories_of_dimensions", [
         {"dimensions": "m_grid", "expect": [4, 3, 2]},
         read("m_grid", "int16", [0, 0, 0], [4, 3, 2], {"dims": [4, 3, 2], "data": list(range(24))}),
@@ -376,8 +376,7 @@ SCENARIOS = [
         write("m_vector_grid", [0, 2], {"Vector3[*]": {"dims": [2, 1], "data": [1.5] * 6}}),
         read("m_vector_grid", "Vector3", [0, 1], [1, 2], {"dims": [1, 2], "data": [6.0, 7.0, 8.0, 1.5, 1.5, 1.5]}),
         write("m_sample_grid", [0, 1], {"Sample[*]": {"dims": [2, 1], "data": [SAMPLE["Sample"], OTHER_SAMPLE["Sample"]]}}),
-        read("m_sample_grid", "Sample", [1, 0], [1, 2], {"dims": [1, 2], "data": [ZERO_SAMPLE, plain_of(OTHER_SAMPLE)[0]]})],
-        clients=NATIVE),
+        read("m_sample_grid", "Sample", [1, 0], [1, 2], {"dims": [1, 2], "data": [ZERO_SAMPLE, plain_of(OTHER_SAMPLE)[0]]})]),
     # More than one request may carry, each way, from the beginning and from the middle of a dimension.
     Scenario("large_memories", [
         digest("m_large", "double", [0], [50000], {"count": 50000, "first": 0.0, "last": 49999.0, "sum": 1249975000.0}),
@@ -390,8 +389,7 @@ SCENARIOS = [
         write("m_volume", [0, 5, 3], {"single[*]": {"dims": [60, 40, 30], "data": [0.5] * 72000}}),
         digest("m_volume", "single", [0, 5, 3], [60, 40, 30], {"count": 72000, "first": 0.5, "last": 0.5, "sum": 36000.0}),
         read("m_volume", "single", [59, 4, 3], [1, 2, 1], {"dims": [1, 2, 1], "data": [9299.0, 0.5]}),
-        read("m_volume", "single", [0, 44, 32], [1, 2, 2], {"dims": [1, 2, 2], "data": [0.5, 98700.0, 101640.0, 101700.0]})],
-        clients=NATIVE),
+        read("m_volume", "single", [0, 44, 32], [1, 2, 2], {"dims": [1, 2, 2], "data": [0.5, 98700.0, 101640.0, 101700.0]})]),
     # The reference checks no ranges, neither as a client nor in a Python service.
     Scenario("memory_bounds", [
         read_fails("m_numbers", "double", [97], [4], OUTSIDE),

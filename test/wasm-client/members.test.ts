@@ -372,12 +372,6 @@ describe("object references", () => {
   });
 });
 
-it("members of kinds that come later say so", async () => {
-  for (const call of [() => (m("buffer") as unknown as { read(): Promise<unknown> }).read()]) {
-    expect((await failure(call() as unknown as Promise<unknown>)).code).toBe(ErrorCode.NotImplementedError);
-  }
-});
-
 it("uses the root object as the type that was asked for", async () => {
   const other = await TestService.start({ definitions: [definition], root: "test.members.Root" });
   const base = await other.connect({ objectType: "test.members.Base" });

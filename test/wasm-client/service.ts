@@ -16,6 +16,7 @@
 //   generator functions      give each value back that they are given; those that take none count to their first
 //                            argument from 0 (if it is negative, OutOfRange "no more" follows); "refuse" refuses,
 //                            "hang_on" never answers a step; the property generator_end says how the last one ended
+//   memories of double       10 numbers, or 4 * 3; at first 0, 1, 2 ...
 //   objrefs                  of every index but "missing" and 99; a property `name` tells which
 // Service "test", node "test.service", attribute site = "dock".
 import { readFileSync } from "node:fs";

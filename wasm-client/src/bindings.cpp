@@ -74,6 +74,17 @@ RequestId rr_step_generator(int step, JsHandle path, JsHandle member, std::int32
   return session->step_generator(static_cast<rr::GeneratorStep>(step), JsValue(path), JsValue(member), index,
                                  JsValue(parameter));
 }
+RR_EXPORT(get_memory_dimensions) RequestId rr_get_memory_dimensions(JsHandle path, JsHandle member) {
+  return session->ask(&ClientSession::get_memory_dimensions, JsValue(path), JsValue(member));
+}
+RR_EXPORT(read_memory)
+RequestId rr_read_memory(JsHandle path, JsHandle member, JsHandle position, JsHandle count) {
+  return session->read_memory(JsValue(path), JsValue(member), JsValue(position), JsValue(count));
+}
+RR_EXPORT(write_memory)
+RequestId rr_write_memory(JsHandle path, JsHandle member, JsHandle position, JsHandle value) {
+  return session->write_memory(JsValue(path), JsValue(member), JsValue(position), JsValue(value));
+}
 RR_EXPORT(find_object) RequestId rr_find_object(JsHandle path) {
   return session->find_object(JsValue(path));
 }

@@ -153,6 +153,26 @@ RequestId WasmSession::step_generator(GeneratorStep step, const JsValue& path, c
   return remember(session_.next_generator(target->path, target->member, index, value, now_), target->definition->type);
 }
 
+RequestId WasmSession::read_memory(const JsValue& path, const JsValue& member, const JsValue& position,
+                                   const JsValue& count) {
+  const auto target = find_target(path, member);
+  const auto from = target ? read_range(position, "position") : std::nullopt;
+  const auto size = from ? read_range(count, "count") : std::nullopt;
+  if (!size) return 0;
+  return session_.read_memory(target->path, target->member, from->get_if<Array>()->items<std::uint64_t>(),
+                              size->get_if<Array>()->items<std::uint64_t>(), now_);
+}
+
+RequestId WasmSession::write_memory(const JsValue& path, const JsValue& member, const JsValue& position,
+                                    const JsValue& value) {
+  const auto target = find_target(path, member);
+  const auto from = target ? read_range(position, "position") : std::nullopt;
+  const auto read = from ? read_value(value, target->definition->type, target->member) : std::nullopt;
+  if (!read) return 0;
+  return session_.write_memory(target->path, target->member, from->get_if<Array>()->items<std::uint64_t>(), *read,
+                               now_);
+}
+
 RequestId WasmSession::find_object(const JsValue& path) {
   return session_.find_object(text_of(path), now_);
 }
@@ -409,6 +429,13 @@ std::optional<Value> WasmSession::read_value(const JsValue& js, const TypeDefini
   if (value.has_value()) return std::move(*value);
   error_ = value.error();
   return std::nullopt;
+}
+
+std::optional<Value> WasmSession::read_range(const JsValue& js, std::string_view name) {
+  TypeDefinition type;
+  type.type = DataType::uint64_t;
+  type.array = ArrayKind::variable;
+  return read_value(js, type, name);
 }
 
 std::optional<std::vector<Value>> WasmSession::read_arguments(const JsValue& arguments,

@@ -44,6 +44,9 @@ class WasmSession {
   /// `parameter` for GeneratorStep::next, undefined where the generator takes none.
   RequestId step_generator(GeneratorStep step, const JsValue& path, const JsValue& member, std::int32_t index,
                            const JsValue& parameter);
+  /// `position`, `count`: arrays, one number a dimension.
+  RequestId read_memory(const JsValue& path, const JsValue& member, const JsValue& position, const JsValue& count);
+  RequestId write_memory(const JsValue& path, const JsValue& member, const JsValue& position, const JsValue& value);
   RequestId find_object(const JsValue& path);
   /// Returns  whether it was sent or queued.
   bool send_wire(const JsValue& path, const JsValue& member, const JsValue& value);
@@ -106,6 +109,8 @@ class WasmSession {
   const MemberDefinition* find_member(std::string_view path, std::string_view member) const;
   /// Nothing: error_ says why.
   std::optional<Value> read_value(const JsValue& js, const TypeDefinition& type, std::string_view name);
+  /// An array of numbers from 0 on; nothing: error_ says why.
+  std::optional<Value> read_range(const JsValue& js, std::string_view name);
   /// Those of a function that a call hands over; nothing: error_ says why.
   std::optional<std::vector<Value>> read_arguments(const JsValue& arguments, const MemberDefinition& function);
   /// Returns `id`, whose reply holds a value of the type.

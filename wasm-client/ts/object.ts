@@ -4,8 +4,8 @@ import type { RobotRaconteurError } from "./errors.js";
 import { make_callback } from "./members/callback.js";
 import { make_event } from "./members/event.js";
 import { make_function } from "./members/function.js";
-import { make_later } from "./members/later.js";
 import type { MemberContext } from "./members/member.js";
+import { make_memory } from "./members/memory.js";
 import { make_objref } from "./members/objref.js";
 import { make_pipe } from "./members/pipe.js";
 import { make_property } from "./members/property.js";
@@ -33,7 +33,7 @@ const faces: Record<MemberKind, (context: MemberContext) => unknown> = {
   wire: make_wire,
   pipe: make_pipe,
   callback: make_callback,
-  memory: (context) => make_later(context, "memory"),
+  memory: make_memory,
 };
 
 /**

@@ -239,11 +239,17 @@ export interface CallbackMember<A extends unknown[] = RrValue[], R = unknown> {
   handler: ((...args: A) => R | Promise<R>) | null;
 }
 
-/** Positions and counts have one number a dimension. */
+/**
+ * A large array that is read and written in parts. Positions (from 0) and counts have one number a dimension; a plain
+ * array takes the number alone as well. Large parts travel in pieces: what others write meanwhile may be in some of them.
+ * @throws RobotRaconteurError (rejects) OutOfRange, ReadOnlyMember, WriteOnlyMember, DataTypeMismatch, ...
+ */
 export interface MemoryMember<A = RrValue> {
+  /** Of a plain array its length. */
   dimensions(options?: CallOptions): Promise<number[]>;
-  read(position: readonly number[], count: readonly number[], options?: CallOptions): Promise<A>;
-  write(position: readonly number[], value: A, options?: CallOptions): Promise<void>;
+  read(position: number | readonly number[], count: number | readonly number[], options?: CallOptions): Promise<A>;
+  /** All of `value`; where that fails, a part may be written. */
+  write(position: number | readonly number[], value: A, options?: CallOptions): Promise<void>;
 }
 
 /**
@@ -273,6 +279,9 @@ export interface DynamicMember extends AsyncIterable<RrValue[]> {
   peek(options?: CallOptions): Promise<RrValue>;
   peekOut(options?: CallOptions): Promise<RrValue>;
   poke(value: unknown, options?: CallOptions): Promise<void>;
+  dimensions(options?: CallOptions): Promise<number[]>;
+  read(position: number | readonly number[], count: number | readonly number[], options?: CallOptions): Promise<RrValue>;
+  write(position: number | readonly number[], value: unknown, options?: CallOptions): Promise<void>;
 }
 
 /** A connected object: its members by name, and `$`. */

@@ -62,6 +62,9 @@ interface WasmSession extends CoreExports {
   call_function(path: Handle, member: Handle, args: Handle): number;
   open_generator(path: Handle, member: Handle, args: Handle): number;
   step_generator(step: number, path: Handle, member: Handle, index: number, parameter: Handle): number;
+  get_memory_dimensions(path: Handle, member: Handle): number;
+  read_memory(path: Handle, member: Handle, position: Handle, count: Handle): number;
+  write_memory(path: Handle, member: Handle, position: Handle, value: Handle): number;
   find_object(path: Handle): number;
   connect_wire(path: Handle, member: Handle): number;
   disconnect_wire(path: Handle, member: Handle): number;
@@ -181,6 +184,18 @@ export class Core {
     return this.#checked(
       this.#at_now().step_generator(number, this.#give(path), this.#give(member), index, handle),
     );
+  }
+
+  get_memory_dimensions(path: string, member: string): number {
+    return this.#ask("get_memory_dimensions", path, member);
+  }
+
+  read_memory(path: string, member: string, position: readonly number[], count: readonly number[]): number {
+    return this.#ask("read_memory", path, member, position, count);
+  }
+
+  write_memory(path: string, member: string, position: readonly number[], value: unknown): number {
+    return this.#ask("write_memory", path, member, position, value);
   }
 
   find_object(path: string): number {
@@ -344,7 +359,7 @@ export class Core {
   /** Makes a request of the core with `args`. */
   #ask(request: MemberRequest, ...args: unknown[]): number {
     const session = this.#at_now();
-    const handles = args.map((arg) => this.#values.give(arg)) as [Handle, Handle, Handle];
+    const handles = args.map((arg) => this.#values.give(arg)) as [Handle, Handle, Handle, Handle];
     return this.#checked(session[request](...handles));
   }
 }
@@ -356,6 +371,9 @@ type MemberRequest =
   | "call_function"
   | "open_generator"
   | "find_object"
+  | "get_memory_dimensions"
+  | "read_memory"
+  | "write_memory"
   | "authenticate"
   | "logout"
   | "unlock"

@@ -149,7 +149,7 @@ class Client {
     async call(target, member, step) {
       const result = await target[member](...(step.args ?? []).map(build));
       if (!step.digest) return this.plainOf(target, member, result);
-      return { count: result.length, first: result[0], last: result.at(-1), sum: result.reduce((sum, item) => sum + item, 0) };
+      return digest(result);
     },
     async open(_target, name, { service, username, password }) {
       const url = process.argv[2].replace("service=interop", `service=${service}`);
@@ -282,6 +282,17 @@ class Client {
       await until(async () => asked.length >= step.count, true);
       return { list: [...asked] };
     },
+    async dimensions(target, member) {
+      return target[member].dimensions();
+    },
+    async read_memory(target, member, step) {
+      const read = await target[member].read(step.position, step.size);
+      return step.digest ? digest(read.data ?? read) : this.plainOf(target, member, read);
+    },
+    async write_memory(target, member, step) {
+      await target[member].write(step.position, build(step.value));
+      return null;
+    },
     async peek_in(target, member) {
       return this.plainOf(target, member, await target[member].peek());
     },
@@ -294,6 +305,13 @@ class Client {
     },
   };
 }
+
+const digest = (items) => ({
+  count: items.length,
+  first: items[0],
+  last: items.at(-1),
+  sum: items.reduce((sum, item) => sum + item, 0),
+});
 
 /** Asks until the answer is the wanted one, for as long as patience lasts. */
 async function until(ask, wanted) {

@@ -5,6 +5,7 @@
 
 #include "core/session/service_session.hpp"
 #include "core/support/random.hpp"
+#include "core/types/multidim.hpp"
 #include "wasm-client/src/js_access.hpp"
 
 namespace {
@@ -159,6 +160,11 @@ class TestService {
       case CallKind::function:
         if (name.starts_with("ask_")) return ask(called);
         return call(name, called.arguments, called.member->type);
+      case CallKind::memory_dimensions:
+        return Value(memory(called).dims);
+      case CallKind::memory_read:
+      case CallKind::memory_write:
+        return access_memory(called);
       case CallKind::generator_open:
         if (name == "refuse") return make_error(ErrorCode::operation_failed, "no");
         runs_[called.generator] = {called.arguments, 0};
@@ -172,6 +178,50 @@ class TestService {
         return Value{};
     }
     return Value{};
+  }
+
+  struct Memory {
+    std::vector<std::uint64_t> dims;
+    std::vector<double> items;  ///< column-major
+  };
+
+  /// 4 * 3 numbers where the memory has dimensions, else 10; at first 0, 1, 2 ...
+  Memory& memory(const Called& called) {
+    auto& memory = memories_[called.member->name];
+    if (!memory.items.empty()) return memory;
+    if (is_multidim(called.member->type))
+      memory.dims = {4, 3};
+    else
+      memory.dims = {10};
+    const auto size = *product_of(std::span<const std::uint64_t>(memory.dims));
+    for (std::uint64_t i = 0; i < size; ++i) memory.items.push_back(static_cast<double>(i));
+    return memory;
+  }
+
+  Result<Value> access_memory(const Called& called) {
+    auto& [dims, items] = memory(called);
+    if (auto within = check_memory_range(called.range, dims, *called.member); !within) return within.error();
+    const auto& [position, count] = called.range;
+    const bool is_write = called.kind == CallKind::memory_write;
+    std::vector<double> part(*product_of(std::span<const std::uint64_t>(count)));
+    if (is_write) {
+      const auto& given = called.arguments.front();
+      const auto* grid = given.get_if<MultiDimArray>();
+      const auto numbers = (grid ? grid->array : *given.get_if<Array>()).items<double>();
+      part.assign(numbers.begin(), numbers.end());
+    }
+    for (std::size_t i = 0; i < part.size(); ++i) {
+      const std::size_t row = i % count[0] + position[0];
+      const std::size_t column = count.size() > 1 ? i / count[0] + position[1] : 0;
+      auto& item = items[row + column * dims[0]];
+      is_write ? item = part[i] : part[i] = item;
+    }
+    if (is_write) return Value{};
+    if (count.size() == 1) return Value(std::move(part));
+    MultiDimArray grid;
+    grid.dims.assign(count.begin(), count.end());
+    grid.array = Array::take(std::move(part));
+    return Value(std::move(grid));
   }
 
   /// The answer of the client's callback is the function's own.
@@ -231,6 +281,7 @@ class TestService {
   std::shared_ptr<TestObject> root_;
   std::shared_ptr<const TypeRegistry> types_;
   std::optional<ServiceSession> session_;
+  std::map<std::string, Memory, std::less<>> memories_;
   std::map<CallbackId, CallId> asks_;
   struct Run {
     std::vector<Value> arguments;
