@@ -201,9 +201,10 @@ class TestService {
   Result<Value> access_memory(const Called& called) {
     auto& [dims, items] = memory(called);
     if (auto within = check_memory_range(called.range, dims, *called.member); !within) return within.error();
-    const auto& [position, count] = called.range;
+    const std::vector<std::size_t> position(called.range.position.begin(), called.range.position.end());
+    const std::vector<std::size_t> count(called.range.count.begin(), called.range.count.end());
     const bool is_write = called.kind == CallKind::memory_write;
-    std::vector<double> part(*product_of(std::span<const std::uint64_t>(count)));
+    std::vector<double> part(static_cast<std::size_t>(*product_of(std::span<const std::uint64_t>(called.range.count))));
     if (is_write) {
       const auto& given = called.arguments.front();
       const auto* grid = given.get_if<MultiDimArray>();
@@ -213,7 +214,7 @@ class TestService {
     for (std::size_t i = 0; i < part.size(); ++i) {
       const std::size_t row = i % count[0] + position[0];
       const std::size_t column = count.size() > 1 ? i / count[0] + position[1] : 0;
-      auto& item = items[row + column * dims[0]];
+      auto& item = items[row + column * static_cast<std::size_t>(dims[0])];
       is_write ? item = part[i] : part[i] = item;
     }
     if (is_write) return Value{};
