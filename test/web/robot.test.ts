@@ -5,6 +5,7 @@ import { advance, ORIGIN, Reckoner, wrap_angle } from "../../web/src/robot/recko
 import { loops_of, obstacles_of, pose_of, walls_of } from "../../web/src/robot/room";
 import { read_sensor_packet } from "../../web/src/robot/sensor_packet";
 import { rate_of, Series } from "../../web/src/robot/series";
+import { name_notes, song_after } from "../../web/src/robot/song";
 import { command_for, direction_of_key, SPIN_LEFT, SPIN_RIGHT, STOP, STRAIGHT, TURN_RADIUS } from "../../web/src/robot/steering";
 import type { Direction, DriveCommand } from "../../web/src/robot/steering";
 import { Trail } from "../../web/src/robot/trail";
@@ -277,5 +278,17 @@ describe("series", () => {
     for (let t = 0; t < 4000; t += 50) series.push(t, 1);
     expect(rate_of(series, 3999)).toBe(20);
     expect(rate_of(series, 9000)).toBe(0);
+  });
+});
+
+describe("the song", () => {
+  it("is pairs of note and length, and rises with the way", () => {
+    expect(Array.from(song_after(0)).slice(0, 4)).toEqual([60, 16, 64, 16]);
+    expect(song_after(100)[0]).toBe(61);
+    expect(song_after(1200)[0]).toBe(60);
+    expect(song_after(-100)[0]).toBe(71);
+  });
+  it("is named as musicians do", () => {
+    expect(name_notes(Uint8Array.of(60, 16, 61, 8, 71, 1))).toBe("C4 C♯4 B4");
   });
 });

@@ -32,6 +32,41 @@ test("opens an object behind a reference, and shows the service's own error for 
   await expect(page.locator("main").getByRole("alert")).toContainText("RobotRaconteur.");
 });
 
+test("reads a memory", async ({ page, lab }) => {
+  await page.goto(`${lab.url}#/devices/webcams/Webcam/Webcams%5B0%5D`);
+  const buffer = page.locator('[data-member="buffer"]');
+  await page.getByRole("button", { name: "Call CaptureFrameToBuffer" }).click();
+  await expect(page.locator('[data-member="CaptureFrameToBuffer"] output')).toContainText("width: 320");
+  await page.getByRole("button", { name: "Measure buffer" }).click();
+  await expect(buffer).toContainText(`${320 * 240 * 3} items`);
+  await buffer.getByLabel("Items of buffer").fill("[4]");
+  await page.getByRole("button", { name: "Read buffer" }).click();
+  await expect(buffer.locator("output")).toHaveText(/^\[?(\d+, ){3}\d+\]?$/);
+  await buffer.getByLabel("Position in buffer").fill("[1000000]");
+  await page.getByRole("button", { name: "Read buffer" }).click();
+  await expect(buffer.getByRole("alert")).toContainText("OutOfRange");
+});
+
+test("follows a pipe, and answers a callback", async ({ page, lab }) => {
+  await page.goto(`${lab.url}#/devices/webcams/Webcam/Webcams%5B0%5D`);
+  const member = (name: string) => page.locator(`[data-member="${name}"]`);
+  await page.getByRole("button", { name: "Call StartStreaming" }).click();
+  await page.getByRole("button", { name: "Follow FrameStream" }).click();
+  await expect(member("FrameStream").locator("li").nth(3)).toContainText("width: 320");
+  await page.getByRole("button", { name: "Stop FrameStream" }).click();
+  await expect(page.getByRole("button", { name: "Follow FrameStream" })).toBeVisible();
+
+  await page.goto(`${lab.url}#/devices/create/Create?view=members`);
+  await member("play_callback").getByLabel("Answer of play_callback").fill("[60, 16, 62, 8]");
+  await page.getByRole("button", { name: "Answer play_callback", exact: true }).click();
+  await page.getByRole("button", { name: "Call press_play", exact: true }).click();
+  await expect(member("play_callback").locator("li").first()).toContainText("DistanceTraveled:");
+  await expect(async () => {
+    await page.getByRole("button", { name: "Read song" }).click();
+    await expect(member("song").locator("output")).toContainText("60, 16, 62, 8", { timeout: 500 });
+  }).toPass();
+});
+
 test("a service that the device does not have is said, not shown as loading for ever", async ({ page, lab }) => {
   await page.goto(`${lab.url}#/devices/create/Nothing`);
   await expect(page.locator('[data-link="lost"]')).toContainText("No connection to create since");

@@ -1,4 +1,5 @@
 // The demo robot: drive, see it move; kill the device, see the page say so; start it, see the page recover.
+import { readFileSync } from "node:fs";
 import { distance, expect, open_robot, pose_of, put_at_start, test, wait_until_moved, wait_until_still } from "../lab_test";
 
 test.beforeEach(async ({ page, lab }) => {
@@ -77,6 +78,20 @@ test("sensor packets and camera pictures arrive", async ({ page }) => {
     expect(colours.width).toBeGreaterThan(4);
     expect(colours.distinct).toBeGreaterThan(3);
   }).toPass();
+});
+
+test("a snapshot comes through the camera's memory", async ({ page }) => {
+  const camera = page.getByRole("region", { name: "Camera" });
+  await camera.getByRole("button", { name: "Snapshot" }).click();
+  const saved = page.waitForEvent("download");
+  await camera.getByRole("link", { name: "Save it" }).click();
+  const file = await (await saved).path();
+  expect(readFileSync(file).subarray(1, 4).toString()).toBe("PNG");
+});
+
+test("the play button makes the robot ask this page for a song", async ({ page }) => {
+  await page.getByRole("button", { name: "Play a song" }).click();
+  await expect(page.getByLabel("Song")).toHaveText(/^♪( [A-G]♯?\d){7}$/);
 });
 
 test("says when the device is lost, disables driving, and recovers without a reload", async ({ page, lab }) => {

@@ -1,4 +1,5 @@
-// Live pictures of the webcam service behind the same gateway, one `CaptureFrame` after the other.
+// Live pictures of the webcam service behind the same gateway: the packets of its `FrameStream`, or where a camera has no
+// such pipe one `CaptureFrame` after the other.
 // Layer: web/camera.
 
 import { useEffect, useRef, useState } from "preact/hooks";
@@ -8,7 +9,8 @@ import type { DeviceList, GatewayState } from "../gateway/devices";
 import { Link } from "../robot/link";
 import { explain, open_remote } from "../robot/remote";
 import type { Remote } from "../robot/remote";
-import { read_frame } from "./frame";
+import { draw_frame } from "./draw_frame";
+import { Snapshot } from "./snapshot";
 import { clock_time } from "../ui/words";
 
 const PAUSE_MS = 80; // between frames, so that the camera never takes the line from the robot
@@ -107,6 +109,7 @@ function Picture({ link, place, shown }: { link: Link; place: Place; shown: bool
           <span>{cameras[0]?.name ?? place.device}</span>
         )}
         <span class="note">{size}</span>
+        {remote && index !== null && <Snapshot host={remote} index={index} />}
       </div>
     </>
   );
@@ -154,13 +157,11 @@ function useFrames(
     const stop = new AbortController();
     const follow = async (): Promise<void> => {
       const camera = await remote.child("Webcams", index);
-      while (!stop.signal.aborted) {
-        if (!document.hidden) {
-          const size = await show(canvas.current, await camera.call("CaptureFrame", []));
-          if (stop.signal.aborted) return;
-          set_frames((old) => (old.failure === null && old.size === size ? old : { failure: null, has_frame: true, size }));
-        }
-        await new Promise((resolve) => setTimeout(resolve, PAUSE_MS));
+      for await (const frame of frames_of(camera, stop.signal)) {
+        if (document.hidden) continue;
+        const size = await draw_frame(canvas.current, frame);
+        if (stop.signal.aborted) return;
+        set_frames((old) => (old.failure === null && old.size === size ? old : { failure: null, has_frame: true, size }));
       }
     };
     const keep_following = async (): Promise<void> => {
@@ -177,19 +178,15 @@ function useFrames(
   return frames;
 }
 
-/** @returns the size in words. */
-async function show(canvas: HTMLCanvasElement | null, value: unknown): Promise<string> {
-  const frame = read_frame(value);
-  const bitmap = frame.encoded ? await createImageBitmap(new Blob([frame.encoded])) : null;
-  const width = bitmap?.width ?? frame.width;
-  const height = bitmap?.height ?? frame.height;
-  const ctx = canvas?.getContext("2d");
-  if (canvas && ctx) {
-    if (canvas.width !== width) canvas.width = width;
-    if (canvas.height !== height) canvas.height = height;
-    if (bitmap) ctx.drawImage(bitmap, 0, 0);
-    else if (frame.rgba) ctx.putImageData(new ImageData(frame.rgba, width, height), 0, 0);
+async function* frames_of(camera: Remote, signal: AbortSignal): AsyncGenerator<unknown, void> {
+  if (camera.has("FrameStream", "pipe")) {
+    const stream = camera.pipe("FrameStream", signal);
+    await camera.call("StartStreaming", []);
+    yield* stream;
+    return;
   }
-  bitmap?.close();
-  return `${width} × ${height}`;
+  while (!signal.aborted) {
+    if (!document.hidden) yield await camera.call("CaptureFrame", []);
+    await new Promise((resolve) => setTimeout(resolve, PAUSE_MS));
+  }
 }

@@ -3,10 +3,12 @@
 
 import type { ComponentType } from "preact";
 import type { Route } from "../app/router";
+import { CallbackRow } from "../members/callback_row";
 import { EventRow } from "../members/event_row";
 import { FunctionRow } from "../members/function_row";
+import { MemoryRow } from "../members/memory_row";
 import { ObjrefRow } from "../members/objref_row";
-import { OtherRow } from "../members/other_row";
+import { PipeRow } from "../members/pipe_row";
 import { PropertyRow } from "../members/property_row";
 import type { MemberRowProps } from "../members/row";
 import { WireRow } from "../members/wire_row";
@@ -18,9 +20,9 @@ const GROUPS: readonly { kind: MemberKind; title: string; row: ComponentType<Mem
   { kind: "function", title: "Functions", row: FunctionRow },
   { kind: "wire", title: "Wires", row: WireRow },
   { kind: "event", title: "Events", row: EventRow },
-  { kind: "pipe", title: "Pipes", row: OtherRow },
-  { kind: "callback", title: "Callbacks", row: OtherRow },
-  { kind: "memory", title: "Memories", row: OtherRow },
+  { kind: "pipe", title: "Pipes", row: PipeRow },
+  { kind: "callback", title: "Callbacks", row: CallbackRow },
+  { kind: "memory", title: "Memories", row: MemoryRow },
 ];
 
 export interface ObjectViewProps {

@@ -14,6 +14,7 @@ import { RobotModel } from "../robot/robot_model";
 import { BumpLog } from "../robot_view/bump_log";
 import { DrivePanel } from "../robot_view/drive_panel";
 import { PoseLine } from "../robot_view/pose_line";
+import { SongBox } from "../robot_view/song_box";
 import { ValuesPanel } from "../robot_view/values_panel";
 
 export interface RobotPageProps {
@@ -68,6 +69,7 @@ export function RobotPage({ link, list, device, shown }: RobotPageProps) {
           <button class="button button-quiet" type="button" onClick={() => model.clear_trail()}>
             Clear trail
           </button>
+          <SongBox robot={remote} />
         </div>
       </section>
       <DrivePanel driver={driver} enabled={live && shown} lost={state.kind === "lost"} failure={drive_failure} device={device} />

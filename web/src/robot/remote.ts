@@ -20,6 +20,13 @@ export interface Remote {
   /** Values of a wire from now on, the newest only; ends with the connection or with `signal`. */
   wire(name: string, signal: AbortSignal): AsyncGenerator<unknown, void>;
   poke(name: string, value: unknown): Promise<void>;
+  /** All packets of a new pipe endpoint; ends when the device closes it, with the connection or with `signal`. */
+  pipe(name: string, signal: AbortSignal): AsyncGenerator<unknown, void>;
+  /** Items of a memory in each dimension. */
+  dimensions(memory: string): Promise<number[]>;
+  read(memory: string, position: readonly number[], count: readonly number[]): Promise<unknown>;
+  /** Answers a callback by `handler`. @returns a function that stops answering. */
+  answer(name: string, handler: (...args: unknown[]) => unknown): () => void;
   /** @returns a function that unsubscribes. */
   on(name: string, heard: (...args: unknown[]) => void): () => void;
   child(name: string, index?: string | number): Promise<Remote>;
@@ -55,7 +62,15 @@ function wrap(object: RemoteObject): Remote {
     call: async (name, args) => member(name)(...args),
     get: async (name) => member(name).get(),
     set: async (name, value) => member(name).set(value),
-    wire: (name, signal) => wire_values(() => member(name).connect({ signal }), signal),
+    wire: (name, signal) => values_of(() => member(name).connect({ signal }), signal),
+    pipe: (name, signal) => values_of(() => member(name).connect(-1, { signal }), signal),
+    dimensions: async (name) => member(name).dimensions(),
+    read: async (name, position, count) => member(name).read(position, count),
+    answer: (name, handler) => {
+      const callback = member(name);
+      callback.handler = handler;
+      return () => void (callback.handler = null);
+    },
     poke: async (name, value) => member(name).poke(value),
     on: (name, heard) => member(name).on(heard),
     child: async (name, index) => wrap(await (index === undefined ? find(member(name)) : member(name).get(index))),
@@ -71,9 +86,12 @@ async function find(objref: DynamicMember): Promise<RemoteObject> {
   return (await objref.get()) as unknown as RemoteObject;
 }
 
-/** Leaving the loop, or `signal`, closes the wire's connection. */
-async function* wire_values(open: () => AsyncIterable<unknown>, signal: AbortSignal): AsyncGenerator<unknown, void> {
-  const values = open()[Symbol.asyncIterator]();
+/** Leaving the loop, or `signal`, closes the wire's connection or the pipe's endpoint. */
+async function* values_of(
+  open: () => AsyncIterable<unknown> | Promise<AsyncIterable<unknown>>,
+  signal: AbortSignal,
+): AsyncGenerator<unknown, void> {
+  const values = (await open())[Symbol.asyncIterator]();
   const stop = (): void => void values.return?.()?.catch(() => undefined); // closing what is already gone
   signal.addEventListener("abort", stop, { once: true });
   try {
