@@ -330,14 +330,15 @@ describe("wires", () => {
 
 describe("object references", () => {
   it("lead to objects, by number, by text and without index", async () => {
-    const head = await m("head").get();
+    const head = await m("head").get<RemoteObject>();
     expect(head.$.path).toBe("test.head");
     expect(head.$.type).toBe("test.members.Part");
     await head["size"]!.set(2);
     expect(await head["size"]!.get()).toBe(2);
     expect(await (await m("parts").get(-5))["name"]!.get()).toBe("parts -5");
     expect(await (await m("named").get("right hand ü."))["name"]!.get()).toBe("named right hand ü.");
-    expect((await (await head["inner"]!.get())["inner"]!.get() as unknown as RemoteObject).$.path).toBe("test.head.inner.inner");
+    const inner = await head["inner"]!.get<RemoteObject>();
+    expect((await inner["inner"]!.get<RemoteObject>()).$.path).toBe("test.head.inner.inner");
   });
 
   it("give the same object for the same path", async () => {
@@ -357,15 +358,15 @@ describe("object references", () => {
   });
 
   it("know when the service has replaced an object", async () => {
-    const head = await m("head").get();
-    const inner = (await head["inner"]!.get()) as unknown as RemoteObject;
+    const head = await m("head").get<RemoteObject>();
+    const inner = await head["inner"]!.get<RemoteObject>();
     const told: unknown[] = [];
     inner.$.onClose((reason) => told.push(reason?.message));
     await m("release")("test.head");
     expect(head.$.state).toBe("released");
     expect(told).toEqual(['the service released object "test.head.inner": look it up again']);
     expect((await failure(head["size"]!.get())).code).toBe(ErrorCode.ObjectNotFound);
-    const again = await m("head").get();
+    const again = await m("head").get<RemoteObject>();
     expect(again).not.toBe(head);
     expect(await again["size"]!.get()).toBe(0);
     expect(robot.$.state).toBe("connected");

@@ -142,7 +142,7 @@ describe("connecting", () => {
       expect(error.message).toContain(message);
       expect(error).toBeInstanceOf(RobotRaconteurError);
     }
-    expect((await failure(connect("ws://test/?service=test&nodeid=xyz", { transport: ((url, listener) => {
+    expect((await failure(connect("ws://test/?service=test&nodeid=xyz", { transport: ((_url, listener) => {
       queueMicrotask(() => listener.opened());
       return { send: () => undefined, buffered: 0, close: () => undefined };
     }) as OpenTransport }))).message).toContain("'nodeId'");

@@ -86,7 +86,7 @@ it.each([
 ])("%s: object references", async (name, options) => {
   const { robot, transcript } = await replay(name, options);
   const m = (member: string) => robot[member]!;
-  const head = await m("head").get();
+  const head = await m("head").get<RemoteObject>();
   expect(await head["size"]!.get()).toBe(4);
   await head["size"]!.set(3);
   expect(await head["identify"]!()).toBe("part head");
@@ -94,7 +94,7 @@ it.each([
   expect(await (await m("parts").get(-1))["identify"]!()).toBe("part #-1");
   expect(await (await m("named").get("a b[1]/.-_%"))["identify"]!()).toBe("part a b[1]/.-_%");
   expect((await failure(m("named").get("none"))).code).toBe(ErrorCode.InvalidArgument);
-  expect(await (await m("anything").get())["identify"]!()).toBe("part any");
+  expect(await (await m("anything").get<RemoteObject>())["identify"]!()).toBe("part any");
   await robot.$.close();
   expect_same_bytes(transcript);
 });

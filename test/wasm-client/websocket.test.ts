@@ -10,7 +10,8 @@ interface Socket {
   close(code?: number, reason?: string): void;
   terminate(): void;
 }
-interface Server extends Socket {
+interface Server {
+  on(event: string, heard: (...args: any[]) => void): void;
   address(): AddressInfo;
   close(done?: () => void): void;
 }

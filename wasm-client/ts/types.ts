@@ -267,8 +267,9 @@ export interface GeneratorMember<A extends unknown[] = never[], R = RrValue, P =
 export interface DynamicMember extends AsyncIterable<RrValue[]> {
   /** Of a generator function an AsyncGenerator instead. */
   (...args: unknown[]): Promise<RrValue> & AsyncGenerator<RrValue, void, unknown>;
-  get(options?: CallOptions): Promise<RrValue>;
-  get(index?: number | string, options?: CallOptions): Promise<RemoteObject>;
+  /** A property's value; of an objref without index the object: `get<RemoteObject>()`. */
+  get<T extends RrValue | RemoteObject = RrValue>(options?: CallOptions): Promise<T>;
+  get(index: number | string, options?: CallOptions): Promise<RemoteObject>;
   set(value: unknown, options?: CallOptions): Promise<void>;
   on(listener: (...args: RrValue[]) => void): () => void;
   once(options?: CallOptions): Promise<RrValue[]>;

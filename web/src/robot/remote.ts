@@ -73,17 +73,13 @@ function wrap(object: RemoteObject): Remote {
     },
     poke: async (name, value) => member(name).poke(value),
     on: (name, heard) => member(name).on(heard),
-    child: async (name, index) => wrap(await (index === undefined ? find(member(name)) : member(name).get(index))),
+    child: async (name, index) =>
+      wrap(await (index === undefined ? member(name).get<RemoteObject>() : member(name).get(index))),
     on_close: (heard) => void info.onClose((reason) => heard(reason ? explain(reason) : "the connection was closed")),
     close: () => {
       info.close().catch(() => undefined); // it ends either way; there is nobody left to tell
     },
   };
-}
-
-/** The object of an objref without index: `get` is also that of properties, so its type says less than the definition. */
-async function find(objref: DynamicMember): Promise<RemoteObject> {
-  return (await objref.get()) as unknown as RemoteObject;
 }
 
 /** Leaving the loop, or `signal`, closes the wire's connection or the pipe's endpoint. */
