@@ -6,9 +6,26 @@ import urllib.request
 import pytest
 
 from directions import DIRECTIONS, LEVELS, service_command
-from processes import BUILD, Background, free_port
+from matrix import Matrix
+from processes import BUILD, ROOT, Background, free_port
 
 TEST_DEADLINE = 120.0  # seconds; beyond it the run is ended with all stacks printed
+
+
+matrix = Matrix()
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_makereport(item, call):
+    report = (yield).get_result()
+    params = item.callspec.params if hasattr(item, "callspec") else {}
+    if "scenario" in params and (report.when == "call" or report.failed):
+        direction, level = params["link"]
+        matrix.note(params["scenario"].name, direction.name, level, report.passed)
+
+
+def pytest_sessionfinish():
+    matrix.write(ROOT / "build" / "test-logs" / "interop-matrix.md")
 
 
 @pytest.fixture(autouse=True)
