@@ -149,6 +149,46 @@ class AsyncObject {
     return connection_->send_pipe(path_, pipe, index, packet);
   }
 
+  /// Calls a generator function; completes with the generator's index as int32, which the three below take.
+  template <class Token = boost::asio::use_awaitable_t<>>
+  auto open_generator(std::string_view function, std::vector<Value> arguments = {}, Token&& token = {}) const {
+    return request<&ClientConnection::open_generator>(token, std::string(function), std::move(arguments));
+  }
+  /// Completes with the next value; behind the last one a ClientException with stop_iteration.
+  template <class Token = boost::asio::use_awaitable_t<>>
+  auto next_generator(std::string_view function, std::int32_t index, std::optional<Value> parameter = {},
+                      Token&& token = {}) const {
+    return request<&ClientConnection::next_generator>(token, std::string(function), index, std::move(parameter));
+  }
+  template <class Token = boost::asio::use_awaitable_t<>>
+  auto close_generator(std::string_view function, std::int32_t index, Token&& token = {}) const {
+    return request<&ClientConnection::close_generator>(token, std::string(function), index);
+  }
+  template <class Token = boost::asio::use_awaitable_t<>>
+  auto abort_generator(std::string_view function, std::int32_t index, Token&& token = {}) const {
+    return request<&ClientConnection::abort_generator>(token, std::string(function), index);
+  }
+
+  /// Completes with a uint64 array: one number a dimension.
+  template <class Token = boost::asio::use_awaitable_t<>>
+  auto memory_dimensions(std::string_view memory, Token&& token = {}) const {
+    return request<&ClientConnection::get_memory_dimensions>(token, std::string(memory));
+  }
+  /// Position and count in items, one number a dimension; completes with the items.
+  template <class Token = boost::asio::use_awaitable_t<>>
+  auto read_memory(std::string_view memory, MemoryShape position, MemoryShape count, Token&& token = {}) const {
+    return request<&ClientConnection::read_memory>(token, std::string(memory),
+                                                   MemoryRange{std::move(position), std::move(count)});
+  }
+  template <class Token = boost::asio::use_awaitable_t<>>
+  auto write_memory(std::string_view memory, MemoryShape position, Value items, Token&& token = {}) const {
+    return request<&ClientConnection::write_memory>(token, std::string(memory), std::move(position), std::move(items));
+  }
+
+  /// What the service gets when it calls this callback; see ClientConnection.
+  void on_callback(std::string_view callback, ClientConnection::CallbackHandler handler) const {
+    connection_->on_callback(path_, callback, std::move(handler));
+  }
   void on_event(std::string_view event, ClientConnection::EventHandler handler) const {
     connection_->on_event(path_, event, std::move(handler));
   }

@@ -30,6 +30,10 @@ object Arm
     objref Tool{string} tools
     wire double torque
     pipe double samples
+    function int32{generator} count(int32 from)
+    memory uint8[] buffer
+    callback double ask(string question)
+    function void wonder()
 end
 )";
 
@@ -48,6 +52,20 @@ void add_arm(Node& node) {
     tool->property("name").get([name = std::string(index)] { return name; });
     return tool;
   });
+  service->generator("count", [](std::int32_t from) {
+    return [next = from, end = from + 2]() mutable -> std::optional<std::int32_t> {
+      if (next == end) return std::nullopt;
+      return next++;
+    };
+  });
+  auto buffer = std::make_shared<NumberMemory<std::uint8_t>>();
+  buffer->dimensions = {4};
+  buffer->items = {1, 2, 3, 4};
+  service->memory("buffer", buffer);
+  service->function("wonder", [arm] {
+    arm->call_callback(arm->current_client(), "ask", {Value("how much?")},
+                       [arm](const Result<Value>& answer) { arm->set_wire("torque", *answer->to<double>()); });
+  });
   service->on_wire("torque", [arm](double value) { arm->set_wire("torque", 2 * value); });
   node.add(service);
 }
@@ -57,7 +75,8 @@ asio::awaitable<void> use_everything(asio::io_context& io, std::string url, bool
   CHECK(arm.path() == "Arm");
   int bumps = 0;
   arm.on_event("bumped", [&](std::span<const Value>) { ++bumps; });
-  // No co_await inside of CHECK: it repeats its expression in a condition that is never evaluated, and GCC 12 awaits it.
+  // No co_await inside of CHECK: it repeats its expression in a condition that is never evaluated, and GCC 12 awaits
+  // it.
   const auto sum = co_await arm.call("add", 1.5, 2.25);
   CHECK(*sum.to<double>() == 3.75);
   CHECK(bumps == 1);
@@ -87,6 +106,28 @@ asio::awaitable<void> use_everything(asio::io_context& io, std::string url, bool
   REQUIRE(arm.send_wire("torque", 4.0));
   co_await received.async_wait(asio::as_tuple(asio::use_awaitable));
   co_await arm.disconnect_wire("torque");
+
+  const auto opened = co_await arm.open_generator("count", std::vector<Value>(1, std::int32_t{5}));
+  const auto index = *opened.to<std::int32_t>();
+  const auto first = co_await arm.next_generator("count", index);
+  CHECK(*first.to<std::int32_t>() == 5);
+  co_await arm.close_generator("count", index);
+
+  const auto items = co_await arm.read_memory("buffer", MemoryShape(1, 1), MemoryShape(1, 2));
+  CHECK(items == Value(std::vector<std::uint8_t>{2, 3}));
+  co_await arm.write_memory("buffer", MemoryShape(1, 3), Value(std::vector<std::uint8_t>(1, 9)));
+  const auto last = co_await arm.read_memory("buffer", MemoryShape(1, 3), MemoryShape(1, 1));
+  CHECK(last == Value(std::vector<std::uint8_t>(1, 9)));
+
+  arm.on_callback("ask", [](std::span<const Value> question) -> Result<Value> {
+    CHECK(question[0].to_text().value() == "how much?");
+    return Value(12.5);
+  });
+  co_await arm.call("wonder");
+  for (double told = 0; told != 12.5;) {
+    const auto torque = co_await arm.peek_in("torque");
+    told = *torque.to<double>();
+  }
   arm.connection()->disconnect();
   is_done = true;
 }
