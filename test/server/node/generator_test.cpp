@@ -51,15 +51,6 @@ std::shared_ptr<Service> make_scanner(std::vector<std::string>& log) {
   return scanner;
 }
 
-std::string refusal(const std::function<void()>& work) {
-  try {
-    work();
-  } catch (const std::invalid_argument& refused) {
-    return refused.what();
-  }
-  return "not refused";
-}
-
 }  // namespace
 
 TEST_CASE("a generator is read by range-for, and step by step") {

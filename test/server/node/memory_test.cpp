@@ -36,15 +36,6 @@ std::shared_ptr<Service> make_store() {
   return Service::from_text({definition}, "Store", "Store");
 }
 
-std::string refusal(const std::function<void()>& work) {
-  try {
-    work();
-  } catch (const std::invalid_argument& refused) {
-    return refused.what();
-  }
-  return "not refused";
-}
-
 }  // namespace
 
 TEST_CASE("containers of the service are read and written in parts") {

@@ -4,6 +4,7 @@
 #include <exception>
 #include <functional>
 #include <future>
+#include <stdexcept>
 #include <string>
 #include <thread>
 
@@ -58,6 +59,17 @@ Error error_of(F&& work) {
     return exception.error();
   }
   return {ErrorCode::none, "no exception"};
+}
+
+/// The text of the std::invalid_argument that `work` throws.
+template <class F>
+std::string refusal(F&& work) {
+  try {
+    work();
+  } catch (const std::invalid_argument& refused) {
+    return refused.what();
+  }
+  return "not refused";
 }
 
 }  // namespace rr

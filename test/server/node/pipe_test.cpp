@@ -54,15 +54,6 @@ struct Belt {
 
 using Log = std::vector<std::string>;
 
-std::string refusal(const std::function<void()>& work) {
-  try {
-    work();
-  } catch (const std::invalid_argument& refused) {
-    return refused.what();
-  }
-  return "not refused";
-}
-
 }  // namespace
 
 TEST_CASE("a client's packets reach the handler with their endpoint, and are answered there") {

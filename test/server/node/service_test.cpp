@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 
 #include "server/node/node.hpp"
+#include "test/server/node/node_fixture.hpp"
 
 using namespace rr;
 using Catch::Matchers::Contains;
@@ -47,15 +48,6 @@ end
 
 std::shared_ptr<Service> make_lamp() {
   return Service::from_text({definition}, "lamp", "Lamp");
-}
-
-std::string refusal(const std::function<void()>& work) {
-  try {
-    work();
-  } catch (const std::invalid_argument& refused) {
-    return refused.what();
-  }
-  return "not refused";
 }
 
 std::shared_ptr<Service> make_complete_lamp() {
