@@ -11,6 +11,9 @@ namespace rr {
 /// The token that marks messages and entries of wire packets.
 inline constexpr std::string_view unreliable_metadata = "unreliable\n";
 
+/// Above this many bytes waiting for the stream, wire values are replaced instead of queued.
+inline constexpr std::size_t wire_high_mark = 64 * 1024;
+
 /// Adds `packettime` and `packet` to the last entry.
 Result<> write_wire_value(Message& message, const Value& value, TimeSpec time, const MemberDefinition& member,
                           const TypeRegistry& types);

@@ -16,8 +16,6 @@ constexpr std::chrono::seconds keep_alive_period{60};
 constexpr std::chrono::milliseconds disconnect_timeout{500};
 /// For so long a connect reply that comes too late for its request still closes the pipe endpoint that it names.
 constexpr std::chrono::seconds late_reply_period{60};
-/// Above this many bytes waiting for the stream, wire values are replaced instead of queued.
-constexpr std::size_t wire_high_mark = 64 * 1024;
 
 bool is_reply(EntryType type) {
   const auto code = static_cast<std::uint16_t>(type);

@@ -14,8 +14,6 @@ namespace {
 
 /// A closed session's last reply gets out before the connection closes.
 constexpr std::chrono::milliseconds linger{100};
-/// Above this many bytes waiting for the stream, wire values are replaced instead of queued.
-constexpr std::size_t wire_high_mark = 64 * 1024;
 
 bool is_request(EntryType type) {
   return static_cast<std::uint16_t>(type) % 2 == 1;

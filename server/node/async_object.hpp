@@ -18,7 +18,6 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <exception>
-#include <initializer_list>
 #include <memory>
 #include <optional>
 #include <string>

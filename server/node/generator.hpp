@@ -104,7 +104,7 @@ template <class C, class R, class... P>
 struct StepSignature<R (C::*)(P...) const> : StepSignature<R (C::*)(P...)> {};
 
 template <class R, class... Args, class F>
-GeneratorHandler make_typed_generator_handler(F function) {
+GeneratorHandler make_typed_generator_handler(SignatureTag<R, Args...>, F function) {
   GeneratorHandler handler;
   handler.parameters = {handler_type<Args>()...};
   constexpr bool is_generator = std::is_same_v<R, Generator>;
@@ -126,28 +126,12 @@ GeneratorHandler make_typed_generator_handler(F function) {
   return handler;
 }
 
-template <class F>
-struct OpenSignature : OpenSignature<decltype(&F::operator())> {};
-template <class R, class... Args>
-struct OpenSignature<R (*)(Args...)> {
-  template <class F>
-  static GeneratorHandler make(F function) {
-    return make_typed_generator_handler<R, Args...>(std::move(function));
-  }
-};
-template <class R, class... Args>
-struct OpenSignature<R(Args...)> : OpenSignature<R (*)(Args...)> {};
-template <class C, class R, class... Args>
-struct OpenSignature<R (C::*)(Args...)> : OpenSignature<R (*)(Args...)> {};
-template <class C, class R, class... Args>
-struct OpenSignature<R (C::*)(Args...) const> : OpenSignature<R (*)(Args...)> {};
-
 }  // namespace detail
 
 /// Wraps a callable whose operator() is not overloaded, and that returns such a callable or an rr::Generator.
 template <class F>
 GeneratorHandler make_generator_handler(F&& function) {
-  return detail::OpenSignature<std::remove_cvref_t<F>>::make(std::forward<F>(function));
+  return detail::make_typed_generator_handler(detail::SignatureTagOf<F>{}, std::forward<F>(function));
 }
 
 /// One that was put together by hand.

@@ -119,8 +119,29 @@ auto with_arguments(std::span<const Value> arguments, std::index_sequence<Index.
   return use(std::move(*std::get<Index>(converted))...);
 }
 
+/// Return and parameter types of a callable, as an argument to deduce them from.
+template <class R, class... Args>
+struct SignatureTag {};
+
+template <class F>
+struct SignatureOf : SignatureOf<decltype(&F::operator())> {};
+template <class R, class... Args>
+struct SignatureOf<R(Args...)> {
+  using Tag = SignatureTag<R, Args...>;
+};
+template <class R, class... Args>
+struct SignatureOf<R (*)(Args...)> : SignatureOf<R(Args...)> {};
+template <class C, class R, class... Args>
+struct SignatureOf<R (C::*)(Args...)> : SignatureOf<R(Args...)> {};
+template <class C, class R, class... Args>
+struct SignatureOf<R (C::*)(Args...) const> : SignatureOf<R(Args...)> {};
+
+/// Of a callable whose operator() is not overloaded.
+template <class F>
+using SignatureTagOf = typename SignatureOf<std::remove_cvref_t<F>>::Tag;
+
 template <class R, class... Args, class F>
-Handler make_typed_handler(F function) {
+Handler make_typed_handler(SignatureTag<R, Args...>, F function) {
   Handler handler;
   handler.parameters = {handler_type<Args>()...};
   handler.result = handler_type<R>();
@@ -138,28 +159,12 @@ Handler make_typed_handler(F function) {
   return handler;
 }
 
-template <class F>
-struct Signature : Signature<decltype(&F::operator())> {};
-template <class R, class... Args>
-struct Signature<R (*)(Args...)> {
-  template <class F>
-  static Handler make(F function) {
-    return make_typed_handler<R, Args...>(std::move(function));
-  }
-};
-template <class R, class... Args>
-struct Signature<R(Args...)> : Signature<R (*)(Args...)> {};
-template <class C, class R, class... Args>
-struct Signature<R (C::*)(Args...)> : Signature<R (*)(Args...)> {};
-template <class C, class R, class... Args>
-struct Signature<R (C::*)(Args...) const> : Signature<R (*)(Args...)> {};
-
 }  // namespace detail
 
 /// Wraps a callable whose operator() is not overloaded.
 template <class F>
 Handler make_handler(F&& function) {
-  return detail::Signature<std::remove_cvref_t<F>>::make(std::forward<F>(function));
+  return detail::make_typed_handler(detail::SignatureTagOf<F>{}, std::forward<F>(function));
 }
 
 /// One that was put together by hand.
