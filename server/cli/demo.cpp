@@ -54,7 +54,7 @@ std::string find_program(std::string_view name) {
 bool is_port_free(std::uint16_t port) {
   asio::io_context io;
   asio::ip::tcp::acceptor acceptor(io);
-  error_code error;
+  rr::error_code error;
   acceptor.open(asio::ip::tcp::v4(), error);
   acceptor.set_option(asio::socket_base::reuse_address(true), error);
   acceptor.bind({asio::ip::make_address("127.0.0.1"), port}, error);
@@ -107,8 +107,8 @@ void stop_devices(std::vector<DemoDevice>& devices) {
 }
 
 /// Prints the address once all devices answer; says so if they don't.
-awaitable<void> announce(Gateway& gateway, std::uint16_t port) {
-  asio::steady_timer pause(gateway.watchdog().executor());
+rr::awaitable<void> announce(Gateway& gateway, std::uint16_t port) {
+  asio::steady_timer pause(co_await asio::this_coro::executor);
   const auto is_online = [](const auto& device) { return device->state() == DeviceState::online; };
   const auto& devices = gateway.devices().all();
   const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(20);
@@ -176,7 +176,7 @@ int run_demo(Arguments arguments) {
 
   std::optional<asio::signal_set> deaths;
   std::function<void()> wait_for_death = [&] {
-    deaths->async_wait([&](const error_code& error, int) {
+    deaths->async_wait([&](const rr::error_code& error, int) {
       if (error) return;
       note_dead_devices(devices);
       wait_for_death();

@@ -5,7 +5,7 @@
 
 namespace rrgate {
 
-awaitable<rr::Result<std::unique_ptr<Boarding>>> board(Device& device) {
+rr::awaitable<rr::Result<std::unique_ptr<Boarding>>> board(Device& device) {
   const auto label = "device " + rr::quoted(device.config().name);
   auto seat = device.take_seat();
   if (!seat)
@@ -18,18 +18,18 @@ awaitable<rr::Result<std::unique_ptr<Boarding>>> board(Device& device) {
   co_return boarding;
 }
 
-awaitable<void> relay_client(Gateway& gateway, Connection& connection, ByteStream& client, Boarding& boarding) {
+rr::awaitable<void> relay_client(Gateway& gateway, Connection& connection, rr::ByteStream& client, Boarding& boarding) {
   const auto& limits = gateway.config().limits;
-  Relay relay(client, *boarding.stream, {limits.max_message_size, limits.outbox_bytes}, gateway.watchdog());
+  Relay relay(client, *boarding.stream, {limits.max_message_size, limits.outbox_bytes});
   connection.is_relay = true;
-  connection.stop = [&relay](EndReason reason) { relay.stop(std::move(reason)); };
+  connection.stop = [&relay](rr::EndReason reason) { relay.stop(std::move(reason)); };
   const auto& name = boarding.device.config().name;
   log(LogLevel::info, "client connected", {{"device", name}, {"peer", client.peer()}});
 
   const auto reason = co_await relay.run();
 
   connection.is_relay = false;
-  connection.stop = [&client](const EndReason&) { client.close(); };
+  connection.stop = [&client](const rr::EndReason&) { client.close(); };
   // A device that ends a connection may be ending altogether: find out now rather than at the next look.
   if (!gateway.is_stopping() && (reason.code == 1011 || reason.text.rfind("device", 0) == 0))
     boarding.device.note_trouble();

@@ -13,13 +13,13 @@ namespace rrgate {
 struct Boarding {
   Device& device;
   Device::Seat seat;
-  std::unique_ptr<ByteStream> stream;
+  std::unique_ptr<rr::ByteStream> stream;
 };
 
 /// Errors   connection_error: the device is full or can't be reached; the text is for the client.
-awaitable<rr::Result<std::unique_ptr<Boarding>>> board(Device& device);
+rr::awaitable<rr::Result<std::unique_ptr<Boarding>>> board(Device& device);
 
 /// Relays until one side ends; ends both. `client` is at the start of its Robot Raconteur stream.
-awaitable<void> relay_client(Gateway& gateway, Connection& connection, ByteStream& client, Boarding& boarding);
+rr::awaitable<void> relay_client(Gateway& gateway, Connection& connection, rr::ByteStream& client, Boarding& boarding);
 
 }  // namespace rrgate

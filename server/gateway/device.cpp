@@ -35,15 +35,14 @@ std::string_view to_string(DeviceState state) {
   return "unknown";
 }
 
-Device::Device(const asio::any_io_executor& executor, DeviceConfig config, const Config& whole, Watchdog& watchdog)
+Device::Device(const asio::any_io_executor& executor, DeviceConfig config, const Config& whole)
     : config_(std::move(config)),
       dial_options_{whole.timeouts.connect, whole.timeouts.send_stall},
       retry_(whole.retry),
-      watchdog_(watchdog),
       wake_(executor) {}
 
-awaitable<rr::Result<std::unique_ptr<ByteStream>>> Device::connect() {
-  auto stream = co_await dial(config_.url, dial_options_, watchdog_);
+rr::awaitable<rr::Result<std::unique_ptr<rr::ByteStream>>> Device::connect() {
+  auto stream = co_await rr::dial(config_.url, dial_options_);
   // News either way: it was thought online and can't be reached, or it is back before the next look was due.
   if (stream.has_value() != (state_ == DeviceState::online)) look_again();
   co_return stream;
@@ -54,11 +53,11 @@ std::optional<Device::Seat> Device::take_seat() {
   return Seat(*this);
 }
 
-awaitable<void> Device::watch() {
+rr::awaitable<void> Device::watch() {
   auto backoff = retry_.min;
   while (!is_stopping_) {
     looks_again_ = false;
-    const auto result = co_await probe(config_.url, dial_options_, watchdog_);
+    const auto result = co_await probe(config_.url, dial_options_);
     if (is_stopping_) break;
     note(result);
     const auto looked = std::chrono::steady_clock::now();
@@ -102,10 +101,8 @@ void Device::note(const rr::Result<ProbeResult>& result) {
   last_error_ = result.error().message;
 }
 
-DeviceRegistry::DeviceRegistry(const asio::any_io_executor& executor, const Config& config, Watchdog& watchdog)
-    : executor_(executor) {
-  for (const auto& device : config.devices)
-    devices_.push_back(std::make_unique<Device>(executor, device, config, watchdog));
+DeviceRegistry::DeviceRegistry(const asio::any_io_executor& executor, const Config& config) : executor_(executor) {
+  for (const auto& device : config.devices) devices_.push_back(std::make_unique<Device>(executor, device, config));
 }
 
 void DeviceRegistry::start() {

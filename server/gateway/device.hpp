@@ -20,7 +20,7 @@ std::string_view to_string(DeviceState state);
 /// One configured device. Looks at it from time to time; connects clients to it.
 class Device {
  public:
-  Device(const boost::asio::any_io_executor& executor, DeviceConfig config, const Config& whole, Watchdog& watchdog);
+  Device(const boost::asio::any_io_executor& executor, DeviceConfig config, const Config& whole);
 
   const DeviceConfig& config() const { return config_; }
   DeviceState state() const { return state_; }
@@ -31,7 +31,7 @@ class Device {
   std::size_t clients() const { return clients_; }
 
   /// A connection for one client. A failure makes the device be looked at again soon.
-  awaitable<rr::Result<std::unique_ptr<ByteStream>>> connect();
+  rr::awaitable<rr::Result<std::unique_ptr<rr::ByteStream>>> connect();
   /// A client's connection to the device broke: look at it again soon.
   void note_trouble() { look_again(); }
 
@@ -52,7 +52,7 @@ class Device {
   std::optional<Seat> take_seat();
 
   /// Probes until stop().
-  awaitable<void> watch();
+  rr::awaitable<void> watch();
   void stop();
 
  private:
@@ -60,9 +60,8 @@ class Device {
   void note(const rr::Result<ProbeResult>& result);
 
   DeviceConfig config_;
-  DialOptions dial_options_;
+  rr::DialOptions dial_options_;
   Retry retry_;
-  Watchdog& watchdog_;
   DeviceState state_ = DeviceState::connecting;
   std::string last_error_;
   std::optional<ProbeResult> identity_;
@@ -74,7 +73,7 @@ class Device {
 
 class DeviceRegistry {
  public:
-  DeviceRegistry(const boost::asio::any_io_executor& executor, const Config& config, Watchdog& watchdog);
+  DeviceRegistry(const boost::asio::any_io_executor& executor, const Config& config);
 
   void start();
   void stop();

@@ -7,6 +7,7 @@
 #include "server/gateway/http_client.hpp"
 #include "server/gateway/native_client.hpp"
 #include "server/log/log.hpp"
+#include "server/transport/watchdog.hpp"
 
 namespace rrgate {
 
@@ -25,12 +26,12 @@ Protocol detect_protocol(rr::ByteSpan first_bytes) {
   return text.size() == 4 ? Protocol::http : Protocol::undecided;
 }
 
-awaitable<void> serve_connection(Gateway& gateway, std::unique_ptr<TcpStream> stream, Admission::Ticket) {
+rr::awaitable<void> serve_connection(Gateway& gateway, std::unique_ptr<rr::TcpStream> stream, Admission::Ticket) {
   auto& tcp = *stream;
   Connection connection;
-  connection.stop = [&tcp](const EndReason&) { tcp.close(); };
+  connection.stop = [&tcp](const rr::EndReason&) { tcp.close(); };
   gateway.add(connection);
-  Deadline limit(gateway.watchdog(), [&tcp] { tcp.close(); });
+  rr::Deadline limit(tcp.executor(), [&tcp] { tcp.close(); });
   limit.arm(gateway.config().limits.header_timeout);
 
   std::array<std::uint8_t, 4096> first{};
@@ -66,7 +67,7 @@ awaitable<void> serve_connection(Gateway& gateway, std::unique_ptr<TcpStream> st
       const auto line = rr::as_bytes("HTTP/1.1 404 File Not Found\r\n");
       const std::span<const rr::ByteSpan> slices(&line, 1);
       co_await tcp.write(slices);
-      co_await tcp.end(no_reason);
+      co_await tcp.end(rr::no_reason);
     }
   }
 }

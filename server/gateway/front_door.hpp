@@ -24,6 +24,6 @@ enum class Protocol {
 Protocol detect_protocol(rr::ByteSpan first_bytes);
 
 /// Serves one accepted connection to its end.
-awaitable<void> serve_connection(Gateway& gateway, std::unique_ptr<TcpStream> stream, Admission::Ticket ticket);
+rr::awaitable<void> serve_connection(Gateway& gateway, std::unique_ptr<rr::TcpStream> stream, Admission::Ticket ticket);
 
 }  // namespace rrgate

@@ -34,8 +34,7 @@ rr::NodeId random_node_id() {
 Gateway::Gateway(asio::io_context& io, Config config)
     : io_(io),
       config_(std::move(config)),
-      watchdog_(io.get_executor()),
-      devices_(io.get_executor(), config_, watchdog_),
+      devices_(io.get_executor(), config_),
       admission_(config_.limits.clients, config_.limits.clients_per_address),
       router_(make_routes(*this)),
       node_id_(random_node_id()),
@@ -44,7 +43,7 @@ Gateway::Gateway(asio::io_context& io, Config config)
 rr::Result<std::vector<rr::HostPort>> Gateway::start() {
   std::vector<rr::HostPort> bound;
   for (const auto& address : config_.listen) {
-    auto listener = std::make_unique<TcpListener>(io_.get_executor());
+    auto listener = std::make_unique<rr::TcpListener>(io_.get_executor());
     auto opened = listener->open(address);
     if (!opened) {
       listeners_.clear();
@@ -54,13 +53,14 @@ rr::Result<std::vector<rr::HostPort>> Gateway::start() {
     listeners_.push_back(std::move(listener));
   }
   for (const auto& listener : listeners_)
-    listener->start([this](asio::ip::tcp::socket socket) { accept(std::move(socket)); });
+    listener->start([this](asio::ip::tcp::socket socket) { accept(std::move(socket)); },
+                    [](const std::string& problem) { log(LogLevel::error, problem, {}); });
   devices_.start();
   return bound;
 }
 
 void Gateway::accept(asio::ip::tcp::socket socket) {
-  error_code error;
+  rr::error_code error;
   const auto peer = socket.remote_endpoint(error);
   if (error) return;  // gone already
   auto ticket = admission_.admit(peer.address());
@@ -70,7 +70,7 @@ void Gateway::accept(asio::ip::tcp::socket socket) {
     return;
   }
   ++open_connections_;
-  auto stream = std::make_unique<TcpStream>(std::move(socket), watchdog_, config_.timeouts.send_stall);
+  auto stream = std::make_unique<rr::TcpStream>(std::move(socket), config_.timeouts.send_stall);
   auto serve = serve_connection(*this, std::move(stream), std::move(*ticket));
   asio::co_spawn(io_, std::move(serve), [this](std::exception_ptr failure) {
     --open_connections_;
@@ -102,26 +102,26 @@ bool Gateway::has_relay() const {
   return std::any_of(connections_.begin(), connections_.end(), [](const auto& each) { return each.is_relay; });
 }
 
-void Gateway::end_all(const EndReason& reason) {
+void Gateway::end_all(const rr::EndReason& reason) {
   for (auto it = connections_.begin(); it != connections_.end();) {
     auto& connection = *it++;
     connection.stop(reason);
   }
 }
 
-awaitable<void> Gateway::drain() {
+rr::awaitable<void> Gateway::drain() {
   for (auto it = connections_.begin(); it != connections_.end();) {
     auto& connection = *it++;
     if (!connection.is_relay) connection.stop({1001, "the gateway is stopping"});
   }
   log(LogLevel::info, "stopping", {{"connections", open_connections_}, {"drain_ms", config_.timeouts.drain.count()}});
-  const auto wait_until = [this](std::chrono::steady_clock::time_point deadline) -> awaitable<void> {
+  const auto wait_until = [this](std::chrono::steady_clock::time_point deadline) -> rr::awaitable<void> {
     drained_.expires_at(deadline);
     co_await drained_.async_wait(asio::as_tuple(asio::use_awaitable));
   };
   auto deadline = std::chrono::steady_clock::now() + config_.timeouts.drain;
   while (has_relay() && !ends_at_once_ && std::chrono::steady_clock::now() < deadline) co_await wait_until(deadline);
-  const EndReason reason{1001, "the gateway is stopping"};
+  const rr::EndReason reason{1001, "the gateway is stopping"};
   end_all(reason);
   deadline = std::chrono::steady_clock::now() + last_wait;
   while (open_connections_ > 0 && std::chrono::steady_clock::now() < deadline) co_await wait_until(deadline);

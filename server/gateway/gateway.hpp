@@ -12,14 +12,13 @@
 #include "server/gateway/device.hpp"
 #include "server/http/router.hpp"
 #include "server/transport/tcp.hpp"
-#include "server/transport/watchdog.hpp"
 
 namespace rrgate {
 
 /// One open connection as the gateway knows it, so that it can be asked to end.
 struct Connection : boost::intrusive::list_base_hook<boost::intrusive::link_mode<boost::intrusive::auto_unlink>> {
   /// Ends it soon.
-  std::function<void(EndReason)> stop;
+  std::function<void(rr::EndReason)> stop;
   /// Whether it may go on for a while when the gateway stops: it carries a client's session.
   bool is_relay = false;
 };
@@ -44,7 +43,6 @@ class Gateway {
 
   // What connections need.
   const Config& config() const { return config_; }
-  Watchdog& watchdog() { return watchdog_; }
   DeviceRegistry& devices() { return devices_; }
   const Router& router() const { return router_; }
   /// Our own node id, for answers to native clients that no device takes.
@@ -53,18 +51,17 @@ class Gateway {
 
  private:
   void accept(boost::asio::ip::tcp::socket socket);
-  awaitable<void> drain();
+  rr::awaitable<void> drain();
   bool has_relay() const;
-  void end_all(const EndReason& reason);
+  void end_all(const rr::EndReason& reason);
 
   boost::asio::io_context& io_;
   Config config_;
-  Watchdog watchdog_;
   DeviceRegistry devices_;
   Admission admission_;
   Router router_;
   rr::NodeId node_id_;
-  std::vector<std::unique_ptr<TcpListener>> listeners_;
+  std::vector<std::unique_ptr<rr::TcpListener>> listeners_;
   boost::intrusive::list<Connection, boost::intrusive::constant_time_size<false>> connections_;
   std::size_t open_connections_ = 0;
   bool is_stopping_ = false;

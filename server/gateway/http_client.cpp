@@ -12,13 +12,13 @@ namespace {
 
 constexpr std::string_view devices_prefix = "/devices/";
 
-awaitable<error_code> write_text(ByteStream& stream, std::string_view text) {
+rr::awaitable<rr::error_code> write_text(rr::ByteStream& stream, std::string_view text) {
   const auto slice = rr::as_bytes(text);
   const std::span<const rr::ByteSpan> slices(&slice, 1);
   co_return co_await stream.write(slices);
 }
 
-awaitable<error_code> write_response(ByteStream& stream, const Request* request, const Response& response) {
+rr::awaitable<rr::error_code> write_response(rr::ByteStream& stream, const Request* request, const Response& response) {
   const bool keeps_alive = request && request->message.keep_alive() && !response.closes;
   const auto head = format_response_head(response, keeps_alive, request && request->message.version() == 10 ? 0 : 1);
   const bool has_body = response.body && !(request && request->message.method() == http::verb::head);
@@ -56,14 +56,14 @@ rr::Result<Device*> find_device(Gateway& gateway, const Request& request) {
 }
 
 /// Carries an upgrade through. The stream is used up.
-awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, std::unique_ptr<TcpStream> stream,
-                                const Request& request, rr::ByteSpan unread) {
+rr::awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, std::unique_ptr<rr::TcpStream> stream,
+                                    const Request& request, rr::ByteSpan unread) {
   auto& tcp = *stream;
-  const auto refuse = [&tcp, &request](const Response& refusal) -> awaitable<void> {
+  const auto refuse = [&tcp, &request](const Response& refusal) -> rr::awaitable<void> {
     auto response = refusal;
     response.closes = true;
     co_await write_response(tcp, &request, response);
-    co_await tcp.end(no_reason);
+    co_await tcp.end(rr::no_reason);
   };
   if (auto refusal = refuse_upgrade(request, gateway.config().allowed_origins)) {
     log(LogLevel::info, "upgrade refused",
@@ -89,10 +89,10 @@ awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, std::u
   const auto accepted = format_upgrade_response(request);
   if (co_await write_text(tcp, accepted)) co_return;
   tcp.put_back(unread);
-  WebSocketStream socket(std::move(stream), gateway.watchdog(), takes_close);
+  rr::WebSocketStream socket(std::move(stream), takes_close);
   if (!boarding) {  // a page can't read the status of a refused upgrade, but it can read why a WebSocket closes
     log(LogLevel::info, "client refused", {{"peer", socket.peer()}, {"error", boarding.error().message}});
-    const EndReason reason{1013, boarding.error().message};
+    const rr::EndReason reason{1013, boarding.error().message};
     co_await socket.end(reason);
     co_return;
   }
@@ -101,10 +101,10 @@ awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, std::u
 
 }  // namespace
 
-awaitable<void> serve_http_client(Gateway& gateway, Connection& connection, std::unique_ptr<TcpStream> stream) {
+rr::awaitable<void> serve_http_client(Gateway& gateway, Connection& connection, std::unique_ptr<rr::TcpStream> stream) {
   const auto& config = gateway.config();
   const RequestLimits limits{config.limits.header_bytes, config.limits.header_timeout, config.timeouts.idle};
-  RequestReader reader(*stream, limits, gateway.watchdog());
+  RequestReader reader(*stream, limits);
   for (;;) {
     const auto read = co_await reader.next();
     if (!read.request && read.refusal == 0) break;
@@ -113,7 +113,7 @@ awaitable<void> serve_http_client(Gateway& gateway, Connection& connection, std:
           {{"peer", stream->peer()}, {"status", read.refusal}, {"detail", read.detail}});
       const auto response = problem_response(read.refusal, read.detail);
       co_await write_response(*stream, nullptr, response);
-      co_await stream->end(no_reason);
+      co_await stream->end(rr::no_reason);
       break;
     }
     const auto& request = *read.request;
@@ -127,7 +127,7 @@ awaitable<void> serve_http_client(Gateway& gateway, Connection& connection, std:
     const bool goes_on = request.message.keep_alive() && !response.closes;
     if (co_await write_response(*stream, &request, response)) break;
     if (!goes_on) {
-      co_await stream->end(no_reason);
+      co_await stream->end(rr::no_reason);
       break;
     }
   }

@@ -6,6 +6,7 @@
 #include "core/wire/frame_scanner.hpp"
 #include "server/gateway/client_relay.hpp"
 #include "server/log/log.hpp"
+#include "server/transport/watchdog.hpp"
 
 namespace rrgate {
 
@@ -15,7 +16,7 @@ namespace {
 constexpr std::size_t largest_first_message = 512 * 1024;
 
 /// Reads one message and puts all that was read back, for the relay. Errors: as FrameScanner, or the connection ended.
-awaitable<rr::Result<rr::Bytes>> read_first_message(TcpStream& stream, std::size_t limit) {
+rr::awaitable<rr::Result<rr::Bytes>> read_first_message(rr::TcpStream& stream, std::size_t limit) {
   rr::FrameScanner scanner(limit);
   rr::Bytes seen;
   rr::Bytes buffer(4096);
@@ -64,9 +65,10 @@ rr::Bytes make_refusal(const rr::Message& request, const rr::NodeId& own_id, con
   return encoded.to_bytes();
 }
 
-awaitable<void> serve_native_client(Gateway& gateway, Connection& connection, std::unique_ptr<TcpStream> stream) {
+rr::awaitable<void> serve_native_client(Gateway& gateway, Connection& connection,
+                                        std::unique_ptr<rr::TcpStream> stream) {
   auto& client = *stream;
-  Deadline limit(gateway.watchdog(), [&client] { client.close(); });
+  rr::Deadline limit(client.executor(), [&client] { client.close(); });
   limit.arm(gateway.config().limits.header_timeout);
   const auto bytes =
       co_await read_first_message(client, std::min(largest_first_message, gateway.config().limits.max_message_size));
@@ -97,7 +99,7 @@ awaitable<void> serve_native_client(Gateway& gateway, Connection& connection, st
   const rr::ByteSpan slice(reply);
   const std::span<const rr::ByteSpan> slices(&slice, 1);
   co_await client.write(slices);
-  co_await client.end(no_reason);
+  co_await client.end(rr::no_reason);
 }
 
 }  // namespace rrgate

@@ -4,6 +4,7 @@
 #include "core/session/service_index.hpp"
 #include "core/support/random.hpp"
 #include "server/node/clocks.hpp"
+#include "server/transport/watchdog.hpp"
 
 namespace rrgate {
 
@@ -46,11 +47,11 @@ rr::Error lost(std::string what) {
 
 }  // namespace
 
-awaitable<rr::Result<ProbeResult>> probe(rr::ConnectionUrl url, DialOptions options, Watchdog& watchdog) {
-  auto dialed = co_await dial(url, options, watchdog);
+rr::awaitable<rr::Result<ProbeResult>> probe(rr::ConnectionUrl url, rr::DialOptions options) {
+  auto dialed = co_await rr::dial(url, options);
   if (!dialed) co_return dialed.error();
-  ByteStream& stream = **dialed;
-  Deadline limit(watchdog, [&stream] { stream.close(); });
+  rr::ByteStream& stream = **dialed;
+  rr::Deadline limit(stream.executor(), [&stream] { stream.close(); });
   limit.arm(options.timeout);
 
   rr::ClientSession session(index_options(url, options.timeout), rr::read_clocks());

@@ -26,6 +26,6 @@ struct ProbeResult {
 
 /// Connects to the service index, asks for the services, disconnects; all of it within options.timeout.
 /// Errors   connection_error: not reached, no or a wrong answer. node_not_found: another node than the URL names.
-awaitable<rr::Result<ProbeResult>> probe(rr::ConnectionUrl url, DialOptions options, Watchdog& watchdog);
+rr::awaitable<rr::Result<ProbeResult>> probe(rr::ConnectionUrl url, rr::DialOptions options);
 
 }  // namespace rrgate

@@ -20,19 +20,19 @@ constexpr std::chrono::milliseconds half_closed_time{1000};
 
 }  // namespace
 
-Relay::Relay(ByteStream& client, ByteStream& device, RelayOptions options, Watchdog& watchdog)
+Relay::Relay(rr::ByteStream& client, rr::ByteStream& device, RelayOptions options)
     : client_(client),
       device_(device),
       options_(options),
       to_device_{client, device, FrameGate(options.max_message_size), false},
       to_client_{device, client, FrameGate(options.max_message_size), true},
-      half_closed_limit_(watchdog,
+      half_closed_limit_(client.executor(),
                          [this] {
                            stop({1000, "the client has ended"});
                          }),
-      to_device_done_(watchdog.executor(), asio::steady_timer::time_point::max()) {}
+      to_device_done_(client.executor(), asio::steady_timer::time_point::max()) {}
 
-awaitable<EndReason> Relay::run() {
+rr::awaitable<rr::EndReason> Relay::run() {
   const auto executor = co_await asio::this_coro::executor;
   asio::co_spawn(executor, pump_to_device(), asio::detached);
   co_await pump(to_client_);
@@ -44,20 +44,20 @@ awaitable<EndReason> Relay::run() {
   co_return reason;
 }
 
-void Relay::stop(EndReason reason) {
+void Relay::stop(rr::EndReason reason) {
   if (end_reason_) return;
   end_reason_ = std::move(reason);
   device_.close();
   client_.cancel();
 }
 
-awaitable<void> Relay::pump_to_device() {
+rr::awaitable<void> Relay::pump_to_device() {
   co_await pump(to_device_);
   is_to_device_done_ = true;
   to_device_done_.cancel();
 }
 
-awaitable<void> Relay::pump(Direction& direction) {
+rr::awaitable<void> Relay::pump(Direction& direction) {
   // Not a vector: its pages are touched, and so become memory, only as far as they are used.
   const auto buffer = std::make_unique_for_overwrite<std::uint8_t[]>(options_.outbox_bytes);
   std::size_t held = 0;  // bytes of an incomplete message start, at the front
@@ -79,8 +79,8 @@ awaitable<void> Relay::pump(Direction& direction) {
     if (error) {
       const bool is_slow = error == asio::error::timed_out;
       stop(direction.is_from_device
-               ? EndReason{1013, is_slow ? "client too slow" : "client lost: " + error.message()}
-               : EndReason{1011, is_slow ? "device takes no data" : "device lost: " + error.message()});
+               ? rr::EndReason{1013, is_slow ? "client too slow" : "client lost: " + error.message()}
+               : rr::EndReason{1011, is_slow ? "device takes no data" : "device lost: " + error.message()});
       break;
     }
     direction.bytes += *passed;
@@ -89,9 +89,10 @@ awaitable<void> Relay::pump(Direction& direction) {
   }
 }
 
-void Relay::end_of(Direction& direction, error_code error) {
+void Relay::end_of(Direction& direction, rr::error_code error) {
   if (direction.is_from_device) {
-    stop(error ? EndReason{1011, "device lost: " + error.message()} : EndReason{1000, "device closed the connection"});
+    stop(error ? rr::EndReason{1011, "device lost: " + error.message()}
+               : rr::EndReason{1000, "device closed the connection"});
   } else if (error) {
     stop({1000, "client lost: " + error.message()});
   } else if (!end_reason_) {
@@ -100,7 +101,7 @@ void Relay::end_of(Direction& direction, error_code error) {
   }
 }
 
-EndReason Relay::broken_rule(const Direction& direction, const rr::Error& error) const {
+rr::EndReason Relay::broken_rule(const Direction& direction, const rr::Error& error) const {
   const std::uint16_t code = direction.gate.is_too_large() ? 1009 : direction.is_from_device ? 1011 : 1002;
   return {code, (direction.is_from_device ? "from the device: " : "from the client: ") + error.message};
 }

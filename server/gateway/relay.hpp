@@ -22,38 +22,38 @@ struct RelayOptions {
 /// Both streams outlive the relay. One relay, one run().
 class Relay {
  public:
-  Relay(ByteStream& client, ByteStream& device, RelayOptions options, Watchdog& watchdog);
+  Relay(rr::ByteStream& client, rr::ByteStream& device, RelayOptions options);
 
   /// Forwards until one side ends, fails, or breaks the rules. Ends both streams and says why.
-  awaitable<EndReason> run();
+  rr::awaitable<rr::EndReason> run();
 
   /// Makes run() end soon, with this reason for the client.
-  void stop(EndReason reason);
+  void stop(rr::EndReason reason);
 
   std::uint64_t bytes_to_device() const { return to_device_.bytes; }
   std::uint64_t bytes_to_client() const { return to_client_.bytes; }
 
  private:
   struct Direction {
-    ByteStream& from;
-    ByteStream& to;
+    rr::ByteStream& from;
+    rr::ByteStream& to;
     FrameGate gate;
     bool is_from_device;
     std::uint64_t bytes = 0;
   };
 
-  awaitable<void> pump_to_device();
-  awaitable<void> pump(Direction& direction);
-  void end_of(Direction& direction, error_code error);
-  EndReason broken_rule(const Direction& direction, const rr::Error& error) const;
+  rr::awaitable<void> pump_to_device();
+  rr::awaitable<void> pump(Direction& direction);
+  void end_of(Direction& direction, rr::error_code error);
+  rr::EndReason broken_rule(const Direction& direction, const rr::Error& error) const;
 
-  ByteStream& client_;
-  ByteStream& device_;
+  rr::ByteStream& client_;
+  rr::ByteStream& device_;
   RelayOptions options_;
   Direction to_device_;
   Direction to_client_;
-  Deadline half_closed_limit_;
-  std::optional<EndReason> end_reason_;
+  rr::Deadline half_closed_limit_;
+  std::optional<rr::EndReason> end_reason_;
   bool is_to_device_done_ = false;
   boost::asio::steady_timer to_device_done_;  ///< cancelled when that pump has ended
 };

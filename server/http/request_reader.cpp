@@ -22,8 +22,8 @@ ReadRequest refuse_for(const boost::beast::error_code& error, const RequestLimit
 
 }  // namespace
 
-RequestReader::RequestReader(ByteStream& stream, RequestLimits limits, Watchdog& watchdog)
-    : stream_(stream), limits_(limits), limit_(watchdog, [this] { stream_.cancel(); }) {}
+RequestReader::RequestReader(rr::ByteStream& stream, RequestLimits limits)
+    : stream_(stream), limits_(limits), limit_(stream.executor(), [this] { stream_.cancel(); }) {}
 
 /// Beast's own header_limit is a few bytes generous; ours counts every byte up to and with the empty line.
 bool RequestReader::is_header_too_long(std::size_t consumed) const {
@@ -32,7 +32,7 @@ bool RequestReader::is_header_too_long(std::size_t consumed) const {
   return consumed + (end == std::string_view::npos ? text.size() : end + 4) > limits_.header_bytes;
 }
 
-awaitable<ReadRequest> RequestReader::next() {
+rr::awaitable<ReadRequest> RequestReader::next() {
   http::request_parser<http::string_body> parser;
   parser.header_limit(static_cast<std::uint32_t>(limits_.header_bytes) + 1024);
   parser.body_limit(limits_.body_bytes);

@@ -26,18 +26,18 @@ struct ReadRequest {
 /// One for each connection: keeps what was read beyond a request.
 class RequestReader {
  public:
-  RequestReader(ByteStream& stream, RequestLimits limits, Watchdog& watchdog);
+  RequestReader(rr::ByteStream& stream, RequestLimits limits);
 
-  awaitable<ReadRequest> next();
+  rr::awaitable<ReadRequest> next();
   /// Bytes behind the last request: of the next one, or of the protocol that was upgraded to.
   rr::ByteSpan unread() const { return buffer_; }
 
  private:
   bool is_header_too_long(std::size_t consumed) const;
 
-  ByteStream& stream_;
+  rr::ByteStream& stream_;
   RequestLimits limits_;
-  Deadline limit_;
+  rr::Deadline limit_;
   rr::Bytes buffer_;
   bool is_first_ = true;
 };

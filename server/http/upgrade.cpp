@@ -57,7 +57,7 @@ std::optional<Response> refuse_upgrade(const Request& request, const std::vector
 
 std::string format_upgrade_response(const Request& request) {
   return "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Accept: " +
-         websocket_accept(request.header(http::field::sec_websocket_key)) +
+         rr::websocket_accept(request.header(http::field::sec_websocket_key)) +
          "\r\nSec-WebSocket-Protocol: " + std::string(websocket_subprotocol) + "\r\nSec-WebSocket-Version: 13\r\n\r\n";
 }
 

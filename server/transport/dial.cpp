@@ -2,22 +2,22 @@
 
 #include "server/transport/tcp.hpp"
 
-namespace rrgate {
+namespace rr {
 
 namespace {
 
-using Dialed = rr::Result<std::unique_ptr<ByteStream>>;
+using Dialed = Result<std::unique_ptr<ByteStream>>;
 
-awaitable<Dialed> dial_tcp(rr::ConnectionUrl url, DialOptions options, Watchdog& watchdog) {
+awaitable<Dialed> dial_tcp(ConnectionUrl url, DialOptions options) {
   auto socket = co_await connect_tcp(url.host, url.port, options.timeout);
   if (!socket) co_return socket.error();
-  std::unique_ptr<ByteStream> stream = std::make_unique<TcpStream>(std::move(*socket), watchdog, options.send_stall);
+  std::unique_ptr<ByteStream> stream = std::make_unique<TcpStream>(std::move(*socket), options.send_stall);
   co_return stream;
 }
 
 struct Dialer {
   std::string_view scheme;
-  awaitable<Dialed> (*dial)(rr::ConnectionUrl, DialOptions, Watchdog&);
+  awaitable<Dialed> (*dial)(ConnectionUrl, DialOptions);
 };
 
 /// A transport adds its line here.
@@ -43,12 +43,12 @@ std::string dialable_schemes() {
   return out;
 }
 
-awaitable<Dialed> dial(rr::ConnectionUrl url, DialOptions options, Watchdog& watchdog) {
+awaitable<Dialed> dial(ConnectionUrl url, DialOptions options) {
   const auto* dialer = find_dialer(url.scheme);
   if (!dialer)
-    co_return rr::make_error(rr::ErrorCode::connection_error,
-                             "scheme " + rr::quoted(url.scheme) + " can't be dialed; available: " + dialable_schemes());
-  co_return co_await dialer->dial(std::move(url), options, watchdog);
+    co_return make_error(ErrorCode::connection_error,
+                         "scheme " + quoted(url.scheme) + " can't be dialed; available: " + dialable_schemes());
+  co_return co_await dialer->dial(std::move(url), options);
 }
 
-}  // namespace rrgate
+}  // namespace rr

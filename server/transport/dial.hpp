@@ -6,9 +6,8 @@
 
 #include "server/transport/byte_stream.hpp"
 #include "server/transport/schemes.hpp"
-#include "server/transport/watchdog.hpp"
 
-namespace rrgate {
+namespace rr {
 
 struct DialOptions {
   std::chrono::milliseconds timeout{5000};
@@ -17,6 +16,6 @@ struct DialOptions {
 
 /// Connects to the device of `url`; nothing is sent.
 /// Errors   connection_error: not reached in time, refused, or a scheme that isn't in the list.
-awaitable<rr::Result<std::unique_ptr<ByteStream>>> dial(rr::ConnectionUrl url, DialOptions options, Watchdog& watchdog);
+awaitable<Result<std::unique_ptr<ByteStream>>> dial(ConnectionUrl url, DialOptions options);
 
-}  // namespace rrgate
+}  // namespace rr

@@ -6,10 +6,10 @@
 
 #include "core/session/url.hpp"
 
-namespace rrgate {
+namespace rr {
 
 bool can_dial(std::string_view scheme);
 /// "rr+tcp, ..." for messages.
 std::string dialable_schemes();
 
-}  // namespace rrgate
+}  // namespace rr

@@ -11,9 +11,7 @@
 #include <boost/container/static_vector.hpp>
 #include <cstring>
 
-#include "server/log/log.hpp"
-
-namespace rrgate {
+namespace rr {
 
 namespace asio = boost::asio;
 using asio::ip::tcp;
@@ -31,19 +29,19 @@ constexpr std::chrono::milliseconds linger_time{1000};
 constexpr std::size_t linger_bytes = 1024 * 1024;
 
 std::string describe(const tcp::endpoint& endpoint) {
-  return rr::format_host_port(endpoint.address().to_string(), endpoint.port());
+  return format_host_port(endpoint.address().to_string(), endpoint.port());
 }
 
 }  // namespace
 
-TcpStream::TcpStream(Socket socket, Watchdog& watchdog, std::chrono::milliseconds send_stall)
+TcpStream::TcpStream(Socket socket, std::chrono::milliseconds send_stall)
     : socket_(std::move(socket)),
-      stall_(watchdog,
+      stall_(socket_.get_executor(),
              [this] {
                is_stalled_ = true;
                close();
              }),
-      linger_(watchdog, [this] { cancel(); }),
+      linger_(socket_.get_executor(), [this] { cancel(); }),
       send_stall_(send_stall) {
   error_code ignored;  // a socket that is gone already shows it at the first read
   socket_.non_blocking(true, ignored);
@@ -54,34 +52,36 @@ TcpStream::TcpStream(Socket socket, Watchdog& watchdog, std::chrono::millisecond
 }
 
 awaitable<ReadResult> TcpStream::read_some(std::span<std::uint8_t> into) {
-  if (put_back_used_ < put_back_.size()) {
-    const auto count = std::min(into.size(), put_back_.size() - put_back_used_);
-    std::memcpy(into.data(), put_back_.data() + put_back_used_, count);
-    put_back_used_ += count;
-    if (put_back_used_ == put_back_.size()) {
-      rr::Bytes().swap(put_back_);
-      put_back_used_ = 0;
-    }
-    co_return ReadResult{{}, count};
-  }
+  if (const auto count = take_put_back(into)) co_return ReadResult{{}, count};
   auto [error, bytes] = co_await socket_.async_read_some(asio::buffer(into.data(), into.size()), await_tuple);
   if (error == asio::error::eof) error = {};
   co_return ReadResult{error, bytes};
 }
 
-awaitable<error_code> TcpStream::write(std::span<const rr::ByteSpan> slices) {
+std::size_t TcpStream::try_write(std::span<const ByteSpan> slices, error_code& error) {
+  return write_now(slices, 0, error);
+}
+
+/// `offset`  bytes of the first slice that are written already.
+std::size_t TcpStream::write_now(std::span<const ByteSpan> slices, std::size_t offset, error_code& error) {
+  boost::container::static_vector<asio::const_buffer, 64> buffers;
+  for (const auto& slice : slices) {
+    if (buffers.size() == buffers.capacity()) break;
+    const auto rest = buffers.empty() ? slice.subspan(offset) : slice;
+    buffers.emplace_back(rest.data(), rest.size());
+  }
+  const auto written = socket_.write_some(buffers, error);
+  if (error == asio::error::would_block) error = {};
+  return written;
+}
+
+awaitable<error_code> TcpStream::write(std::span<const ByteSpan> slices) {
   const auto cancel_count = cancel_count_;
   std::size_t offset = 0;  // bytes of slices.front() that are written
   while (!slices.empty()) {
-    boost::container::static_vector<asio::const_buffer, 64> buffers;
-    for (const auto& slice : slices) {
-      if (buffers.size() == buffers.capacity()) break;
-      const auto rest = buffers.empty() ? slice.subspan(offset) : slice;
-      buffers.emplace_back(rest.data(), rest.size());
-    }
     error_code error;
-    auto written = socket_.write_some(buffers, error);
-    if (error == asio::error::would_block) {
+    auto written = write_now(slices, offset, error);
+    if (written == 0 && !error) {
       if (!stall_.is_armed()) stall_.arm(send_stall_);
       std::tie(error) = co_await socket_.async_wait(tcp::socket::wait_write, await_tuple);
       if (is_stalled_) co_return asio::error::timed_out;
@@ -132,22 +132,16 @@ void TcpStream::close() {
   socket_.close(ignored);
 }
 
-void TcpStream::put_back(rr::ByteSpan bytes) {
-  put_back_.erase(put_back_.begin(), put_back_.begin() + static_cast<std::ptrdiff_t>(put_back_used_));
-  put_back_used_ = 0;
-  put_back_.insert(put_back_.begin(), bytes.begin(), bytes.end());
-}
-
-rr::Result<std::vector<rr::HostPort>> TcpListener::open(const rr::HostPort& address) {
+Result<std::vector<HostPort>> TcpListener::open(const HostPort& address) {
   const auto fail = [&](const error_code& error) {
-    return rr::make_error(rr::ErrorCode::connection_error,
-                          "listen on " + rr::format_host_port(address.host, address.port) + ": " + error.message());
+    return make_error(ErrorCode::connection_error,
+                      "listen on " + format_host_port(address.host, address.port) + ": " + error.message());
   };
   error_code error;
   tcp::resolver resolver(executor_);
   const auto endpoints = resolver.resolve(address.host, std::to_string(address.port), tcp::resolver::passive, error);
   if (error) return fail(error);
-  std::vector<rr::HostPort> bound;
+  std::vector<HostPort> bound;
   for (const auto& entry : endpoints) {
     const auto endpoint = entry.endpoint();
     auto acceptor = std::make_shared<Acceptor>(executor_);
@@ -164,11 +158,12 @@ rr::Result<std::vector<rr::HostPort>> TcpListener::open(const rr::HostPort& addr
   return bound;
 }
 
-void TcpListener::start(OnAccept on_accept) {
-  for (const auto& acceptor : acceptors_) asio::co_spawn(executor_, accept_all(acceptor, on_accept), asio::detached);
+void TcpListener::start(OnAccept on_accept, OnProblem on_problem) {
+  for (const auto& acceptor : acceptors_)
+    asio::co_spawn(executor_, accept_all(acceptor, on_accept, on_problem), asio::detached);
 }
 
-awaitable<void> TcpListener::accept_all(std::shared_ptr<Acceptor> acceptor, OnAccept on_accept) {
+awaitable<void> TcpListener::accept_all(std::shared_ptr<Acceptor> acceptor, OnAccept on_accept, OnProblem on_problem) {
   asio::steady_timer pause(acceptor->get_executor());
   while (acceptor->is_open()) {
     auto [error, socket] = co_await acceptor->async_accept(await_tuple);
@@ -178,7 +173,7 @@ awaitable<void> TcpListener::accept_all(std::shared_ptr<Acceptor> acceptor, OnAc
     }
     if (error == asio::error::operation_aborted) break;
     // Out of descriptors or memory: accepting again at once would spin.
-    log(LogLevel::error, "accept failed", {{"error", error.message()}});
+    on_problem("accept: " + error.message());
     pause.expires_after(std::chrono::milliseconds(200));
     co_await pause.async_wait(await_tuple);
   }
@@ -218,9 +213,8 @@ awaitable<void> attempt(std::shared_ptr<Race> race, std::size_t index, tcp::endp
   race->changed.cancel();
 }
 
-rr::Error connect_error(const std::string& host, std::uint16_t port, const std::string& cause) {
-  return rr::make_error(rr::ErrorCode::connection_error,
-                        "connect to " + rr::format_host_port(host, port) + ": " + cause);
+Error connect_error(const std::string& host, std::uint16_t port, const std::string& cause) {
+  return make_error(ErrorCode::connection_error, "connect to " + format_host_port(host, port) + ": " + cause);
 }
 
 /// A name look-up. Shared, since getaddrinfo can't be interrupted and may outlive the patience of its caller.
@@ -243,8 +237,8 @@ awaitable<void> look_up(std::shared_ptr<Lookup> lookup, std::string host, std::s
 }
 
 /// IPv4 first, order kept otherwise; a literal needs no look-up.
-awaitable<rr::Result<std::vector<tcp::endpoint>>> resolve(std::string host, std::uint16_t port,
-                                                          std::chrono::milliseconds timeout) {
+awaitable<Result<std::vector<tcp::endpoint>>> resolve(std::string host, std::uint16_t port,
+                                                      std::chrono::milliseconds timeout) {
   std::vector<tcp::endpoint> endpoints;
   error_code error;
   if (const auto literal = asio::ip::make_address(host, error); !error) {
@@ -266,8 +260,7 @@ awaitable<rr::Result<std::vector<tcp::endpoint>>> resolve(std::string host, std:
 
 }  // namespace
 
-awaitable<rr::Result<tcp::socket>> connect_tcp(std::string host, std::uint16_t port,
-                                               std::chrono::milliseconds timeout) {
+awaitable<Result<tcp::socket>> connect_tcp(std::string host, std::uint16_t port, std::chrono::milliseconds timeout) {
   const auto executor = co_await asio::this_coro::executor;
   const auto give_up = std::chrono::steady_clock::now() + timeout;
   auto endpoints = co_await resolve(host, port, timeout);
@@ -304,4 +297,4 @@ awaitable<rr::Result<tcp::socket>> connect_tcp(std::string host, std::uint16_t p
   co_return std::move(*race->sockets[*race->winner]);
 }
 
-}  // namespace rrgate
+}  // namespace rr

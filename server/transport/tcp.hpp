@@ -13,30 +13,29 @@
 #include "server/transport/byte_stream.hpp"
 #include "server/transport/watchdog.hpp"
 
-namespace rrgate {
+namespace rr {
 
 class TcpStream final : public ByteStream {
  public:
   using Socket = boost::asio::ip::tcp::socket;
 
   /// Takes over a connected socket. `send_stall`: see ByteStream::write.
-  TcpStream(Socket socket, Watchdog& watchdog, std::chrono::milliseconds send_stall);
+  TcpStream(Socket socket, std::chrono::milliseconds send_stall);
 
   awaitable<ReadResult> read_some(std::span<std::uint8_t> into) override;
-  awaitable<error_code> write(std::span<const rr::ByteSpan> slices) override;
+  std::size_t try_write(std::span<const ByteSpan> slices, error_code& error) override;
+  awaitable<error_code> write(std::span<const ByteSpan> slices) override;
   void finish_sending() override;
   void cancel() override;
   awaitable<void> end(const EndReason& reason) override;
   void close() override;
   std::string peer() const override { return peer_; }
-
-  /// The next reads return these bytes first: what was read to find out which protocol the peer speaks.
-  void put_back(rr::ByteSpan bytes);
+  boost::asio::any_io_executor executor() override { return socket_.get_executor(); }
 
  private:
+  std::size_t write_now(std::span<const ByteSpan> slices, std::size_t offset, error_code& error);
+
   Socket socket_;
-  rr::Bytes put_back_;
-  std::size_t put_back_used_ = 0;
   Deadline stall_;
   Deadline linger_;
   std::chrono::milliseconds send_stall_;
@@ -52,16 +51,18 @@ class TcpListener {
 
   /// Binds and listens. Returns the addresses with their true ports (port 0 asks the system for one).
   /// Errors   connection_error: name unknown, address in use, not permitted.
-  [[nodiscard]] rr::Result<std::vector<rr::HostPort>> open(const rr::HostPort& address);
+  [[nodiscard]] Result<std::vector<HostPort>> open(const HostPort& address);
 
-  /// Calls `on_accept` for every connection until close().
+  /// Calls `on_accept` for every connection until close(), and `on_problem` when one could not be accepted (no
+  /// descriptors left, say); it goes on a little later then.
   using OnAccept = std::function<void(boost::asio::ip::tcp::socket)>;
-  void start(OnAccept on_accept);
+  using OnProblem = std::function<void(const std::string& problem)>;
+  void start(OnAccept on_accept, OnProblem on_problem);
   void close();
 
  private:
   using Acceptor = boost::asio::ip::tcp::acceptor;
-  static awaitable<void> accept_all(std::shared_ptr<Acceptor> acceptor, OnAccept on_accept);
+  static awaitable<void> accept_all(std::shared_ptr<Acceptor> acceptor, OnAccept on_accept, OnProblem on_problem);
 
   boost::asio::any_io_executor executor_;
   std::vector<std::shared_ptr<Acceptor>> acceptors_;
@@ -69,7 +70,7 @@ class TcpListener {
 
 /// Connects to a host: all its addresses, IPv4 first, 5 ms apart and side by side; the first to connect wins.
 /// Errors   connection_error with the last cause, or that `timeout` has passed.
-awaitable<rr::Result<boost::asio::ip::tcp::socket>> connect_tcp(std::string host, std::uint16_t port,
-                                                                std::chrono::milliseconds timeout);
+awaitable<Result<boost::asio::ip::tcp::socket>> connect_tcp(std::string host, std::uint16_t port,
+                                                            std::chrono::milliseconds timeout);
 
-}  // namespace rrgate
+}  // namespace rr

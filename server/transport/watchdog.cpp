@@ -1,6 +1,24 @@
 #include "server/transport/watchdog.hpp"
 
-namespace rrgate {
+namespace rr {
+
+namespace asio = boost::asio;
+
+asio::execution_context::id Watchdog::id;
+
+Watchdog& Watchdog::of(const asio::any_io_executor& executor) {
+  auto& watchdog = asio::use_service<Watchdog>(asio::query(executor, asio::execution::context));
+  if (!watchdog.timer_) watchdog.timer_.emplace(executor);
+  return watchdog;
+}
+
+void Watchdog::shutdown() {
+  timer_.reset();
+  armed_.clear();
+}
+
+Deadline::Deadline(const asio::any_io_executor& executor, std::function<void()> on_expired)
+    : watchdog_(Watchdog::of(executor)), on_expired_(std::move(on_expired)) {}
 
 void Deadline::arm(std::chrono::milliseconds after) {
   at_ = std::chrono::steady_clock::now() + after;
@@ -14,8 +32,8 @@ void Watchdog::add(Deadline& deadline) {
 
 void Watchdog::wait() {
   is_waiting_ = true;
-  timer_.expires_after(tick);
-  timer_.async_wait([this](const boost::system::error_code& error) {
+  timer_->expires_after(tick);
+  timer_->async_wait([this](const boost::system::error_code& error) {
     if (error) return;  // the watchdog is gone, or about to be
     is_waiting_ = false;
     check();
@@ -41,4 +59,4 @@ void Watchdog::check() {
   if (!armed_.empty() && !is_waiting_) wait();
 }
 
-}  // namespace rrgate
+}  // namespace rr

@@ -5,21 +5,22 @@
 #pragma once
 
 #include <boost/asio/any_io_executor.hpp>
+#include <boost/asio/execution_context.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/intrusive/list.hpp>
 #include <chrono>
 #include <functional>
+#include <optional>
 
-namespace rrgate {
+namespace rr {
 
 class Watchdog;
 
-/// One deadline; its owner keeps it. Disarmed by its destructor.
+/// One deadline; its owner keeps it. Disarmed by its destructor. For the thread of its executor.
 class Deadline : public boost::intrusive::list_base_hook<boost::intrusive::link_mode<boost::intrusive::auto_unlink>> {
  public:
-  /// `on_expired` runs on the watchdog's executor; the deadline is disarmed by then.
-  Deadline(Watchdog& watchdog, std::function<void()> on_expired)
-      : watchdog_(watchdog), on_expired_(std::move(on_expired)) {}
+  /// `on_expired` runs on the executor's thread; the deadline is disarmed by then.
+  Deadline(const boost::asio::any_io_executor& executor, std::function<void()> on_expired);
   Deadline(const Deadline&) = delete;
   Deadline& operator=(const Deadline&) = delete;
 
@@ -37,28 +38,27 @@ class Deadline : public boost::intrusive::list_base_hook<boost::intrusive::link_
   std::chrono::steady_clock::time_point at_;
 };
 
-/// Outlives every Deadline made with it. One thread.
-class Watchdog {
+/// The timer of one execution context, which runs on one thread; Deadlines find it there.
+class Watchdog final : public boost::asio::execution_context::service {
  public:
   static constexpr std::chrono::milliseconds tick{50};
+  static boost::asio::execution_context::id id;
 
-  explicit Watchdog(const boost::asio::any_io_executor& executor) : timer_(executor) {}
-  Watchdog(const Watchdog&) = delete;
-  Watchdog& operator=(const Watchdog&) = delete;
-
-  boost::asio::any_io_executor executor() { return timer_.get_executor(); }
+  explicit Watchdog(boost::asio::execution_context& context) : service(context) {}
 
  private:
   friend class Deadline;
   using List = boost::intrusive::list<Deadline, boost::intrusive::constant_time_size<false>>;
 
+  static Watchdog& of(const boost::asio::any_io_executor& executor);
+  void shutdown() override;
   void add(Deadline& deadline);
   void wait();
   void check();
 
-  boost::asio::steady_timer timer_;
+  std::optional<boost::asio::steady_timer> timer_;
   List armed_;
   bool is_waiting_ = false;
 };
 
-}  // namespace rrgate
+}  // namespace rr

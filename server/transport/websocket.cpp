@@ -6,7 +6,7 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/system/errc.hpp>
 
-namespace rrgate {
+namespace rr {
 
 namespace asio = boost::asio;
 
@@ -17,11 +17,11 @@ constexpr std::chrono::milliseconds close_time{1000};
 
 }  // namespace
 
-WebSocketStream::WebSocketStream(std::unique_ptr<ByteStream> inner, Watchdog& watchdog, bool takes_close)
+WebSocketStream::WebSocketStream(std::unique_ptr<ByteStream> inner, bool takes_close)
     : inner_(std::move(inner)),
-      close_limit_(watchdog, [this] { inner_->close(); }),
+      close_limit_(inner_->executor(), [this] { inner_->close(); }),
       takes_close_(takes_close),
-      written_(watchdog.executor(), asio::steady_timer::time_point::max()) {}
+      written_(inner_->executor(), asio::steady_timer::time_point::max()) {}
 
 awaitable<ReadResult> WebSocketStream::read_some(std::span<std::uint8_t> into) {
   for (;;) {
@@ -36,22 +36,22 @@ awaitable<ReadResult> WebSocketStream::read_some(std::span<std::uint8_t> into) {
     }
     if (auto ping = decoder_.take_ping()) {
       const auto pong = make_control_frame(WebSocketOpcode::pong, *ping);
-      const rr::ByteSpan slice(pong);
-      const std::span<const rr::ByteSpan> slices(&slice, 1);
+      const ByteSpan slice(pong);
+      const std::span<const ByteSpan> slices(&slice, 1);
       if (const auto error = co_await write_raw(slices); error) co_return ReadResult{error, 0};
     }
     if (*payload > 0) co_return ReadResult{{}, *payload};
   }
 }
 
-awaitable<error_code> WebSocketStream::write(std::span<const rr::ByteSpan> slices) {
+awaitable<error_code> WebSocketStream::write(std::span<const ByteSpan> slices) {
   while (is_writing_) co_await written_.async_wait(asio::as_tuple(asio::use_awaitable));
   const auto frames = splitter_.split(slices);
   if (frames.empty()) co_return error_code();  // an empty frame would end a native peer's connection
   co_return co_await write_raw(frames);
 }
 
-awaitable<error_code> WebSocketStream::write_raw(std::span<const rr::ByteSpan> slices) {
+awaitable<error_code> WebSocketStream::write_raw(std::span<const ByteSpan> slices) {
   while (is_writing_) co_await written_.async_wait(asio::as_tuple(asio::use_awaitable));
   if (is_broken_) co_return asio::error::broken_pipe;
   is_writing_ = true;
@@ -67,8 +67,8 @@ awaitable<void> WebSocketStream::end(const EndReason& given) {
   const auto& received = decoder_.received_close();
   if (!is_broken_ && (takes_close_ || received || decoder_.has_seen_control())) {
     const auto frame = received ? make_close_frame(received->code, {}) : make_close_frame(reason.code, reason.text);
-    const rr::ByteSpan slice(frame);
-    const std::span<const rr::ByteSpan> slices(&slice, 1);
+    const ByteSpan slice(frame);
+    const std::span<const ByteSpan> slices(&slice, 1);
     close_limit_.arm(close_time);
     co_await write_raw(slices);
     close_limit_.disarm();
@@ -76,4 +76,4 @@ awaitable<void> WebSocketStream::end(const EndReason& given) {
   co_await inner_->end(reason);
 }
 
-}  // namespace rrgate
+}  // namespace rr

@@ -8,26 +8,27 @@
 #include "server/transport/watchdog.hpp"
 #include "server/transport/websocket_frames.hpp"
 
-namespace rrgate {
+namespace rr {
 
 /// Native Robot Raconteur peers drop a connection at any ping, pong, close or empty frame. So none is sent, except a
 /// pong or close that answers the peer's own, and a close with a reason to a peer that is known to take it.
 class WebSocketStream final : public ByteStream {
  public:
   /// `inner` has just carried the 101 response. `takes_close`: the peer is a browser or another full WebSocket client.
-  WebSocketStream(std::unique_ptr<ByteStream> inner, Watchdog& watchdog, bool takes_close);
+  WebSocketStream(std::unique_ptr<ByteStream> inner, bool takes_close);
 
   awaitable<ReadResult> read_some(std::span<std::uint8_t> into) override;
-  awaitable<error_code> write(std::span<const rr::ByteSpan> slices) override;
+  awaitable<error_code> write(std::span<const ByteSpan> slices) override;
   /// WebSockets have no half-closed state: does nothing, end() follows.
   void finish_sending() override {}
   void cancel() override { inner_->cancel(); }
   awaitable<void> end(const EndReason& reason) override;
   void close() override { inner_->close(); }
   std::string peer() const override { return inner_->peer(); }
+  boost::asio::any_io_executor executor() override { return inner_->executor(); }
 
  private:
-  awaitable<error_code> write_raw(std::span<const rr::ByteSpan> slices);
+  awaitable<error_code> write_raw(std::span<const ByteSpan> slices);
 
   std::unique_ptr<ByteStream> inner_;
   WebSocketDecoder decoder_;
@@ -40,4 +41,4 @@ class WebSocketStream final : public ByteStream {
   boost::asio::steady_timer written_;  ///< cancelled when a write ends
 };
 
-}  // namespace rrgate
+}  // namespace rr

@@ -5,7 +5,7 @@
 #include <boost/uuid/detail/sha1.hpp>
 #include <cstring>
 
-namespace rrgate {
+namespace rr {
 
 namespace {
 
@@ -27,12 +27,12 @@ bool is_sendable_code(std::uint16_t code) {
 
 }  // namespace
 
-rr::Error WebSocketDecoder::fail(std::uint16_t code, std::string what) {
+Error WebSocketDecoder::fail(std::uint16_t code, std::string what) {
   close_code_ = code;
-  return rr::protocol_error("WebSocket: " + std::move(what));
+  return protocol_error("WebSocket: " + std::move(what));
 }
 
-rr::Result<std::size_t> WebSocketDecoder::decode(std::span<std::uint8_t> bytes) {
+Result<std::size_t> WebSocketDecoder::decode(std::span<std::uint8_t> bytes) {
   std::size_t out = 0;
   std::size_t in = 0;
   while (in < bytes.size() && !close_) {
@@ -62,7 +62,7 @@ rr::Result<std::size_t> WebSocketDecoder::decode(std::span<std::uint8_t> bytes) 
   return out;
 }
 
-rr::Result<> WebSocketDecoder::begin_frame() {
+Result<> WebSocketDecoder::begin_frame() {
   header_size_ = 0;
   const bool is_final = (header_[0] & 0x80) != 0;
   if ((header_[0] & 0x70) != 0) return fail(1002, "reserved bits are set, but no extension was agreed on");
@@ -105,10 +105,10 @@ void WebSocketDecoder::end_control() {
   close_.emplace();
   if (control_.size() < 2) return;
   close_->code = static_cast<std::uint16_t>(control_[0] << 8 | control_[1]);
-  close_->reason = std::string(rr::as_text(rr::ByteSpan(control_).subspan(2)));
+  close_->reason = std::string(as_text(ByteSpan(control_).subspan(2)));
 }
 
-std::optional<rr::Bytes> WebSocketDecoder::take_ping() {
+std::optional<Bytes> WebSocketDecoder::take_ping() {
   auto out = std::move(ping_);
   ping_.reset();
   return out;
@@ -136,27 +136,27 @@ FrameHeader make_frame_header(WebSocketOpcode opcode, std::size_t payload) {
   return {{first, 126, static_cast<std::uint8_t>(payload >> 8), static_cast<std::uint8_t>(payload)}, 4};
 }
 
-rr::Bytes make_control_frame(WebSocketOpcode opcode, rr::ByteSpan payload) {
+Bytes make_control_frame(WebSocketOpcode opcode, ByteSpan payload) {
   const auto kept = payload.first(std::min<std::size_t>(payload.size(), 125));
   const auto header = make_frame_header(opcode, kept.size());
-  rr::Bytes out(header.bytes.begin(), header.bytes.begin() + header.size);
+  Bytes out(header.bytes.begin(), header.bytes.begin() + header.size);
   out.insert(out.end(), kept.begin(), kept.end());
   return out;
 }
 
-rr::Bytes make_close_frame(std::uint16_t code, std::string_view reason) {
+Bytes make_close_frame(std::uint16_t code, std::string_view reason) {
   if (!is_sendable_code(code)) return make_control_frame(WebSocketOpcode::close, {});
   if (reason.size() > 123) {
     std::size_t end = 123;
     while (end > 0 && (static_cast<unsigned char>(reason[end]) & 0xc0) == 0x80) --end;
     reason = reason.substr(0, end);
   }
-  rr::Bytes payload{static_cast<std::uint8_t>(code >> 8), static_cast<std::uint8_t>(code)};
+  Bytes payload{static_cast<std::uint8_t>(code >> 8), static_cast<std::uint8_t>(code)};
   payload.insert(payload.end(), reason.begin(), reason.end());
   return make_control_frame(WebSocketOpcode::close, payload);
 }
 
-std::span<const rr::ByteSpan> FrameSplitter::split(std::span<const rr::ByteSpan> payload) {
+std::span<const ByteSpan> FrameSplitter::split(std::span<const ByteSpan> payload) {
   std::size_t left = 0;
   for (const auto& slice : payload) left += slice.size();
   headers_.clear();
@@ -193,4 +193,4 @@ std::string websocket_accept(std::string_view key) {
   return out;
 }
 
-}  // namespace rrgate
+}  // namespace rr

@@ -16,7 +16,7 @@
 #include "core/support/bytes.hpp"
 #include "core/support/error.hpp"
 
-namespace rrgate {
+namespace rr {
 
 enum class WebSocketOpcode : std::uint8_t { continuation = 0, text = 1, binary = 2, close = 8, ping = 9, pong = 10 };
 
@@ -36,19 +36,19 @@ class WebSocketDecoder {
   /// Returns  n; 0 when the bytes held no payload.
   /// Errors   protocol_error: reserved bits or opcodes, a text frame, an unmasked frame, a control frame that is
   ///          fragmented or longer than 125 bytes. close_code() then has the code to close with.
-  [[nodiscard]] rr::Result<std::size_t> decode(std::span<std::uint8_t> bytes);
+  [[nodiscard]] Result<std::size_t> decode(std::span<std::uint8_t> bytes);
 
   /// Payload of the newest ping that was not yet taken; it is to be answered by a pong with the same bytes.
-  std::optional<rr::Bytes> take_ping();
+  std::optional<Bytes> take_ping();
   const std::optional<CloseFrame>& received_close() const { return close_; }
   /// Whether the peer has sent any control frame, and so can be sent some.
   bool has_seen_control() const { return has_seen_control_; }
   std::uint16_t close_code() const { return close_code_; }
 
  private:
-  rr::Result<> begin_frame();
+  Result<> begin_frame();
   void end_control();
-  rr::Error fail(std::uint16_t code, std::string what);
+  Error fail(std::uint16_t code, std::string what);
 
   std::array<std::uint8_t, 14> header_{};
   std::size_t header_size_ = 0;  ///< bytes of the header in hand
@@ -57,8 +57,8 @@ class WebSocketDecoder {
   std::uint64_t left_ = 0;  ///< payload bytes of this frame still to come
   std::array<std::uint8_t, 4> mask_{};
   std::size_t mask_index_ = 0;
-  rr::Bytes control_;
-  std::optional<rr::Bytes> ping_;
+  Bytes control_;
+  std::optional<Bytes> ping_;
   std::optional<CloseFrame> close_;
   bool has_seen_control_ = false;
   std::uint16_t close_code_ = 1002;
@@ -72,27 +72,27 @@ void unmask(const std::uint8_t* from, std::uint8_t* to, std::size_t count, const
 struct FrameHeader {
   std::array<std::uint8_t, 4> bytes;
   std::uint8_t size;
-  rr::ByteSpan span() const { return {bytes.data(), size}; }
+  ByteSpan span() const { return {bytes.data(), size}; }
 };
 FrameHeader make_frame_header(WebSocketOpcode opcode, std::size_t payload);
 
 /// A whole control frame; `payload` is cut after 125 bytes.
-rr::Bytes make_control_frame(WebSocketOpcode opcode, rr::ByteSpan payload);
+Bytes make_control_frame(WebSocketOpcode opcode, ByteSpan payload);
 /// A close frame; `reason` is cut after 123 bytes, at a UTF-8 boundary. Code 1005 makes an empty one.
-rr::Bytes make_close_frame(std::uint16_t code, std::string_view reason);
+Bytes make_close_frame(std::uint16_t code, std::string_view reason);
 
 /// Lays slices out as binary frames of at most max_frame_payload bytes.
 class FrameSplitter {
  public:
   /// Headers and payload in write order; valid until the next call and as long as the input is.
-  std::span<const rr::ByteSpan> split(std::span<const rr::ByteSpan> payload);
+  std::span<const ByteSpan> split(std::span<const ByteSpan> payload);
 
  private:
   std::vector<FrameHeader> headers_;
-  std::vector<rr::ByteSpan> slices_;
+  std::vector<ByteSpan> slices_;
 };
 
 /// Sec-WebSocket-Accept of a Sec-WebSocket-Key.
 std::string websocket_accept(std::string_view key);
 
-}  // namespace rrgate
+}  // namespace rr
