@@ -27,4 +27,9 @@ std::uint32_t random_endpoint() {
     if (const auto endpoint = random_u32()) return endpoint;
 }
 
+std::chrono::milliseconds random_between(std::chrono::milliseconds least, std::chrono::milliseconds most) {
+  const auto choices = static_cast<std::uint32_t>((most - least).count()) + 1;
+  return least + std::chrono::milliseconds(random_u32() % choices);
+}
+
 }  // namespace rr

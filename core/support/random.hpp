@@ -1,6 +1,7 @@
 // The one source of randomness of the core: the system's. Layer: support.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 
 #include "core/support/node_id.hpp"
@@ -14,5 +15,8 @@ NodeId random_node_id();
 
 /// An endpoint number: random, never 0 ("no session").
 std::uint32_t random_endpoint();
+
+/// From `least` to `most`, both included.
+std::chrono::milliseconds random_between(std::chrono::milliseconds least, std::chrono::milliseconds most);
 
 }  // namespace rr
