@@ -8,7 +8,7 @@ import re
 import sys
 
 # Each layer may include itself and those before it.
-CORE_LAYERS = ["support", "wire", "robdef", "types", "member", "session", "discovery"]
+CORE_LAYERS = ["support", "hardware", "wire", "robdef", "types", "member", "session", "discovery"]
 
 # What no file of core/ may include: input and output, threads and clocks belong to the drivers.
 CORE_FORBIDDEN = re.compile(
