@@ -1,6 +1,6 @@
 // Callbacks: the service asks, a handler answers.
-import { ErrorCode, RobotRaconteurError } from "../../wasm-client/dist/index.js";
-import type { RemoteObject, RrValue } from "../../wasm-client/dist/index.js";
+import { ErrorCode, RobotRaconteurError } from "../../wasm-client/dist/node.js";
+import type { RemoteObject, RrValue } from "../../wasm-client/dist/node.js";
 import { failure, settle, TestService } from "./service.js";
 
 const definition = `service test.callback

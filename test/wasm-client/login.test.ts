@@ -1,6 +1,6 @@
 // Users and locks.
-import { ErrorCode } from "../../wasm-client/dist/index.js";
-import type { ConnectOptions, RemoteObject } from "../../wasm-client/dist/index.js";
+import { ErrorCode } from "../../wasm-client/dist/node.js";
+import type { ConnectOptions, RemoteObject } from "../../wasm-client/dist/node.js";
 import { failure, TestService } from "./service.js";
 
 const definition = `service test.login

@@ -1,6 +1,6 @@
 // Members of objects as an application uses them.
-import { connect, ErrorCode, RobotRaconteurError } from "../../wasm-client/dist/index.js";
-import type { RemoteObject, RrValue, WireConnection } from "../../wasm-client/dist/index.js";
+import { connect, ErrorCode, RobotRaconteurError } from "../../wasm-client/dist/node.js";
+import type { RemoteObject, RrValue, WireConnection } from "../../wasm-client/dist/node.js";
 import { failure, settle, TestService } from "./service.js";
 
 const definition = `service test.members

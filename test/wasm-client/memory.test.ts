@@ -1,6 +1,6 @@
 // Memories: parts of arrays, with one dimension and with more.
-import { ErrorCode } from "../../wasm-client/dist/index.js";
-import type { RemoteObject } from "../../wasm-client/dist/index.js";
+import { ErrorCode } from "../../wasm-client/dist/node.js";
+import type { RemoteObject } from "../../wasm-client/dist/node.js";
 import { failure, settle, TestService } from "./service.js";
 
 const definition = `service test.memory

@@ -1,13 +1,13 @@
 // What is published: versions that agree, and code that a strict page can load.
 import { readdirSync, readFileSync } from "node:fs";
-import { version } from "../../wasm-client/dist/index.js";
+import { version } from "../../wasm-client/dist/node.js";
 
 const package_file = new URL("../../wasm-client/package.json", import.meta.url);
 const dist = new URL("../../wasm-client/dist/", import.meta.url);
 const manifest = JSON.parse(readFileSync(package_file, "utf8")) as {
   version: string;
   dependencies?: object;
-  imports: Record<string, Record<string, string>>;
+  exports: Record<string, string | Record<string, string>>;
 };
 const read = (file: string) => readFileSync(new URL(file, dist), "utf8");
 
@@ -20,20 +20,24 @@ it("depends on nothing", () => {
   expect(manifest.dependencies).toBeUndefined();
 });
 
-it("needs no eval, no shared memory and nothing of Node in a page", () => {
-  const ours = readdirSync(dist, { encoding: "utf8", recursive: true });
-  for (const file of ours.filter((name) => name.endsWith(".js") && !name.endsWith("_node.js"))) {
+it("needs no eval, no shared memory, no bundler and nothing of Node in a page", () => {
+  const scripts = readdirSync(dist, { encoding: "utf8", recursive: true }).filter((name) => name.endsWith(".js"));
+  for (const file of scripts.filter((name) => name !== "node.js")) {
     expect(read(file), file).not.toMatch(/\beval\(|new Function\(|SharedArrayBuffer|require\(/);
     expect(read(file), file).not.toMatch(/from "node:|import\("node:|process\./);
+    // What a page resolves by itself: paths.
+    for (const [, from] of read(file).matchAll(/\b(?:from|import)\s*\(?"([^"]*)"/g)) expect(from, file).toMatch(/^\.\.?\//);
   }
 });
 
 it("names the wasm file where bundlers look for it", () => {
-  expect(read("load_wasm_web.js")).toContain('new URL("./rrgate.wasm", import.meta.url)');
+  expect(read("platform.js")).toContain('new URL("./rrgate.wasm", import.meta.url)');
 });
 
-it("knows a file for every import of its own", () => {
-  for (const targets of Object.values(manifest.imports)) {
-    for (const target of Object.values(targets)) expect(readFileSync(new URL(target, package_file), "utf8")).not.toBe("");
+it("has the files that it exports", () => {
+  for (const targets of Object.values(manifest.exports)) {
+    for (const target of [targets].flatMap((one) => (typeof one === "string" ? one : Object.values(one)))) {
+      expect(readFileSync(new URL(target, package_file), "utf8"), target).not.toBe("");
+    }
   }
 });

@@ -1,6 +1,6 @@
 // Pipes: packets in order, none lost, and what ends an endpoint.
-import { ErrorCode } from "../../wasm-client/dist/index.js";
-import type { PipeEndpoint, RemoteObject, RrValue } from "../../wasm-client/dist/index.js";
+import { ErrorCode } from "../../wasm-client/dist/node.js";
+import type { PipeEndpoint, RemoteObject, RrValue } from "../../wasm-client/dist/node.js";
 import { failure, settle, TestService } from "./service.js";
 
 const definition = `service test.pipe

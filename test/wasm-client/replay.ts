@@ -1,6 +1,6 @@
 // A transport that answers with what a real service once sent. Source: test/golden/transcripts (see their README).
 import { readFileSync } from "node:fs";
-import type { OpenTransport, TransportListener } from "../../wasm-client/dist/index.js";
+import type { OpenTransport, TransportListener } from "../../wasm-client/dist/node.js";
 
 interface Step {
   dir: "c>s" | "s>c";

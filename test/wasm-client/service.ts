@@ -20,10 +20,10 @@
 //   objrefs                  of every index but "missing" and 99; a property `name` tells which
 // Service "test", node "test.service", attribute site = "dock".
 import { readFileSync } from "node:fs";
-import { connect } from "../../wasm-client/dist/index.js";
+import { connect } from "../../wasm-client/dist/node.js";
 import { JsValues } from "../../wasm-client/dist/js_values.js";
 import type { CoreExports, Handle } from "../../wasm-client/dist/js_values.js";
-import type { ConnectOptions, OpenTransport, RemoteObject, TransportListener } from "../../wasm-client/dist/index.js";
+import type { ConnectOptions, OpenTransport, RemoteObject, TransportListener } from "../../wasm-client/dist/node.js";
 
 interface WasmService extends CoreExports {
   _initialize(): void;

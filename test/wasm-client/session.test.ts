@@ -1,6 +1,6 @@
 // The life of a session: how it begins, what ends it, and what becomes of what waits. Time is simulated.
-import { connect, ErrorCode, RobotRaconteurError } from "../../wasm-client/dist/index.js";
-import type { OpenTransport, RemoteObject, TransportListener } from "../../wasm-client/dist/index.js";
+import { connect, ErrorCode, RobotRaconteurError } from "../../wasm-client/dist/node.js";
+import type { OpenTransport, RemoteObject, TransportListener } from "../../wasm-client/dist/node.js";
 import { failure, settle, TestService } from "./service.js";
 
 const definition = `service test.session

@@ -1,6 +1,6 @@
 // Subscriptions: connections come and go, the waits between are in the hands of the test.
-import { ErrorCode, RobotRaconteurError, subscribe } from "../../wasm-client/dist/index.js";
-import type { Clock, OpenTransport, RemoteObject, SubscribeOptions } from "../../wasm-client/dist/index.js";
+import { ErrorCode, RobotRaconteurError, subscribe } from "../../wasm-client/dist/node.js";
+import type { Clock, OpenTransport, RemoteObject, SubscribeOptions } from "../../wasm-client/dist/node.js";
 import { failure, settle, TestService } from "./service.js";
 
 const definition = `service test.subscribe

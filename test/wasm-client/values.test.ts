@@ -1,6 +1,6 @@
 // Every type of value, there and back, in every version of the message format.
-import { rrValue, typeOf } from "../../wasm-client/dist/index.js";
-import type { RemoteObject } from "../../wasm-client/dist/index.js";
+import { rrValue, typeOf } from "../../wasm-client/dist/node.js";
+import type { RemoteObject } from "../../wasm-client/dist/node.js";
 import { failure, TestService } from "./service.js";
 
 const definition = `service test.values

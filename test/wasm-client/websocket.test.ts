@@ -1,7 +1,7 @@
 // The WebSocket transport against a server in the same process.
 import { createRequire } from "node:module";
 import type { AddressInfo } from "node:net";
-import { connect, ErrorCode } from "../../wasm-client/dist/index.js";
+import { connect, ErrorCode } from "../../wasm-client/dist/node.js";
 import { failure } from "./service.js";
 
 interface Socket {

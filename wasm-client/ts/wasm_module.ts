@@ -1,10 +1,10 @@
 // The compiled core: the only file that knows its handles and its memory. Layer: wasm-client/ts.
 // Source: src/wasm_session.hpp, and core/session/client_session.hpp behind it.
-import { load_wasm } from "#load-wasm";
 import { RobotRaconteurError } from "./errors.js";
 import type { ErrorFields } from "./errors.js";
 import { JsValues } from "./js_values.js";
 import type { CoreExports, Handle } from "./js_values.js";
+import { platform } from "./platform.js";
 import type { MemberInfo, RrValue, SessionStats } from "./types.js";
 
 export interface CoreOptions {
@@ -112,7 +112,7 @@ export class Core {
 
   /** @throws Error where the WebAssembly file cannot be loaded, RobotRaconteurError for options that make no sense. */
   static async create(options: CoreOptions): Promise<Core> {
-    compiled ??= load_wasm().catch((error: unknown) => {
+    compiled ??= platform.load_wasm().catch((error: unknown) => {
       compiled = undefined; // the next connect() tries again
       throw error;
     });

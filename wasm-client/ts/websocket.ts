@@ -1,12 +1,12 @@
 // Robot Raconteur over WebSocket. Layer: wasm-client/ts. Source: transports spec section 4.
-import { find_websocket } from "#find-websocket";
+import { platform } from "./platform.js";
 import type { Transport, TransportListener } from "./transport.js";
 
 export const subprotocol = "robotraconteur.robotraconteur.com";
 
 /** @throws Error where this engine has no WebSocket; everything later is told to `listener`. */
 export async function open_websocket(url: URL, listener: TransportListener): Promise<Transport> {
-  const WebSocketClass = await find_websocket();
+  const WebSocketClass = await platform.find_websocket();
   const socket = new WebSocketClass(url.href, [subprotocol]);
   socket.binaryType = "arraybuffer";
   let is_open = false;

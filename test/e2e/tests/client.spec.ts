@@ -1,5 +1,5 @@
 // The client package in a page without a bundler: big values through device, gateway and browser.
-import { cpSync, existsSync, mkdtempSync, readFileSync, writeFileSync } from "node:fs";
+import { cpSync, existsSync, mkdtempSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import path from "node:path";
 import { expect, test } from "@playwright/test";
@@ -7,14 +7,10 @@ import { Program, repository_root, rrgate, start_gateway } from "../processes";
 
 const service = path.join(path.dirname(rrgate), "../test/interop/cpp/rr-test-service");
 
-/** A folder for the gateway to serve: an empty page, and the package with its two "imports" resolved as a browser would. */
+/** A folder for the gateway to serve: the package as it is published, and an empty page. */
 function make_site(): string {
   const site = mkdtempSync(path.join(tmpdir(), "rrgate-site-"));
   cpSync(path.join(repository_root, "wasm-client/dist"), site, { recursive: true });
-  for (const [file, name] of [["wasm_module.js", "load-wasm"], ["websocket.js", "find-websocket"]] as const) {
-    const text = readFileSync(path.join(site, file), "utf8");
-    writeFileSync(path.join(site, file), text.replace(`"#${name}"`, `"./${name.replaceAll("-", "_")}_web.js"`));
-  }
   writeFileSync(path.join(site, "index.html"), "<!doctype html><title>client</title>");
   return site;
 }

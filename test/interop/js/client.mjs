@@ -2,7 +2,7 @@
 //
 //   node client.mjs URL     reads {"steps": [...]} from standard input, prints {"results": [...]}
 import { readFileSync } from "node:fs";
-import { connect, ErrorCode, RobotRaconteurError, rrValue, typeOf } from "../../../wasm-client/dist/index.js";
+import { connect, ErrorCode, RobotRaconteurError, rrValue, typeOf } from "../../../wasm-client/dist/node.js";
 
 const patience = 10_000; // ms for anything that has to come by itself
 

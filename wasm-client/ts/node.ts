@@ -1,6 +1,16 @@
-// The WebSocket of Node: its own since version 22, before that the package "ws". Layer: wasm-client/ts.
+/**
+ * rrgate-client in Node: the same, with Node's ways to a file and to a WebSocket.
+ * @module
+ */
+import { readFile } from "node:fs/promises";
+import { platform } from "./platform.js";
 
-export async function find_websocket(): Promise<typeof WebSocket> {
+export * from "./index.js";
+
+platform.load_wasm = async () => WebAssembly.compile(await readFile(new URL("./rrgate.wasm", import.meta.url)));
+
+/** Node's own since version 22, before that the package "ws". */
+platform.find_websocket = async () => {
   if (typeof globalThis.WebSocket === "function") return globalThis.WebSocket;
   const name = "ws"; // not a literal: the package is optional
   const found = (await import(name).catch(() => null)) as { WebSocket: WsClass } | null;
@@ -12,6 +22,6 @@ export async function find_websocket(): Promise<typeof WebSocket> {
       super(url, protocols, { perMessageDeflate: false, maxPayload: 0 });
     }
   } as typeof WebSocket;
-}
+};
 
 type WsClass = new (url: string | URL, protocols: string | string[] | undefined, options: object) => WebSocket;
