@@ -1,18 +1,11 @@
 // Browser tests of the dashboard. RRGATE names the gateway's program (default: build/release/server/rrgate), CHROMIUM the
 // browser (default: /usr/bin/chromium); the dashboard is taken from web/dist, so build it first.
+import launch from "./chromium.json" with { type: "json" };
 import { defineConfig, devices } from "@playwright/test";
 
 const chromium = {
-  executablePath: process.env["CHROMIUM"] ?? "/usr/bin/chromium",
-  args: [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-  ],
+  ...launch,
+  executablePath: process.env["CHROMIUM"] ?? launch.executablePath,
 };
 
 const { viewport, userAgent, deviceScaleFactor, isMobile, hasTouch } = devices["Pixel 7"] ?? {};

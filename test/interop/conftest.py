@@ -5,6 +5,7 @@ import urllib.request
 
 import pytest
 
+from clients import Chromium
 from directions import DIRECTIONS, LEVELS, service_command
 from matrix import Matrix
 from processes import BUILD, ROOT, Background, free_port
@@ -40,7 +41,9 @@ def pytest_generate_tests(metafunc):
         pairs = [(direction, level) for direction in DIRECTIONS for level in LEVELS if level in direction.levels]
         if metafunc.definition.get_closest_marker("direct"):
             # The tap reads bare streams; what a WebSocket carries is masked.
-            pairs = [pair for pair in pairs if pair[0].route == "direct" and pair[0].client != "browser"]
+            pairs = [pair for pair in pairs if pair[0].route == "direct" and not pair[0].speaks_javascript]
+        if metafunc.definition.get_closest_marker("pages"):
+            pairs = [pair for pair in pairs if pair[0].client == "chromium"]
         metafunc.parametrize("link", pairs, indirect=True, scope="module",
                              ids=[f"{direction.name}-{level}" for direction, level in pairs])
 
@@ -49,26 +52,31 @@ def pytest_collection_modifyitems(config, items):
     """Scenarios that a client or a service cannot carry out are not its tests."""
     def is_known(item):
         scenario, link = (item.callspec.params.get(name) for name in ("scenario", "link"))
-        if not scenario or not link:
-            return True
-        return link[0].client in scenario.clients and link[0].service in scenario.services
+        return not scenario or not link or link[0].knows(scenario)
 
     config.hook.pytest_deselected(items=[item for item in items if not is_known(item)])
     items[:] = filter(is_known, items)
 
 
+@pytest.fixture(scope="session")
+def chromium(tmp_path_factory):
+    browser = Chromium(tmp_path_factory.mktemp("chromium"))
+    yield browser
+    browser.stop()
+
+
 @pytest.fixture(scope="module")
-def link(request, tmp_path_factory):
+def link(request, chromium, tmp_path_factory):
     """A running service, behind the gateway where the direction says so: (direction, level, port)."""
     direction, level = request.param
     folder = tmp_path_factory.mktemp("link")
-    service = Background(service_command(direction.service, level), folder / "service.log")
+    service = Background(service_command(direction, level, chromium.origin), folder / "service.log")
     gateway = None
     try:
-        ready = service.first_line()
+        ready = service.next_line()
         port = ready["port"]
         if direction.route != "direct":
-            gateway, port = start_gateway(folder, ready["url"])
+            gateway, port = start_gateway(folder, ready["url"], chromium.origin)
         yield direction, level, port
         if gateway:
             code, description = gateway.stop(), gateway.description()
@@ -80,10 +88,14 @@ def link(request, tmp_path_factory):
         service.stop()
 
 
-def start_gateway(folder, device_url):
+def start_gateway(folder, device_url, page_origin):
     port = free_port()
     config = folder / "gateway.json"
-    config.write_text(json.dumps({"listen": [f"127.0.0.1:{port}"], "devices": [{"name": "interop", "url": device_url}]}))
+    config.write_text(json.dumps({
+        "listen": [f"127.0.0.1:{port}"],
+        "allowed_origins": [page_origin],
+        "devices": [{"name": "interop", "url": device_url}],
+    }))
     gateway = Background([BUILD / "server" / "rrgate", "serve", "--config", config], folder / "gateway.log")
 
     def device_is_up():

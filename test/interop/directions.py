@@ -17,10 +17,19 @@ LEVELS = {
 @dataclass(frozen=True)
 class Direction:
     name: str
-    client: str  # reference, ours, browser
+    client: str  # reference, ours, node, chromium
     route: str  # direct, gateway-tcp, gateway-ws
     service: str  # reference, ours
     levels: tuple = tuple(LEVELS)
+
+    @property
+    def speaks_javascript(self):
+        return self.client in ("node", "chromium")
+
+    def knows(self, scenario):
+        """Whether both sides can do what the scenario asks."""
+        language = "javascript" if self.speaks_javascript else self.client
+        return language in scenario.clients and self.service in scenario.services
 
 
 # The first shows that scenarios and peers are right: the reference talks to itself.
@@ -29,32 +38,21 @@ DIRECTIONS = [
     Direction("reference-to-ours", "reference", "direct", "ours"),
     Direction("ours-to-reference", "ours", "direct", "reference"),
     Direction("ours-to-ours", "ours", "direct", "ours"),
-    Direction("browser-to-reference", "browser", "direct", "reference"),
+    Direction("node-to-reference", "node", "direct", "reference"),
+    Direction("chromium-to-reference", "chromium", "direct", "reference"),
     Direction("reference-gateway-tcp-reference", "reference", "gateway-tcp", "reference"),
     Direction("reference-gateway-ws-reference", "reference", "gateway-ws", "reference"),
     Direction("reference-gateway-tcp-ours", "reference", "gateway-tcp", "ours"),
     Direction("ours-gateway-tcp-reference", "ours", "gateway-tcp", "reference"),
-    Direction("browser-gateway-ws-reference", "browser", "gateway-ws", "reference"),
-    Direction("browser-gateway-ws-ours", "browser", "gateway-ws", "ours"),
+    Direction("node-gateway-ws-reference", "node", "gateway-ws", "reference"),
+    Direction("node-gateway-ws-ours", "node", "gateway-ws", "ours"),
+    Direction("chromium-gateway-ws-reference", "chromium", "gateway-ws", "reference"),
+    Direction("chromium-gateway-ws-ours", "chromium", "gateway-ws", "ours"),
 ]
 
 
-def service_command(service, level):
-    if service == "reference":
-        return [sys.executable, PEERS / "service.py", *LEVELS[level]]
+def service_command(direction, level, page_origin):
+    """`page_origin`: whose pages may connect straight to the service."""
+    if direction.service == "reference":
+        return [sys.executable, PEERS / "service.py", *LEVELS[level], f"--robotraconteur-tcp-ws-add-origins={page_origin}"]
     return [BUILD / "test/interop/cpp/rr-test-service", *LEVELS[level]]
-
-
-def client_command(direction, port):
-    if direction.client == "browser":
-        path = "" if direction.route == "direct" else "devices/interop"  # a node takes WebSockets on its own port
-        return ["node", ROOT / "test/interop/js/client.mjs", f"ws://127.0.0.1:{port}/{path}?service=interop"]
-    url = {
-        "direct": f"rr+tcp://127.0.0.1:{port}/?service=interop",
-        # A native client names the device that it wants; the gateway is only the way to it.
-        "gateway-tcp": f"rr+tcp://127.0.0.1:{port}/?nodename=interop.service&service=interop",
-        "gateway-ws": f"rr+ws://127.0.0.1:{port}/devices/interop?service=interop",
-    }[direction.route]
-    if direction.client == "reference":
-        return [sys.executable, PEERS / "client.py", url, "--robotraconteur-disable-stringtable=false"]
-    return [BUILD / "test/interop/cpp/rr-test-client", url]

@@ -30,21 +30,26 @@ class Background:
             # A session of its own: whatever it starts is ended with it.
             self.process = subprocess.Popen(self.command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                                             stderr=errors, start_new_session=True, cwd=ROOT)
+        self._output = b""  # read, but not asked for yet
 
-    def first_line(self):
-        """The first line that the process prints, as JSON."""
-        buffer = b""
-        deadline = time.monotonic() + START_DEADLINE
+    def next_line(self, within=START_DEADLINE):
+        """The next line that the process prints, as JSON."""
+        deadline = time.monotonic() + within
         with selectors.DefaultSelector() as selector:
             selector.register(self.process.stdout, selectors.EVENT_READ)
-            while b"\n" not in buffer:
+            while b"\n" not in self._output:
                 if not selector.select(max(0.0, deadline - time.monotonic())):
-                    raise AssertionError(f"not ready after {START_DEADLINE} s: {self.description()}")
+                    raise AssertionError(f"no line after {within} s: {self.description()}")
                 chunk = os.read(self.process.stdout.fileno(), 65536)
                 if not chunk:
-                    raise AssertionError(f"ended before it was ready: {self.description()}")
-                buffer += chunk
-        return json.loads(buffer.split(b"\n")[0])
+                    raise AssertionError(f"ended before it printed a line: {self.description()}")
+                self._output += chunk
+        line, self._output = self._output.split(b"\n", 1)
+        return json.loads(line)
+
+    def write_line(self, value):
+        self.process.stdin.write(json.dumps(value).encode() + b"\n")
+        self.process.stdin.flush()
 
     def wait_until(self, is_ready):
         deadline = time.monotonic() + START_DEADLINE
@@ -75,23 +80,3 @@ class Background:
         self.process.stdout.close()
         return code
 
-
-def run_client(command, scenario):
-    """Hands the steps of a scenario to a client program. Returns its results, one for each step."""
-    steps = [{key: value for key, value in step.items() if not key.startswith("expect") and key not in ("message", "any_order")}
-             for step in scenario.steps]
-    client = subprocess.Popen([str(word) for word in command], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                              stderr=subprocess.PIPE, text=True, start_new_session=True, cwd=ROOT)
-    try:
-        output, errors = client.communicate(json.dumps({"steps": steps}), timeout=STEP_DEADLINE)
-    except subprocess.TimeoutExpired:
-        os.killpg(client.pid, signal.SIGKILL)
-        output, errors = client.communicate()
-        raise AssertionError(f"client still busy after {STEP_DEADLINE} s\n{output[-2000:]}\n{errors[-4000:]}") from None
-    lines = output.strip().splitlines()
-    if client.returncode != 0 or not lines:
-        raise AssertionError(f"client ended with {client.returncode}\n{output[-2000:]}\n{errors[-4000:]}")
-    answer = json.loads(lines[-1])
-    if "results" not in answer:
-        raise AssertionError(f"client did not connect: {answer}")
-    return answer["results"]

@@ -3,16 +3,15 @@ import json
 
 import pytest
 
-from directions import client_command
-from processes import run_client
+from clients import client_url, run_client
 from scenarios import SCENARIOS
 from tap import Tap
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda scenario: scenario.name)
-def test_scenario(link, scenario):
+def test_scenario(link, chromium, scenario):
     direction, _, port = link
-    results = run_client(client_command(direction, port), scenario)
+    results = run_client(direction, port, scenario, chromium)
     assert len(results) == len(scenario.steps)
     for number, (step, result) in enumerate(zip(scenario.steps, results), 1):
         check(f"step {number}: {json.dumps(step, ensure_ascii=False)[:400]}", step, result)
@@ -38,7 +37,18 @@ def test_agreed_level(link):
     tap = Tap(port)
     try:
         functions = next(scenario for scenario in SCENARIOS if scenario.name == "functions")
-        run_client(client_command(direction, tap.port), functions)
+        run_client(direction, tap.port, functions)
         assert tap.level() == level
     finally:
         tap.close()
+
+
+@pytest.mark.pages
+def test_pages_of_other_origins(link, chromium):
+    """A page may connect where it is expected, and nowhere else; browsers do not tell it why."""
+    direction, _, port = link
+    request = {"url": client_url(direction, port), "steps": []}
+    assert chromium.ask(request) == {"results": []}
+    answer = chromium.ask({**request, "page": chromium.origin.replace("127.0.0.1", "localhost")})
+    assert answer["connect_error"]["name"] == "RobotRaconteur.ConnectionError"
+    assert "could not connect to ws://127.0.0.1" in answer["connect_error"]["message"]

@@ -1,0 +1,87 @@
+"""Test clients of all kinds: each carries out the steps of a scenario."""
+import json
+import os
+import signal
+import subprocess
+import sys
+
+from directions import PEERS
+from processes import BUILD, ROOT, Background, free_port
+
+STEP_DEADLINE = 60.0  # seconds for a client to carry out one scenario
+JS = ROOT / "test" / "interop" / "js"
+
+
+def run_client(direction, port, scenario, chromium=None):
+    """Hands the steps of a scenario to the client of a direction. Returns its results, one for each step."""
+    steps = [{key: value for key, value in step.items() if not key.startswith("expect") and key not in ("message", "any_order")}
+             for step in scenario.steps]
+    if direction.client == "chromium":
+        answer = chromium.ask({"url": client_url(direction, port), "steps": steps})
+    else:
+        answer = run_program(client_command(direction, port), steps)
+    if "results" not in answer:
+        raise AssertionError(f"client did not connect: {answer}")
+    return answer["results"]
+
+
+def client_url(direction, port):
+    if direction.speaks_javascript:
+        path = "" if direction.route == "direct" else "devices/interop"  # a node takes WebSockets on its own port
+        return f"ws://127.0.0.1:{port}/{path}?service=interop"
+    return {
+        "direct": f"rr+tcp://127.0.0.1:{port}/?service=interop",
+        # A native client names the device that it wants; the gateway is only the way to it.
+        "gateway-tcp": f"rr+tcp://127.0.0.1:{port}/?nodename=interop.service&service=interop",
+        "gateway-ws": f"rr+ws://127.0.0.1:{port}/devices/interop?service=interop",
+    }[direction.route]
+
+
+def client_command(direction, port):
+    url = client_url(direction, port)
+    return {
+        "reference": [sys.executable, PEERS / "client.py", url, "--robotraconteur-disable-stringtable=false"],
+        "ours": [BUILD / "test/interop/cpp/rr-test-client", url],
+        "node": ["node", JS / "client.mjs", url],
+    }[direction.client]
+
+
+def run_program(command, steps):
+    client = subprocess.Popen([str(word) for word in command], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                              stderr=subprocess.PIPE, text=True, start_new_session=True, cwd=ROOT)
+    try:
+        output, errors = client.communicate(json.dumps({"steps": steps}), timeout=STEP_DEADLINE)
+    except subprocess.TimeoutExpired:
+        os.killpg(client.pid, signal.SIGKILL)
+        output, errors = client.communicate()
+        raise AssertionError(f"client still busy after {STEP_DEADLINE} s\n{output[-2000:]}\n{errors[-4000:]}") from None
+    lines = output.strip().splitlines()
+    if client.returncode != 0 or not lines:
+        raise AssertionError(f"client ended with {client.returncode}\n{output[-2000:]}\n{errors[-4000:]}")
+    return json.loads(lines[-1])
+
+
+class Chromium:
+    """One browser for the whole run, started when it is needed first; a page of its own for each scenario."""
+
+    def __init__(self, folder):
+        self._log = folder / "chromium.log"
+        self._port = free_port()
+        self._driver = None
+        self.origin = f"http://127.0.0.1:{self._port}"
+
+    def ask(self, request):
+        if not self._driver:
+            self._driver = Background(["node", JS / "chromium.mjs", self._port], self._log)
+            self._driver.next_line()
+        try:
+            self._driver.write_line(request)
+            return self._driver.next_line(STEP_DEADLINE)
+        except (AssertionError, OSError):
+            self.stop()  # whatever holds it, the next scenario gets a new one
+            raise
+
+    def stop(self):
+        driver, self._driver = self._driver, None
+        if driver:
+            driver.stop()
