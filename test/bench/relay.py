@@ -32,7 +32,7 @@ def device(build):
     with tempfile.TemporaryDirectory() as scratch, contextlib.ExitStack() as stack:
         process = Background([build / "test/interop/cpp/rr-test-service"], pathlib.Path(scratch) / "device.log")
         stack.callback(process.stop)
-        yield process.next_line()["port"]
+        yield json.loads(process.next_line())["port"]
 
 
 @contextlib.contextmanager

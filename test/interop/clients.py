@@ -76,7 +76,7 @@ class Chromium:
             self._driver.next_line()
         try:
             self._driver.write_line(request)
-            return self._driver.next_line(STEP_DEADLINE)
+            return json.loads(self._driver.next_line(STEP_DEADLINE))
         except (AssertionError, OSError):
             self.stop()  # whatever holds it, the next scenario gets a new one
             raise

@@ -1,14 +1,13 @@
 """Fixtures of the interoperability tests: one pair of service and route at a time, shared by its scenarios."""
 import faulthandler
 import json
-import urllib.request
 
 import pytest
 
 from clients import Chromium
 from directions import DIRECTIONS, LEVELS, service_command
 from matrix import Matrix
-from processes import BUILD, ROOT, Background, free_port
+from processes import ROOT, Background, start_gateway
 
 TEST_DEADLINE = 120.0  # seconds; beyond it the run is ended with all stacks printed
 
@@ -51,7 +50,8 @@ def pytest_generate_tests(metafunc):
 def pytest_collection_modifyitems(config, items):
     """Scenarios that a client or a service cannot carry out are not its tests."""
     def is_known(item):
-        scenario, link = (item.callspec.params.get(name) for name in ("scenario", "link"))
+        params = item.callspec.params if hasattr(item, "callspec") else {}
+        scenario, link = params.get("scenario"), params.get("link")
         return not scenario or not link or link[0].knows(scenario)
 
     config.hook.pytest_deselected(items=[item for item in items if not is_known(item)])
@@ -73,7 +73,7 @@ def link(request, chromium, tmp_path_factory):
     service = Background(service_command(direction, level, chromium.origin), folder / "service.log")
     gateway = None
     try:
-        ready = service.next_line()
+        ready = json.loads(service.next_line())
         port = ready["port"]
         if direction.route != "direct":
             gateway, port = start_gateway(folder, ready["url"], chromium.origin)
@@ -86,29 +86,3 @@ def link(request, chromium, tmp_path_factory):
         if gateway:
             gateway.stop()
         service.stop()
-
-
-def start_gateway(folder, device_url, page_origin):
-    port = free_port()
-    config = folder / "gateway.json"
-    config.write_text(json.dumps({
-        "listen": [f"127.0.0.1:{port}"],
-        "allowed_origins": [page_origin],
-        "devices": [{"name": "interop", "url": device_url}],
-    }))
-    gateway = Background([BUILD / "server" / "rrgate", "serve", "--config", config], folder / "gateway.log")
-
-    def device_is_up():
-        try:
-            with urllib.request.urlopen(f"http://127.0.0.1:{port}/api/v1/devices", timeout=5) as answer:
-                (device,) = json.load(answer)["devices"]
-                return device["state"] == "online"
-        except OSError:
-            return False
-
-    try:
-        gateway.wait_until(device_is_up)
-    except BaseException:
-        gateway.stop()
-        raise
-    return gateway, port

@@ -7,6 +7,7 @@ import signal
 import socket
 import subprocess
 import time
+import urllib.request
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = pathlib.Path(os.environ.get("RR_BUILD", ROOT / "build" / "release"))
@@ -23,17 +24,18 @@ def free_port():
 class Background:
     """A process that runs beside the tests. Its standard input stays open while it is wanted."""
 
-    def __init__(self, command, log):
+    def __init__(self, command, log, environment={}):
         self.command = [str(word) for word in command]
         self._log = pathlib.Path(log)
         with open(self._log, "wb") as errors:
             # A session of its own: whatever it starts is ended with it.
             self.process = subprocess.Popen(self.command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                                            stderr=errors, start_new_session=True, cwd=ROOT)
+                                            stderr=errors, start_new_session=True, cwd=ROOT,
+                                            env={**os.environ, **environment})
         self._output = b""  # read, but not asked for yet
 
     def next_line(self, within=START_DEADLINE):
-        """The next line that the process prints, as JSON."""
+        """The next line that the process prints."""
         deadline = time.monotonic() + within
         with selectors.DefaultSelector() as selector:
             selector.register(self.process.stdout, selectors.EVENT_READ)
@@ -45,7 +47,7 @@ class Background:
                     raise AssertionError(f"ended before it printed a line: {self.description()}")
                 self._output += chunk
         line, self._output = self._output.split(b"\n", 1)
-        return json.loads(line)
+        return line.decode()
 
     def write_line(self, value):
         self.process.stdin.write(json.dumps(value).encode() + b"\n")
@@ -80,3 +82,29 @@ class Background:
         self.process.stdout.close()
         return code
 
+
+def start_gateway(folder, device_url, page_origin=None):
+    """A gateway to one device, called "interop", when it has reached it: (process, port)."""
+    port = free_port()
+    config = folder / "gateway.json"
+    config.write_text(json.dumps({
+        "listen": [f"127.0.0.1:{port}"],
+        "allowed_origins": [page_origin] if page_origin else [],
+        "devices": [{"name": "interop", "url": device_url}],
+    }))
+    gateway = Background([BUILD / "server" / "rrgate", "serve", "--config", config], folder / "gateway.log")
+
+    def device_is_up():
+        try:
+            with urllib.request.urlopen(f"http://127.0.0.1:{port}/api/v1/devices", timeout=5) as answer:
+                (device,) = json.load(answer)["devices"]
+                return device["state"] == "online"
+        except OSError:
+            return False
+
+    try:
+        gateway.wait_until(device_is_up)
+    except BaseException:
+        gateway.stop()
+        raise
+    return gateway, port
