@@ -4,8 +4,9 @@ include(GNUInstallDirs)
 
 set_target_properties(rr_node PROPERTIES EXPORT_NAME node)
 set_target_properties(rr_transport PROPERTIES EXPORT_NAME transport)
+set_target_properties(rrgate_http PROPERTIES EXPORT_NAME http)
 install(
-  TARGETS rr_options rr_boost rr_support rr_wire rr_robdef rr_types rr_member rr_session rrgate_asio rr_transport rr_node rrgate
+  TARGETS rr_options rr_boost rr_support rr_wire rr_robdef rr_types rr_member rr_session rrgate_asio rr_transport rrgate_http rr_node rrgate
   EXPORT rrgateTargets
   RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}"
   ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")

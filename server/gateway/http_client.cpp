@@ -89,7 +89,7 @@ rr::awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, st
   const auto accepted = format_upgrade_response(request);
   if (co_await write_text(tcp, accepted)) co_return;
   tcp.put_back(unread);
-  rr::WebSocketStream socket(std::move(stream), takes_close);
+  rr::WebSocketStream socket(std::move(stream), rr::WebSocketRole::server, takes_close);
   if (!boarding) {  // a page can't read the status of a refused upgrade, but it can read why a WebSocket closes
     log(LogLevel::info, "client refused", {{"peer", socket.peer()}, {"error", boarding.error().message}});
     const rr::EndReason reason{1013, boarding.error().message};

@@ -13,7 +13,7 @@ bool asks_for_websocket(const Request& request) {
 Response upgrade_required(std::string_view detail) {
   auto response = problem_response(426, detail);
   response.set("Upgrade", "websocket");
-  response.set("Sec-WebSocket-Protocol", std::string(websocket_subprotocol));
+  response.set("Sec-WebSocket-Protocol", std::string(rr::websocket_subprotocol));
   response.set("Sec-WebSocket-Version", "13");
   response.closes = true;
   return response;
@@ -38,11 +38,11 @@ std::optional<Response> refuse_upgrade(const Request& request, const std::vector
   const auto lines = message.equal_range(http::field::sec_websocket_protocol);
   for (auto it = lines.first; it != lines.second; ++it) {
     has_protocol = true;
-    has_ours = has_ours || has_token({it->value().data(), it->value().size()}, websocket_subprotocol);
+    has_ours = has_ours || has_token({it->value().data(), it->value().size()}, rr::websocket_subprotocol);
   }
   if (has_protocol && !has_ours)
     return upgrade_required("subprotocol " + rr::quoted(request.header(http::field::sec_websocket_protocol)) +
-                            ": expected " + std::string(websocket_subprotocol));
+                            ": expected " + std::string(rr::websocket_subprotocol));
   const auto origins = message.count(http::field::origin);
   const auto origin = request.header(http::field::origin);
   if (origins > 1 || (origins == 1 && !is_origin_allowed(origin, request.header(http::field::host), allowed_origins))) {
@@ -58,7 +58,8 @@ std::optional<Response> refuse_upgrade(const Request& request, const std::vector
 std::string format_upgrade_response(const Request& request) {
   return "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Accept: " +
          rr::websocket_accept(request.header(http::field::sec_websocket_key)) +
-         "\r\nSec-WebSocket-Protocol: " + std::string(websocket_subprotocol) + "\r\nSec-WebSocket-Version: 13\r\n\r\n";
+         "\r\nSec-WebSocket-Protocol: " + std::string(rr::websocket_subprotocol) +
+         "\r\nSec-WebSocket-Version: 13\r\n\r\n";
 }
 
 bool takes_close_frames(const Request& request) {

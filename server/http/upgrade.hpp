@@ -9,8 +9,6 @@
 
 namespace rrgate {
 
-inline constexpr std::string_view websocket_subprotocol = "robotraconteur.robotraconteur.com";
-
 /// Whether the request asks to become a WebSocket at all.
 bool asks_for_websocket(const Request& request);
 

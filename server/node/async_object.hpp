@@ -236,7 +236,7 @@ class AsyncObject {
 /// The root object of the service that `url` names; completes with an AsyncObject. The connection lives until
 /// disconnect().
 template <class Token = boost::asio::use_awaitable_t<>>
-auto async_connect(boost::asio::io_context& io, std::string url, const ClientOptions& options, Token&& token = {}) {
+auto async_connect(boost::asio::io_context& io, std::string url, const ConnectOptions& options, Token&& token = {}) {
   return boost::asio::async_initiate<Token, void(std::exception_ptr, AsyncObject)>(
       [&io, url = std::move(url), options](auto handler) {
         const detail::CompleteOnce<AsyncObject, decltype(handler)> complete(std::move(handler), io.get_executor());
@@ -250,7 +250,7 @@ auto async_connect(boost::asio::io_context& io, std::string url, const ClientOpt
 /// With default options.
 template <class Token = boost::asio::use_awaitable_t<>>
 auto async_connect(boost::asio::io_context& io, std::string url, Token&& token = {}) {
-  const ClientOptions options;
+  const ConnectOptions options;
   return async_connect(io, std::move(url), options, std::forward<Token>(token));
 }
 

@@ -31,7 +31,7 @@ Value password_credentials(std::string_view password) {
 
 }  // namespace
 
-BlockingConnection::BlockingConnection(std::string_view url, ClientOptions options) {
+BlockingConnection::BlockingConnection(std::string_view url, ConnectOptions options) {
   std::optional<Error> failure;
   ClientConnection::open(io_, url, std::move(options), [&](Result<std::shared_ptr<ClientConnection>> opened) {
     if (opened)
@@ -227,14 +227,14 @@ const std::string& RemoteObject::type_name() const {
   return type->qualified_name;
 }
 
-RemoteObject connect(std::string_view url, ClientOptions options) {
+RemoteObject connect(std::string_view url, ConnectOptions options) {
   auto connection = std::make_shared<BlockingConnection>(url, std::move(options));
   const std::string root = connection->asynchronous().root_path();
   return {std::move(connection), root};
 }
 
 RemoteObject connect(std::string_view url, std::string_view username, std::string_view password) {
-  ClientOptions options;
+  ConnectOptions options;
   options.username = username;
   options.credentials = password_credentials(password);
   return connect(url, std::move(options));

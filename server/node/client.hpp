@@ -34,7 +34,7 @@ class ClientException : public Exception {
 class BlockingConnection {
  public:
   /// Throws   ClientException.
-  BlockingConnection(std::string_view url, ClientOptions options);
+  BlockingConnection(std::string_view url, ConnectOptions options);
   /// Disconnects, within a second.
   ~BlockingConnection();
   BlockingConnection(const BlockingConnection&) = delete;
@@ -164,7 +164,7 @@ class RemoteObject {
 
 /// The root object of the service that `url` names. A service that requires a user takes options.username and
 /// options.credentials, or those given here.
-RemoteObject connect(std::string_view url, ClientOptions options = {});
+RemoteObject connect(std::string_view url, ConnectOptions options = {});
 RemoteObject connect(std::string_view url, std::string_view username, std::string_view password);
 
 }  // namespace rr

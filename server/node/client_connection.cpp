@@ -1,43 +1,48 @@
 #include "server/node/client_connection.hpp"
 
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
 #include <boost/asio/post.hpp>
 #include <variant>
 
 #include "core/session/service_path.hpp"
 #include "core/session/url.hpp"
 #include "core/support/random.hpp"
-#include "server/node/tcp_connect.hpp"
 
 namespace rr {
 
 namespace asio = boost::asio;
 
-ClientConnection::ClientConnection(asio::ip::tcp::socket socket, ClientOptions options, Opened opened)
-    : SessionDriver(std::move(socket), std::move(options), read_clocks()), opened_(std::move(opened)) {}
+namespace {
 
-void ClientConnection::open(asio::io_context& io, std::string_view url, ClientOptions options, Opened done) {
+awaitable<void> dial_and_start(ConnectionUrl url, ConnectOptions options, ClientConnection::Opened done) {
+  const auto deadline = std::chrono::steady_clock::now() + options.connect_timeout;
+  options.dial.timeout = options.connect_timeout;
+  auto stream = co_await dial(std::move(url), std::move(options.dial));
+  if (!stream) co_return done(stream.error());
+  const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
+  options.connect_timeout = std::max(left, std::chrono::milliseconds(1));
+  std::make_shared<ClientConnection>(std::move(*stream), std::move(options), std::move(done))->start();
+}
+
+}  // namespace
+
+ClientConnection::ClientConnection(std::unique_ptr<ByteStream> stream, ClientOptions options, Opened opened)
+    : SessionDriver(std::move(stream), std::move(options), read_clocks()), opened_(std::move(opened)) {}
+
+void ClientConnection::open(asio::io_context& io, std::string_view url, ConnectOptions options, Opened done) {
   const auto refuse = [&](ErrorCode code, std::string why) {
     asio::post(io, [done, error = make_error(code, std::move(why))] { done(error); });
   };
   const auto parsed = parse_url(url);
   if (!parsed) return refuse(parsed.error().code, parsed.error().message);
-  if (parsed->scheme != "rr+tcp")
+  if (!can_dial(parsed->scheme))
     return refuse(ErrorCode::connection_error, "connect to " + quoted(url) + ": scheme '" + parsed->scheme +
-                                                   "' is not available here, expected rr+tcp");
+                                                   "' is not available here, expected " + dialable_schemes());
   options.service = parsed->service;
   options.connection.target = {parsed->node_id.value_or(NodeId{}), parsed->node_name};
   if (options.connection.self.id.is_any()) options.connection.self.id = random_node_id();
-  const auto deadline = std::chrono::steady_clock::now() + options.connect_timeout;
-  const auto timeout = options.connect_timeout;
-  tcp_connect(
-      io, parsed->host, parsed->port, timeout,
-      [options = std::move(options), deadline, done = std::move(done)](Result<asio::ip::tcp::socket> socket) mutable {
-        if (!socket) return done(socket.error());
-        const auto left =
-            std::chrono::duration_cast<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
-        options.connect_timeout = std::max(left, std::chrono::milliseconds(1));
-        std::make_shared<ClientConnection>(std::move(*socket), std::move(options), std::move(done))->start();
-      });
+  asio::co_spawn(io, dial_and_start(*parsed, std::move(options), std::move(done)), asio::detached);
 }
 
 void ClientConnection::expect(RequestId id, Completion done) {

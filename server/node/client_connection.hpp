@@ -1,4 +1,4 @@
-// A client of one service over TCP, with callbacks. Layer: node.
+// A client of one service, with callbacks. Layer: node.
 #pragma once
 
 #include <boost/asio/io_context.hpp>
@@ -13,9 +13,18 @@
 #include <vector>
 
 #include "core/session/client_session.hpp"
-#include "server/node/tcp_driver.hpp"
+#include "server/node/stream_driver.hpp"
+#include "server/transport/dial.hpp"
 
 namespace rr {
+
+/// How to reach a service and what to be there.
+struct ConnectOptions : ClientOptions {
+  ConnectOptions() = default;
+  ConnectOptions(ClientOptions options) : ClientOptions(std::move(options)) {}
+
+  DialOptions dial = {};  ///< its timeout is connect_timeout
+};
 
 /// One connection to a service. All callbacks run on the thread of the io_context. Each completion is called exactly
 /// once, when the reply is there or the connection has ended; for a request that cannot be sent, maybe before the
@@ -33,9 +42,10 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   };
 
   /// Resolves, connects (all addresses, side by side) and opens the session, all within options.connect_timeout.
-  /// `url`      rr+tcp://host:port/?service=NAME, with nodeid or nodename where that node alone will do.
+  /// `url`      SCHEME://host:port/?service=NAME, with nodeid or nodename where that node alone will do; the schemes
+  ///            are those of server/transport/dial.cpp.
   /// `options`  service and target node are taken from the URL; a random NodeID where none is given.
-  static void open(boost::asio::io_context& io, std::string_view url, ClientOptions options, Opened done);
+  static void open(boost::asio::io_context& io, std::string_view url, ConnectOptions options, Opened done);
 
   // Paths name objects: root_path(), or those of child_path() after find_object(). See ClientSession for what requests
   // complete with.
@@ -90,7 +100,7 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   const ClientSession& session() const { return session_; }
 
   /// For open(): use that.
-  ClientConnection(boost::asio::ip::tcp::socket socket, ClientOptions options, Opened opened);
+  ClientConnection(std::unique_ptr<ByteStream> stream, ClientOptions options, Opened opened);
 
  private:
   using MemberKey = std::pair<std::string, std::string>;               // path, member

@@ -1,7 +1,8 @@
 #include "server/node/node.hpp"
 
 #include <algorithm>
-#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
@@ -13,18 +14,19 @@
 
 #include "core/session/url.hpp"
 #include "core/support/random.hpp"
+#include "server/node/accept.hpp"
 #include "server/node/service_client.hpp"
+#include "server/transport/tcp.hpp"
 
 namespace rr {
 
 namespace asio = boost::asio;
-using asio::ip::tcp;
 using boost::system::error_code;
 
 namespace {
 
 constexpr std::chrono::milliseconds stop_deadline{500};
-constexpr std::chrono::milliseconds accept_pause{100};  // after a failure, e.g. no file descriptors left
+constexpr std::chrono::milliseconds send_stall{15000};
 
 NodeIdentity make_identity(std::string name, const NodeId& id) {
   if (!name.empty() && !is_valid_node_name(name))
@@ -98,17 +100,13 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
 
   std::uint16_t listen(std::string_view url) {
     const HostPort address = parse_listen_url(url);
-    try {
-      tcp::resolver resolver(io_);
-      const auto endpoints = resolver.resolve(address.host, std::to_string(address.port),
-                                              tcp::resolver::passive | tcp::resolver::numeric_service);
-      auto acceptor = std::make_shared<tcp::acceptor>(io_, endpoints.begin()->endpoint());
-      acceptors_.push_back(acceptor);
-      accept(acceptor);
-      return acceptor->local_endpoint().port();
-    } catch (const boost::system::system_error& failure) {
-      throw std::system_error(failure.code(), "listen on " + std::string(url));
-    }
+    auto listener = std::make_unique<TcpListener>(io_.get_executor());
+    const auto bound = listener->open(address, true);
+    if (!bound) throw std::runtime_error(bound.error().message);
+    listener->start([this](asio::ip::tcp::socket socket) { accept(std::move(socket)); },
+                    [this](const std::string& problem) { report(problem); });
+    listeners_.push_back(std::move(listener));
+    return bound->front().port;
   }
 
   void run() {
@@ -236,33 +234,32 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     }
   }
 
-  void accept(const std::shared_ptr<tcp::acceptor>& acceptor) {
-    acceptor->async_accept([this, acceptor](const error_code& error, tcp::socket socket) {
-      if (error == asio::error::operation_aborted || !acceptor->is_open()) return;
-      if (error) return accept_later(acceptor, error);
-      if (clients_.size() < options_.max_clients) add_client(std::move(socket));
-      accept(acceptor);
-    });
-  }
-
-  void accept_later(const std::shared_ptr<tcp::acceptor>& acceptor, const error_code& why) {
-    report("accept: " + why.message());
-    const auto pause = std::make_shared<asio::steady_timer>(io_, accept_pause);
-    pause->async_wait([this, acceptor, pause](const error_code&) {
-      if (acceptor->is_open()) accept(acceptor);
-    });
-  }
-
-  void add_client(tcp::socket socket) {
+  void accept(asio::ip::tcp::socket socket) {
     error_code error;
-    const tcp::endpoint local = socket.local_endpoint(error);
+    const auto local = socket.local_endpoint(error);
     if (error) return;  // gone already
+    if (clients_.size() + arriving_ >= options_.max_clients) return;
+    ++arriving_;
+    auto stream = std::make_unique<TcpStream>(std::move(socket), send_stall);
+    asio::co_spawn(io_, welcome(std::move(stream), format_host_port(local.address().to_string(), local.port())),
+                   asio::detached);
+  }
+
+  awaitable<void> welcome(std::unique_ptr<ByteStream> stream, std::string local) {
+    AcceptOptions how;
+    how.allowed_origins = options_.allowed_origins;
+    auto accepted = co_await accept_stream(std::move(stream), std::move(how));
+    --arriving_;
+    if (accepted && !is_stopping_) add_client(std::move(accepted->stream), accepted->scheme + "://" + local + "/");
+  }
+
+  void add_client(std::unique_ptr<ByteStream> stream, std::string base_url) {
     ServiceSessionOptions session;
     session.connection.features = options_.features;
     session.connection.max_message_size = options_.max_message_size;
-    session.base_url = "rr+tcp://" + format_host_port(local.address().to_string(), local.port()) + "/";
+    session.base_url = std::move(base_url);
     const ClientId id = ++last_client_id_;
-    const auto client = std::make_shared<ServiceClient>(id, *this, directory_, std::move(session), std::move(socket));
+    const auto client = std::make_shared<ServiceClient>(id, *this, directory_, std::move(session), std::move(stream));
     clients_.emplace(id, client);
     client->start();
   }
@@ -273,9 +270,8 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   }
 
   void close_listeners() {
-    error_code ignored;
-    for (const auto& acceptor : acceptors_) acceptor->close(ignored);
-    acceptors_.clear();
+    for (const auto& listener : listeners_) listener->close();
+    listeners_.clear();
     for (const auto& job : repeats_) {
       job->is_stopped = true;
       job->timer.cancel();
@@ -288,9 +284,10 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   asio::io_context& io_;
   ServiceDirectory directory_;
   std::vector<std::shared_ptr<Service>> services_;
-  std::vector<std::shared_ptr<tcp::acceptor>> acceptors_;
+  std::vector<std::unique_ptr<TcpListener>> listeners_;
   std::vector<std::shared_ptr<Repeat>> repeats_;
   std::map<ClientId, std::shared_ptr<ServiceClient>> clients_;
+  std::size_t arriving_ = 0;  ///< connections whose first bytes are awaited
   ClientId last_client_id_ = 0;
   ClientId current_client_ = 0;
   bool is_stopping_ = false;

@@ -17,6 +17,8 @@ struct NodeOptions {
   Features features = {};
   std::size_t max_message_size = 12u * 1024 * 1024;
   std::size_t max_clients = 4096;  ///< more connections are closed at once
+  /// Pages of other hosts that may open WebSockets: "https://lab.example", "https://*.example.org:8443".
+  std::vector<std::string> allowed_origins = {};
   /// A sentence about something that went wrong and that no client hears of; the default writes it to stderr.
   std::function<void(const std::string& problem)> report = {};
 };
@@ -34,7 +36,8 @@ class Node {
   /// Throws   std::invalid_argument that names the missing handlers or the name that is taken.
   void add(const std::shared_ptr<Service>& service);
   /// "rr+tcp://0.0.0.0:52222", "rr+tcp://[::]:0" (IPv4 as well), "rr+tcp://localhost:0"; port 0 takes a free one.
-  /// Returns  the port. Throws std::invalid_argument; std::system_error ("listen on rr+tcp://...: Address in use").
+  /// WebSockets (rr+ws) are taken on the same port.
+  /// Returns  the port. Throws std::invalid_argument; std::runtime_error ("listen on ...: Address already in use").
   std::uint16_t listen(std::string_view url);
 
   /// Runs until stop(), SIGINT or SIGTERM; what else was given to io_context() does not hold it up then.

@@ -30,8 +30,8 @@ Result<Value> next_value(const Generator& generator, std::span<const Value> argu
 }  // namespace
 
 ServiceClient::ServiceClient(ClientId id, ServiceClientOwner& owner, ServiceDirectory& directory,
-                             ServiceSessionOptions options, boost::asio::ip::tcp::socket socket)
-    : SessionDriver(std::move(socket), directory, std::move(options), read_clocks()), id_(id), owner_(&owner) {}
+                             ServiceSessionOptions options, std::unique_ptr<ByteStream> stream)
+    : SessionDriver(std::move(stream), directory, std::move(options), read_clocks()), id_(id), owner_(&owner) {}
 
 void ServiceClient::send_event(const std::string& path, const MemberDefinition& event,
                                std::span<const Value> arguments) {

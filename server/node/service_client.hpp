@@ -1,4 +1,4 @@
-// One client of a node: its session, driven over TCP, and the way from its requests to handlers. Layer: node.
+// One client of a node: its session, driven over its stream, and the way from its requests to handlers. Layer: node.
 #pragma once
 
 #include <memory>
@@ -7,7 +7,7 @@
 
 #include "core/session/service_session.hpp"
 #include "server/node/service.hpp"
-#include "server/node/tcp_driver.hpp"
+#include "server/node/stream_driver.hpp"
 
 namespace rr {
 
@@ -32,7 +32,7 @@ class ServiceClientOwner {
 class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSender {
  public:
   ServiceClient(ClientId id, ServiceClientOwner& owner, ServiceDirectory& directory, ServiceSessionOptions options,
-                boost::asio::ip::tcp::socket socket);
+                std::unique_ptr<ByteStream> stream);
 
   ClientId id() const { return id_; }
   const ServiceSession& session() const { return session_; }

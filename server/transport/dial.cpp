@@ -1,6 +1,7 @@
 #include "server/transport/dial.hpp"
 
 #include "server/transport/tcp.hpp"
+#include "server/transport/watchdog.hpp"
 
 namespace rr {
 
@@ -8,11 +9,56 @@ namespace {
 
 using Dialed = Result<std::unique_ptr<ByteStream>>;
 
-awaitable<Dialed> dial_tcp(ConnectionUrl url, DialOptions options) {
-  auto socket = co_await connect_tcp(url.host, url.port, options.timeout);
+/// Closes a stream whose other end takes too long to agree to something.
+class Limit {
+ public:
+  Limit(ByteStream& stream, std::chrono::milliseconds timeout)
+      : timeout_(timeout), deadline_(stream.executor(), [this, &stream] {
+          is_over_ = true;
+          stream.close();
+        }) {
+    deadline_.arm(timeout);
+  }
+
+  /// The true reason of a failure that may come from the closing.
+  Error explain(Error failure) const {
+    if (is_over_) failure.message += ": no answer within " + std::to_string(timeout_.count()) + " ms";
+    return failure;
+  }
+
+ private:
+  std::chrono::milliseconds timeout_;
+  bool is_over_ = false;
+  Deadline deadline_;
+};
+
+/// The TCP connection below all schemes that have a host.
+awaitable<Dialed> reach(ConnectionUrl url, DialOptions options) {
+  const bool has_proxy = !options.proxy.host.empty();
+  const HostPort next = has_proxy ? options.proxy : HostPort{url.host, url.port};
+  auto socket = co_await connect_tcp(next.host, next.port, options.timeout);
   if (!socket) co_return socket.error();
   std::unique_ptr<ByteStream> stream = std::make_unique<TcpStream>(std::move(*socket), options.send_stall);
+  if (has_proxy) {
+    const Limit limit(*stream, options.timeout);
+    HostPort target{url.host, url.port};
+    const auto opened = co_await connect_through_proxy(*stream, std::move(target));
+    if (!opened) co_return limit.explain(opened.error());
+  }
   co_return stream;
+}
+
+awaitable<Dialed> dial_tcp(ConnectionUrl url, DialOptions options) {
+  co_return co_await reach(std::move(url), std::move(options));
+}
+
+awaitable<Dialed> dial_websocket(ConnectionUrl url, DialOptions options) {
+  auto stream = co_await reach(url, options);
+  if (!stream) co_return stream;
+  const Limit limit(**stream, options.timeout);
+  auto socket = co_await connect_websocket(std::move(*stream), std::move(url), std::move(options.headers));
+  if (!socket) co_return limit.explain(socket.error());
+  co_return socket;
 }
 
 struct Dialer {
@@ -23,6 +69,7 @@ struct Dialer {
 /// A transport adds its line here.
 constexpr Dialer dialers[] = {
     {"rr+tcp", dial_tcp},
+    {"rr+ws", dial_websocket},
 };
 
 const Dialer* find_dialer(std::string_view scheme) {

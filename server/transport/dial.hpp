@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "server/transport/byte_stream.hpp"
+#include "server/transport/http_connect.hpp"
 #include "server/transport/schemes.hpp"
 
 namespace rr {
@@ -12,6 +13,10 @@ namespace rr {
 struct DialOptions {
   std::chrono::milliseconds timeout{5000};
   std::chrono::milliseconds send_stall{15000};
+  /// An HTTP proxy between here and hosts of the TCP family, asked by CONNECT; empty host: none.
+  HostPort proxy = {};
+  /// For the HTTP request of a WebSocket: a token that a gateway wants, say.
+  HttpHeaders headers = {};
 };
 
 /// Connects to the device of `url`; nothing is sent.

@@ -132,8 +132,9 @@ void TcpStream::close() {
   socket_.close(ignored);
 }
 
-Result<std::vector<HostPort>> TcpListener::open(const HostPort& address) {
+Result<std::vector<HostPort>> TcpListener::open(const HostPort& address, bool takes_both) {
   const auto fail = [&](const error_code& error) {
+    close();
     return make_error(ErrorCode::connection_error,
                       "listen on " + format_host_port(address.host, address.port) + ": " + error.message());
   };
@@ -141,21 +142,29 @@ Result<std::vector<HostPort>> TcpListener::open(const HostPort& address) {
   tcp::resolver resolver(executor_);
   const auto endpoints = resolver.resolve(address.host, std::to_string(address.port), tcp::resolver::passive, error);
   if (error) return fail(error);
-  std::vector<HostPort> bound;
-  for (const auto& entry : endpoints) {
-    const auto endpoint = entry.endpoint();
-    auto acceptor = std::make_shared<Acceptor>(executor_);
-    acceptor->open(endpoint.protocol(), error);
-    if (!error) acceptor->set_option(Acceptor::reuse_address(true), error);
-    if (!error && endpoint.address().is_v6()) acceptor->set_option(asio::ip::v6_only(true), error);
-    if (!error) acceptor->bind(endpoint, error);
-    if (!error) acceptor->listen(asio::socket_base::max_listen_connections, error);
-    if (error) return fail(error);
-    const auto local = acceptor->local_endpoint(error);
-    bound.push_back({local.address().to_string(), local.port()});
-    acceptors_.push_back(std::move(acceptor));
+  // A port that is free at one address may be taken at the next.
+  for (int attempts = address.port == 0 ? 8 : 1; attempts > 0; --attempts) {
+    std::vector<HostPort> bound;
+    for (const auto& entry : endpoints) {
+      auto endpoint = entry.endpoint();
+      if (!bound.empty()) endpoint.port(bound.front().port);
+      const auto acceptor = std::make_shared<Acceptor>(executor_);
+      acceptor->open(endpoint.protocol(), error);
+      if (!error) acceptor->set_option(Acceptor::reuse_address(true), error);
+      if (!error && endpoint.address().is_v6())
+        acceptor->set_option(asio::ip::v6_only(!(takes_both && endpoints.size() == 1)), error);
+      if (!error) acceptor->bind(endpoint, error);
+      if (!error) acceptor->listen(asio::socket_base::max_listen_connections, error);
+      if (error) break;
+      const auto local = acceptor->local_endpoint(error);
+      bound.push_back({local.address().to_string(), local.port()});
+      acceptors_.push_back(acceptor);
+    }
+    if (!error) return bound;
+    if (error != asio::error::address_in_use) break;
+    close();
   }
-  return bound;
+  return fail(error);
 }
 
 void TcpListener::start(OnAccept on_accept, OnProblem on_problem) {
@@ -199,14 +208,15 @@ struct Race {
   std::vector<std::unique_ptr<tcp::socket>> sockets;
   std::size_t failed = 0;
   std::optional<std::size_t> winner;
-  std::string last_failure;
+  std::string failures;  ///< "127.0.0.1: Connection refused; ::1: ..."
 };
 
 awaitable<void> attempt(std::shared_ptr<Race> race, std::size_t index, tcp::endpoint endpoint) {
   auto [error] = co_await race->sockets[index]->async_connect(endpoint, await_tuple);
   if (error) {
     ++race->failed;
-    if (error != asio::error::operation_aborted) race->last_failure = describe(endpoint) + ": " + error.message();
+    if (error != asio::error::operation_aborted)
+      race->failures += (race->failures.empty() ? "" : "; ") + endpoint.address().to_string() + ": " + error.message();
   } else if (!race->winner) {
     race->winner = index;
   }
@@ -272,12 +282,13 @@ awaitable<Result<tcp::socket>> connect_tcp(std::string host, std::uint16_t port,
   while (!race->winner) {
     const bool all_started = started == endpoints->size();
     if (all_started && race->failed == started) {
-      cause = race->last_failure;
+      cause = race->failures;
       break;
     }
     const auto now = std::chrono::steady_clock::now();
     if (now >= give_up) {
       cause = "no answer within " + std::to_string(timeout.count()) + " ms";
+      if (!race->failures.empty()) cause += "; " + race->failures;
       break;
     }
     if (!all_started) {
@@ -293,6 +304,8 @@ awaitable<Result<tcp::socket>> connect_tcp(std::string host, std::uint16_t port,
     error_code ignored;
     if (i != race->winner) race->sockets[i]->close(ignored);
   }
+  // A literal address was named already.
+  if (const auto literal = host + ": "; cause.starts_with(literal)) cause.erase(0, literal.size());
   if (!race->winner) co_return connect_error(host, port, cause);
   co_return std::move(*race->sockets[*race->winner]);
 }

@@ -50,8 +50,9 @@ class TcpListener {
   explicit TcpListener(const boost::asio::any_io_executor& executor) : executor_(executor) {}
 
   /// Binds and listens. Returns the addresses with their true ports (port 0 asks the system for one).
+  /// Where the name stands for several, port 0 becomes the same port of all. `takes_both`: "::" takes IPv4 as well.
   /// Errors   connection_error: name unknown, address in use, not permitted.
-  [[nodiscard]] Result<std::vector<HostPort>> open(const HostPort& address);
+  [[nodiscard]] Result<std::vector<HostPort>> open(const HostPort& address, bool takes_both = false);
 
   /// Calls `on_accept` for every connection until close(), and `on_problem` when one could not be accepted (no
   /// descriptors left, say); it goes on a little later then.
@@ -69,7 +70,7 @@ class TcpListener {
 };
 
 /// Connects to a host: all its addresses, IPv4 first, 5 ms apart and side by side; the first to connect wins.
-/// Errors   connection_error with the last cause, or that `timeout` has passed.
+/// Errors   connection_error with the cause of each address, or that `timeout` has passed.
 awaitable<Result<boost::asio::ip::tcp::socket>> connect_tcp(std::string host, std::uint16_t port,
                                                             std::chrono::milliseconds timeout);
 

@@ -17,8 +17,11 @@ constexpr std::chrono::milliseconds close_time{1000};
 
 }  // namespace
 
-WebSocketStream::WebSocketStream(std::unique_ptr<ByteStream> inner, bool takes_close)
+WebSocketStream::WebSocketStream(std::unique_ptr<ByteStream> inner, WebSocketRole role, bool takes_close)
     : inner_(std::move(inner)),
+      role_(role),
+      decoder_(role),
+      splitter_(role),
       close_limit_(inner_->executor(), [this] { inner_->close(); }),
       takes_close_(takes_close),
       written_(inner_->executor(), asio::steady_timer::time_point::max()) {}
@@ -35,7 +38,7 @@ awaitable<ReadResult> WebSocketStream::read_some(std::span<std::uint8_t> into) {
       co_return ReadResult{boost::system::errc::make_error_code(boost::system::errc::protocol_error), 0};
     }
     if (auto ping = decoder_.take_ping()) {
-      const auto pong = make_control_frame(WebSocketOpcode::pong, *ping);
+      const auto pong = make_control_frame(role_, WebSocketOpcode::pong, *ping);
       const ByteSpan slice(pong);
       const std::span<const ByteSpan> slices(&slice, 1);
       if (const auto error = co_await write_raw(slices); error) co_return ReadResult{error, 0};
@@ -66,7 +69,8 @@ awaitable<void> WebSocketStream::end(const EndReason& given) {
   const auto& reason = violation_ ? *violation_ : given;
   const auto& received = decoder_.received_close();
   if (!is_broken_ && (takes_close_ || received || decoder_.has_seen_control())) {
-    const auto frame = received ? make_close_frame(received->code, {}) : make_close_frame(reason.code, reason.text);
+    const auto frame =
+        received ? make_close_frame(role_, received->code, {}) : make_close_frame(role_, reason.code, reason.text);
     const ByteSpan slice(frame);
     const std::span<const ByteSpan> slices(&slice, 1);
     close_limit_.arm(close_time);

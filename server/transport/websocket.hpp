@@ -1,4 +1,4 @@
-// The server's end of a WebSocket, as a byte stream. Layer: server/transport. Source: transports spec section 4.5.
+// A WebSocket as a byte stream. Layer: server/transport. Source: transports spec section 4.5.
 #pragma once
 
 #include <boost/asio/steady_timer.hpp>
@@ -14,8 +14,9 @@ namespace rr {
 /// pong or close that answers the peer's own, and a close with a reason to a peer that is known to take it.
 class WebSocketStream final : public ByteStream {
  public:
-  /// `inner` has just carried the 101 response. `takes_close`: the peer is a browser or another full WebSocket client.
-  WebSocketStream(std::unique_ptr<ByteStream> inner, bool takes_close);
+  /// `inner` has just carried the 101 response. `role` is ours. `takes_close`: the peer is a browser or another full
+  /// WebSocket client.
+  WebSocketStream(std::unique_ptr<ByteStream> inner, WebSocketRole role, bool takes_close);
 
   awaitable<ReadResult> read_some(std::span<std::uint8_t> into) override;
   awaitable<error_code> write(std::span<const ByteSpan> slices) override;
@@ -31,6 +32,7 @@ class WebSocketStream final : public ByteStream {
   awaitable<error_code> write_raw(std::span<const ByteSpan> slices);
 
   std::unique_ptr<ByteStream> inner_;
+  WebSocketRole role_;
   WebSocketDecoder decoder_;
   FrameSplitter splitter_;
   Deadline close_limit_;

@@ -5,6 +5,8 @@
 #include <boost/uuid/detail/sha1.hpp>
 #include <cstring>
 
+#include "core/support/random.hpp"
+
 namespace rr {
 
 namespace {
@@ -17,6 +19,14 @@ bool is_control(WebSocketOpcode opcode) {
 std::size_t header_length(std::uint8_t second) {
   const std::uint8_t length = second & 0x7f;
   return 2u + (length == 126 ? 2u : length == 127 ? 8u : 0u) + ((second & 0x80) != 0 ? 4u : 0u);
+}
+
+/// Unpredictable, so that no page chooses the bytes that a proxy sees (RFC 6455, 10.3).
+WebSocketMask make_mask() {
+  WebSocketMask mask;
+  const auto random = random_u32();
+  std::memcpy(mask.data(), &random, sizeof(random));
+  return mask;
 }
 
 /// Codes that may stand in a close frame (RFC 6455, 7.4).
@@ -79,7 +89,8 @@ Result<> WebSocketDecoder::begin_frame() {
     default:
       return fail(1002, "opcode " + std::to_string(header_[0] & 0x0f) + " is reserved");
   }
-  if ((header_[1] & 0x80) == 0) return fail(1002, "frame of a client without mask");
+  const bool is_masked = (header_[1] & 0x80) != 0;
+  if (!is_masked && role_ == WebSocketRole::server) return fail(1002, "frame of a client without mask");
   left_ = header_[1] & 0x7f;
   std::size_t at = 2;
   if (left_ >= 126) {
@@ -92,7 +103,8 @@ Result<> WebSocketDecoder::begin_frame() {
     if (!is_final || left_ > 125) return fail(1002, "control frame that is fragmented or longer than 125 bytes");
     control_.clear();
   }
-  std::memcpy(mask_.data(), header_.data() + at, 4);
+  mask_ = {};
+  if (is_masked) std::memcpy(mask_.data(), header_.data() + at, 4);
   mask_index_ = 0;
   in_payload_ = left_ != 0;
   return {};
@@ -114,7 +126,7 @@ std::optional<Bytes> WebSocketDecoder::take_ping() {
   return out;
 }
 
-void unmask(const std::uint8_t* from, std::uint8_t* to, std::size_t count, const std::array<std::uint8_t, 4>& mask,
+void unmask(const std::uint8_t* from, std::uint8_t* to, std::size_t count, const WebSocketMask& mask,
             std::size_t index) {
   std::uint8_t rotated[8];
   for (std::size_t i = 0; i < 8; ++i) rotated[i] = mask[(index + i) % 4];
@@ -130,22 +142,35 @@ void unmask(const std::uint8_t* from, std::uint8_t* to, std::size_t count, const
   for (; i < count; ++i) to[i] = static_cast<std::uint8_t>(from[i] ^ rotated[i % 8]);
 }
 
-FrameHeader make_frame_header(WebSocketOpcode opcode, std::size_t payload) {
-  const auto first = static_cast<std::uint8_t>(0x80 | static_cast<std::uint8_t>(opcode));
-  if (payload < 126) return {{first, static_cast<std::uint8_t>(payload), 0, 0}, 2};
-  return {{first, 126, static_cast<std::uint8_t>(payload >> 8), static_cast<std::uint8_t>(payload)}, 4};
+FrameHeader make_frame_header(WebSocketOpcode opcode, std::size_t payload, const WebSocketMask* mask) {
+  FrameHeader header{};
+  const std::uint8_t mask_bit = mask ? 0x80 : 0;
+  const auto add = [&](std::size_t byte) { header.bytes[header.size++] = static_cast<std::uint8_t>(byte); };
+  add(0x80u | static_cast<std::uint8_t>(opcode));
+  if (payload < 126) {
+    add(mask_bit | payload);
+  } else {
+    add(mask_bit | 126u);
+    add(payload >> 8);
+    add(payload);
+  }
+  if (mask)
+    for (const auto byte : *mask) add(byte);
+  return header;
 }
 
-Bytes make_control_frame(WebSocketOpcode opcode, ByteSpan payload) {
+Bytes make_control_frame(WebSocketRole role, WebSocketOpcode opcode, ByteSpan payload) {
   const auto kept = payload.first(std::min<std::size_t>(payload.size(), 125));
-  const auto header = make_frame_header(opcode, kept.size());
-  Bytes out(header.bytes.begin(), header.bytes.begin() + header.size);
-  out.insert(out.end(), kept.begin(), kept.end());
+  const auto mask = role == WebSocketRole::client ? make_mask() : WebSocketMask{};
+  const auto header = make_frame_header(opcode, kept.size(), role == WebSocketRole::client ? &mask : nullptr);
+  Bytes out(header.size + kept.size());
+  std::copy_n(header.bytes.begin(), header.size, out.begin());
+  unmask(kept.data(), out.data() + header.size, kept.size(), mask, 0);
   return out;
 }
 
-Bytes make_close_frame(std::uint16_t code, std::string_view reason) {
-  if (!is_sendable_code(code)) return make_control_frame(WebSocketOpcode::close, {});
+Bytes make_close_frame(WebSocketRole role, std::uint16_t code, std::string_view reason) {
+  if (!is_sendable_code(code)) return make_control_frame(role, WebSocketOpcode::close, {});
   if (reason.size() > 123) {
     std::size_t end = 123;
     while (end > 0 && (static_cast<unsigned char>(reason[end]) & 0xc0) == 0x80) --end;
@@ -153,7 +178,7 @@ Bytes make_close_frame(std::uint16_t code, std::string_view reason) {
   }
   Bytes payload{static_cast<std::uint8_t>(code >> 8), static_cast<std::uint8_t>(code)};
   payload.insert(payload.end(), reason.begin(), reason.end());
-  return make_control_frame(WebSocketOpcode::close, payload);
+  return make_control_frame(role, WebSocketOpcode::close, payload);
 }
 
 std::span<const ByteSpan> FrameSplitter::split(std::span<const ByteSpan> payload) {
@@ -162,17 +187,28 @@ std::span<const ByteSpan> FrameSplitter::split(std::span<const ByteSpan> payload
   headers_.clear();
   slices_.clear();
   headers_.reserve(left / max_frame_payload + 1);  // slices_ points into it
-  std::size_t room = 0;                            // of the current frame
+  const bool is_masked = role_ == WebSocketRole::client;
+  masked_.resize(is_masked ? left : 0);  // and into this
+  std::size_t at = 0;                    // of masked_
+  WebSocketMask mask{};
+  std::size_t frame = 0;  // payload of the current frame
+  std::size_t room = 0;   // what is still free of it
   for (auto slice : payload) {
     while (!slice.empty()) {
       if (room == 0) {
-        room = std::min(left, max_frame_payload);
-        headers_.push_back(make_frame_header(WebSocketOpcode::binary, room));
+        frame = room = std::min(left, max_frame_payload);
+        if (is_masked) mask = make_mask();
+        headers_.push_back(make_frame_header(WebSocketOpcode::binary, frame, is_masked ? &mask : nullptr));
         slices_.push_back(headers_.back().span());
       }
-      const auto part = slice.first(std::min(slice.size(), room));
-      slices_.push_back(part);
+      auto part = slice.first(std::min(slice.size(), room));
       slice = slice.subspan(part.size());
+      if (is_masked) {
+        unmask(part.data(), masked_.data() + at, part.size(), mask, (frame - room) % 4);
+        part = ByteSpan(masked_).subspan(at, part.size());
+        at += part.size();
+      }
+      slices_.push_back(part);
       room -= part.size();
       left -= part.size();
     }

@@ -50,7 +50,7 @@ TEST_CASE("frames of any shape become one byte stream") {
   const auto big = text_of(70000);
   const auto bytes = frame(0x82, "hello ") + frame(0x02, "wor", 2) + frame(0x00, "l") + frame(0x80, "d") +
                      frame(0x82, "") + frame(0x80, "!", 8) + frame(0x82, big);
-  WebSocketDecoder decoder;
+  WebSocketDecoder decoder(WebSocketRole::server);
   CHECK(decoded(decoder, bytes) == "hello world!" + big);
   CHECK_FALSE(decoder.has_seen_control());
 }
@@ -59,7 +59,7 @@ TEST_CASE("split at every byte the payload is the same") {
   const auto bytes =
       frame(0x82, text_of(300)) + frame(0x89, "ping") + frame(0x82, text_of(9), 8) + frame(0x88, "\x03\xe8");
   for (std::size_t cut = 0; cut <= bytes.size(); ++cut) {
-    WebSocketDecoder decoder;
+    WebSocketDecoder decoder(WebSocketRole::server);
     const auto middle = bytes.begin() + static_cast<std::ptrdiff_t>(cut);
     auto out = decoded(decoder, rr::Bytes(bytes.begin(), middle));
     out += decoded(decoder, rr::Bytes(middle, bytes.end()));
@@ -68,14 +68,14 @@ TEST_CASE("split at every byte the payload is the same") {
     REQUIRE(decoder.received_close().has_value());
     CHECK(decoder.received_close()->code == 1000);
   }
-  WebSocketDecoder decoder;
+  WebSocketDecoder decoder(WebSocketRole::server);
   std::string out;
   for (const auto byte : bytes) out += decoded(decoder, {byte});
   CHECK(out == text_of(300) + text_of(9));
 }
 
 TEST_CASE("control frames are noticed and take no part in the stream") {
-  WebSocketDecoder decoder;
+  WebSocketDecoder decoder(WebSocketRole::server);
   CHECK(decoded(decoder,
                 frame(0x82, "a") + frame(0x89, "1") + frame(0x89, "2") + frame(0x8a, "x") + frame(0x82, "b")) == "ab");
   CHECK(decoder.has_seen_control());
@@ -88,7 +88,7 @@ TEST_CASE("control frames are noticed and take no part in the stream") {
 }
 
 TEST_CASE("a close frame without a code is 1005") {
-  WebSocketDecoder decoder;
+  WebSocketDecoder decoder(WebSocketRole::server);
   decoded(decoder, frame(0x88, ""));
   REQUIRE(decoder.received_close().has_value());
   CHECK(decoder.received_close()->code == 1005);
@@ -96,7 +96,7 @@ TEST_CASE("a close frame without a code is 1005") {
 
 TEST_CASE("what RFC 6455 forbids is an error with its code") {
   const auto refuses = [](rr::Bytes bytes, std::uint16_t code) {
-    WebSocketDecoder decoder;
+    WebSocketDecoder decoder(WebSocketRole::server);
     CHECK_FALSE(decoder.decode(bytes).has_value());
     CHECK(decoder.close_code() == code);
   };
@@ -125,7 +125,7 @@ TEST_CASE("our frames are final, unmasked and at most 65535 bytes") {
   const auto first = text_of(65530);
   const auto second = text_of(65545);
   const rr::ByteSpan payload[] = {rr::as_bytes(first), rr::ByteSpan(), rr::as_bytes(second)};
-  FrameSplitter splitter;
+  FrameSplitter splitter(WebSocketRole::server);
   rr::Bytes wire;
   for (const auto& slice : splitter.split(payload)) wire.insert(wire.end(), slice.begin(), slice.end());
   std::string out;
@@ -149,11 +149,36 @@ TEST_CASE("our frames are final, unmasked and at most 65535 bytes") {
   CHECK(splitter.split({}).empty());
 }
 
+TEST_CASE("a client's frames are masked anew each, and a server reads them") {
+  const auto first = text_of(65530);
+  const auto second = text_of(65545);
+  const rr::ByteSpan payload[] = {rr::as_bytes(first), rr::as_bytes(second)};
+  FrameSplitter splitter(WebSocketRole::client);
+  rr::Bytes wire;
+  for (const auto& slice : splitter.split(payload)) wire.insert(wire.end(), slice.begin(), slice.end());
+  CHECK((wire[1] & 0x80) != 0);
+  const ByteSpan first_mask = ByteSpan(wire).subspan(4, 4);
+  const ByteSpan second_mask = ByteSpan(wire).subspan(8 + 65535 + 4, 4);
+  CHECK_FALSE(std::equal(first_mask.begin(), first_mask.end(), second_mask.begin()));
+  WebSocketDecoder decoder(WebSocketRole::server);
+  CHECK(decoded(decoder, wire) == first + second);
+  auto pong = make_control_frame(WebSocketRole::client, WebSocketOpcode::ping, rr::as_bytes("hello"));
+  CHECK(decoded(decoder, pong).empty());
+  CHECK(decoder.take_ping() == rr::Bytes{'h', 'e', 'l', 'l', 'o'});
+}
+
+TEST_CASE("a client reads plain frames, and masked ones as the reference does") {
+  WebSocketDecoder decoder(WebSocketRole::client);
+  CHECK(decoded(decoder, frame(0x82, "plain", 0, false) + frame(0x82, "masked")) == "plainmasked");
+}
+
 TEST_CASE("control frames are cut to their bound") {
-  CHECK(make_control_frame(WebSocketOpcode::pong, rr::as_bytes(std::string(200, 'x'))).size() == 127);
-  CHECK(make_close_frame(1005, "x") == rr::Bytes{0x88, 0});
-  CHECK(make_close_frame(1000, "ok") == rr::Bytes{0x88, 4, 0x03, 0xe8, 'o', 'k'});
-  const auto cut = make_close_frame(1011, std::string(122, 'a') + "\xc3\xa4");  // the umlaut would be cut in two
+  CHECK(make_control_frame(WebSocketRole::server, WebSocketOpcode::pong, rr::as_bytes(std::string(200, 'x'))).size() ==
+        127);
+  CHECK(make_close_frame(WebSocketRole::server, 1005, "x") == rr::Bytes{0x88, 0});
+  CHECK(make_close_frame(WebSocketRole::server, 1000, "ok") == rr::Bytes{0x88, 4, 0x03, 0xe8, 'o', 'k'});
+  const auto cut = make_close_frame(WebSocketRole::server, 1011,
+                                    std::string(122, 'a') + "\xc3\xa4");  // the umlaut would be cut in two
   CHECK(cut.size() == 2 + 2 + 122);
 }
 

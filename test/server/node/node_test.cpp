@@ -339,9 +339,8 @@ TEST_CASE("a node listens on IPv6 as well, and says why it cannot") {
   try {
     node.listen("rr+tcp://127.0.0.1:" + std::to_string(port));
     FAIL("listened twice on one port");
-  } catch (const std::system_error& error) {
-    CHECK(error.code() == std::errc::address_in_use);
-    CHECK_THAT(error.what(), Contains("rr+tcp://127.0.0.1:" + std::to_string(port)));
+  } catch (const std::runtime_error& error) {
+    CHECK_THAT(error.what(), Contains("listen on 127.0.0.1:" + std::to_string(port) + ": Address already in use"));
   }
   CHECK_THROWS_WITH(node.listen("rr+ws://127.0.0.1:0"), Contains("rr+tcp://HOST:PORT"));
   CHECK_THROWS_AS(node.listen("rr+tcp://127.0.0.1"), std::invalid_argument);

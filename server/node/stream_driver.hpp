@@ -1,8 +1,7 @@
-// Moves bytes between a TCP socket and a sans-IO session, for both roles. Layer: node.
+// Moves bytes between a stream and a sans-IO session, for both roles. Layer: node.
 // Source: the contract in core/session/connection.hpp.
 #pragma once
 
-#include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <functional>
 #include <memory>
@@ -12,33 +11,34 @@
 #include "core/support/bytes.hpp"
 #include "core/support/error.hpp"
 #include "server/node/clocks.hpp"
+#include "server/transport/byte_stream.hpp"
 
 namespace rr {
 
-/// One socket and, in SessionDriver, one session. Everything runs on the thread of the socket's io_context and a
-/// message is handled to the end where it was read: read, decode, handler, reply, write, without a hop, a lock, or a
-/// timer operation. Writes are tried at once and gather all that is queued; only a full socket waits.
+/// One stream and, in SessionDriver, one session. Everything runs on the thread of the stream's executor and a message
+/// is handled to the end where it was read: read, decode, handler, reply, write, without a hop, a lock, or a timer
+/// operation. Writes are tried at once and gather all that is queued; only a full stream waits.
 ///
 /// Lives in a shared_ptr, which the pending read keeps; after close() the last handlers let go of it.
-class TcpDriver : public std::enable_shared_from_this<TcpDriver> {
+class StreamDriver : public std::enable_shared_from_this<StreamDriver> {
  public:
-  explicit TcpDriver(boost::asio::ip::tcp::socket socket);
-  virtual ~TcpDriver() = default;
-  TcpDriver(const TcpDriver&) = delete;
-  TcpDriver& operator=(const TcpDriver&) = delete;
+  explicit StreamDriver(std::unique_ptr<ByteStream> stream);
+  virtual ~StreamDriver() = default;
+  StreamDriver(const StreamDriver&) = delete;
+  StreamDriver& operator=(const StreamDriver&) = delete;
 
   /// Begins to read; call once.
   void start();
   /// Handles the session's events, writes what it has to send, sees to timer and end. Due after everything asked of
   /// the session; inside of event handlers it does nothing, because the loop that called them goes on anyway.
   void settle();
-  /// Closes the socket at once. The session hears `reason` unless it has ended already.
+  /// Closes the stream at once. The session hears `reason` unless it has ended already.
   void close(Error reason);
   bool is_closed() const { return is_closed_; }
-  boost::asio::any_io_executor executor() { return socket_.get_executor(); }
+  boost::asio::any_io_executor executor() { return timer_.get_executor(); }
 
  protected:
-  /// Runs `work` on the thread of the socket, later.
+  /// Runs `work` on the thread of the stream, later.
   void post(std::function<void()> work);
 
  private:
@@ -52,34 +52,35 @@ class TcpDriver : public std::enable_shared_from_this<TcpDriver> {
   virtual TimePoint poll_timeout() const = 0;
   /// Polls one event and handles it. Returns whether there was one.
   virtual bool handle_event(Now now) = 0;
-  /// The socket was closed and all events are handled; called once, last.
+  /// The stream is closed and all events are handled; called once, last.
   virtual void ended() = 0;
 
-  void read();
+  static awaitable<void> read_all(std::shared_ptr<StreamDriver> self);
+  static awaitable<void> write_waiting(std::shared_ptr<StreamDriver> self);
   void settle(Now now);
   void write(Now now);
-  void wait_for_room();
   void arm_timer();
   void finish(Error reason, Now now);
 
   static constexpr std::size_t read_size = 64 * 1024;
 
-  boost::asio::ip::tcp::socket socket_;
+  std::unique_ptr<ByteStream> stream_;
   boost::asio::steady_timer timer_;
   TimePoint armed_for_ = TimePoint::max();
   std::unique_ptr<std::uint8_t[]> buffer_;
   bool is_settling_ = false;
-  bool is_waiting_for_room_ = false;
+  bool is_writing_ = false;  ///< write_waiting() runs
   bool is_closed_ = false;
+  bool ends_in_good_order_ = false;  ///< the session has said goodbye: the stream may as well
 };
 
 /// The driver of one ClientSession or ServiceSession. What it leaves to the derived class are the session's events.
 template <class Session>
-class SessionDriver : public TcpDriver {
+class SessionDriver : public StreamDriver {
  protected:
   template <class... Args>
-  explicit SessionDriver(boost::asio::ip::tcp::socket socket, Args&&... session_arguments)
-      : TcpDriver(std::move(socket)), session_(std::forward<Args>(session_arguments)...) {}
+  explicit SessionDriver(std::unique_ptr<ByteStream> stream, Args&&... session_arguments)
+      : StreamDriver(std::move(stream)), session_(std::forward<Args>(session_arguments)...) {}
 
   Session session_;
 
