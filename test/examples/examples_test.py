@@ -3,6 +3,7 @@
 examples_test.py BUILD_DIR EXAMPLES_DIR GENERATOR CXX BOOST_ROOT
 """
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -10,6 +11,7 @@ import unittest
 
 BUILD, EXAMPLES, GENERATOR, CXX, BOOST_ROOT = sys.argv[1:6]
 del sys.argv[1:]
+THERMOSTAT = os.path.join(EXAMPLES, "thermostat")
 
 
 def run(*command):
@@ -24,7 +26,9 @@ class Examples(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             prefix, build = os.path.join(folder, "installed"), os.path.join(folder, "build")
             run("cmake", "--install", BUILD, "--prefix", prefix)
-            self.assertRegex(run(os.path.join(prefix, "bin/rrgate"), "--version"), r"^rrgate \d")
+            rrgate = os.path.join(prefix, "bin/rrgate")
+            self.assertRegex(run(rrgate, "--version"), r"^rrgate \d")
+            run(rrgate, "check-config", os.path.join(THERMOSTAT, "gateway.json"))
             boost = [f"-DBOOST_ROOT={BOOST_ROOT}"] if BOOST_ROOT else []
             run("cmake", "-S", EXAMPLES, "-B", build, "-G", GENERATOR, f"-DCMAKE_PREFIX_PATH={prefix}",
                 f"-DCMAKE_CXX_COMPILER={CXX}", "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Werror", *boost)
@@ -41,13 +45,28 @@ class Examples(unittest.TestCase):
                 self.assertEqual(device.wait(timeout=10), 0)
 
 
-class Length(unittest.TestCase):
-    """The examples say how little it takes: device in 40 lines at most, client in 15."""
+class Text(unittest.TestCase):
+    """The examples say how little it takes: the device 40 lines at most, each file of a client 15."""
 
     def test_examples_are_short(self):
-        for name, limit in (("device", 40), ("client", 15)):
-            with open(os.path.join(EXAMPLES, "thermostat", f"{name}.cpp")) as source:
-                self.assertLessEqual(len(source.readlines()), limit, name)
+        limits = {"device.cpp": 40, "client.cpp": 15, "client.mjs": 15, "site/index.html": 15, "site/client.js": 15}
+        for name, limit in limits.items():
+            self.assertLessEqual(len(text_of(name).splitlines()), limit, name)
+
+    def test_the_documentation_shows_the_files_as_they_are(self):
+        with open(os.path.join(EXAMPLES, "../docs/examples.md")) as page:
+            shown = dict(re.findall(r"^<!-- (\S+) -->\n```\w*\n(.*?)^```$", page.read(), re.MULTILINE | re.DOTALL))
+        for name, text in shown.items():
+            self.assertEqual(text, text_of(name), name)
+        # What a reader has put there is not ours: rrgate-client, node_modules.
+        names = {os.path.relpath(os.path.join(folder, name), THERMOSTAT)
+                 for folder, _, files in os.walk(THERMOSTAT) for name in files if not re.search("/(rrgate-client|node_modules)", folder)}
+        self.assertEqual(set(shown), names)
+
+
+def text_of(name):
+    with open(os.path.join(THERMOSTAT, name)) as source:
+        return source.read()
 
 
 if __name__ == "__main__":
