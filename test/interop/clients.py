@@ -27,10 +27,11 @@ def run_client(direction, port, scenario, chromium=None):
 
 def client_url(direction, port):
     if direction.speaks_javascript:
-        path = "" if direction.route == "direct" else "devices/interop"  # a node takes WebSockets on its own port
+        path = "devices/interop" if direction.route == "gateway-ws" else ""
         return f"ws://127.0.0.1:{port}/{path}?service=interop"
     return {
         "direct": f"rr+tcp://127.0.0.1:{port}/?service=interop",
+        "direct-ws": f"rr+ws://127.0.0.1:{port}/?service=interop",
         # A native client names the device that it wants; the gateway is only the way to it.
         "gateway-tcp": f"rr+tcp://127.0.0.1:{port}/?nodename=interop.service&service=interop",
         "gateway-ws": f"rr+ws://127.0.0.1:{port}/devices/interop?service=interop",

@@ -40,7 +40,7 @@ def pytest_generate_tests(metafunc):
         pairs = [(direction, level) for direction in DIRECTIONS for level in LEVELS if level in direction.levels]
         if metafunc.definition.get_closest_marker("direct"):
             # The tap reads bare streams; what a WebSocket carries is masked.
-            pairs = [pair for pair in pairs if pair[0].route == "direct" and not pair[0].speaks_javascript]
+            pairs = [pair for pair in pairs if pair[0].route == "direct"]
         if metafunc.definition.get_closest_marker("pages"):
             pairs = [pair for pair in pairs if pair[0].client == "chromium"]
         metafunc.parametrize("link", pairs, indirect=True, scope="module",
@@ -75,7 +75,7 @@ def link(request, chromium, tmp_path_factory):
     try:
         ready = json.loads(service.next_line())
         port = ready["port"]
-        if direction.route != "direct":
+        if direction.route.startswith("gateway"):
             gateway, port = start_gateway(folder, ready["url"], chromium.origin)
         yield direction, level, port
         if gateway:

@@ -18,7 +18,7 @@ LEVELS = {
 class Direction:
     name: str
     client: str  # reference, ours, node, chromium
-    route: str  # direct, gateway-tcp, gateway-ws
+    route: str  # direct, direct-ws, gateway-tcp, gateway-ws
     service: str  # reference, ours
     levels: tuple = tuple(LEVELS)
 
@@ -38,12 +38,18 @@ DIRECTIONS = [
     Direction("reference-to-ours", "reference", "direct", "ours"),
     Direction("ours-to-reference", "ours", "direct", "reference"),
     Direction("ours-to-ours", "ours", "direct", "ours"),
-    Direction("node-to-reference", "node", "direct", "reference"),
-    Direction("chromium-to-reference", "chromium", "direct", "reference"),
+    Direction("reference-ws-ours", "reference", "direct-ws", "ours", ("v4",)),
+    Direction("ours-ws-reference", "ours", "direct-ws", "reference", ("v4",)),
+    Direction("ours-ws-ours", "ours", "direct-ws", "ours", ("v4",)),
+    Direction("node-to-reference", "node", "direct-ws", "reference"),
+    Direction("node-to-ours", "node", "direct-ws", "ours"),
+    Direction("chromium-to-reference", "chromium", "direct-ws", "reference"),
+    Direction("chromium-to-ours", "chromium", "direct-ws", "ours"),
     Direction("reference-gateway-tcp-reference", "reference", "gateway-tcp", "reference"),
     Direction("reference-gateway-ws-reference", "reference", "gateway-ws", "reference"),
     Direction("reference-gateway-tcp-ours", "reference", "gateway-tcp", "ours"),
     Direction("ours-gateway-tcp-reference", "ours", "gateway-tcp", "reference"),
+    Direction("ours-gateway-ws-reference", "ours", "gateway-ws", "reference", ("v4",)),
     Direction("node-gateway-ws-reference", "node", "gateway-ws", "reference"),
     Direction("node-gateway-ws-ours", "node", "gateway-ws", "ours"),
     Direction("chromium-gateway-ws-reference", "chromium", "gateway-ws", "reference"),
@@ -55,4 +61,4 @@ def service_command(direction, level, page_origin):
     """`page_origin`: whose pages may connect straight to the service."""
     if direction.service == "reference":
         return [sys.executable, PEERS / "service.py", *LEVELS[level], f"--robotraconteur-tcp-ws-add-origins={page_origin}"]
-    return [BUILD / "test/interop/cpp/rr-test-service", *LEVELS[level]]
+    return [BUILD / "test/interop/cpp/rr-test-service", *LEVELS[level], f"--allow-origin={page_origin}"]

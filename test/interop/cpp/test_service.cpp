@@ -332,6 +332,8 @@ rr::NodeOptions parse_options(int argc, char** argv) {
   rr::NodeOptions options;
   for (int i = 1; i < argc; ++i) {
     const std::string_view argument = argv[i];
+    constexpr std::string_view allow_origin = "--allow-origin=";
+    if (argument.starts_with(allow_origin)) options.allowed_origins.emplace_back(argument.substr(allow_origin.size()));
     if (argument == "--robotraconteur-disable-message4=true") options.features.v4 = false;
     if (argument == "--robotraconteur-disable-stringtable=true")
       options.features.string_table = {.local = false, .standard = false};
