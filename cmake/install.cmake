@@ -6,7 +6,8 @@ set_target_properties(rr_node PROPERTIES EXPORT_NAME node)
 set_target_properties(rr_transport PROPERTIES EXPORT_NAME transport)
 set_target_properties(rrgate_http PROPERTIES EXPORT_NAME http)
 install(
-  TARGETS rr_options rr_boost rr_support rr_wire rr_robdef rr_types rr_member rr_session rrgate_asio rr_transport rrgate_http rr_node rrgate
+  TARGETS rr_options rr_boost rr_support rr_hardware rr_wire rr_robdef rr_types rr_member rr_session rrgate_asio
+          rr_transport rrgate_http rr_node rrgate
   EXPORT rrgateTargets
   RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}"
   ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")
@@ -24,3 +25,6 @@ write_basic_package_version_file("${PROJECT_BINARY_DIR}/rrgateConfigVersion.cmak
 install(FILES "${PROJECT_BINARY_DIR}/rrgateConfig.cmake" "${PROJECT_BINARY_DIR}/rrgateConfigVersion.cmake"
               cmake/rrgate_generate.cmake
         DESTINATION "${package_dir}")
+
+# Who may open USB devices: udev reads rules below its prefix only, so for other prefixes the file is to be copied.
+install(FILES gateway-config/60-robotraconteur-usb.rules DESTINATION lib/udev/rules.d)

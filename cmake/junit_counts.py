@@ -3,7 +3,7 @@
 
 junit_counts.py FILE             prints "passed failed skipped"; a missing or broken file counts as nothing
 junit_counts.py --failures FILE  prints name and output of what failed, shortened
-junit_counts.py --write FILE     makes a JUnit file of lines "name passed|failed" on standard input
+junit_counts.py --write FILE     makes a JUnit file of lines "name passed|failed|skipped" on standard input
 """
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -47,7 +47,9 @@ def write(path, lines):
     for line in lines:
         name, _, verdict = line.strip().partition(" ")
         case = ElementTree.SubElement(suite, "testcase", name=name)
-        if verdict != "passed":
+        if verdict == "skipped":
+            ElementTree.SubElement(case, "skipped")
+        elif verdict != "passed":
             ElementTree.SubElement(case, "failure", message=verdict)
     ElementTree.ElementTree(suite).write(path, encoding="utf-8", xml_declaration=True)
 

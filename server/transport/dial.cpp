@@ -1,5 +1,6 @@
 #include "server/transport/dial.hpp"
 
+#include "server/transport/hardware.hpp"
 #include "server/transport/tcp.hpp"
 #include "server/transport/watchdog.hpp"
 
@@ -61,6 +62,10 @@ awaitable<Dialed> dial_websocket(ConnectionUrl url, DialOptions options) {
   co_return socket;
 }
 
+awaitable<Dialed> dial_device(ConnectionUrl url, DialOptions options) {
+  return dial_hardware(std::move(url), std::move(options));
+}
+
 struct Dialer {
   std::string_view scheme;
   awaitable<Dialed> (*dial)(ConnectionUrl, DialOptions);
@@ -70,6 +75,8 @@ struct Dialer {
 constexpr Dialer dialers[] = {
     {"rr+tcp", dial_tcp},
     {"rr+ws", dial_websocket},
+    {"rr+usb", dial_device},
+    {"rr+pci", dial_device},
 };
 
 const Dialer* find_dialer(std::string_view scheme) {

@@ -89,6 +89,8 @@ UsbReply SimulatedDevice::control(const UsbControl& request) {
 }
 
 UsbReply SimulatedDevice::standard_request(const UsbControl& request) {
+  if (request.request_type == 0x80 && request.request == 0) return cut(Bytes(2, 0), request.length);  // status
+  if ((request.request_type & 0x80) == 0 && request.length == 0) return {};                           // features
   if (request.request_type != 0x80 || request.request != 6) return stalled;
   const auto index = static_cast<std::uint8_t>(request.value);
   switch (request.value >> 8) {

@@ -1,0 +1,213 @@
+#!/usr/bin/env python3
+"""The USB transport end to end, through a real kernel: no hardware, no modules of this machine's kernel.
+
+run.py [--build DIR] [--kernel DIR] [--junit FILE] [pattern]
+
+A QEMU guest (Debian's kernel, by software alone) sees this machine's files read-only and runs the programs of the build.
+Its USB controller has a device that rr-usb-emulator plays: guest_test.cpp talks to it through libusb, then rr-test-client
+calls a service through rrgate and the device:
+
+  guest:  rr-test-client --rr+tcp--> rrgate --rr+usb--> libusb, kernel, xHCI
+  host:   QEMU --usbredir--> rr-usb-emulator --rr+tcp--> rr-test-service
+
+--kernel is a folder with boot/vmlinuz-* and lib/modules/* of Debian's linux-image package.
+"""
+import argparse
+import gzip
+import json
+import os
+import pathlib
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import xml.etree.ElementTree as ElementTree
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+GUEST_LIMIT = 150.0  # seconds; 25 are usual
+MODULES = ["virtio_pci", "9pnet_virtio", "9p", "usbcore", "xhci_pci", "cuse"]
+GATEWAY_PORT = 52990  # of the guest, which has no other network than its loopback
+
+INIT = r"""#!/bin/busybox sh
+/bin/busybox --install -s /bin; export PATH=/bin
+mount -t proc p /proc; mount -t sysfs s /sys; mount -t devtmpfs d /dev
+while read module; do insmod /modules/$module || echo "insmod: $module"; done < /modules/order
+mount -t 9p -o trans=virtio,version=9p2000.L,ro,msize=262144,cache=loose host /host
+for folder in dev sys proc; do mount --bind /$folder /host/$folder; done
+mount -t tmpfs t /host/run; cp -r /given /host/run/given
+ip link set lo up
+echo "MARK ready $(cut -d' ' -f1 /proc/uptime)"
+exec chroot /host /bin/sh /run/given/guest.sh
+"""
+
+GUEST = r"""cd {root}
+echo "MARK junit begin"
+{build}/test/usb/rr-usb-guest-test -r junit {pattern}
+echo "MARK junit end"
+{build}/server/rrgate serve --config /run/given/gateway.json > /run/gateway.log 2>&1 &
+tries=0
+until grep -q 'device online' /run/gateway.log || [ $tries -ge 50 ]; do /bin/busybox usleep 200000; tries=$((tries + 1)); done
+echo "MARK client begin"
+{build}/test/interop/cpp/rr-test-client '{url}' < /run/given/scenario.json
+echo "MARK client end"
+echo "MARK log begin"
+cat /run/gateway.log
+echo "MARK log end"
+/bin/busybox poweroff -f
+"""
+
+# As in test/interop/scenarios.py: small things, then an array of 10 MB there and back.
+SCENARIO = [
+    ({"call": "add", "args": [{"double": 1.5}, {"double": 2.25}]}, 3.75),
+    ({"call": "join", "args": [{"list": ["a", "b", "c"]}, ", "]}, "a, b, c"),
+    ({"call": "ramp", "args": [{"uint32": 4}]}, [0.0, 1.0, 2.0, 3.0]),
+    ({"call": "sum", "args": [{"ramp": 1310720}]}, 858992803840.0),
+    ({"get": "version"}, "1"),
+]
+
+
+def make_initrd(path, kernel, version, given):
+    """busybox, the modules in the order in which they have to be loaded, /init, and what the guest is given."""
+    with tempfile.TemporaryDirectory() as scratch:
+        tree = pathlib.Path(scratch)
+        for folder in ("bin", "proc", "sys", "dev", "host", "modules"):
+            (tree / folder).mkdir()
+        shutil.copy("/bin/busybox", tree / "bin/busybox")
+        shutil.copytree(given, tree / "given")
+        (tree / "init").write_text(INIT)
+        (tree / "init").chmod(0o755)
+        order = []
+        for module in MODULES:
+            shown = subprocess.run(["/sbin/modprobe", "-d", kernel, "-S", version, "--show-depends", module], check=True,
+                                   capture_output=True, text=True).stdout
+            for line in shown.splitlines():
+                word, _, file = line.strip().partition(" ")
+                name = os.path.basename(file)
+                if word == "insmod" and name not in order:
+                    order.append(name)
+                    shutil.copy(file, tree / "modules" / name)
+        (tree / "modules/order").write_text("\n".join(order) + "\n")
+        names = "\0".join(str(file.relative_to(tree)) for file in sorted(tree.rglob("*")))
+        archive = subprocess.run(["cpio", "-o", "-H", "newc", "--quiet", "-0"], cwd=tree, input=names.encode(), check=True,
+                                 stdout=subprocess.PIPE).stdout
+    path.write_bytes(gzip.compress(archive, 1))
+
+
+def between(text, name):
+    found = re.search(rf"^MARK {name} begin\n(.*?)^MARK {name} end$", text, re.DOTALL | re.MULTILINE)
+    return found[1] if found else ""
+
+
+class Run:
+    def __init__(self, arguments):
+        self.build = arguments.build.resolve()
+        self.kernel = arguments.kernel.resolve()
+        self.pattern = arguments.pattern
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="rr-usb-"))
+        self.processes = []
+
+    def start(self, *command, **options):
+        process = subprocess.Popen([str(word) for word in command], stdin=subprocess.PIPE, start_new_session=True, **options)
+        self.processes.append(process)
+        return process
+
+    def stop(self):
+        for process in self.processes:
+            if process.poll() is None:
+                process.kill()
+            process.wait()
+
+    def guest_output(self):
+        service = self.start(self.build / "test/interop/cpp/rr-test-service", stdout=subprocess.PIPE)
+        port = json.loads(service.stdout.readline())["port"]
+        bus = self.folder / "usb"
+        emulator = self.start(self.build / "test/usb/rr-usb-emulator", bus, port, "interop.service",
+                              stdout=subprocess.PIPE)
+        emulator.stdout.readline()
+        image = sorted((self.kernel / "boot").glob("vmlinuz-*"))[-1]
+        version = image.name.removeprefix("vmlinuz-")
+        if not (self.kernel / "lib/modules" / version / "modules.dep.bin").exists():
+            subprocess.run(["/sbin/depmod", "-b", self.kernel, version], check=True)
+        given = self.folder / "given"
+        given.mkdir()
+        url = f"rr+tcp://127.0.0.1:{GATEWAY_PORT}/?nodename=interop.service&service=interop"
+        (given / "gateway.json").write_text(json.dumps({
+            "listen": [f"127.0.0.1:{GATEWAY_PORT}"],
+            "devices": [{"name": "usb", "url": "rr+usb:///?nodename=interop.service"}]}))
+        (given / "scenario.json").write_text(json.dumps({"steps": [step for step, _ in SCENARIO]}))
+        (given / "guest.sh").write_text(GUEST.format(root=ROOT, build=self.build, url=url,
+                                                         pattern=shlex.quote(self.pattern) if self.pattern else ""))
+        initrd = self.folder / "initrd.gz"
+        make_initrd(initrd, self.kernel, version, given)
+        # Software emulation always: where /dev/kvm exists it may still not work.
+        qemu = self.start(
+            "qemu-system-x86_64", "-accel", "tcg", "-M", "q35", "-cpu", "max", "-m", "512", "-smp", "1", "-nographic",
+            "-no-reboot", "-nodefaults", "-serial", "stdio", "-monitor", "none", "-kernel", image, "-initrd", initrd,
+            "-append", "console=ttyS0 panic=-1 quiet",
+            "-virtfs", "local,path=/,mount_tag=host,security_model=none,readonly=on,multidevs=remap",
+            "-device", "qemu-xhci", "-chardev", f"socket,id=bus,path={bus}", "-device", "usb-redir,chardev=bus",
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+        timer = threading.Timer(GUEST_LIMIT, qemu.kill)
+        timer.start()
+        text = qemu.stdout.read().decode("utf-8", "replace").replace("\r", "")
+        timer.cancel()
+        return text
+
+
+def add_case(suite, name, failure=None):
+    case = ElementTree.SubElement(suite, "testcase", classname="usb", name=name)
+    if failure is not None:
+        ElementTree.SubElement(case, "failure", message=name).text = failure
+
+
+def judge(text):
+    """The guest's own test cases, and one for each step of the scenario."""
+    suite = ElementTree.Element("testsuite", name="usb")
+    try:
+        junit = between(text, "junit")
+        suite.extend(ElementTree.fromstring(junit[junit.index("<?xml"):]).iter("testcase"))
+    except (ValueError, ElementTree.ParseError) as problem:
+        add_case(suite, "the guest's tests", f"{problem}\n{text[-4000:]}")
+    try:
+        answer = json.loads(between(text, "client"))
+        results = answer.get("results") or [answer] * len(SCENARIO)
+    except ValueError as problem:
+        results = [f"{problem}: {between(text, 'client')}"] * len(SCENARIO)
+    for (step, expected), result in zip(SCENARIO, results):
+        is_right = isinstance(result, dict) and result.get("value") == expected
+        add_case(suite, f"through rrgate and USB: {json.dumps(step)}",
+                 None if is_right else f"found {result}, expected {expected}\n{between(text, 'log')[-2000:]}")
+    return suite
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build/release")
+    parser.add_argument("--kernel", type=pathlib.Path, default=ROOT / "build/deps/linux")
+    parser.add_argument("--junit", type=pathlib.Path)
+    parser.add_argument("pattern", nargs="?", help="which of the guest's test cases to run, as Catch2 takes it")
+    arguments = parser.parse_args()
+    started = time.monotonic()
+    run = Run(arguments)
+    try:
+        text = run.guest_output()
+    finally:
+        run.stop()
+        shutil.rmtree(run.folder)
+    print(text)
+    suite = judge(text)
+    if arguments.junit:
+        ElementTree.ElementTree(suite).write(arguments.junit, encoding="utf-8", xml_declaration=True)
+    failed = [case for case in suite if case.find("failure") is not None or case.find("error") is not None]
+    for case in failed:
+        print("FAILED:", case.get("name"))
+    print(f"{len(suite) - len(failed)} passed, {len(failed)} failed, {time.monotonic() - started:.0f} s")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
