@@ -96,6 +96,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
       throw std::invalid_argument(added.error().message);
     }
     services_.push_back(service);
+    if (services_changed_) services_changed_();
   }
 
   std::uint16_t listen(std::string_view url) {
@@ -106,6 +107,8 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     listener->start([this](asio::ip::tcp::socket socket) { accept(std::move(socket)); },
                     [this](const std::string& problem) { report(problem); });
     listeners_.push_back(std::move(listener));
+    listens_.insert(listens_.end(), bound->begin(), bound->end());
+    if (services_changed_) services_changed_();
     return bound->front().port;
   }
 
@@ -147,6 +150,15 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     repeats_.push_back(job);
     repeat(job);
   }
+
+  std::vector<std::string> listen_urls() const {
+    std::vector<std::string> out;
+    for (const auto& [host, port] : listens_)
+      out.push_back("rr+tcp://" + format_host_port(host, port) +
+                    "?nodeid=" + format_node_id(identity().id, NodeIdFormat::dashes));
+    return out;
+  }
+  void on_services_changed(std::function<void()> handler) { services_changed_ = std::move(handler); }
 
   asio::io_context& io() { return io_; }
   const NodeIdentity& identity() const { return directory_.identity(); }
@@ -241,8 +253,9 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     if (clients_.size() + arriving_ >= options_.max_clients) return;
     ++arriving_;
     auto stream = std::make_unique<TcpStream>(std::move(socket), send_stall);
-    asio::co_spawn(io_, welcome(std::move(stream), format_host_port(local.address().to_string(), local.port())),
-                   asio::detached);
+    std::string host = local.address().to_string();
+    host.resize(std::min(host.size(), host.find('%')));  // the zone is what this machine calls the link
+    asio::co_spawn(io_, welcome(std::move(stream), format_host_port(host, local.port())), asio::detached);
   }
 
   awaitable<void> welcome(std::unique_ptr<ByteStream> stream, std::string local) {
@@ -272,6 +285,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   void close_listeners() {
     for (const auto& listener : listeners_) listener->close();
     listeners_.clear();
+    listens_.clear();
     for (const auto& job : repeats_) {
       job->is_stopped = true;
       job->timer.cancel();
@@ -284,7 +298,9 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   asio::io_context& io_;
   ServiceDirectory directory_;
   std::vector<std::shared_ptr<Service>> services_;
+  std::function<void()> services_changed_;
   std::vector<std::unique_ptr<TcpListener>> listeners_;
+  std::vector<HostPort> listens_;  ///< of the listeners: addresses with their true ports
   std::vector<std::shared_ptr<Repeat>> repeats_;
   std::map<ClientId, std::shared_ptr<ServiceClient>> clients_;
   std::size_t arriving_ = 0;  ///< connections whose first bytes are awaited
@@ -322,6 +338,12 @@ void Node::every(std::chrono::nanoseconds period, std::function<void()> work) {
 }
 const NodeIdentity& Node::identity() const {
   return implementation_->identity();
+}
+std::vector<std::string> Node::listen_urls() const {
+  return implementation_->listen_urls();
+}
+void Node::on_services_changed(std::function<void()> handler) {
+  implementation_->on_services_changed(std::move(handler));
 }
 asio::io_context& Node::io_context() {
   return implementation_->io();

@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "server/node/service.hpp"
 
@@ -52,6 +53,10 @@ class Node {
   void every(std::chrono::nanoseconds period, std::function<void()> work);
 
   const NodeIdentity& identity() const;
+  /// Where it listens now: "rr+tcp://0.0.0.0:52222?nodeid=..."; empty once it has stopped.
+  std::vector<std::string> listen_urls() const;
+  /// `handler` hears of services and listen URLs that are added. One handler; a second replaces the first.
+  void on_services_changed(std::function<void()> handler);
   boost::asio::io_context& io_context();
   /// Clients that are connected to a service now.
   std::size_t client_count() const;

@@ -1,0 +1,56 @@
+// Asks nodes for their services. Layer: server/discovery. Source: transports spec section 6.4, sessions spec section
+// 2.16.
+#pragma once
+
+#include <chrono>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/discovery/detected_nodes.hpp"
+#include "core/session/connection.hpp"
+#include "core/types/value.hpp"
+#include "server/transport/dial.hpp"
+
+namespace rr {
+
+/// What a node says about one of its services (ServiceInfo2 of the reference).
+struct ServiceInfo {
+  NodeIdentity node;  ///< as the node itself said it when connecting
+  std::string name;
+  std::string root_object_type;
+  std::vector<std::string> root_object_implements;
+  std::string connection_url;  ///< the way that the answer took, with the service's name
+  MapString attributes;
+
+  /// Whether the root object is of this type.
+  bool implements(std::string_view type) const;
+};
+
+struct NodeServices {
+  NodeIdentity node;
+  std::vector<ServiceInfo> services;  ///< but for the index itself; none from a node without an index
+};
+
+struct ServiceQueryOptions {
+  std::string self_name = {};                ///< node name to come under
+  std::chrono::milliseconds timeout{5'000};  ///< for all of it
+  std::chrono::milliseconds send_stall{15'000};
+  std::size_t max_answer_bytes = 64 * 1024;
+};
+
+/// Connects to the service index of `url`'s node, asks, disconnects.
+/// Errors   connection_error: not reached, no or a wrong answer, one that is too long. node_not_found: another node
+/// than
+///          the URL names.
+awaitable<Result<NodeServices>> query_services(ConnectionUrl url, ServiceQueryOptions options);
+
+/// URLs of a detected node to connect to: those with a scheme of the list (empty: any) that can be dialed, the ones
+/// announced last first, at most 8. They demand the node's id and name.
+std::vector<ConnectionUrl> candidate_urls(const NodeDiscoveryInfo& node, const std::vector<std::string>& schemes = {});
+
+/// Asks a node over several URLs, 15 ms apart; the first answer counts.
+/// Errors   as query_services, of the last attempt to fail; connection_error: no URL.
+awaitable<Result<NodeServices>> query_node(std::vector<ConnectionUrl> urls, ServiceQueryOptions options);
+
+}  // namespace rr

@@ -1,0 +1,137 @@
+// Our peer of the discovery tests: announces a node, or says what it hears. One JSON object a line on standard output;
+// ends when standard input does.
+//
+//   rr-test-discovery serve NAME NODEID [PORT]   a node with the service "thing" of experimental.found.Thing; every
+//   line
+//                                                of input adds another service
+//   rr-test-discovery watch                      nodes that come, change and go
+//   rr-test-discovery find-type TYPE | find-name NAME
+//                                                searches once
+#include <unistd.h>
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/posix/stream_descriptor.hpp>
+#include <boost/asio/read_until.hpp>
+#include <boost/asio/streambuf.hpp>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "server/discovery/discovery.hpp"
+#include "server/node/node.hpp"
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* definition = R"(service experimental.found
+object Thing
+  property int32 one [readonly]
+end
+)";
+
+void say(const Json& what) {
+  std::cout << what.dump() << std::endl;
+}
+
+Json describe(const rr::NodeDiscoveryInfo& node) {
+  Json out{{"id", rr::format_node_id(node.node_id, rr::NodeIdFormat::dashes)},
+           {"name", node.node_name},
+           {"nonce", node.service_state_nonce},
+           {"urls", Json::array()}};
+  for (const auto& url : node.urls) out["urls"].push_back(url.url);
+  return out;
+}
+
+std::shared_ptr<rr::Service> make_thing(const std::string& name) {
+  auto service = rr::Service::from_text({definition}, name, "Thing");
+  service->property("one").get([] { return 1; });
+  return service;
+}
+
+/// Calls `line` for each line of standard input, and stops the io_context at its end.
+struct Input {
+  Input(boost::asio::io_context& io, std::function<void()> line) : io_(io), line_(std::move(line)), input_(io) {
+    input_.assign(::dup(STDIN_FILENO));
+    read();
+  }
+  void read() {
+    boost::asio::async_read_until(input_, buffer_, '\n',
+                                  [this](const boost::system::error_code& error, std::size_t size) {
+                                    if (error) return io_.stop();
+                                    buffer_.consume(size);
+                                    line_();
+                                    read();
+                                  });
+  }
+  boost::asio::io_context& io_;
+  std::function<void()> line_;
+  boost::asio::posix::stream_descriptor input_;
+  boost::asio::streambuf buffer_;
+};
+
+void serve(const std::string& name, const std::string& id, const std::string& port) {
+  boost::asio::io_context io(1);
+  rr::NodeOptions options;
+  options.id = rr::parse_node_id(id).value();
+  rr::Node node(io, name, options);
+  rr::Discovery discovery(io);
+  node.add(make_thing("thing"));
+  say({{"port", node.listen("rr+tcp://[::]:" + port)}});
+  discovery.announce(node);
+  int more = 0;
+  const Input input(io, [&] { node.add(make_thing("thing" + std::to_string(++more))); });
+  io.run();
+}
+
+void watch() {
+  boost::asio::io_context io(1);
+  rr::Discovery discovery(io);
+  say({{"ready", true}});
+  discovery.watch([](const rr::NodeEvent& event) {
+    constexpr const char* words[] = {"found", "changed", "lost"};
+    auto line = describe(event.node);
+    line["event"] = words[static_cast<int>(event.kind)];
+    say(line);
+  });
+  const Input input(io, [] {});
+  io.run();
+}
+
+rr::awaitable<void> search(rr::Discovery& discovery, std::string what, std::string argument) {
+  Json found = Json::array();
+  if (what == "find-type") {
+    for (const auto& service : co_await discovery.find_service_by_type(argument))
+      found.push_back({{"node", service.node.name}, {"name", service.name}, {"url", service.connection_url}});
+  } else {
+    for (const auto& node : co_await discovery.find_node_by_name(argument)) found.push_back(describe(node));
+  }
+  say({{"found", found}});
+}
+
+void find(const std::string& what, const std::string& argument) {
+  boost::asio::io_context io(1);
+  rr::Discovery discovery(io);
+  auto work = search(discovery, what, argument);
+  boost::asio::co_spawn(io, std::move(work), [&io](std::exception_ptr) { io.stop(); });
+  io.run();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const std::vector<std::string> words(argv + 1, argv + argc);
+  try {
+    if (words.size() >= 3 && words[0] == "serve")
+      serve(words[1], words[2], words.size() > 3 ? words[3] : "0");
+    else if (words.size() == 1 && words[0] == "watch")
+      watch();
+    else if (words.size() == 2 && words[0].rfind("find-", 0) == 0)
+      find(words[0], words[1]);
+    else
+      throw std::invalid_argument("usage: serve NAME NODEID [PORT] | watch | find-type TYPE | find-name NAME");
+  } catch (const std::exception& failure) {
+    std::cerr << "rr-test-discovery: " << failure.what() << '\n';
+    return 1;
+  }
+}

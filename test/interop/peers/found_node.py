@@ -1,0 +1,57 @@
+"""The reference implementation in the discovery tests: announces a node, or searches. One line of JSON on standard output.
+
+found_node.py serve NAME NODEID [PORT]   a node with the service "thing"; runs until its standard input ends
+found_node.py find-type TYPE             its services, on nodes that it hears of within three seconds
+found_node.py detected                   those nodes
+"""
+import json
+import sys
+import time
+
+import RobotRaconteur as RR
+
+DEFINITION = """service experimental.found
+object Thing
+  property int32 one [readonly]
+end
+"""
+# Local transports would find everybody through the file system.
+QUIET = ["local-enable=false", "local-start-server=false", "local-start-client=false", "intra-enable=false",
+         "log-level=WARNING", "tcp-ipv6-discovery=true"]
+
+
+class Thing:
+    one = 1
+
+
+def options(*more):
+    return [f"--robotraconteur-{option}" for option in [*QUIET, *more]]
+
+
+def serve(name, node_id, port="0"):
+    with RR.ServerNodeSetup(name, int(port), argv=options("discovery-announce-enable=true", f"nodeid={node_id}")):
+        node = RR.RobotRaconteurNode.s
+        node.RegisterServiceType(DEFINITION)
+        node.RegisterService("thing", "experimental.found.Thing", Thing())
+        print(json.dumps({"ready": True, "id": str(node.NodeID.ToString())}), flush=True)
+        sys.stdin.read()
+
+
+def search(what, argument=None):
+    with RR.ClientNodeSetup(argv=options("discovery-listening-enable=true")):
+        node = RR.RobotRaconteurNode.s
+        time.sleep(3)  # FindServiceByType asks only nodes that are known when it is called
+        if what == "find-type":
+            found = node.FindServiceByType(argument, ["rr+tcp"])
+            print(json.dumps([{"node": info.NodeName, "name": info.Name, "url": list(info.ConnectionURL)} for info in found]))
+        else:
+            node.UpdateDetectedNodes(["rr+tcp"])
+            found = node.GetDetectedNodes()
+            print(json.dumps([str(each.ToString()).strip("{}") for each in found]))
+
+
+if __name__ == "__main__":
+    if sys.argv[1] == "serve":
+        serve(*sys.argv[2:])
+    else:
+        search(*sys.argv[1:])

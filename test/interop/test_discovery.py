@@ -1,0 +1,128 @@
+"""Nodes that find one another over IPv6 link-local multicast: ours and the reference's, each on a machine of its own."""
+import json
+import os
+import sys
+import time
+
+import pytest
+
+from network import Network, run
+from processes import BUILD, ROOT, Background
+
+OURS = BUILD / "test" / "interop" / "cpp" / "rr-test-discovery"
+THEIRS = [sys.executable, str(ROOT / "test" / "interop" / "peers" / "found_node.py")]
+TYPE = "experimental.found.Thing"
+IDS = [f"1111111{number}-0000-4000-8000-000000000000" for number in range(8)]
+FIND_DEADLINE = 5.0  # seconds
+
+
+@pytest.fixture(scope="module")
+def network():
+    made = Network(4)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def start(network, tmp_path):
+    """start(host, *command): a background process there, ended with the test."""
+    running = []
+
+    def start_process(host, *command):
+        running.append(Background(network.on(host, *command), tmp_path / f"{len(running)}.log"))
+        return running[-1]
+
+    yield start_process
+    for process in running:
+        process.stop()
+
+
+class Watch:
+    """rr-test-discovery watch on a host: its events as they come."""
+
+    def __init__(self, process):
+        self._process = process
+        assert json.loads(process.next_line()) == {"ready": True}
+
+    def wait_for(self, is_wanted, seconds=FIND_DEADLINE):
+        """The first event from here on that is_wanted(event)."""
+        deadline = time.monotonic() + seconds
+        while True:
+            event = json.loads(self._process.next_line(within=deadline - time.monotonic()))
+            if is_wanted(event):
+                return event
+
+
+def search(network, host, *command):
+    done = run(*network.on(host, *command))
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.strip().splitlines()[-1])
+
+
+def serve(start, implementation, host, name, node_id, port=0):
+    command = [OURS] if implementation == "ours" else THEIRS
+    process = start(host, *command, "serve", name, node_id, str(port))
+    process.next_line()
+    return process
+
+
+def test_our_node_is_found_by_the_reference(network, start):
+    serve(start, "ours", 0, "ours.node", IDS[0])
+    assert IDS[0] in search(network, 1, *THEIRS, "detected")
+    (found,) = search(network, 1, *THEIRS, "find-type", TYPE)
+    assert (found["node"], found["name"]) == ("ours.node", "thing")
+    assert found["url"][0].startswith("rr+tcp://[fe80::") and "%" not in found["url"][0]
+
+
+@pytest.mark.parametrize("implementation", ["ours", "theirs"])
+def test_nodes_are_found_by_ours(network, start, implementation):
+    watch = Watch(start(0, OURS, "watch"))
+    serve(start, implementation, 1, "a.node", IDS[1])
+    event = watch.wait_for(lambda event: event["id"] == IDS[1])
+    assert (event["event"], event["name"]) == ("found", "a.node")
+    assert event["urls"][0].startswith("rr+tcp://[fe80::") and "%eth0]" in event["urls"][0]
+    assert len(event["nonce"]) == 16
+    # One that is there already is asked for.
+    late = Watch(start(2, OURS, "watch"))
+    late.wait_for(lambda event: event["id"] == IDS[1])
+    (service,) = search(network, 2, OURS, "find-type", TYPE)["found"]
+    assert (service["node"], service["name"]) == ("a.node", "thing")
+    (node,) = search(network, 2, OURS, "find-name", "a.node")["found"]
+    assert node["id"] == IDS[1]
+
+
+def test_a_new_service_changes_the_nonce(network, start):
+    watch = Watch(start(0, OURS, "watch"))
+    node = serve(start, "ours", 1, "a.node", IDS[2])
+    first = watch.wait_for(lambda event: event["id"] == IDS[2])
+    node.write_line("another one")
+    second = watch.wait_for(lambda event: event["id"] == IDS[2])
+    assert second["event"] == "changed" and second["nonce"] != first["nonce"]
+    assert len(search(network, 2, OURS, "find-type", TYPE)["found"]) == 2
+
+
+@pytest.mark.parametrize("implementation", ["ours", "theirs"])
+def test_a_node_that_restarts_on_another_port_is_found_again(network, start, implementation):
+    watch = Watch(start(0, OURS, "watch"))
+    before = serve(start, implementation, 1, "a.node", IDS[3], 50001)
+    watch.wait_for(lambda event: event["id"] == IDS[3] and any(":50001/" in url for url in event["urls"]))
+    before.process.kill()
+    before.process.wait()
+    serve(start, implementation, 1, "a.node", IDS[3], 50002)
+    watch.wait_for(lambda event: event["id"] == IDS[3] and any(":50002/" in url for url in event["urls"]))
+    (service,) = search(network, 2, OURS, "find-type", TYPE)["found"]
+    assert ":50002/" in service["url"]
+
+
+def node_that_dies_is_lost(network, start):
+    watch = Watch(start(0, OURS, "watch"))
+    node = serve(start, "theirs", 1, "a.node", IDS[4])
+    watch.wait_for(lambda event: event["id"] == IDS[4])
+    node.process.kill()
+    killed = time.monotonic()
+    watch.wait_for(lambda event: event["id"] == IDS[4] and event["event"] == "lost", seconds=65)
+    assert time.monotonic() - killed < 62
+
+
+if "RR_LONG_TESTS" in os.environ:  # what expires when is in the tests of core/discovery; this is it in earnest
+    test_a_node_that_dies_is_lost_within_a_minute = node_that_dies_is_lost
