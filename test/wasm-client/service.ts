@@ -31,6 +31,10 @@ interface WasmService extends CoreExports {
   set_now(steady: number): void;
   receive_buffer(size: number): number;
   handle_bytes(): void;
+  join(): number;
+  select(client: number): void;
+  poll_timeout(): number;
+  handle_timeout(): void;
   release(path: Handle): void;
   stop(): void;
   wants_close(): number;
@@ -65,24 +69,36 @@ export class TestService {
   #listener: TransportListener | undefined;
   #deliveries: Uint8Array[] = [];
   #is_delivering = false;
+  #timer: ReturnType<typeof setTimeout> | undefined;
+  readonly #number: number;
 
   static async start(options: ServiceOptions): Promise<TestService> {
     compiled ??= WebAssembly.compile(readFileSync(new URL("test_service.wasm", built)));
     const values = new JsValues();
     const { exports } = await WebAssembly.instantiate(await compiled, values.imports);
-    return new TestService(values, exports as unknown as WasmService, options);
+    const service = exports as unknown as WasmService;
+    values.attach(service);
+    service._initialize();
+    const all = { version: 4, stringTable: true, ...options };
+    const error = values.take(service.open(values.give(all), performance.now()));
+    if (error) throw new Error(String(error));
+    return new TestService(values, service, options, []);
   }
 
   private constructor(
     private readonly values: JsValues,
     private readonly service: WasmService,
     private readonly options: ServiceOptions,
+    /** All clients of the service, by number. */
+    private readonly clients: TestService[],
   ) {
-    values.attach(service);
-    service._initialize();
-    const all = { version: 4, stringTable: true, ...options };
-    const error = values.take(service.open(values.give(all), performance.now()));
-    if (error) throw new Error(String(error));
+    this.#number = clients.push(this) - 1;
+  }
+
+  /** The way of one more client to the same service. */
+  join(): TestService {
+    this.service.join();
+    return new TestService(this.values, this.service, this.options, this.clients);
   }
 
   connect(options: ConnectOptions = {}): Promise<RemoteObject> {
@@ -115,40 +131,70 @@ export class TestService {
   }
 
   stop(): void {
-    this.service.stop();
+    this.#select().stop();
     this.#poll();
   }
 
   release(path: string): void {
-    this.service.release(this.values.give(path));
+    this.#select().release(this.values.give(path));
     this.#poll();
   }
 
   #receive(bytes: Uint8Array): void {
     this.sent.push(bytes);
     if (this.is_mute) return;
-    this.service.set_now(performance.now());
-    const address = this.service.receive_buffer(bytes.length);
+    const service = this.#select();
+    const address = service.receive_buffer(bytes.length);
     this.values.bytes.set(bytes, address);
-    this.service.handle_bytes();
+    service.handle_bytes();
     this.#poll();
   }
 
+  /** The service, with its mind on this client. */
+  #select(): WasmService {
+    this.service.select(this.#number);
+    this.service.set_now(performance.now());
+    return this.service;
+  }
+
+  /** What one client says may be news for all. */
   #poll(): void {
-    for (let length = this.service.poll_transmit(); length > 0; length = this.service.poll_transmit()) {
-      const address = this.service.transmit_address();
+    for (const client of this.clients) {
+      client.#transmit();
+      client.#arm_timer();
+    }
+  }
+
+  #transmit(): void {
+    const service = this.#select();
+    for (let length = service.poll_transmit(); length > 0; length = service.poll_transmit()) {
+      const address = service.transmit_address();
       const bytes = this.values.bytes.slice(address, address + length);
       const size = this.options.pieces ?? bytes.length;
       for (let from = 0; from < bytes.length; from += size) this.#deliveries.push(bytes.slice(from, from + size));
-      this.service.handle_transmitted(bytes.length);
+      service.handle_transmitted(bytes.length);
     }
     if (this.#is_delivering || this.#deliveries.length === 0) return;
     this.#is_delivering = true;
     queueMicrotask(() => {
       this.#is_delivering = false;
       for (const bytes of this.#deliveries.splice(0)) if (!this.is_closed) this.#listener?.received(bytes);
-      if (this.service.wants_close() && !this.is_closed) this.drop("closed by the service");
+      if (this.#select().wants_close() && !this.is_closed) this.drop("closed by the service");
     });
+  }
+
+  /** Of what a service does by itself, only what clients wait for from one another is tested. */
+  #arm_timer(): void {
+    clearTimeout(this.#timer);
+    if (this.clients.length < 2 || this.is_closed) return;
+    const delay = this.#select().poll_timeout() - performance.now();
+    this.#timer = setTimeout(
+      () => {
+        this.#select().handle_timeout();
+        this.#poll();
+      },
+      Math.min(Math.max(Math.ceil(delay), 0), 2 ** 31 - 1),
+    );
   }
 }
 

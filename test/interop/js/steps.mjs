@@ -197,14 +197,20 @@ class Client {
       await target.$.unlock();
       return null;
     },
-    async enter(target, name, { timeout }) {
+    async enter(target, name, { timeout, later }) {
       const monitor = {};
-      await new Promise((entered, refused) => {
+      this.#monitors.set(name, monitor);
+      monitor.entered = new Promise((entered, refused) => {
         const inside = () => new Promise((leave) => ((monitor.leave = leave), entered()));
         monitor.left = target.$.monitor(inside, timeout < 0 ? {} : { timeout });
         monitor.left.catch(refused);
       });
-      this.#monitors.set(name, monitor);
+      monitor.entered.catch(() => {}); // told where it is waited for
+      if (!later) await monitor.entered;
+      return null;
+    },
+    async entered(_target, name) {
+      await this.#monitors.get(name).entered;
       return null;
     },
     async exit(_target, name) {

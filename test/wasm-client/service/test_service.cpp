@@ -1,5 +1,6 @@
 // A service that gives back what it is given, for any definition; ../service.ts says what each member does.
 #include <cmath>
+#include <deque>
 #include <map>
 #include <optional>
 
@@ -70,6 +71,12 @@ class TestService {
     carry_out();
   }
   void release(const JsValue& path) { session_->release_path(path.text().value(), now_); }
+  /// One more client. Returns its number; what follows concerns it, until another is selected.
+  std::size_t join() {
+    session_ = &sessions_.emplace_back(directory_, session_options_, now_);
+    return sessions_.size() - 1;
+  }
+  void select(std::size_t number) { session_ = &sessions_[number]; }
   void stop() { session_->close_service(now_); }
   bool wants_close() const { return session_->wants_close(); }
 
@@ -79,6 +86,13 @@ class TestService {
   }
   void handle_transmitted(std::size_t size) {
     session_->handle_transmitted(size, now_);
+    carry_out();
+  }
+  double poll_timeout() const {
+    return std::chrono::duration<double, std::milli>(session_->poll_timeout().time_since_epoch()).count();
+  }
+  void handle_timeout() {
+    session_->handle_timeout(now_);
     carry_out();
   }
 
@@ -98,11 +112,10 @@ class TestService {
     (*service)->set_policy({std::make_shared<TestAuthenticator>(), requires_user, true});
     if (auto added = directory_.add(*service); added.has_error()) return added;
     types_ = std::move(types);
-    ServiceSessionOptions session_options;
-    auto& features = session_options.connection.features;
+    auto& features = session_options_.connection.features;
     if (options.field("version")->number() == 2) features.v4 = false;
     if (!options.field("stringTable")->is_true()) features.string_table = {.local = false, .standard = false};
-    session_.emplace(directory_, session_options, now_);
+    join();
     return {};
   }
 
@@ -118,6 +131,8 @@ class TestService {
         if (const auto found = values.find(wire->member->name); found != values.end())
           (void)session_->send_wire(wire->path, *wire->member, found->second, now_);
       }
+      if (std::holds_alternative<LocksChanged>(*event))
+        for (auto& session : sessions_) session.handle_locks_changed(now_);
       if (const auto* pipe = std::get_if<PipeConnected>(&*event)) connect_pipe(*pipe);
       if (const auto* packet = std::get_if<PipeReceived>(&*event))
         (void)session_->send_pipe_packet(packet->id, packet->value, now_);
@@ -281,7 +296,9 @@ class TestService {
   ServiceDirectory directory_;
   std::shared_ptr<TestObject> root_;
   std::shared_ptr<const TypeRegistry> types_;
-  std::optional<ServiceSession> session_;
+  ServiceSessionOptions session_options_;
+  std::deque<ServiceSession> sessions_;
+  ServiceSession* session_ = nullptr;  ///< the one selected
   std::map<std::string, Memory, std::less<>> memories_;
   std::map<CallbackId, CallId> asks_;
   struct Run {
@@ -312,6 +329,18 @@ RR_EXPORT(open) JsHandle rr_open(JsHandle options, double steady) {
 }
 RR_EXPORT(set_now) void rr_set_now(double steady) {
   service->set_now(steady);
+}
+RR_EXPORT(join) std::size_t rr_join() {
+  return service->join();
+}
+RR_EXPORT(select) void rr_select(std::size_t number) {
+  service->select(number);
+}
+RR_EXPORT(poll_timeout) double rr_poll_timeout() {
+  return service->poll_timeout();
+}
+RR_EXPORT(handle_timeout) void rr_handle_timeout() {
+  service->handle_timeout();
 }
 RR_EXPORT(receive_buffer) std::uint8_t* rr_receive_buffer(std::size_t size) {
   return service->receive_buffer(size);
