@@ -51,4 +51,5 @@ def test_pages_of_other_origins(link, chromium):
     assert chromium.ask(request) == {"results": []}
     answer = chromium.ask({**request, "page": chromium.origin.replace("127.0.0.1", "localhost")})
     assert answer["connect_error"]["name"] == "RobotRaconteur.ConnectionError"
-    assert "could not connect to ws://127.0.0.1" in answer["connect_error"]["message"]
+    assert f"could not connect to ws://127.0.0.1:{port}" in answer["connect_error"]["message"]
+    assert "does not let pages of http://localhost:" in answer["connect_error"]["message"]

@@ -40,10 +40,10 @@ it.each([
   ["rrs+tcp://gw.example/?service=a", "use rr+wss"],
   ["rr+tpc://gw.example/?service=a", "scheme unknown; known: ws, wss"],
   ["ftp://gw.example/?service=a", "scheme unknown"],
-  ["/devices/create?service=Create", "Invalid URL"],
+  ["/devices/create?service=Create", "no page that it could be relative to"],
   ["ws://gw.example:99999/?service=a", "Invalid URL"],
   ["ws://?service=a", "Invalid URL"],
-  ["", "Invalid URL"],
+  ["", "no page that it could be relative to"],
 ])("refuses %j", (text, message) => {
   expect(() => parse(text)).toThrow(message);
 });

@@ -1,12 +1,13 @@
 // connect(): from a URL to an object. Layer: wasm-client/ts.
 import { make_error } from "./errors.js";
 import { ObjectTree } from "./object.js";
-import { Session } from "./session.js";
+import { check_timeout, Session } from "./session.js";
 import type { OpenTransport, Transport } from "./transport.js";
 import type { ObjectInfo, RemoteObject } from "./types.js";
 import { parse_service_url } from "./url.js";
 import { Core } from "./wasm_module.js";
 import { open_websocket } from "./websocket.js";
+import { check_signal } from "./within.js";
 
 export interface ConnectOptions {
   /** Gives up connecting. Once connected it has no effect; use `$.close()`. */
@@ -49,10 +50,15 @@ export async function connect<T = RemoteObject>(
   options: ConnectOptions = {},
 ): Promise<T & { readonly $: ObjectInfo }> {
   const { signal } = options;
+  check_signal(signal);
   signal?.throwIfAborted();
   const { socket, service, nodeId, nodeName } = parse_service_url(url);
-  const timeout = options.timeout ?? default_connect_timeout;
-  if (!(timeout > 0)) throw make_error("InvalidArgument", `timeout ${String(timeout)}: expected milliseconds above 0`);
+  const timeout = check_timeout(options.timeout ?? default_connect_timeout);
+  const request_timeout = check_timeout(options.requestTimeout ?? default_request_timeout, "requestTimeout");
+  if (options.username === undefined && (options.password ?? options.credentials) !== undefined) {
+    // Without it there would be a session, but nobody's.
+    throw make_error("InvalidArgument", "found a password or credentials without username");
+  }
 
   const attempt = new Attempt();
   const abort = () => attempt.fail(signal?.reason);
@@ -78,7 +84,7 @@ export async function connect<T = RemoteObject>(
         maxMessageSize: options.maxMessageSize,
       }),
     );
-    const session = attempt.begin(core, options.requestTimeout ?? default_request_timeout);
+    const session = attempt.begin(core, request_timeout);
     const type = await attempt.unless_failed(session.start());
     return new ObjectTree(session).root(service, type) as T & { readonly $: ObjectInfo };
   } catch (error) {

@@ -90,6 +90,9 @@ export function make_error(name: CodeName, message: string): RobotRaconteurError
   return new RobotRaconteurError({ code: ErrorCode[name], name: `RobotRaconteur.${name}`, message });
 }
 
+/** The message of whatever was thrown. */
+export const text_of = (thrown: unknown): string => (thrown instanceof Error ? thrown.message : String(thrown));
+
 /** Hands an exception of application code to whoever collects those, so that it ends nothing else. */
 export function report(error: unknown): void {
   const { reportError } = globalThis as { reportError?: (error: unknown) => void };

@@ -3,6 +3,7 @@
  * @module
  */
 import { readFile } from "node:fs/promises";
+import { make_error } from "./errors.js";
 import { platform } from "./platform.js";
 
 export * from "./index.js";
@@ -14,7 +15,7 @@ platform.find_websocket = async () => {
   if (typeof globalThis.WebSocket === "function") return globalThis.WebSocket;
   const name = "ws"; // not a literal: the package is optional
   const found = (await import(name).catch(() => null)) as { WebSocket: WsClass } | null;
-  if (!found) throw new Error('Node before version 22 has no WebSocket: install the package "ws"');
+  if (!found) throw make_error("SystemResourceError", 'Node before version 22 has no WebSocket: install the package "ws"');
   const { WebSocket: Base } = found;
   return class extends Base {
     constructor(url: string | URL, protocols?: string | string[]) {

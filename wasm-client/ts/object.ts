@@ -10,8 +10,9 @@ import { make_objref } from "./members/objref.js";
 import { make_pipe } from "./members/pipe.js";
 import { make_property } from "./members/property.js";
 import { make_wire } from "./members/wire.js";
+import { check_timeout } from "./session.js";
 import type { Session } from "./session.js";
-import { within } from "./within.js";
+import { check_signal, within } from "./within.js";
 import type {
   CallOptions,
   DynamicMember,
@@ -62,7 +63,9 @@ export class ObjectTree {
   find(path: string, options: CallOptions = {}): Promise<RemoteObject> {
     const known = this.#objects.get(path);
     // A look-up with limits of its own shares nothing: its end must not be that of others.
-    if (known && !options.signal && options.timeout === undefined) return known.object;
+    // Nor does one that comes too late: the request says why.
+    const is_shared = !options.signal && options.timeout === undefined && !this.#session.is_closed;
+    if (known && is_shared) return known.object;
     const released: (() => void)[] = [];
     const object = this.#session
       .request((core) => core.find_object(path), options)
@@ -189,6 +192,11 @@ class Info implements ObjectInfo {
 
   async monitor<R>(action: () => R | Promise<R>, { signal, timeout }: CallOptions = {}): Promise<R> {
     const session = this.#session;
+    if (typeof action !== "function") {
+      throw make_error("InvalidArgument", `monitor: found ${typeof action}, expected a function`);
+    }
+    check_signal(signal);
+    if (timeout !== undefined) check_timeout(timeout);
     const entering = session.request((core) => core.enter_monitor(this.path, timeout ?? -1));
     const leave = () => session.request((core) => core.exit_monitor(this.path));
     try {

@@ -4,7 +4,7 @@
 export interface Platform {
   /** The compiled core. */
   load_wasm(): Promise<WebAssembly.Module>;
-  /** @throws Error where there is none. */
+  /** @throws RobotRaconteurError SystemResourceError: there is none. */
   find_websocket(): Promise<typeof WebSocket>;
 }
 

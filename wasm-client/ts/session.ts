@@ -1,9 +1,10 @@
 // Drives the core: bytes in and out, timers, and which promise a request belongs to. Layer: wasm-client/ts.
-import { call_safely, connection_lost, ErrorCode, make_error, RobotRaconteurError } from "./errors.js";
+import { call_safely, connection_lost, ErrorCode, make_error, RobotRaconteurError, text_of } from "./errors.js";
 import type { ErrorFields } from "./errors.js";
 import type { Transport } from "./transport.js";
 import type { CallOptions, RrValue } from "./types.js";
 import type { Core, CoreEvent } from "./wasm_module.js";
+import { check_signal } from "./within.js";
 
 /** Above this many bytes in the transport, the core keeps what it has: there newer wire values replace older ones. */
 const high_mark = 256 * 1024;
@@ -92,9 +93,10 @@ export class Session {
    */
   request(ask: (core: Core) => number, options: CallOptions = {}, done?: (value: RrValue) => void): Promise<RrValue> {
     const { signal } = options;
-    if (signal?.aborted) return Promise.reject(signal.reason);
-    if (this.#end) return Promise.reject(this.#end.reason);
     return new Promise((resolve, reject) => {
+      check_signal(signal);
+      if (signal?.aborted) return reject(signal.reason);
+      if (this.#end) return reject(this.#end.reason);
       this.core.set_request_timeout(check_timeout(options.timeout ?? this.timeout));
       const id = ask(this.core);
       const abort = () => {
@@ -348,8 +350,7 @@ export class Session {
     try {
       what();
     } catch (error) {
-      const text = error instanceof Error ? error.message : String(error);
-      this.#finish(make_error("InternalError", `the session failed: ${text}`));
+      this.#finish(make_error("InternalError", `the session failed: ${text_of(error)}`));
     }
   }
 }
@@ -364,7 +365,8 @@ function error_fields(error: unknown): Partial<ErrorFields> {
   return { code: ErrorCode.UnknownError, message: String(error) };
 }
 
-function check_timeout(milliseconds: number): number {
+/** @throws RobotRaconteurError InvalidArgument */
+export function check_timeout(milliseconds: number, name = "timeout"): number {
   if (milliseconds > 0) return milliseconds;
-  throw make_error("InvalidArgument", `timeout ${String(milliseconds)}: expected milliseconds above 0`);
+  throw make_error("InvalidArgument", `${name} ${String(milliseconds)}: expected milliseconds above 0`);
 }

@@ -10,6 +10,7 @@ import { PipeSubscription, WireSubscription } from "./member_subscription.js";
 import type { MemberSubscriptionOptions, PipeSubscriptionOptions } from "./member_subscription.js";
 import type { CallOptions, ObjectInfo, RemoteObject } from "./types.js";
 import { parse_service_url } from "./url.js";
+import { check_signal } from "./within.js";
 
 export interface SubscribeOptions extends ConnectOptions {
   /** Ends the subscription. */
@@ -29,13 +30,14 @@ type Client<T> = T & { readonly $: ObjectInfo };
 /**
  * Stays connected to a service: connects, and connects again after each loss, until close().
  * @param urls  one service, or several ways to it; each attempt tries them in order. As for connect().
- * @throws      RobotRaconteurError InvalidArgument (URLs that name different services, no URL). What fails later is told
+ * @throws      RobotRaconteurError InvalidArgument (URLs that name different services, no URL, signal). What fails later is told
  *              to onFailed() and tried again.
  */
 export function subscribe<T = RemoteObject>(
   urls: string | URL | readonly (string | URL)[],
   options: SubscribeOptions = {},
 ): Subscription<T> {
+  check_signal(options.signal);
   const list = [urls].flat() as (string | URL)[];
   const services = new Set(list.map((url) => parse_service_url(url).service));
   if (services.size !== 1) {
@@ -87,10 +89,11 @@ export class Subscription<T = RemoteObject> {
    */
   client(options: CallOptions = {}): Promise<Client<T>> {
     const { signal, timeout } = options;
-    if (signal?.aborted) return Promise.reject(signal.reason);
-    if (this.isClosed) return Promise.reject(closed_error());
-    if (this.#client) return Promise.resolve(this.#client);
     return new Promise((resolve, reject) => {
+      check_signal(signal);
+      if (signal?.aborted) return reject(signal.reason);
+      if (this.isClosed) return reject(closed_error());
+      if (this.#client) return resolve(this.#client);
       const end = () => {
         stops.forEach((stop) => stop());
         signal?.removeEventListener("abort", abort);

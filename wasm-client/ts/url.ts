@@ -1,5 +1,5 @@
 // URLs of services. Layer: wasm-client/ts. Source: transports spec section 1.
-import { make_error } from "./errors.js";
+import { make_error, text_of } from "./errors.js";
 
 export interface ServiceUrl {
   /** What the WebSocket opens: ws: or wss:. */
@@ -44,7 +44,9 @@ export function parse_service_url(text: string | URL, base = globalThis.location
     if (!to) throw new TypeError(`scheme ${socket.protocol} unknown`);
     socket.protocol = to;
   } catch (error) {
-    throw refuse(error instanceof Error ? error.message : String(error));
+    const is_relative = scheme === undefined && base === undefined;
+    const why = is_relative ? "there is no page that it could be relative to" : text_of(error);
+    throw refuse(`${why}; expected the like of ws://host:8080/devices/robot?service=Robot`);
   }
   socket.hash = "";
   const query = socket.searchParams;

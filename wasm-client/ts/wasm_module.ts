@@ -1,6 +1,6 @@
 // The compiled core: the only file that knows its handles and its memory. Layer: wasm-client/ts.
 // Source: src/wasm_session.hpp, and core/session/client_session.hpp behind it.
-import { RobotRaconteurError } from "./errors.js";
+import { make_error, RobotRaconteurError, text_of } from "./errors.js";
 import type { ErrorFields } from "./errors.js";
 import { JsValues } from "./js_values.js";
 import type { CoreExports, Handle } from "./js_values.js";
@@ -110,11 +110,11 @@ export class Core {
   readonly #values: JsValues;
   readonly #session: WasmSession;
 
-  /** @throws Error where the WebAssembly file cannot be loaded, RobotRaconteurError for options that make no sense. */
+  /** @throws RobotRaconteurError SystemResourceError: the file cannot be loaded; those of options that make no sense. */
   static async create(options: CoreOptions): Promise<Core> {
     compiled ??= platform.load_wasm().catch((error: unknown) => {
       compiled = undefined; // the next connect() tries again
-      throw error;
+      throw make_error("SystemResourceError", `the protocol core could not be loaded: ${text_of(error)}`);
     });
     const code = await compiled;
     const values = new JsValues();

@@ -2,6 +2,12 @@
 import { make_error } from "./errors.js";
 import type { CallOptions } from "./types.js";
 
+/** An AbortController in its place is a common slip. @throws RobotRaconteurError InvalidArgument */
+export function check_signal(signal: AbortSignal | null | undefined): void {
+  if (signal === undefined || signal === null || typeof signal.addEventListener === "function") return;
+  throw make_error("InvalidArgument", "signal: expected an AbortSignal (the `signal` of an AbortController)");
+}
+
 /**
  * What `promise` brings, unless its signal or time comes first.
  * @param late  what the error of a time-out says: "`late` within 100 ms".
@@ -9,6 +15,7 @@ import type { CallOptions } from "./types.js";
 export function within<T>(promise: Promise<T>, { signal, timeout }: CallOptions, late: string): Promise<T> {
   if (signal === undefined && timeout === undefined) return promise;
   return new Promise((resolve, reject) => {
+    check_signal(signal);
     if (signal?.aborted) reject(signal.reason);
     const abort = () => reject(signal?.reason);
     signal?.addEventListener("abort", abort, { once: true });

@@ -1,6 +1,7 @@
 // Events: listeners, the next one, or a loop over all. Layer: wasm-client/ts/members. Source: sessions spec section 2.9.
 import { make_error } from "../errors.js";
 import type { EventMember, RrValue } from "../types.js";
+import { check_signal } from "../within.js";
 import type { MemberContext } from "./member.js";
 import { ValueQueue } from "./queue.js";
 
@@ -10,10 +11,14 @@ const queue_limit = 10_000;
 export function make_event({ session, path, info }: MemberContext): EventMember {
   const listen = (on_event: (args: RrValue[]) => void) => session.listen(path, info.name, { on_event });
   return Object.freeze({
-    on: (listener: (...args: RrValue[]) => void) => listen((args) => listener(...args)),
+    on: (listener: (...args: RrValue[]) => void) => {
+      if (typeof listener === "function") return listen((args) => listener(...args));
+      throw make_error("InvalidArgument", `${info.name}.on: found ${typeof listener}, expected a function`);
+    },
 
     once: ({ signal, timeout } = {}) =>
       new Promise((resolve, reject) => {
+        check_signal(signal);
         if (signal?.aborted) return reject(signal.reason);
         const end = () => {
           stop_listening();

@@ -1,7 +1,7 @@
 // Pipes: every packet, in order. Layer: wasm-client/ts/members. Source: sessions spec section 2.11.
 import { call_safely, make_error } from "../errors.js";
 import type { PipeConnectOptions, PipeEndpoint, PipeMember, PipeSendOptions, RrValue } from "../types.js";
-import { within } from "../within.js";
+import { check_signal, within } from "../within.js";
 import type { MemberContext } from "./member.js";
 import { ValueQueue } from "./queue.js";
 
@@ -111,6 +111,7 @@ class Endpoint implements PipeEndpoint {
 
   async send(packet: unknown, { ack = false, ...limits }: PipeSendOptions = {}): Promise<void> {
     const { session, path, info } = this.context;
+    check_signal(limits.signal);
     limits.signal?.throwIfAborted();
     if (this.#is_over) throw this.#closed_error();
     if (ack && this.#acks.size >= max_acks) {

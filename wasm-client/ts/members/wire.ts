@@ -1,6 +1,7 @@
 // Wires: the newest value wins. Layer: wasm-client/ts/members. Source: sessions spec section 2.12.
 import { make_error } from "../errors.js";
 import type { CallOptions, RrValue, WireConnection, WireMember, WireTime } from "../types.js";
+import { check_signal } from "../within.js";
 import type { MemberContext } from "./member.js";
 import { ValueQueue } from "./queue.js";
 
@@ -10,6 +11,7 @@ export function make_wire(context: MemberContext): WireMember<unknown> {
   let shared: SharedWire | undefined;
   return Object.freeze({
     connect: (options = {}) => {
+      check_signal(options.signal);
       if (!shared || shared.is_over) shared = new SharedWire(context);
       return shared.join(options);
     },
