@@ -1,6 +1,7 @@
 #include "server/config/config.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -46,6 +47,43 @@ void read_device(ObjectReader& in, DeviceConfig& device) {
   in.size("max_clients", device.max_clients, {0, 1'000'000});
 }
 
+void read_discover_rule(ObjectReader& in, DiscoverRule& rule) {
+  std::string node_id;
+  in.text("node_name", rule.node_name);
+  in.text("node_id", node_id);
+  in.text("service_type", rule.service_type);
+  const auto is_glob_char = [](char c) {
+    return std::string_view("*?._-").find(c) != std::string_view::npos || std::isalnum(static_cast<unsigned char>(c));
+  };
+  if (!std::all_of(rule.node_name.begin(), rule.node_name.end(), is_glob_char))
+    in.finding("node_name", "found " + rr::quoted(rule.node_name) +
+                                ", expected the letters, digits, '_', '-', '.' of node names, '*' or '?'");
+  if (!node_id.empty()) {
+    const auto id = rr::parse_node_id(node_id);
+    if (id && !id->is_any())
+      rule.node_id = *id;
+    else
+      in.finding("node_id", "found " + rr::quoted(node_id) + ", expected a UUID that is not all zeros");
+  } else if (rule.node_name.empty() && rule.service_type.empty()) {
+    in.finding("node_name",
+               "missing; a rule needs one of node_name, node_id and service_type (\"node_name\": \"*\" allows all)");
+  }
+}
+
+void read_discover(ObjectReader& in, Discover& discover) {
+  discover.is_enabled = true;
+  std::vector<std::string> scopes;
+  in.texts("scopes", false, [&](const std::string& text) -> std::string {
+    if (text != "node_local" && text != "link_local" && text != "site_local" && text != "ipv4_broadcast")
+      return "found " + rr::quoted(text) + ", expected one of: node_local, link_local, site_local, ipv4_broadcast";
+    scopes.push_back(text);
+    return {};
+  });
+  if (!scopes.empty()) discover.scopes = std::move(scopes);
+  in.objects("allow", false, [&](ObjectReader& item) { read_discover_rule(item, discover.allow.emplace_back()); });
+  in.size("max_devices", discover.max_devices, {1, 4096});
+}
+
 void read_limits(ObjectReader& in, Limits& limits) {
   in.size("max_message_size", limits.max_message_size, {16 * 1024, 100 * 1024 * 1024});
   in.size("header_bytes", limits.header_bytes, {1024, 65536});
@@ -83,6 +121,7 @@ void read_config(ObjectReader& in, Config& config) {
       item.finding("name", "found " + rr::quoted(device.name) + " a second time; expected a name of its own");
     config.devices.push_back(std::move(device));
   });
+  in.object("discover", [&](ObjectReader& part) { read_discover(part, config.discover); });
   in.text("web_root", config.web_root);
   in.texts("allowed_origins", false, [&](const std::string& text) -> std::string {
     if (!is_origin_pattern(text))

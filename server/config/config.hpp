@@ -19,6 +19,7 @@ struct DeviceConfig {
   std::string name;  ///< the path segment of /devices/<name>
   rr::ConnectionUrl url;
   std::size_t max_clients = 0;  ///< 0: no bound of its own
+  bool is_found = false;        ///< by discovery, not configured
 
   bool operator==(const DeviceConfig&) const = default;
 };
@@ -59,9 +60,28 @@ struct LogConfig {
   bool operator==(const LogConfig&) const = default;
 };
 
+/// Which found nodes become devices. All conditions that are given must hold; at least one is.
+struct DiscoverRule {
+  std::string node_name;     ///< with * and ?; empty: any
+  rr::NodeId node_id;        ///< any: any
+  std::string service_type;  ///< of a root object, or of one that it implements; empty: any
+
+  bool operator==(const DiscoverRule&) const = default;
+};
+
+struct Discover {
+  bool is_enabled = false;                        ///< there where the configuration has "discover"
+  std::vector<std::string> scopes{"link_local"};  ///< of node_local, link_local, site_local, ipv4_broadcast
+  std::vector<DiscoverRule> allow;
+  std::size_t max_devices = 64;  ///< found ones at a time
+
+  bool operator==(const Discover&) const = default;
+};
+
 struct Config {
   std::vector<rr::HostPort> listen;
   std::vector<DeviceConfig> devices;
+  Discover discover;
   std::string web_root;  ///< folder of the dashboard; empty: the one that was installed with the program
   std::vector<std::string> allowed_origins;
   Limits limits;

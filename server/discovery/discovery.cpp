@@ -48,7 +48,7 @@ awaitable<void> query_nodes(std::shared_ptr<TypeSearch> search, std::chrono::ste
     auto urls = std::move(search->nodes.back());
     search->nodes.pop_back();
     ServiceQueryOptions options;
-    options.timeout = std::min(left, options.timeout);
+    options.dial.timeout = std::min(left, options.dial.timeout);
     auto answer = co_await query_node(std::move(urls), options);
     if (!answer) continue;  // gone, or not what it says it is
     for (auto& service : answer->services)

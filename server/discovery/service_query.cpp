@@ -27,7 +27,7 @@ ClientOptions index_options(const ConnectionUrl& url, const ServiceQueryOptions&
   ClientOptions out;
   out.connection.self = {random_node_id(), options.self_name};
   out.connection.target = {url.node_id.value_or(NodeId{}), url.node_name};
-  out.connection.handshake_timeout = options.timeout;
+  out.connection.handshake_timeout = options.dial.timeout;
   out.connection.max_message_size = options.max_answer_bytes;
   out.service = service_index_name;
   return out;
@@ -87,12 +87,11 @@ bool ServiceInfo::implements(std::string_view type) const {
 }
 
 awaitable<Result<NodeServices>> query_services(ConnectionUrl url, ServiceQueryOptions options) {
-  const DialOptions dial_options{options.timeout, options.send_stall};
-  auto dialed = co_await dial(url, dial_options);
+  auto dialed = co_await dial(url, options.dial);
   if (!dialed) co_return dialed.error();
   ByteStream& stream = **dialed;
   Deadline limit(stream.executor(), [&stream] { stream.close(); });
-  limit.arm(options.timeout);
+  limit.arm(options.dial.timeout);
 
   ClientSession session(index_options(url, options), read_clocks());
   NodeServices result;
@@ -127,7 +126,8 @@ awaitable<Result<NodeServices>> query_services(ConnectionUrl url, ServiceQueryOp
     }
     const auto read = co_await stream.read_some(buffer);
     if (!limit.is_armed())
-      session.handle_closed(lost("no answer within " + std::to_string(options.timeout.count()) + " ms"), read_clocks());
+      session.handle_closed(lost("no answer within " + std::to_string(options.dial.timeout.count()) + " ms"),
+                            read_clocks());
     else if (read.error)
       session.handle_closed(lost(read.error.message()), read_clocks());
     else if (read.is_end())
@@ -189,7 +189,7 @@ awaitable<Result<NodeServices>> query_node(std::vector<ConnectionUrl> urls, Serv
       ++started;
     }
     // Each attempt ends in its own time, so the last needs no deadline here.
-    race->changed.expires_after(started < urls.size() ? stagger : options.timeout * 2);
+    race->changed.expires_after(started < urls.size() ? stagger : options.dial.timeout * 2);
     co_await race->changed.async_wait(asio::as_tuple(asio::use_awaitable));
   }
   if (!race->winner) co_return race->last_failure;

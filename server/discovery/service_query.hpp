@@ -33,9 +33,8 @@ struct NodeServices {
 };
 
 struct ServiceQueryOptions {
-  std::string self_name = {};                ///< node name to come under
-  std::chrono::milliseconds timeout{5'000};  ///< for all of it
-  std::chrono::milliseconds send_stall{15'000};
+  std::string self_name = {};  ///< node name to come under
+  DialOptions dial = {};       ///< timeout: for all that follows, too
   std::size_t max_answer_bytes = 64 * 1024;
 };
 

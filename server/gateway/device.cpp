@@ -7,6 +7,7 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <random>
 
+#include "core/session/connection.hpp"
 #include "server/log/log.hpp"
 
 namespace rrgate {
@@ -42,7 +43,11 @@ Device::Device(const asio::any_io_executor& executor, DeviceConfig config, const
       wake_(executor) {}
 
 rr::awaitable<rr::Result<std::unique_ptr<rr::ByteStream>>> Device::connect() {
-  auto stream = co_await rr::dial(config_.url, dial_options_);
+  rr::Result<std::unique_ptr<rr::ByteStream>> stream = rr::Error{};
+  for (const auto& url : urls_to_try()) {
+    stream = co_await rr::dial(url, dial_options_);
+    if (stream) break;
+  }
   // News either way: it was thought online and can't be reached, or it is back before the next look was due.
   if (stream.has_value() != (state_ == DeviceState::online)) look_again();
   co_return stream;
@@ -57,7 +62,14 @@ rr::awaitable<void> Device::watch() {
   auto backoff = retry_.min;
   while (!is_stopping_) {
     looks_again_ = false;
-    const auto result = co_await probe(config_.url, dial_options_);
+    rr::Result<ProbeResult> result = rr::Error{};
+    for (const auto& url : urls_to_try()) {
+      result = co_await probe(url, dial_options_);
+      if (is_stopping_) break;
+      if (!result) continue;
+      config_.url = url;
+      break;
+    }
     if (is_stopping_) break;
     note(result);
     const auto looked = std::chrono::steady_clock::now();
@@ -70,6 +82,20 @@ rr::awaitable<void> Device::watch() {
       co_await wake_.async_wait(asio::as_tuple(asio::use_awaitable));
     }
   }
+}
+
+std::vector<rr::ConnectionUrl> Device::urls_to_try() const {
+  std::vector<rr::ConnectionUrl> out{config_.url};
+  std::copy_if(urls_.begin(), urls_.end(), std::back_inserter(out),
+               [&](const auto& url) { return url != config_.url; });
+  return out;
+}
+
+void Device::set_urls(std::vector<rr::ConnectionUrl> urls) {
+  if (urls == urls_ || urls.empty()) return;
+  urls_ = std::move(urls);
+  if (std::find(urls_.begin(), urls_.end(), config_.url) == urls_.end()) config_.url = urls_.front();
+  look_again();
 }
 
 void Device::look_again() {
@@ -101,12 +127,35 @@ void Device::note(const rr::Result<ProbeResult>& result) {
   last_error_ = result.error().message;
 }
 
-DeviceRegistry::DeviceRegistry(const asio::any_io_executor& executor, const Config& config) : executor_(executor) {
-  for (const auto& device : config.devices) devices_.push_back(std::make_unique<Device>(executor, device, config));
+DeviceRegistry::DeviceRegistry(const asio::any_io_executor& executor, const Config& config)
+    : executor_(executor), config_(config) {
+  for (const auto& device : config.devices) devices_.push_back(std::make_shared<Device>(executor, device, config));
 }
 
+namespace {
+
+rr::awaitable<void> watch(std::shared_ptr<Device> device) {
+  co_await device->watch();
+}
+
+}  // namespace
+
 void DeviceRegistry::start() {
-  for (const auto& device : devices_) asio::co_spawn(executor_, device->watch(), asio::detached);
+  for (const auto& device : devices_) asio::co_spawn(executor_, watch(device), asio::detached);
+}
+
+Device& DeviceRegistry::add(DeviceConfig device) {
+  devices_.push_back(std::make_shared<Device>(executor_, std::move(device), config_));
+  asio::co_spawn(executor_, watch(devices_.back()), asio::detached);
+  return *devices_.back();
+}
+
+void DeviceRegistry::remove(const Device& device) {
+  const auto found =
+      std::find_if(devices_.begin(), devices_.end(), [&](const auto& each) { return each.get() == &device; });
+  if (found == devices_.end()) return;
+  (*found)->stop();
+  devices_.erase(found);
 }
 
 void DeviceRegistry::stop() {
@@ -119,15 +168,33 @@ Device* DeviceRegistry::find(std::string_view name) const {
   return found == devices_.end() ? nullptr : found->get();
 }
 
+namespace {
+
+/// Before the first answer, and for a device that is down, what the URL says must do.
+rr::NodeIdentity identity_of(const Device& device) {
+  if (const auto& known = device.identity()) return {known->node_id, known->node_name};
+  const auto& url = device.config().url;
+  return {url.node_id.value_or(rr::NodeId{}), url.node_name};
+}
+
+}  // namespace
+
+Device* DeviceRegistry::find_configured(const rr::NodeId& node_id) const {
+  for (const auto& device : devices_)
+    if (!device->config().is_found && identity_of(*device).id == node_id) return device.get();
+  return nullptr;
+}
+
 Device* DeviceRegistry::route(const rr::NodeId& node_id, std::string_view node_name) const {
-  if (node_id.is_any() && node_name.empty()) return devices_.size() == 1 ? devices_.front().get() : nullptr;
+  if (node_id.is_any() && node_name.empty()) {
+    const auto choices =
+        config_.devices.empty() ? devices_.size() : config_.devices.size();  // configured ones are first
+    return choices == 1 ? devices_.front().get() : nullptr;
+  }
   for (const auto& device : devices_) {
-    // Before the first answer, and for a device that is down, what the configured URL says must do.
-    const auto& url = device->config().url;
-    const auto& known = device->identity();
-    const auto id = known ? known->node_id : url.node_id.value_or(rr::NodeId{});
-    const auto& name = known ? known->node_name : url.node_name;
-    if ((node_id.is_any() || node_id == id) && (node_name.empty() || node_name == name)) return device.get();
+    const auto identity = identity_of(*device);
+    if ((node_id.is_any() || node_id == identity.id) && (node_name.empty() || node_name == identity.name))
+      return device.get();
   }
   return nullptr;
 }

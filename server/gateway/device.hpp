@@ -17,8 +17,8 @@ namespace rrgate {
 enum class DeviceState { connecting, online, offline };
 std::string_view to_string(DeviceState state);
 
-/// One configured device. Looks at it from time to time; connects clients to it.
-class Device {
+/// One device. Looks at it from time to time; connects clients to it. Those who use it over a wait hold a Seat.
+class Device : public std::enable_shared_from_this<Device> {
  public:
   Device(const boost::asio::any_io_executor& executor, DeviceConfig config, const Config& whole);
 
@@ -30,6 +30,9 @@ class Device {
   const std::optional<ProbeResult>& identity() const { return identity_; }
   std::size_t clients() const { return clients_; }
 
+  /// The ways to a found device, best first; the first that works becomes config().url.
+  void set_urls(std::vector<rr::ConnectionUrl> urls);
+
   /// A connection for one client. A failure makes the device be looked at again soon.
   rr::awaitable<rr::Result<std::unique_ptr<rr::ByteStream>>> connect();
   /// A client's connection to the device broke: look at it again soon.
@@ -38,15 +41,15 @@ class Device {
   /// Counts one client while it lives; see max_clients.
   class Seat {
    public:
-    explicit Seat(Device& device) : device_(&device) { ++device_->clients_; }
-    Seat(Seat&& other) noexcept : device_(std::exchange(other.device_, nullptr)) {}
+    explicit Seat(Device& device) : device_(device.shared_from_this()) { ++device_->clients_; }
+    Seat(Seat&& other) noexcept = default;
     Seat& operator=(Seat&&) = delete;
     ~Seat() {
       if (device_) --device_->clients_;
     }
 
    private:
-    Device* device_;
+    std::shared_ptr<Device> device_;  ///< a found device may be lost meanwhile
   };
   /// nullopt when the device has as many clients as it may.
   std::optional<Seat> take_seat();
@@ -57,9 +60,12 @@ class Device {
 
  private:
   void look_again();
+  /// The one that worked last, then the others.
+  std::vector<rr::ConnectionUrl> urls_to_try() const;
   void note(const rr::Result<ProbeResult>& result);
 
   DeviceConfig config_;
+  std::vector<rr::ConnectionUrl> urls_;  ///< of a found device
   rr::DialOptions dial_options_;
   Retry retry_;
   DeviceState state_ = DeviceState::connecting;
@@ -73,21 +79,30 @@ class Device {
 
 class DeviceRegistry {
  public:
+  /// `config`  must outlive it.
   DeviceRegistry(const boost::asio::any_io_executor& executor, const Config& config);
 
   void start();
   void stop();
 
-  const std::vector<std::unique_ptr<Device>>& all() const { return devices_; }
+  /// A found device joins; its name is nobody's yet.
+  Device& add(DeviceConfig device);
+  /// A found device goes; clients that are connected to it stay so.
+  void remove(const Device& device);
+
+  const std::vector<std::shared_ptr<Device>>& all() const { return devices_; }
   /// Null when no device has this name.
   Device* find(std::string_view name) const;
-  /// The device that a client asks for by node id and name (any id and "" ask for none in particular, and then there
-  /// must be just one device). Null when there is none.
+  /// The configured device that is this node, as far as is known. Null when there is none.
+  Device* find_configured(const rr::NodeId& node_id) const;
+  /// The device that a client asks for by node id and name (any id and "" ask for none in particular: it gets the only
+  /// configured device, or where none is configured the only one). Null when there is none.
   Device* route(const rr::NodeId& node_id, std::string_view node_name) const;
 
  private:
   boost::asio::any_io_executor executor_;
-  std::vector<std::unique_ptr<Device>> devices_;
+  const Config& config_;
+  std::vector<std::shared_ptr<Device>> devices_;
 };
 
 }  // namespace rrgate

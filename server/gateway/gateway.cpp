@@ -56,6 +56,10 @@ rr::Result<std::vector<rr::HostPort>> Gateway::start() {
     listener->start([this](asio::ip::tcp::socket socket) { accept(std::move(socket)); },
                     [](const std::string& problem) { log(LogLevel::error, problem, {}); });
   devices_.start();
+  if (config_.discover.is_enabled) {
+    found_ = std::make_unique<FoundDevices>(io_, config_, devices_);
+    found_->start();
+  }
   return bound;
 }
 
@@ -94,6 +98,7 @@ void Gateway::stop(std::function<void()> on_stopped) {
   on_stopped_ = std::move(on_stopped);
   if (on_stop_) on_stop_();
   for (const auto& listener : listeners_) listener->close();
+  if (found_) found_->stop();
   devices_.stop();
   asio::co_spawn(io_, drain(), asio::detached);
 }

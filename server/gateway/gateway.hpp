@@ -10,6 +10,7 @@
 #include "server/config/config.hpp"
 #include "server/gateway/admission.hpp"
 #include "server/gateway/device.hpp"
+#include "server/gateway/found_devices.hpp"
 #include "server/http/router.hpp"
 #include "server/transport/tcp.hpp"
 
@@ -44,6 +45,8 @@ class Gateway {
   // What connections need.
   const Config& config() const { return config_; }
   DeviceRegistry& devices() { return devices_; }
+  /// Null where the configuration has no "discover", and before start().
+  FoundDevices* found() { return found_.get(); }
   const Router& router() const { return router_; }
   /// Our own node id, for answers to native clients that no device takes.
   const rr::NodeId& node_id() const { return node_id_; }
@@ -58,6 +61,7 @@ class Gateway {
   boost::asio::io_context& io_;
   Config config_;
   DeviceRegistry devices_;
+  std::unique_ptr<FoundDevices> found_;
   Admission admission_;
   Router router_;
   rr::NodeId node_id_;

@@ -2,6 +2,7 @@
 
 #include "server/http/endpoints/dashboard.hpp"
 #include "server/http/endpoints/devices.hpp"
+#include "server/http/endpoints/discovery.hpp"
 #include "server/http/endpoints/health.hpp"
 
 namespace rrgate {
@@ -11,6 +12,7 @@ Router make_routes(Gateway& gateway) {
   router.add(http::verb::get, "/healthz", health_endpoint());
   router.add(http::verb::get, "/readyz", ready_endpoint(gateway));
   router.add(http::verb::get, "/api/v1/devices", devices_endpoint(gateway));
+  router.add(http::verb::get, "/api/v1/discovery", discovery_endpoint(gateway));
   router.add(http::verb::get, "/api/*", no_such_api_endpoint());
   router.add(http::verb::get, "/devices/*", device_endpoint(gateway));
   router.add(http::verb::get, "/*", dashboard_endpoint(gateway));

@@ -114,6 +114,38 @@ def test_a_node_that_restarts_on_another_port_is_found_again(network, start, imp
     assert ":50002/" in service["url"]
 
 
+def test_a_gateway_finds_three_nodes_and_uses_those_it_may(network, start, tmp_path):
+    config = tmp_path / "gateway.json"
+    config.write_text(json.dumps({"listen": ["127.0.0.1:8080"], "devices": [], "retry": {"min_ms": 100, "online_ms": 1000},
+                                  "discover": {"allow": [{"node_name": "lab.*"}, {"service_type": TYPE, "node_id": IDS[7]}]}}))
+    serve(start, "ours", 0, "lab.ours", IDS[5])
+    theirs = serve(start, "theirs", 1, "lab.theirs", IDS[6], 50001)
+    serve(start, "theirs", 2, "home.node", IDS[7])
+    serve(start, "ours", 2, "home.other", IDS[4])
+    gateway = start(3, BUILD / "server" / "rrgate", "serve", "--config", config)
+
+    def ask(what, is_wanted):
+        deadline = time.monotonic() + FIND_DEADLINE + 5
+        while not is_wanted(answer := network.get_json(3, f"http://127.0.0.1:8080/api/v1/{what}")):
+            assert time.monotonic() < deadline, f"{answer}\n{gateway.description()}"
+        return answer
+
+    def online(answer):
+        return answer and {device["name"] for device in answer["devices"] if device["state"] == "online"}
+
+    names = {"lab.ours", "lab.theirs", "home.node"}
+    devices = ask("devices", lambda answer: online(answer) == names)["devices"]
+    assert all(device["found"] and device["services"] == [{"name": "thing", "type": TYPE}] for device in devices)
+    nodes = ask("discovery", lambda answer: len(answer["nodes"]) == 4)["nodes"]
+    assert {node["node_name"]: node["allowed"] for node in nodes} == {**dict.fromkeys(names, True), "home.other": False}
+    assert all(node["age"] < 20 and "%eth0]" in node["urls"][0]["url"] for node in nodes)
+    # One that restarts on another port stays the same device.
+    theirs.process.kill()
+    theirs.process.wait()
+    serve(start, "theirs", 1, "lab.theirs", IDS[6], 50002)
+    ask("devices", lambda answer: any(":50002/" in device["url"] and device["state"] == "online" for device in answer["devices"]))
+
+
 def node_that_dies_is_lost(network, start):
     watch = Watch(start(0, OURS, "watch"))
     node = serve(start, "theirs", 1, "a.node", IDS[4])

@@ -80,6 +80,9 @@ TEST_CASE("every option arrives") {
   const auto parsed = parse_config(R"(/* all of them */ {
     "listen": ["[::1]:1", "localhost:2"],
     "devices": [{"name": "a", "url": "rr+tcp://h:1/?service=s", "max_clients": 3}],
+    "discover": {"scopes": ["node_local", "ipv4_broadcast"], "max_devices": 7,
+                 "allow": [{"node_name": "lab.*", "node_id": "{82301bf1-e1ef-4e89-8d8f-0848291587ac}",
+                            "service_type": "com.x.Arm"}]},
     "web_root": "web", "allowed_origins": ["https://a.example", "http://*.b.example:81"],
     "limits": {"max_message_size": 20000, "header_bytes": 2000, "header_timeout_ms": 300, "outbox_bytes": 40000,
                "clients": 5, "clients_per_address": 6},
@@ -91,6 +94,8 @@ TEST_CASE("every option arrives") {
   const auto& config = parsed.config;
   CHECK(config.listen == std::vector<rr::HostPort>{{"::1", 1}, {"localhost", 2}});
   CHECK(config.devices.at(0).max_clients == 3);
+  const auto id = rr::parse_node_id("82301bf1-e1ef-4e89-8d8f-0848291587ac").value();
+  CHECK(config.discover == Discover{true, {"node_local", "ipv4_broadcast"}, {{"lab.*", id, "com.x.Arm"}}, 7});
   CHECK(config.web_root == "web");
   CHECK(config.allowed_origins.size() == 2);
   CHECK(config.limits == Limits{20000, 2000, milliseconds(300), 40000, 5, 6});
@@ -106,7 +111,7 @@ TEST_CASE("mistakes are named by path, with what was found and expected") {
   finds(R"({"devices": []})", "gateway.json: /listen: missing; expected an array");
   finds(R"({"listen": ["127.0.0.1:0"]})", "gateway.json: /devices: missing");
   finds(R"({"listen": [], "devices": []})", "gateway.json: /listen: empty");
-  finds(with(R"("listn": 1)"), "gateway.json: /listn: unknown option; known here: listen, devices, web_root");
+  finds(with(R"("listn": 1)"), "gateway.json: /listn: unknown option; known here: listen, devices, discover");
   finds(with(R"("a/b~c": 1)"), "gateway.json: /a~1b~0c: unknown");
   finds(with(R"("limits": {"clents": 1})"), "gateway.json: /limits/clents: unknown option", "clients_per_address");
   finds(with(R"("limits": 3)"), "gateway.json: /limits: found integer 3, expected an object");
@@ -140,6 +145,28 @@ TEST_CASE("mistakes in devices are named by their index") {
         "gateway.json: /devices/0/url: ", "available: rr+tcp");
   const std::string device = R"({"name": "a", "url": "rr+tcp://h:1/?service=s"})";
   finds(with_device(device + "," + device), "gateway.json: /devices/1/name: found 'a' a second time");
+}
+
+TEST_CASE("discovery is on where it is named, and allows nothing by itself") {
+  CHECK_FALSE(parse_config(smallest).config.discover.is_enabled);
+  const auto parsed = parse_config(with(R"("discover": {})"));
+  CHECK(parsed.findings.empty());
+  CHECK(parsed.config.discover == Discover{true, {"link_local"}, {}, 64});
+}
+
+TEST_CASE("mistakes in discovery rules are named by their index") {
+  const auto with_rule = [](const std::string& rule) { return with(R"("discover": {"allow": [)" + rule + "]}"); };
+  finds(with(R"("discover": true)"), "gateway.json: /discover: found boolean true, expected an object");
+  finds(with(R"("discover": {"scopes": ["everywhere"]})"),
+        "gateway.json: /discover/scopes/0: found 'everywhere', expected one of: node_local, link_local");
+  finds(with(R"("discover": {"max_devices": 0})"), "gateway.json: /discover/max_devices: found 0, expected 1 to 4096");
+  finds(with_rule("{}"), "gateway.json: /discover/allow/0/node_name: missing; a rule needs one of");
+  finds(with_rule(R"({"node_name": ""})"), "gateway.json: /discover/allow/0/node_name: missing");
+  finds(with_rule(R"({"node_name": "a b"})"), "gateway.json: /discover/allow/0/node_name: found 'a b'");
+  finds(with_rule(R"({"node_id": "me"})"), "gateway.json: /discover/allow/0/node_id: found 'me', expected a UUID");
+  finds(with_rule(R"({"node_id": "{0}"})"), "gateway.json: /discover/allow/0/node_id: found '{0}', expected a UUID");
+  finds(with_rule(R"({"node_name": "*", "type": "x"})"),
+        "gateway.json: /discover/allow/0/type: unknown option; known here: node_name");
 }
 
 TEST_CASE("all findings are listed at once") {

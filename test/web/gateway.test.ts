@@ -9,6 +9,7 @@ describe("list of devices", () => {
     const device = {
       name: "create",
       url: "rr+tcp://127.0.0.1:52222/?service=Create",
+      found: true,
       node_id: "{00}",
       node_name: "demo",
       state: "online",
@@ -19,7 +20,7 @@ describe("list of devices", () => {
   });
   it("does without fields that an older gateway leaves out", () => {
     expect(read_devices({ devices: [{ name: "arm", state: "sleeping" }, null] })).toEqual([
-      { name: "arm", url: "", node_id: "", node_name: "", state: "offline", last_error: null, services: [] },
+      { name: "arm", url: "", found: false, node_id: "", node_name: "", state: "offline", last_error: null, services: [] },
     ]);
   });
   it("refuses an answer that is no list of devices", () => {

@@ -13,6 +13,7 @@ nlohmann::ordered_json describe(const Device& device) {
   nlohmann::ordered_json out;
   out["name"] = device.config().name;
   out["url"] = rr::format_url(device.config().url);
+  out["found"] = device.config().is_found;
   out["node_id"] = nullptr;
   out["node_name"] = nullptr;
   const auto& identity = device.identity();

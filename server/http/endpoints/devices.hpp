@@ -7,8 +7,9 @@ namespace rrgate {
 
 class Gateway;
 
-/// {"devices":[{"name","url","node_id","node_name","state","last_error","services":[{"name","type"}],"clients"}]};
-/// node_id and node_name are null until the device has answered once, last_error is null while it is online.
+/// {"devices":[{"name","url","found","node_id","node_name","state","last_error","services":[{"name","type"}],"clients"}]};
+/// found: by discovery, not configured; node_id and node_name are null until the device has answered once, last_error
+/// is null while it is online.
 Handler devices_endpoint(Gateway& gateway);
 /// Everything else below /api/: 404.
 Handler no_such_api_endpoint();

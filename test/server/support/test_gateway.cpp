@@ -56,17 +56,32 @@ void TestGateway::restart_device(std::size_t index) {
   done.get_future().wait();
 }
 
-nlohmann::json TestGateway::wait_for_device(std::size_t index,
-                                            const std::function<bool(const nlohmann::json&)>& is_wanted) {
+nlohmann::json TestGateway::wait_for(const std::string& path,
+                                     const std::function<bool(const nlohmann::json&)>& is_wanted) {
   const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(10);
   TestClient client(port_);
-  nlohmann::json device;
+  nlohmann::json answer;
   while (std::chrono::steady_clock::now() < give_up) {
-    client.send("GET /api/v1/devices HTTP/1.1\r\nHost: gw\r\n\r\n");
-    device = nlohmann::json::parse(client.receive_response().body).at("devices").at(index);
-    if (is_wanted(device)) return device;
+    client.send("GET " + path + " HTTP/1.1\r\nHost: gw\r\n\r\n");
+    answer = nlohmann::json::parse(client.receive_response().body);
+    if (is_wanted(answer)) return answer;
   }
-  throw std::runtime_error("device not as wanted within 10 s: " + device.dump());
+  throw std::runtime_error(path + " not as wanted within 10 s: " + answer.dump());
+}
+
+nlohmann::json TestGateway::wait_for_device(std::size_t index,
+                                            const std::function<bool(const nlohmann::json&)>& is_wanted) {
+  const auto answer =
+      wait_for("/api/v1/devices", [&](const auto& all) { return is_wanted(all.at("devices").at(index)); });
+  return answer.at("devices").at(index);
+}
+
+void TestGateway::announce(const rr::Announcement& announcement) {
+  asio::post(io_, [this, announcement] { gateway_->found()->discovery().handle_announcement(announcement); });
+}
+
+void TestGateway::withdraw(const rr::NodeId& node_id, const std::string& url) {
+  asio::post(io_, [this, node_id, url] { gateway_->found()->discovery().handle_withdrawn(node_id, url); });
 }
 
 std::string TestGateway::wait_for_state(std::string_view state, std::size_t index) {

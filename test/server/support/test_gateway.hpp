@@ -31,6 +31,12 @@ class TestGateway {
   /// Until its state is this one; returns its JSON text.
   std::string wait_for_state(std::string_view state, std::size_t index = 0);
 
+  /// The gateway, whose configuration has "discover", hears of a node; or hears that it has left a URL.
+  void announce(const rr::Announcement& announcement);
+  void withdraw(const rr::NodeId& node_id, const std::string& url);
+  /// Asks `path` until the answer is as wanted; returns it. Throws after 10 s.
+  nlohmann::json wait_for(const std::string& path, const std::function<bool(const nlohmann::json&)>& is_wanted);
+
   /// Gateway::stop; the future is ready when everything has ended.
   std::future<void> stop();
 

@@ -14,6 +14,8 @@ export interface Service {
 export interface Device {
   name: string;
   url: string;
+  /** By discovery; not configured. */
+  found: boolean;
   node_id: string;
   node_name: string;
   state: DeviceState;
@@ -101,6 +103,7 @@ export function read_devices(answer: unknown): Device[] {
   return list.filter(is_record).map((device) => ({
     name: text(device["name"]),
     url: text(device["url"]),
+    found: device["found"] === true,
     node_id: text(device["node_id"]),
     node_name: text(device["node_name"]),
     state: state_of(device["state"]),

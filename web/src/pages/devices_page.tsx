@@ -67,6 +67,11 @@ function DeviceRow({ device, stale }: { device: Device; stale: boolean }) {
     <li class="device" data-device={device.name}>
       <div class="device-head">
         <h2 class="place-name">{device.name}</h2>
+        {device.found && (
+          <span class="found-mark" title="Found on the network; it goes when it is not announced any more">
+            found
+          </span>
+        )}
         <StateBadge state={device.state} text={stale ? `was ${device.state}` : device.state} />
       </div>
       <dl class="device-facts">

@@ -1,0 +1,62 @@
+#include "server/http/endpoints/discovery.hpp"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "server/gateway/gateway.hpp"
+
+namespace rrgate {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json describe_services(const FoundDevices::Entry& entry) {
+  Json out = Json::array();
+  if (entry.device && entry.device->identity()) {
+    for (const auto& service : entry.device->identity()->services)
+      out.push_back({{"name", service.name}, {"type", service.type}});
+  } else if (entry.services) {
+    for (const auto& service : *entry.services)
+      out.push_back({{"name", service.name}, {"type", service.root_object_type}});
+  } else {
+    return nullptr;
+  }
+  return out;
+}
+
+Json describe(const FoundDevices::Entry& entry, std::chrono::steady_clock::time_point now) {
+  const auto age = [now](const rr::NodeDiscoveryUrl& url) {
+    return std::chrono::duration_cast<std::chrono::seconds>(now - url.last_announce).count();
+  };
+  Json out;
+  out["node_id"] = rr::format_node_id(entry.node.node_id, rr::NodeIdFormat::dashes);
+  out["node_name"] = entry.node.node_name;
+  out["urls"] = Json::array();
+  for (const auto& url : entry.node.urls) out["urls"].push_back({{"url", url.url}, {"age", age(url)}});
+  const auto newest = std::max_element(entry.node.urls.begin(), entry.node.urls.end(),
+                                       [](const auto& a, const auto& b) { return a.last_announce < b.last_announce; });
+  out["age"] = age(*newest);  // a node has at least one URL
+  out["services"] = describe_services(entry);
+  out["allowed"] = entry.is_allowed;
+  out["device"] = nullptr;
+  if (entry.device) out["device"] = entry.device->config().name;
+  return out;
+}
+
+}  // namespace
+
+Handler discovery_endpoint(Gateway& gateway) {
+  return [&gateway](const Request&, std::string_view) {
+    const auto now = std::chrono::steady_clock::now();
+    const auto* found = gateway.found();
+    Json out;
+    out["enabled"] = found != nullptr;
+    out["nodes"] = Json::array();
+    if (found)
+      for (const auto& entry : found->list()) out["nodes"].push_back(describe(entry, now));
+    return json_response(200, out.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n");
+  };
+}
+
+}  // namespace rrgate

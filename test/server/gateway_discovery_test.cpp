@@ -1,0 +1,168 @@
+// Found nodes as devices of the gateway. Announcements are handed in; the nodes are real, on the loopback.
+#include <boost/asio/ip/tcp.hpp>
+#include <catch2/catch.hpp>
+
+#include "test/server/node/node_fixture.hpp"
+#include "test/server/support/test_gateway.hpp"
+
+using namespace rrgate;
+using namespace rrgate::test;
+using nlohmann::json;
+
+namespace {
+
+std::function<void(Config&)> allowing(std::vector<DiscoverRule> rules, std::size_t max_devices = 64) {
+  return [rules = std::move(rules), max_devices](Config& config) {
+    config.discover = {true, {}, rules, max_devices};  // no scopes: no packets
+  };
+}
+
+rr::Announcement at(const rr::NodeId& id, std::uint16_t port, const std::string& name, const std::string& nonce = "n") {
+  return {id, name,
+          "rr+tcp://127.0.0.1:" + std::to_string(port) +
+              "/?nodeid=" + rr::format_node_id(id, rr::NodeIdFormat::dashes) + "&service=RobotRaconteurServiceIndex",
+          nonce};
+}
+
+std::shared_ptr<rr::Service> make_thing() {
+  auto service =
+      rr::Service::from_text({"service com.x\nobject Arm\nproperty int32 one [readonly]\nend\n"}, "thing", "Arm");
+  service->property("one").get([] { return 1; });
+  return service;
+}
+
+rr::NodeId id_of(rr::RunningNode& node) {
+  return node.ask([](rr::Node& asked) { return asked.identity().id; });
+}
+
+json wait_for_devices(TestGateway& gateway, const std::function<bool(const json&)>& is_wanted) {
+  return gateway.wait_for("/api/v1/devices", [&](const json& all) { return is_wanted(all["devices"]); })["devices"];
+}
+
+json wait_for_nodes(TestGateway& gateway, const std::function<bool(const json&)>& is_wanted) {
+  return gateway.wait_for("/api/v1/discovery", [&](const json& all) { return is_wanted(all["nodes"]); })["nodes"];
+}
+
+/// Listens, and knows whether somebody has connected.
+struct Trap {
+  boost::asio::io_context io;
+  boost::asio::ip::tcp::acceptor acceptor{io, {boost::asio::ip::address_v4::loopback(), 0}};
+  std::uint16_t port() const { return acceptor.local_endpoint().port(); }
+  bool was_touched() {
+    acceptor.non_blocking(true);
+    boost::system::error_code error;
+    boost::asio::ip::tcp::socket socket(io);
+    acceptor.accept(socket, error);
+    return !error;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("without \"discover\" nothing is found") {
+  TestGateway gateway;
+  const auto answer = gateway.wait_for("/api/v1/discovery", [](const json&) { return true; });
+  CHECK(answer == json::parse(R"({"enabled": false, "nodes": []})"));
+}
+
+TEST_CASE("an allowed node becomes a device, others are listed and left alone") {
+  rr::RunningNode node([](rr::Node& made) { made.add(make_thing()); });
+  Trap trap;
+  TestGateway gateway(1, allowing({{"test.*", {}, ""}}));
+  gateway.announce(at(rr::NodeId{{7}}, trap.port(), "stranger"));
+  gateway.announce(at(id_of(node), node.port(), "test.node"));
+  const auto devices =
+      wait_for_devices(gateway, [](const json& all) { return all.size() == 2 && all[1]["state"] == "online"; });
+  CHECK(devices[0]["found"] == false);
+  CHECK(devices[1]["found"] == true);
+  CHECK(devices[1]["name"] == "test.node");
+  CHECK(devices[1]["services"][0] == json::parse(R"({"name": "thing", "type": "com.x.Arm"})"));
+
+  const auto nodes = wait_for_nodes(gateway, [](const json& all) { return all.size() == 2; });
+  const auto& stranger = nodes[nodes[0]["node_name"] == "stranger" ? 0 : 1];
+  const auto& allowed = nodes[nodes[0]["node_name"] == "stranger" ? 1 : 0];
+  CHECK(stranger["allowed"] == false);
+  CHECK(stranger["device"].is_null());
+  CHECK(stranger["services"].is_null());
+  CHECK(allowed["allowed"] == true);
+  CHECK(allowed["device"] == "test.node");
+  CHECK(allowed["services"][0]["type"] == "com.x.Arm");
+  CHECK(allowed["age"] >= 0);
+  CHECK(allowed["urls"].size() == 1);
+  CHECK_FALSE(trap.was_touched());
+}
+
+TEST_CASE("a rule by service type asks the node, and follows its services") {
+  rr::RunningNode node([](rr::Node&) {});
+  TestGateway gateway(0, allowing({{"", {}, "com.x.Arm"}}));
+  gateway.announce(at(id_of(node), node.port(), "test.node", "empty"));
+  wait_for_nodes(gateway, [](const json& all) { return all.size() == 1 && all[0]["services"].is_array(); });
+  CHECK(wait_for_devices(gateway, [](const json&) { return true; }).empty());
+  node.ask([](rr::Node& asked) {
+    asked.add(make_thing());
+    return 0;
+  });
+  gateway.announce(at(id_of(node), node.port(), "test.node", "with an arm"));
+  wait_for_devices(gateway, [](const json& all) { return all.size() == 1 && all[0]["state"] == "online"; });
+}
+
+TEST_CASE("a lost node takes its device along; one that comes back has its name again") {
+  rr::RunningNode node([](rr::Node& made) { made.add(make_thing()); });
+  TestGateway gateway(0, allowing({{"*", {}, ""}}));
+  const auto news = at(id_of(node), node.port(), "test.node");
+  for (int round = 0; round < 2; ++round) {
+    gateway.announce(news);
+    CHECK(wait_for_devices(gateway, [](const json& all) { return all.size() == 1; })[0]["name"] == "test.node");
+    gateway.withdraw(news.node_id, news.url);
+    wait_for_devices(gateway, [](const json& all) { return all.empty(); });
+  }
+}
+
+TEST_CASE("a node at ananother port is reached there") {
+  Trap dead;
+  const auto port = dead.port();
+  dead.acceptor.close();
+  rr::RunningNode node([](rr::Node& made) { made.add(make_thing()); });
+  auto id = id_of(node);
+  TestGateway gateway(0, allowing({{"test.*", {}, ""}}));
+  gateway.announce(at(id, port, "test.node"));
+  wait_for_devices(gateway, [](const json& all) { return all.size() == 1 && all[0]["state"] == "offline"; });
+  gateway.announce(at(id, node.port(), "test.node"));
+  const auto devices = wait_for_devices(gateway, [](const json& all) { return all[0]["state"] == "online"; });
+  CHECK(devices[0]["url"].get<std::string>().find(":" + std::to_string(node.port()) + "/") != std::string::npos);
+}
+
+TEST_CASE("a configured device is not found a second time, and names stay unique") {
+  TestGateway gateway(1, allowing({{"*", {}, ""}}));
+  gateway.wait_for_state("online");
+  gateway.announce(at(gateway.device().node_id(), gateway.device().port(), "node.x"));
+  gateway.announce(at(rr::NodeId{{0xab, 0xcd}}, 1, "x"));
+  gateway.announce(at(rr::NodeId{{0x12}}, 1, ""));
+  const auto devices = wait_for_devices(gateway, [](const json& all) { return all.size() >= 3; });
+  CHECK(devices.size() == 3);
+  CHECK(devices[1]["name"] == "x-abcd0000");
+  CHECK(devices[2]["name"] == "node-12000000");
+  const auto nodes = wait_for_nodes(gateway, [](const json& all) { return all.size() == 3; });
+  for (const auto& node : nodes)
+    if (node["node_name"] == "node.x") CHECK(node["device"] == "x");
+}
+
+TEST_CASE("a flood of nodes makes no more devices than may be") {
+  TestGateway gateway(0, allowing({{"*", {}, ""}}, 3));
+  for (std::uint8_t i = 1; i <= 50; ++i) gateway.announce(at(rr::NodeId{{i}}, 1, "node" + std::to_string(i)));
+  wait_for_nodes(gateway, [](const json& all) { return all.size() == 50; });
+  CHECK(wait_for_devices(gateway, [](const json&) { return true; }).size() == 3);
+}
+
+TEST_CASE("a client stays connected to a found device whose announcements end") {
+  TestGateway gateway(1, allowing({{"*", {}, ""}}));
+  rr::RunningNode node([](rr::Node& made) { made.add(make_thing()); });
+  const auto news = at(id_of(node), node.port(), "test.node");
+  gateway.announce(news);
+  wait_for_devices(gateway, [](const json& all) { return all.size() == 2 && all[1]["state"] == "online"; });
+  auto thing =
+      rr::connect("rr+tcp://127.0.0.1:" + std::to_string(gateway.port()) + "/?nodename=test.node&service=thing");
+  gateway.withdraw(news.node_id, news.url);
+  wait_for_devices(gateway, [](const json& all) { return all.size() == 1; });
+  CHECK(thing.get("one").to<std::int32_t>().value() == 1);
+}
