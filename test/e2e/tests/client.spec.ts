@@ -1,4 +1,4 @@
-// The client package in a page without a bundler: big values through device, gateway and browser.
+// The client package in a page and in a worker, without a bundler: through device, gateway and browser.
 import { cpSync, existsSync, mkdtempSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import path from "node:path";
@@ -7,48 +7,78 @@ import { Program, repository_root, rrgate, start_gateway } from "../processes";
 
 const service = path.join(path.dirname(rrgate), "../test/interop/cpp/rr-test-service");
 
-/** A folder for the gateway to serve: the package as it is published, and an empty page. */
+const worker = `
+import { connect } from "./index.js";
+const robot = await connect(new URL("/devices/big?service=interop", location));
+postMessage(await robot.add(2, 3));
+for await (const number of robot.count_up(1, 3)) postMessage(number);
+await robot.$.close();
+postMessage(robot.$.state);
+`;
+
+/** A folder for the gateway to serve: the package as it is published, an empty page and a worker. */
 function make_site(): string {
   const site = mkdtempSync(path.join(tmpdir(), "rrgate-site-"));
   cpSync(path.join(repository_root, "wasm-client/dist"), site, { recursive: true });
   writeFileSync(path.join(site, "index.html"), "<!doctype html><title>client</title>");
+  writeFileSync(path.join(site, "worker.js"), worker);
   return site;
 }
 
-test("10 MiB of doubles cross device, gateway and browser unharmed; more than the limit fails alone", async ({ page }) => {
+let device: Program;
+let gateway: { program: Program; url: string };
+
+test.beforeAll(async () => {
   if (!existsSync(service)) throw new Error(`${service} is missing: build the target rr-test-service`);
-  const device = new Program(service, []);
+  device = new Program(service, []);
   device.start();
   const found = await device.wait_for_output(/"url": *"([^"]+)"/);
-  const gateway = await start_gateway("big", found[1] ?? "", make_site());
-  try {
-    await page.goto(gateway.url);
-    const seen = await page.evaluate(async () => {
-      const count = 1_310_720; // doubles in 10 MiB
-      const { connect } = await import(new URL("index.js", location.href).href);
-      const url = `ws://${location.host}/devices/big?service=interop`;
-      const big = await connect(url);
-      const other = await connect(url);
-      const ramp: Float64Array = await big.ramp(count);
-      const wrong = ramp.findIndex((value, index) => value !== index);
-      const sum: number = await big.sum(ramp);
-      const too_much: string = await big.sum(new Float64Array(2 * count)).then(
-        () => "accepted",
-        (error: { code: number }) => `refused with ${error.code}`,
-      );
-      const after: number = await other.add(2, 3);
-      return { kind: ramp.constructor.name, length: ramp.length, wrong, sum, too_much, after };
-    });
-    expect(seen).toEqual({
-      kind: "Float64Array",
-      length: 1_310_720,
-      wrong: -1,
-      sum: (1_310_720 * 1_310_719) / 2,
-      too_much: "refused with 2",
-      after: 5,
-    });
-  } finally {
-    await gateway.program.kill("SIGTERM");
-    await device.kill("SIGTERM");
-  }
+  gateway = await start_gateway("big", found[1] ?? "", make_site());
+});
+
+test.afterAll(async () => {
+  await gateway?.program.kill("SIGTERM");
+  await device?.kill("SIGTERM");
+});
+
+test("10 MiB of doubles cross device, gateway and browser unharmed; more than the limit fails alone", async ({ page }) => {
+  await page.goto(gateway.url);
+  const seen = await page.evaluate(async () => {
+    const count = 1_310_720; // doubles in 10 MiB
+    const { connect } = await import(new URL("index.js", location.href).href);
+    const url = `ws://${location.host}/devices/big?service=interop`;
+    const big = await connect(url);
+    const other = await connect(url);
+    const ramp: Float64Array = await big.ramp(count);
+    const wrong = ramp.findIndex((value, index) => value !== index);
+    const sum: number = await big.sum(ramp);
+    const too_much: string = await big.sum(new Float64Array(2 * count)).then(
+      () => "accepted",
+      (error: { code: number }) => `refused with ${error.code}`,
+    );
+    const after: number = await other.add(2, 3);
+    return { kind: ramp.constructor.name, length: ramp.length, wrong, sum, too_much, after };
+  });
+  expect(seen).toEqual({
+    kind: "Float64Array",
+    length: 1_310_720,
+    wrong: -1,
+    sum: (1_310_720 * 1_310_719) / 2,
+    too_much: "refused with 2",
+    after: 5,
+  });
+});
+
+test("a worker is as good as a page", async ({ page }) => {
+  await page.goto(gateway.url);
+  const said = await page.evaluate(
+    () =>
+      new Promise((resolve, reject) => {
+        const said: unknown[] = [];
+        const worker = new Worker("worker.js", { type: "module" });
+        worker.onerror = (error) => reject(new Error(error.message));
+        worker.onmessage = ({ data }) => said.push(data) === 5 && resolve(said);
+      }),
+  );
+  expect(said).toEqual([5, 1, 2, 3, "closed"]);
 });
