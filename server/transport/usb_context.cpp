@@ -95,8 +95,16 @@ std::string UsbDevice::description() const {
 // --- context ---
 
 struct UsbContext::Watched {
-  Watched(const asio::any_io_executor& executor, int number) : descriptor(executor, number) {}
+  Watched(const asio::any_io_executor& executor, int number, short mask)
+      : descriptor(executor, number), waits{{{POLLIN, false}, {POLLOUT, false}}}, events(mask) {}
+
+  struct Wait {
+    short event;
+    bool is_pending;
+  };
   asio::posix::stream_descriptor descriptor;
+  std::array<Wait, 2> waits;
+  short events;
 };
 
 Result<std::shared_ptr<UsbContext>> UsbContext::make(const asio::any_io_executor& executor) {
@@ -122,10 +130,8 @@ UsbContext::~UsbContext() {
 }
 
 void UsbContext::watch(int descriptor, short events) {
-  auto watched = std::make_shared<Watched>(executor_, descriptor);
-  watched_[descriptor] = watched;
-  for (const short event : {short{POLLIN}, short{POLLOUT}})
-    if (events & event) wait(descriptor, watched, event);
+  watched_[descriptor] = std::make_shared<Watched>(executor_, descriptor, events);
+  wait();
 }
 
 /// libusb closes the descriptor itself, right after this.
@@ -136,18 +142,29 @@ void UsbContext::unwatch(int descriptor) {
   watched_.erase(found);
 }
 
-void UsbContext::wait(int descriptor, const std::shared_ptr<Watched>& watched, short event) {
-  const auto kind =
-      event == POLLIN ? asio::posix::stream_descriptor::wait_read : asio::posix::stream_descriptor::wait_write;
-  watched->descriptor.async_wait(
-      kind, [weak = weak_from_this(), descriptor, watched, event](const boost::system::error_code& error) {
-        const auto self = weak.lock();
-        if (error || !self) return;
-        self->handle_events();
-        // Another one may have got the number meanwhile.
-        const auto found = self->watched_.find(descriptor);
-        if (found != self->watched_.end() && found->second == watched) self->wait(descriptor, watched, event);
-      });
+/// Only while there are transfers: an idle context must not keep a loop running.
+void UsbContext::wait() {
+  if (pending_transfers_ == 0) return;
+  for (const auto& [number, watched] : watched_)
+    for (auto& each : watched->waits) {
+      if (each.is_pending || (watched->events & each.event) == 0) continue;
+      each.is_pending = true;
+      const auto kind =
+          each.event == POLLIN ? asio::posix::stream_descriptor::wait_read : asio::posix::stream_descriptor::wait_write;
+      watched->descriptor.async_wait(
+          kind, [weak = weak_from_this(), watched = watched, &each](const boost::system::error_code& error) {
+            each.is_pending = false;
+            const auto self = weak.lock();
+            if (!self) return;
+            if (!error) self->handle_events();
+            self->wait();
+          });
+    }
+}
+
+void UsbContext::stop_waiting() {
+  boost::system::error_code ignored;
+  for (const auto& [number, watched] : watched_) watched->descriptor.cancel(ignored);
 }
 
 void UsbContext::handle_events() {
@@ -226,7 +243,7 @@ struct UsbHandle::Transfer {
     std::unique_ptr<Transfer> self(static_cast<Transfer*>(raw->user_data));
     auto& handle = *self->handle;
     std::erase(handle.pending_, self.get());
-    --handle.context_->pending_transfers_;
+    if (--handle.context_->pending_transfers_ == 0) handle.context_->stop_waiting();
     self->finish(status_of_transfer(raw->status));
     // The last reference to handle and context must not go while libusb handles its events.
     asio::post(handle.context_->executor_, [kept = std::shared_ptr<Transfer>(std::move(self))] {});
@@ -286,8 +303,8 @@ void UsbHandle::bulk(std::uint8_t endpoint, std::span<std::uint8_t> buffer,
 void UsbHandle::submit(std::unique_ptr<Transfer> transfer) {
   const int code = libusb_submit_transfer(transfer->raw);
   if (code == 0) {
-    ++context_->pending_transfers_;
     pending_.push_back(transfer.release());
+    if (++context_->pending_transfers_ == 1) context_->wait();
     return;
   }
   asio::post(context_->executor_, [code, failed = std::shared_ptr<Transfer>(std::move(transfer))] {

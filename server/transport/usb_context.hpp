@@ -66,7 +66,8 @@ class UsbContext : public std::enable_shared_from_this<UsbContext> {
   explicit UsbContext(const boost::asio::any_io_executor& executor) : executor_(executor) {}
   void watch(int descriptor, short events);
   void unwatch(int descriptor);
-  void wait(int descriptor, const std::shared_ptr<Watched>& watched, short event);
+  void wait();
+  void stop_waiting();
   void handle_events();
 
   boost::asio::any_io_executor executor_;

@@ -113,7 +113,7 @@ class Emulator {
 
  private:
   struct Stream {
-    enum class Kind { unknown, joined, echo, deaf, done } kind = Kind::unknown;
+    enum class Kind { unknown, joined, echo, sink, deaf, done } kind = Kind::unknown;
     int socket = -1;
     Bytes out;   ///< to the node
     Bytes head;  ///< while it is unknown what the stream is
@@ -129,7 +129,7 @@ class Emulator {
   std::unique_ptr<SimulatedDevice> make_device() const {
     test::SimulatedDeviceOptions options;
     options.name = node_name_;
-    options.interface = 1;  // not 0, which is all that 1.2.8 can
+    options.interface = interface_;
     options.packet_size = 512;
     options.max_input = 8192;
     return std::make_unique<SimulatedDevice>(options);
@@ -150,17 +150,17 @@ class Emulator {
       const auto at = static_cast<std::size_t>((address & 0x80) >> 3 | (address & 0x0F));
       endpoints.type[at] = type;
       endpoints.max_packet_size[at] = size;
-      endpoints.interface[at] = 1;
+      endpoints.interface[at] = interface_;
     };
     add(0x00, usb_redir_type_control, 64);
     add(0x80, usb_redir_type_control, 64);
     add(device_->out_address(), usb_redir_type_bulk, 512);
     add(device_->in_address(), usb_redir_type_bulk, 512);
     usb_redir_interface_info_header interfaces{};
-    interfaces.interface_count = 2;
+    interfaces.interface_count = interface_ + 1u;
     interfaces.interface[1] = 1;
     interfaces.interface_class[0] = 0xFE;
-    interfaces.interface_class[1] = 0xFF;
+    interfaces.interface_class[interface_] = 0xFF;
     usb_redir_device_connect_header device{};
     device.speed = usb_redir_speed_high;
     device.vendor_id = 0x1209;
@@ -283,6 +283,11 @@ class Emulator {
         device_->send(id, input);
         return !input.empty();
       }
+      case Stream::Kind::sink: {
+        const auto count = device_->take_input(id).size();
+        sunk_ += count;
+        return count > 0;
+      }
       case Stream::Kind::deaf:
       case Stream::Kind::done:
         break;
@@ -331,6 +336,15 @@ class Emulator {
       device_->stall_next_out();
     } else if (command == "wrong-length") {
       device_->send_raw({9, 0, 0, 0, static_cast<std::uint8_t>(id), 0, 0, 0});
+    } else if (command == "sink") {
+      stream.kind = Stream::Kind::sink;
+      sunk_ = rest.size();
+    } else if (command == "sunk") {
+      device_->send(id, as_bytes(std::to_string(sunk_)));
+      device_->close(id);
+    } else if (command == "interface-0") {
+      interface_ = 0;
+      unplug();
     } else if (command == "unplug-soon") {
       unplug_at_ = Clock::now() + std::chrono::milliseconds(300);  // the stream's writes are pending by then
     } else {
@@ -370,6 +384,8 @@ class Emulator {
   std::string node_name_;
   usbredirparser* parser_;
   std::unique_ptr<SimulatedDevice> device_;
+  std::uint8_t interface_ = 1;  ///< not 0, which is all that 1.2.8 can
+  std::size_t sunk_ = 0;        ///< bytes that the latest sink got
   std::deque<Bulk> reads_;
   std::deque<Bulk> writes_;
   std::map<std::int32_t, Stream> streams_;
