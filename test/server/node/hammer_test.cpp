@@ -108,7 +108,10 @@ class Hammer {
       : io_(io), url_(std::move(url)), number_(number), end_(end), packet_arrived_(io), loop_ended_(io) {}
 
   void start() {
-    asio::co_spawn(io_, run(), [this](std::exception_ptr failure) { note(failure); });
+    asio::co_spawn(io_, run(), [this](std::exception_ptr what) {
+      note(what);
+      if (anvil_.connection()) anvil_.connection()->disconnect();  // or it would hold the thread
+    });
   }
 
   std::uint64_t answers = 0;
@@ -179,7 +182,6 @@ class Hammer {
       spawn((this->*loop)());
     while (loops_ > 0) co_await wait_for(loop_ended_, 600s);
     while (packets_received < packets_sent && failure.empty()) co_await wait_for(packet_arrived_, 20s);
-    anvil_.connection()->disconnect();
     is_finished = true;
   }
 
