@@ -120,8 +120,8 @@ awaitable<void> UsbHost::probe(std::shared_ptr<Known> known) {
       arrived->cancel();
     });
     if (!answer->is_there) co_await arrived->async_wait(await_tuple);
-    if (answer->status == UsbStatus::busy || answer->status == UsbStatus::no_device ||
-        answer->status == UsbStatus::timed_out) {
+    // A refusal says what the device is; anything else is worth another try.
+    if (answer->status != UsbStatus::ok && answer->status != UsbStatus::stall) {
       known->problem = open_problem(known->device, answer->status);
       co_return;
     }

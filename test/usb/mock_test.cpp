@@ -1,0 +1,127 @@
+// What the host sees of USB before any transfer, with the real libusb and udev library on a simulated /sys and /dev
+// (umockdev-wrapper): enumeration, what is worth asking, hot-plug.
+#include <umockdev.h>
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <catch2/catch.hpp>
+#include <memory>
+
+#include "server/transport/hardware.hpp"
+#include "server/transport/usb_host.hpp"
+#include "test/core/hardware/simulated_device.hpp"
+#include "test/support/golden.hpp"
+#include "test/support/print.hpp"
+
+using namespace rr;
+using namespace rr::test;
+namespace asio = boost::asio;
+using namespace std::chrono_literals;
+
+namespace {
+
+/// A computer with nothing plugged in.
+class Machine {
+ public:
+  Machine() : testbed_(umockdev_testbed_new(), g_object_unref) {}
+
+  /// `bos`  what the kernel shows of it; empty: the kernel does not show it.
+  std::string plug_in(int address, const SimulatedDevice& device, const Bytes& bos) {
+    auto descriptors = device.device_descriptor();
+    const auto configuration = device.configuration_descriptor();
+    descriptors.insert(descriptors.end(), configuration.begin(), configuration.end());
+    const auto number = std::to_string(address);
+    auto text = "P: /devices/pci0000:00/usb1/1-" + number + "\nN: bus/usb/001/00" + number +
+                "\nE: DEVTYPE=usb_device\nE: SUBSYSTEM=usb\nE: DRIVER=usb\nE: MAJOR=189\nE: MINOR=" + number +
+                "\nE: DEVNAME=/dev/bus/usb/001/00" + number + "\nE: BUSNUM=001\nE: DEVNUM=00" + number +
+                "\nA: busnum=1\\n\nA: devnum=" + number + "\\n\nA: bConfigurationValue=1\\n\nA: speed=480\\n\n" +
+                "H: descriptors=" + to_hex(descriptors) + "\n";
+    if (!bos.empty()) text += "H: bos_descriptors=" + to_hex(bos) + "\n";
+    GError* error = nullptr;
+    if (!umockdev_testbed_add_from_string(testbed_.get(), text.c_str(), &error)) FAIL(error->message);
+    return "/sys/devices/pci0000:00/usb1/1-" + number;
+  }
+
+  void tell(const std::string& path, const char* action) {
+    umockdev_testbed_uevent(testbed_.get(), path.c_str(), action);
+  }
+  void remove(const std::string& path) { umockdev_testbed_remove_device(testbed_.get(), path.c_str()); }
+
+ private:
+  std::unique_ptr<UMockdevTestbed, void (*)(void*)> testbed_;
+};
+
+UsbHost::Found scan(asio::io_context& io) {
+  UsbHost::Found found;
+  bool is_done = false;
+  asio::co_spawn(
+      io, [&]() -> awaitable<void> { found = co_await UsbHost::of(io.get_executor()).scan(); },
+      [&](std::exception_ptr) {
+        is_done = true;
+        io.stop();
+      });
+  io.restart();
+  io.run_for(5s);
+  REQUIRE(is_done);
+  return found;
+}
+
+}  // namespace
+
+TEST_CASE("devices are enumerated with their interfaces, endpoints and places") {
+  Machine machine;
+  machine.plug_in(4, SimulatedDevice({.interface = 2, .packet_size = 512}), {});
+  asio::io_context io{1};
+  const auto context = UsbContext::make(io.get_executor());
+  REQUIRE(context);
+  const auto devices = (*context)->devices();
+  REQUIRE(devices.size() == 1);
+  const auto& device = devices[0];
+  CHECK(device.key == "1,4");
+  CHECK(device.node == "/dev/bus/usb/001/004");
+  CHECK(device.usb_version == 0x0201);
+  CHECK(device.configuration == 1);
+  CHECK(device.description() == "USB device " + device.path + " (1209:5252)");
+  REQUIRE(device.interfaces.size() == 3);
+  const auto pipes = find_usb_pipes(device.interfaces, 2);
+  REQUIRE(pipes);
+  CHECK(pipes->in.address == 0x81);
+  CHECK(pipes->out.address == 0x02);
+  CHECK(pipes->in.max_packet_size == 512);
+}
+
+TEST_CASE("only what may be a node is opened; what then fails is said") {
+  Machine machine;
+  asio::io_context io{1};
+  CHECK(scan(io).problems.empty());
+  // Not vendor specific, and ours by class but not by its BOS.
+  machine.plug_in(4, SimulatedDevice({.class_code = 0x08}), {});
+  machine.plug_in(5, SimulatedDevice(), from_hex("05 0f 0c00 01  07 10 02 00000000"));
+  auto found = scan(io);
+  CHECK(found.nodes.empty());
+  CHECK(found.problems.empty());
+  // This one would be, but the simulated node takes no requests.
+  machine.plug_in(6, SimulatedDevice(), usb_bos(0, 0xBA));
+  found = scan(io);
+  CHECK(found.nodes.empty());
+  REQUIRE(found.problems.size() == 1);
+  CHECK(found.problems[0].find("(1209:5252): ") != std::string::npos);
+}
+
+TEST_CASE("a watch looks again soon after the system tells of a device, and only of those that matter") {
+  Machine machine;
+  asio::io_context io{1};
+  int looks = 0;
+  const HardwareWatch watch(
+      io.get_executor(), [&](const auto&) { ++looks; }, 60s);
+  io.run_for(200ms);
+  REQUIRE(looks == 1);
+  const auto path = machine.plug_in(4, SimulatedDevice({.class_code = 0x08}), {});
+  for (int times = 0; times < 5; ++times) machine.tell(path, "change");
+  io.run_for(1s);
+  CHECK(looks == 2);  // several news, one look
+  machine.tell(path, "remove");
+  io.run_for(1s);
+  CHECK(looks == 3);  // not only the first time
+}
