@@ -3,8 +3,7 @@
 import { ErrorCode, RobotRaconteurError } from "../errors.js";
 import type { CallOptions, MemberInfo, RrValue } from "../types.js";
 import type { GeneratorStep } from "../wasm_module.js";
-import { split_arguments } from "./function.js";
-import { signature } from "./member.js";
+import { signature, split_arguments } from "./member.js";
 import type { MemberContext } from "./member.js";
 
 const suffix = "{generator}";
