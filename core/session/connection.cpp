@@ -12,6 +12,7 @@ namespace {
 
 constexpr std::string_view create_connection = "CreateConnection";
 constexpr std::string_view get_remote_node_id = "GetRemoteNodeID";
+constexpr std::string_view start_tls = "STARTTLS";
 constexpr std::size_t send_headroom = 100;  // the reference sends at most its receive limit less 100 bytes
 
 bool is_special(EntryType type) {
@@ -55,6 +56,7 @@ Connection::Connection(ConnectionRole role, ConnectionOptions options, Now now)
       opened_(now.steady),
       last_sent_(now.steady),
       last_received_(now.steady) {
+  peer_.id = options_.known_peer;
   if (role_ == ConnectionRole::client) {
     // Nothing can fail here but a node name of thousands of bytes, and that would fail the handshake's deadline.
     if (auto sent = send_create_connection(now); !sent) close(sent.error());
@@ -107,6 +109,7 @@ Result<> Connection::handle_message(ByteSpan bytes, Now now) {
   fill_header();
   if (incoming_.entries.empty()) return {};  // legal, and there is nothing to do
   if (role_ == ConnectionRole::service) state_ = ConnectionState::open;
+  if (auto checked = check_sender(); !checked) return checked;
   const auto is_handled = handle_stream_entry(now);
   if (!is_handled) return is_handled.error();
   has_message_ = !*is_handled;
@@ -124,6 +127,16 @@ void Connection::fill_header() {
     header.sender_endpoint = remote_endpoint_;
     header.receiver_endpoint = local_endpoint_;
   }
+}
+
+/// Who has proved to be one node speaks for no other. In CreateConnection that is answered, not punished.
+Result<> Connection::check_sender() const {
+  const auto type = incoming_.entries.front().type;
+  if (options_.known_peer.is_any() || incoming_.header.sender_node_id == options_.known_peer ||
+      type == EntryType::stream_op || type == EntryType::stream_op_ret)
+    return {};
+  return make_error(ErrorCode::node_not_found, "a message of node " + format_node_id(incoming_.header.sender_node_id) +
+                                                   " came from node " + format_node_id(options_.known_peer));
 }
 
 /// Returns whether the first entry is one that the stream layer answers or ignores itself.
@@ -170,7 +183,10 @@ void Connection::begin_stream_reply(const MessageEntry& request) {
 Result<> Connection::answer_stream_op(const MessageEntry& entry, Now now) {
   if (entry.member_name == create_connection) return answer_create_connection(entry, now);
   begin_stream_reply(entry);
-  if (entry.member_name != get_remote_node_id) write_error(reply_, protocol_error("Invalid Stream Operation"));
+  if (entry.member_name == start_tls && !options_.is_encrypted)  // who can do it answers before there is a session
+    write_error(reply_, make_error(ErrorCode::connection_error, "Server certificate not loaded"));
+  else if (entry.member_name != get_remote_node_id)
+    write_error(reply_, protocol_error("Invalid Stream Operation"));
   return send(reply_, now);
 }
 
@@ -225,7 +241,8 @@ Result<> Connection::handle_stream_op_reply(const MessageEntry& entry, Now) {
     error.message = "the node refused the connection: " + error.message;
     return error;
   }
-  const auto& target = options_.target;
+  auto target = options_.target;
+  if (!options_.known_peer.is_any()) target = {options_.known_peer, {}};
   if ((!target.id.is_any() && header.sender_node_id != target.id) ||
       (!target.name.empty() && header.sender_node_name != target.name))
     return make_error(ErrorCode::connection_error,

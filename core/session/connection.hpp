@@ -37,6 +37,9 @@ enum class ConnectionState : std::uint8_t {
 struct ConnectionOptions {
   NodeIdentity self;
   NodeIdentity target = {};  ///< client: the node that the URL asks for
+  /// What the peer is known to be by TLS, and so must say in every message. Any: nothing is known.
+  NodeId known_peer = {};
+  bool is_encrypted = false;  ///< the stream is TLS already: a service refuses to start it again
   Features features = {};
   std::size_t max_message_size = 12u * 1024 * 1024;
   std::size_t max_unauthorised_message_size = 512u * 1024;  ///< in force until authorise()
@@ -107,6 +110,7 @@ class Connection {
  private:
   Result<> handle_message(ByteSpan bytes, Now now);
   void fill_header();
+  Result<> check_sender() const;
   Result<bool> handle_stream_entry(Now now);
   Result<> answer_stream_op(const MessageEntry& entry, Now now);
   Result<> answer_create_connection(const MessageEntry& entry, Now now);

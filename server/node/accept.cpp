@@ -5,6 +5,7 @@
 #include "core/wire/frame_start.hpp"
 #include "server/http/request_reader.hpp"
 #include "server/http/upgrade.hpp"
+#include "server/transport/start_tls.hpp"
 #include "server/transport/watchdog.hpp"
 #include "server/transport/websocket.hpp"
 
@@ -60,9 +61,7 @@ awaitable<Result<Accepted>> upgrade(std::unique_ptr<ByteStream> stream, AcceptOp
   co_return dropped(*stream, std::move(why));
 }
 
-}  // namespace
-
-awaitable<Result<Accepted>> accept_stream(std::unique_ptr<ByteStream> stream, AcceptOptions options) {
+awaitable<Result<Accepted>> accept_plain(std::unique_ptr<ByteStream> stream, AcceptOptions options) {
   auto& raw = *stream;
   Deadline limit(raw.executor(), [&raw] { raw.close(); });
   limit.arm(prologue_time);
@@ -82,6 +81,26 @@ awaitable<Result<Accepted>> accept_stream(std::unique_ptr<ByteStream> stream, Ac
     co_return result;
   }
   co_return co_await upgrade(std::move(stream), std::move(options));
+}
+
+}  // namespace
+
+awaitable<Result<Accepted>> accept_stream(std::unique_ptr<ByteStream> stream, AcceptOptions options) {
+  AcceptTlsOptions tls;
+  tls.self = options.self;
+  tls.context = options.tls;
+  tls.is_required = options.requires_tls;
+  tls.timeout = prologue_time;
+  auto accepted = co_await accept_plain(std::move(stream), std::move(options));
+  if (!accepted || !tls.context) co_return accepted;
+  auto secured = co_await accept_tls(std::move(accepted->stream), std::move(tls));
+  if (!secured) co_return secured.error();
+  accepted->stream = std::move(secured->stream);
+  if (secured->is_encrypted) accepted->scheme.replace(0, 2, "rrs");
+  accepted->is_encrypted = secured->is_encrypted;
+  const auto verified = accepted->stream->verified_peer();
+  accepted->known_peer = verified.is_any() ? secured->claimed : verified;
+  co_return accepted;
 }
 
 }  // namespace rr

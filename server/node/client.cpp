@@ -233,8 +233,8 @@ RemoteObject connect(std::string_view url, ConnectOptions options) {
   return {std::move(connection), root};
 }
 
-RemoteObject connect(std::string_view url, std::string_view username, std::string_view password) {
-  ConnectOptions options;
+RemoteObject connect(std::string_view url, std::string_view username, std::string_view password,
+                     ConnectOptions options) {
   options.username = username;
   options.credentials = password_credentials(password);
   return connect(url, std::move(options));

@@ -165,6 +165,7 @@ class RemoteObject {
 /// The root object of the service that `url` names. A service that requires a user takes options.username and
 /// options.credentials, or those given here.
 RemoteObject connect(std::string_view url, ConnectOptions options = {});
-RemoteObject connect(std::string_view url, std::string_view username, std::string_view password);
+RemoteObject connect(std::string_view url, std::string_view username, std::string_view password,
+                     ConnectOptions options = {});
 
 }  // namespace rr

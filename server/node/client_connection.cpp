@@ -22,6 +22,7 @@ awaitable<void> dial_and_start(ConnectionUrl url, ConnectOptions options, Client
   if (!stream) co_return done(stream.error());
   const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
   options.connect_timeout = std::max(left, std::chrono::milliseconds(1));
+  options.connection.known_peer = (*stream)->verified_peer();
   std::make_shared<ClientConnection>(std::move(*stream), std::move(options), std::move(done))->start();
 }
 

@@ -34,17 +34,24 @@ NodeIdentity make_identity(std::string name, const NodeId& id) {
   return {id.is_any() ? random_node_id() : id, std::move(name)};
 }
 
-HostPort parse_listen_url(std::string_view url) {
+struct ListenUrl {
+  HostPort address;
+  bool requires_tls = false;
+};
+
+ListenUrl parse_listen_url(std::string_view url) {
   constexpr std::string_view scheme = "rr+tcp://";
+  constexpr std::string_view secure_scheme = "rrs+tcp://";
   const auto fail = [&](const std::string& why) {
     throw std::invalid_argument("listen on " + quoted(url) + ": " + why + ", expected rr+tcp://HOST:PORT");
   };
-  if (url.substr(0, scheme.size()) != scheme) fail("unknown scheme");
-  std::string_view rest = url.substr(scheme.size());
+  const bool is_secure = url.substr(0, secure_scheme.size()) == secure_scheme;
+  if (!is_secure && url.substr(0, scheme.size()) != scheme) fail("unknown scheme");
+  std::string_view rest = url.substr(is_secure ? secure_scheme.size() : scheme.size());
   if (!rest.empty() && rest.back() == '/') rest.remove_suffix(1);
   const auto parsed = parse_host_port(rest);
   if (!parsed) fail(parsed.error().message);
-  return *parsed;
+  return {*parsed, is_secure};
 }
 
 /// Runs work at multiples of a period.
@@ -100,11 +107,14 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   }
 
   std::uint16_t listen(std::string_view url) {
-    const HostPort address = parse_listen_url(url);
+    const auto parsed = parse_listen_url(url);
+    const bool requires_tls = parsed.requires_tls || options_.require_tls;
+    if (requires_tls && !(options_.tls && options_.tls->has_certificate()))
+      throw std::invalid_argument("listen on " + quoted(url) + ": TLS needs a certificate: NodeOptions::tls");
     auto listener = std::make_unique<TcpListener>(io_.get_executor());
-    const auto bound = listener->open(address, true);
+    const auto bound = listener->open(parsed.address, true);
     if (!bound) throw std::runtime_error(bound.error().message);
-    listener->start([this](asio::ip::tcp::socket socket) { accept(std::move(socket)); },
+    listener->start([this, requires_tls](asio::ip::tcp::socket socket) { accept(std::move(socket), requires_tls); },
                     [this](const std::string& problem) { report(problem); });
     listeners_.push_back(std::move(listener));
     listens_.insert(listens_.end(), bound->begin(), bound->end());
@@ -195,7 +205,8 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     if (found == clients_.end() || !found->second->service()) return {};
     const ServiceSession& session = found->second->session();
     const auto* user = session.user();
-    return {id, user ? user->name : std::string(), session.endpoint(), session.connection().peer()};
+    return {id, user ? user->name : std::string(), session.endpoint(), session.connection().peer(),
+            found->second->verified_peer()};
   }
 
   // ServiceClientOwner: from clients
@@ -246,7 +257,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     }
   }
 
-  void accept(asio::ip::tcp::socket socket) {
+  void accept(asio::ip::tcp::socket socket, bool requires_tls) {
     error_code error;
     const auto local = socket.local_endpoint(error);
     if (error) return;  // gone already
@@ -255,24 +266,32 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     auto stream = std::make_unique<TcpStream>(std::move(socket), send_stall);
     std::string host = local.address().to_string();
     host.resize(std::min(host.size(), host.find('%')));  // the zone is what this machine calls the link
-    asio::co_spawn(io_, welcome(std::move(stream), format_host_port(host, local.port())), asio::detached);
+    asio::co_spawn(io_, welcome(std::move(stream), format_host_port(host, local.port()), requires_tls), asio::detached);
   }
 
-  awaitable<void> welcome(std::unique_ptr<ByteStream> stream, std::string local) {
+  awaitable<void> welcome(std::unique_ptr<ByteStream> stream, std::string local, bool requires_tls) {
     AcceptOptions how;
     how.allowed_origins = options_.allowed_origins;
+    how.self = identity();
+    how.tls = options_.tls;
+    how.requires_tls = requires_tls;
     auto accepted = co_await accept_stream(std::move(stream), std::move(how));
     --arriving_;
-    if (accepted && !is_stopping_) add_client(std::move(accepted->stream), accepted->scheme + "://" + local + "/");
+    if (!accepted && accepted.error().code == ErrorCode::authentication_error) report(accepted.error().message);
+    if (accepted && !is_stopping_) add_client(std::move(*accepted), local);
   }
 
-  void add_client(std::unique_ptr<ByteStream> stream, std::string base_url) {
+  void add_client(Accepted accepted, const std::string& local) {
     ServiceSessionOptions session;
     session.connection.features = options_.features;
     session.connection.max_message_size = options_.max_message_size;
-    session.base_url = std::move(base_url);
+    session.connection.known_peer = accepted.known_peer;
+    session.connection.is_encrypted = accepted.is_encrypted;
+    if (const auto verified = accepted.stream->verified_peer(); !verified.is_any()) session.verified_node_id = verified;
+    session.base_url = accepted.scheme + "://" + local + "/";
     const ClientId id = ++last_client_id_;
-    const auto client = std::make_shared<ServiceClient>(id, *this, directory_, std::move(session), std::move(stream));
+    const auto client =
+        std::make_shared<ServiceClient>(id, *this, directory_, std::move(session), std::move(accepted.stream));
     clients_.emplace(id, client);
     client->start();
   }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "server/node/service.hpp"
+#include "server/security/tls_context.hpp"
 
 namespace rr {
 
@@ -20,6 +21,10 @@ struct NodeOptions {
   std::size_t max_clients = 4096;  ///< more connections are closed at once
   /// Pages of other hosts that may open WebSockets: "https://lab.example", "https://*.example.org:8443".
   std::vector<std::string> allowed_origins = {};
+  /// With the certificate of `id`, by load_node_tls() or make_node_tls(): clients may use TLS, on the same port. Null:
+  /// they can't.
+  TlsContextPtr tls = {};
+  bool require_tls = false;  ///< clients without TLS are refused
   /// A sentence about something that went wrong and that no client hears of; the default writes it to stderr.
   std::function<void(const std::string& problem)> report = {};
 };
@@ -37,7 +42,8 @@ class Node {
   /// Throws   std::invalid_argument that names the missing handlers or the name that is taken.
   void add(const std::shared_ptr<Service>& service);
   /// "rr+tcp://0.0.0.0:52222", "rr+tcp://[::]:0" (IPv4 as well), "rr+tcp://localhost:0"; port 0 takes a free one.
-  /// WebSockets (rr+ws) are taken on the same port.
+  /// WebSockets (rr+ws) are taken on the same port, and TLS (rrs+tcp, rrs+ws) where the node has a certificate;
+  /// "rrs+tcp://HOST:PORT" takes nothing but TLS.
   /// Returns  the port. Throws std::invalid_argument; std::runtime_error ("listen on ...: Address already in use").
   std::uint16_t listen(std::string_view url);
 

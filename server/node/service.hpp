@@ -47,6 +47,7 @@ struct Caller {
   std::string user = {};       ///< the name it has logged in by; empty while it has not
   std::uint32_t endpoint = 0;  ///< the service's number of the session, as the reference names clients
   NodeIdentity node = {};      ///< as the client says
+  NodeId verified_node = {};   ///< as its certificate proves; any: nobody vouches for it
 };
 
 using CallbackDone = std::function<void(Result<Value> answer)>;

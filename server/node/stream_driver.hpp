@@ -35,6 +35,8 @@ class StreamDriver : public std::enable_shared_from_this<StreamDriver> {
   /// Closes the stream at once. The session hears `reason` unless it has ended already.
   void close(Error reason);
   bool is_closed() const { return is_closed_; }
+  /// See ByteStream.
+  NodeId verified_peer() const { return stream_->verified_peer(); }
   boost::asio::any_io_executor executor() { return timer_.get_executor(); }
 
  protected:

@@ -1,7 +1,10 @@
 #include "server/transport/dial.hpp"
 
+#include "server/security/certificate_files.hpp"
 #include "server/transport/hardware.hpp"
+#include "server/transport/start_tls.hpp"
 #include "server/transport/tcp.hpp"
+#include "server/transport/tls.hpp"
 #include "server/transport/watchdog.hpp"
 
 namespace rr {
@@ -66,15 +69,65 @@ awaitable<Dialed> dial_device(ConnectionUrl url, DialOptions options) {
   return dial_hardware(std::move(url), std::move(options));
 }
 
+/// What the next step may take of a time that all steps have together.
+std::chrono::milliseconds left_of(std::chrono::milliseconds timeout, std::chrono::steady_clock::time_point begin) {
+  const auto passed = std::chrono::duration_cast<std::chrono::milliseconds>(std::chrono::steady_clock::now() - begin);
+  return std::max(timeout - passed, std::chrono::milliseconds(1));
+}
+
+/// HTTPS below the WebSocket.
+awaitable<Dialed> dial_https_websocket(ConnectionUrl url, DialOptions options) {
+  if (!options.web_tls) {
+    auto context = make_web_client_tls({});
+    if (!context) co_return context.error();
+    options.web_tls = *context;
+  }
+  const auto begin = std::chrono::steady_clock::now();
+  auto stream = co_await reach(url, options);
+  if (!stream) co_return stream;
+  TlsPeerOptions server;
+  server.host = url.host;
+  auto tls = std::make_unique<TlsStream>(std::move(*stream), options.web_tls, TlsRole::client, server);
+  if (auto done = co_await tls->handshake(left_of(options.timeout, begin)); !done) co_return done.error();
+  const Limit limit(*tls, left_of(options.timeout, begin));
+  auto socket = co_await connect_websocket(std::move(tls), std::move(url), std::move(options.headers));
+  if (!socket) co_return limit.explain(socket.error());
+  co_return socket;
+}
+
+using Dial = awaitable<Dialed> (*)(ConnectionUrl, DialOptions);
+
+/// TLS between the nodes, inside of what `below` reaches.
+template <Dial below>
+awaitable<Dialed> dial_secure(ConnectionUrl url, DialOptions options) {
+  if (!options.tls) {
+    NodeTlsOptions anonymous;
+    anonymous.trust = default_trust();
+    auto context = make_node_tls(anonymous);
+    if (!context) co_return context.error();
+    options.tls = *context;
+  }
+  const auto begin = std::chrono::steady_clock::now();
+  NodeIdentity target{url.node_id.value_or(NodeId{}), url.node_name};
+  auto stream = co_await below(std::move(url), options);
+  if (!stream) co_return stream;
+  const auto left = left_of(options.timeout, begin);
+  co_return co_await start_tls_client(std::move(*stream), std::move(target), std::move(options.tls), left);
+}
+
 struct Dialer {
   std::string_view scheme;
-  awaitable<Dialed> (*dial)(ConnectionUrl, DialOptions);
+  Dial dial;
 };
 
 /// A transport adds its line here.
 constexpr Dialer dialers[] = {
     {"rr+tcp", dial_tcp},
+    {"rrs+tcp", dial_secure<dial_tcp>},
     {"rr+ws", dial_websocket},
+    {"rrs+ws", dial_secure<dial_websocket>},
+    {"rr+wss", dial_https_websocket},
+    {"rrs+wss", dial_secure<dial_https_websocket>},
     {"rr+usb", dial_device},
     {"rr+pci", dial_device},
 };

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <memory>
 
+#include "server/security/tls_context.hpp"
 #include "server/transport/byte_stream.hpp"
 #include "server/transport/http_connect.hpp"
 #include "server/transport/schemes.hpp"
@@ -17,10 +18,15 @@ struct DialOptions {
   HostPort proxy = {};
   /// For the HTTP request of a WebSocket: a token that a gateway wants, say.
   HttpHeaders headers = {};
+  /// For the schemes with TLS between nodes ("rrs+..."). Null: no certificate of one's own, and default_trust().
+  TlsContextPtr tls = {};
+  /// For the schemes by HTTPS ("...+wss"). Null: what this system trusts.
+  TlsContextPtr web_tls = {};
 };
 
-/// Connects to the device of `url`; nothing is sent.
-/// Errors   connection_error: not reached in time, refused, or a scheme that isn't in the list.
+/// Connects to the device of `url`; nothing is sent but what the scheme itself needs.
+/// Errors   connection_error: not reached in time, refused, or a scheme that isn't in the list; those of
+///          start_tls_client(), TlsStream::handshake() and make_node_tls().
 awaitable<Result<std::unique_ptr<ByteStream>>> dial(ConnectionUrl url, DialOptions options);
 
 }  // namespace rr

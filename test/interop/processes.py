@@ -83,14 +83,16 @@ class Background:
         return code
 
 
-def start_gateway(folder, device_url, page_origin=None):
-    """A gateway to one device, called "interop", when it has reached it: (process, port)."""
+def start_gateway(folder, device_url, page_origin=None, device={}, **more):
+    """A gateway to one device, called "interop", when it has reached it: (process, port). `device` and `more` are
+    further members of the device's configuration and of the whole."""
     port = free_port()
     config = folder / "gateway.json"
     config.write_text(json.dumps({
         "listen": [f"127.0.0.1:{port}"],
         "allowed_origins": [page_origin] if page_origin else [],
-        "devices": [{"name": "interop", "url": device_url}],
+        "devices": [{"name": "interop", "url": device_url, **device}],
+        **more,
     }))
     gateway = Background([BUILD / "server" / "rrgate", "serve", "--config", config], folder / "gateway.log")
 

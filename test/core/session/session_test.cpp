@@ -1,6 +1,8 @@
 // Client and service sessions against each other: what a request becomes on the other side, and its answer back.
 #include <catch2/catch.hpp>
 
+#include <algorithm>
+
 #include "test/core/session/loopback.hpp"
 #include "test/support/print.hpp"
 
@@ -69,6 +71,61 @@ TEST_CASE("the wrong node is refused by the service") {
   pair.client = std::make_unique<ClientSession>(options, pair.now);
   pair.pump();
   CHECK(pair.next_client<SessionClosed>().reason.code == ErrorCode::node_not_found);
+}
+
+TEST_CASE("a client that is known by its certificate speaks for itself alone") {
+  Loopback pair;
+  ServiceSessionOptions options;
+  options.connection.known_peer = GENERATE(client_id, NodeId{{9}});
+  const bool is_itself = options.connection.known_peer == client_id;
+  pair.service = std::make_unique<ServiceSession>(pair.directory, options, pair.now);
+  pair.pump();
+  if (!is_itself) {
+    CHECK(pair.next_client<SessionClosed>().reason.code == ErrorCode::node_not_found);
+    return;
+  }
+  pair.next_client<Connected>();
+  pair.next_service<ClientConnected>();
+  pair.forge(*pair.client, [](Message& message) {
+    message.begin_entry(EntryType::client_keep_alive_req, "arm", {}, 77);
+    message.header.receiver_node_id = NodeId{{8}};  // so that addresses are written
+  });
+  Bytes bytes;
+  for (const auto slice : pair.client->poll_transmit()) bytes.insert(bytes.end(), slice.begin(), slice.end());
+  const auto at = std::search(bytes.begin(), bytes.end(), client_id.bytes.begin(), client_id.bytes.end());
+  REQUIRE(at != bytes.end());
+  *at = 0xee;
+  pair.service->handle_bytes(bytes, pair.now);
+  CHECK(pair.service->wants_close());
+  CHECK_THAT(pair.service->connection().close_reason().message, Catch::Contains("a message of node {eeaaaaaa-0100"));
+}
+
+TEST_CASE("a service that is known by its certificate needs no name, but its id") {
+  Loopback pair;
+  const bool is_expected = GENERATE(true, false);
+  ClientOptions options;
+  options.connection.self = {client_id, ""};
+  options.connection.known_peer = is_expected ? service_id : NodeId{{9}};
+  options.service = "arm";
+  pair.client = std::make_unique<ClientSession>(options, pair.now);
+  pair.pump();
+  if (is_expected)
+    pair.next_client<Connected>();
+  else
+    CHECK_THAT(pair.next_client<SessionClosed>().reason.message, Catch::Contains("wrong node"));
+}
+
+TEST_CASE("STARTTLS where it can't be done any more") {
+  Loopback pair;
+  const auto ask = [](Message& message) { message.begin_entry(EntryType::stream_op, {}, "STARTTLS"); };
+  pair.connect();
+  CHECK(pair.answer_to(ask).message == "Server certificate not loaded");
+  ServiceSessionOptions options;
+  options.connection.is_encrypted = true;
+  Loopback encrypted;
+  encrypted.service = std::make_unique<ServiceSession>(encrypted.directory, options, encrypted.now);
+  encrypted.connect();
+  CHECK(encrypted.answer_to(ask).message == "Invalid Stream Operation");
 }
 
 TEST_CASE("properties are read and written, directions hold on both sides") {

@@ -3,10 +3,14 @@
 #include <map>
 
 #include "server/node/client.hpp"
+#include "server/security/certificate_files.hpp"
 #include "test/interop/cpp/plain_value.hpp"
 #include "test/interop/cpp/scenario_value.hpp"
 
 namespace {
+
+/// For all connections; set by the command line.
+rr::ConnectOptions connect_options;
 
 using nlohmann::json;
 
@@ -14,7 +18,7 @@ constexpr std::chrono::seconds patience{10};
 
 class Client {
  public:
-  explicit Client(const std::string& url) : url_(url), root_(rr::connect(url)) {}
+  explicit Client(const std::string& url) : url_(url), root_(rr::connect(url, connect_options)) {}
 
   json carry_out(const json& step) {
     const rr::RemoteObject target = find(step);
@@ -268,9 +272,10 @@ class Client {
   json open(const rr::RemoteObject&, const std::string& name, const json& step) {
     std::string url = url_;
     url.replace(url.find("service=interop"), std::string::npos, "service=" + step.at("service").get<std::string>());
-    others_.insert_or_assign(name, step.contains("username") ? rr::connect(url, step.at("username").get<std::string>(),
-                                                                           step.at("password").get<std::string>())
-                                                             : rr::connect(url));
+    const auto text = [&step](const char* key) { return step.at(key).get<std::string>(); };
+    others_.insert_or_assign(name, step.contains("username")
+                                       ? rr::connect(url, text("username"), text("password"), connect_options)
+                                       : rr::connect(url, connect_options));
     return nullptr;
   }
 
@@ -347,10 +352,19 @@ json run_scenario(const std::string& url, const json& steps) {
 
 int main(int argc, char** argv) {
   if (argc < 2) {
-    std::cerr << "usage: rr-test-client URL < scenario.json\n";
+    std::cerr
+        << "usage: rr-test-client URL [--robotraconteur-nodeid=ID --robotraconteur-load-tls=true] < scenario.json\n";
     return 2;
   }
   try {
+    for (int i = 2; i < argc; ++i) {
+      const std::string_view argument = argv[i];
+      constexpr std::string_view node_id = "--robotraconteur-nodeid=";
+      if (argument.substr(0, node_id.size()) == node_id)
+        connect_options.connection.self.id = rr::parse_node_id(argument.substr(node_id.size())).value();
+      if (argument == "--robotraconteur-load-tls=true")
+        connect_options.dial.tls = rr::load_node_tls(connect_options.connection.self.id).value();
+    }
     std::cout << run_scenario(argv[1], json::parse(std::cin).at("steps")) << std::endl;
   } catch (const std::exception& failure) {
     std::cerr << "rr-test-client: " << failure.what() << '\n';

@@ -10,6 +10,7 @@
 
 #include "core/types/pack.hpp"
 #include "server/node/node.hpp"
+#include "server/security/certificate_files.hpp"
 #include "server/security/password_file.hpp"
 
 namespace {
@@ -312,7 +313,7 @@ class Guarded {
 };
 
 /// Name, hash of the password (secret, hunter2, toor, secret), privileges; bob's as our own files have it.
-rr::SecurityPolicy make_security(bool require_valid_user) {
+rr::SecurityPolicy make_security(bool require_valid_user, bool requires_verified_client = false) {
   const auto bob = rr::PasswordHash::make_scrypt("hunter2", {10, 8, 1}).value().text();
   const std::string users =
       "alice 5ebe2294ecd0e0f08eab7690d2a6ee69 objectlock\n"
@@ -322,7 +323,9 @@ rr::SecurityPolicy make_security(bool require_valid_user) {
       "root 7b24afc8bc80e548d66c4e7ff72171c5 objectlock,objectlockoverride\n"
       "guest 5ebe2294ecd0e0f08eab7690d2a6ee69 _\n";
   rr::SecurityPolicy policy;
-  policy.authenticator = rr::PasswordFileAuthenticator::from_text(users, {.accepts_md5 = true}).value();
+  policy.authenticator = rr::PasswordFileAuthenticator::from_text(
+                             users, {.accepts_md5 = true, .requires_verified_client = requires_verified_client})
+                             .value();
   policy.require_valid_user = require_valid_user;
   policy.allow_object_lock = true;
   return policy;
@@ -334,6 +337,10 @@ rr::NodeOptions parse_options(int argc, char** argv) {
     const std::string_view argument = argv[i];
     constexpr std::string_view allow_origin = "--allow-origin=";
     if (argument.starts_with(allow_origin)) options.allowed_origins.emplace_back(argument.substr(allow_origin.size()));
+    constexpr std::string_view node_id = "--robotraconteur-nodeid=";
+    if (argument.starts_with(node_id)) options.id = rr::parse_node_id(argument.substr(node_id.size())).value();
+    if (argument == "--robotraconteur-load-tls=true") options.tls = rr::load_node_tls(options.id).value();
+    if (argument == "--robotraconteur-require-tls=true") options.require_tls = true;
     if (argument == "--robotraconteur-disable-message4=true") options.features.v4 = false;
     if (argument == "--robotraconteur-disable-stringtable=true")
       options.features.string_table = {.local = false, .standard = false};
@@ -360,6 +367,7 @@ int main(int argc, char** argv) {
     const Interop interop(node);
     const Guarded guarded(node, "guarded", make_security(true));
     const Guarded open(node, "open", make_security(false));
+    const Guarded proven(node, "proven", make_security(true, true));
     const std::string port = std::to_string(node.listen("rr+tcp://127.0.0.1:0"));
     std::cout << R"({"port": )" << port << R"(, "url": "rr+tcp://127.0.0.1:)" << port << R"(/?service=interop"})"
               << std::endl;

@@ -1,0 +1,22 @@
+// Whether a peer is the node that it says to be. Layer: security. Source: transports spec section 5.3.
+#pragma once
+
+#include "core/support/error.hpp"
+#include "core/support/node_id.hpp"
+
+struct x509_store_ctx_st;
+
+namespace rr {
+
+/// Checks the chain of a peer: as any chain, then that each certificate is marked for its level (root, intermediate,
+/// node) by a critical extension and has no other critical one that is unknown, and the subject.
+/// Returns  the node that the certificate is of.
+/// Errors   authentication_error: which certificate fails which check.
+Result<NodeId> check_node_chain(x509_store_ctx_st* store);
+
+/// The object identifiers that mark the levels.
+inline constexpr const char* root_oid = "1.3.6.1.4.1.45455.1.1.3.1";
+inline constexpr const char* intermediate_oid = "1.3.6.1.4.1.45455.1.1.3.2";
+inline constexpr const char* node_oid = "1.3.6.1.4.1.45455.1.1.3.3";
+
+}  // namespace rr
