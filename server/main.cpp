@@ -12,6 +12,8 @@ int main(int count, char** values) {
       {"fmt", "fmt [--in-place | --check | --compat] FILE...", "print or lay out service definitions", rrgate::run_fmt},
       {"generate", "generate ts|cpp FILE...|URL [-o OUT] [-I DIR]", "write TypeScript types or C++ classes",
        rrgate::run_generate},
+      {"cert", "cert ca|node|web FOLDER [NODE | HOST...] [--force]", "make certificates for nodes and HTTPS",
+       rrgate::run_cert},
   };
   const std::vector<std::string_view> arguments(values + 1, values + count);
   return rrgate::run_command_line(commands, arguments);

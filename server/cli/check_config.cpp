@@ -11,6 +11,11 @@ int run_check_config(Arguments arguments) {
   const auto& file = parsed.operands.front();
   const auto config = load_config(file);
   if (!report_findings(file, config)) return exit_usage;
+  if (const auto& certificates = config.config.tls.certificates; !certificates.empty())
+    if (const auto tls = rr::make_web_tls(certificates); !tls) {
+      std::cerr << short_name(file) << ": /tls/certificates: " << tls.error().message << "\n";
+      return exit_usage;
+    }
   std::cout << short_name(file) << ": good; " << config.config.devices.size() << " devices\n";
   return exit_ok;
 }

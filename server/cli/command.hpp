@@ -52,5 +52,6 @@ int run_demo(Arguments arguments);
 int run_check(Arguments arguments);
 int run_fmt(Arguments arguments);
 int run_generate(Arguments arguments);
+int run_cert(Arguments arguments);
 
 }  // namespace rrgate

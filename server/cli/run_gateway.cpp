@@ -42,11 +42,16 @@ int run_gateway(Config config, const OnStarted& on_started) {
 
   boost::asio::io_context io(1);
   Gateway gateway(io, std::move(config));
-  boost::asio::signal_set signals(io, SIGTERM, SIGINT);
+  boost::asio::signal_set signals(io, SIGTERM, SIGINT, SIGHUP);
   std::function<void()> wait_for_signal = [&] {
     signals.async_wait([&](const boost::system::error_code& error, int number) {
       if (error) return;
       log(LogLevel::info, "signal", {{"number", number}});
+      if (number == SIGHUP) {
+        gateway.reload_tls();
+        wait_for_signal();
+        return;
+      }
       wait_for_signal();  // first: an idle gateway stops within the call below
       gateway.stop([&] { signals.cancel(); });
     });

@@ -12,7 +12,8 @@ namespace rrgate {
 /// Called once the listeners are open; the gateway is not yet serving.
 using OnStarted = std::function<void(boost::asio::io_context&, Gateway&, const std::vector<rr::HostPort>& addresses)>;
 
-/// Serves until SIGTERM or SIGINT, then drains; a second signal ends what is left at once. Returns an exit code.
+/// Serves until SIGTERM or SIGINT, then drains; a second signal ends what is left at once. SIGHUP reads
+/// certificates anew. Returns an exit code.
 int run_gateway(Config config, const OnStarted& on_started);
 
 /// The dashboard that belongs to this program: beside an installed program (../share/rrgate/web) or in the source tree

@@ -1,6 +1,4 @@
 // rrgate serve: the gateway as a service. Layer: server/cli.
-#include <filesystem>
-
 #include "server/cli/command.hpp"
 #include "server/cli/findings.hpp"
 #include "server/cli/run_gateway.hpp"
@@ -16,9 +14,6 @@ int run_serve(Arguments arguments) {
   if (file == parsed.options.end()) return usage_error("serve", "missing --config FILE");
   auto config = load_config(file->second);
   if (!report_findings(file->second, config)) return exit_usage;
-  // A relative folder counts from the file that names it, wherever the program was started.
-  auto& web_root = config.config.web_root;
-  if (!web_root.empty()) web_root = (std::filesystem::path(file->second).parent_path() / web_root).string();
   return run_gateway(std::move(config.config), [](auto&, auto&, const auto&) {});
 }
 

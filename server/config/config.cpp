@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -38,6 +39,21 @@ std::string read_device_url(const std::string& text, rr::ConnectionUrl& target) 
   return {};
 }
 
+constexpr auto no_file_name = "empty; expected the name of a file";
+
+auto read_file_name(std::string& target) {
+  return [&target](const std::string& text) -> std::string {
+    target = text;
+    return text.empty() ? no_file_name : "";
+  };
+}
+auto read_file_name(std::vector<std::string>& target) {
+  return [&target](const std::string& text) -> std::string {
+    target.push_back(text);
+    return text.empty() ? no_file_name : "";
+  };
+}
+
 void read_device(ObjectReader& in, DeviceConfig& device) {
   in.required_text("name", [&](const std::string& text) {
     device.name = text;
@@ -45,6 +61,17 @@ void read_device(ObjectReader& in, DeviceConfig& device) {
   });
   in.required_text("url", [&](const std::string& text) { return read_device_url(text, device.url); });
   in.size("max_clients", device.max_clients, {0, 1'000'000});
+  in.object("tls", [&](ObjectReader& part) { part.texts("ca", false, read_file_name(device.tls.ca)); });
+}
+
+void read_tls(ObjectReader& in, TlsConfig& tls) {
+  in.objects("certificates", false, [&](ObjectReader& item) {
+    rr::WebCertificate certificate;
+    item.required_text("cert", read_file_name(certificate.certificate_file));
+    item.required_text("key", read_file_name(certificate.key_file));
+    tls.certificates.push_back(std::move(certificate));
+  });
+  in.size("hsts_seconds", tls.hsts_seconds, {0, 100'000'000});
 }
 
 void read_discover_rule(ObjectReader& in, DiscoverRule& rule) {
@@ -129,6 +156,7 @@ void read_config(ObjectReader& in, Config& config) {
     config.allowed_origins.push_back(text);
     return {};
   });
+  in.object("tls", [&](ObjectReader& part) { read_tls(part, config.tls); });
   in.object("limits", [&](ObjectReader& part) { read_limits(part, config.limits); });
   in.object("timeouts", [&](ObjectReader& part) { read_timeouts(part, config.timeouts); });
   in.object("retry", [&](ObjectReader& part) { read_retry(part, config.retry); });
@@ -192,7 +220,19 @@ ParsedConfig load_config(const std::string& file) {
     out.findings.push_back({{}, "can't be read; expected a JSON file"});
     return out;
   }
-  return parse_config(text.str());
+  auto parsed = parse_config(text.str());
+  const auto folder = std::filesystem::path(file).parent_path();
+  const auto locate = [&folder](std::string& path) {
+    if (!path.empty()) path = (folder / path).string();
+  };
+  locate(parsed.config.web_root);
+  for (auto& certificate : parsed.config.tls.certificates) {
+    locate(certificate.certificate_file);
+    locate(certificate.key_file);
+  }
+  for (auto& device : parsed.config.devices)
+    for (auto& ca : device.tls.ca) locate(ca);
+  return parsed;
 }
 
 std::vector<OptionInfo> config_options() {

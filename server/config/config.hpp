@@ -10,16 +10,26 @@
 
 #include "core/session/url.hpp"
 #include "server/config/finding.hpp"
+#include "server/security/tls_context.hpp"
 
 namespace rrgate {
 
 using std::chrono::milliseconds;
+
+/// How a device that is reached by TLS is checked. The gateway itself shows no certificate: the clients whose messages
+/// it relays are other nodes than it.
+struct DeviceTls {
+  std::vector<std::string> ca;  ///< PEM files; empty: what every Robot Raconteur program on this machine trusts
+
+  bool operator==(const DeviceTls&) const = default;
+};
 
 struct DeviceConfig {
   std::string name;  ///< the path segment of /devices/<name>
   rr::ConnectionUrl url;
   std::size_t max_clients = 0;  ///< 0: no bound of its own
   bool is_found = false;        ///< by discovery, not configured
+  DeviceTls tls;
 
   bool operator==(const DeviceConfig&) const = default;
 };
@@ -53,6 +63,14 @@ struct Retry {
   bool operator==(const Retry&) const = default;
 };
 
+/// HTTPS and secure WebSockets, on the same ports as everything else.
+struct TlsConfig {
+  std::vector<rr::WebCertificate> certificates;  ///< empty: TLS is not served
+  std::size_t hsts_seconds = 0;                  ///< how long browsers shall come by HTTPS alone; 0: they are not told
+
+  bool operator==(const TlsConfig&) const = default;
+};
+
 struct LogConfig {
   std::string level = "info";
   std::string format = "text";
@@ -84,6 +102,7 @@ struct Config {
   Discover discover;
   std::string web_root;  ///< folder of the dashboard; empty: the one that was installed with the program
   std::vector<std::string> allowed_origins;
+  TlsConfig tls;
   Limits limits;
   Timeouts timeouts;
   Retry retry;
@@ -100,7 +119,8 @@ struct ParsedConfig {
 };
 ParsedConfig parse_config(std::string_view text);
 
-/// The same for a file; a file that can't be read is a finding with an empty path.
+/// The same for a file; a file that can't be read is a finding with an empty path. Relative paths in it count from its
+/// folder.
 ParsedConfig load_config(const std::string& file);
 
 /// Every option the parser knows, in its order: what the schema must say too.

@@ -93,7 +93,9 @@ awaitable<Result<NodeServices>> query_services(ConnectionUrl url, ServiceQueryOp
   Deadline limit(stream.executor(), [&stream] { stream.close(); });
   limit.arm(options.dial.timeout);
 
-  ClientSession session(index_options(url, options), read_clocks());
+  auto session_options = index_options(url, options);
+  session_options.connection.known_peer = stream.verified_peer();
+  ClientSession session(std::move(session_options), read_clocks());
   NodeServices result;
   std::optional<Error> failure;
   Bytes buffer(16 * 1024);

@@ -22,6 +22,11 @@ milliseconds with_jitter(milliseconds wait) {
   return wait * std::uniform_int_distribution<int>(75, 125)(random) / 100;
 }
 
+bool is_secure(const rr::ConnectionUrl& url) {
+  const auto* scheme = rr::find_url_scheme(url.scheme);
+  return scheme && scheme->is_secure;
+}
+
 }  // namespace
 
 std::string_view to_string(DeviceState state) {
@@ -39,13 +44,31 @@ std::string_view to_string(DeviceState state) {
 Device::Device(const asio::any_io_executor& executor, DeviceConfig config, const Config& whole)
     : config_(std::move(config)),
       dial_options_{whole.timeouts.connect, whole.timeouts.send_stall},
+      tls_(is_secure(config_.url) ? std::make_unique<TlsFiles>(config_.tls) : nullptr),
       retry_(whole.retry),
       wake_(executor) {}
+
+rr::DialOptions Device::dial_options() const {
+  auto options = dial_options_;
+  if (tls_) options.tls = tls_->context();
+  return options;
+}
+
+rr::Result<> Device::load_tls() {
+  if (!tls_) return {};
+  auto loaded = tls_->load();
+  if (!loaded) loaded.error().message = "device " + rr::quoted(config_.name) + ": " + loaded.error().message;
+  return loaded;
+}
+
+void Device::reload_tls(bool is_forced) {
+  if (tls_ && (is_forced || tls_->has_changed()) && tls_->reload()) look_again();
+}
 
 rr::awaitable<rr::Result<std::unique_ptr<rr::ByteStream>>> Device::connect() {
   rr::Result<std::unique_ptr<rr::ByteStream>> stream = rr::Error{};
   for (const auto& url : urls_to_try()) {
-    stream = co_await rr::dial(url, dial_options_);
+    stream = co_await rr::dial(url, dial_options());
     if (stream) break;
   }
   // News either way: it was thought online and can't be reached, or it is back before the next look was due.
@@ -64,7 +87,7 @@ rr::awaitable<void> Device::watch() {
     looks_again_ = false;
     rr::Result<ProbeResult> result = rr::Error{};
     for (const auto& url : urls_to_try()) {
-      result = co_await probe(url, dial_options_);
+      result = co_await probe(url, dial_options());
       if (is_stopping_) break;
       if (!result) continue;
       config_.url = url;
@@ -130,6 +153,16 @@ void Device::note(const rr::Result<ProbeResult>& result) {
 DeviceRegistry::DeviceRegistry(const asio::any_io_executor& executor, const Config& config)
     : executor_(executor), config_(config) {
   for (const auto& device : config.devices) devices_.push_back(std::make_shared<Device>(executor, device, config));
+}
+
+rr::Result<> DeviceRegistry::load_tls() {
+  for (const auto& device : devices_)
+    if (auto loaded = device->load_tls(); !loaded) return loaded;
+  return {};
+}
+
+void DeviceRegistry::reload_tls(bool is_forced) {
+  for (const auto& device : devices_) device->reload_tls(is_forced);
 }
 
 namespace {

@@ -10,6 +10,7 @@
 
 #include "server/config/config.hpp"
 #include "server/gateway/probe.hpp"
+#include "server/gateway/tls_files.hpp"
 #include "server/transport/dial.hpp"
 
 namespace rrgate {
@@ -54,11 +55,16 @@ class Device : public std::enable_shared_from_this<Device> {
   /// nullopt when the device has as many clients as it may.
   std::optional<Seat> take_seat();
 
+  /// For devices by TLS: reads the CAs that it is checked against. See TlsFiles.
+  [[nodiscard]] rr::Result<> load_tls();
+  void reload_tls(bool is_forced);
+
   /// Probes until stop().
   rr::awaitable<void> watch();
   void stop();
 
  private:
+  rr::DialOptions dial_options() const;
   void look_again();
   /// The one that worked last, then the others.
   std::vector<rr::ConnectionUrl> urls_to_try() const;
@@ -67,6 +73,7 @@ class Device : public std::enable_shared_from_this<Device> {
   DeviceConfig config_;
   std::vector<rr::ConnectionUrl> urls_;  ///< of a found device
   rr::DialOptions dial_options_;
+  std::unique_ptr<TlsFiles> tls_;  ///< null: the URL wants none
   Retry retry_;
   DeviceState state_ = DeviceState::connecting;
   std::string last_error_;
@@ -82,6 +89,9 @@ class DeviceRegistry {
   /// `config`  must outlive it.
   DeviceRegistry(const boost::asio::any_io_executor& executor, const Config& config);
 
+  /// Errors   those of make_node_tls(), with the device's name.
+  [[nodiscard]] rr::Result<> load_tls();
+  void reload_tls(bool is_forced);
   void start();
   void stop();
 

@@ -2,9 +2,29 @@
 
 #include <algorithm>
 
+#include "core/wire/codec.hpp"
 #include "core/wire/frame_start.hpp"
 
 namespace rrgate {
+
+namespace {
+
+/// STARTTLS stands at the beginning, behind a few other stream operations at most, and its answer is short.
+constexpr std::size_t early_messages = 8;
+constexpr std::size_t early_size = 4096;
+
+}  // namespace
+
+void FrameGate::look_for_start_tls() {
+  ++seen_;
+  rr::Message message;
+  if (!early_.empty() && rr::decode(early_, {}, message) && message.entries.size() == 1) {
+    const auto& entry = message.entries.front();
+    has_seen_start_tls_ = entry.type == rr::EntryType::stream_op_ret && entry.member_name == "STARTTLS" &&
+                          entry.error == rr::ErrorCode::none;
+  }
+  early_ = {};
+}
 
 rr::Result<std::size_t> FrameGate::pass(rr::ByteSpan bytes) {
   if (is_opaque_) return bytes.size();
@@ -19,10 +39,16 @@ rr::Result<std::size_t> FrameGate::pass(rr::ByteSpan bytes) {
       }
       if (start.size() < rr::frame_start_size) return passed;
       left_ = rr::frame_message_size(start);
+      is_early_ = seen_ < early_messages && left_ <= early_size;
     }
     const auto count = std::min(left_, bytes.size() - passed);
+    if (is_early_) {
+      const auto part = bytes.subspan(passed, count);
+      early_.insert(early_.end(), part.begin(), part.end());
+    }
     left_ -= count;
     passed += count;
+    if (left_ == 0 && seen_ < early_messages) look_for_start_tls();
   }
   return passed;
 }

@@ -22,12 +22,21 @@ class FrameGate {
 
   /// After in-stream TLS began: everything passes, unread.
   void make_opaque() { is_opaque_ = true; }
+  /// Whether one of the first messages was a service's consent to TLS: what follows, both ways, is no message. Asked of
+  /// the gate from the device.
+  bool has_seen_start_tls() const { return has_seen_start_tls_; }
   /// Whether the last error was a message above the limit.
   bool is_too_large() const { return is_too_large_; }
 
  private:
+  void look_for_start_tls();
+
   std::size_t limit_;
   std::size_t left_ = 0;  ///< bytes of the current message still to come
+  std::size_t seen_ = 0;  ///< messages, as long as they are looked at
+  rr::Bytes early_;       ///< the current message, if it is one of the first and small
+  bool is_early_ = false;
+  bool has_seen_start_tls_ = false;
   bool is_opaque_ = false;
   bool is_too_large_ = false;
 };

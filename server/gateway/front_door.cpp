@@ -7,6 +7,7 @@
 #include "server/gateway/http_client.hpp"
 #include "server/gateway/native_client.hpp"
 #include "server/log/log.hpp"
+#include "server/transport/tls.hpp"
 #include "server/transport/watchdog.hpp"
 
 namespace rrgate {
@@ -26,29 +27,66 @@ Protocol detect_protocol(rr::ByteSpan first_bytes) {
   return text.size() == 4 ? Protocol::http : Protocol::undecided;
 }
 
-rr::awaitable<void> serve_connection(Gateway& gateway, std::unique_ptr<rr::TcpStream> stream, Admission::Ticket) {
-  auto& tcp = *stream;
-  Connection connection;
-  connection.stop = [&tcp](const rr::EndReason&) { tcp.close(); };
-  gateway.add(connection);
-  rr::Deadline limit(tcp.executor(), [&tcp] { tcp.close(); });
-  limit.arm(gateway.config().limits.header_timeout);
+namespace {
 
+/// Reads until the first bytes tell the protocol, and puts them back. Undecided: the connection ended before.
+rr::awaitable<Protocol> look_at_first_bytes(rr::ByteStream& stream, std::chrono::milliseconds patience) {
+  rr::Deadline limit(stream.executor(), [&stream] { stream.close(); });
+  limit.arm(patience);
   std::array<std::uint8_t, 4096> first{};
   std::size_t size = 0;
   auto protocol = Protocol::undecided;
   while (protocol == Protocol::undecided) {
-    const auto read = co_await tcp.read_some(std::span(first).subspan(size));
+    const auto read = co_await stream.read_some(std::span(first).subspan(size));
     if (read.error || read.is_end()) {
       if (size > 0 || !limit.is_armed())
-        log(LogLevel::debug, "connection ended before its first bytes told the protocol", {{"peer", tcp.peer()}});
-      co_return;
+        log(LogLevel::debug, "connection ended before its first bytes told the protocol", {{"peer", stream.peer()}});
+      co_return Protocol::undecided;
     }
     size += read.bytes;
     protocol = detect_protocol({first.data(), size});
   }
-  limit.disarm();
-  tcp.put_back({first.data(), size});
+  if (protocol == Protocol::unknown)
+    log(LogLevel::info, "connection closed: neither Robot Raconteur nor HTTP",
+        {{"peer", stream.peer()}, {"found", rr::as_text({first.data(), std::min<std::size_t>(size, 16)})}});
+  stream.put_back({first.data(), size});
+  co_return protocol;
+}
+
+/// The stream inside TLS; null where there is none.
+rr::awaitable<std::unique_ptr<rr::ByteStream>> accept_https(Gateway& gateway, std::unique_ptr<rr::ByteStream> stream) {
+  const auto context = gateway.tls();
+  if (!context) {
+    log(LogLevel::info, "connection closed: TLS is not served here", {{"peer", stream->peer()}});
+    co_return nullptr;
+  }
+  const rr::TlsPeerOptions any_client;
+  auto tls = std::make_unique<rr::TlsStream>(std::move(stream), context, rr::TlsRole::server, any_client);
+  const auto done = co_await tls->handshake(gateway.config().limits.header_timeout);
+  if (!done) {
+    log(LogLevel::info, "connection closed", {{"error", done.error().message}});
+    co_return nullptr;
+  }
+  co_return tls;
+}
+
+}  // namespace
+
+rr::awaitable<void> serve_connection(Gateway& gateway, std::unique_ptr<rr::ByteStream> stream, Admission::Ticket) {
+  rr::ByteStream* current = stream.get();
+  Connection connection;
+  connection.stop = [&current](const rr::EndReason&) { current->close(); };
+  gateway.add(connection);
+  const auto patience = gateway.config().limits.header_timeout;
+  auto protocol = co_await look_at_first_bytes(*stream, patience);
+  if (protocol == Protocol::tls) {
+    // Closing what is below closes the TLS stream too, whose part it becomes: `current` holds through the handshake.
+    stream = co_await accept_https(gateway, std::move(stream));
+    if (!stream) co_return;
+    current = stream.get();
+    connection.is_encrypted = true;
+    protocol = co_await look_at_first_bytes(*stream, patience);
+  }
 
   switch (protocol) {
     case Protocol::robot_raconteur:
@@ -57,18 +95,16 @@ rr::awaitable<void> serve_connection(Gateway& gateway, std::unique_ptr<rr::TcpSt
     case Protocol::http:
       co_await serve_http_client(gateway, connection, std::move(stream));
       break;
-    case Protocol::tls:
-      log(LogLevel::info, "connection closed: TLS is not served on this port", {{"peer", tcp.peer()}});
-      break;
-    default: {
+    case Protocol::unknown: {
       // The line that native nodes answer with.
-      log(LogLevel::info, "connection closed: neither Robot Raconteur nor HTTP",
-          {{"peer", tcp.peer()}, {"found", rr::as_text({first.data(), std::min<std::size_t>(size, 16)})}});
       const auto line = rr::as_bytes("HTTP/1.1 404 File Not Found\r\n");
       const std::span<const rr::ByteSpan> slices(&line, 1);
-      co_await tcp.write(slices);
-      co_await tcp.end(rr::no_reason);
+      co_await current->write(slices);
+      co_await current->end(rr::no_reason);
+      break;
     }
+    default:
+      break;
   }
 }
 

@@ -1,4 +1,4 @@
-// One port for all: tells raw Robot Raconteur from HTTP by the first bytes. Layer: server/gateway.
+// One port for all: tells raw Robot Raconteur, HTTP and TLS apart by the first bytes. Layer: server/gateway.
 // Source: transports spec section 4.1.
 #pragma once
 
@@ -6,7 +6,7 @@
 #include <span>
 
 #include "server/gateway/admission.hpp"
-#include "server/transport/tcp.hpp"
+#include "server/transport/byte_stream.hpp"
 
 namespace rrgate {
 
@@ -16,7 +16,7 @@ enum class Protocol {
   undecided,  ///< more bytes needed
   robot_raconteur,
   http,
-  tls,  ///< a ClientHello; not served yet
+  tls,  ///< a ClientHello; one of the others follows inside
   unknown,
 };
 
@@ -24,6 +24,7 @@ enum class Protocol {
 Protocol detect_protocol(rr::ByteSpan first_bytes);
 
 /// Serves one accepted connection to its end.
-rr::awaitable<void> serve_connection(Gateway& gateway, std::unique_ptr<rr::TcpStream> stream, Admission::Ticket ticket);
+rr::awaitable<void> serve_connection(Gateway& gateway, std::unique_ptr<rr::ByteStream> stream,
+                                     Admission::Ticket ticket);
 
 }  // namespace rrgate

@@ -20,6 +20,9 @@ namespace {
 /// After connections were told to end: close frames leave, answers come, sockets close.
 constexpr std::chrono::milliseconds last_wait{2000};
 
+/// How often the files of certificates and CAs are looked at.
+constexpr std::chrono::seconds tls_watch_period{2};
+
 rr::NodeId random_node_id() {
   std::random_device random;
   rr::NodeId id;
@@ -34,13 +37,18 @@ rr::NodeId random_node_id() {
 Gateway::Gateway(asio::io_context& io, Config config)
     : io_(io),
       config_(std::move(config)),
+      web_tls_(config_.tls.certificates.empty() ? nullptr : std::make_unique<TlsFiles>(config_.tls.certificates)),
       devices_(io.get_executor(), config_),
       admission_(config_.limits.clients, config_.limits.clients_per_address),
       router_(make_routes(*this)),
       node_id_(random_node_id()),
+      tls_watch_(io),
       drained_(io) {}
 
 rr::Result<std::vector<rr::HostPort>> Gateway::start() {
+  if (web_tls_)
+    if (auto loaded = web_tls_->load(); !loaded) return loaded.error();
+  if (auto loaded = devices_.load_tls(); !loaded) return loaded.error();
   std::vector<rr::HostPort> bound;
   for (const auto& address : config_.listen) {
     auto listener = std::make_unique<rr::TcpListener>(io_.get_executor());
@@ -60,7 +68,23 @@ rr::Result<std::vector<rr::HostPort>> Gateway::start() {
     found_ = std::make_unique<FoundDevices>(io_, config_, devices_);
     found_->start();
   }
+  asio::co_spawn(io_, watch_tls(), asio::detached);
   return bound;
+}
+
+rr::awaitable<void> Gateway::watch_tls() {
+  while (!is_stopping_) {
+    tls_watch_.expires_after(tls_watch_period);
+    co_await tls_watch_.async_wait(asio::as_tuple(asio::use_awaitable));
+    if (is_stopping_) break;
+    if (web_tls_ && web_tls_->has_changed()) web_tls_->reload();
+    devices_.reload_tls(false);
+  }
+}
+
+void Gateway::reload_tls() {
+  if (web_tls_) web_tls_->reload();
+  devices_.reload_tls(true);
 }
 
 void Gateway::accept(asio::ip::tcp::socket socket) {
@@ -100,6 +124,7 @@ void Gateway::stop(std::function<void()> on_stopped) {
   for (const auto& listener : listeners_) listener->close();
   if (found_) found_->stop();
   devices_.stop();
+  tls_watch_.cancel();
   asio::co_spawn(io_, drain(), asio::detached);
 }
 

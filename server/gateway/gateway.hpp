@@ -11,6 +11,7 @@
 #include "server/gateway/admission.hpp"
 #include "server/gateway/device.hpp"
 #include "server/gateway/found_devices.hpp"
+#include "server/gateway/tls_files.hpp"
 #include "server/http/router.hpp"
 #include "server/transport/tcp.hpp"
 
@@ -22,6 +23,7 @@ struct Connection : boost::intrusive::list_base_hook<boost::intrusive::link_mode
   std::function<void(rr::EndReason)> stop;
   /// Whether it may go on for a while when the gateway stops: it carries a client's session.
   bool is_relay = false;
+  bool is_encrypted = false;
 };
 
 /// Uses one thread: that of the io_context. Outlives its run().
@@ -39,6 +41,9 @@ class Gateway {
   /// left. A second call ends them at once.
   void stop(std::function<void()> on_stopped);
   bool is_stopping() const { return is_stopping_; }
+  /// Reads certificates, keys and CAs anew. What can't be used stays as it was, and the log says why. Connections that
+  /// are open keep what they have.
+  void reload_tls();
   /// Called when stopping begins.
   void on_stop(std::function<void()> call) { on_stop_ = std::move(call); }
 
@@ -48,6 +53,8 @@ class Gateway {
   /// Null where the configuration has no "discover", and before start().
   FoundDevices* found() { return found_.get(); }
   const Router& router() const { return router_; }
+  /// What new connections are encrypted with; null: TLS is not served.
+  rr::TlsContextPtr tls() const { return web_tls_ ? web_tls_->context() : nullptr; }
   /// Our own node id, for answers to native clients that no device takes.
   const rr::NodeId& node_id() const { return node_id_; }
   void add(Connection& connection) { connections_.push_back(connection); }
@@ -55,11 +62,13 @@ class Gateway {
  private:
   void accept(boost::asio::ip::tcp::socket socket);
   rr::awaitable<void> drain();
+  rr::awaitable<void> watch_tls();
   bool has_relay() const;
   void end_all(const rr::EndReason& reason);
 
   boost::asio::io_context& io_;
   Config config_;
+  std::unique_ptr<TlsFiles> web_tls_;
   DeviceRegistry devices_;
   std::unique_ptr<FoundDevices> found_;
   Admission admission_;
@@ -72,6 +81,7 @@ class Gateway {
   bool ends_at_once_ = false;
   std::function<void()> on_stop_;
   std::function<void()> on_stopped_;
+  boost::asio::steady_timer tls_watch_;
   boost::asio::steady_timer drained_;  ///< cancelled when a connection ends while stopping
 };
 

@@ -56,7 +56,7 @@ rr::Result<Device*> find_device(Gateway& gateway, const Request& request) {
 }
 
 /// Carries an upgrade through. The stream is used up.
-rr::awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, std::unique_ptr<rr::TcpStream> stream,
+rr::awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, std::unique_ptr<rr::ByteStream> stream,
                                     const Request& request, rr::ByteSpan unread) {
   auto& tcp = *stream;
   const auto refuse = [&tcp, &request](const Response& refusal) -> rr::awaitable<void> {
@@ -101,7 +101,8 @@ rr::awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, st
 
 }  // namespace
 
-rr::awaitable<void> serve_http_client(Gateway& gateway, Connection& connection, std::unique_ptr<rr::TcpStream> stream) {
+rr::awaitable<void> serve_http_client(Gateway& gateway, Connection& connection,
+                                      std::unique_ptr<rr::ByteStream> stream) {
   const auto& config = gateway.config();
   const RequestLimits limits{config.limits.header_bytes, config.limits.header_timeout, config.timeouts.idle};
   RequestReader reader(*stream, limits);
@@ -124,6 +125,8 @@ rr::awaitable<void> serve_http_client(Gateway& gateway, Connection& connection, 
     }
     auto response = gateway.router().answer(request);
     if (gateway.is_stopping()) response.closes = true;
+    if (connection.is_encrypted && config.tls.hsts_seconds > 0)
+      response.set("Strict-Transport-Security", "max-age=" + std::to_string(config.tls.hsts_seconds));
     const bool goes_on = request.message.keep_alive() && !response.closes;
     if (co_await write_response(*stream, &request, response)) break;
     if (!goes_on) {

@@ -8,6 +8,6 @@
 namespace rrgate {
 
 /// Serves requests, kept alive and pipelined, until the connection ends or becomes a WebSocket and that ends.
-rr::awaitable<void> serve_http_client(Gateway& gateway, Connection& connection, std::unique_ptr<rr::TcpStream> stream);
+rr::awaitable<void> serve_http_client(Gateway& gateway, Connection& connection, std::unique_ptr<rr::ByteStream> stream);
 
 }  // namespace rrgate

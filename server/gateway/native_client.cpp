@@ -16,7 +16,7 @@ namespace {
 constexpr std::size_t largest_first_message = 512 * 1024;
 
 /// Reads one message and puts all that was read back, for the relay. Errors: as FrameScanner, or the connection ended.
-rr::awaitable<rr::Result<rr::Bytes>> read_first_message(rr::TcpStream& stream, std::size_t limit) {
+rr::awaitable<rr::Result<rr::Bytes>> read_first_message(rr::ByteStream& stream, std::size_t limit) {
   rr::FrameScanner scanner(limit);
   rr::Bytes seen;
   rr::Bytes buffer(4096);
@@ -66,7 +66,7 @@ rr::Bytes make_refusal(const rr::Message& request, const rr::NodeId& own_id, con
 }
 
 rr::awaitable<void> serve_native_client(Gateway& gateway, Connection& connection,
-                                        std::unique_ptr<rr::TcpStream> stream) {
+                                        std::unique_ptr<rr::ByteStream> stream) {
   auto& client = *stream;
   rr::Deadline limit(client.executor(), [&client] { client.close(); });
   limit.arm(gateway.config().limits.header_timeout);

@@ -12,7 +12,7 @@ namespace rrgate {
 /// Reads the first message, routes by its ReceiverNodeID and ReceiverNodeName, and relays. A client that asks for a
 /// node that isn't here, or is down, gets the error reply a node would send.
 rr::awaitable<void> serve_native_client(Gateway& gateway, Connection& connection,
-                                        std::unique_ptr<rr::TcpStream> stream);
+                                        std::unique_ptr<rr::ByteStream> stream);
 
 /// The reply to a first message that reaches no device.
 rr::Bytes make_refusal(const rr::Message& request, const rr::NodeId& own_id, const rr::Error& error);

@@ -74,6 +74,10 @@ rr::awaitable<void> Relay::pump(Direction& direction) {
       break;
     }
     if (*passed == 0) continue;
+    if (direction.is_from_device && direction.gate.has_seen_start_tls()) {
+      to_client_.gate.make_opaque();
+      to_device_.gate.make_opaque();
+    }
     const rr::ByteSpan slice(buffer.get(), *passed);
     const auto error = co_await direction.to.write({&slice, 1});
     if (error) {

@@ -63,6 +63,20 @@ void list_schema(const nlohmann::json& schema, const std::string& path, bool is_
 
 }  // namespace
 
+TEST_CASE("certificates, and how devices are checked") {
+  const auto parsed = parse_config(
+      R"({"listen": ["127.0.0.1:0"], "devices": [{"name": "a", "url": "rrs+tcp://h:1/?service=s", "tls": {"ca": ["x"]}}],
+          "tls": {"certificates": [{"cert": "c", "key": "k"}], "hsts_seconds": 7}})");
+  REQUIRE(parsed.findings.empty());
+  CHECK(parsed.config.tls.certificates == std::vector<rr::WebCertificate>{{"c", "k"}});
+  CHECK(parsed.config.tls.hsts_seconds == 7);
+  CHECK(parsed.config.devices[0].tls.ca == std::vector<std::string>{"x"});
+  finds(with(R"("tls": {"certificates": [{"cert": "c", "key": ""}]})"),
+        "gateway.json: /tls/certificates/0/key: ", "empty");
+  finds(with(R"("tls": {"certificates": [{"cert": "c"}]})"), "gateway.json: /tls/certificates/0/key: ");
+  finds(with(R"("tls": {"certificate": []})"), "gateway.json: /tls/certificate: ");
+}
+
 TEST_CASE("the smallest configuration works, with the defaults") {
   const auto parsed = parse_config(smallest);
   CHECK(parsed.findings.empty());

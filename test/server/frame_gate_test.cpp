@@ -3,6 +3,8 @@
 #include <catch2/catch.hpp>
 #include <cstring>
 
+#include "core/session/start_tls.hpp"
+
 using namespace rrgate;
 
 namespace {
@@ -75,4 +77,25 @@ TEST_CASE("an opaque stream passes unread") {
   FrameGate gate(5000);
   gate.make_opaque();
   CHECK(gate.pass(rr::Bytes{0x16, 3, 1}).value() == 3);
+}
+
+TEST_CASE("a service's consent to TLS is seen, however it is cut, and its refusal is none") {
+  const rr::NodeIdentity self{rr::NodeId{{1}}, "device"};
+  const auto reply_to = [&](bool can_start_tls) {
+    return rr::answer_first_request(rr::make_start_tls({}, true), self, can_start_tls).value().reply;
+  };
+  for (const std::size_t step : {1u, 7u, 1000u}) {
+    FrameGate gate(5000);
+    offer(gate, reply_to(false), step);
+    CHECK_FALSE(gate.has_seen_start_tls());
+    offer(gate, reply_to(true), step);
+    CHECK(gate.has_seen_start_tls());
+  }
+  FrameGate from_client(5000);
+  offer(from_client, rr::make_start_tls({}, true), 1000);
+  CHECK_FALSE(from_client.has_seen_start_tls());
+  FrameGate late(5000);
+  for (int i = 0; i < 8; ++i) offer(late, message(16), 16);
+  offer(late, reply_to(true), 1000);
+  CHECK_FALSE(late.has_seen_start_tls());
 }
