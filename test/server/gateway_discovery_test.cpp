@@ -118,7 +118,7 @@ TEST_CASE("a lost node takes its device along; one that comes back has its name 
   }
 }
 
-TEST_CASE("a node at ananother port is reached there") {
+TEST_CASE("a node at another port is reached there") {
   Trap dead;
   const auto port = dead.port();
   dead.acceptor.close();
