@@ -31,6 +31,7 @@ class Network:
                 self._ip("-n", name, "link", "set", "lo", "up")
                 self._ip("-n", name, "addr", "add", f"10.77.0.{number + 1}/24", "broadcast", "10.77.0.255", "dev", "eth0")
                 self._ip("-n", name, "link", "set", "eth0", "up")
+                self._ip("-n", name, "route", "add", "default", "dev", "eth0")  # the reference sends to 255.255.255.255
             self._wait_for_addresses()
             self._check_entering()
         except BaseException:

@@ -59,9 +59,9 @@ def search(network, host, *command):
     return json.loads(done.stdout.strip().splitlines()[-1])
 
 
-def serve(start, implementation, host, name, node_id, port=0):
+def serve(start, implementation, host, name, node_id, port=0, *more):
     command = [OURS] if implementation == "ours" else THEIRS
-    process = start(host, *command, "serve", name, node_id, str(port))
+    process = start(host, *command, "serve", name, node_id, str(port), *more)
     process.next_line()
     return process
 
@@ -89,6 +89,17 @@ def test_nodes_are_found_by_ours(network, start, implementation):
     assert (service["node"], service["name"]) == ("a.node", "thing")
     (node,) = search(network, 2, OURS, "find-name", "a.node")["found"]
     assert node["id"] == IDS[1]
+
+
+def test_nodes_are_found_by_ipv4_broadcast(network, start):
+    watch = Watch(start(0, OURS, "watch", "ipv4"))
+    serve(start, "theirs", 1, "their.node", IDS[1], 0, "ipv4")
+    event = watch.wait_for(lambda event: event["id"] == IDS[1])
+    assert event["urls"][0].startswith("rr+tcp://10.77.0.2:")
+    serve(start, "ours", 2, "our.node", IDS[2], 0, "ipv4")
+    event = watch.wait_for(lambda event: event["id"] == IDS[2])
+    assert event["urls"][0].startswith("rr+tcp://10.77.0.3:")
+    assert {IDS[1], IDS[2]} <= set(search(network, 3, *THEIRS, "detected", "ipv4"))
 
 
 def test_a_new_service_changes_the_nonce(network, start):

@@ -1,10 +1,10 @@
 // Our peer of the discovery tests: announces a node, or says what it hears. One JSON object a line on standard output;
 // ends when standard input does.
 //
-//   rr-test-discovery serve NAME NODEID [PORT]   a node with the service "thing" of experimental.found.Thing; every
-//   line
+//   rr-test-discovery serve NAME NODEID [PORT [ipv4]]  a node with the service "thing" of experimental.found.Thing;
+//   every line
 //                                                of input adds another service
-//   rr-test-discovery watch                      nodes that come, change and go
+//   rr-test-discovery watch [ipv4]               nodes that come, change and go
 //   rr-test-discovery find-type TYPE | find-name NAME
 //                                                searches once
 #include <unistd.h>
@@ -70,12 +70,19 @@ struct Input {
   boost::asio::streambuf buffer_;
 };
 
-void serve(const std::string& name, const std::string& id, const std::string& port) {
+/// IPv6 link-local, or IPv4 broadcast alone.
+rr::DiscoveryOptions options_for(std::string_view ip) {
+  rr::DiscoveryOptions options;
+  if (ip == "ipv4") options.ip = rr::IpDiscoveryScopes{.link_local = false, .ipv4_broadcast = true};
+  return options;
+}
+
+void serve(const std::string& name, const std::string& id, const std::string& port, const std::string& ip) {
   boost::asio::io_context io(1);
   rr::NodeOptions options;
   options.id = rr::parse_node_id(id).value();
   rr::Node node(io, name, options);
-  rr::Discovery discovery(io);
+  rr::Discovery discovery(io, options_for(ip));
   node.add(make_thing("thing"));
   say({{"port", node.listen("rr+tcp://[::]:" + port)}});
   discovery.announce(node);
@@ -84,9 +91,9 @@ void serve(const std::string& name, const std::string& id, const std::string& po
   io.run();
 }
 
-void watch() {
+void watch(const std::string& ip) {
   boost::asio::io_context io(1);
-  rr::Discovery discovery(io);
+  rr::Discovery discovery(io, options_for(ip));
   say({{"ready", true}});
   discovery.watch([](const rr::NodeEvent& event) {
     constexpr const char* words[] = {"found", "changed", "lost"};
@@ -123,13 +130,14 @@ int main(int argc, char** argv) {
   const std::vector<std::string> words(argv + 1, argv + argc);
   try {
     if (words.size() >= 3 && words[0] == "serve")
-      serve(words[1], words[2], words.size() > 3 ? words[3] : "0");
-    else if (words.size() == 1 && words[0] == "watch")
-      watch();
+      serve(words[1], words[2], words.size() > 3 ? words[3] : "0", words.size() > 4 ? words[4] : "");
+    else if (!words.empty() && words[0] == "watch")
+      watch(words.size() > 1 ? words[1] : "");
     else if (words.size() == 2 && words[0].rfind("find-", 0) == 0)
       find(words[0], words[1]);
     else
-      throw std::invalid_argument("usage: serve NAME NODEID [PORT] | watch | find-type TYPE | find-name NAME");
+      throw std::invalid_argument(
+          "usage: serve NAME NODEID [PORT [ipv4]] | watch [ipv4] | find-type TYPE | find-name NAME");
   } catch (const std::exception& failure) {
     std::cerr << "rr-test-discovery: " << failure.what() << '\n';
     return 1;

@@ -1,8 +1,8 @@
 """The reference implementation in the discovery tests: announces a node, or searches. One line of JSON on standard output.
 
-found_node.py serve NAME NODEID [PORT]   a node with the service "thing"; runs until its standard input ends
-found_node.py find-type TYPE             its services, on nodes that it hears of within three seconds
-found_node.py detected                   those nodes
+found_node.py serve NAME NODEID [PORT] [ipv4]   a node with the service "thing"; runs until its standard input ends
+found_node.py find-type TYPE                    its services, on nodes that it hears of within three seconds
+found_node.py detected [ipv4]                   those nodes
 """
 import json
 import sys
@@ -17,19 +17,20 @@ end
 """
 # Local transports would find everybody through the file system.
 QUIET = ["local-enable=false", "local-start-server=false", "local-start-client=false", "intra-enable=false",
-         "log-level=WARNING", "tcp-ipv6-discovery=true"]
+         "log-level=WARNING"]
 
 
 class Thing:
     one = 1
 
 
-def options(*more):
-    return [f"--robotraconteur-{option}" for option in [*QUIET, *more]]
+def options(ip, *more):
+    scopes = ["tcp-ipv6-discovery=false", "tcp-ipv4-discovery=true"] if ip == "ipv4" else ["tcp-ipv6-discovery=true"]
+    return [f"--robotraconteur-{option}" for option in [*QUIET, *scopes, *more]]
 
 
-def serve(name, node_id, port="0"):
-    with RR.ServerNodeSetup(name, int(port), argv=options("discovery-announce-enable=true", f"nodeid={node_id}")):
+def serve(name, node_id, port="0", ip="ipv6"):
+    with RR.ServerNodeSetup(name, int(port), argv=options(ip, "discovery-announce-enable=true", f"nodeid={node_id}")):
         node = RR.RobotRaconteurNode.s
         node.RegisterServiceType(DEFINITION)
         node.RegisterService("thing", "experimental.found.Thing", Thing())
@@ -38,7 +39,7 @@ def serve(name, node_id, port="0"):
 
 
 def search(what, argument=None):
-    with RR.ClientNodeSetup(argv=options("discovery-listening-enable=true")):
+    with RR.ClientNodeSetup(argv=options(argument, "discovery-listening-enable=true")):
         node = RR.RobotRaconteurNode.s
         time.sleep(3)  # FindServiceByType asks only nodes that are known when it is called
         if what == "find-type":
