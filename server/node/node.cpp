@@ -117,7 +117,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     listener->start([this, requires_tls](asio::ip::tcp::socket socket) { accept(std::move(socket), requires_tls); },
                     [this](const std::string& problem) { report(problem); });
     listeners_.push_back(std::move(listener));
-    listens_.insert(listens_.end(), bound->begin(), bound->end());
+    for (const auto& at : *bound) listens_.push_back({at, requires_tls});
     if (services_changed_) services_changed_();
     return bound->front().port;
   }
@@ -163,9 +163,12 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
 
   std::vector<std::string> listen_urls() const {
     std::vector<std::string> out;
-    for (const auto& [host, port] : listens_)
-      out.push_back("rr+tcp://" + format_host_port(host, port) +
-                    "?nodeid=" + format_node_id(identity().id, NodeIdFormat::dashes));
+    for (const auto& [address, requires_tls] : listens_) {
+      const auto at = "://" + format_host_port(address.host, address.port) +
+                      "?nodeid=" + format_node_id(identity().id, NodeIdFormat::dashes);
+      if (!requires_tls) out.push_back("rr+tcp" + at);
+      if (options_.tls && options_.tls->has_certificate()) out.push_back("rrs+tcp" + at);
+    }
     return out;
   }
   void on_services_changed(std::function<void()> handler) { services_changed_ = std::move(handler); }
@@ -319,7 +322,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   std::vector<std::shared_ptr<Service>> services_;
   std::function<void()> services_changed_;
   std::vector<std::unique_ptr<TcpListener>> listeners_;
-  std::vector<HostPort> listens_;  ///< of the listeners: addresses with their true ports
+  std::vector<ListenUrl> listens_;  ///< of the listeners: addresses with their true ports
   std::vector<std::shared_ptr<Repeat>> repeats_;
   std::map<ClientId, std::shared_ptr<ServiceClient>> clients_;
   std::size_t arriving_ = 0;  ///< connections whose first bytes are awaited

@@ -74,7 +74,8 @@ TlsTrust default_trust() {
   const auto folder = user_config_folder();
   if (no_roots == "true" || no_roots == "1" || !folder) return trust;
   std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(std::filesystem::path(*folder) / "certificates" / "roots", error))
+  for (const auto& entry :
+       std::filesystem::directory_iterator(std::filesystem::path(*folder) / "certificates" / "roots", error))
     if (const auto extension = entry.path().extension(); extension == ".pem" || extension == ".crt")
       trust.published_roots.push_back(entry.path().string());
   std::sort(trust.published_roots.begin(), trust.published_roots.end());

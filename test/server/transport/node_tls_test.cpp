@@ -69,6 +69,17 @@ TEST_CASE("handlers know the node that a client's certificate proves", "[tls]") 
   CHECK(error_of([&] { connect(node.url("rrs+tcp"), as(context, NodeId{{9}})); }).code == ErrorCode::node_not_found);
 }
 
+TEST_CASE("a node tells by which schemes it is reached", "[tls]") {
+  CertificateLab lab;
+  Node node("x", SecureNode::options(lab, false));
+  const auto port = std::to_string(node.listen("rr+tcp://127.0.0.1:0"));
+  const auto secure_port = std::to_string(node.listen("rrs+tcp://127.0.0.1:0"));
+  const auto query = "?nodeid=" + format_node_id(service_node, NodeIdFormat::dashes);
+  CHECK(node.listen_urls() == std::vector<std::string>{"rr+tcp://127.0.0.1:" + port + query,
+                                                       "rrs+tcp://127.0.0.1:" + port + query,
+                                                       "rrs+tcp://127.0.0.1:" + secure_port + query});
+}
+
 TEST_CASE("a node that requires TLS", "[tls]") {
   CertificateLab lab;
   SecureNode node(lab, true);
