@@ -3,13 +3,14 @@ include(CMakePackageConfigHelpers)
 include(GNUInstallDirs)
 
 set_target_properties(rr_node PROPERTIES EXPORT_NAME node)
+set_target_properties(rr_platform PROPERTIES EXPORT_NAME platform)
 set_target_properties(rr_security PROPERTIES EXPORT_NAME security)
 set_target_properties(rr_transport PROPERTIES EXPORT_NAME transport)
 set_target_properties(rr_discovery PROPERTIES EXPORT_NAME discovery)
 set_target_properties(rrgate_http PROPERTIES EXPORT_NAME http)
 install(
   TARGETS rr_options rr_boost rr_support rr_hardware rr_wire rr_robdef rr_types rr_member rr_session rr_discovery_core
-          rr_security rrgate_asio rr_transport rrgate_http rr_node rr_discovery rrgate
+          rr_platform rr_security rrgate_asio rr_transport rrgate_http rr_node rr_discovery rrgate
   EXPORT rrgateTargets
   RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}"
   ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")
@@ -17,7 +18,7 @@ install(TARGETS rrgate-demo-create rrgate-demo-webcams RUNTIME DESTINATION "${CM
 
 set(include_dir "${CMAKE_INSTALL_INCLUDEDIR}/rrgate")
 install(DIRECTORY core DESTINATION "${include_dir}" FILES_MATCHING PATTERN "*.hpp")
-install(DIRECTORY server/discovery server/node server/security server/transport DESTINATION "${include_dir}/server"
+install(DIRECTORY server/discovery server/node server/platform server/security server/transport DESTINATION "${include_dir}/server"
         FILES_MATCHING PATTERN "*.hpp" PATTERN openssl.hpp EXCLUDE)
 
 set(package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/rrgate")

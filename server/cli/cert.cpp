@@ -12,6 +12,7 @@
 #include "core/support/random.hpp"
 #include "server/cli/command.hpp"
 #include "server/definitions/text_file.hpp"
+#include "server/platform/folders.hpp"
 #include "server/security/certificate_files.hpp"
 #include "server/security/issue_certificates.hpp"
 #include "server/security/node_certificate_check.hpp"

@@ -98,7 +98,7 @@ void Gateway::accept(asio::ip::tcp::socket socket) {
     return;
   }
   ++open_connections_;
-  auto stream = std::make_unique<rr::TcpStream>(std::move(socket), config_.timeouts.send_stall);
+  auto stream = rr::make_tcp_stream(std::move(socket), config_.timeouts.send_stall);
   auto serve = serve_connection(*this, std::move(stream), std::move(*ticket));
   asio::co_spawn(io_, std::move(serve), [this](std::exception_ptr failure) {
     --open_connections_;

@@ -12,10 +12,13 @@
 #include <optional>
 #include <system_error>
 
+#include "core/discovery/announcement.hpp"
 #include "core/session/url.hpp"
 #include "core/support/random.hpp"
 #include "server/node/accept.hpp"
 #include "server/node/service_client.hpp"
+#include "server/platform/node_id_store.hpp"
+#include "server/transport/local.hpp"
 #include "server/transport/tcp.hpp"
 
 namespace rr {
@@ -30,7 +33,8 @@ constexpr std::chrono::milliseconds send_stall{15000};
 
 NodeIdentity make_identity(std::string name, const NodeId& id) {
   if (!name.empty() && !is_valid_node_name(name))
-    throw std::invalid_argument("node name " + quoted(name) + " is not valid: expected letters, digits, '_', '-', '.'");
+    throw std::invalid_argument("node name " + rr::quoted(name) +
+                                " is not valid: expected letters, digits, '_', '-', '.'");
   return {id.is_any() ? random_node_id() : id, std::move(name)};
 }
 
@@ -43,7 +47,8 @@ ListenUrl parse_listen_url(std::string_view url) {
   constexpr std::string_view scheme = "rr+tcp://";
   constexpr std::string_view secure_scheme = "rrs+tcp://";
   const auto fail = [&](const std::string& why) {
-    throw std::invalid_argument("listen on " + quoted(url) + ": " + why + ", expected rr+tcp://HOST:PORT");
+    throw std::invalid_argument("listen on " + rr::quoted(url) + ": " + why +
+                                ", expected rr+tcp://HOST:PORT or rr+local:///");
   };
   const bool is_secure = url.substr(0, secure_scheme.size()) == secure_scheme;
   if (!is_secure && url.substr(0, scheme.size()) != scheme) fail("unknown scheme");
@@ -52,6 +57,14 @@ ListenUrl parse_listen_url(std::string_view url) {
   const auto parsed = parse_host_port(rest);
   if (!parsed) fail(parsed.error().message);
   return {*parsed, is_secure};
+}
+
+/// The NodeID that this machine keeps for the name, while nobody else uses it.
+std::optional<NodeIdClaim> claim_stored_id(const std::string& name, const NodeOptions& options) {
+  if (!options.keeps_id) return std::nullopt;
+  auto claim = NodeIdClaim::take(name);
+  if (!claim) throw std::runtime_error("node " + rr::quoted(name) + ": " + claim.error().message);
+  return std::move(*claim);
 }
 
 /// Runs work at multiples of a period.
@@ -82,7 +95,8 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
       : options_(std::move(options)),
         own_io_(io ? nullptr : std::make_unique<asio::io_context>(1)),
         io_(io ? *io : *own_io_),
-        directory_(make_identity(std::move(name), options_.id)),
+        claim_(claim_stored_id(name, options_)),
+        directory_(make_identity(std::move(name), claim_ ? claim_->id() : options_.id)),
         stop_timer_(io_) {}
 
   ~Implementation() {
@@ -103,14 +117,17 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
       throw std::invalid_argument(added.error().message);
     }
     services_.push_back(service);
+    if (local_)
+      if (auto published = local_->publish(make_service_state_nonce()); !published) report(published.error().message);
     if (services_changed_) services_changed_();
   }
 
   std::uint16_t listen(std::string_view url) {
+    if (url == "rr+local:///") return listen_locally();
     const auto parsed = parse_listen_url(url);
     const bool requires_tls = parsed.requires_tls || options_.require_tls;
     if (requires_tls && !(options_.tls && options_.tls->has_certificate()))
-      throw std::invalid_argument("listen on " + quoted(url) + ": TLS needs a certificate: NodeOptions::tls");
+      throw std::invalid_argument("listen on " + rr::quoted(url) + ": TLS needs a certificate: NodeOptions::tls");
     auto listener = std::make_unique<TcpListener>(io_.get_executor());
     const auto bound = listener->open(parsed.address, true);
     if (!bound) throw std::runtime_error(bound.error().message);
@@ -120,6 +137,24 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     for (const auto& at : *bound) listens_.push_back({at, requires_tls});
     if (services_changed_) services_changed_();
     return bound->front().port;
+  }
+
+  std::uint16_t listen_locally() {
+    if (local_) throw std::invalid_argument("listen on rr+local:///: the node does so already");
+    auto listener = std::make_unique<LocalListener>(io_.get_executor());
+    if (auto opened = listener->open(identity()); !opened)
+      throw std::runtime_error("listen on rr+local:///: " + opened.error().message);
+    auto welcome = [this](std::unique_ptr<ByteStream> stream) {
+      if (clients_.size() + arriving_ >= options_.max_clients) return;
+      Accepted accepted;
+      accepted.stream = std::move(stream);
+      accepted.scheme = "rr+local";
+      add_client(std::move(accepted), "");
+    };
+    listener->start(
+        std::move(welcome), [this](const std::string& problem) { report(problem); }, send_stall);
+    local_ = std::move(listener);
+    return 0;
   }
 
   void run() {
@@ -266,7 +301,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     if (error) return;  // gone already
     if (clients_.size() + arriving_ >= options_.max_clients) return;
     ++arriving_;
-    auto stream = std::make_unique<TcpStream>(std::move(socket), send_stall);
+    auto stream = make_tcp_stream(std::move(socket), send_stall);
     std::string host = local.address().to_string();
     host.resize(std::min(host.size(), host.find('%')));  // the zone is what this machine calls the link
     asio::co_spawn(io_, welcome(std::move(stream), format_host_port(host, local.port()), requires_tls), asio::detached);
@@ -307,6 +342,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   void close_listeners() {
     for (const auto& listener : listeners_) listener->close();
     listeners_.clear();
+    local_.reset();
     listens_.clear();
     for (const auto& job : repeats_) {
       job->is_stopped = true;
@@ -318,10 +354,12 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   NodeOptions options_;
   std::unique_ptr<asio::io_context> own_io_;
   asio::io_context& io_;
+  std::optional<NodeIdClaim> claim_;
   ServiceDirectory directory_;
   std::vector<std::shared_ptr<Service>> services_;
   std::function<void()> services_changed_;
   std::vector<std::unique_ptr<TcpListener>> listeners_;
+  std::unique_ptr<LocalListener> local_;
   std::vector<ListenUrl> listens_;  ///< of the listeners: addresses with their true ports
   std::vector<std::shared_ptr<Repeat>> repeats_;
   std::map<ClientId, std::shared_ptr<ServiceClient>> clients_;

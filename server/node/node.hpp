@@ -24,6 +24,9 @@ struct NodeOptions {
   /// With the certificate of `id`, by load_node_tls() or make_node_tls(): clients may use TLS, on the same port. Null:
   /// they can't.
   TlsContextPtr tls = {};
+  /// Takes the NodeID that this machine keeps for the node's name, in the place where the reference has it as well, and
+  /// makes one the first time. The name is then this node's alone; `id` is not used.
+  bool keeps_id = false;
   bool require_tls = false;  ///< clients without TLS are refused
   /// A sentence about something that went wrong and that no client hears of; the default writes it to stderr.
   std::function<void(const std::string& problem)> report = {};
@@ -44,7 +47,9 @@ class Node {
   /// "rr+tcp://0.0.0.0:52222", "rr+tcp://[::]:0" (IPv4 as well), "rr+tcp://localhost:0"; port 0 takes a free one.
   /// WebSockets (rr+ws) are taken on the same port, and TLS (rrs+tcp, rrs+ws) where the node has a certificate;
   /// "rrs+tcp://HOST:PORT" takes nothing but TLS.
-  /// Returns  the port. Throws std::invalid_argument; std::runtime_error ("listen on ...: Address already in use").
+  /// "rr+local:///": programs of this user on this machine, who find the node by its ID or name.
+  /// Returns  the port, 0 for rr+local. Throws std::invalid_argument; std::runtime_error ("listen on ...: Address
+  /// already in use").
   std::uint16_t listen(std::string_view url);
 
   /// Runs until stop(), SIGINT or SIGTERM; what else was given to io_context() does not hold it up then.

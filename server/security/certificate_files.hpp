@@ -8,12 +8,6 @@
 
 namespace rr {
 
-/// This user's configuration of Robot Raconteur: ROBOTRACONTEUR_USER_CONFIG_DIR, else below ROBOTRACONTEUR_USER_HOME,
-/// XDG_CONFIG_HOME or HOME; for root /etc/robotraconteur, below ROBOTRACONTEUR_SYSTEM_PREFIX, or
-/// ROBOTRACONTEUR_SYSTEM_CONFIG_DIR.
-/// Errors   invalid_configuration: nothing says where, or what does is a relative path.
-[[nodiscard]] Result<std::string> user_config_folder();
-
 /// The certificate of a node, whether it is there or not: certificates/{id}.p12 in user_config_folder().
 [[nodiscard]] Result<std::string> node_certificate_path(const NodeId& id);
 

@@ -2,6 +2,7 @@
 
 #include "server/security/certificate_files.hpp"
 #include "server/transport/hardware.hpp"
+#include "server/transport/local.hpp"
 #include "server/transport/start_tls.hpp"
 #include "server/transport/tcp.hpp"
 #include "server/transport/tls.hpp"
@@ -42,7 +43,7 @@ awaitable<Dialed> reach(ConnectionUrl url, DialOptions options) {
   const HostPort next = has_proxy ? options.proxy : HostPort{url.host, url.port};
   auto socket = co_await connect_tcp(next.host, next.port, options.timeout);
   if (!socket) co_return socket.error();
-  std::unique_ptr<ByteStream> stream = std::make_unique<TcpStream>(std::move(*socket), options.send_stall);
+  auto stream = make_tcp_stream(std::move(*socket), options.send_stall);
   if (has_proxy) {
     const Limit limit(*stream, options.timeout);
     HostPort target{url.host, url.port};
@@ -125,6 +126,7 @@ constexpr Dialer dialers[] = {
     {"rr+tcp", dial_tcp},
     {"rrs+tcp", dial_secure<dial_tcp>},
     {"rr+ws", dial_websocket},
+    {"rr+local", dial_local},
     {"rrs+ws", dial_secure<dial_websocket>},
     {"rr+wss", dial_https_websocket},
     {"rrs+wss", dial_secure<dial_https_websocket>},
@@ -154,7 +156,7 @@ awaitable<Dialed> dial(ConnectionUrl url, DialOptions options) {
   const auto* dialer = find_dialer(url.scheme);
   if (!dialer)
     co_return make_error(ErrorCode::connection_error,
-                         "scheme " + quoted(url.scheme) + " can't be dialed; available: " + dialable_schemes());
+                         "scheme " + rr::quoted(url.scheme) + " can't be dialed; available: " + dialable_schemes());
   co_return co_await dialer->dial(std::move(url), options);
 }
 

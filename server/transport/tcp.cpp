@@ -8,8 +8,9 @@
 #include <boost/asio/ip/v6_only.hpp>
 #include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
-#include <boost/container/static_vector.hpp>
-#include <cstring>
+
+#include "server/transport/accept_all.hpp"
+#include "server/transport/socket_stream.hpp"
 
 namespace rr {
 
@@ -24,112 +25,19 @@ constexpr auto await_tuple = asio::as_tuple(asio::use_awaitable);
 /// waits at its source instead. In-flight data is not limited by it, so long fat links keep their throughput.
 constexpr int unsent_low_mark = 256 * 1024;
 
-/// How long end() waits for the peer to take the last bytes, and how much it reads meanwhile.
-constexpr std::chrono::milliseconds linger_time{1000};
-constexpr std::size_t linger_bytes = 1024 * 1024;
-
 std::string describe(const tcp::endpoint& endpoint) {
   return format_host_port(endpoint.address().to_string(), endpoint.port());
 }
 
 }  // namespace
 
-TcpStream::TcpStream(Socket socket, std::chrono::milliseconds send_stall)
-    : socket_(std::move(socket)),
-      stall_(socket_.get_executor(),
-             [this] {
-               is_stalled_ = true;
-               close();
-             }),
-      linger_(socket_.get_executor(), [this] { cancel(); }),
-      send_stall_(send_stall) {
-  error_code ignored;  // a socket that is gone already shows it at the first read
-  socket_.non_blocking(true, ignored);
-  socket_.set_option(tcp::no_delay(true), ignored);
-  ::setsockopt(socket_.native_handle(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &unsent_low_mark, sizeof(unsent_low_mark));
-  const auto endpoint = socket_.remote_endpoint(ignored);
-  peer_ = ignored ? "(gone)" : describe(endpoint);
-}
-
-awaitable<ReadResult> TcpStream::read_some(std::span<std::uint8_t> into) {
-  if (const auto count = take_put_back(into)) co_return ReadResult{{}, count};
-  auto [error, bytes] = co_await socket_.async_read_some(asio::buffer(into.data(), into.size()), await_tuple);
-  if (error == asio::error::eof) error = {};
-  co_return ReadResult{error, bytes};
-}
-
-std::size_t TcpStream::try_write(std::span<const ByteSpan> slices, error_code& error) {
-  return write_now(slices, 0, error);
-}
-
-/// `offset`  bytes of the first slice that are written already.
-std::size_t TcpStream::write_now(std::span<const ByteSpan> slices, std::size_t offset, error_code& error) {
-  boost::container::static_vector<asio::const_buffer, 64> buffers;
-  for (const auto& slice : slices) {
-    if (buffers.size() == buffers.capacity()) break;
-    const auto rest = buffers.empty() ? slice.subspan(offset) : slice;
-    buffers.emplace_back(rest.data(), rest.size());
-  }
-  const auto written = socket_.write_some(buffers, error);
-  if (error == asio::error::would_block) error = {};
-  return written;
-}
-
-awaitable<error_code> TcpStream::write(std::span<const ByteSpan> slices) {
-  const auto cancel_count = cancel_count_;
-  std::size_t offset = 0;  // bytes of slices.front() that are written
-  while (!slices.empty()) {
-    error_code error;
-    auto written = write_now(slices, offset, error);
-    if (written == 0 && !error) {
-      if (!stall_.is_armed()) stall_.arm(send_stall_);
-      std::tie(error) = co_await socket_.async_wait(tcp::socket::wait_write, await_tuple);
-      if (is_stalled_) co_return asio::error::timed_out;
-      if (!error && cancel_count != cancel_count_) error = asio::error::operation_aborted;
-    }
-    if (error) {
-      stall_.disarm();
-      co_return error;
-    }
-    if (written > 0) stall_.disarm();
-    while (!slices.empty() && written >= slices.front().size() - offset) {
-      written -= slices.front().size() - offset;
-      slices = slices.subspan(1);
-      offset = 0;
-    }
-    offset += written;
-  }
-  co_return error_code();
-}
-
-void TcpStream::finish_sending() {
-  error_code ignored;
-  socket_.shutdown(tcp::socket::shutdown_send, ignored);
-}
-
-void TcpStream::cancel() {
-  ++cancel_count_;
-  error_code ignored;
-  socket_.cancel(ignored);
-}
-
-awaitable<void> TcpStream::end(const EndReason&) {
-  // Closing with unread input resets the connection, and a reset may overtake the last bytes sent: read on for a while.
-  finish_sending();
-  linger_.arm(linger_time);
-  std::uint8_t scrap[4096];
-  for (std::size_t total = 0; total < linger_bytes && linger_.is_armed();) {
-    const auto read = co_await read_some(scrap);
-    if (read.error || read.is_end()) break;
-    total += read.bytes;
-  }
-  linger_.disarm();
-  close();
-}
-
-void TcpStream::close() {
-  error_code ignored;
-  socket_.close(ignored);
+std::unique_ptr<ByteStream> make_tcp_stream(tcp::socket socket, std::chrono::milliseconds send_stall) {
+  error_code error;
+  socket.set_option(tcp::no_delay(true), error);
+  ::setsockopt(socket.native_handle(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &unsent_low_mark, sizeof(unsent_low_mark));
+  const auto endpoint = socket.remote_endpoint(error);
+  std::string peer = error ? "(gone)" : describe(endpoint);
+  return std::make_unique<SocketStream>(std::move(socket), std::move(peer), send_stall);
 }
 
 Result<std::vector<HostPort>> TcpListener::open(const HostPort& address, bool takes_both) {
@@ -170,22 +78,6 @@ Result<std::vector<HostPort>> TcpListener::open(const HostPort& address, bool ta
 void TcpListener::start(OnAccept on_accept, OnProblem on_problem) {
   for (const auto& acceptor : acceptors_)
     asio::co_spawn(executor_, accept_all(acceptor, on_accept, on_problem), asio::detached);
-}
-
-awaitable<void> TcpListener::accept_all(std::shared_ptr<Acceptor> acceptor, OnAccept on_accept, OnProblem on_problem) {
-  asio::steady_timer pause(acceptor->get_executor());
-  while (acceptor->is_open()) {
-    auto [error, socket] = co_await acceptor->async_accept(await_tuple);
-    if (!error) {
-      on_accept(std::move(socket));
-      continue;
-    }
-    if (error == asio::error::operation_aborted) break;
-    // Out of descriptors or memory: accepting again at once would spin.
-    on_problem("accept: " + error.message());
-    pause.expires_after(std::chrono::milliseconds(200));
-    co_await pause.async_wait(await_tuple);
-  }
 }
 
 void TcpListener::close() {

@@ -11,38 +11,11 @@
 
 #include "core/session/url.hpp"
 #include "server/transport/byte_stream.hpp"
-#include "server/transport/watchdog.hpp"
 
 namespace rr {
 
-class TcpStream final : public ByteStream {
- public:
-  using Socket = boost::asio::ip::tcp::socket;
-
-  /// Takes over a connected socket. `send_stall`: see ByteStream::write.
-  TcpStream(Socket socket, std::chrono::milliseconds send_stall);
-
-  awaitable<ReadResult> read_some(std::span<std::uint8_t> into) override;
-  std::size_t try_write(std::span<const ByteSpan> slices, error_code& error) override;
-  awaitable<error_code> write(std::span<const ByteSpan> slices) override;
-  void finish_sending() override;
-  void cancel() override;
-  awaitable<void> end(const EndReason& reason) override;
-  void close() override;
-  std::string peer() const override { return peer_; }
-  boost::asio::any_io_executor executor() override { return socket_.get_executor(); }
-
- private:
-  std::size_t write_now(std::span<const ByteSpan> slices, std::size_t offset, error_code& error);
-
-  Socket socket_;
-  Deadline stall_;
-  Deadline linger_;
-  std::chrono::milliseconds send_stall_;
-  bool is_stalled_ = false;
-  unsigned cancel_count_ = 0;  ///< a write that was between two waits notices cancel() by it
-  std::string peer_;
-};
+/// `socket` as a stream, with TCP's options set.
+std::unique_ptr<ByteStream> make_tcp_stream(boost::asio::ip::tcp::socket socket, std::chrono::milliseconds send_stall);
 
 /// Accepts connections on the addresses that one host name or literal stands for.
 class TcpListener {
@@ -63,7 +36,6 @@ class TcpListener {
 
  private:
   using Acceptor = boost::asio::ip::tcp::acceptor;
-  static awaitable<void> accept_all(std::shared_ptr<Acceptor> acceptor, OnAccept on_accept, OnProblem on_problem);
 
   boost::asio::any_io_executor executor_;
   std::vector<std::shared_ptr<Acceptor>> acceptors_;

@@ -5,7 +5,7 @@ import signal
 import subprocess
 import sys
 
-from directions import PEERS
+from directions import ENABLE_LOCAL, LOCAL_URL, PEERS
 from processes import BUILD, ROOT, Background, free_port
 
 STEP_DEADLINE = 60.0  # seconds for a client to carry out one scenario
@@ -32,16 +32,18 @@ def client_url(direction, port):
     return {
         "direct": f"rr+tcp://127.0.0.1:{port}/?service=interop",
         "direct-ws": f"rr+ws://127.0.0.1:{port}/?service=interop",
+        "local": LOCAL_URL,
         # A native client names the device that it wants; the gateway is only the way to it.
         "gateway-tcp": f"rr+tcp://127.0.0.1:{port}/?nodename=interop.service&service=interop",
         "gateway-ws": f"rr+ws://127.0.0.1:{port}/devices/interop?service=interop",
+        "gateway-ws-local": f"rr+ws://127.0.0.1:{port}/devices/interop?service=interop",
     }[direction.route]
 
 
 def client_command(direction, port):
     url = client_url(direction, port)
     return {
-        "reference": [sys.executable, PEERS / "client.py", url, "--robotraconteur-disable-stringtable=false"],
+        "reference": [sys.executable, PEERS / "client.py", url, "--robotraconteur-disable-stringtable=false", ENABLE_LOCAL],
         "ours": [BUILD / "test/interop/cpp/rr-test-client", url],
         "node": ["node", JS / "client.mjs", url],
     }[direction.client]

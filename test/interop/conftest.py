@@ -1,11 +1,14 @@
 """Fixtures of the interoperability tests: one pair of service and route at a time, shared by its scenarios."""
 import faulthandler
 import json
+import os
+import shutil
+import tempfile
 
 import pytest
 
 from clients import Chromium
-from directions import DIRECTIONS, LEVELS, service_command
+from directions import DIRECTIONS, LEVELS, LOCAL_URL, service_command
 from matrix import Matrix
 from processes import ROOT, Background, start_gateway
 
@@ -13,6 +16,18 @@ TEST_DEADLINE = 120.0  # seconds; beyond it the run is ended with all stacks pri
 
 
 matrix = Matrix()
+
+
+def pytest_configure(config):
+    """Local nodes keep their files in a folder of this run: no other node of the machine is met, none is disturbed."""
+    config.local_folder = tempfile.mkdtemp(prefix="rr-interop-")  # short: it is part of a socket's path
+    os.environ["ROBOTRACONTEUR_SYSTEM_PREFIX"] = config.local_folder
+    os.environ["ROBOTRACONTEUR_USER_RUN_DIR"] = config.local_folder + "/run"
+    os.environ["ROBOTRACONTEUR_USER_HOME"] = config.local_folder + "/home"
+
+
+def pytest_unconfigure(config):
+    shutil.rmtree(config.local_folder, ignore_errors=True)
 
 
 @pytest.hookimpl(hookwrapper=True)
@@ -76,7 +91,8 @@ def link(request, chromium, tmp_path_factory):
         ready = json.loads(service.next_line())
         port = ready["port"]
         if direction.route.startswith("gateway"):
-            gateway, port = start_gateway(folder, ready["url"], chromium.origin)
+            device_url = LOCAL_URL if direction.route == "gateway-ws-local" else ready["url"]
+            gateway, port = start_gateway(folder, device_url, chromium.origin)
         yield direction, level, port
         if gateway:
             code, description = gateway.stop(), gateway.description()

@@ -18,7 +18,7 @@ LEVELS = {
 class Direction:
     name: str
     client: str  # reference, ours, node, chromium
-    route: str  # direct, direct-ws, gateway-tcp, gateway-ws
+    route: str  # direct, direct-ws, local, gateway-tcp, gateway-ws, gateway-ws-local (which reaches the device by rr+local)
     service: str  # reference, ours
     levels: tuple = tuple(LEVELS)
 
@@ -41,6 +41,9 @@ DIRECTIONS = [
     Direction("reference-ws-ours", "reference", "direct-ws", "ours", ("v4",)),
     Direction("ours-ws-reference", "ours", "direct-ws", "reference", ("v4",)),
     Direction("ours-ws-ours", "ours", "direct-ws", "ours", ("v4",)),
+    Direction("reference-local-ours", "reference", "local", "ours", ("v4",)),
+    Direction("ours-local-reference", "ours", "local", "reference", ("v4",)),
+    Direction("ours-local-ours", "ours", "local", "ours", ("v4",)),
     Direction("node-to-reference", "node", "direct-ws", "reference"),
     Direction("node-to-ours", "node", "direct-ws", "ours"),
     Direction("chromium-to-reference", "chromium", "direct-ws", "reference"),
@@ -50,6 +53,7 @@ DIRECTIONS = [
     Direction("reference-gateway-tcp-ours", "reference", "gateway-tcp", "ours"),
     Direction("ours-gateway-tcp-reference", "ours", "gateway-tcp", "reference"),
     Direction("ours-gateway-ws-reference", "ours", "gateway-ws", "reference", ("v4",)),
+    Direction("ours-gateway-local-reference", "ours", "gateway-ws-local", "reference", ("v4",)),
     Direction("node-gateway-ws-reference", "node", "gateway-ws", "reference"),
     Direction("node-gateway-ws-ours", "node", "gateway-ws", "ours"),
     Direction("chromium-gateway-ws-reference", "chromium", "gateway-ws", "reference"),
@@ -57,8 +61,13 @@ DIRECTIONS = [
 ]
 
 
+LOCAL_URL = "rr+local:///?nodename=interop.service&service=interop"
+ENABLE_LOCAL = "--robotraconteur-local-enable=true"
+
+
 def service_command(direction, level, page_origin):
     """`page_origin`: whose pages may connect straight to the service."""
+    local = [ENABLE_LOCAL] if direction.route.endswith("local") else []
     if direction.service == "reference":
-        return [sys.executable, PEERS / "service.py", *LEVELS[level], f"--robotraconteur-tcp-ws-add-origins={page_origin}"]
-    return [BUILD / "test/interop/cpp/rr-test-service", *LEVELS[level], f"--allow-origin={page_origin}"]
+        return [sys.executable, PEERS / "service.py", *LEVELS[level], *local, f"--robotraconteur-tcp-ws-add-origins={page_origin}"]
+    return [BUILD / "test/interop/cpp/rr-test-service", *LEVELS[level], *local, f"--allow-origin={page_origin}"]

@@ -331,6 +331,8 @@ rr::SecurityPolicy make_security(bool require_valid_user, bool requires_verified
   return policy;
 }
 
+constexpr std::string_view enable_local = "--robotraconteur-local-enable=true";
+
 rr::NodeOptions parse_options(int argc, char** argv) {
   rr::NodeOptions options;
   for (int i = 1; i < argc; ++i) {
@@ -340,6 +342,7 @@ rr::NodeOptions parse_options(int argc, char** argv) {
     constexpr std::string_view node_id = "--robotraconteur-nodeid=";
     if (argument.starts_with(node_id)) options.id = rr::parse_node_id(argument.substr(node_id.size())).value();
     if (argument == "--robotraconteur-load-tls=true") options.tls = rr::load_node_tls(options.id).value();
+    if (argument == enable_local) options.keeps_id = true;
     if (argument == "--robotraconteur-require-tls=true") options.require_tls = true;
     if (argument == "--robotraconteur-disable-message4=true") options.features.v4 = false;
     if (argument == "--robotraconteur-disable-stringtable=true")
@@ -369,6 +372,7 @@ int main(int argc, char** argv) {
     const Guarded open(node, "open", make_security(false));
     const Guarded proven(node, "proven", make_security(true, true));
     const std::string port = std::to_string(node.listen("rr+tcp://127.0.0.1:0"));
+    if (std::find(argv + 1, argv + argc, enable_local) != argv + argc) node.listen("rr+local:///");
     std::cout << R"({"port": )" << port << R"(, "url": "rr+tcp://127.0.0.1:)" << port << R"(/?service=interop"})"
               << std::endl;
     boost::asio::posix::stream_descriptor input(node.io_context());

@@ -16,8 +16,9 @@ namespace rr {
 /// `prepare` adds the services; then the node listens on a free port of 127.0.0.1 until the end of the scope.
 class RunningNode {
  public:
-  explicit RunningNode(const std::function<void(Node&)>& prepare, NodeOptions options = {})
-      : node_("test.node", std::move(options)) {
+  explicit RunningNode(const std::function<void(Node&)>& prepare, NodeOptions options = {},
+                       const std::string& name = "test.node")
+      : node_(name, std::move(options)) {
     prepare(node_);
     port_ = node_.listen("rr+tcp://127.0.0.1:0");
     thread_ = std::thread([this] { node_.run(); });

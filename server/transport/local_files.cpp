@@ -1,0 +1,206 @@
+#include "server/transport/local_files.hpp"
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <map>
+
+#include "server/platform/folders.hpp"
+
+namespace rr {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::size_t max_info_size = 16 * 1024;
+constexpr std::size_t max_nodes = 4096;
+
+bool is_key_char(char c) {
+  return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '+' || c == '.' || c == '-';
+}
+
+std::string_view trim(std::string_view text) {
+  constexpr std::string_view space = " \t\r\v\f";
+  const auto first = text.find_first_not_of(space);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(space) + 1 - first);
+}
+
+/// Lines "key: value"; the first of a key counts, other lines don't.
+std::map<std::string, std::string, std::less<>> parse_lines(std::string_view text) {
+  std::map<std::string, std::string, std::less<>> values;
+  while (!text.empty()) {
+    const auto end = text.find('\n');
+    const auto line = text.substr(0, end);
+    text = end == std::string_view::npos ? std::string_view() : text.substr(end + 1);
+    const auto colon = line.find(':');
+    if (colon == std::string_view::npos) continue;
+    const auto key = trim(line.substr(0, colon));
+    if (key.empty() || !std::all_of(key.begin(), key.end(), is_key_char)) continue;
+    values.emplace(key, trim(line.substr(colon + 1)));
+  }
+  return values;
+}
+
+std::optional<LocalNodeInfo> read_info(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) return std::nullopt;
+  std::string text(max_info_size, '\0');
+  in.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(in.gcount()));
+  auto info = parse_local_info(text);
+  if (!info) return std::nullopt;
+  return std::move(*info);
+}
+
+fs::path by_id(const fs::path& base, const NodeId& id, const char* extension) {
+  return base / "by-nodeid" / (format_node_id(id, NodeIdFormat::dashes) + extension);
+}
+fs::path by_name(const fs::path& base, const std::string& name, const char* extension) {
+  return base / "by-nodename" / (name + extension);
+}
+
+Error file_error(const char* what, const fs::path& path, const std::string& why) {
+  return make_error(ErrorCode::system_resource_error, std::string(what) + " " + path.string() + ": " + why);
+}
+
+}  // namespace
+
+std::string format_local_info(const LocalNodeInfo& info) {
+  std::string text = "ServiceStateNonce: " + info.nonce + "\nnodeid: " + format_node_id(info.node.id) + "\n";
+  if (!info.node.name.empty()) text += "nodename: " + info.node.name + "\n";
+  return text + "pid: " + std::to_string(::getpid()) + "\nsocket: " + info.socket + "\nusername: " + info.username +
+         "\n";
+}
+
+Result<LocalNodeInfo> parse_local_info(std::string_view text) {
+  auto values = parse_lines(text);
+  const auto id = parse_node_id(values["nodeid"]);
+  if (!id) return make_error(ErrorCode::invalid_configuration, "info file: " + id.error().message);
+  LocalNodeInfo info{{*id, values["nodename"]}, values["socket"], values["username"], values["ServiceStateNonce"]};
+  if (!info.node.name.empty() && !is_valid_node_name(info.node.name))
+    return make_error(ErrorCode::invalid_configuration, "info file: nodename " + rr::quoted(info.node.name));
+  if (info.socket.empty() || info.socket.front() != '/')
+    return make_error(ErrorCode::invalid_configuration, "info file: no absolute path of a socket");
+  return info;
+}
+
+Result<LocalNodeFiles> LocalNodeFiles::take(const fs::path& base, const NodeIdentity& node) {
+  LocalNodeFiles files;
+  const auto add = [&](const fs::path& pid, const fs::path& info) -> Result<> {
+    for (const auto& [path, list] : {std::pair(pid, &files.pids_), std::pair(info, &files.infos_)}) {
+      auto file = LockedFile::open(path);
+      if (!file) return file.error();
+      list->push_back(std::move(*file));
+    }
+    return files.pids_.back().write(std::to_string(::getpid()));
+  };
+  for (const char* folder : {"by-nodeid", "by-nodename"}) {
+    std::error_code error;
+    fs::create_directories(base / folder, error);
+    if (error) return file_error("create", base / folder, error.message());
+  }
+  if (auto done = add(by_id(base, node.id, ".pid"), by_id(base, node.id, ".info")); !done) return done.error();
+  if (!node.name.empty())
+    if (auto done = add(by_name(base, node.name, ".pid"), by_name(base, node.name, ".info")); !done)
+      return done.error();
+  return files;
+}
+
+LocalNodeFiles::~LocalNodeFiles() {
+  // Info files first: who still sees the other finds a node that does not answer, and goes on.
+  for (auto& file : infos_) file.remove();
+  for (auto& file : pids_) file.remove();
+}
+
+Result<> LocalNodeFiles::publish(const LocalNodeInfo& info) {
+  const auto text = format_local_info(info);
+  for (auto& file : infos_)
+    if (auto written = file.write(text); !written) return written;
+  return {};
+}
+
+Result<std::vector<fs::path>> local_bases(const ConnectionUrl& url) {
+  const auto system = system_run_folder();
+  if (!system) return system.error();
+  const auto publics = *system / "transport" / "local";
+  const auto me = user_name();
+  std::vector<fs::path> bases;
+  if (url.user.empty() || url.user == me) {
+    const auto run = user_run_folder();
+    if (!run) return run.error();
+    bases.push_back(*run / "transport" / "local");
+    if (!me.empty()) bases.push_back(publics / me);
+    if (url.user.empty() && me != "root") bases.push_back(publics / "root");
+  } else {
+    bases.push_back(publics / url.user);
+  }
+  return bases;
+}
+
+std::optional<LocalNodeInfo> find_local_node(const fs::path& base, const ConnectionUrl& url) {
+  if (!url.node_id) {
+    auto info = read_info(by_name(base, url.node_name, ".info"));
+    if (info && info->node.name != url.node_name) return std::nullopt;
+    return info;
+  }
+  auto info = read_info(by_id(base, *url.node_id, ".info"));
+  if (!info || info->node.id != *url.node_id) return std::nullopt;
+  if (url.node_name.empty()) return info;
+  const auto named = read_info(by_name(base, url.node_name, ".info"));
+  if (info->node.name != url.node_name || !named || named->socket != info->socket) return std::nullopt;
+  return info;
+}
+
+std::vector<LocalNodeInfo> list_local_nodes(const fs::path& base) {
+  std::vector<LocalNodeInfo> nodes;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(base / "by-nodeid", error)) {
+    if (entry.path().extension() != ".info" || nodes.size() >= max_nodes) continue;
+    auto info = read_info(entry.path());
+    if (!info || entry.path() != by_id(base, info->node.id, ".info")) continue;
+    // The reference's own info files lose their locks while it runs; its pid files don't.
+    if (LockedFile::is_held(by_id(base, info->node.id, ".pid"))) nodes.push_back(std::move(*info));
+  }
+  return nodes;
+}
+
+void clean_local_base(const fs::path& base, const fs::path& sockets) {
+  std::error_code error;
+  std::vector<fs::path> infos;
+  for (const char* folder : {"by-nodeid", "by-nodename"})
+    for (const auto& entry : fs::directory_iterator(base / folder, error))
+      if (entry.path().extension() == ".info") infos.push_back(entry.path());
+  for (const auto& path : infos) {
+    auto pid_path = path;
+    auto pid = LockedFile::open(pid_path.replace_extension(".pid"));
+    if (!pid) continue;
+    auto info = LockedFile::open(path);
+    if (!info) continue;
+    if (const auto found = read_info(path); found && fs::path(found->socket).parent_path() == sockets)
+      fs::remove(found->socket, error);
+    info->remove();
+    pid->remove();
+  }
+}
+
+Result<LocalFolders> make_local_folders() {
+  const auto run = user_run_folder();
+  if (!run) return run.error();
+  std::error_code error;
+  if (fs::create_directories(*run, error)) fs::permissions(*run, fs::perms::owner_all, error);
+  struct stat status {};
+  if (::stat(run->c_str(), &status) != 0) return file_error("create", *run, error.message());
+  if (status.st_uid != ::geteuid())
+    return make_error(ErrorCode::system_resource_permission_denied, run->string() + " belongs to another user");
+  LocalFolders folders{*run / "transport" / "local", *run / "socket"};
+  for (const auto& folder : {folders.base, folders.sockets}) {
+    fs::create_directories(folder, error);
+    if (error) return file_error("create", folder, error.message());
+  }
+  return folders;
+}
+
+}  // namespace rr
