@@ -12,8 +12,8 @@ namespace rr {
 /// Certificates and NodeIDs of this user; of the whole machine for root.
 /// Errors   invalid_configuration: nothing says where, or what does is a relative path.
 [[nodiscard]] Result<std::filesystem::path> user_config_folder();
-/// Sockets and locks of this user's nodes. Below /tmp where there is no XDG_RUNTIME_DIR; then it must be the user's own.
-/// Errors   as above.
+/// Sockets and locks of this user's nodes. Below /tmp where there is no XDG_RUNTIME_DIR; then it must be the user's
+/// own. Errors   as above.
 [[nodiscard]] Result<std::filesystem::path> user_run_folder();
 [[nodiscard]] Result<std::filesystem::path> system_run_folder();
 /// What this machine's own nodes keep.
