@@ -54,6 +54,38 @@ auto read_file_name(std::vector<std::string>& target) {
   };
 }
 
+/// What stands between the gateway and the device.
+void read_way(ObjectReader& in, DeviceConfig& device) {
+  std::string proxy;
+  in.text("proxy", proxy);
+  if (!proxy.empty()) {
+    auto address = rr::parse_host_port(proxy);
+    const auto* scheme = rr::find_url_scheme(device.url.scheme);
+    if (!address)
+      in.finding("proxy", address.error().message);
+    else if (scheme && !scheme->needs_host)
+      in.finding("proxy", "there is no proxy on the way of " + device.url.scheme + "; expected a URL with a host");
+    else
+      device.proxy = std::move(*address);
+  }
+  in.objects("headers", false, [&](ObjectReader& item) {
+    std::pair<std::string, std::string> header;
+    item.required_text("name", [&](const std::string& text) -> std::string {
+      header.first = text;
+      return {};
+    });
+    item.required_text("value", [&](const std::string& text) -> std::string {
+      header.second = text;
+      return {};
+    });
+    if (!header.first.empty() && !rr::is_extra_header(header.first, header.second))
+      item.finding("name", "header " + rr::quoted(header.first) +
+                               " can't be added: the upgrade sets it itself, or its name or value has a character that "
+                               "headers can't have");
+    device.headers.push_back(std::move(header));
+  });
+}
+
 void read_device(ObjectReader& in, DeviceConfig& device) {
   in.required_text("name", [&](const std::string& text) {
     device.name = text;
@@ -61,6 +93,7 @@ void read_device(ObjectReader& in, DeviceConfig& device) {
   });
   in.required_text("url", [&](const std::string& text) { return read_device_url(text, device.url); });
   in.size("max_clients", device.max_clients, {0, 1'000'000});
+  read_way(in, device);
   in.object("tls", [&](ObjectReader& part) { part.texts("ca", false, read_file_name(device.tls.ca)); });
 }
 

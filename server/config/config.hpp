@@ -10,6 +10,7 @@
 
 #include "core/session/url.hpp"
 #include "server/config/finding.hpp"
+#include "server/transport/http_headers.hpp"
 #include "server/security/tls_context.hpp"
 
 namespace rrgate {
@@ -30,6 +31,8 @@ struct DeviceConfig {
   std::size_t max_clients = 0;  ///< 0: no bound of its own
   bool is_found = false;        ///< by discovery, not configured
   DeviceTls tls;
+  rr::HostPort proxy;       ///< HTTP proxy on the way; empty host: none
+  rr::HttpHeaders headers;  ///< for WebSocket URLs
 
   bool operator==(const DeviceConfig&) const = default;
 };

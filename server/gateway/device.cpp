@@ -43,7 +43,7 @@ std::string_view to_string(DeviceState state) {
 
 Device::Device(const asio::any_io_executor& executor, DeviceConfig config, const Config& whole)
     : config_(std::move(config)),
-      dial_options_{whole.timeouts.connect, whole.timeouts.send_stall},
+      dial_options_{whole.timeouts.connect, whole.timeouts.send_stall, config_.proxy, config_.headers},
       tls_(is_secure(config_.url) ? std::make_unique<TlsFiles>(config_.tls) : nullptr),
       retry_(whole.retry),
       wake_(executor) {}

@@ -3,16 +3,12 @@
 #pragma once
 
 #include <memory>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "core/session/url.hpp"
 #include "server/transport/byte_stream.hpp"
+#include "server/transport/http_headers.hpp"
 
 namespace rr {
-
-using HttpHeaders = std::vector<std::pair<std::string, std::string>>;
 
 /// Asks the server of `url` for a WebSocket: its path, its whole query (with service, nodeid and nodename, by which
 /// gateways route), and `headers` besides the necessary ones.
@@ -24,8 +20,5 @@ awaitable<Result<std::unique_ptr<ByteStream>>> connect_websocket(std::unique_ptr
 /// Asks an HTTP proxy at the other end for a way to host:port; afterwards the stream goes there.
 /// Errors   connection_error: refused (with status and reason), or the proxy has gone.
 awaitable<Result<>> connect_through_proxy(ByteStream& proxy, HostPort target);
-
-/// Whether text can stand as name and value of a header: no control characters, no name that the upgrade sets itself.
-bool is_extra_header(std::string_view name, std::string_view value);
 
 }  // namespace rr

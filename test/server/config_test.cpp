@@ -77,6 +77,25 @@ TEST_CASE("certificates, and how devices are checked") {
   finds(with(R"("tls": {"certificate": []})"), "gateway.json: /tls/certificate: ");
 }
 
+TEST_CASE("what stands between the gateway and a device") {
+  const auto device = [](const std::string& url, const std::string& more) {
+    return R"({"listen": ["127.0.0.1:0"], "devices": [{"name": "a", "url": ")" + url + R"(", )" + more + "}]}";
+  };
+  const auto parsed =
+      parse_config(device("rr+ws://h/d?service=s",
+                          R"("proxy": "[::1]:3128", "headers": [{"name": "Authorization", "value": "Bearer x"}])"));
+  REQUIRE(parsed.findings.empty());
+  CHECK(parsed.config.devices[0].proxy == rr::HostPort{"::1", 3128});
+  CHECK(parsed.config.devices[0].headers == rr::HttpHeaders{{"Authorization", "Bearer x"}});
+  finds(device("rr+ws://h/?service=s", R"("proxy": "nowhere")"), "gateway.json: /devices/0/proxy: ");
+  finds(device("rr+local:///?nodename=n&service=s", R"("proxy": "p:1")"),
+        "gateway.json: /devices/0/proxy: ", "rr+local");
+  finds(device("rr+ws://h/?service=s", R"("headers": [{"name": "Host", "value": "x"}])"),
+        "gateway.json: /devices/0/headers/0/name: ", "'Host' can't be added");
+  finds(device("rr+ws://h/?service=s", R"("headers": [{"name": "X-A", "value": "x\r\nEvil: 1"}])"),
+        "gateway.json: /devices/0/headers/0/name: ");
+}
+
 TEST_CASE("the smallest configuration works, with the defaults") {
   const auto parsed = parse_config(smallest);
   CHECK(parsed.findings.empty());
@@ -155,7 +174,7 @@ TEST_CASE("mistakes in devices are named by their index") {
   finds(with_device(R"({"name": "", "url": "rr+tcp://h:1/?service=s"})"), "gateway.json: /devices/0/name: found ''");
   finds(with_device(R"({"name": "a", "url": "rr+tpc://h:1/?service=s"})"),
         "gateway.json: /devices/0/url: ", "scheme 'rr+tpc' unknown; known: rr+tcp");
-  finds(with_device(R"({"name": "a", "url": "rr+local:///?nodename=n&service=s"})"),
+  finds(with_device(R"({"name": "a", "url": "rr+intra:///?nodename=n&service=s"})"),
         "gateway.json: /devices/0/url: ", "available: rr+tcp");
   const std::string device = R"({"name": "a", "url": "rr+tcp://h:1/?service=s"})";
   finds(with_device(device + "," + device), "gateway.json: /devices/1/name: found 'a' a second time");

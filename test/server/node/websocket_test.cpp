@@ -133,14 +133,18 @@ TEST_CASE("a WebSocket to what is none says what came instead") {
     asio::read_until(socket, asio::dynamic_buffer(request), "\r\n\r\n");
     asio::write(socket, asio::buffer(std::string("HTTP/1.1 503 Try later\r\nContent-Length: 0\r\n\r\n")));
   });
+  ConnectOptions options;
+  options.dial.headers = {{"Authorization", "Bearer 1"}};
   const auto error = error_of([&] {
-    connect("rr+ws://127.0.0.1:" + std::to_string(acceptor.local_endpoint().port()) +
-            "/robots/a?token=1&service=Blocks");
+    connect(
+        "rr+ws://127.0.0.1:" + std::to_string(acceptor.local_endpoint().port()) + "/robots/a?token=1&service=Blocks",
+        options);
   });
   server.join();
   CHECK(error.code == ErrorCode::connection_error);
   CHECK_THAT(error.message, Contains("status 503 'Try later'"));
   CHECK_THAT(request, StartsWith("GET /robots/a?token=1&service=Blocks HTTP/1.1\r\n"));
+  CHECK_THAT(request, Contains("\r\nAuthorization: Bearer 1\r\n"));
 }
 
 TEST_CASE("a proxy leads to the node, or says why not") {
