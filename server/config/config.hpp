@@ -10,8 +10,8 @@
 
 #include "core/session/url.hpp"
 #include "server/config/finding.hpp"
-#include "server/transport/http_headers.hpp"
 #include "server/security/tls_context.hpp"
+#include "server/transport/http_headers.hpp"
 
 namespace rrgate {
 

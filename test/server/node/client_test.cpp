@@ -34,7 +34,8 @@ void add_echo(Node& node) {
 TEST_CASE("connecting fails with a reason") {
   RunningNode node(add_echo);
   CHECK(error_of([&] { connect(node.url("Nothing")); }).code == ErrorCode::service_not_found);
-  CHECK_THAT(error_of([&] { connect("rr+tcp://127.0.0.1:1/?service=Echo"); }).message, Equals("connect to 127.0.0.1:1: Connection refused"));
+  CHECK_THAT(error_of([&] { connect("rr+tcp://127.0.0.1:1/?service=Echo"); }).message,
+             Equals("connect to 127.0.0.1:1: Connection refused"));
   CHECK_THAT(error_of([&] { connect("rr+usb:///?service=Echo"); }).message, Contains("rr+usb"));
   CHECK_THAT(error_of([&] { connect("nonsense"); }).message, Contains("nonsense"));
   const auto other_node = node.url("Echo") + "&nodeid=11111111-2222-3333-4444-555555555555";
