@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/session/start_tls.hpp"
+#include "core/wire/frame_start.hpp"
 #include "server/transport/tls.hpp"
 #include "server/transport/watchdog.hpp"
 
@@ -10,7 +11,6 @@ namespace rr {
 
 namespace {
 
-constexpr std::size_t head_size = 10;  // magic, size, version
 constexpr std::size_t largest_first_message = 512 * 1024;
 constexpr std::size_t chunk_size = 4096;
 
@@ -23,7 +23,7 @@ struct FirstBytes {
 awaitable<Result<FirstBytes>> read_first(ByteStream& stream) {
   FirstBytes first;
   auto& bytes = first.bytes;
-  std::size_t size = head_size;
+  std::size_t size = frame_start_size;
   while (bytes.size() < size) {
     const auto begin = bytes.size();
     bytes.resize(std::min(size, begin + chunk_size));  // as it comes, not as its header promises
@@ -32,11 +32,12 @@ awaitable<Result<FirstBytes>> read_first(ByteStream& stream) {
     if (read.error)
       co_return make_error(ErrorCode::connection_error, "lost before a message was there: " + read.error.message());
     if (read.is_end()) co_return make_error(ErrorCode::connection_error, "ended before a message was there");
-    const auto magic = as_text(bytes).substr(0, 4);
-    if (magic != std::string_view("RRAC").substr(0, magic.size())) co_return first;
-    if (begin < head_size && bytes.size() >= head_size) {
-      size = load<std::uint32_t>(bytes.data() + 4);
-      if (size < 16 || size > largest_first_message) co_return first;  // the session says what is wrong with it
+    const auto magic = as_text(bytes).substr(0, frame_magic.size());
+    if (magic != frame_magic.substr(0, magic.size())) co_return first;
+    if (begin < frame_start_size && bytes.size() >= frame_start_size) {
+      size = frame_message_size(bytes);
+      if (size < min_message_size || size > largest_first_message)
+        co_return first;  // the session says what is wrong with it
     }
   }
   first.is_message = true;
