@@ -144,6 +144,28 @@ void read_discover(ObjectReader& in, Discover& discover) {
   in.size("max_devices", discover.max_devices, {1, 4096});
 }
 
+void read_proxy(ObjectReader& in, Config& config) {
+  in.text("base_path", config.base_path);
+  if (!is_path_prefix(config.base_path))
+    in.finding("base_path",
+               "found " + rr::quoted(config.base_path) + ", expected a path as \"/robots\", without '/' at its end");
+  in.texts("trusted_proxies", false, [&](const std::string& text) -> std::string {
+    const auto range = parse_address_range(text);
+    if (!range)
+      return "found " + rr::quoted(text) + ", expected an address or a range as \"10.0.0.0/8\", no bits set behind it";
+    config.proxy.trust.proxies.push_back(*range);
+    return {};
+  });
+  std::string headers = "x-forwarded";
+  std::string protocol = "off";
+  in.choice("proxy_headers", headers, {"x-forwarded", "forwarded"});
+  in.choice("proxy_protocol", protocol, {"off", "required"});
+  config.proxy.trust.headers = headers == "forwarded" ? ForwardedBy::forwarded : ForwardedBy::x_forwarded;
+  config.proxy.has_proxy_protocol = protocol == "required";
+  if (config.proxy.has_proxy_protocol && config.proxy.trust.proxies.empty())
+    in.finding("proxy_protocol", "there is nobody to take it from; expected trusted_proxies beside it");
+}
+
 void read_limits(ObjectReader& in, Limits& limits) {
   in.size("max_message_size", limits.max_message_size, {16 * 1024, 100 * 1024 * 1024});
   in.size("header_bytes", limits.header_bytes, {1024, 65536});
@@ -183,6 +205,7 @@ void read_config(ObjectReader& in, Config& config) {
   });
   in.object("discover", [&](ObjectReader& part) { read_discover(part, config.discover); });
   in.text("web_root", config.web_root);
+  read_proxy(in, config);
   in.texts("allowed_origins", false, [&](const std::string& text) -> std::string {
     if (!is_origin_pattern(text))
       return "found " + rr::quoted(text) + ", expected scheme://host[:port] or scheme://*.domain[:port]";

@@ -10,6 +10,7 @@
 
 #include "core/session/url.hpp"
 #include "server/config/finding.hpp"
+#include "server/http/forwarded.hpp"
 #include "server/security/tls_context.hpp"
 #include "server/transport/http_headers.hpp"
 
@@ -74,6 +75,14 @@ struct TlsConfig {
   bool operator==(const TlsConfig&) const = default;
 };
 
+/// What stands before the gateway.
+struct ProxyConfig {
+  ProxyTrust trust;
+  bool has_proxy_protocol = false;  ///< connections of trusted proxies begin with a PROXY header
+
+  bool operator==(const ProxyConfig&) const = default;
+};
+
 struct LogConfig {
   std::string level = "info";
   std::string format = "text";
@@ -103,7 +112,9 @@ struct Config {
   std::vector<rr::HostPort> listen;
   std::vector<DeviceConfig> devices;
   Discover discover;
-  std::string web_root;  ///< folder of the dashboard; empty: the one that was installed with the program
+  std::string web_root;   ///< folder of the dashboard; empty: the one that was installed with the program
+  std::string base_path;  ///< "" or "/robots": before all paths, where a proxy passes it on
+  ProxyConfig proxy;
   std::vector<std::string> allowed_origins;
   TlsConfig tls;
   Limits limits;

@@ -24,7 +24,7 @@ rr::awaitable<void> relay_client(Gateway& gateway, Connection& connection, rr::B
   connection.is_relay = true;
   connection.stop = [&relay](rr::EndReason reason) { relay.stop(std::move(reason)); };
   const auto& name = boarding.device.config().name;
-  log(LogLevel::info, "client connected", {{"device", name}, {"peer", client.peer()}});
+  log(LogLevel::info, "client connected", {{"device", name}, {"peer", connection.client}});
 
   const auto reason = co_await relay.run();
 
@@ -35,7 +35,7 @@ rr::awaitable<void> relay_client(Gateway& gateway, Connection& connection, rr::B
     boarding.device.note_trouble();
   log(LogLevel::info, "client disconnected",
       {{"device", name},
-       {"peer", client.peer()},
+       {"peer", connection.client},
        {"reason", reason.text},
        {"bytes_to_device", relay.bytes_to_device()},
        {"bytes_to_client", relay.bytes_to_client()}});

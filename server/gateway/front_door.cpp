@@ -6,6 +6,7 @@
 #include "server/gateway/gateway.hpp"
 #include "server/gateway/http_client.hpp"
 #include "server/gateway/native_client.hpp"
+#include "server/gateway/proxy_protocol.hpp"
 #include "server/log/log.hpp"
 #include "server/transport/tls.hpp"
 #include "server/transport/watchdog.hpp"
@@ -29,8 +30,37 @@ Protocol detect_protocol(rr::ByteSpan first_bytes) {
 
 namespace {
 
+/// Reads what a proxy begins a connection with. Returns false where that is nothing that can be used.
+rr::awaitable<bool> take_proxy_header(rr::ByteStream& stream, Connection& connection,
+                                      std::chrono::milliseconds patience) {
+  rr::Deadline limit(stream.executor(), [&stream] { stream.close(); });
+  limit.arm(patience);
+  std::array<std::uint8_t, largest_proxy_header> first{};
+  std::size_t size = 0;
+  for (;;) {
+    const auto read = co_await stream.read_some(std::span(first).subspan(size));
+    if (read.error || read.is_end()) co_return false;
+    size += read.bytes;
+    const auto header = parse_proxy_header({first.data(), size});
+    if (!header) {
+      log(LogLevel::warning, "connection of a trusted proxy closed",
+          {{"peer", connection.client}, {"error", header.error().message}});
+      co_return false;
+    }
+    if (header->size == 0) continue;
+    stream.put_back({first.data() + header->size, size - header->size});
+    if (!header->client) co_return true;
+    connection.peer.endpoint = *header->client;
+    connection.client = Connection::describe(connection.peer);
+    if (connection.ticket.pass_to(header->client->address())) co_return true;
+    log(LogLevel::warning, "connection refused: too many", {{"peer", connection.client}});
+    co_return false;
+  }
+}
+
 /// Reads until the first bytes tell the protocol, and puts them back. Undecided: the connection ended before.
-rr::awaitable<Protocol> look_at_first_bytes(rr::ByteStream& stream, std::chrono::milliseconds patience) {
+rr::awaitable<Protocol> look_at_first_bytes(rr::ByteStream& stream, const std::string& client,
+                                            std::chrono::milliseconds patience) {
   rr::Deadline limit(stream.executor(), [&stream] { stream.close(); });
   limit.arm(patience);
   std::array<std::uint8_t, 4096> first{};
@@ -40,7 +70,7 @@ rr::awaitable<Protocol> look_at_first_bytes(rr::ByteStream& stream, std::chrono:
     const auto read = co_await stream.read_some(std::span(first).subspan(size));
     if (read.error || read.is_end()) {
       if (size > 0 || !limit.is_armed())
-        log(LogLevel::debug, "connection ended before its first bytes told the protocol", {{"peer", stream.peer()}});
+        log(LogLevel::debug, "connection ended before its first bytes told the protocol", {{"peer", client}});
       co_return Protocol::undecided;
     }
     size += read.bytes;
@@ -48,16 +78,17 @@ rr::awaitable<Protocol> look_at_first_bytes(rr::ByteStream& stream, std::chrono:
   }
   if (protocol == Protocol::unknown)
     log(LogLevel::info, "connection closed: neither Robot Raconteur nor HTTP",
-        {{"peer", stream.peer()}, {"found", rr::as_text({first.data(), std::min<std::size_t>(size, 16)})}});
+        {{"peer", client}, {"found", rr::as_text({first.data(), std::min<std::size_t>(size, 16)})}});
   stream.put_back({first.data(), size});
   co_return protocol;
 }
 
 /// The stream inside TLS; null where there is none.
-rr::awaitable<std::unique_ptr<rr::ByteStream>> accept_https(Gateway& gateway, std::unique_ptr<rr::ByteStream> stream) {
+rr::awaitable<std::unique_ptr<rr::ByteStream>> accept_https(Gateway& gateway, const Connection& connection,
+                                                            std::unique_ptr<rr::ByteStream> stream) {
   const auto context = gateway.tls();
   if (!context) {
-    log(LogLevel::info, "connection closed: TLS is not served here", {{"peer", stream->peer()}});
+    log(LogLevel::info, "connection closed: TLS is not served here", {{"peer", connection.client}});
     co_return nullptr;
   }
   const rr::TlsPeerOptions any_client;
@@ -72,20 +103,24 @@ rr::awaitable<std::unique_ptr<rr::ByteStream>> accept_https(Gateway& gateway, st
 
 }  // namespace
 
-rr::awaitable<void> serve_connection(Gateway& gateway, std::unique_ptr<rr::ByteStream> stream, Admission::Ticket) {
+rr::awaitable<void> serve_connection(Gateway& gateway, std::unique_ptr<rr::ByteStream> stream,
+                                     boost::asio::ip::tcp::endpoint peer, Admission::Ticket ticket) {
   rr::ByteStream* current = stream.get();
-  Connection connection;
+  Connection connection(Peer{std::move(peer), false}, std::move(ticket));
   connection.stop = [&current](const rr::EndReason&) { current->close(); };
   gateway.add(connection);
   const auto patience = gateway.config().limits.header_timeout;
-  auto protocol = co_await look_at_first_bytes(*stream, patience);
+  const auto& proxy = gateway.config().proxy;
+  if (proxy.has_proxy_protocol && proxy.trust.trusts(connection.peer.endpoint.address()))
+    if (!co_await take_proxy_header(*stream, connection, patience)) co_return;
+  auto protocol = co_await look_at_first_bytes(*stream, connection.client, patience);
   if (protocol == Protocol::tls) {
     // Closing what is below closes the TLS stream too, whose part it becomes: `current` holds through the handshake.
-    stream = co_await accept_https(gateway, std::move(stream));
+    stream = co_await accept_https(gateway, connection, std::move(stream));
     if (!stream) co_return;
     current = stream.get();
-    connection.is_encrypted = true;
-    protocol = co_await look_at_first_bytes(*stream, patience);
+    connection.peer.is_encrypted = true;
+    protocol = co_await look_at_first_bytes(*stream, connection.client, patience);
   }
 
   switch (protocol) {

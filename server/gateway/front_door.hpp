@@ -2,6 +2,7 @@
 // Source: transports spec section 4.1.
 #pragma once
 
+#include <boost/asio/ip/tcp.hpp>
 #include <memory>
 #include <span>
 
@@ -25,6 +26,6 @@ Protocol detect_protocol(rr::ByteSpan first_bytes);
 
 /// Serves one accepted connection to its end.
 rr::awaitable<void> serve_connection(Gateway& gateway, std::unique_ptr<rr::ByteStream> stream,
-                                     Admission::Ticket ticket);
+                                     boost::asio::ip::tcp::endpoint peer, Admission::Ticket ticket);
 
 }  // namespace rrgate

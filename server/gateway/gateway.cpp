@@ -91,7 +91,8 @@ void Gateway::accept(asio::ip::tcp::socket socket) {
   rr::error_code error;
   const auto peer = socket.remote_endpoint(error);
   if (error) return;  // gone already
-  auto ticket = admission_.admit(peer.address());
+  const bool is_proxy = config_.proxy.trust.trusts(peer.address());
+  auto ticket = admission_.admit(is_proxy ? std::nullopt : std::optional(peer.address()));
   if (!ticket) {
     log(LogLevel::warning, "connection refused: too many",
         {{"peer", peer.address().to_string()}, {"open", admission_.open()}});
@@ -99,7 +100,7 @@ void Gateway::accept(asio::ip::tcp::socket socket) {
   }
   ++open_connections_;
   auto stream = rr::make_tcp_stream(std::move(socket), config_.timeouts.send_stall);
-  auto serve = serve_connection(*this, std::move(stream), std::move(*ticket));
+  auto serve = serve_connection(*this, std::move(stream), peer, std::move(*ticket));
   asio::co_spawn(io_, std::move(serve), [this](std::exception_ptr failure) {
     --open_connections_;
     if (is_stopping_) drained_.cancel();

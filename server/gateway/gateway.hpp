@@ -19,11 +19,20 @@ namespace rrgate {
 
 /// One open connection as the gateway knows it, so that it can be asked to end.
 struct Connection : boost::intrusive::list_base_hook<boost::intrusive::link_mode<boost::intrusive::auto_unlink>> {
+  Connection(Peer from, Admission::Ticket held)
+      : peer(std::move(from)), ticket(std::move(held)), client(describe(peer)) {}
+  static std::string describe(const Peer& peer) {
+    return rr::format_host_port(peer.endpoint.address().to_string(), peer.endpoint.port());
+  }
+
   /// Ends it soon.
   std::function<void(rr::EndReason)> stop;
   /// Whether it may go on for a while when the gateway stops: it carries a client's session.
   bool is_relay = false;
-  bool is_encrypted = false;
+  Peer peer;
+  Admission::Ticket ticket;
+  /// The client as logs name it: as `peer`, or as a trusted proxy says.
+  std::string client;
 };
 
 /// Uses one thread: that of the io_context. Outlives its run().
@@ -52,6 +61,7 @@ class Gateway {
   DeviceRegistry& devices() { return devices_; }
   /// Null where the configuration has no "discover", and before start().
   FoundDevices* found() { return found_.get(); }
+  Admission& admission() { return admission_; }
   const Router& router() const { return router_; }
   /// What new connections are encrypted with; null: TLS is not served.
   rr::TlsContextPtr tls() const { return web_tls_ ? web_tls_->context() : nullptr; }

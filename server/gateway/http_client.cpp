@@ -59,6 +59,7 @@ rr::Result<Device*> find_device(Gateway& gateway, const Request& request) {
 rr::awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, std::unique_ptr<rr::ByteStream> stream,
                                     const Request& request, rr::ByteSpan unread) {
   auto& tcp = *stream;
+  connection.client = request.arrival.peer;
   const auto refuse = [&tcp, &request](const Response& refusal) -> rr::awaitable<void> {
     auto response = refusal;
     response.closes = true;
@@ -67,8 +68,14 @@ rr::awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, st
   };
   if (auto refusal = refuse_upgrade(request, gateway.config().allowed_origins)) {
     log(LogLevel::info, "upgrade refused",
-        {{"peer", tcp.peer()}, {"status", refusal->status}, {"origin", request.header(http::field::origin)}});
+        {{"peer", connection.client}, {"status", refusal->status}, {"origin", request.header(http::field::origin)}});
     co_await refuse(*refusal);
+    co_return;
+  }
+  if (!connection.ticket.pass_to(request.arrival.address)) {
+    log(LogLevel::warning, "connection refused: too many", {{"peer", connection.client}});
+    const auto response = problem_response(503, "too many connections from " + request.arrival.address.to_string());
+    co_await refuse(response);
     co_return;
   }
   auto device = find_device(gateway, request);
@@ -91,12 +98,23 @@ rr::awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, st
   tcp.put_back(unread);
   rr::WebSocketStream socket(std::move(stream), rr::WebSocketRole::server, takes_close);
   if (!boarding) {  // a page can't read the status of a refused upgrade, but it can read why a WebSocket closes
-    log(LogLevel::info, "client refused", {{"peer", socket.peer()}, {"error", boarding.error().message}});
+    log(LogLevel::info, "client refused", {{"peer", connection.client}, {"error", boarding.error().message}});
     const rr::EndReason reason{1013, boarding.error().message};
     co_await socket.end(reason);
     co_return;
   }
   co_await relay_client(gateway, connection, socket, **boarding);
+}
+
+/// The page's own links are relative: they need the '/' at the end.
+bool is_base_path(const Request& request, const Config& config) {
+  return !config.base_path.empty() && request.path() == config.base_path;
+}
+
+Response to_base_path(const Config& config) {
+  auto response = problem_response(308, "the page is at " + config.base_path + "/");
+  response.set("Location", config.base_path + "/");
+  return response;
 }
 
 }  // namespace
@@ -107,25 +125,27 @@ rr::awaitable<void> serve_http_client(Gateway& gateway, Connection& connection,
   const RequestLimits limits{config.limits.header_bytes, config.limits.header_timeout, config.timeouts.idle};
   RequestReader reader(*stream, limits);
   for (;;) {
-    const auto read = co_await reader.next();
+    auto read = co_await reader.next();
     if (!read.request && read.refusal == 0) break;
     if (!read.request) {
       log(LogLevel::info, "request refused",
-          {{"peer", stream->peer()}, {"status", read.refusal}, {"detail", read.detail}});
+          {{"peer", connection.client}, {"status", read.refusal}, {"detail", read.detail}});
       const auto response = problem_response(read.refusal, read.detail);
       co_await write_response(*stream, nullptr, response);
       co_await stream->end(rr::no_reason);
       break;
     }
-    const auto& request = *read.request;
+    auto& request = *read.request;
+    request.arrival = see_through_proxies(request, connection.peer, config.proxy.trust);
+    take_base_path(request, config.base_path);
     if (asks_for_websocket(request)) {
       const rr::Bytes unread(reader.unread().begin(), reader.unread().end());
       co_await serve_websocket(gateway, connection, std::move(stream), request, unread);
       break;
     }
-    auto response = gateway.router().answer(request);
+    auto response = is_base_path(request, config) ? to_base_path(config) : gateway.router().answer(request);
     if (gateway.is_stopping()) response.closes = true;
-    if (connection.is_encrypted && config.tls.hsts_seconds > 0)
+    if (request.arrival.is_encrypted && config.tls.hsts_seconds > 0)
       response.set("Strict-Transport-Security", "max-age=" + std::to_string(config.tls.hsts_seconds));
     const bool goes_on = request.message.keep_alive() && !response.closes;
     if (co_await write_response(*stream, &request, response)) break;

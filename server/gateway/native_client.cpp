@@ -76,7 +76,7 @@ rr::awaitable<void> serve_native_client(Gateway& gateway, Connection& connection
   rr::Message request;
   rr::Result<> read = bytes ? rr::decode(*bytes, {}, request) : rr::Result<>(bytes.error());
   if (!read) {
-    log(LogLevel::info, "native client dropped", {{"peer", client.peer()}, {"error", read.error().message}});
+    log(LogLevel::info, "native client dropped", {{"peer", connection.client}, {"error", read.error().message}});
     client.close();
     co_return;
   }
@@ -94,7 +94,7 @@ rr::awaitable<void> serve_native_client(Gateway& gateway, Connection& connection
     refusal = rr::make_error(rr::ErrorCode::node_not_found, "Node not found");
   }
   log(LogLevel::info, "native client refused",
-      {{"peer", client.peer()}, {"wanted", describe_wish(request.header)}, {"error", refusal.message}});
+      {{"peer", connection.client}, {"wanted", describe_wish(request.header)}, {"error", refusal.message}});
   const auto reply = make_refusal(request, gateway.node_id(), refusal);
   const rr::ByteSpan slice(reply);
   const std::span<const rr::ByteSpan> slices(&slice, 1);

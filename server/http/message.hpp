@@ -1,6 +1,7 @@
 // A request and what answers it. Layer: server/http.
 #pragma once
 
+#include <boost/asio/ip/address.hpp>
 #include <boost/beast/http/message.hpp>
 #include <boost/beast/http/string_body.hpp>
 #include <memory>
@@ -13,9 +14,19 @@ namespace rrgate {
 
 namespace http = boost::beast::http;
 
+/// Who sent a request, and by which URL: as the client sees it, before any proxy.
+struct Arrival {
+  boost::asio::ip::address address;
+  std::string peer;  ///< the same for logs, with the port where it is known
+  bool is_encrypted = false;
+  std::string host;    ///< host[:port]; empty where the request names none
+  std::string prefix;  ///< of all paths, "" or "/robots"
+};
+
 /// A whole request, its body included (bounded while it was read).
 struct Request {
   http::request<http::string_body> message;
+  Arrival arrival = {};
 
   /// The target before and after '?'. The path is as received, not percent-decoded.
   std::string_view path() const;

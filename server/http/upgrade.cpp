@@ -45,7 +45,9 @@ std::optional<Response> refuse_upgrade(const Request& request, const std::vector
                             ": expected " + std::string(rr::websocket_subprotocol));
   const auto origins = message.count(http::field::origin);
   const auto origin = request.header(http::field::origin);
-  if (origins > 1 || (origins == 1 && !is_origin_allowed(origin, request.header(http::field::host), allowed_origins))) {
+  const std::string_view host =
+      request.arrival.host.empty() ? request.header(http::field::host) : std::string_view(request.arrival.host);
+  if (origins > 1 || (origins == 1 && !is_origin_allowed(origin, host, allowed_origins))) {
     auto response =
         problem_response(403, "pages of origin " + rr::quoted(origin) +
                                   " may not connect; allowed_origins in the configuration lists those that may");

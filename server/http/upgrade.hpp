@@ -12,8 +12,8 @@ namespace rrgate {
 /// Whether the request asks to become a WebSocket at all.
 bool asks_for_websocket(const Request& request);
 
-/// Checks an upgrade: method and version, Upgrade, key and version (426), subprotocol if named (426), Origin if sent
-/// (403). nullopt: all is well.
+/// Checks an upgrade, by the host that the client named (Request::arrival): method and version, Upgrade, key and
+/// version (426), subprotocol if named (426), Origin if sent (403). nullopt: all is well.
 std::optional<Response> refuse_upgrade(const Request& request, const std::vector<std::string>& allowed_origins);
 
 /// The 101 response, with `Connection: Upgrade` alone: native clients compare it as a single token.

@@ -1,4 +1,5 @@
 """Processes of the harness: started on free ports, waited for by what they say, always ended."""
+import http.client
 import json
 import os
 import pathlib
@@ -7,7 +8,6 @@ import signal
 import socket
 import subprocess
 import time
-import urllib.request
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = pathlib.Path(os.environ.get("RR_BUILD", ROOT / "build" / "release"))
@@ -83,9 +83,9 @@ class Background:
         return code
 
 
-def start_gateway(folder, device_url, page_origin=None, device={}, **more):
+def start_gateway(folder, device_url, page_origin=None, device={}, asked_from="127.0.0.1", **more):
     """A gateway to one device, called "interop", when it has reached it: (process, port). `device` and `more` are
-    further members of the device's configuration and of the whole."""
+    further members of the device's configuration and of the whole; it is asked how it is from `asked_from`."""
     port = free_port()
     config = folder / "gateway.json"
     config.write_text(json.dumps({
@@ -97,12 +97,15 @@ def start_gateway(folder, device_url, page_origin=None, device={}, **more):
     gateway = Background([BUILD / "server" / "rrgate", "serve", "--config", config], folder / "gateway.log")
 
     def device_is_up():
+        connection = http.client.HTTPConnection("127.0.0.1", port, timeout=5, source_address=(asked_from, 0))
         try:
-            with urllib.request.urlopen(f"http://127.0.0.1:{port}/api/v1/devices", timeout=5) as answer:
-                (device,) = json.load(answer)["devices"]
-                return device["state"] == "online"
+            connection.request("GET", "/api/v1/devices")
+            (device,) = json.load(connection.getresponse())["devices"]
+            return device["state"] == "online"
         except OSError:
             return False
+        finally:
+            connection.close()
 
     try:
         gateway.wait_until(device_is_up)

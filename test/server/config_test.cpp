@@ -116,6 +116,8 @@ TEST_CASE("every option arrives") {
     "discover": {"scopes": ["node_local", "ipv4_broadcast"], "max_devices": 7,
                  "allow": [{"node_name": "lab.*", "node_id": "{82301bf1-e1ef-4e89-8d8f-0848291587ac}",
                             "service_type": "com.x.Arm"}]},
+    "base_path": "/lab", "trusted_proxies": ["10.0.0.0/8", "::1"], "proxy_headers": "forwarded",
+    "proxy_protocol": "required",
     "web_root": "web", "allowed_origins": ["https://a.example", "http://*.b.example:81"],
     "limits": {"max_message_size": 20000, "header_bytes": 2000, "header_timeout_ms": 300, "outbox_bytes": 40000,
                "clients": 5, "clients_per_address": 6},
@@ -129,12 +131,22 @@ TEST_CASE("every option arrives") {
   CHECK(config.devices.at(0).max_clients == 3);
   const auto id = rr::parse_node_id("82301bf1-e1ef-4e89-8d8f-0848291587ac").value();
   CHECK(config.discover == Discover{true, {"node_local", "ipv4_broadcast"}, {{"lab.*", id, "com.x.Arm"}}, 7});
+  CHECK(config.base_path == "/lab");
+  CHECK(config.proxy ==
+        ProxyConfig{{{*parse_address_range("10.0.0.0/8"), *parse_address_range("::1")}, ForwardedBy::forwarded}, true});
   CHECK(config.web_root == "web");
   CHECK(config.allowed_origins.size() == 2);
   CHECK(config.limits == Limits{20000, 2000, milliseconds(300), 40000, 5, 6});
   CHECK(config.timeouts == Timeouts{milliseconds(101), milliseconds(102), milliseconds(103), milliseconds(104)});
   CHECK(config.retry == Retry{milliseconds(51), milliseconds(52), milliseconds(53)});
   CHECK(config.log == LogConfig{"debug", "json"});
+}
+
+TEST_CASE("proxies before the gateway") {
+  finds(with(R"("base_path": "robots")"), "gateway.json: /base_path: ", "expected a path");
+  finds(with(R"("base_path": "/robots/")"), "gateway.json: /base_path: ");
+  finds(with(R"("trusted_proxies": ["10.0.0.1/8"])"), "gateway.json: /trusted_proxies/0: ", "no bits set behind it");
+  finds(with(R"("proxy_protocol": "required")"), "gateway.json: /proxy_protocol: ", "trusted_proxies");
 }
 
 TEST_CASE("mistakes are named by path, with what was found and expected") {

@@ -9,10 +9,17 @@ namespace rrgate {
 
 namespace {
 
-nlohmann::ordered_json describe(const Device& device) {
+/// Where the asker finds the device: by the host, scheme and path that it used itself.
+nlohmann::ordered_json websocket_url(const Arrival& arrival, const std::string& device) {
+  if (arrival.host.empty()) return nullptr;
+  return (arrival.is_encrypted ? "wss://" : "ws://") + arrival.host + arrival.prefix + "/devices/" + device;
+}
+
+nlohmann::ordered_json describe(const Device& device, const Arrival& arrival) {
   nlohmann::ordered_json out;
   out["name"] = device.config().name;
   out["url"] = rr::format_url(device.config().url);
+  out["websocket_url"] = websocket_url(arrival, device.config().name);
   out["found"] = device.config().is_found;
   out["node_id"] = nullptr;
   out["node_name"] = nullptr;
@@ -35,10 +42,10 @@ nlohmann::ordered_json describe(const Device& device) {
 }  // namespace
 
 Handler devices_endpoint(Gateway& gateway) {
-  return [&gateway](const Request&, std::string_view) {
+  return [&gateway](const Request& request, std::string_view) {
     nlohmann::ordered_json out;
     out["devices"] = nlohmann::ordered_json::array();
-    for (const auto& device : gateway.devices().all()) out["devices"].push_back(describe(*device));
+    for (const auto& device : gateway.devices().all()) out["devices"].push_back(describe(*device, request.arrival));
     return json_response(200, out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
   };
 }

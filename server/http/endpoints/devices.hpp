@@ -7,9 +7,10 @@ namespace rrgate {
 
 class Gateway;
 
-/// {"devices":[{"name","url","found","node_id","node_name","state","last_error","services":[{"name","type"}],"clients"}]};
-/// found: by discovery, not configured; node_id and node_name are null until the device has answered once, last_error
-/// is null while it is online.
+/// {"devices":[{"name","url","websocket_url","found","node_id","node_name","state","last_error","services":[{"name","type"}],"clients"}]};
+/// url: the device's own; websocket_url: the way to it through the gateway, and the proxies before it, that the asker
+/// came; found: by discovery, not configured; node_id and node_name are null until the device has answered once,
+/// last_error is null while it is online.
 Handler devices_endpoint(Gateway& gateway);
 /// Everything else below /api/: 404.
 Handler no_such_api_endpoint();

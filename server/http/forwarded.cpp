@@ -1,0 +1,216 @@
+#include "server/http/forwarded.hpp"
+
+#include <algorithm>
+#include <charconv>
+
+#include "core/session/url.hpp"
+
+namespace rrgate {
+
+using boost::asio::ip::address;
+
+namespace {
+
+template <class Bytes>
+bool share_first_bits(const Bytes& left, const Bytes& right, unsigned bits) {
+  for (std::size_t i = 0; i < left.size() && bits > 0; ++i) {
+    const unsigned here = std::min(bits, 8u);
+    if ((left[i] ^ right[i]) >> (8 - here)) return false;
+    bits -= here;
+  }
+  return true;
+}
+
+std::string_view trim(std::string_view text) {
+  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
+  while (!text.empty() && (text.back() == ' ' || text.back() == '\t')) text.remove_suffix(1);
+  return text;
+}
+
+/// Splits at `separator` where it is not inside a quoted string.
+std::vector<std::string_view> split(std::string_view text, char separator) {
+  std::vector<std::string_view> out;
+  std::size_t begin = 0;
+  bool is_quoted = false;
+  for (std::size_t i = 0; i <= text.size(); ++i) {
+    if (i < text.size() && is_quoted && text[i] == '\\') {
+      ++i;
+    } else if (i < text.size() && text[i] == '"') {
+      is_quoted = !is_quoted;
+    } else if (i >= text.size() || (!is_quoted && text[i] == separator)) {
+      out.push_back(trim(text.substr(begin, i - begin)));
+      begin = i + 1;
+    }
+  }
+  if (begin < text.size()) out.push_back(trim(text.substr(begin)));  // a quote that never ends
+  return out;
+}
+
+/// All lines of a header as the one list that they are.
+template <class Name>
+std::string joined(const Request& request, Name name) {
+  std::string out;
+  const auto lines = request.message.equal_range(name);
+  for (auto it = lines.first; it != lines.second; ++it) {
+    if (!out.empty()) out += ',';
+    out.append(it->value().data(), it->value().size());
+  }
+  return out;
+}
+
+/// "192.0.2.1", "192.0.2.1:80", "[2001:db8::1]:80", "2001:db8::1".
+std::optional<address> parse_node(std::string_view text) {
+  if (text.size() >= 2 && text.front() == '"' && text.back() == '"') text = text.substr(1, text.size() - 2);
+  if (!text.empty() && text.front() == '[') {
+    const auto close = text.find(']');
+    if (close == std::string_view::npos) return std::nullopt;
+    text = text.substr(1, close - 1);
+  } else if (const auto colon = text.find(':'); colon != std::string_view::npos && text.rfind(':') == colon) {
+    text = text.substr(0, colon);
+  }
+  boost::system::error_code error;
+  auto out = boost::asio::ip::make_address(std::string(text), error);
+  if (error) return std::nullopt;
+  return plain_address(out);
+}
+
+/// What one proxy said about the request that it got.
+struct Hop {
+  std::optional<address> from;
+  std::string proto;
+  std::string host;
+};
+
+std::vector<Hop> hops_of_forwarded(const Request& request) {
+  std::vector<Hop> out;
+  const auto text = joined(request, "Forwarded");
+  for (const auto element : split(text, ',')) {
+    auto& hop = out.emplace_back();
+    for (const auto pair : split(element, ';')) {
+      const auto equals = pair.find('=');
+      if (equals == std::string_view::npos) continue;
+      const auto name = trim(pair.substr(0, equals));
+      auto value = trim(pair.substr(equals + 1));
+      if (equals_ignoring_case(name, "for")) hop.from = parse_node(value);
+      if (value.size() >= 2 && value.front() == '"' && value.back() == '"') value = value.substr(1, value.size() - 2);
+      if (equals_ignoring_case(name, "proto")) hop.proto = value;
+      if (equals_ignoring_case(name, "host")) hop.host = value;
+    }
+  }
+  return out;
+}
+
+std::string last_of(const std::string& list) {
+  const auto comma = list.rfind(',');
+  return std::string(
+      trim(comma == std::string::npos ? std::string_view(list) : std::string_view(list).substr(comma + 1)));
+}
+
+std::vector<Hop> hops_of_x_forwarded(const Request& request) {
+  std::vector<Hop> out;
+  const auto text = joined(request, "X-Forwarded-For");
+  const auto proto = last_of(joined(request, "X-Forwarded-Proto"));
+  const auto host = last_of(joined(request, "X-Forwarded-Host"));
+  for (const auto node : split(text, ',')) out.push_back({parse_node(node), proto, host});
+  return out;
+}
+
+bool is_authority(std::string_view text) {
+  return !text.empty() && text.size() <= 255 && std::all_of(text.begin(), text.end(), [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+           std::string_view(".-_:[]").find(c) != std::string_view::npos;
+  });
+}
+
+}  // namespace
+
+address plain_address(const address& address) {
+  if (address.is_v6() && address.to_v6().is_v4_mapped())
+    return boost::asio::ip::make_address_v4(boost::asio::ip::v4_mapped, address.to_v6());
+  return address;
+}
+
+bool AddressRange::contains(const boost::asio::ip::address& other) const {
+  const auto plain = plain_address(other);
+  if (plain.is_v4() != address.is_v4()) return false;
+  if (plain.is_v4()) return share_first_bits(address.to_v4().to_bytes(), plain.to_v4().to_bytes(), bits);
+  return share_first_bits(address.to_v6().to_bytes(), plain.to_v6().to_bytes(), bits);
+}
+
+std::optional<AddressRange> parse_address_range(std::string_view text) {
+  const auto slash = text.find('/');
+  boost::system::error_code error;
+  AddressRange out;
+  out.address = boost::asio::ip::make_address(std::string(text.substr(0, slash)), error);
+  if (error) return std::nullopt;
+  const unsigned all = out.address.is_v4() ? 32 : 128;
+  out.bits = all;
+  if (slash == std::string_view::npos) return out;
+  const auto digits = text.substr(slash + 1);
+  const auto [end, failure] = std::from_chars(digits.data(), digits.data() + digits.size(), out.bits);
+  if (digits.empty() || failure != std::errc() || end != digits.data() + digits.size() || out.bits > all)
+    return std::nullopt;
+  // "10.0.0.1/8" is one host to some who write it and all of a network to others.
+  const auto has_more = [&](const auto& bytes) {
+    for (unsigned bit = out.bits; bit < all; ++bit)
+      if (bytes[bit / 8] & (0x80 >> (bit % 8))) return true;
+    return false;
+  };
+  if (out.address.is_v4() ? has_more(out.address.to_v4().to_bytes()) : has_more(out.address.to_v6().to_bytes()))
+    return std::nullopt;
+  return out;
+}
+
+bool ProxyTrust::trusts(const address& address) const {
+  return std::any_of(proxies.begin(), proxies.end(), [&](const auto& range) { return range.contains(address); });
+}
+
+Arrival see_through_proxies(const Request& request, const Peer& peer, const ProxyTrust& trust) {
+  Arrival out;
+  out.address = plain_address(peer.endpoint.address());
+  out.peer = rr::format_host_port(out.address.to_string(), peer.endpoint.port());
+  out.is_encrypted = peer.is_encrypted;
+  out.host = request.header(http::field::host);
+  if (!trust.trusts(out.address)) return out;
+
+  const bool is_standard = trust.headers == ForwardedBy::forwarded;
+  const auto hops = is_standard ? hops_of_forwarded(request) : hops_of_x_forwarded(request);
+  // From the nearest proxy outwards, as far as each that speaks is trusted.
+  for (auto hop = hops.rbegin(); hop != hops.rend(); ++hop) {
+    if (equals_ignoring_case(hop->proto, "https") || equals_ignoring_case(hop->proto, "wss")) out.is_encrypted = true;
+    if (equals_ignoring_case(hop->proto, "http") || equals_ignoring_case(hop->proto, "ws")) out.is_encrypted = false;
+    if (is_authority(hop->host)) out.host = hop->host;
+    if (!hop->from) break;
+    out.address = *hop->from;
+    out.peer = out.address.to_string();
+    if (!trust.trusts(out.address)) break;
+  }
+  auto prefix = last_of(joined(request, "X-Forwarded-Prefix"));
+  while (!prefix.empty() && prefix.back() == '/') prefix.pop_back();
+  if (is_path_prefix(prefix)) out.prefix = prefix;
+  return out;
+}
+
+bool is_path_prefix(std::string_view text) {
+  if (text.empty()) return true;
+  if (text.front() != '/' || text.back() == '/' || text.size() > 255 || text.find("//") != std::string_view::npos ||
+      text.find("/.") != std::string_view::npos)
+    return false;
+  return std::all_of(text.begin(), text.end(), [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+           std::string_view("/._~-").find(c) != std::string_view::npos;
+  });
+}
+
+void take_base_path(Request& request, std::string_view base_path) {
+  const auto path = request.path();
+  if (base_path.empty() || path.substr(0, base_path.size()) != base_path || path.size() == base_path.size() ||
+      path[base_path.size()] != '/')
+    return;
+  const auto target = request.message.target();
+  const std::string rest(target.data() + base_path.size(), target.size() - base_path.size());
+  request.message.target(rest);
+  request.arrival.prefix += base_path;
+}
+
+}  // namespace rrgate

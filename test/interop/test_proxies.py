@@ -1,0 +1,280 @@
+"""The gateway behind reverse proxies, each with the configuration that gateway-config/proxies/ has for it."""
+import http.client
+import json
+import os
+import re
+import socket
+import struct
+import sys
+import time
+
+import pytest
+
+from clients import JS, run_program
+from directions import PEERS
+from processes import Background, start_gateway
+from reverse_proxies import CONFIGS, ReverseProxy
+from scenarios import SCENARIOS
+from test_interop import check
+
+IDLE_SECONDS = float(os.environ.get("RRGATE_IDLE_SECONDS", "2"))  # longer than what the proxies' other timeouts allow here
+CLIENT = "127.0.0.2"  # an address that no proxy has
+SCENARIO = {scenario.name: scenario for scenario in SCENARIOS}
+PROXIES = {"nginx": "nginx.conf", "caddy": "Caddyfile", "haproxy": "haproxy.cfg", "httpd": "httpd.conf"}
+STEPS = SCENARIO["functions"].steps + SCENARIO["large_arrays"].steps + SCENARIO["events"].steps
+
+
+@pytest.fixture(scope="module")
+def device(tmp_path_factory):
+    service = Background([sys.executable, PEERS / "service.py"], tmp_path_factory.mktemp("device") / "service.log")
+    yield json.loads(service.next_line())["url"]
+    service.stop()
+
+
+@pytest.fixture(scope="module")
+def gateway(device, tmp_path_factory):
+    """(port, log file) of a gateway that trusts the proxies of this machine."""
+    folder = tmp_path_factory.mktemp("gateway")
+    process, port = start_gateway(folder, device, trusted_proxies=["127.0.0.1"])
+    yield port, folder / "gateway.log"
+    process.stop()
+
+
+@pytest.fixture(scope="module", params=list(PROXIES))
+def proxy(request, gateway, tmp_path_factory):
+    running = ReverseProxy(request.param, PROXIES[request.param], tmp_path_factory.mktemp(request.param), gateway[0])
+    yield running
+    running.stop()
+
+
+@pytest.fixture(params=["root", "below a path"])
+def site(request, proxy):
+    """(port, path before all others)."""
+    return (proxy.root, "") if request.param == "root" else (proxy.below, "/robots")
+
+
+def fetch(port, path, headers={}, address=CLIENT):
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10, source_address=(address, 0))
+    try:
+        connection.request("GET", path, headers=headers)
+        answer = connection.getresponse()
+        return answer.status, answer.headers, answer.read()
+    finally:
+        connection.close()
+
+
+def device_of(port, prefix, headers={}):
+    status, _, body = fetch(port, prefix + "/api/v1/devices", headers)
+    assert status == 200, body
+    (entry,) = json.loads(body)["devices"]
+    return entry
+
+
+def run_steps(kind, url, steps=STEPS):
+    command = {"reference": [sys.executable, PEERS / "client.py", url.replace("ws://", "rr+ws://")],
+               "node": ["node", JS / "client.mjs", url]}[kind]
+    plain = [{key: value for key, value in step.items() if not key.startswith("expect") and key not in ("message", "any_order")}
+             for step in steps]
+    answer = run_program(command, plain)
+    assert "results" in answer, answer
+    assert len(answer["results"]) == len(steps)
+    for step, result in zip(steps, answer["results"]):
+        check(json.dumps(step)[:200], step, result)
+
+
+def open_websocket(port, path, headers=""):
+    """A connected WebSocket as a socket; what comes first was the 101."""
+    link = socket.create_connection(("127.0.0.1", port), 10, source_address=(CLIENT, 0))
+    link.sendall(f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+                 f"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n{headers}\r\n".encode())
+    head = b""
+    while b"\r\n\r\n" not in head:
+        chunk = link.recv(4096)
+        assert chunk, head
+        head += chunk
+    assert head.startswith(b"HTTP/1.1 101 "), head
+    return link
+
+
+def last_client(log, since):
+    """The peer of the last client that connected, as the log names it."""
+    deadline = time.monotonic() + 10
+    while time.monotonic() < deadline:
+        found = re.findall(r"client connected .*peer=(\S+)", log.read_text()[since:])
+        if found:
+            return found[-1]
+        time.sleep(0.02)
+    raise AssertionError("nobody connected")
+
+
+def connected_as(port, path, log, headers=""):
+    since = len(log.read_text())
+    open_websocket(port, path, headers).close()
+    return last_client(log, since)
+
+
+def test_the_page_and_all_that_it_loads(site):
+    port, prefix = site
+    status, headers, body = fetch(port, prefix + "/")
+    assert (status, headers["Content-Type"]) == (200, "text/html; charset=utf-8")
+    links = re.findall(r'(?:src|href)="([^"]+)"', body.decode())
+    assets = [link for link in links if not link.startswith("api/")]
+    assert len(assets) >= 4, links
+    scripts = ""
+    for link in assets:
+        assert link.startswith("./"), f"{link} would leave the path of the page"
+        status, headers, content = fetch(port, prefix + link[1:])
+        assert status == 200, link
+        if link.endswith(".js"):
+            assert headers["Content-Type"].startswith("text/javascript")
+            scripts += content.decode()
+    (wasm,) = set(re.findall(r"rrgate-[\w-]+\.wasm", scripts))
+    status, headers, content = fetch(port, f"{prefix}/assets/{wasm}")
+    assert (status, headers["Content-Type"], content[:4]) == (200, "application/wasm", b"\0asm")
+
+
+def test_the_page_below_a_path_has_its_slash(proxy):
+    status, headers, _ = fetch(proxy.below, "/robots")
+    assert status == 308
+    assert re.fullmatch(r"(http://[^/]+)?/robots/", headers["Location"]), headers["Location"]
+
+
+def test_metrics_are_not_for_everybody(site):
+    port, prefix = site
+    assert fetch(port, prefix + "/metrics")[0] == 403
+
+
+@pytest.mark.parametrize("client", ["reference", "node"])
+def test_sessions(site, client):
+    """By the very URL that the API names, 10 MB arrays included."""
+    port, prefix = site
+    entry = device_of(port, prefix)
+    assert entry["websocket_url"] == f"ws://127.0.0.1:{port}{prefix}/devices/interop"
+    run_steps(client, entry["websocket_url"] + "?service=interop")
+
+
+def test_who_the_client_is(site, gateway):
+    port, prefix = site
+    forged = "X-Forwarded-For: 6.6.6.6\r\nForwarded: for=6.6.6.6;proto=https\r\n"
+    assert connected_as(port, prefix + "/devices/interop", gateway[1], forged) == CLIENT
+
+
+def test_what_a_client_forges_for_others(site):
+    port, prefix = site
+    entry = device_of(port, prefix, {"X-Forwarded-Host": "evil.example", "X-Forwarded-Proto": "https",
+                                     "X-Forwarded-Prefix": "/evil", "Forwarded": "host=evil.example"})
+    assert entry["websocket_url"] == f"ws://127.0.0.1:{port}{prefix}/devices/interop"
+
+
+def test_a_page_of_the_proxys_host_may_connect(site):
+    port, prefix = site
+    open_websocket(port, prefix + "/devices/interop", f"Origin: http://127.0.0.1:{port}\r\n").close()
+    with pytest.raises(AssertionError, match="403"):
+        open_websocket(port, prefix + "/devices/interop", "Origin: http://evil.example\r\n")
+
+
+def test_an_idle_session(proxy):
+    """Silent for longer than a request may be; then the gateway still hears it."""
+    port = proxy.root
+    link = open_websocket(port, "/devices/interop", f"Origin: http://127.0.0.1:{port}\r\n")
+    link.settimeout(IDLE_SECONDS)
+    with pytest.raises(TimeoutError):
+        link.recv(1)
+    link.settimeout(10)
+    link.sendall(b"\x82\x84\0\0\0\0XXXX")  # no Robot Raconteur: the gateway says so in its close frame
+    assert b"from the client: " in link.recv(4096)
+    link.close()
+
+
+def test_a_reload_of_the_proxy(proxy, tmp_path):
+    """Costs a subscription less than 2 s; docs/deploy.md says what it costs with each."""
+    url = f"ws://127.0.0.1:{proxy.root}/devices/interop?service=interop"
+    client = Background(["node", JS / "reload.mjs", url], tmp_path / "client.log")
+    try:
+        client.next_line()
+        proxy.reload()
+        time.sleep(1)  # proxies tell nobody when they have reloaded
+        client.write_line("tell")
+        told = json.loads(client.next_line())
+        assert told["value"] == 3
+        assert told["longest"] < 2000, told
+        print(f"{proxy.name}: {told['losses']} losses, the longest {told['longest']:.0f} ms")
+    finally:
+        client.stop()
+    # The proxy goes on with new connections.
+    assert device_of(proxy.root, "")["state"] == "online"
+
+
+def test_headers_of_others_are_ignored(gateway):
+    port, log = gateway
+    entry = device_of(port, "", {"X-Forwarded-Host": "evil.example", "X-Forwarded-Proto": "https", "X-Forwarded-Prefix": "/x"})
+    assert entry["websocket_url"] == f"ws://127.0.0.1:{port}/devices/interop"
+    peer = connected_as(port, "/devices/interop", log, "X-Forwarded-For: 6.6.6.6\r\n")
+    assert re.fullmatch(re.escape(CLIENT) + r":\d+", peer)
+
+
+def test_forwarded(device, tmp_path):
+    process, port = start_gateway(tmp_path, device, trusted_proxies=["127.0.0.2"], proxy_headers="forwarded")
+    try:
+        header = {"Forwarded": 'for="[2001:db8::7]:99";proto=https;host=lab.example', "X-Forwarded-Host": "evil.example"}
+        assert device_of(port, "", header)["websocket_url"] == "wss://lab.example/devices/interop"
+        log = tmp_path / "gateway.log"
+        assert connected_as(port, "/devices/interop", log, "Forwarded: for=192.0.2.7\r\n") == "192.0.2.7"
+    finally:
+        process.stop()
+
+
+@pytest.mark.parametrize("client", ["reference", "node"])
+def test_a_base_path(device, tmp_path, client):
+    process, port = start_gateway(tmp_path, device, base_path="/lab")
+    try:
+        assert fetch(port, "/lab/")[0] == fetch(port, "/lab/healthz")[0] == fetch(port, "/healthz")[0] == 200
+        status, headers, _ = fetch(port, "/lab")
+        assert (status, headers["Location"]) == (308, "/lab/")
+        entry = device_of(port, "/lab")
+        assert entry["websocket_url"] == f"ws://127.0.0.1:{port}/lab/devices/interop"
+        run_steps(client, entry["websocket_url"] + "?service=interop", SCENARIO["functions"].steps)
+    finally:
+        process.stop()
+
+
+@pytest.mark.parametrize("version", ["send-proxy", "send-proxy-v2"])
+def test_proxy_protocol(device, tmp_path, monkeypatch, version):
+    """Every protocol of the port through a TCP proxy; the log names the client."""
+    process, port = start_gateway(tmp_path, device, trusted_proxies=["127.0.0.1/32"], proxy_protocol="required",
+                                  asked_from=CLIENT)
+    configs = tmp_path / "configs"
+    configs.mkdir()
+    text = (CONFIGS / "haproxy-tcp.cfg").read_text()
+    assert "send-proxy-v2" in text
+    (configs / "haproxy-tcp.cfg").write_text(text.replace("send-proxy-v2", version))
+    monkeypatch.setattr("reverse_proxies.CONFIGS", configs)
+    folder = tmp_path / "haproxy"
+    folder.mkdir()
+    proxy = ReverseProxy("haproxy", "haproxy-tcp.cfg", folder, port)
+    log = tmp_path / "gateway.log"
+    try:
+        assert device_of(proxy.root, "")["websocket_url"] == f"ws://127.0.0.1:{proxy.root}/devices/interop"
+        assert connected_as(proxy.root, "/devices/interop", log).startswith(CLIENT + ":")
+        run_steps("node", f"ws://127.0.0.1:{proxy.root}/devices/interop?service=interop")
+        steps, native = SCENARIO["functions"].steps, f"rr+tcp://127.0.0.1:{proxy.root}/?nodename=interop.service&service=interop"
+        run_steps("reference", native, steps)
+
+        # Whoever is not trusted is what its address says, and nothing that a proxy would say.
+        with socket.create_connection(("127.0.0.1", port), 10, source_address=(CLIENT, 0)) as link:
+            link.sendall(b"PROXY TCP4 6.6.6.6 127.0.0.1 1 1\r\nGET /healthz HTTP/1.1\r\nHost: x\r\n\r\n")
+            assert link.recv(4096).startswith(b"HTTP/1.1 400 ")
+        # The proxy itself must say it.
+        with socket.create_connection(("127.0.0.1", port), 10) as link:
+            link.sendall(b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n")
+            assert link.recv(4096) == b""
+        block = b"\r\n\r\n\0\r\nQUIT\n\x21\x11" + struct.pack(">H4s4sHH", 12, bytes([192, 0, 2, 7]), bytes(4), 4711, 80)
+        with socket.create_connection(("127.0.0.1", port), 10) as link:
+            for byte in block:  # in as many pieces as there can be
+                link.sendall(bytes([byte]))
+            link.sendall(b"nonsense")
+            link.recv(4096)
+        assert "192.0.2.7:4711" in log.read_text()
+    finally:
+        proxy.stop()
+        process.stop()
