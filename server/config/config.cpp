@@ -142,6 +142,8 @@ void read_discover(ObjectReader& in, Discover& discover) {
   if (!scopes.empty()) discover.scopes = std::move(scopes);
   in.objects("allow", false, [&](ObjectReader& item) { read_discover_rule(item, discover.allow.emplace_back()); });
   in.size("max_devices", discover.max_devices, {1, 4096});
+  in.flag("local", discover.local);
+  in.flag("hardware", discover.hardware);
 }
 
 void read_proxy(ObjectReader& in, Config& config) {

@@ -104,6 +104,8 @@ struct Discover {
   std::vector<std::string> scopes{"link_local"};  ///< of node_local, link_local, site_local, ipv4_broadcast
   std::vector<DiscoverRule> allow;
   std::size_t max_devices = 64;  ///< found ones at a time
+  bool local = true;             ///< nodes of this machine, by rr+local
+  bool hardware = true;          ///< nodes that are plugged in: rr+usb, rr+pci
 
   bool operator==(const Discover&) const = default;
 };

@@ -117,6 +117,11 @@ void ObjectReader::text(std::string_view key, std::string& target) {
   if (value) target = value->get<std::string>();
 }
 
+void ObjectReader::flag(std::string_view key, bool& target) {
+  const auto* value = find(key, "boolean", {.path = {}, .type = {}, .default_value = target ? "true" : "false"});
+  if (value) target = value->get<bool>();
+}
+
 void ObjectReader::choice(std::string_view key, std::string& target, std::vector<std::string> choices) {
   const auto* value =
       find(key, "string", {.path = {}, .type = {}, .choices = choices, .default_value = nlohmann::json(target).dump()});

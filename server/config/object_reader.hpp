@@ -36,6 +36,7 @@ class ObjectReader {
   void size(std::string_view key, std::size_t& target, IntegerRange range);
   void duration(std::string_view key, std::chrono::milliseconds& target, IntegerRange range);
   void text(std::string_view key, std::string& target);
+  void flag(std::string_view key, bool& target);
   void choice(std::string_view key, std::string& target, std::vector<std::string> choices);
   /// `read` turns the text into something else and returns what is wrong with it, or "".
   using ReadText = std::function<std::string(const std::string&)>;

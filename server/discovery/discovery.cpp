@@ -11,6 +11,7 @@
 
 #include "core/discovery/schedules.hpp"
 #include "core/support/random.hpp"
+#include "server/discovery/machine_nodes.hpp"
 #include "server/node/clocks.hpp"
 #include "server/node/node.hpp"
 
@@ -74,12 +75,14 @@ class Discovery::Implementation : public std::enable_shared_from_this<Implementa
       ip_.emplace(io_.get_executor(), *options_.ip, options_.listens, std::move(callbacks));
       if (options_.listens) requests_.start(std::chrono::steady_clock::now());
     }
+    if (options_.listens && (options_.local || options_.hardware)) find_machine_nodes();
     wait();
   }
 
   void close() {
     is_closed_ = true;
     ip_.reset();
+    machine_.reset();
     timer_.cancel();
     watchers_.clear();
     for (auto* waiting : waiting_) waiting->cancel();
@@ -101,6 +104,7 @@ class Discovery::Implementation : public std::enable_shared_from_this<Implementa
   void unwatch(WatchId id) { watchers_.erase(id); }
 
   void refresh() {
+    if (machine_) machine_->refresh();
     if (!ip_) return;
     ip_->send_everywhere(format_discovery_request(listener_id_));
     requests_.start(std::chrono::steady_clock::now());
@@ -151,17 +155,19 @@ class Discovery::Implementation : public std::enable_shared_from_this<Implementa
     co_return found;
   }
 
-  void announce(NodeIdentity identity, std::function<std::vector<ListenAddress>()> listens) {
+  void announce(NodeIdentity identity, std::function<std::vector<ListenAddress>()> listens,
+                std::function<std::string()> make_nonce) {
     const auto id = identity.id;
-    own_.insert_or_assign(
-        id, OwnNode{std::move(identity), std::move(listens), AnnounceSchedule(options_.announce_period), {}});
+    OwnNode own{
+        std::move(identity), std::move(listens), std::move(make_nonce), AnnounceSchedule(options_.announce_period), {}};
+    own_.insert_or_assign(id, std::move(own));
     services_changed(id);
   }
 
   void services_changed(const NodeId& node_id) {
     const auto own = own_.find(node_id);
     if (own == own_.end()) return;
-    own->second.nonce = make_service_state_nonce();
+    own->second.nonce = own->second.make_nonce();
     own->second.schedule.announce_soon(std::chrono::steady_clock::now());
     wait();
   }
@@ -181,6 +187,7 @@ class Discovery::Implementation : public std::enable_shared_from_this<Implementa
   struct OwnNode {
     NodeIdentity identity;
     std::function<std::vector<ListenAddress>()> listens;
+    std::function<std::string()> make_nonce;
     AnnounceSchedule schedule;
     std::string nonce;
   };
@@ -192,6 +199,19 @@ class Discovery::Implementation : public std::enable_shared_from_this<Implementa
     waiting_.push_back(&timer);
     co_await timer.async_wait(asio::as_tuple(asio::use_awaitable));
     waiting_.erase(std::find(waiting_.begin(), waiting_.end(), &timer));
+  }
+
+  void find_machine_nodes() {
+    MachineNodesOptions machine;
+    machine.local = options_.local;
+    machine.hardware = options_.hardware;
+    machine.refresh = std::min(machine.refresh, options_.cache.expiry * 9 / 10);
+    MachineNodes::Callbacks callbacks;
+    callbacks.is_own = [this](const NodeId& id) { return own_.contains(id); };
+    callbacks.announced = [this](const Announcement& announcement) { handle_announcement(announcement); };
+    callbacks.withdrawn = [this](const NodeId& id, const std::string& url) { handle_withdrawn(id, url); };
+    callbacks.report = [this](const std::string& problem) { report(problem); };
+    machine_.emplace(io_.get_executor(), machine, std::move(callbacks));
   }
 
   void received(std::string_view packet, const PacketSource& source) {
@@ -272,6 +292,7 @@ class Discovery::Implementation : public std::enable_shared_from_this<Implementa
   RequestSchedule requests_;
   NodeId listener_id_ = random_node_id();
   std::optional<IpDiscovery> ip_;
+  std::optional<MachineNodes> machine_;
   std::map<NodeId, OwnNode> own_;
   std::map<WatchId, std::shared_ptr<Watcher>> watchers_;
   WatchId last_watch_id_ = 0;
@@ -319,18 +340,20 @@ awaitable<std::vector<NodeDiscoveryInfo>> Discovery::find_node_by_name(std::stri
 }
 
 void Discovery::announce(Node& node) {
-  announce(node.identity(), [&node] {
+  const auto listens = [&node] {
     std::vector<ListenAddress> out;
     for (const auto& text : node.listen_urls())
       if (auto url = parse_url(text, ServiceInUrl::optional)) out.push_back({url->scheme, url->host, url->port});
     return out;
-  });
+  };
+  // The nonce that its info files have: who sees both must not take the node for one that changes all the time.
+  implementation_->announce(node.identity(), listens, [&node] { return node.service_state_nonce(); });
   node.on_services_changed([weak = std::weak_ptr(implementation_), id = node.identity().id] {
     if (const auto discovery = weak.lock()) discovery->services_changed(id);
   });
 }
 void Discovery::announce(NodeIdentity identity, std::function<std::vector<ListenAddress>()> listens) {
-  implementation_->announce(std::move(identity), std::move(listens));
+  implementation_->announce(std::move(identity), std::move(listens), make_service_state_nonce);
 }
 void Discovery::services_changed(const NodeId& node_id) {
   implementation_->services_changed(node_id);

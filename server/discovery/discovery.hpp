@@ -1,4 +1,5 @@
-// Finding nodes on the local network, and being found. Layer: server/discovery. Source: transports spec section 6.
+// Finding nodes on the local network, on this machine and plugged into it, and being found. Layer: server/discovery.
+// Source: transports spec sections 6 and 8.5.
 //
 //   rr::Discovery discovery(io);
 //   discovery.announce(node);                                   // a service: others find it
@@ -19,6 +20,7 @@
 #include "server/discovery/announced_urls.hpp"
 #include "server/discovery/ip_discovery.hpp"
 #include "server/discovery/service_query.hpp"
+#include "server/transport/driver_device.hpp"
 
 namespace rr {
 
@@ -28,6 +30,10 @@ struct DiscoveryOptions {
   std::optional<IpDiscoveryScopes> ip =
       IpDiscoveryScopes{};  ///< nullopt: no packets; announcements come from elsewhere
   bool listens = true;      ///< false: hears of nobody, and does not answer those who ask
+  /// Nodes of this machine (rr+local): this user's, and the public ones of all users.
+  bool local = true;
+  /// Nodes that are plugged in (rr+usb, rr+pci), where the system shows them; nullopt: none.
+  std::optional<DriverRoots> hardware = DriverRoots{};
   std::chrono::milliseconds announce_period{55'000};
   DetectedNodesOptions cache = {};
   /// A sentence about something that went wrong; the default writes it to stderr.
@@ -51,7 +57,7 @@ class Discovery {
   using Watcher = std::function<void(const NodeEvent& event)>;
   WatchId watch(Watcher handler);
   void unwatch(WatchId id);
-  /// Asks all nodes to announce themselves; they do within about half a second.
+  /// Asks all nodes to announce themselves; they do within about half a second. Looks for local ones again.
   void refresh();
 
   // --- finding. Schemes: those of URLs that will do ("rr+tcp", ...), empty for any. They may be waited for while the

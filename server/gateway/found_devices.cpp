@@ -25,6 +25,8 @@ rr::DiscoveryOptions discovery_options(const Discover& discover) {
   rr::DiscoveryOptions options;
   options.ip = rr::IpDiscoveryScopes{has("node_local"), has("link_local"), has("site_local"), has("ipv4_broadcast")};
   if (discover.scopes.empty()) options.ip.reset();
+  options.local = discover.local;
+  if (!discover.hardware) options.hardware.reset();
   options.report = [](const std::string& problem) { log(LogLevel::warning, "discovery", {{"error", problem}}); };
   return options;
 }

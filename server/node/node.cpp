@@ -117,8 +117,9 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
       throw std::invalid_argument(added.error().message);
     }
     services_.push_back(service);
+    nonce_ = make_service_state_nonce();
     if (local_)
-      if (auto published = local_->publish(make_service_state_nonce()); !published) report(published.error().message);
+      if (auto published = local_->publish(nonce_); !published) report(published.error().message);
     if (services_changed_) services_changed_();
   }
 
@@ -142,7 +143,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   std::uint16_t listen_locally() {
     if (local_) throw std::invalid_argument("listen on rr+local:///: the node does so already");
     auto listener = std::make_unique<LocalListener>(io_.get_executor());
-    if (auto opened = listener->open(identity()); !opened)
+    if (auto opened = listener->open(identity(), nonce_); !opened)
       throw std::runtime_error("listen on rr+local:///: " + opened.error().message);
     auto welcome = [this](std::unique_ptr<ByteStream> stream) {
       if (clients_.size() + arriving_ >= options_.max_clients) return;
@@ -204,8 +205,10 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
       if (!requires_tls) out.push_back("rr+tcp" + at);
       if (options_.tls && options_.tls->has_certificate()) out.push_back("rrs+tcp" + at);
     }
+    if (local_) out.push_back("rr+local:///?nodeid=" + format_node_id(identity().id, NodeIdFormat::dashes));
     return out;
   }
+  const std::string& nonce() const { return nonce_; }
   void on_services_changed(std::function<void()> handler) { services_changed_ = std::move(handler); }
 
   asio::io_context& io() { return io_; }
@@ -357,6 +360,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   std::optional<NodeIdClaim> claim_;
   ServiceDirectory directory_;
   std::vector<std::shared_ptr<Service>> services_;
+  std::string nonce_ = make_service_state_nonce();
   std::function<void()> services_changed_;
   std::vector<std::unique_ptr<TcpListener>> listeners_;
   std::unique_ptr<LocalListener> local_;
@@ -401,6 +405,9 @@ const NodeIdentity& Node::identity() const {
 }
 std::vector<std::string> Node::listen_urls() const {
   return implementation_->listen_urls();
+}
+const std::string& Node::service_state_nonce() const {
+  return implementation_->nonce();
 }
 void Node::on_services_changed(std::function<void()> handler) {
   implementation_->on_services_changed(std::move(handler));

@@ -64,8 +64,10 @@ class Node {
   void every(std::chrono::nanoseconds period, std::function<void()> work);
 
   const NodeIdentity& identity() const;
-  /// Where it listens now: "rr+tcp://0.0.0.0:52222?nodeid=..."; empty once it has stopped.
+  /// Where it listens now: "rr+tcp://0.0.0.0:52222?nodeid=...", "rr+local:///?nodeid=..."; empty once it has stopped.
   std::vector<std::string> listen_urls() const;
+  /// Other random text after each add(): how those who found the node see that its services have changed.
+  const std::string& service_state_nonce() const;
   /// `handler` hears of services and listen URLs that are added. One handler; a second replaces the first.
   void on_services_changed(std::function<void()> handler);
   boost::asio::io_context& io_context();

@@ -40,7 +40,8 @@ Result<LockedFile> LockedFile::open(const fs::path& path) {
 }
 
 bool LockedFile::is_held(const fs::path& path) {
-  const int descriptor = ::open(path.c_str(), O_RDWR | O_CLOEXEC);
+  // To read only: other users' nodes let no more, and who watches the folder would take our closing for news.
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_NOFOLLOW | O_CLOEXEC);
   if (descriptor < 0) return false;
   auto lock = whole_file();
   const bool is_known = ::fcntl(descriptor, F_OFD_GETLK, &lock) == 0;

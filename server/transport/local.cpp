@@ -46,7 +46,7 @@ std::optional<uid_t> user_number(const std::string& name) {
 
 }  // namespace
 
-Result<> LocalListener::open(const NodeIdentity& node) {
+Result<> LocalListener::open(const NodeIdentity& node, std::string nonce) {
   const auto folders = make_local_folders();
   if (!folders) return folders.error();
   clean_local_base(folders->base, folders->sockets);
@@ -65,7 +65,7 @@ Result<> LocalListener::open(const NodeIdentity& node) {
       acceptor_->listen(asio::socket_base::max_listen_connections, error);
     }
     if (!error) {
-      info_ = {node, path, user_name(), make_service_state_nonce()};
+      info_ = {node, path, user_name(), std::move(nonce)};
       files_.emplace(std::move(*files));
       return files_->publish(info_);
     }

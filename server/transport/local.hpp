@@ -22,7 +22,7 @@ class LocalListener {
   /// Takes the node's ID and name among this user's nodes, opens its socket, and tells where it is. What nodes that
   /// crashed have left is cleaned up.
   /// Errors   system_resource_permission_denied: ID or name are in use; system_resource_error.
-  [[nodiscard]] Result<> open(const NodeIdentity& node);
+  [[nodiscard]] Result<> open(const NodeIdentity& node, std::string nonce);
   /// As TcpListener::start().
   using OnAccept = std::function<void(std::unique_ptr<ByteStream>)>;
   using OnProblem = std::function<void(const std::string& problem)>;

@@ -1,9 +1,9 @@
 #include "server/transport/local_files.hpp"
 
+#include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <fstream>
 #include <map>
 
 #include "server/platform/folders.hpp"
@@ -15,7 +15,8 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::size_t max_info_size = 16 * 1024;
-constexpr std::size_t max_nodes = 4096;
+constexpr std::size_t max_nodes = 4096;  // of a base
+constexpr std::size_t max_bases = 256;
 
 bool is_key_char(char c) {
   return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '+' || c == '.' || c == '-';
@@ -45,11 +46,16 @@ std::map<std::string, std::string, std::less<>> parse_lines(std::string_view tex
 }
 
 std::optional<LocalNodeInfo> read_info(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) return std::nullopt;
+  // Another user may have put anything there: a pipe must not make us wait, a link not lead elsewhere.
+  const int descriptor = ::open(file.c_str(), O_RDONLY | O_NONBLOCK | O_NOFOLLOW | O_CLOEXEC);
+  if (descriptor < 0) return std::nullopt;
+  struct stat status {};
   std::string text(max_info_size, '\0');
-  in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<std::size_t>(in.gcount()));
+  const bool is_file = ::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode);
+  const auto size = is_file ? ::read(descriptor, text.data(), text.size()) : -1;
+  ::close(descriptor);
+  if (size < 0) return std::nullopt;
+  text.resize(static_cast<std::size_t>(size));
   auto info = parse_local_info(text);
   if (!info) return std::nullopt;
   return std::move(*info);
@@ -122,20 +128,40 @@ Result<> LocalNodeFiles::publish(const LocalNodeInfo& info) {
   return {};
 }
 
-Result<std::vector<fs::path>> local_bases(const ConnectionUrl& url) {
+Result<fs::path> public_bases_folder() {
   const auto system = system_run_folder();
-  if (!system) return system.error();
-  const auto publics = *system / "transport" / "local";
+  if (!system) return system;
+  return *system / "transport" / "local";
+}
+
+Result<std::vector<LocalBase>> all_local_bases() {
+  const auto publics = public_bases_folder();
+  if (!publics) return publics.error();
+  const auto run = user_run_folder();
+  if (!run) return run.error();
+  std::vector<LocalBase> bases{{*run / "transport" / "local", ""}};
+  std::error_code error;
+  for (fs::directory_iterator entry(*publics, error), end; !error && entry != end && bases.size() < max_bases;
+       entry.increment(error)) {
+    std::error_code unreadable;
+    if (entry->is_directory(unreadable)) bases.push_back({entry->path(), entry->path().filename().string()});
+  }
+  return bases;
+}
+
+Result<std::vector<fs::path>> local_bases(const ConnectionUrl& url) {
+  const auto publics = public_bases_folder();
+  if (!publics) return publics.error();
   const auto me = user_name();
   std::vector<fs::path> bases;
   if (url.user.empty() || url.user == me) {
     const auto run = user_run_folder();
     if (!run) return run.error();
     bases.push_back(*run / "transport" / "local");
-    if (!me.empty()) bases.push_back(publics / me);
-    if (url.user.empty() && me != "root") bases.push_back(publics / "root");
+    if (!me.empty()) bases.push_back(*publics / me);
+    if (url.user.empty() && me != "root") bases.push_back(*publics / "root");
   } else {
-    bases.push_back(publics / url.user);
+    bases.push_back(*publics / url.user);
   }
   return bases;
 }
@@ -157,10 +183,12 @@ std::optional<LocalNodeInfo> find_local_node(const fs::path& base, const Connect
 std::vector<LocalNodeInfo> list_local_nodes(const fs::path& base) {
   std::vector<LocalNodeInfo> nodes;
   std::error_code error;
-  for (const auto& entry : fs::directory_iterator(base / "by-nodeid", error)) {
-    if (entry.path().extension() != ".info" || nodes.size() >= max_nodes) continue;
-    auto info = read_info(entry.path());
-    if (!info || entry.path() != by_id(base, info->node.id, ".info")) continue;
+  std::size_t seen = 0;
+  for (fs::directory_iterator entry(base / "by-nodeid", error), end; !error && entry != end; entry.increment(error)) {
+    if (entry->path().extension() != ".info") continue;
+    if (++seen > max_nodes) break;
+    auto info = read_info(entry->path());
+    if (!info || entry->path() != by_id(base, info->node.id, ".info")) continue;
     // The reference's own info files lose their locks while it runs; its pid files don't.
     if (LockedFile::is_held(by_id(base, info->node.id, ".pid"))) nodes.push_back(std::move(*info));
   }

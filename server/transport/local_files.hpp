@@ -49,8 +49,19 @@ class LocalNodeFiles {
 [[nodiscard]] Result<std::vector<std::filesystem::path>> local_bases(const ConnectionUrl& url);
 /// What a base says of the node that `url` names; nullopt when it doesn't know it.
 std::optional<LocalNodeInfo> find_local_node(const std::filesystem::path& base, const ConnectionUrl& url);
-/// All nodes that a base knows and that run.
+/// All nodes that a base knows and that run; of very many, some.
 std::vector<LocalNodeInfo> list_local_nodes(const std::filesystem::path& base);
+
+/// One place where nodes of this machine leave their info files.
+struct LocalBase {
+  std::filesystem::path path;
+  std::string user;  ///< whose public base it is; empty: this user's own
+};
+/// This user's, and the public ones of all users, which may be none yet.
+/// Errors   those of system_run_folder() and user_run_folder().
+[[nodiscard]] Result<std::vector<LocalBase>> all_local_bases();
+/// The folder in which a public base has a folder for each user.
+[[nodiscard]] Result<std::filesystem::path> public_bases_folder();
 /// Deletes what nodes that ended without a word have left in a base of ours, their sockets in `sockets` too.
 void clean_local_base(const std::filesystem::path& base, const std::filesystem::path& sockets);
 

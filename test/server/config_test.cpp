@@ -113,7 +113,7 @@ TEST_CASE("every option arrives") {
   const auto parsed = parse_config(R"(/* all of them */ {
     "listen": ["[::1]:1", "localhost:2"],
     "devices": [{"name": "a", "url": "rr+tcp://h:1/?service=s", "max_clients": 3}],
-    "discover": {"scopes": ["node_local", "ipv4_broadcast"], "max_devices": 7,
+    "discover": {"scopes": ["node_local", "ipv4_broadcast"], "max_devices": 7, "local": false, "hardware": false,
                  "allow": [{"node_name": "lab.*", "node_id": "{82301bf1-e1ef-4e89-8d8f-0848291587ac}",
                             "service_type": "com.x.Arm"}]},
     "base_path": "/lab", "trusted_proxies": ["10.0.0.0/8", "::1"], "proxy_headers": "forwarded",
@@ -130,7 +130,8 @@ TEST_CASE("every option arrives") {
   CHECK(config.listen == std::vector<rr::HostPort>{{"::1", 1}, {"localhost", 2}});
   CHECK(config.devices.at(0).max_clients == 3);
   const auto id = rr::parse_node_id("82301bf1-e1ef-4e89-8d8f-0848291587ac").value();
-  CHECK(config.discover == Discover{true, {"node_local", "ipv4_broadcast"}, {{"lab.*", id, "com.x.Arm"}}, 7});
+  CHECK(config.discover ==
+        Discover{true, {"node_local", "ipv4_broadcast"}, {{"lab.*", id, "com.x.Arm"}}, 7, false, false});
   CHECK(config.base_path == "/lab");
   CHECK(config.proxy ==
         ProxyConfig{{{*parse_address_range("10.0.0.0/8"), *parse_address_range("::1")}, ForwardedBy::forwarded}, true});

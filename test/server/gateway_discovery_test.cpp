@@ -13,7 +13,7 @@ namespace {
 
 std::function<void(Config&)> allowing(std::vector<DiscoverRule> rules, std::size_t max_devices = 64) {
   return [rules = std::move(rules), max_devices](Config& config) {
-    config.discover = {true, {}, rules, max_devices};  // no scopes: no packets
+    config.discover = {true, {}, rules, max_devices, false, false};  // no scopes: no packets
   };
 }
 

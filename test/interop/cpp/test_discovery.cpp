@@ -70,10 +70,11 @@ struct Input {
   boost::asio::streambuf buffer_;
 };
 
-/// IPv6 link-local, or IPv4 broadcast alone.
+/// IPv6 link-local, or IPv4 broadcast alone, or nothing but this machine.
 rr::DiscoveryOptions options_for(std::string_view ip) {
   rr::DiscoveryOptions options;
   if (ip == "ipv4") options.ip = rr::IpDiscoveryScopes{.link_local = false, .ipv4_broadcast = true};
+  if (ip == "local") options.ip.reset();
   return options;
 }
 
@@ -116,9 +117,9 @@ rr::awaitable<void> search(rr::Discovery& discovery, std::string what, std::stri
   say({{"found", found}});
 }
 
-void find(const std::string& what, const std::string& argument) {
+void find(const std::string& what, const std::string& argument, const std::string& ip) {
   boost::asio::io_context io(1);
-  rr::Discovery discovery(io);
+  rr::Discovery discovery(io, options_for(ip));
   auto work = search(discovery, what, argument);
   boost::asio::co_spawn(io, std::move(work), [&io](std::exception_ptr) { io.stop(); });
   io.run();
@@ -133,11 +134,12 @@ int main(int argc, char** argv) {
       serve(words[1], words[2], words.size() > 3 ? words[3] : "0", words.size() > 4 ? words[4] : "");
     else if (!words.empty() && words[0] == "watch")
       watch(words.size() > 1 ? words[1] : "");
-    else if (words.size() == 2 && words[0].rfind("find-", 0) == 0)
-      find(words[0], words[1]);
+    else if (words.size() >= 2 && words[0].rfind("find-", 0) == 0)
+      find(words[0], words[1], words.size() > 2 ? words[2] : "");
     else
       throw std::invalid_argument(
-          "usage: serve NAME NODEID [PORT [ipv4]] | watch [ipv4] | find-type TYPE | find-name NAME");
+          "usage: serve NAME NODEID [PORT [ipv4]] | watch [ipv4|local] | find-type TYPE [local] | find-name NAME "
+          "[local]");
   } catch (const std::exception& failure) {
     std::cerr << "rr-test-discovery: " << failure.what() << '\n';
     return 1;

@@ -1,6 +1,7 @@
 """The reference implementation in the discovery tests: announces a node, or searches. One line of JSON on standard output.
 
 found_node.py serve NAME NODEID [PORT] [ipv4]   a node with the service "thing"; runs until its standard input ends
+found_node.py serve-local NAME                  the same by rr+local alone, with the NodeID that the machine keeps for NAME
 found_node.py find-type TYPE                    its services, on nodes that it hears of within three seconds
 found_node.py detected [ipv4]                   those nodes
 """
@@ -31,11 +32,21 @@ def options(ip, *more):
 
 def serve(name, node_id, port="0", ip="ipv6"):
     with RR.ServerNodeSetup(name, int(port), argv=options(ip, "discovery-announce-enable=true", f"nodeid={node_id}")):
-        node = RR.RobotRaconteurNode.s
-        node.RegisterServiceType(DEFINITION)
-        node.RegisterService("thing", "experimental.found.Thing", Thing())
-        print(json.dumps({"ready": True, "id": str(node.NodeID.ToString())}), flush=True)
-        sys.stdin.read()
+        offer_thing()
+
+
+def offer_thing():
+    node = RR.RobotRaconteurNode.s
+    node.RegisterServiceType(DEFINITION)
+    node.RegisterService("thing", "experimental.found.Thing", Thing())
+    print(json.dumps({"ready": True, "id": str(node.NodeID.ToString()).strip("{}")}), flush=True)
+    sys.stdin.read()
+
+
+def serve_local(name):
+    given = [*QUIET[2:], "tcp-enable=false", "local-enable=true", "local-start-server=true"]
+    with RR.ServerNodeSetup(name, 0, argv=[f"--robotraconteur-{option}" for option in given]):
+        offer_thing()
 
 
 def search(what, argument=None):
@@ -54,5 +65,7 @@ def search(what, argument=None):
 if __name__ == "__main__":
     if sys.argv[1] == "serve":
         serve(*sys.argv[2:])
+    elif sys.argv[1] == "serve-local":
+        serve_local(*sys.argv[2:])
     else:
         search(*sys.argv[1:])

@@ -32,7 +32,7 @@ std::shared_ptr<Service> make_thing(const std::string& name, const std::string& 
 
 /// A Discovery that hears only what the test says.
 struct Listener {
-  Listener() : discovery(io, DiscoveryOptions{.ip = std::nullopt}) {}
+  Listener() : discovery(io, DiscoveryOptions{.ip = std::nullopt, .local = false, .hardware = std::nullopt}) {}
 
   void hear(const NodeId& id, std::uint16_t port, const std::string& name = "test.node") {
     discovery.handle_announcement({id, name,
@@ -164,7 +164,8 @@ TEST_CASE("watchers hear of nodes that are there, that come and that go") {
 TEST_CASE("a node expires by itself") {
   constexpr milliseconds expiry{50};
   boost::asio::io_context io;
-  Discovery discovery(io, DiscoveryOptions{.ip = std::nullopt, .cache = {.expiry = expiry}});
+  Discovery discovery(
+      io, DiscoveryOptions{.ip = std::nullopt, .local = false, .hardware = std::nullopt, .cache = {.expiry = expiry}});
   const auto begin = std::chrono::steady_clock::now();
   discovery.handle_announcement({NodeId{{1}}, "n", "rr+tcp://127.0.0.1:1/?service=x", ""});
   CHECK(discovery.detected_nodes().size() == 1);
@@ -178,7 +179,8 @@ TEST_CASE("a node expires by itself") {
 
 TEST_CASE("a search that outlives its Discovery finds nothing") {
   boost::asio::io_context io;
-  auto discovery = std::make_unique<Discovery>(io, DiscoveryOptions{.ip = std::nullopt});
+  auto discovery =
+      std::make_unique<Discovery>(io, DiscoveryOptions{.ip = std::nullopt, .local = false, .hardware = std::nullopt});
   int ended = 0;
   const auto count = [&](std::exception_ptr, auto found) { ended += found.empty() ? 1 : 100; };
   boost::asio::co_spawn(io, discovery->find_service_by_type("a"), count);

@@ -12,38 +12,13 @@
 #include "server/platform/folders.hpp"
 #include "server/platform/node_id_store.hpp"
 #include "test/server/node/node_fixture.hpp"
+#include "test/server/transport/sandbox.hpp"
 
 using namespace rr;
 namespace fs = std::filesystem;
 using Catch::Matchers::Contains;
 
 namespace {
-
-/// Folders of this test alone, by the variables of the reference.
-class Sandbox {
- public:
-  Sandbox() {
-    char name[] = "/tmp/rrgate-local-XXXXXX";
-    REQUIRE(::mkdtemp(name) != nullptr);
-    folder_ = name;
-    set("ROBOTRACONTEUR_SYSTEM_PREFIX", folder_);
-    set("ROBOTRACONTEUR_USER_HOME", folder_ + "/home");
-    set("ROBOTRACONTEUR_USER_RUN_DIR", folder_ + "/run");
-  }
-  ~Sandbox() {
-    for (const auto& name : names_) ::unsetenv(name.c_str());
-    fs::remove_all(folder_);
-  }
-  void set(const std::string& name, const std::string& value) {
-    ::setenv(name.c_str(), value.c_str(), 1);
-    names_.push_back(name);
-  }
-  const std::string& folder() const { return folder_; }
-
- private:
-  std::string folder_;
-  std::vector<std::string> names_;
-};
 
 void add_adder(Node& node) {
   auto service = Service::from_text({"service test.sum\nobject Sum\nfunction double add(double a, double b)\nend\n"},
