@@ -1,5 +1,5 @@
 // Subscriptions: connections come and go, the waits between are in the hands of the test.
-import { ErrorCode, RobotRaconteurError, subscribe } from "../../wasm-client/dist/node.js";
+import { ErrorCode, findServices, RobotRaconteurError, subscribe } from "../../wasm-client/dist/node.js";
 import type { Clock, OpenTransport, RemoteObject, SubscribeOptions } from "../../wasm-client/dist/node.js";
 import { failure, settle, TestService } from "./service.js";
 
@@ -284,5 +284,66 @@ it("ends a loop over a pipe that is too far behind", async () => {
   await settle();
   for (let i = 0; i < 10; ++i) expect((await packets.next()).value).toBe(1);
   expect((await failure(packets.next())).code).toBe(ErrorCode.OutOfSystemResource);
+  await subscription.close();
+});
+
+/** A gateway's answer: name, state and type of the one service "test" of each device. */
+function answer_devices(...devices: [name: string, state: string, type: string][]): string[] {
+  const asked: string[] = [];
+  const list = devices.map(([name, state, type]) => ({ name, state, node_id: "id", node_name: null, services: [{ name: "test", type }] }));
+  vi.stubGlobal("fetch", async (url: URL) => {
+    asked.push(String(url));
+    return new Response(JSON.stringify({ devices: list }));
+  });
+  return asked;
+}
+afterEach(() => vi.unstubAllGlobals());
+
+const type = "test.subscribe.Root";
+
+it("finds services of a type among the devices of a gateway", async () => {
+  const asked = answer_devices(["a b", "online", type], ["other", "online", "test.Other"], ["off", "offline", type], ["c", "online", type]);
+  const gateway = "http://gateway:8080/lab";
+  const found = await findServices({ gateway, type });
+  expect(asked).toEqual(["http://gateway:8080/lab/api/v1/devices"]);
+  expect(found.map(({ device }) => device)).toEqual(["a b", "c"]);
+  expect(found[0]).toEqual({ url: "http://gateway:8080/lab/devices/a%20b?service=test", device: "a b", service: "test", type, nodeId: "id", nodeName: null });
+  expect(await findServices({ gateway: `${gateway}/`, type, filter: ({ device }) => device === "c" })).toEqual([found[1]]);
+  for (const response of [new Response("no", { status: 404 }), new Response("{}"), new Response("<html>")]) {
+    vi.stubGlobal("fetch", async () => response);
+    const error = await failure(findServices({ gateway, type }));
+    expect([error.code, error.message]).toEqual([ErrorCode.ConnectionError, expect.stringContaining(gateway)]);
+  }
+});
+
+it("follows a type: the first device that works, asked for anew after each loss", async () => {
+  const first = await start();
+  const second = await start();
+  const tried: string[] = [];
+  const transport: OpenTransport = (to, listener) => {
+    tried.push(to.pathname);
+    if (to.pathname.endsWith("broken")) throw new Error("refused");
+    return (to.pathname.endsWith("a") ? first : second).transport(to, listener);
+  };
+  answer_devices(["b", "offline", type]);
+  const failed: string[] = [];
+  const subscription = subscribe({ gateway: "http://gateway", type }, { transport, clock, random: () => 0.5 });
+  subscription.onFailed((error, at) => failed.push(`${at} ${(error as RobotRaconteurError).code}`));
+  const wire = subscription.wire("both");
+  await vi.waitUntil(() => clock.waits.length > 0);
+  expect(failed).toEqual([`http://gateway ${ErrorCode.ServiceNotFound}`]);
+  answer_devices(["broken", "online", type], ["a", "online", type]);
+  clock.fire();
+  await subscription.client();
+  expect(tried).toEqual(["/devices/broken", "/devices/a"]);
+  answer_devices(["b", "online", type]);
+  first.drop("gone");
+  await vi.waitUntil(() => clock.waits.length > 0);
+  clock.fire();
+  const client = await subscription.client();
+  await vi.waitUntil(() => wire.isConnected);
+  await client["publish_both"]!(7);
+  await vi.waitUntil(() => wire.value === 7);
+  expect(tried.at(-1)).toBe("/devices/b");
   await subscription.close();
 });

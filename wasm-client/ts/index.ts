@@ -13,6 +13,8 @@ export type {
   PipeSubscriptionOptions,
   WireSubscription,
 } from "./member_subscription.js";
+export { findServices } from "./find_services.js";
+export type { FoundService, ServiceQuery } from "./find_services.js";
 export { subscribe } from "./subscribe.js";
 export type { SubscribeOptions, Subscription } from "./subscribe.js";
 export type { OpenTransport, Transport, TransportListener } from "./transport.js";

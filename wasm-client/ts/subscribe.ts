@@ -6,6 +6,8 @@ import { connect } from "./connect.js";
 import type { ConnectOptions } from "./connect.js";
 import { call_safely, make_error } from "./errors.js";
 import type { RobotRaconteurError } from "./errors.js";
+import { findServices } from "./find_services.js";
+import type { ServiceQuery } from "./find_services.js";
 import { PipeSubscription, WireSubscription } from "./member_subscription.js";
 import type { MemberSubscriptionOptions, PipeSubscriptionOptions } from "./member_subscription.js";
 import type { CallOptions, ObjectInfo, RemoteObject } from "./types.js";
@@ -29,15 +31,18 @@ type Client<T> = T & { readonly $: ObjectInfo };
 
 /**
  * Stays connected to a service: connects, and connects again after each loss, until close().
- * @param urls  one service, or several ways to it; each attempt tries them in order. As for connect().
+ * @param urls  one service, or several ways to it; each attempt tries them in order. As for connect(). Or the services of
+ *              a type behind a gateway, as its devices come and go: the first one that can be connected to, and after a
+ *              loss the first again; each attempt asks the gateway anew.
  * @throws      RobotRaconteurError InvalidArgument (URLs that name different services, no URL, signal). What fails later is told
  *              to onFailed() and tried again.
  */
 export function subscribe<T = RemoteObject>(
-  urls: string | URL | readonly (string | URL)[],
+  urls: string | URL | readonly (string | URL)[] | ServiceQuery,
   options: SubscribeOptions = {},
 ): Subscription<T> {
   check_signal(options.signal);
+  if (typeof urls === "object" && "gateway" in urls) return new Subscription<T>(urls, options);
   const list = [urls].flat() as (string | URL)[];
   const services = new Set(list.map((url) => parse_service_url(url).service));
   if (services.size !== 1) {
@@ -49,7 +54,7 @@ export function subscribe<T = RemoteObject>(
 
 /** One service that is wanted. Calls that are under way when a connection is lost reject: they are not repeated. */
 export class Subscription<T = RemoteObject> {
-  readonly #urls: readonly (string | URL)[];
+  readonly #urls: readonly (string | URL)[] | ServiceQuery;
   readonly #options: SubscribeOptions;
   readonly #clock: Clock;
   readonly #backoff: Backoff;
@@ -63,7 +68,7 @@ export class Subscription<T = RemoteObject> {
   readonly #ended = new Set<() => void>();
 
   /** Use subscribe(). */
-  constructor(urls: readonly (string | URL)[], options: SubscribeOptions) {
+  constructor(urls: readonly (string | URL)[] | ServiceQuery, options: SubscribeOptions) {
     this.#urls = urls;
     this.#options = options;
     this.#clock = options.clock ?? system_clock;
@@ -127,7 +132,7 @@ export class Subscription<T = RemoteObject> {
     return this.#on(this.#lost, lost);
   }
 
-  /** Calls `failed` for each URL that an attempt could not connect to. */
+  /** Calls `failed` for each URL that an attempt could not connect to, or the gateway's where it found no service. */
   onFailed(failed: (error: unknown, url: string) => void): () => void {
     return this.#on(this.#failed, failed);
   }
@@ -166,17 +171,34 @@ export class Subscription<T = RemoteObject> {
   /** One attempt: the first URL that works. Without any, the next attempt follows after a while. */
   async #connect(): Promise<void> {
     const { signal: _, ...options } = this.#options;
-    for (const url of this.#urls) {
+    const { signal } = this.#ending;
+    for (const url of await this.#ways()) {
       if (this.isClosed) return;
       try {
-        this.#take(await connect<T>(url, { ...options, signal: this.#ending.signal }));
-        return;
+        return this.#take(await connect<T>(url, { ...options, signal }));
       } catch (error) {
-        if (this.isClosed) return;
-        for (const failed of [...this.#failed]) call_safely(() => failed(error, String(url)));
+        this.#tell_failed(error, url);
       }
     }
     this.#retry();
+  }
+
+  async #ways(): Promise<readonly (string | URL)[]> {
+    const query = this.#urls;
+    if (!("gateway" in query)) return query;
+    try {
+      const found = await findServices(query, this.#ending.signal);
+      if (found.length > 0) return found.map(({ url }) => url);
+      throw make_error("ServiceNotFound", `no service of type ${query.type} at the gateway ${query.gateway}`);
+    } catch (error) {
+      this.#tell_failed(error, query.gateway);
+      return [];
+    }
+  }
+
+  #tell_failed(error: unknown, url: string | URL): void {
+    if (this.isClosed) return;
+    for (const failed of [...this.#failed]) call_safely(() => failed(error, String(url)));
   }
 
   #take(client: Client<T>): void {

@@ -1,0 +1,53 @@
+// Services of a type, among the devices of a gateway. Layer: wasm-client/ts. Source: GET /api/v1/devices.
+import { make_error, text_of } from "./errors.js";
+
+/** A service of a device of a gateway. */
+export interface FoundService {
+  url: string;
+  /** Name of the device at the gateway. */
+  device: string;
+  service: string;
+  /** Of the root object, qualified. */
+  type: string;
+  nodeId: string | null;
+  nodeName: string | null;
+}
+
+export interface ServiceQuery {
+  /** Where the gateway is: "https://gateway.example". In a page, relative to it. */
+  gateway: string | URL;
+  /** Of the root object, qualified: "experimental.create2.Create". */
+  type: string;
+  /** Which of them; all. */
+  filter?: ((found: FoundService) => boolean) | undefined;
+}
+
+interface Device {
+  name: string;
+  state: string;
+  node_id: string | null;
+  node_name: string | null;
+  services: { name: string; type: string }[];
+}
+
+/**
+ * The services that are there now, on devices that are online.
+ * @throws RobotRaconteurError ConnectionError: the gateway is not reached, or answers something else.
+ */
+export async function findServices(query: ServiceQuery, signal?: AbortSignal): Promise<FoundService[]> {
+  const found: FoundService[] = [];
+  try {
+    const gateway = new URL(String(query.gateway).replace(/\/*$/, "/"), globalThis.location?.href);
+    const response = await fetch(new URL("api/v1/devices", gateway), { signal: signal ?? null, cache: "no-store" });
+    if (!response.ok) throw new Error(`HTTP ${response.status}`);
+    for (const { name, state, node_id, node_name, services } of (await response.json()).devices as Device[])
+      for (const { name: service, type } of state === "online" ? services : [])
+        if (type === query.type) {
+          const url = new URL(`devices/${encodeURIComponent(name)}?service=${encodeURIComponent(service)}`, gateway);
+          found.push({ url: String(url), device: name, service, type, nodeId: node_id, nodeName: node_name });
+        }
+  } catch (error) {
+    throw make_error("ConnectionError", `devices of the gateway ${query.gateway}: ${text_of(error)}`);
+  }
+  return found.filter(query.filter ?? (() => true));
+}
