@@ -333,6 +333,11 @@ std::size_t UsbLink::unread_bytes(UsbStreamKey key) const {
   return found == streams_.end() ? 0 : found->second.unread.size();
 }
 
+std::size_t UsbLink::unsent_bytes(UsbStreamKey key) const {
+  const auto found = streams_.find(key);
+  return found == streams_.end() ? 0 : found->second.unsent.size();
+}
+
 // --- within ---
 
 /// Unread bytes stay, so that a reader gets all that came before the end.

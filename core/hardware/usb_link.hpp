@@ -107,6 +107,8 @@ class UsbLink {
   /// Everything that write() took has reached the device.
   bool is_sent(UsbStreamKey key) const;
   std::size_t unread_bytes(UsbStreamKey key) const;
+  /// What write() took and no transfer carries yet.
+  std::size_t unsent_bytes(UsbStreamKey key) const;
   std::size_t stream_count() const { return streams_.size(); }
 
  private:

@@ -2,8 +2,8 @@
 import { parse_service_url } from "../../wasm-client/dist/url.js";
 
 const parse = (text: string, base?: string) => {
-  const { socket, service, nodeId, nodeName } = parse_service_url(text, base);
-  return { socket: socket.href, service, nodeId, nodeName };
+  const { address, service, nodeId, nodeName } = parse_service_url(text, base);
+  return { address: address.href, service, nodeId, nodeName };
 };
 
 it.each([
@@ -19,8 +19,8 @@ it.each([
   ["rr+tcp://[::1]:52222/?service=Create", "ws://[::1]:52222/?service=Create"],
   ["rr+tcp://[::1]/?service=Create", "ws://[::1]:48653/?service=Create"],
   ["WSS://gw.example/?service=Create#part", "wss://gw.example/?service=Create"],
-])("opens %s as %s", (text, socket) => {
-  expect(parse(text)).toEqual({ socket, service: "Create", nodeId: undefined, nodeName: undefined });
+])("opens %s as %s", (text, address) => {
+  expect(parse(text)).toEqual({ address, service: "Create", nodeId: undefined, nodeName: undefined });
 });
 
 it("reads the node that is meant", () => {
@@ -28,10 +28,19 @@ it("reads the node that is meant", () => {
   expect(parse(`ws://h/?nodeid=${id}&nodename=my.robot&service=a`)).toMatchObject({ nodeId: id, nodeName: "my.robot" });
 });
 
+it.each([
+  ["rr+usb:///?nodename=robot&service=Create", "rr+usb:///?nodename=robot&service=Create"],
+  ["RR+USB:///?nodename=robot&service=Create#part", "rr+usb:///?nodename=robot&service=Create"],
+  ["rr+usb://localhost/?service=Create&nodename=robot", "rr+usb:///?service=Create&nodename=robot"],
+  ["rr+usb://localhost?service=Create&nodename=robot", "rr+usb:///?service=Create&nodename=robot"],
+])("opens %s as %s", (text, address) => {
+  expect(parse(text)).toEqual({ address, service: "Create", nodeId: undefined, nodeName: "robot" });
+});
+
 it("is relative to the page where there is one", () => {
-  expect(parse("/devices/create?service=Create", "https://gw.example/app/").socket).toBe("wss://gw.example/devices/create?service=Create");
-  expect(parse("devices/create?service=Create", "http://gw.example:8080/app/").socket).toBe("ws://gw.example:8080/app/devices/create?service=Create");
-  expect(parse("//other.example/?service=Create", "http://gw.example/").socket).toBe("ws://other.example/?service=Create");
+  expect(parse("/devices/create?service=Create", "https://gw.example/app/").address).toBe("wss://gw.example/devices/create?service=Create");
+  expect(parse("devices/create?service=Create", "http://gw.example:8080/app/").address).toBe("ws://gw.example:8080/app/devices/create?service=Create");
+  expect(parse("//other.example/?service=Create", "http://gw.example/").address).toBe("ws://other.example/?service=Create");
 });
 
 it.each([
@@ -39,6 +48,13 @@ it.each([
   ["ws://gw.example/?service=", "names no service"],
   ["rrs+tcp://gw.example/?service=a", "use rr+wss"],
   ["rr+tpc://gw.example/?service=a", "scheme unknown; known: ws, wss"],
+  ["rr+usb:///?service=a", 'names no node; add "nodeid=ID" or "nodename=NAME"'],
+  ["rr+usb:///?service=a&nodeid=", "names no node"],
+  ["rr+usb:///?nodename=robot", "names no service"],
+  ["rr+usb://robot/?nodename=robot&service=a", "found a host, port or path"],
+  ["rr+usb://localhost:80/?nodename=robot&service=a", "found a host, port or path"],
+  ["rr+usb:///robot?nodename=robot&service=a", "found a host, port or path"],
+  ["rr+usb:?nodename=robot&service=a", "found a host, port or path"],
   ["ftp://gw.example/?service=a", "scheme unknown"],
   ["/devices/create?service=Create", "no page that it could be relative to"],
   ["ws://gw.example:99999/?service=a", "Invalid URL"],

@@ -3,9 +3,9 @@ import { copyFile, mkdir } from "node:fs/promises";
 
 const from = new URL("../../build/wasm/wasm-client/", import.meta.url);
 const to = new URL("../dist/", import.meta.url);
-await mkdir(to, { recursive: true });
-for (const file of ["rrgate.wasm"]) {
-  await copyFile(new URL(file, from), new URL(file, to)).catch((error) => {
-    throw new Error(`${file} is not built: run "cmake --build --preset wasm --target rrgate_wasm" first (${error.message})`);
+await mkdir(new URL("usb/", to), { recursive: true });
+for (const [file, place] of [["rrgate.wasm", "rrgate.wasm"], ["rrgate-usb.wasm", "usb/rrgate-usb.wasm"]]) {
+  await copyFile(new URL(file, from), new URL(place, to)).catch((error) => {
+    throw new Error(`${file} is not built: run "cmake --build --preset wasm --target wasm-client/all" first (${error.message})`);
   });
 }

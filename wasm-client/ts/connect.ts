@@ -5,6 +5,7 @@ import { check_timeout, Session } from "./session.js";
 import type { OpenTransport, Transport } from "./transport.js";
 import type { ObjectInfo, RemoteObject } from "./types.js";
 import { parse_service_url } from "./url.js";
+import { open_usb } from "./usb_devices.js";
 import { Core } from "./wasm_module.js";
 import { open_websocket } from "./websocket.js";
 import { check_signal } from "./within.js";
@@ -30,7 +31,7 @@ export interface ConnectOptions {
   /** For tests and peers with a gap: the newest message version to offer (4), and whether to offer string tables. */
   version?: 2 | 4 | undefined;
   stringTable?: boolean | undefined;
-  /** Carries the bytes instead of a WebSocket. */
+  /** Carries the bytes instead of a WebSocket or a USB device. */
   transport?: OpenTransport | undefined;
 }
 
@@ -40,7 +41,8 @@ const default_request_timeout = 15_000;
 /**
  * Connects to a service.
  * @param url "wss://host/devices/create?service=Create"; schemes ws, wss, http, https, rr+ws, rr+wss, rr+tcp (the port
- *            of a node takes WebSockets too); in a page also relative to it.
+ *            of a node takes WebSockets too); in a page also relative to it. "rr+usb:///?nodename=robot&service=Create" for
+ *            a USB device that the page may use (see requestUsbDevice()), where the browser has WebUSB.
  * @returns   the service's root object, once the session is up.
  * @throws    RobotRaconteurError InvalidArgument (URL, options), ConnectionError, ServiceNotFound, NodeNotFound,
  *            AuthenticationError, RequestTimeout, ...; the reason of `signal`.
@@ -52,7 +54,7 @@ export async function connect<T = RemoteObject>(
   const { signal } = options;
   check_signal(signal);
   signal?.throwIfAborted();
-  const { socket, service, nodeId, nodeName } = parse_service_url(url);
+  const { address, service, nodeId, nodeName } = parse_service_url(url);
   const timeout = check_timeout(options.timeout ?? default_connect_timeout);
   const request_timeout = check_timeout(options.requestTimeout ?? default_request_timeout, "requestTimeout");
   if (options.username === undefined && (options.password ?? options.credentials) !== undefined) {
@@ -64,11 +66,11 @@ export async function connect<T = RemoteObject>(
   const abort = () => attempt.fail(signal?.reason);
   signal?.addEventListener("abort", abort, { once: true });
   const timer = setTimeout(
-    () => attempt.fail(make_error("RequestTimeout", `${socket.host}: no session within ${timeout} ms`)),
+    () => attempt.fail(make_error("RequestTimeout", `${address.host || address.href}: no session within ${timeout} ms`)),
     Math.min(timeout, 2 ** 31 - 1),
   );
   try {
-    await attempt.open(socket, options.transport ?? open_websocket);
+    await attempt.open(address, options.transport ?? (address.protocol === "rr+usb:" ? open_usb : open_websocket));
     const core = await attempt.unless_failed(
       Core.create({
         service,

@@ -1,5 +1,5 @@
 /**
- * rrgate-client: Robot Raconteur services in browsers, workers and Node, over WebSocket.
+ * rrgate-client: Robot Raconteur services in browsers, workers and Node, over WebSocket; in browsers over USB, too.
  * @module
  */
 export type { Clock } from "./clock.js";
@@ -19,6 +19,8 @@ export { subscribe } from "./subscribe.js";
 export type { SubscribeOptions, Subscription } from "./subscribe.js";
 export type { OpenTransport, Transport, TransportListener } from "./transport.js";
 export type * from "./types.js";
+export { listUsbDevices, requestUsbDevice } from "./usb_devices.js";
+export type { UsbFilter, UsbNode } from "./usb_devices.js";
 export { rrValue, typeOf } from "./values.js";
 export type { ExactValue } from "./values.js";
 export { version } from "./version.js";

@@ -8,7 +8,7 @@ import { platform } from "./platform.js";
 
 export * from "./index.js";
 
-platform.load_wasm = async () => WebAssembly.compile(await readFile(new URL("./rrgate.wasm", import.meta.url)));
+platform.load_wasm = async (url) => WebAssembly.compile(await readFile(url));
 
 /** Node's own since version 22, before that the package "ws". */
 platform.find_websocket = async () => {

@@ -2,18 +2,16 @@
 // Relative imports only: a page loads dist/ as it is, without a bundler.
 
 export interface Platform {
-  /** The compiled core. */
-  load_wasm(): Promise<WebAssembly.Module>;
+  /** Compiles a file of this package. */
+  load_wasm(url: URL): Promise<WebAssembly.Module>;
   /** @throws RobotRaconteurError SystemResourceError: there is none. */
   find_websocket(): Promise<typeof WebSocket>;
 }
 
 export const platform: Platform = {
-  async load_wasm() {
-    // Written out so that bundlers see it and ship the file.
-    const url = new URL("./rrgate.wasm", import.meta.url);
+  async load_wasm(url) {
     const response = await fetch(url);
-    if (!response.ok) throw new Error(`rrgate.wasm: ${url.href} answered ${response.status} ${response.statusText}`);
+    if (!response.ok) throw new Error(`${url.href} answered ${response.status} ${response.statusText}`);
     if (response.headers.get("Content-Type")?.startsWith("application/wasm")) {
       return WebAssembly.compileStreaming(response);
     }

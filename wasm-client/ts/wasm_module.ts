@@ -112,7 +112,8 @@ export class Core {
 
   /** @throws RobotRaconteurError SystemResourceError: the file cannot be loaded; those of options that make no sense. */
   static async create(options: CoreOptions): Promise<Core> {
-    compiled ??= platform.load_wasm().catch((error: unknown) => {
+    // Written out so that bundlers see it and ship the file.
+    compiled ??= platform.load_wasm(new URL("./rrgate.wasm", import.meta.url)).catch((error: unknown) => {
       compiled = undefined; // the next connect() tries again
       throw make_error("SystemResourceError", `the protocol core could not be loaded: ${text_of(error)}`);
     });

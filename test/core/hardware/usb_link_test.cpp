@@ -139,12 +139,14 @@ TEST_CASE("the first stream is opened and the last one closed as the reference d
   // 56 + 56 + 39 bytes.
   const auto message = pattern(151);
   CHECK(link.write(key, message) == 151);
+  CHECK(link.unsent_bytes(key) == 151);
   for (const std::string start : {"4000000007000000", "4000000007000000", "2f00000007000000"}) {
     const auto write = link.poll_write();
     REQUIRE(write);
     CHECK(to_hex(write->bytes.first(8)) == start);
     CHECK(write->bytes.size() == write->bytes[0]);
   }
+  CHECK(link.unsent_bytes(key) == 0);
   CHECK_FALSE(link.poll_write());
   CHECK_FALSE(link.is_sent(key));
   for (std::size_t slot = 0; slot < 3; ++slot) link.handle_written(slot, UsbStatus::ok, slot < 2 ? 64 : 47);

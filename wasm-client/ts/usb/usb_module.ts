@@ -1,0 +1,228 @@
+// The compiled USB half of the core: the only file that knows its handles and its memory. Layer: wasm-client/ts.
+// Source: src/usb_bindings.cpp, and core/hardware/usb_probe.hpp and usb_link.hpp behind it.
+import { make_error, text_of } from "../errors.js";
+import { JsValues } from "../js_values.js";
+import type { CoreExports, Handle } from "../js_values.js";
+import { platform } from "../platform.js";
+import type { WebUsbConfiguration, WebUsbSetup } from "./webusb.js";
+
+/** As rr::UsbStatus. */
+const statuses = ["ok", "stall", "no_device", "timed_out", "cancelled", "overflow", "busy", "denied", "failed"] as const;
+export type UsbStatus = (typeof statuses)[number];
+
+export interface UsbControl {
+  setup: WebUsbSetup;
+  /** Bytes asked for, or what the host sends. */
+  data: number | Uint8Array<ArrayBuffer>;
+}
+
+export interface UsbEvent {
+  kind: "opened" | "readable" | "writable" | "closed";
+  stream: number;
+  /** closed only. */
+  reason: string;
+}
+
+interface WasmUsb extends CoreExports {
+  _initialize(): void;
+  buffer(size: number): number;
+  add_interface(number: number, alternate: number, class_code: number): void;
+  add_endpoint(address: number, is_bulk: boolean, packet_size: number): void;
+  node(): Handle;
+  interface_number(): number;
+  in_address(): number;
+  out_address(): number;
+  handle_control(status: number, size: number): void;
+  handle_written(slot: number, status: number, size: number): void;
+  handle_read(slot: number, status: number, size: number): void;
+  open_stream(): number;
+  write(stream: number): number;
+  read(stream: number): number;
+  close_stream(stream: number): void;
+  close(reason: Handle): void;
+  poll_control(): number;
+  poll_write(): number;
+  write_address(): number;
+  write_size(): number;
+  poll_read(): number;
+  read_address(): number;
+  read_size(): number;
+  poll_event(): Handle;
+  has_link(): number;
+  is_ending(): number;
+  is_closed(): number;
+  is_sent(stream: number): number;
+  unsent_bytes(stream: number): number;
+  unread_bytes(stream: number): number;
+}
+
+const request_types = ["standard", "class", "vendor"] as const;
+const recipients = ["device", "interface", "endpoint", "other"] as const;
+const in_bit = 0x80;
+const endpoint_bits = 0x0f;
+
+let compiled: Promise<WebAssembly.Module> | undefined;
+
+/**
+ * One claim of one device, in an instance of its own: first the probe that finds out who it is, then its streams.
+ * All methods follow the order of the sans-IO contract: after whatever is told or asked, poll.
+ */
+export class UsbCore {
+  readonly #values: JsValues;
+  readonly #usb: WasmUsb;
+
+  /** @throws RobotRaconteurError SystemResourceError: the file cannot be loaded. */
+  static async create(configuration: WebUsbConfiguration): Promise<UsbCore> {
+    // Written out so that bundlers see it and ship the file.
+    compiled ??= platform.load_wasm(new URL("./rrgate-usb.wasm", import.meta.url)).catch((error: unknown) => {
+      compiled = undefined; // the next one tries again
+      throw make_error("SystemResourceError", `the protocol core for USB could not be loaded: ${text_of(error)}`);
+    });
+    const code = await compiled;
+    const values = new JsValues();
+    const { exports } = await WebAssembly.instantiate(code, values.imports);
+    return new UsbCore(values, exports as unknown as WasmUsb, configuration);
+  }
+
+  private constructor(values: JsValues, usb: WasmUsb, configuration: WebUsbConfiguration) {
+    this.#values = values;
+    this.#usb = usb;
+    values.attach(usb);
+    usb._initialize();
+    for (const { interfaceNumber, alternates } of configuration.interfaces) {
+      for (const { alternateSetting, interfaceClass, endpoints } of alternates) {
+        usb.add_interface(interfaceNumber, alternateSetting, interfaceClass);
+        for (const { endpointNumber, direction, type, packetSize } of endpoints) {
+          usb.add_endpoint(endpointNumber | (direction === "in" ? in_bit : 0), type === "bulk", packetSize);
+        }
+      }
+    }
+  }
+
+  // --- who it is ---
+
+  /** While control requests are to be made: undefined. Then the node, or a sentence that says why it is none. */
+  node(): { id: string; name: string } | string | undefined {
+    return this.#values.take(this.#usb.node()) as { id: string; name: string } | string | undefined;
+  }
+
+  /** Of a device whose node is known. */
+  places(): { interface: number; in: number; out: number } {
+    const usb = this.#usb;
+    return {
+      interface: usb.interface_number(),
+      in: usb.in_address() & endpoint_bits,
+      out: usb.out_address() & endpoint_bits,
+    };
+  }
+
+  // --- told ---
+
+  handle_control(status: UsbStatus, data: Uint8Array): void {
+    this.#put(data);
+    this.#usb.handle_control(statuses.indexOf(status), data.length);
+  }
+
+  handle_written(slot: number, status: UsbStatus, size: number): void {
+    this.#usb.handle_written(slot, statuses.indexOf(status), size);
+  }
+
+  /** `data`: no more than poll_read() asked for. */
+  handle_read(slot: number, address: number, status: UsbStatus, data: Uint8Array): void {
+    this.#values.bytes.set(data, address);
+    this.#usb.handle_read(slot, statuses.indexOf(status), data.length);
+  }
+
+  // --- asked ---
+
+  open_stream(): number {
+    return this.#usb.open_stream();
+  }
+
+  /** Takes all of them. */
+  write(stream: number, bytes: Uint8Array): void {
+    this.#put(bytes);
+    this.#usb.write(stream);
+  }
+
+  /** What was received; a copy. */
+  read(stream: number): Uint8Array {
+    const size = this.#usb.unread_bytes(stream);
+    const address = this.#usb.buffer(size);
+    this.#usb.read(stream);
+    return this.#values.bytes.slice(address, address + size);
+  }
+
+  close_stream(stream: number): void {
+    this.#usb.close_stream(stream);
+  }
+
+  close(reason: string): void {
+    this.#usb.close(this.#values.give(reason));
+  }
+
+  // --- answers ---
+
+  poll_control(): UsbControl | undefined {
+    const at = this.#usb.poll_control();
+    if (at === 0) return undefined;
+    const view = new DataView(this.#values.bytes.buffer, at);
+    const type = view.getUint8(0);
+    const length = view.getUint16(6, true);
+    return {
+      setup: {
+        requestType: request_types[(type >> 5) & 3] ?? "vendor",
+        recipient: recipients[type & 31] ?? "other",
+        request: view.getUint8(1),
+        value: view.getUint16(2, true),
+        index: view.getUint16(4, true),
+      },
+      data: type & in_bit ? length : this.#values.bytes.slice(at + 8, at + 8 + length),
+    };
+  }
+
+  poll_write(): { slot: number; bytes: Uint8Array<ArrayBuffer> } | undefined {
+    const slot = this.#usb.poll_write();
+    if (slot === 0) return undefined;
+    const at = this.#usb.write_address();
+    return { slot, bytes: this.#values.bytes.slice(at, at + this.#usb.write_size()) };
+  }
+
+  poll_read(): { slot: number; address: number; size: number } | undefined {
+    const slot = this.#usb.poll_read();
+    return slot === 0 ? undefined : { slot, address: this.#usb.read_address(), size: this.#usb.read_size() };
+  }
+
+  poll_event(): UsbEvent | undefined {
+    return this.#values.take(this.#usb.poll_event()) as UsbEvent | undefined;
+  }
+
+  // --- looked at ---
+
+  /** Whether a stream was ever asked for. */
+  has_link(): boolean {
+    return this.#usb.has_link() !== 0;
+  }
+
+  /** New streams need a new claim. */
+  is_ending(): boolean {
+    return this.#usb.is_ending() !== 0;
+  }
+
+  is_closed(): boolean {
+    return this.#usb.is_closed() !== 0;
+  }
+
+  is_sent(stream: number): boolean {
+    return this.#usb.is_sent(stream) !== 0;
+  }
+
+  unsent_bytes(stream: number): number {
+    return this.#usb.unsent_bytes(stream);
+  }
+
+  #put(bytes: Uint8Array): void {
+    const address = this.#usb.buffer(bytes.length);
+    this.#values.bytes.set(bytes, address);
+  }
+}
