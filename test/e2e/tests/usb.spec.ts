@@ -1,0 +1,164 @@
+// A USB device in a page and in a worker of a real browser: its navigator.usb is the one of the client's tests, and behind
+// the device is a service that the gateway leads to.
+import { execFileSync } from "node:child_process";
+import { cpSync, existsSync, mkdtempSync, readFileSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import path from "node:path";
+import { expect, test } from "@playwright/test";
+import type { Page } from "@playwright/test";
+import { Program, repository_root, rrgate, start_gateway } from "../processes";
+
+const service = path.join(path.dirname(rrgate), "../test/interop/cpp/rr-test-service");
+const simulated = path.join(repository_root, "build/wasm/test/wasm-client/usb_device/test_usb_device.wasm");
+
+const script = `
+import { connect, listUsbDevices, requestUsbDevice } from "./index.js";
+import { open_websocket } from "./websocket.js";
+import { FakeUsb, FakeUsbDevice } from "./fake_usb.js";
+
+const relay = new URL("/devices/big?service=interop", location);
+relay.protocol = "ws:";
+const { devices } = await (await fetch("/api/v1/devices")).json();
+const code = await WebAssembly.compileStreaming(fetch("./test_usb_device.wasm"));
+const device = await FakeUsbDevice.make(code, { name: devices[0].node_name, packetSize: 512 });
+device.accept = () => (_url, listener) =>
+  new Promise((resolve) => {
+    const transport = open_websocket(relay, { ...listener, opened: () => resolve(transport) });
+  });
+const usb = new FakeUsb();
+Object.defineProperty(navigator, "usb", { value: usb });
+
+/** Whether what speaks to USB devices has been loaded. */
+const is_loaded = () => performance.getEntriesByType("resource").some(({ name }) => name.endsWith("/rrgate-usb.wasm"));
+
+export async function run(is_page) {
+  const said = { loaded_before: is_loaded() };
+  if (is_page) {
+    usb.choice = device;
+    said.chosen = (await requestUsbDevice()).nodeName;
+  } else {
+    usb.plug(device);
+  }
+  const [node] = await listUsbDevices();
+  said.is_same_node = node.nodeName === devices[0].node_name;
+  const robot = await connect("rr+usb:///?service=interop&nodename=" + node.nodeName);
+  said.sum = await robot.add(2, 3);
+  const ramp = await robot.ramp(20_000);
+  said.ramp = ramp.length + " doubles, wrong at " + ramp.findIndex((value, index) => value !== index);
+  said.counted = [];
+  for await (const number of robot.count_up(1, 3)) said.counted.push(number);
+  const end = new Promise((resolve) => robot.$.onClose(resolve));
+  const call = robot.add(1, 1).catch((error) => error.subName);
+  usb.unplug(device);
+  said.call = await call;
+  said.end = (await end).message;
+  said.loaded_after = is_loaded();
+  return said;
+}
+`;
+
+/** Asks while it loads, without a click: what a test runs in a page later counts as one. */
+const own = `
+import { connect, listUsbDevices, requestUsbDevice } from "./index.js";
+const message = (error) => error.message;
+const asked = requestUsbDevice().catch(message);
+globalThis.said = {
+  asked: await asked,
+  listed: await listUsbDevices(),
+  connected: await connect("rr+usb:///?nodename=robot&service=interop").catch(message),
+};
+`;
+
+/** The package as it is published, and the script above with what it needs. */
+function make_site(): string {
+  const site = mkdtempSync(path.join(tmpdir(), "rrgate-usb-site-"));
+  cpSync(path.join(repository_root, "wasm-client/dist"), site, { recursive: true });
+  cpSync(simulated, path.join(site, "test_usb_device.wasm"));
+  const fake = path.join(repository_root, "test/wasm-client/fake_usb.ts");
+  const how = "--ignoreConfig --skipLibCheck --strict --target es2022 --module esnext --moduleResolution bundler --rootDir".split(" ");
+  const tsc = path.join(repository_root, "test/e2e/node_modules/.bin/tsc");
+  execFileSync(tsc, [...how, repository_root, "--outDir", site, fake]);
+  const compiled = readFileSync(path.join(site, "test/wasm-client/fake_usb.js"), "utf8");
+  writeFileSync(path.join(site, "fake_usb.js"), compiled.replaceAll("../../wasm-client/dist/", "./"));
+  writeFileSync(path.join(site, "usb_script.js"), script);
+  writeFileSync(path.join(site, "worker.js"), 'import { run } from "./usb_script.js"; postMessage(await run(false));');
+  writeFileSync(path.join(site, "own.js"), own);
+  writeFileSync(path.join(site, "own.html"), '<!doctype html><title>USB</title><script type="module" src="own.js"></script>');
+  writeFileSync(path.join(site, "index.html"), "<!doctype html><title>USB</title>");
+  return site;
+}
+
+let device: Program;
+let gateway: { program: Program; url: string };
+
+test.beforeAll(async () => {
+  for (const file of [service, simulated]) if (!existsSync(file)) throw new Error(`${file} is missing: build it first`);
+  device = new Program(service, []);
+  device.start();
+  const found = await device.wait_for_output(/"url": *"([^"]+)"/);
+  gateway = await start_gateway("big", found[1] ?? "", make_site());
+});
+
+test.afterAll(async () => {
+  await gateway?.program.kill("SIGTERM");
+  await device?.kill("SIGTERM");
+});
+
+/** The gateway has to know who its device is. */
+async function open(page: Page): Promise<void> {
+  await expect(async () => {
+    const answer = (await (await page.request.get(`${gateway.url}api/v1/devices`)).json()) as { devices: { node_name: string }[] };
+    expect(answer.devices[0]?.node_name).not.toBe("");
+  }).toPass();
+  await page.goto(gateway.url);
+}
+
+const expected = {
+  loaded_before: false,
+  is_same_node: true,
+  sum: 5,
+  ramp: "20000 doubles, wrong at -1",
+  counted: [1, 2, 3],
+  call: "connection_lost",
+  end: expect.stringMatching(/USB device "Test robot" \(1209:5252\): .*(unplugged|the device is gone); plug it in again$/),
+  loaded_after: true,
+};
+
+test("a page lets the user choose a USB device and speaks to the service behind it", async ({ page }) => {
+  await open(page);
+  const said = await page.evaluate(async () => (await import(new URL("usb_script.js", location.href).href)).run(true));
+  expect(said).toEqual({ ...expected, chosen: expect.any(String) });
+});
+
+test("a worker speaks to the same device", async ({ page }) => {
+  await open(page);
+  const said = await page.evaluate(
+    () =>
+      new Promise((resolve, reject) => {
+        const worker = new Worker("worker.js", { type: "module" });
+        worker.onerror = (error) => reject(new Error(error.message));
+        worker.onmessage = ({ data }) => resolve(data);
+      }),
+  );
+  expect(said).toEqual(expected);
+});
+
+test("where there is no WebUSB, a page hears so", async ({ page }) => {
+  await page.goto(gateway.url);
+  const said = await page.evaluate(async () => {
+    Object.defineProperty(navigator, "usb", { value: undefined });
+    const { connect } = await import(new URL("index.js", location.href).href);
+    return connect("rr+usb:///?nodename=robot&service=interop").catch((error: Error) => error.message);
+  });
+  expect(said).toContain("this browser has no WebUSB");
+});
+
+test("the browser's own WebUSB takes what it is asked", async ({ page }) => {
+  await page.goto(new URL("own.html", gateway.url).href);
+  const said = await page.waitForFunction(() => (globalThis as { said?: Record<string, unknown> }).said);
+  expect(await said.jsonValue()).toEqual({
+    asked: expect.stringMatching(/^the user cannot be asked .* user gesture/),
+    listed: [],
+    connected: expect.stringContaining("let the user choose one with requestUsbDevice()"),
+  });
+});
