@@ -110,7 +110,10 @@ Result<NodeId> check_node_chain(x509_store_ctx_st* store) {
   // Critical extensions that OpenSSL does not know are looked at below.
   X509_VERIFY_PARAM_set_flags(X509_STORE_CTX_get0_param(store), X509_V_FLAG_IGNORE_CRITICAL);
   if (X509_verify_cert(store) != 1) return refused(describe_chain_error(store));
-  STACK_OF(X509)* const chain = X509_STORE_CTX_get0_chain(store);
+  return read_node_chain(X509_STORE_CTX_get0_chain(store));
+}
+
+Result<NodeId> read_node_chain(const stack_st_X509* chain) {
   const int size = sk_X509_num(chain);
   if (size < 2)
     return refused(about(sk_X509_value(chain, 0)) + " is self-signed; expected one that a trusted CA has issued");

@@ -4,6 +4,7 @@
 #include "core/support/error.hpp"
 #include "core/support/node_id.hpp"
 
+struct stack_st_X509;
 struct x509_store_ctx_st;
 
 namespace rr {
@@ -13,6 +14,8 @@ namespace rr {
 /// Returns  the node that the certificate is of.
 /// Errors   authentication_error: which certificate fails which check.
 Result<NodeId> check_node_chain(x509_store_ctx_st* store);
+/// The part of it that follows the checks of any chain. `chain`: the peer's certificate first, the root last.
+Result<NodeId> read_node_chain(const stack_st_X509* chain);
 
 /// The object identifiers that mark the levels.
 inline constexpr const char* root_oid = "1.3.6.1.4.1.45455.1.1.3.1";

@@ -25,6 +25,15 @@ constexpr auto await_tuple = asio::as_tuple(asio::use_awaitable);
 /// waits at its source instead. In-flight data is not limited by it, so long fat links keep their throughput.
 constexpr int unsent_low_mark = 256 * 1024;
 
+/// A peer that vanished without a word, with nothing on its way to it, is noticed after a minute: nobody else may.
+void watch_for_dead_peers(int socket) {
+  const auto set = [&](int level, int name, int value) { ::setsockopt(socket, level, name, &value, sizeof(value)); };
+  set(SOL_SOCKET, SO_KEEPALIVE, 1);
+  set(IPPROTO_TCP, TCP_KEEPIDLE, 30);   // seconds without a byte from the peer, then
+  set(IPPROTO_TCP, TCP_KEEPINTVL, 10);  // so often,
+  set(IPPROTO_TCP, TCP_KEEPCNT, 3);     // so many times
+}
+
 std::string describe(const tcp::endpoint& endpoint) {
   return format_host_port(endpoint.address().to_string(), endpoint.port());
 }
@@ -35,6 +44,7 @@ std::unique_ptr<ByteStream> make_tcp_stream(tcp::socket socket, std::chrono::mil
   error_code error;
   socket.set_option(tcp::no_delay(true), error);
   ::setsockopt(socket.native_handle(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &unsent_low_mark, sizeof(unsent_low_mark));
+  watch_for_dead_peers(socket.native_handle());
   const auto endpoint = socket.remote_endpoint(error);
   std::string peer = error ? "(gone)" : describe(endpoint);
   return std::make_unique<SocketStream>(std::move(socket), std::move(peer), send_stall);

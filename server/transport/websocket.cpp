@@ -27,6 +27,7 @@ WebSocketStream::WebSocketStream(std::unique_ptr<ByteStream> inner, WebSocketRol
       written_(inner_->executor(), asio::steady_timer::time_point::max()) {}
 
 awaitable<ReadResult> WebSocketStream::read_some(std::span<std::uint8_t> into) {
+  if (const auto count = take_put_back(into)) co_return ReadResult{{}, count};
   for (;;) {
     if (decoder_.received_close()) co_return ReadResult{};
     const auto read = co_await inner_->read_some(into);

@@ -14,12 +14,10 @@ JS = ROOT / "test" / "interop" / "js"
 
 def run_client(direction, port, scenario, chromium=None):
     """Hands the steps of a scenario to the client of a direction. Returns its results, one for each step."""
-    steps = [{key: value for key, value in step.items() if not key.startswith("expect") and key not in ("message", "any_order")}
-             for step in scenario.steps]
     if direction.client == "chromium":
-        answer = chromium.ask({"url": client_url(direction, port), "steps": steps})
+        answer = chromium.ask({"url": client_url(direction, port), "steps": without_expectations(scenario.steps)})
     else:
-        answer = run_program(client_command(direction, port), steps)
+        answer = run_program(client_command(direction, port), scenario.steps)
     if "results" not in answer:
         raise AssertionError(f"client did not connect: {answer}")
     return answer["results"]
@@ -49,11 +47,19 @@ def client_command(direction, port):
     }[direction.client]
 
 
-def run_program(command, steps):
+def without_expectations(steps):
+    """What the client is told of a scenario."""
+    return [{key: value for key, value in step.items() if not key.startswith("expect") and key not in ("message", "any_order")}
+            for step in steps]
+
+
+def run_program(command, steps, environment={}):
+    """What a client program prints: {"results": [...]} or {"connect_error": {...}}."""
     client = subprocess.Popen([str(word) for word in command], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                              stderr=subprocess.PIPE, text=True, start_new_session=True, cwd=ROOT)
+                              stderr=subprocess.PIPE, text=True, start_new_session=True, cwd=ROOT,
+                              env={**os.environ, **environment})
     try:
-        output, errors = client.communicate(json.dumps({"steps": steps}), timeout=STEP_DEADLINE)
+        output, errors = client.communicate(json.dumps({"steps": without_expectations(steps)}), timeout=STEP_DEADLINE)
     except subprocess.TimeoutExpired:
         os.killpg(client.pid, signal.SIGKILL)
         output, errors = client.communicate()

@@ -45,8 +45,12 @@ def pytest_sessionfinish():
 
 @pytest.fixture(autouse=True)
 def deadline():
-    faulthandler.dump_traceback_later(TEST_DEADLINE, exit=True)
-    yield
+    """A test that does the same thing many times calls it for each of them."""
+    def begin():
+        faulthandler.dump_traceback_later(TEST_DEADLINE, exit=True)
+
+    begin()
+    yield begin
     faulthandler.cancel_dump_traceback_later()
 
 
@@ -71,6 +75,17 @@ def pytest_collection_modifyitems(config, items):
 
     config.hook.pytest_deselected(items=[item for item in items if not is_known(item)])
     items[:] = filter(is_known, items)
+
+
+@pytest.fixture
+def carries(record_property):
+    """carries(client, service, scheme[, device_scheme]): says in the JUnit file what the test shows, for transports.py:
+    client ("ours" in any language, "reference") and service understand each other by the scheme; with a device_scheme,
+    through the gateway, which reaches the service by that."""
+    def note(client, service, *schemes):
+        assert len(schemes) in (1, 2)
+        record_property("carries", " ".join(["reference" if client == "reference" else "ours", service, *schemes]))
+    return note
 
 
 @pytest.fixture(scope="session")

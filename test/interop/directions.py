@@ -23,6 +23,12 @@ class Direction:
     levels: tuple = tuple(LEVELS)
 
     @property
+    def schemes(self):
+        """Those of the client and, through the gateway, of the device."""
+        return {"direct": ["rr+tcp"], "direct-ws": ["rr+ws"], "local": ["rr+local"], "gateway-tcp": ["rr+tcp", "rr+tcp"],
+                "gateway-ws": ["rr+ws", "rr+tcp"], "gateway-ws-local": ["rr+ws", "rr+local"]}[self.route]
+
+    @property
     def speaks_javascript(self):
         return self.client in ("node", "chromium")
 

@@ -1,12 +1,14 @@
 """Machines of a network of our own: a network namespace each, joined by a bridge. Needs root and the right to make them."""
+import concurrent.futures
 import contextlib
-import json
+import ctypes
 import os
 import subprocess
-import sys
 import time
 
 import pytest
+
+from processes import read_json
 
 ADDRESS_DEADLINE = 15.0  # seconds until the system has checked the link-local addresses for duplicates
 
@@ -66,9 +68,42 @@ class Network:
 
     def get_json(self, host, url):
         """What an HTTP server says to one who runs on the host; None where it cannot be reached."""
-        done = run(*self.on(host, sys.executable, "-c",
-                            f"import urllib.request as r; print(r.urlopen({url!r}, timeout=5).read().decode())"))
-        return json.loads(done.stdout) if done.returncode == 0 else None
+        return self.call(host, lambda: read_json(url))
+
+    def call(self, host, function):
+        """function() by a thread that is on the host; sockets that it makes stay there."""
+        def enter_and_call():
+            with open(f"/run/netns/{self._names[host + 1]}") as namespace:
+                if ctypes.CDLL(None, use_errno=True).setns(namespace.fileno(), 0) != 0:
+                    raise OSError(ctypes.get_errno(), "setns")
+            return function()
+
+        with concurrent.futures.ThreadPoolExecutor(1) as thread:
+            return thread.submit(enter_and_call).result()
+
+    def pull_cable(self, host):
+        self._ip("-n", self._names[host + 1], "link", "set", "eth0", "down")
+
+    def plug_in(self, host):
+        self._ip("-n", self._names[host + 1], "link", "set", "eth0", "up")
+
+    @contextlib.contextmanager
+    def losing_packets(self, host, percent):
+        """Of the TCP segments that the host sends. Gives a function that says how many were lost so far; None where this
+        machine cannot do it."""
+        rule = ["-p", "tcp", "-m", "statistic", "--mode", "random", "--probability", str(percent / 100), "-j", "DROP"]
+        try:
+            done = run(*self.on(host, "iptables", "-A", "OUTPUT", *rule))
+        except OSError:
+            yield None
+            return
+        if done.returncode != 0:
+            yield None
+            return
+        try:
+            yield lambda: int(run(*self.on(host, "iptables", "-nvxL", "OUTPUT")).stdout.splitlines()[2].split()[0])
+        finally:
+            run(*self.on(host, "iptables", "-D", "OUTPUT", *rule))
 
     def close(self):
         for name in self._names:

@@ -1,4 +1,5 @@
 """Processes of the harness: started on free ports, waited for by what they say, always ended."""
+import functools
 import http.client
 import json
 import os
@@ -8,11 +9,11 @@ import signal
 import socket
 import subprocess
 import time
+import urllib.parse
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = pathlib.Path(os.environ.get("RR_BUILD", ROOT / "build" / "release"))
 START_DEADLINE = 30.0  # seconds until a process must be ready
-STEP_DEADLINE = 60.0  # seconds for a client to carry out one scenario
 
 
 def free_port():
@@ -83,9 +84,24 @@ class Background:
         return code
 
 
-def start_gateway(folder, device_url, page_origin=None, device={}, asked_from="127.0.0.1", **more):
+def read_json(url, asked_from=""):
+    """What an HTTP server says to one who comes from that address; None where it cannot be reached."""
+    parts = urllib.parse.urlsplit(url)
+    connection = http.client.HTTPConnection(parts.netloc, timeout=5, source_address=(asked_from, 0))
+    try:
+        connection.request("GET", parts.path)
+        answer = connection.getresponse()
+        return json.load(answer) if answer.status == 200 else None
+    except OSError:
+        return None
+    finally:
+        connection.close()
+
+
+def start_gateway(folder, device_url, page_origin=None, device={}, asked_from="", host=None, on=None, **more):
     """A gateway to one device, called "interop", when it has reached it: (process, port). `device` and `more` are
-    further members of the device's configuration and of the whole; it is asked how it is from `asked_from`."""
+    further members of the device's configuration and of the whole; it is asked how it is from `asked_from`. `on` makes
+    the command that runs it elsewhere, `host` is a network.Network and a host of it to run it on."""
     port = free_port()
     config = folder / "gateway.json"
     config.write_text(json.dumps({
@@ -94,18 +110,14 @@ def start_gateway(folder, device_url, page_origin=None, device={}, asked_from="1
         "devices": [{"name": "interop", "url": device_url, **device}],
         **more,
     }))
-    gateway = Background([BUILD / "server" / "rrgate", "serve", "--config", config], folder / "gateway.log")
+    network, number = host or (None, None)
+    on = on or (functools.partial(network.on, number) if network else lambda *command: command)
+    get_json = functools.partial(network.get_json, number) if network else functools.partial(read_json, asked_from=asked_from)
+    gateway = Background(on(BUILD / "server" / "rrgate", "serve", "--config", config), folder / "gateway.log")
 
     def device_is_up():
-        connection = http.client.HTTPConnection("127.0.0.1", port, timeout=5, source_address=(asked_from, 0))
-        try:
-            connection.request("GET", "/api/v1/devices")
-            (device,) = json.load(connection.getresponse())["devices"]
-            return device["state"] == "online"
-        except OSError:
-            return False
-        finally:
-            connection.close()
+        answer = get_json(f"http://127.0.0.1:{port}/api/v1/devices")
+        return answer is not None and answer["devices"][0]["state"] == "online"
 
     try:
         gateway.wait_until(device_is_up)

@@ -4,13 +4,16 @@ import json
 import pytest
 
 from clients import client_url, run_client
+from directions import LOCAL_URL, Direction, service_command
+from processes import Background, start_gateway
 from scenarios import SCENARIOS
 from tap import Tap
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda scenario: scenario.name)
-def test_scenario(link, chromium, scenario):
+def test_scenario(link, chromium, scenario, carries):
     direction, _, port = link
+    carries(direction.client, direction.service, *direction.schemes)
     results = run_client(direction, port, scenario, chromium)
     assert len(results) == len(scenario.steps)
     for number, (step, result) in enumerate(zip(scenario.steps, results), 1):
@@ -28,6 +31,24 @@ def check(what, step, result):
     if step.get("any_order"):  # The reference hands events to a pool of threads.
         wanted, found = ({"list": sorted(value["list"])} for value in (wanted, found))
     assert found == wanted, what
+
+
+def test_our_local_service_through_the_gateway(tmp_path, carries):
+    """As direction ours-gateway-local-reference, which has all scenarios; the gateway's part does not depend on the service."""
+    carries("ours", "ours", "rr+ws", "rr+local")
+    direction = Direction("ours-gateway-local-ours", "ours", "gateway-ws-local", "ours")
+    functions = next(scenario for scenario in SCENARIOS if scenario.name == "functions")
+    service = Background(service_command(direction, "v4", "http://127.0.0.1"), tmp_path / "service.log")
+    gateway = None
+    try:
+        service.next_line()
+        gateway, port = start_gateway(tmp_path, LOCAL_URL)
+        for step, result in zip(functions.steps, run_client(direction, port, functions), strict=True):
+            check(json.dumps(step), step, result)
+    finally:
+        if gateway:
+            gateway.stop()
+        service.stop()
 
 
 @pytest.mark.direct

@@ -1,14 +1,13 @@
 """TLS between nodes: the reference and ours, each as service and as client, with certificates good and bad."""
 import json
-import os
-import signal
 import subprocess
 import sys
 
 import pytest
 
+from clients import run_program
 from directions import PEERS
-from processes import BUILD, ROOT, STEP_DEADLINE, Background
+from processes import BUILD, Background
 from scenarios import SCENARIOS
 from tap import Tap
 from test_interop import check
@@ -68,20 +67,7 @@ def run_steps(peer, lab, port, steps=FUNCTIONS.steps, *, scheme="rrs+tcp", node=
     url = f"{scheme}://127.0.0.1:{port}/?nodeid={node}&service=interop" if node else f"{scheme}://127.0.0.1:{port}/?service=interop"
     command = {"reference": [sys.executable, PEERS / "client.py"], "ours": [BUILD / "test/interop/cpp/rr-test-client"]}[peer]
     options = [f"--robotraconteur-nodeid={CLIENT}", "--robotraconteur-load-tls=true"] if has_certificate else []
-    client = subprocess.Popen([*map(str, command), url, *options], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                              stderr=subprocess.PIPE, text=True, start_new_session=True, cwd=ROOT,
-                              env={**os.environ, **environment(lab, "good", version)})
-    plain = [{key: value for key, value in step.items() if not key.startswith("expect") and key not in ("message", "any_order")}
-             for step in steps]
-    try:
-        output, errors = client.communicate(json.dumps({"steps": plain}), timeout=STEP_DEADLINE)
-    except subprocess.TimeoutExpired:
-        os.killpg(client.pid, signal.SIGKILL)
-        output, errors = client.communicate()
-        raise AssertionError(f"client still busy\n{output[-2000:]}\n{errors[-4000:]}") from None
-    lines = output.strip().splitlines()
-    assert lines, f"client ended with {client.returncode}\n{errors[-4000:]}"
-    return json.loads(lines[-1])
+    return run_program([*command, url, *options], steps, environment(lab, "good", version))
 
 
 def check_all(steps, answer):
@@ -93,8 +79,9 @@ def check_all(steps, answer):
 @pytest.mark.parametrize("version", TLS_VERSIONS)
 @pytest.mark.parametrize("has_certificate", [False, True], ids=["anonymous", "certified"])
 @pytest.mark.parametrize("client", ["reference", "ours"])
-def test_encrypted(lab, service, client, has_certificate, version):
+def test_encrypted(lab, service, client, has_certificate, version, carries):
     maker, port = service
+    carries(client, maker, "rrs+tcp")
     if version == "1.2" and (maker, client) != ("reference", "ours"):
         version = "1.2" if client == "ours" else "1.3"  # the reference's OpenSSL reads no configuration
     tap = Tap(port)
@@ -108,8 +95,9 @@ def test_encrypted(lab, service, client, has_certificate, version):
 
 
 @pytest.mark.parametrize("client", ["reference", "ours"])
-def test_over_websockets(lab, service, client):
+def test_over_websockets(lab, service, client, carries):
     maker, port = service
+    carries(client, maker, "rrs+ws")
     check_all(FUNCTIONS.steps, run_steps(client, lab, port, scheme="rrs+ws", has_certificate=True))
 
 

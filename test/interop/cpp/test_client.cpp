@@ -11,6 +11,7 @@ namespace {
 
 /// For all connections; set by the command line.
 rr::ConnectOptions connect_options;
+bool tells_when_connected = false;
 
 using nlohmann::json;
 
@@ -335,6 +336,7 @@ json run_scenario(const std::string& url, const json& steps) {
   json results = json::array();
   try {
     Client client(url);
+    if (tells_when_connected) std::cout << R"({"connected": true})" << std::endl;
     for (const auto& step : steps) {
       try {
         results.push_back({{"value", client.carry_out(step)}});
@@ -352,8 +354,8 @@ json run_scenario(const std::string& url, const json& steps) {
 
 int main(int argc, char** argv) {
   if (argc < 2) {
-    std::cerr
-        << "usage: rr-test-client URL [--robotraconteur-nodeid=ID --robotraconteur-load-tls=true] < scenario.json\n";
+    std::cerr << "usage: rr-test-client URL [--robotraconteur-nodeid=ID --robotraconteur-load-tls=true]\n"
+                 "                      [--heartbeat-ms=N] [--tell] < scenario.json\n";
     return 2;
   }
   try {
@@ -362,8 +364,15 @@ int main(int argc, char** argv) {
       constexpr std::string_view node_id = "--robotraconteur-nodeid=";
       if (argument.substr(0, node_id.size()) == node_id)
         connect_options.connection.self.id = rr::parse_node_id(argument.substr(node_id.size())).value();
+      constexpr std::string_view heartbeat = "--heartbeat-ms=";
+      if (argument.substr(0, heartbeat.size()) == heartbeat) {
+        const std::chrono::milliseconds period(std::stoi(std::string(argument.substr(heartbeat.size()))));
+        connect_options.connection.heartbeat_period = period;
+        connect_options.connection.receive_timeout = period * 3 / 2;  // as of the protocol's own figures
+      }
       if (argument == "--robotraconteur-load-tls=true")
         connect_options.dial.tls = rr::load_node_tls(connect_options.connection.self.id).value();
+      if (argument == "--tell") tells_when_connected = true;
     }
     std::cout << run_scenario(argv[1], json::parse(std::cin).at("steps")) << std::endl;
   } catch (const std::exception& failure) {

@@ -331,6 +331,7 @@ rr::SecurityPolicy make_security(bool require_valid_user, bool requires_verified
   return policy;
 }
 
+constexpr std::string_view everywhere = "--robotraconteur-tcp-listen-localhost=false";
 constexpr std::string_view enable_local = "--robotraconteur-local-enable=true";
 
 rr::NodeOptions parse_options(int argc, char** argv) {
@@ -371,7 +372,8 @@ int main(int argc, char** argv) {
     const Guarded guarded(node, "guarded", make_security(true));
     const Guarded open(node, "open", make_security(false));
     const Guarded proven(node, "proven", make_security(true, true));
-    const std::string port = std::to_string(node.listen("rr+tcp://127.0.0.1:0"));
+    const bool is_alone = std::find(argv + 1, argv + argc, everywhere) == argv + argc;
+    const std::string port = std::to_string(node.listen(is_alone ? "rr+tcp://127.0.0.1:0" : "rr+tcp://0.0.0.0:0"));
     if (std::find(argv + 1, argv + argc, enable_local) != argv + argc) node.listen("rr+local:///");
     std::cout << R"({"port": )" << port << R"(, "url": "rr+tcp://127.0.0.1:)" << port << R"(/?service=interop"})"
               << std::endl;

@@ -15,6 +15,7 @@
 #include "test/server/transport/sandbox.hpp"
 
 using namespace rr;
+using namespace std::string_view_literals;
 namespace fs = std::filesystem;
 using Catch::Matchers::Contains;
 
@@ -115,6 +116,7 @@ TEST_CASE("info files are read as the reference writes them") {
   CHECK_FALSE(parse_local_info("").has_value());
   CHECK_FALSE(parse_local_info("nodeid: {0dfc24e5-8305-4b9f-a4f7-431ef45913a7}\nsocket: relative.sock\n").has_value());
   CHECK_FALSE(parse_local_info("nodeid: nonsense\nsocket: /a.sock\n").has_value());
+  CHECK_FALSE(parse_local_info("nodeid: {0dfc24e5-8305-4b9f-a4f7-431ef45913a7}\nsocket: /a\0b.sock\n"sv).has_value());
 }
 
 TEST_CASE("a name keeps its NodeID, for one node at a time") {

@@ -56,7 +56,8 @@ TEST_CASE("TLS below a session, over TCP and WebSockets, beside clients in clear
     CHECK(large.to_items<double>().value().size() == 100'000);
     greeter.set("data", large);
   }
-  CHECK(connect(node.url("rr+tcp")).call("who").to_text().value() == format_node_id({}));
+  for (const auto* scheme : {"rr+tcp", "rr+ws"})
+    CHECK(connect(node.url(scheme)).call("who").to_text().value() == format_node_id({}));
 }
 
 TEST_CASE("handlers know the node that a client's certificate proves", "[tls]") {
