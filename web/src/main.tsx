@@ -5,6 +5,7 @@ import { render } from "preact";
 import { App } from "./app/app";
 import { watch_route } from "./app/router";
 import { DeviceList } from "./gateway/devices";
+import { UsbDeviceList } from "./gateway/usb_devices";
 import "./styles/tokens.css";
 import "./styles/base.css";
 import "./styles/controls.css";
@@ -14,7 +15,9 @@ import "./styles/robot.css";
 
 const list = new DeviceList();
 list.start();
+const usb = new UsbDeviceList();
+usb.start();
 
 const place = document.getElementById("app");
 if (!place) throw new Error("index.html has no element #app");
-render(<App route={watch_route()} list={list} />, place);
+render(<App route={watch_route()} list={list} usb={usb} />, place);

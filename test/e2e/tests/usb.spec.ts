@@ -1,15 +1,13 @@
 // A USB device in a page and in a worker of a real browser: its navigator.usb is the one of the client's tests, and behind
 // the device is a service that the gateway leads to.
-import { execFileSync } from "node:child_process";
-import { cpSync, existsSync, mkdtempSync, readFileSync, writeFileSync } from "node:fs";
-import { tmpdir } from "node:os";
+import { existsSync, writeFileSync } from "node:fs";
 import path from "node:path";
 import { expect, test } from "@playwright/test";
 import type { Page } from "@playwright/test";
-import { Program, repository_root, rrgate, start_gateway } from "../processes";
+import { Program, rrgate, start_gateway } from "../processes";
+import { make_usb_site } from "../usb_site";
 
 const service = path.join(path.dirname(rrgate), "../test/interop/cpp/rr-test-service");
-const simulated = path.join(repository_root, "build/wasm/test/wasm-client/usb_device/test_usb_device.wasm");
 
 const script = `
 import { connect, listUsbDevices, requestUsbDevice } from "./index.js";
@@ -69,17 +67,8 @@ globalThis.said = {
 };
 `;
 
-/** The package as it is published, and the script above with what it needs. */
 function make_site(): string {
-  const site = mkdtempSync(path.join(tmpdir(), "rrgate-usb-site-"));
-  cpSync(path.join(repository_root, "wasm-client/dist"), site, { recursive: true });
-  cpSync(simulated, path.join(site, "test_usb_device.wasm"));
-  const fake = path.join(repository_root, "test/wasm-client/fake_usb.ts");
-  const how = "--ignoreConfig --skipLibCheck --strict --target es2022 --module esnext --moduleResolution bundler --rootDir".split(" ");
-  const tsc = path.join(repository_root, "test/e2e/node_modules/.bin/tsc");
-  execFileSync(tsc, [...how, repository_root, "--outDir", site, fake]);
-  const compiled = readFileSync(path.join(site, "test/wasm-client/fake_usb.js"), "utf8");
-  writeFileSync(path.join(site, "fake_usb.js"), compiled.replaceAll("../../wasm-client/dist/", "./"));
+  const site = make_usb_site();
   writeFileSync(path.join(site, "usb_script.js"), script);
   writeFileSync(path.join(site, "worker.js"), 'import { run } from "./usb_script.js"; postMessage(await run(false));');
   writeFileSync(path.join(site, "own.js"), own);
@@ -92,7 +81,7 @@ let device: Program;
 let gateway: { program: Program; url: string };
 
 test.beforeAll(async () => {
-  for (const file of [service, simulated]) if (!existsSync(file)) throw new Error(`${file} is missing: build it first`);
+  if (!existsSync(service)) throw new Error(`${service} is missing: build the target rr-test-service`);
   device = new Program(service, []);
   device.start();
   const found = await device.wait_for_output(/"url": *"([^"]+)"/);

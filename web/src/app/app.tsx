@@ -9,11 +9,12 @@ import type { Route } from "./router";
 import { theme } from "./theme";
 import type { Theme } from "./theme";
 import type { DeviceList } from "../gateway/devices";
+import type { UsbDeviceList } from "../gateway/usb_devices";
 import { DevicesPage } from "../pages/devices_page";
 import { ServicePage } from "../pages/service_page";
 import { Mark, SunMoonIcon } from "../ui/icons";
 
-export function App({ route, list }: { route: Store<Route>; list: DeviceList }) {
+export function App({ route, list, usb }: { route: Store<Route>; list: DeviceList; usb: UsbDeviceList }) {
   const where = useStore(route);
   const main = useRef<HTMLElement>(null);
   const title = title_of(where);
@@ -38,7 +39,7 @@ export function App({ route, list }: { route: Store<Route>; list: DeviceList }) 
         <ThemeButton />
       </header>
       <main id="main" ref={main} tabIndex={-1}>
-        {where.page === "devices" && <DevicesPage list={list} />}
+        {where.page === "devices" && <DevicesPage list={list} usb={usb} />}
         {where.page === "service" && <ServicePage key={`${where.device}/${where.service}`} route={where} list={list} />}
         {where.page === "unknown" && <UnknownPage address={where.address} />}
       </main>

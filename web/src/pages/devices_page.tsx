@@ -1,14 +1,16 @@
-// The first page: which devices are behind this gateway, how they are, and what they offer.
+// The first page: which devices are behind this gateway or plugged into this computer, how they are, and what they offer.
 // Layer: web/pages.
 
 import { useNow, useStore } from "../app/store";
 import { format_route } from "../app/router";
 import { devices_of } from "../gateway/devices";
 import type { Device, DeviceList, GatewayState, Service } from "../gateway/devices";
+import { is_usb } from "../gateway/usb_devices";
+import type { UsbDeviceList } from "../gateway/usb_devices";
 import { StateBadge } from "../ui/state_badge";
 import { clock_time, sentence, span } from "../ui/words";
 
-export function DevicesPage({ list }: { list: DeviceList }) {
+export function DevicesPage({ list, usb }: { list: DeviceList; usb: UsbDeviceList }) {
   const state = useStore(list.state);
   const devices = devices_of(state);
   return (
@@ -24,7 +26,33 @@ export function DevicesPage({ list }: { list: DeviceList }) {
           ))}
         </ul>
       )}
+      {usb.is_possible && <UsbPart usb={usb} />}
     </div>
+  );
+}
+
+/** Devices that are plugged into the computer where this page is shown; the gateway knows nothing of them. */
+function UsbPart({ usb }: { usb: UsbDeviceList }) {
+  const devices = useStore(usb.devices);
+  const trouble = useStore(usb.trouble);
+  return (
+    <section class="usb-part" aria-label="USB devices of this computer">
+      {devices.length > 0 && (
+        <ul class="devices">
+          {devices.map((device) => (
+            <DeviceRow key={device.name} device={device} stale={false} />
+          ))}
+        </ul>
+      )}
+      <button class="button" type="button" onClick={() => void usb.choose()}>
+        Connect USB device
+      </button>
+      {trouble !== null && (
+        <p class="failure" role="alert">
+          {sentence(trouble)}
+        </p>
+      )}
+    </section>
   );
 }
 
@@ -72,6 +100,11 @@ function DeviceRow({ device, stale }: { device: Device; stale: boolean }) {
             found
           </span>
         )}
+        {is_usb(device.name) && (
+          <span class="found-mark" title="Plugged into this computer; the page speaks to it without the gateway">
+            USB
+          </span>
+        )}
         <StateBadge state={device.state} text={stale ? `was ${device.state}` : device.state} />
       </div>
       <dl class="device-facts">
@@ -90,7 +123,7 @@ function DeviceRow({ device, stale }: { device: Device; stale: boolean }) {
       </dl>
       {device.state !== "online" && (
         <p class="device-trouble">
-          {sentence(device.last_error ?? "Not reached yet")} {!stale && "The gateway keeps trying."}
+          {sentence(device.last_error ?? "Not reached yet")} {!stale && !is_usb(device.name) && "The gateway keeps trying."}
         </p>
       )}
       <ul class="services">

@@ -7,6 +7,7 @@ import type { PathStep, Route } from "../app/router";
 import { useStore } from "../app/store";
 import { devices_of, relay_url } from "../gateway/devices";
 import type { DeviceList } from "../gateway/devices";
+import { is_usb, usb_url } from "../gateway/usb_devices";
 import { Link } from "../robot/link";
 import { explain, open_remote } from "../robot/remote";
 import type { Remote } from "../robot/remote";
@@ -47,7 +48,7 @@ export function ServicePage({ route, list }: { route: ServiceRoute; list: Device
 function useLink(device: string, service: string, list: DeviceList): Link | null {
   const [link, set_link] = useState<Link | null>(null);
   useEffect(() => {
-    const url = relay_url(device, service);
+    const url = is_usb(device) ? usb_url(device, service) : relay_url(device, service);
     const made = new Link((signal) => open_remote(url, signal));
     set_link(made);
     let was_online = true;

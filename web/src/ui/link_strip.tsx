@@ -4,6 +4,7 @@
 import { useNow, useStore } from "../app/store";
 import { devices_of } from "../gateway/devices";
 import type { DeviceList } from "../gateway/devices";
+import { is_usb } from "../gateway/usb_devices";
 import type { Link, LinkState } from "../robot/link";
 import { StateBadge } from "./state_badge";
 import { clock_time, sentence, span } from "./words";
@@ -28,7 +29,7 @@ export function LinkStrip({ link, list, device, service }: LinkStripProps) {
           {headline(state, device, service)}
         </p>
         <p class="link-detail">
-          {lost ? <LostDetail state={state} list={list} device={device} /> : detail(state)}
+          {lost ? <LostDetail state={state} list={list} device={device} /> : detail(state, device)}
         </p>
       </div>
       <button class="button" type="button" hidden={!lost} disabled={lost && state.retry_at === null} onClick={() => link.retry_now()}>
@@ -44,8 +45,8 @@ function headline(state: LinkState, device: string, service: string): string {
   return `No connection to ${device} since ${clock_time(state.since)}`;
 }
 
-function detail(state: LinkState): string {
-  return state.kind === "online" ? state.remote.type : "Asking the gateway for the device";
+function detail(state: LinkState, device: string): string {
+  return state.kind === "online" ? state.remote.type : `Asking ${is_usb(device) ? "this browser" : "the gateway"} for the device`;
 }
 
 function LostDetail({ state, list, device }: { state: LinkState & { kind: "lost" }; list: DeviceList; device: string }) {
@@ -54,7 +55,7 @@ function LostDetail({ state, list, device }: { state: LinkState & { kind: "lost"
   const known = devices_of(gateway)?.find((d) => d.name === device);
   const next = state.retry_at === null ? "trying now" : `next try in ${span(Math.max(0, state.retry_at - now) + 999)}`;
   const why =
-    gateway.kind === "away"
+    gateway.kind === "away" && !is_usb(device)
       ? `The gateway itself does not answer (${gateway.reason}).`
       : known && known.state !== "online"
         ? `The gateway says: device ${known.state}${known.last_error ? `, ${known.last_error}` : ""}.`

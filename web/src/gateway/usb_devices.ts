@@ -1,0 +1,92 @@
+// The USB devices that this browser speaks to by itself, past the gateway, where it has WebUSB.
+// Layer: web/gateway. Beside robot/remote.ts the only file that imports `rrgate-client`.
+
+import { connect, ErrorCode, listUsbDevices, requestUsbDevice, RobotRaconteurError } from "rrgate-client";
+import type { UsbNode } from "rrgate-client";
+import { Store } from "../app/store";
+import type { Device, Service } from "./devices";
+
+const MARK = "usb:";
+const INDEX = "RobotRaconteurServiceIndex";
+
+export class UsbDeviceList {
+  /** Whether this browser can; nothing else here makes sense where it cannot. */
+  readonly is_possible = usb_of_browser() !== undefined;
+  readonly devices = new Store<Device[]>([]);
+  /** Why choosing or listing failed. */
+  readonly trouble = new Store<string | null>(null);
+  #round = 0;
+
+  start(): void {
+    usb_of_browser()?.addEventListener("connect", this.#refresh);
+    usb_of_browser()?.addEventListener("disconnect", this.#refresh);
+    if (this.is_possible) void this.#refresh();
+  }
+
+  /** From a click: the browser asks which device this page may use. */
+  async choose(): Promise<void> {
+    this.trouble.value = null;
+    try {
+      await requestUsbDevice();
+    } catch (error) {
+      const is_cancelled = error instanceof RobotRaconteurError && error.code === ErrorCode.OperationCancelled;
+      if (!is_cancelled) this.trouble.value = (error as Error).message;
+    }
+    await this.#refresh();
+  }
+
+  readonly #refresh = async (): Promise<void> => {
+    const round = ++this.#round;
+    try {
+      const devices = await Promise.all((await listUsbDevices()).map(describe));
+      if (round === this.#round) this.devices.value = devices;
+    } catch (error) {
+      if (round === this.#round) this.trouble.value = (error as Error).message;
+    }
+  };
+}
+
+/** Whether a device's name is one of this list. */
+export function is_usb(device: string): boolean {
+  return device.startsWith(MARK);
+}
+
+/** Where a service of such a device is: by the node's id, or its name. */
+export function usb_url(device: string, service: string): string {
+  const who = device.slice(MARK.length);
+  const key = /^[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}$/.test(who) ? "nodeid" : "nodename";
+  return `rr+usb:///?${new URLSearchParams({ [key]: who, service }).toString()}`;
+}
+
+async function describe(node: UsbNode): Promise<Device> {
+  const device: Device = {
+    name: MARK + (node.url === undefined ? node.device.replace(/^USB device /, "") : node.nodeName || node.nodeId),
+    url: node.url ?? "rr+usb:",
+    found: false,
+    node_id: node.nodeId,
+    node_name: node.nodeName,
+    state: "offline",
+    last_error: node.error?.message ?? null,
+    services: [],
+  };
+  if (node.url === undefined) return device;
+  try {
+    return { ...device, services: await services_of(node.url), state: "online" };
+  } catch (error) {
+    return { ...device, last_error: (error as Error).message };
+  }
+}
+
+async function services_of(url: string): Promise<Service[]> {
+  const index = await connect(`${url}&service=${INDEX}`, { timeout: 5_000 });
+  try {
+    const found = (await index.$.member("GetLocalNodeServices")()) as unknown as Map<number, { Name: string; RootObjectType: string }>;
+    return [...found.values()].filter(({ Name }) => Name !== INDEX).map(({ Name, RootObjectType }) => ({ name: Name, type: RootObjectType }));
+  } finally {
+    void index.$.close();
+  }
+}
+
+function usb_of_browser(): EventTarget | undefined {
+  return (navigator as { usb?: EventTarget }).usb;
+}
