@@ -88,6 +88,8 @@ class Discovery::Implementation : public std::enable_shared_from_this<Implementa
     for (auto* waiting : waiting_) waiting->cancel();
   }
 
+  asio::io_context& io_context() { return io_; }
+
   std::vector<NodeDiscoveryInfo> detected_nodes() const {
     std::vector<NodeDiscoveryInfo> out;
     for (const auto& [id, node] : nodes_.nodes()) out.push_back(node);
@@ -310,6 +312,9 @@ Discovery::~Discovery() {
   implementation_->close();
 }
 
+asio::io_context& Discovery::io_context() {
+  return implementation_->io_context();
+}
 std::vector<NodeDiscoveryInfo> Discovery::detected_nodes() const {
   return implementation_->detected_nodes();
 }

@@ -48,6 +48,8 @@ class Discovery {
   Discovery(const Discovery&) = delete;
   Discovery& operator=(const Discovery&) = delete;
 
+  boost::asio::io_context& io_context();
+
   // --- who is there ---
 
   std::vector<NodeDiscoveryInfo> detected_nodes() const;

@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <boost/asio/as_tuple.hpp>
+#include <boost/asio/bind_cancellation_slot.hpp>
+#include <boost/asio/cancellation_signal.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <list>
 
 #include "core/session/client_session.hpp"
 #include "core/session/service_index.hpp"
@@ -17,6 +20,11 @@
 namespace rr {
 
 namespace asio = boost::asio;
+
+std::string url_of_service(ConnectionUrl url, const NodeIdentity& node, std::string_view service) {
+  url.query = "nodeid=" + format_node_id(node.id, NodeIdFormat::dashes) + "&service=" + percent_encode(service);
+  return format_url(url);
+}
 
 namespace {
 
@@ -37,13 +45,6 @@ std::string text_of(const Structure& info, std::string_view field) {
   const auto* value = info.find(field);
   const auto text = value ? value->to_text() : Result<std::string_view>(std::string_view());
   return text ? std::string(*text) : std::string();
-}
-
-/// The node's own idea of its URL lacks the zone of a link-local address, and might name anybody: ours is known to
-/// work.
-std::string url_of_service(ConnectionUrl url, const NodeIdentity& node, std::string_view service) {
-  url.query = "nodeid=" + format_node_id(node.id, NodeIdFormat::dashes) + "&service=" + percent_encode(service);
-  return format_url(url);
 }
 
 ServiceInfo read_service(const Structure& info, const NodeIdentity& node, const ConnectionUrl& url) {
@@ -157,11 +158,12 @@ std::vector<ConnectionUrl> candidate_urls(const NodeDiscoveryInfo& node, const s
 
 namespace {
 
-/// Attempts that run side by side. Shared by them: the losers end by themselves, after the race.
+/// Attempts that run side by side. Shared by them, since they end a little after the race.
 struct Race {
   explicit Race(const asio::any_io_executor& executor) : changed(executor) {}
 
-  asio::steady_timer changed;  ///< cancelled when an attempt ends
+  asio::steady_timer changed;                     ///< cancelled when an attempt ends
+  std::list<asio::cancellation_signal> attempts;  ///< those that have ended, too
   std::size_t failed = 0;
   std::optional<NodeServices> winner;
   Error last_failure = make_error(ErrorCode::connection_error, "node: no URL of it can be dialed");
@@ -178,16 +180,32 @@ awaitable<void> attempt(std::shared_ptr<Race> race, ConnectionUrl url, ServiceQu
   race->changed.cancel();
 }
 
+/// Cancels the attempts when the race is over, also when it is given up.
+class RaceGuard {
+ public:
+  explicit RaceGuard(std::shared_ptr<Race> race) : race_(std::move(race)) {}
+  RaceGuard(const RaceGuard&) = delete;
+  RaceGuard& operator=(const RaceGuard&) = delete;
+  ~RaceGuard() {
+    for (auto& attempt : race_->attempts) attempt.emit(asio::cancellation_type::terminal);
+  }
+
+ private:
+  std::shared_ptr<Race> race_;
+};
+
 }  // namespace
 
 awaitable<Result<NodeServices>> query_node(std::vector<ConnectionUrl> urls, ServiceQueryOptions options) {
   const auto executor = co_await asio::this_coro::executor;
   auto race = std::make_shared<Race>(executor);
+  const RaceGuard guard(race);
   std::size_t started = 0;
   while (!race->winner && race->failed < urls.size()) {
     if (started < urls.size()) {
       auto next = attempt(race, urls[started], options);
-      asio::co_spawn(executor, std::move(next), asio::detached);
+      auto& signal = race->attempts.emplace_back();
+      asio::co_spawn(executor, std::move(next), asio::bind_cancellation_slot(signal.slot(), asio::detached));
       ++started;
     }
     // Each attempt ends in its own time, so the last needs no deadline here.

@@ -48,7 +48,11 @@ awaitable<Result<NodeServices>> query_services(ConnectionUrl url, ServiceQueryOp
 /// announced last first, at most 8. They demand the node's id and name.
 std::vector<ConnectionUrl> candidate_urls(const NodeDiscoveryInfo& node, const std::vector<std::string>& schemes = {});
 
-/// Asks a node over several URLs, 15 ms apart; the first answer counts.
+/// A way to a node as one to a service of it, that demands the node's id. The node's own idea of its URL lacks the zone
+/// of a link-local address, and might name anybody: a way that is known is better.
+std::string url_of_service(ConnectionUrl url, const NodeIdentity& node, std::string_view service);
+
+/// Asks a node over several URLs, 15 ms apart; the first answer counts. Can be cancelled, and leaves nothing behind.
 /// Errors   as query_services, of the last attempt to fail; connection_error: no URL.
 awaitable<Result<NodeServices>> query_node(std::vector<ConnectionUrl> urls, ServiceQueryOptions options);
 

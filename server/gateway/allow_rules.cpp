@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <optional>
 
+#include "core/support/glob.hpp"
+
 namespace rrgate {
 
 namespace {
@@ -13,7 +15,7 @@ bool is_close(const rr::ConnectionUrl& url) {
 }
 
 bool matches_node(const DiscoverRule& rule, const rr::NodeDiscoveryInfo& node) {
-  return (rule.node_name.empty() || glob_matches(rule.node_name, node.node_name)) &&
+  return (rule.node_name.empty() || rr::glob_matches(rule.node_name, node.node_name)) &&
          (rule.node_id.is_any() || rule.node_id == node.node_id);
 }
 
@@ -23,28 +25,6 @@ void add_new(std::vector<rr::ConnectionUrl>& to, const std::vector<rr::Connectio
 }
 
 }  // namespace
-
-bool glob_matches(std::string_view pattern, std::string_view text) {
-  std::size_t at = 0;
-  std::size_t in = 0;
-  auto star = std::string_view::npos;  // the last '*', and how far the text goes on behind it
-  std::size_t resume = 0;
-  while (in < text.size()) {
-    if (at < pattern.size() && pattern[at] == '*') {
-      star = at++;
-      resume = in;
-    } else if (at < pattern.size() && (pattern[at] == '?' || pattern[at] == text[in])) {
-      ++at;
-      ++in;
-    } else if (star != std::string_view::npos) {
-      at = star + 1;
-      in = ++resume;
-    } else {
-      return false;
-    }
-  }
-  return pattern.find_first_not_of('*', at) == std::string_view::npos;
-}
 
 Verdict judge(const std::vector<DiscoverRule>& rules, const rr::NodeDiscoveryInfo& node,
               const std::vector<rr::ServiceInfo>* services) {

@@ -9,9 +9,6 @@
 
 namespace rrgate {
 
-/// '*' stands for any characters, '?' for one.
-bool glob_matches(std::string_view pattern, std::string_view text);
-
 /// What the rules say about a node. Nobody connects to it but at these URLs.
 struct Verdict {
   bool is_allowed = false;

@@ -31,7 +31,8 @@ namespace rr {
 
 namespace detail {
 
-/// Calls a completion handler once, on its own executor, with what a request came to.
+/// Calls a completion handler once, on its own executor, with what a request came to: void(std::exception_ptr, T), or
+/// without the T where that is void.
 template <class T, class Handler>
 class CompleteOnce {
  public:
@@ -40,15 +41,20 @@ class CompleteOnce {
       : state_(std::make_shared<State>(std::move(handler), fallback)) {}
 
   void operator()(Result<T> result) const {
+    if (result)
+      finish(nullptr, std::move(*result));
+    else
+      finish(std::make_exception_ptr(ClientException(result.error())), T{});
+  }
+  template <class... Results>
+  void finish(std::exception_ptr failure, Results... results) const {
     if (!state_->handler) return;
     auto handler = std::move(*state_->handler);
     state_->handler.reset();
     const auto executor = boost::asio::get_associated_executor(handler, state_->fallback);
-    boost::asio::dispatch(executor, [handler = std::move(handler), result = std::move(result)]() mutable {
-      if (result)
-        std::move(handler)(std::exception_ptr(), std::move(*result));
-      else
-        std::move(handler)(std::make_exception_ptr(ClientException(result.error())), T{});
+    boost::asio::dispatch(executor, [handler = std::move(handler), failure = std::move(failure),
+                                     ... results = std::move(results)]() mutable {
+      std::move(handler)(std::move(failure), std::move(results)...);
     });
   }
 

@@ -1,5 +1,6 @@
 #include "server/node/client_connection.hpp"
 
+#include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/post.hpp>
@@ -15,25 +16,43 @@ namespace asio = boost::asio;
 
 namespace {
 
-awaitable<void> dial_and_start(ConnectionUrl url, ConnectOptions options, ClientConnection::Opened done) {
+/// Throws   boost::system::system_error: it was cancelled.
+awaitable<void> dial_and_start(ConnectionUrl url, ConnectOptions options, std::shared_ptr<ClientOpening> opening,
+                               ClientConnection::Opened done) {
   const auto deadline = std::chrono::steady_clock::now() + options.connect_timeout;
   options.dial.timeout = options.connect_timeout;
   auto stream = co_await dial(std::move(url), std::move(options.dial));
+  if (opening->is_over()) co_return;
   if (!stream) co_return done(stream.error());
   const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
   options.connect_timeout = std::max(left, std::chrono::milliseconds(1));
   options.connection.known_peer = (*stream)->verified_peer();
-  std::make_shared<ClientConnection>(std::move(*stream), std::move(options), std::move(done))->start();
+  const auto connection = std::make_shared<ClientConnection>(std::move(*stream), std::move(options), std::move(done));
+  opening->begin_session(connection);
+  connection->start();
 }
 
 }  // namespace
 
+void ClientOpening::cancel() {
+  if (std::exchange(is_over_, true)) return;
+  dialing_.emit(asio::cancellation_type::terminal);
+  if (const auto connection = connection_.lock())
+    connection->close(make_error(ErrorCode::operation_cancelled, "connecting was given up"));
+}
+
 ClientConnection::ClientConnection(std::unique_ptr<ByteStream> stream, ClientOptions options, Opened opened)
     : SessionDriver(std::move(stream), std::move(options), read_clocks()), opened_(std::move(opened)) {}
 
-void ClientConnection::open(asio::io_context& io, std::string_view url, ConnectOptions options, Opened done) {
+std::shared_ptr<ClientOpening> ClientConnection::open(asio::io_context& io, std::string_view url,
+                                                      ConnectOptions options, Opened done) {
+  const auto opening = std::make_shared<ClientOpening>();
+  auto tell = [opening, done = std::move(done)](Result<std::shared_ptr<ClientConnection>> opened) {
+    if (!std::exchange(opening->is_over_, true)) done(std::move(opened));
+  };
   const auto refuse = [&](ErrorCode code, std::string why) {
-    asio::post(io, [done, error = make_error(code, std::move(why))] { done(error); });
+    asio::post(io, [tell, error = make_error(code, std::move(why))] { tell(error); });
+    return opening;
   };
   const auto parsed = parse_url(url);
   if (!parsed) return refuse(parsed.error().code, parsed.error().message);
@@ -43,7 +62,13 @@ void ClientConnection::open(asio::io_context& io, std::string_view url, ConnectO
   options.service = parsed->service;
   options.connection.target = {parsed->node_id.value_or(NodeId{}), parsed->node_name};
   if (options.connection.self.id.is_any()) options.connection.self.id = random_node_id();
-  asio::co_spawn(io, dial_and_start(*parsed, std::move(options), std::move(done)), asio::detached);
+  auto work = dial_and_start(*parsed, std::move(options), opening, std::move(tell));
+  // Posted: `done` is not called before this returns.
+  asio::post(io, [&io, opening, work = std::move(work)]() mutable {
+    if (!opening->is_over_)
+      asio::co_spawn(io, std::move(work), asio::bind_cancellation_slot(opening->dialing_.slot(), asio::detached));
+  });
+  return opening;
 }
 
 void ClientConnection::expect(RequestId id, Completion done) {
@@ -121,8 +146,14 @@ void ClientConnection::connect_wire(std::string_view path, std::string_view wire
 }
 
 void ClientConnection::disconnect_wire(std::string_view path, std::string_view wire, Completion done) {
-  wire_handlers_.erase({std::string(path), std::string(wire)});
+  const MemberKey key{std::string(path), std::string(wire)};
+  wire_handlers_.erase(key);
+  wire_closed_handlers_.erase(key);
   expect(session_.disconnect_wire(path, wire, read_clocks()), std::move(done));
+}
+
+void ClientConnection::on_wire_closed(std::string_view path, std::string_view wire, std::function<void()> handler) {
+  wire_closed_handlers_[{std::string(path), std::string(wire)}] = std::move(handler);
 }
 
 Result<> ClientConnection::send_wire(std::string_view path, std::string_view wire, const Value& value) {
@@ -227,7 +258,10 @@ void ClientConnection::handle(WireValueReceived&& received) {
 }
 
 void ClientConnection::handle(WireClosedByService&& closed) {
-  wire_handlers_.erase({std::move(closed.path), std::move(closed.member)});
+  const MemberKey key{std::move(closed.path), std::move(closed.member)};
+  wire_handlers_.erase(key);
+  const auto found = wire_closed_handlers_.extract(key);
+  if (found && found.mapped()) found.mapped()();
 }
 
 void ClientConnection::handle(PipePacketReceived&& received) {
@@ -267,10 +301,12 @@ void ClientConnection::handle(PathReleased&& released) {
 void ClientConnection::handle(SessionClosed&& closed) {
   event_handlers_.clear();
   wire_handlers_.clear();
+  wire_closed_handlers_.clear();
   callback_handlers_.clear();
   pipe_handlers_.clear();
   if (const Opened opened = std::exchange(opened_, nullptr)) return opened(std::move(closed.reason));
-  if (const auto handler = std::exchange(on_closed_, nullptr)) handler(closed.reason);
+  for (const auto& handler : std::exchange(on_closed_, {}))
+    if (handler) handler(closed.reason);
 }
 
 }  // namespace rr

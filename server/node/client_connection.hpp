@@ -1,6 +1,7 @@
 // A client of one service, with callbacks. Layer: node.
 #pragma once
 
+#include <boost/asio/cancellation_signal.hpp>
 #include <boost/asio/io_context.hpp>
 #include <functional>
 #include <map>
@@ -18,12 +19,30 @@
 
 namespace rr {
 
+class ClientConnection;
+
 /// How to reach a service and what to be there.
 struct ConnectOptions : ClientOptions {
   ConnectOptions() = default;
   ConnectOptions(ClientOptions options) : ClientOptions(std::move(options)) {}
 
   DialOptions dial = {};  ///< its timeout is connect_timeout
+};
+
+/// A connection that is being opened.
+class ClientOpening {
+ public:
+  /// Gives it up: sockets are closed and nobody is told. Nothing happens once it is open or has failed.
+  void cancel();
+  bool is_over() const { return is_over_; }
+  /// For ClientConnection::open().
+  void begin_session(const std::shared_ptr<ClientConnection>& connection) { connection_ = connection; }
+
+ private:
+  friend class ClientConnection;
+  boost::asio::cancellation_signal dialing_;
+  std::weak_ptr<ClientConnection> connection_;  ///< while the session is being opened
+  bool is_over_ = false;
 };
 
 /// One connection to a service. All callbacks run on the thread of the io_context. Each completion is called exactly
@@ -45,7 +64,9 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   /// `url`      SCHEME://host:port/?service=NAME, with nodeid or nodename where that node alone will do; the schemes
   ///            are those of server/transport/dial.cpp.
   /// `options`  service and target node are taken from the URL; a random NodeID where none is given.
-  static void open(boost::asio::io_context& io, std::string_view url, ConnectOptions options, Opened done);
+  /// Returns    what can give it up; it goes on without it as well.
+  static std::shared_ptr<ClientOpening> open(boost::asio::io_context& io, std::string_view url, ConnectOptions options,
+                                             Opened done);
 
   // Paths name objects: root_path(), or those of child_path() after find_object(). See ClientSession for what requests
   // complete with.
@@ -71,6 +92,9 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   /// `handler` gets each InValue that is newer than the one before, until disconnect_wire().
   void connect_wire(std::string_view path, std::string_view wire, WireHandler handler, Completion done);
   void disconnect_wire(std::string_view path, std::string_view wire, Completion done);
+  /// `handler` hears that the service has closed the wire, or released its object; not of disconnect_wire() and the
+  /// session's end. One handler a wire.
+  void on_wire_closed(std::string_view path, std::string_view wire, std::function<void()> handler);
   /// Errors   the wire is not connected; those of packing.
   Result<> send_wire(std::string_view path, std::string_view wire, const Value& value);
   /// Completes with the index of the endpoint, which may be another than the one asked for. Packets follow.
@@ -92,8 +116,9 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   void on_callback(std::string_view path, std::string_view callback, CallbackHandler handler);
   /// One handler an event; a second replaces the first.
   void on_event(std::string_view path, std::string_view event, EventHandler handler);
-  /// Called once, when the session has ended for whatever reason; not after a failed open().
-  void on_closed(std::function<void(const Error& reason)> handler) { on_closed_ = std::move(handler); }
+  /// Called once, when the session has ended for whatever reason; not after a failed open(). Each handler that is
+  /// given.
+  void on_closed(std::function<void(const Error& reason)> handler) { on_closed_.push_back(std::move(handler)); }
   /// Tells the service, then closes; on_closed follows.
   void disconnect();
 
@@ -126,9 +151,10 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   std::unordered_map<RequestId, Completion> completions_;
   std::map<MemberKey, std::shared_ptr<EventHandler>> event_handlers_;
   std::map<MemberKey, std::shared_ptr<WireHandler>> wire_handlers_;
+  std::map<MemberKey, std::function<void()>> wire_closed_handlers_;
   std::map<MemberKey, std::shared_ptr<CallbackHandler>> callback_handlers_;
   std::map<PipeKey, std::shared_ptr<PipeHandlers>> pipe_handlers_;
-  std::function<void(const Error&)> on_closed_;
+  std::vector<std::function<void(const Error&)>> on_closed_;
 };
 
 }  // namespace rr

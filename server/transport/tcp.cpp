@@ -111,6 +111,25 @@ struct Race {
   std::size_t failed = 0;
   std::optional<std::size_t> winner;
   std::string failures;  ///< "127.0.0.1: Connection refused; ::1: ..."
+
+  void close_losers() {
+    for (std::size_t i = 0; i < sockets.size(); ++i) {
+      error_code ignored;
+      if (i != winner) sockets[i]->close(ignored);
+    }
+  }
+};
+
+/// Ends the attempts when the race is over, also when it is given up.
+class RaceGuard {
+ public:
+  explicit RaceGuard(std::shared_ptr<Race> race) : race_(std::move(race)) {}
+  RaceGuard(const RaceGuard&) = delete;
+  RaceGuard& operator=(const RaceGuard&) = delete;
+  ~RaceGuard() { race_->close_losers(); }
+
+ private:
+  std::shared_ptr<Race> race_;
 };
 
 awaitable<void> attempt(std::shared_ptr<Race> race, std::size_t index, tcp::endpoint endpoint) {
@@ -179,6 +198,7 @@ awaitable<Result<tcp::socket>> connect_tcp(std::string host, std::uint16_t port,
   if (!endpoints) co_return endpoints.error();
 
   auto race = std::make_shared<Race>(executor);
+  const RaceGuard guard(race);
   std::size_t started = 0;
   std::string cause;
   while (!race->winner) {
@@ -201,10 +221,6 @@ awaitable<Result<tcp::socket>> connect_tcp(std::string host, std::uint16_t port,
     // Until the next attempt is due, one ends, or time is up.
     race->changed.expires_at(started < endpoints->size() ? std::min(give_up, now + stagger) : give_up);
     co_await race->changed.async_wait(await_tuple);
-  }
-  for (std::size_t i = 0; i < race->sockets.size(); ++i) {
-    error_code ignored;
-    if (i != race->winner) race->sockets[i]->close(ignored);
   }
   // A literal address was named already.
   if (const auto literal = host + ": "; cause.starts_with(literal)) cause.erase(0, literal.size());

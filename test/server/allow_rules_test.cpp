@@ -2,6 +2,8 @@
 
 #include <catch2/catch.hpp>
 
+#include "core/support/glob.hpp"
+
 using namespace rrgate;
 
 namespace {
@@ -34,17 +36,17 @@ std::vector<rr::ServiceInfo> services_of(const std::string& type, const std::str
 }  // namespace
 
 TEST_CASE("globs") {
-  CHECK(glob_matches("*", ""));
-  CHECK(glob_matches("lab.*", "lab.arm"));
-  CHECK_FALSE(glob_matches("lab.*", "xlab.arm"));
-  CHECK_FALSE(glob_matches("lab.*", "lab"));
-  CHECK(glob_matches("*.arm?", "lab.left.arm2"));
-  CHECK_FALSE(glob_matches("*.arm?", "lab.left.arm"));
-  CHECK(glob_matches("a*b*c", "aXbXbXc"));
-  CHECK_FALSE(glob_matches("a*b*c", "aXbXbX"));
-  CHECK_FALSE(glob_matches("", "a"));
-  CHECK_FALSE(glob_matches("Lab", "lab"));
-  CHECK_FALSE(glob_matches("*a*a*a*a*a*a*a*a*b", std::string(128, 'a')));
+  CHECK(rr::glob_matches("*", ""));
+  CHECK(rr::glob_matches("lab.*", "lab.arm"));
+  CHECK_FALSE(rr::glob_matches("lab.*", "xlab.arm"));
+  CHECK_FALSE(rr::glob_matches("lab.*", "lab"));
+  CHECK(rr::glob_matches("*.arm?", "lab.left.arm2"));
+  CHECK_FALSE(rr::glob_matches("*.arm?", "lab.left.arm"));
+  CHECK(rr::glob_matches("a*b*c", "aXbXbXc"));
+  CHECK_FALSE(rr::glob_matches("a*b*c", "aXbXbX"));
+  CHECK_FALSE(rr::glob_matches("", "a"));
+  CHECK_FALSE(rr::glob_matches("Lab", "lab"));
+  CHECK_FALSE(rr::glob_matches("*a*a*a*a*a*a*a*a*b", std::string(128, 'a')));
 }
 
 TEST_CASE("without a rule nobody is allowed, and nobody is asked") {
