@@ -30,5 +30,9 @@ install(FILES "${PROJECT_BINARY_DIR}/rrgateConfig.cmake" "${PROJECT_BINARY_DIR}/
               cmake/rrgate_generate.cmake
         DESTINATION "${package_dir}")
 
+# The page, where it was built before, and what runs the gateway as a service.
+install(DIRECTORY web/dist/ DESTINATION share/rrgate/web OPTIONAL)
+install(FILES gateway-config/rrgate.service gateway-config/rrgate.socket DESTINATION share/rrgate/systemd)
+
 # Who may open USB devices: udev reads rules below its prefix only, so for other prefixes the file is to be copied.
 install(FILES gateway-config/60-robotraconteur-usb.rules DESTINATION lib/udev/rules.d)

@@ -14,6 +14,7 @@ int main(int count, char** values) {
        rrgate::run_generate},
       {"cert", "cert ca|node|web FOLDER [NODE | HOST...] [--force]", "make certificates for nodes and HTTPS",
        rrgate::run_cert},
+      {"health", "health [--ready] [HOST:PORT]", "ask a running gateway whether it is well", rrgate::run_health},
   };
   const std::vector<std::string_view> arguments(values + 1, values + count);
   return rrgate::run_command_line(commands, arguments);

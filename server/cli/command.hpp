@@ -53,5 +53,6 @@ int run_check(Arguments arguments);
 int run_fmt(Arguments arguments);
 int run_generate(Arguments arguments);
 int run_cert(Arguments arguments);
+int run_health(Arguments arguments);
 
 }  // namespace rrgate

@@ -1,64 +1,71 @@
 #include "server/cli/run_gateway.hpp"
 
-#include <sys/resource.h>
-
-#include <algorithm>
 #include <boost/asio/signal_set.hpp>
 #include <csignal>
 #include <filesystem>
 
 #include "server/cli/command.hpp"
+#include "server/cli/config_file.hpp"
+#include "server/cli/service_manager.hpp"
 #include "server/log/log.hpp"
 
 namespace rrgate {
 
 namespace {
 
-/// A relayed client takes two descriptors. Asks for as many as the system allows, and lowers the bound on clients where
-/// that is not enough: a refused client is better than a gateway that can't open a file.
-void fit_descriptors(Limits& limits) {
-  constexpr rlim_t others = 64;
-  rlimit files{};
-  if (::getrlimit(RLIMIT_NOFILE, &files) != 0) return;
-  const rlim_t wanted = limits.clients * 2 + others;
-  if (files.rlim_cur < wanted) {
-    files.rlim_cur = std::min(wanted, files.rlim_max);
-    ::setrlimit(RLIMIT_NOFILE, &files);
+/// Tells the service manager, as often as it wants, that the loop goes round.
+class Heartbeat {
+ public:
+  explicit Heartbeat(boost::asio::io_context& io) : timer_(io), period_(watchdog_period()) {}
+
+  void start() {
+    if (!period_) return;
+    notify_service_manager("WATCHDOG=1");
+    timer_.expires_after(*period_);
+    timer_.async_wait([this](const rr::error_code& error) {
+      if (!error) start();
+    });
   }
-  if (::getrlimit(RLIMIT_NOFILE, &files) != 0 || files.rlim_cur >= wanted) return;
-  const auto possible = files.rlim_cur > 2 * others ? (files.rlim_cur - others) / 2 : 32;
-  log(LogLevel::warning, "limits.clients lowered: not enough file descriptors",
-      {{"clients", limits.clients}, {"possible", possible}, {"descriptors", files.rlim_cur}});
-  limits.clients = possible;
-}
+  void stop() { timer_.cancel(); }
+
+ private:
+  boost::asio::steady_timer timer_;
+  std::optional<std::chrono::milliseconds> period_;
+};
 
 }  // namespace
 
-int run_gateway(Config config, const OnStarted& on_started) {
+int run_gateway(Config config, const OnStarted& on_started, const std::string& config_file) {
   std::signal(SIGPIPE, SIG_IGN);
-  configure_log(config.log.level, config.log.format);
-  fit_descriptors(config.limits);
-  if (config.web_root.empty()) config.web_root = find_web_root();
+  complete_config(config);
 
   boost::asio::io_context io(1);
   Gateway gateway(io, std::move(config));
+  ConfigFile file(io, gateway, config_file);
+  Heartbeat heartbeat(io);
   boost::asio::signal_set signals(io, SIGTERM, SIGINT, SIGHUP);
   std::function<void()> wait_for_signal = [&] {
     signals.async_wait([&](const boost::system::error_code& error, int number) {
       if (error) return;
       log(LogLevel::info, "signal", {{"number", number}});
       if (number == SIGHUP) {
+        file.reload();
         gateway.reload_tls();
         wait_for_signal();
         return;
       }
       wait_for_signal();  // first: an idle gateway stops within the call below
-      gateway.stop([&] { signals.cancel(); });
+      notify_service_manager("STOPPING=1\nSTATUS=sessions may end");
+      file.stop();
+      gateway.stop([&] {
+        heartbeat.stop();
+        signals.cancel();
+      });
     });
   };
   wait_for_signal();
 
-  const auto addresses = gateway.start();
+  const auto addresses = gateway.start(take_listening_sockets());
   if (!addresses) {
     log(LogLevel::error, "not started", {{"error", addresses.error().message}});
     return exit_failed;
@@ -66,6 +73,9 @@ int run_gateway(Config config, const OnStarted& on_started) {
   for (const auto& address : *addresses)
     log(LogLevel::info, "listening", {{"address", rr::format_host_port(address.host, address.port)}});
   on_started(io, gateway, *addresses);
+  file.watch();
+  heartbeat.start();
+  notify_service_manager("READY=1\nSTATUS=serving");
 
   io.run();  // returns when everything has ended by itself: nothing outlives what it refers to
   return exit_ok;

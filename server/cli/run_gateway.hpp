@@ -12,9 +12,9 @@ namespace rrgate {
 /// Called once the listeners are open; the gateway is not yet serving.
 using OnStarted = std::function<void(boost::asio::io_context&, Gateway&, const std::vector<rr::HostPort>& addresses)>;
 
-/// Serves until SIGTERM or SIGINT, then drains; a second signal ends what is left at once. SIGHUP reads
-/// certificates anew. Returns an exit code.
-int run_gateway(Config config, const OnStarted& on_started);
+/// Serves until SIGTERM or SIGINT, then drains; a second signal ends what is left at once. SIGHUP reads `config_file`,
+/// where there is one, and certificates anew; the file is followed besides. Returns an exit code.
+int run_gateway(Config config, const OnStarted& on_started, const std::string& config_file = {});
 
 /// The dashboard that belongs to this program: beside an installed program (../share/rrgate/web) or in the source tree
 /// of a built one (web/dist). Empty when there is none.

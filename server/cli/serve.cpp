@@ -14,7 +14,8 @@ int run_serve(Arguments arguments) {
   if (file == parsed.options.end()) return usage_error("serve", "missing --config FILE");
   auto config = load_config(file->second);
   if (!report_findings(file->second, config)) return exit_usage;
-  return run_gateway(std::move(config.config), [](auto&, auto&, const auto&) {});
+  return run_gateway(
+      std::move(config.config), [](auto&, auto&, const auto&) {}, file->second);
 }
 
 }  // namespace rrgate

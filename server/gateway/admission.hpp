@@ -51,6 +51,11 @@ class Admission {
     return Ticket(*this, address);
   }
 
+  /// From now on; who is there already stays.
+  void set_limits(std::size_t total, std::size_t per_address) {
+    total_ = total;
+    per_address_ = per_address;
+  }
   std::size_t open() const { return open_; }
 
  private:

@@ -5,30 +5,34 @@
 
 namespace rrgate {
 
-rr::awaitable<rr::Result<std::unique_ptr<Boarding>>> board(Device& device) {
+rr::awaitable<rr::Result<std::unique_ptr<Boarding>>> board(Gateway& gateway, Device& device) {
   const auto label = "device " + rr::quoted(device.config().name);
   auto seat = device.take_seat();
-  if (!seat)
+  if (!seat) {
+    gateway.reject(Rejection::device_full);
     co_return rr::make_error(rr::ErrorCode::connection_error,
                              label + " has all the clients it may have (" + std::to_string(device.clients()) + ")");
+  }
   auto stream = co_await device.connect();
-  if (!stream)
+  if (!stream) {
+    gateway.reject(Rejection::device_offline);
     co_return rr::make_error(rr::ErrorCode::connection_error, label + " is offline: " + stream.error().message);
+  }
   auto boarding = std::make_unique<Boarding>(Boarding{device, std::move(*seat), std::move(*stream)});
   co_return boarding;
 }
 
 rr::awaitable<void> relay_client(Gateway& gateway, Connection& connection, rr::ByteStream& client, Boarding& boarding) {
   const auto& limits = gateway.config().limits;
-  Relay relay(client, *boarding.stream, {limits.max_message_size, limits.outbox_bytes});
-  connection.is_relay = true;
+  Relay relay(client, *boarding.stream, {limits.max_message_size, limits.outbox_bytes}, boarding.device.traffic());
+  connection.device = &boarding.device;
   connection.stop = [&relay](rr::EndReason reason) { relay.stop(std::move(reason)); };
   const auto& name = boarding.device.config().name;
   log(LogLevel::info, "client connected", {{"device", name}, {"peer", connection.client}});
 
   const auto reason = co_await relay.run();
 
-  connection.is_relay = false;
+  connection.device = nullptr;
   connection.stop = [&client](const rr::EndReason&) { client.close(); };
   // A device that ends a connection may be ending altogether: find out now rather than at the next look.
   if (!gateway.is_stopping() && (reason.code == 1011 || reason.text.rfind("device", 0) == 0))

@@ -76,8 +76,22 @@ rr::awaitable<rr::Result<std::unique_ptr<rr::ByteStream>>> Device::connect() {
   co_return stream;
 }
 
+bool Device::can_become(const DeviceConfig& config) const {
+  auto same = config;
+  same.max_clients = config_.max_clients;
+  return same == config_;
+}
+
+void Device::become(const DeviceConfig& config, const Config& whole) {
+  config_.max_clients = config.max_clients;
+  dial_options_.timeout = whole.timeouts.connect;
+  dial_options_.send_stall = whole.timeouts.send_stall;
+  retry_ = whole.retry;
+}
+
 std::optional<Device::Seat> Device::take_seat() {
   if (config_.max_clients != 0 && clients_ >= config_.max_clients) return std::nullopt;
+  ++traffic_.sessions;
   return Seat(*this);
 }
 
@@ -175,6 +189,41 @@ rr::awaitable<void> watch(std::shared_ptr<Device> device) {
 
 void DeviceRegistry::start() {
   for (const auto& device : devices_) asio::co_spawn(executor_, watch(device), asio::detached);
+}
+
+rr::Result<std::vector<std::shared_ptr<Device>>> DeviceRegistry::prepare(const Config& next) {
+  std::vector<std::shared_ptr<Device>> out;
+  for (const auto& config : next.devices) {
+    const auto stays =
+        std::find_if(devices_.begin(), devices_.end(), [&](const auto& device) { return device->can_become(config); });
+    if (stays != devices_.end()) {
+      out.push_back(*stays);
+      continue;
+    }
+    out.push_back(std::make_shared<Device>(executor_, config, next));
+    if (auto loaded = out.back()->load_tls(); !loaded) return loaded.error();
+  }
+  return out;
+}
+
+void DeviceRegistry::replace(std::vector<std::shared_ptr<Device>> configured) {
+  const auto before = std::exchange(devices_, std::move(configured));
+  for (std::size_t i = 0; i < devices_.size(); ++i) {
+    devices_[i]->become(config_.devices[i], config_);
+    if (std::find(before.begin(), before.end(), devices_[i]) == before.end())
+      asio::co_spawn(executor_, watch(devices_[i]), asio::detached);
+  }
+  for (const auto& device : before) {
+    if (has(*device)) continue;
+    if (device->config().is_found)
+      devices_.push_back(device);
+    else
+      device->stop();
+  }
+}
+
+bool DeviceRegistry::has(const Device& device) const {
+  return std::any_of(devices_.begin(), devices_.end(), [&](const auto& each) { return each.get() == &device; });
 }
 
 Device& DeviceRegistry::add(DeviceConfig device) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "server/config/config.hpp"
+#include "server/gateway/metrics.hpp"
 #include "server/gateway/probe.hpp"
 #include "server/gateway/tls_files.hpp"
 #include "server/transport/dial.hpp"
@@ -30,6 +31,12 @@ class Device : public std::enable_shared_from_this<Device> {
   /// What the last answer said; kept while the device is offline, so that clients can still be told which one it is.
   const std::optional<ProbeResult>& identity() const { return identity_; }
   std::size_t clients() const { return clients_; }
+  Traffic& traffic() { return traffic_; }
+  const Traffic& traffic() const { return traffic_; }
+
+  /// Whether it goes on when this is what the configuration says of it; the bound on clients may differ.
+  bool can_become(const DeviceConfig& config) const;
+  void become(const DeviceConfig& config, const Config& whole);
 
   /// The ways to a found device, best first; the first that works becomes config().url.
   void set_urls(std::vector<rr::ConnectionUrl> urls);
@@ -79,6 +86,7 @@ class Device : public std::enable_shared_from_this<Device> {
   std::string last_error_;
   std::optional<ProbeResult> identity_;
   std::size_t clients_ = 0;
+  Traffic traffic_;
   bool is_stopping_ = false;
   bool looks_again_ = false;
   boost::asio::steady_timer wake_;
@@ -94,6 +102,13 @@ class DeviceRegistry {
   void reload_tls(bool is_forced);
   void start();
   void stop();
+
+  /// The devices of another configuration, which must outlive this call alone: those that stay as they are, and new
+  /// ones. Errors   as load_tls(); nothing has changed.
+  [[nodiscard]] rr::Result<std::vector<std::shared_ptr<Device>>> prepare(const Config& next);
+  /// Takes what prepare() made, once the configuration has been replaced. Found devices stay.
+  void replace(std::vector<std::shared_ptr<Device>> configured);
+  bool has(const Device& device) const;
 
   /// A found device joins; its name is nobody's yet.
   Device& add(DeviceConfig device);

@@ -41,9 +41,28 @@ FoundDevices::FoundDevices(asio::io_context& io, const Config& config, DeviceReg
     : io_(io), config_(config), devices_(devices), wake_(io) {}
 
 void FoundDevices::start() {
+  listen();
+  asio::co_spawn(io_, run(), asio::detached);
+}
+
+void FoundDevices::listen() {
   discovery_.emplace(io_, discovery_options(config_.discover));
   discovery_->watch([this](const rr::NodeEvent& event) { handle(event); });
-  asio::co_spawn(io_, run(), asio::detached);
+}
+
+void FoundDevices::note_change(const Discover& before) {
+  const auto& now = config_.discover;
+  auto other_rules = before;
+  other_rules.allow = now.allow;
+  other_rules.max_devices = now.max_devices;
+  if (now != other_rules) {
+    for (auto& [id, node] : nodes_) drop_device(node);
+    nodes_.clear();
+    discovery_.reset();
+    if (now.is_enabled) listen();
+  }
+  next_review_ = {};
+  wake_.cancel();
 }
 
 void FoundDevices::stop() {

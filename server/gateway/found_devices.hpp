@@ -25,6 +25,9 @@ class FoundDevices {
 
   void start();
   void stop();
+  /// The configuration has been replaced; `before` was its part. Where more than the rules differs, all nodes are
+  /// forgotten, and heard of anew.
+  void note_change(const Discover& before);
 
   /// One node that is announced now.
   struct Entry {
@@ -46,6 +49,7 @@ class FoundDevices {
     std::weak_ptr<Device> device;  ///< that was made of it
   };
 
+  void listen();
   void handle(const rr::NodeEvent& event);
   void review(Node& node);
   void drop_device(Node& node);

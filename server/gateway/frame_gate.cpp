@@ -39,6 +39,7 @@ rr::Result<std::size_t> FrameGate::pass(rr::ByteSpan bytes) {
       }
       if (start.size() < rr::frame_start_size) return passed;
       left_ = rr::frame_message_size(start);
+      ++messages_;
       is_early_ = seen_ < early_messages && left_ <= early_size;
     }
     const auto count = std::min(left_, bytes.size() - passed);

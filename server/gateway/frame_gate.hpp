@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 #include "core/support/bytes.hpp"
 #include "core/support/error.hpp"
@@ -20,6 +21,9 @@ class FrameGate {
   /// Errors   protocol_error: magic, version, or a size below 16 or above the limit. No byte of such a message passes.
   [[nodiscard]] rr::Result<std::size_t> pass(rr::ByteSpan bytes);
 
+  /// Messages that have begun to pass.
+  std::uint64_t messages() const { return messages_; }
+
   /// After in-stream TLS began: everything passes, unread.
   void make_opaque() { is_opaque_ = true; }
   /// Whether one of the first messages was a service's consent to TLS: what follows, both ways, is no message. Asked of
@@ -34,7 +38,8 @@ class FrameGate {
   std::size_t limit_;
   std::size_t left_ = 0;  ///< bytes of the current message still to come
   std::size_t seen_ = 0;  ///< messages, as long as they are looked at
-  rr::Bytes early_;       ///< the current message, if it is one of the first and small
+  std::uint64_t messages_ = 0;
+  rr::Bytes early_;  ///< the current message, if it is one of the first and small
   bool is_early_ = false;
   bool has_seen_start_tls_ = false;
   bool is_opaque_ = false;

@@ -31,10 +31,9 @@ Protocol detect_protocol(rr::ByteSpan first_bytes) {
 namespace {
 
 /// Reads what a proxy begins a connection with. Returns false where that is nothing that can be used.
-rr::awaitable<bool> take_proxy_header(rr::ByteStream& stream, Connection& connection,
-                                      std::chrono::milliseconds patience) {
+rr::awaitable<bool> take_proxy_header(Gateway& gateway, rr::ByteStream& stream, Connection& connection) {
   rr::Deadline limit(stream.executor(), [&stream] { stream.close(); });
-  limit.arm(patience);
+  limit.arm(gateway.config().limits.header_timeout);
   std::array<std::uint8_t, largest_proxy_header> first{};
   std::size_t size = 0;
   for (;;) {
@@ -43,6 +42,7 @@ rr::awaitable<bool> take_proxy_header(rr::ByteStream& stream, Connection& connec
     size += read.bytes;
     const auto header = parse_proxy_header({first.data(), size});
     if (!header) {
+      gateway.reject(Rejection::proxy_header);
       log(LogLevel::warning, "connection of a trusted proxy closed",
           {{"peer", connection.client}, {"error", header.error().message}});
       co_return false;
@@ -53,6 +53,7 @@ rr::awaitable<bool> take_proxy_header(rr::ByteStream& stream, Connection& connec
     connection.peer.endpoint = *header->client;
     connection.client = Connection::describe(connection.peer);
     if (connection.ticket.pass_to(header->client->address())) co_return true;
+    gateway.reject(Rejection::too_many);
     log(LogLevel::warning, "connection refused: too many", {{"peer", connection.client}});
     co_return false;
   }
@@ -88,6 +89,7 @@ rr::awaitable<std::unique_ptr<rr::ByteStream>> accept_https(Gateway& gateway, co
                                                             std::unique_ptr<rr::ByteStream> stream) {
   const auto context = gateway.tls();
   if (!context) {
+    gateway.reject(Rejection::unknown_protocol);
     log(LogLevel::info, "connection closed: TLS is not served here", {{"peer", connection.client}});
     co_return nullptr;
   }
@@ -95,6 +97,7 @@ rr::awaitable<std::unique_ptr<rr::ByteStream>> accept_https(Gateway& gateway, co
   auto tls = std::make_unique<rr::TlsStream>(std::move(stream), context, rr::TlsRole::server, any_client);
   const auto done = co_await tls->handshake(gateway.config().limits.header_timeout);
   if (!done) {
+    gateway.reject(Rejection::tls);
     log(LogLevel::info, "connection closed", {{"error", done.error().message}});
     co_return nullptr;
   }
@@ -112,7 +115,7 @@ rr::awaitable<void> serve_connection(Gateway& gateway, std::unique_ptr<rr::ByteS
   const auto patience = gateway.config().limits.header_timeout;
   const auto& proxy = gateway.config().proxy;
   if (proxy.has_proxy_protocol && proxy.trust.trusts(connection.peer.endpoint.address()))
-    if (!co_await take_proxy_header(*stream, connection, patience)) co_return;
+    if (!co_await take_proxy_header(gateway, *stream, connection)) co_return;
   auto protocol = co_await look_at_first_bytes(*stream, connection.client, patience);
   if (protocol == Protocol::tls) {
     // Closing what is below closes the TLS stream too, whose part it becomes: `current` holds through the handshake.
@@ -131,6 +134,7 @@ rr::awaitable<void> serve_connection(Gateway& gateway, std::unique_ptr<rr::ByteS
       co_await serve_http_client(gateway, connection, std::move(stream));
       break;
     case Protocol::unknown: {
+      gateway.reject(Rejection::unknown_protocol);
       // The line that native nodes answer with.
       const auto line = rr::as_bytes("HTTP/1.1 404 File Not Found\r\n");
       const std::span<const rr::ByteSpan> slices(&line, 1);

@@ -1,15 +1,19 @@
 #include "server/gateway/gateway.hpp"
 
+#include <sys/socket.h>
+
 #include <algorithm>
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <random>
+#include <utility>
 
 #include "server/gateway/front_door.hpp"
 #include "server/http/routes.hpp"
 #include "server/log/log.hpp"
+#include "server/transport/accept_all.hpp"
 
 namespace rrgate {
 
@@ -45,24 +49,61 @@ Gateway::Gateway(asio::io_context& io, Config config)
       tls_watch_(io),
       drained_(io) {}
 
-rr::Result<std::vector<rr::HostPort>> Gateway::start() {
+rr::Result<Gateway::Listener> Gateway::open(const rr::HostPort& address, std::vector<rr::HostPort>& bound) {
+  Listener out{address, std::make_unique<rr::TcpListener>(io_.get_executor())};
+  const auto opened = out.socket->open(address);
+  if (!opened) return opened.error();
+  bound.insert(bound.end(), opened->begin(), opened->end());
+  return out;
+}
+
+void Gateway::serve(Listener listener) {
+  listener.socket->start([this](asio::ip::tcp::socket socket) { accept(std::move(socket)); },
+                         [](const std::string& problem) { log(LogLevel::error, problem, {}); });
+  listeners_.push_back(std::move(listener));
+}
+
+rr::Result<> Gateway::adopt(int socket, std::vector<rr::HostPort>& bound) {
+  const auto acceptor = std::make_shared<Acceptor>(io_);
+  sockaddr_storage address{};
+  socklen_t size = sizeof(address);
+  int listens = 0;
+  socklen_t flag_size = sizeof(listens);
+  if (::getsockname(socket, reinterpret_cast<sockaddr*>(&address), &size) != 0 ||
+      (address.ss_family != AF_INET && address.ss_family != AF_INET6) ||
+      ::getsockopt(socket, SOL_SOCKET, SO_ACCEPTCONN, &listens, &flag_size) != 0 || listens == 0)
+    return rr::make_error(rr::ErrorCode::connection_error,
+                          "socket " + std::to_string(socket) + " was handed over: expected a TCP socket that listens");
+  rr::error_code error;
+  acceptor->assign(address.ss_family == AF_INET ? asio::ip::tcp::v4() : asio::ip::tcp::v6(), socket, error);
+  if (error) return rr::make_error(rr::ErrorCode::connection_error, "socket that was handed over: " + error.message());
+  const auto local = acceptor->local_endpoint(error);
+  bound.push_back({local.address().to_string(), local.port()});
+  adopted_.push_back(acceptor);
+  return {};
+}
+
+rr::Result<std::vector<rr::HostPort>> Gateway::start(const std::vector<int>& sockets) {
   if (web_tls_)
     if (auto loaded = web_tls_->load(); !loaded) return loaded.error();
   if (auto loaded = devices_.load_tls(); !loaded) return loaded.error();
   std::vector<rr::HostPort> bound;
-  for (const auto& address : config_.listen) {
-    auto listener = std::make_unique<rr::TcpListener>(io_.get_executor());
-    auto opened = listener->open(address);
-    if (!opened) {
-      listeners_.clear();
-      return opened.error();
+  for (const int socket : sockets)
+    if (auto adopted = adopt(socket, bound); !adopted) return adopted.error();
+  std::vector<Listener> opened;
+  if (adopted_.empty())
+    for (const auto& address : config_.listen) {
+      auto listener = open(address, bound);
+      if (!listener) return listener.error();
+      opened.push_back(std::move(*listener));
     }
-    bound.insert(bound.end(), opened->begin(), opened->end());
-    listeners_.push_back(std::move(listener));
+  for (auto& listener : opened) serve(std::move(listener));
+  for (const auto& acceptor : adopted_) {
+    auto accepting = rr::accept_all(
+        acceptor, [this](asio::ip::tcp::socket socket) { accept(std::move(socket)); },
+        [](const std::string& problem) { log(LogLevel::error, problem, {}); });
+    asio::co_spawn(io_, std::move(accepting), asio::detached);
   }
-  for (const auto& listener : listeners_)
-    listener->start([this](asio::ip::tcp::socket socket) { accept(std::move(socket)); },
-                    [](const std::string& problem) { log(LogLevel::error, problem, {}); });
   devices_.start();
   if (config_.discover.is_enabled) {
     found_ = std::make_unique<FoundDevices>(io_, config_, devices_);
@@ -82,6 +123,57 @@ rr::awaitable<void> Gateway::watch_tls() {
   }
 }
 
+rr::Result<> Gateway::reconfigure(Config next) {
+  // All that can fail comes first.
+  std::unique_ptr<TlsFiles> web_tls;
+  const bool has_other_tls = next.tls.certificates != config_.tls.certificates;
+  if (has_other_tls && !next.tls.certificates.empty()) {
+    web_tls = std::make_unique<TlsFiles>(next.tls.certificates);
+    if (auto loaded = web_tls->load(); !loaded) return loaded;
+  }
+  auto devices = devices_.prepare(next);
+  if (!devices) return devices.error();
+  const auto has = [](const std::vector<rr::HostPort>& addresses, const rr::HostPort& address) {
+    return std::find(addresses.begin(), addresses.end(), address) != addresses.end();
+  };
+  std::vector<Listener> opened;
+  std::vector<rr::HostPort> bound;
+  if (adopted_.empty())
+    for (const auto& address : next.listen) {
+      if (has(config_.listen, address)) continue;
+      auto listener = open(address, bound);
+      if (!listener) return listener.error();
+      opened.push_back(std::move(*listener));
+    }
+
+  const auto before = std::exchange(config_, std::move(next));
+  if (has_other_tls) web_tls_ = std::move(web_tls);
+  std::erase_if(listeners_, [&](const Listener& listener) {
+    const bool is_gone = !has(config_.listen, listener.address);
+    if (is_gone) listener.socket->close();
+    return is_gone;
+  });
+  for (auto& listener : opened) serve(std::move(listener));
+  for (const auto& address : bound)
+    log(LogLevel::info, "listening", {{"address", rr::format_host_port(address.host, address.port)}});
+  admission_.set_limits(config_.limits.clients, config_.limits.clients_per_address);
+  devices_.replace(std::move(*devices));
+  if (found_) {
+    found_->note_change(before.discover);
+  } else if (config_.discover.is_enabled) {
+    found_ = std::make_unique<FoundDevices>(io_, config_, devices_);
+    found_->start();
+  }
+  router_ = make_routes(*this);
+  for (auto it = connections_.begin(); it != connections_.end();) {
+    auto& connection = *it++;
+    // Clients of a found device that is gone stay as long as it lets them.
+    if (connection.device && !connection.device->config().is_found && !devices_.has(*connection.device))
+      connection.stop({1001, "the device has left the configuration, or is another one there"});
+  }
+  return {};
+}
+
 void Gateway::reload_tls() {
   if (web_tls_) web_tls_->reload();
   devices_.reload_tls(true);
@@ -91,9 +183,11 @@ void Gateway::accept(asio::ip::tcp::socket socket) {
   rr::error_code error;
   const auto peer = socket.remote_endpoint(error);
   if (error) return;  // gone already
+  ++metrics_.connections;
   const bool is_proxy = config_.proxy.trust.trusts(peer.address());
   auto ticket = admission_.admit(is_proxy ? std::nullopt : std::optional(peer.address()));
   if (!ticket) {
+    reject(Rejection::too_many);
     log(LogLevel::warning, "connection refused: too many",
         {{"peer", peer.address().to_string()}, {"open", admission_.open()}});
     return;
@@ -122,7 +216,11 @@ void Gateway::stop(std::function<void()> on_stopped) {
   is_stopping_ = true;
   on_stopped_ = std::move(on_stopped);
   if (on_stop_) on_stop_();
-  for (const auto& listener : listeners_) listener->close();
+  for (const auto& listener : listeners_) listener.socket->close();
+  for (const auto& acceptor : adopted_) {
+    rr::error_code ignored;
+    acceptor->close(ignored);
+  }
   if (found_) found_->stop();
   devices_.stop();
   tls_watch_.cancel();
@@ -130,7 +228,7 @@ void Gateway::stop(std::function<void()> on_stopped) {
 }
 
 bool Gateway::has_relay() const {
-  return std::any_of(connections_.begin(), connections_.end(), [](const auto& each) { return each.is_relay; });
+  return std::any_of(connections_.begin(), connections_.end(), [](const auto& each) { return each.device != nullptr; });
 }
 
 void Gateway::end_all(const rr::EndReason& reason) {
@@ -143,7 +241,7 @@ void Gateway::end_all(const rr::EndReason& reason) {
 rr::awaitable<void> Gateway::drain() {
   for (auto it = connections_.begin(); it != connections_.end();) {
     auto& connection = *it++;
-    if (!connection.is_relay) connection.stop({1001, "the gateway is stopping"});
+    if (!connection.device) connection.stop({1001, "the gateway is stopping"});
   }
   log(LogLevel::info, "stopping", {{"connections", open_connections_}, {"drain_ms", config_.timeouts.drain.count()}});
   const auto wait_until = [this](std::chrono::steady_clock::time_point deadline) -> rr::awaitable<void> {

@@ -27,8 +27,8 @@ struct Connection : boost::intrusive::list_base_hook<boost::intrusive::link_mode
 
   /// Ends it soon.
   std::function<void(rr::EndReason)> stop;
-  /// Whether it may go on for a while when the gateway stops: it carries a client's session.
-  bool is_relay = false;
+  /// Set while it carries a client's session, which may go on for a while when the gateway stops.
+  const Device* device = nullptr;
   Peer peer;
   Admission::Ticket ticket;
   /// The client as logs name it: as `peer`, or as a trusted proxy says.
@@ -43,8 +43,14 @@ class Gateway {
   Gateway& operator=(const Gateway&) = delete;
 
   /// Opens all listeners and starts to look at the devices. Returns the addresses with their true ports.
+  /// `sockets`  that listen already, instead of the addresses of the configuration; they become the gateway's.
   /// Errors   connection_error: an address that can't be listened on; then nothing is started.
-  [[nodiscard]] rr::Result<std::vector<rr::HostPort>> start();
+  [[nodiscard]] rr::Result<std::vector<rr::HostPort>> start(const std::vector<int>& sockets = {});
+
+  /// Goes on with another configuration. Sessions end only where their device is gone or another one; limits, timeouts
+  /// and sizes hold for new connections.
+  /// Errors   certificates or CAs that can't be used, an address that can't be listened on; then nothing has changed.
+  [[nodiscard]] rr::Result<> reconfigure(Config next);
 
   /// Closes the listeners, lets relays end within timeouts.drain, then ends them; calls `on_stopped` when nothing is
   /// left. A second call ends them at once.
@@ -60,7 +66,9 @@ class Gateway {
   const Config& config() const { return config_; }
   DeviceRegistry& devices() { return devices_; }
   /// Null where the configuration has no "discover", and before start().
-  FoundDevices* found() { return found_.get(); }
+  FoundDevices* found() { return config_.discover.is_enabled ? found_.get() : nullptr; }
+  Metrics& metrics() { return metrics_; }
+  void reject(Rejection why) { metrics_.reject(why); }
   Admission& admission() { return admission_; }
   const Router& router() const { return router_; }
   /// What new connections are encrypted with; null: TLS is not served.
@@ -70,6 +78,15 @@ class Gateway {
   void add(Connection& connection) { connections_.push_back(connection); }
 
  private:
+  using Acceptor = boost::asio::ip::tcp::acceptor;
+  struct Listener {
+    rr::HostPort address;
+    std::unique_ptr<rr::TcpListener> socket;
+  };
+
+  rr::Result<Listener> open(const rr::HostPort& address, std::vector<rr::HostPort>& bound);
+  void serve(Listener listener);
+  rr::Result<> adopt(int socket, std::vector<rr::HostPort>& bound);
   void accept(boost::asio::ip::tcp::socket socket);
   rr::awaitable<void> drain();
   rr::awaitable<void> watch_tls();
@@ -84,7 +101,9 @@ class Gateway {
   Admission admission_;
   Router router_;
   rr::NodeId node_id_;
-  std::vector<std::unique_ptr<rr::TcpListener>> listeners_;
+  Metrics metrics_;
+  std::vector<Listener> listeners_;
+  std::vector<std::shared_ptr<Acceptor>> adopted_;  ///< sockets that listened already
   boost::intrusive::list<Connection, boost::intrusive::constant_time_size<false>> connections_;
   std::size_t open_connections_ = 0;
   bool is_stopping_ = false;

@@ -67,12 +67,14 @@ rr::awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, st
     co_await tcp.end(rr::no_reason);
   };
   if (auto refusal = refuse_upgrade(request, gateway.config().allowed_origins)) {
+    gateway.reject(refusal->status == 403 ? Rejection::origin : Rejection::bad_request);
     log(LogLevel::info, "upgrade refused",
         {{"peer", connection.client}, {"status", refusal->status}, {"origin", request.header(http::field::origin)}});
     co_await refuse(*refusal);
     co_return;
   }
   if (!connection.ticket.pass_to(request.arrival.address)) {
+    gateway.reject(Rejection::too_many);
     log(LogLevel::warning, "connection refused: too many", {{"peer", connection.client}});
     const auto response = problem_response(503, "too many connections from " + request.arrival.address.to_string());
     co_await refuse(response);
@@ -80,12 +82,13 @@ rr::awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, st
   }
   auto device = find_device(gateway, request);
   if (!device) {
+    gateway.reject(Rejection::no_such_device);
     const auto response =
         problem_response(device.error().code == rr::ErrorCode::node_not_found ? 404 : 400, device.error().message);
     co_await refuse(response);
     co_return;
   }
-  auto boarding = co_await board(**device);
+  auto boarding = co_await board(gateway, **device);
   const bool takes_close = takes_close_frames(request);
   if (!boarding && !takes_close) {
     auto response = problem_response(503, boarding.error().message);
@@ -128,6 +131,7 @@ rr::awaitable<void> serve_http_client(Gateway& gateway, Connection& connection,
     auto read = co_await reader.next();
     if (!read.request && read.refusal == 0) break;
     if (!read.request) {
+      gateway.reject(Rejection::bad_request);
       log(LogLevel::info, "request refused",
           {{"peer", connection.client}, {"status", read.refusal}, {"detail", read.detail}});
       const auto response = problem_response(read.refusal, read.detail);
@@ -136,6 +140,7 @@ rr::awaitable<void> serve_http_client(Gateway& gateway, Connection& connection,
       break;
     }
     auto& request = *read.request;
+    ++gateway.metrics().requests;
     request.arrival = see_through_proxies(request, connection.peer, config.proxy.trust);
     take_base_path(request, config.base_path);
     if (asks_for_websocket(request)) {

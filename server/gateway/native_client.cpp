@@ -76,6 +76,7 @@ rr::awaitable<void> serve_native_client(Gateway& gateway, Connection& connection
   rr::Message request;
   rr::Result<> read = bytes ? rr::decode(*bytes, {}, request) : rr::Result<>(bytes.error());
   if (!read) {
+    gateway.reject(Rejection::bad_request);
     log(LogLevel::info, "native client dropped", {{"peer", connection.client}, {"error", read.error().message}});
     client.close();
     co_return;
@@ -84,13 +85,14 @@ rr::awaitable<void> serve_native_client(Gateway& gateway, Connection& connection
   auto* device = gateway.devices().route(request.header.receiver_node_id, request.header.receiver_node_name);
   rr::Error refusal;
   if (device) {
-    auto boarding = co_await board(*device);
+    auto boarding = co_await board(gateway, *device);
     if (boarding) {
       co_await relay_client(gateway, connection, client, **boarding);
       co_return;
     }
     refusal = boarding.error();
   } else {
+    gateway.reject(Rejection::no_such_device);
     refusal = rr::make_error(rr::ErrorCode::node_not_found, "Node not found");
   }
   log(LogLevel::info, "native client refused",

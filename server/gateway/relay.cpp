@@ -20,12 +20,12 @@ constexpr std::chrono::milliseconds half_closed_time{1000};
 
 }  // namespace
 
-Relay::Relay(rr::ByteStream& client, rr::ByteStream& device, RelayOptions options)
+Relay::Relay(rr::ByteStream& client, rr::ByteStream& device, RelayOptions options, Traffic& traffic)
     : client_(client),
       device_(device),
       options_(options),
-      to_device_{client, device, FrameGate(options.max_message_size), false},
-      to_client_{device, client, FrameGate(options.max_message_size), true},
+      to_device_{client, device, FrameGate(options.max_message_size), false, traffic.to_device},
+      to_client_{device, client, FrameGate(options.max_message_size), true, traffic.to_clients},
       half_closed_limit_(client.executor(),
                          [this] {
                            stop({1000, "the client has ended"});
@@ -68,7 +68,9 @@ rr::awaitable<void> Relay::pump(Direction& direction) {
       break;
     }
     held += read.bytes;
+    const auto messages = direction.gate.messages();
     const auto passed = direction.gate.pass({buffer.get(), held});
+    direction.flow.messages += direction.gate.messages() - messages;
     if (!passed) {
       stop(broken_rule(direction, passed.error()));
       break;
@@ -79,7 +81,9 @@ rr::awaitable<void> Relay::pump(Direction& direction) {
       to_device_.gate.make_opaque();
     }
     const rr::ByteSpan slice(buffer.get(), *passed);
+    direction.flow.waiting += *passed;
     const auto error = co_await direction.to.write({&slice, 1});
+    direction.flow.waiting -= *passed;
     if (error) {
       const bool is_slow = error == asio::error::timed_out;
       stop(direction.is_from_device
@@ -88,6 +92,7 @@ rr::awaitable<void> Relay::pump(Direction& direction) {
       break;
     }
     direction.bytes += *passed;
+    direction.flow.bytes += *passed;
     held -= *passed;
     if (held > 0) std::memmove(buffer.get(), buffer.get() + *passed, held);
   }

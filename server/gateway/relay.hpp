@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "server/gateway/frame_gate.hpp"
+#include "server/gateway/metrics.hpp"
 #include "server/transport/byte_stream.hpp"
 #include "server/transport/watchdog.hpp"
 
@@ -22,7 +23,8 @@ struct RelayOptions {
 /// Both streams outlive the relay. One relay, one run().
 class Relay {
  public:
-  Relay(rr::ByteStream& client, rr::ByteStream& device, RelayOptions options);
+  /// `traffic`  is counted up, and outlives the relay too.
+  Relay(rr::ByteStream& client, rr::ByteStream& device, RelayOptions options, Traffic& traffic);
 
   /// Forwards until one side ends, fails, or breaks the rules. Ends both streams and says why.
   rr::awaitable<rr::EndReason> run();
@@ -39,6 +41,7 @@ class Relay {
     rr::ByteStream& to;
     FrameGate gate;
     bool is_from_device;
+    Flow& flow;
     std::uint64_t bytes = 0;
   };
 

@@ -4,6 +4,7 @@
 #include "server/http/endpoints/devices.hpp"
 #include "server/http/endpoints/discovery.hpp"
 #include "server/http/endpoints/health.hpp"
+#include "server/http/endpoints/metrics.hpp"
 
 namespace rrgate {
 
@@ -11,6 +12,7 @@ Router make_routes(Gateway& gateway) {
   Router router;
   router.add(http::verb::get, "/healthz", health_endpoint());
   router.add(http::verb::get, "/readyz", ready_endpoint(gateway));
+  router.add(http::verb::get, "/metrics", metrics_endpoint(gateway));
   router.add(http::verb::get, "/api/v1/devices", devices_endpoint(gateway));
   router.add(http::verb::get, "/api/v1/discovery", discovery_endpoint(gateway));
   router.add(http::verb::get, "/api/*", no_such_api_endpoint());

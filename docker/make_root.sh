@@ -1,0 +1,35 @@
+#!/bin/sh
+# make_root.sh SOURCE ROOT    puts into ROOT what the image is made of: programs, page, libraries, a configuration
+set -eu
+source=$1
+root=$2
+prebuilt=$source/docker/prebuilt
+
+if [ ! -x "$prebuilt/bin/rrgate" ]; then
+  apt-get update
+  apt-get install -y --no-install-recommends git
+  cd "$source"
+  ./dev setup
+  ./dev build
+  cmake --install build/release --prefix "$prebuilt" --strip
+fi
+
+mkdir -p "$root/usr/libexec" "$root/usr/share" "$root/etc/rrgate" "$root/tmp"
+chmod 1777 "$root/tmp"
+install -D "$prebuilt/bin/rrgate" "$root/usr/bin/rrgate"
+cp -r "$prebuilt/libexec/rrgate" "$root/usr/libexec/rrgate"
+cp -r "$prebuilt/share/rrgate" "$root/usr/share/rrgate"
+cp "$source/docker/gateway.json" "$root/etc/rrgate/gateway.json"
+echo 'rrgate:x:10001:10001::/:/nonexistent' >"$root/etc/passwd"
+echo 'rrgate:x:10001:' >"$root/etc/group"
+
+programs="$root/usr/bin/rrgate $root/usr/libexec/rrgate/*"
+if ldd $programs | grep -q 'not found'; then
+  apt-get update
+  apt-get install -y --no-install-recommends libspdlog1.10 libssl3 libusb-1.0-0
+fi
+ldd $programs | sed -n 's|.*=> \(/[^ ]*\) .*|\1|p; s|^[[:space:]]*\(/[^ ]*ld-linux[^ ]*\) .*|\1|p' | sort -u |
+  while read -r library; do
+    mkdir -p "$root$(dirname "$library")"
+    cp -L "$library" "$root$library"
+  done

@@ -1,0 +1,14 @@
+// /metrics: counters for Prometheus. Layer: server/http. Source: its text exposition format, version 0.0.4.
+#pragma once
+
+#include "server/http/router.hpp"
+
+namespace rrgate {
+
+class Gateway;
+
+/// Labels are the names of devices, of which there are as many as the configuration and discover.max_devices allow,
+/// and words that are listed in metrics.hpp.
+Handler metrics_endpoint(Gateway& gateway);
+
+}  // namespace rrgate

@@ -1,0 +1,179 @@
+"""The container image: built by podman from programs that were compiled already, run as it is meant to be run."""
+import json
+import os
+import re
+import shutil
+import subprocess
+import time
+
+import pytest
+
+from processes import BUILD, ROOT, START_DEADLINE, free_port
+from test_operations import RRGATE, read_metrics
+from test_proxies import fetch
+
+DOCKER = ROOT / "docker"
+BASE = ROOT / "build" / "deps" / "container-base.tar"  # ./dev setup made it; where it can't, images can't be built
+LARGEST = 90 * 1024 * 1024
+
+STORAGE = """[storage]
+driver = "{driver}"
+runroot = "{folder}/run"
+graphroot = "{folder}/graph"
+"""
+CONTAINERS = """[containers]
+netns = "host"
+[engine]
+cgroup_manager = "cgroupfs"
+events_logger = "file"
+runtime = "crun"
+[engine.runtimes]
+crun = ["{folder}/bin/crun"]
+"""
+# Machines whose root may not raise limits: the runtime would fail at those that podman asks for.
+CRUN = """#!/usr/bin/python3
+import json, os, sys
+for before, word in zip(sys.argv, sys.argv[1:]):
+    path = os.path.join(word, "config.json") if before in ("--bundle", "-b") else word
+    if before in ("--bundle", "-b", "--process", "-p"):
+        config = json.load(open(path))
+        config.get("process", config).pop("rlimits", None)
+        json.dump(config, open(path, "w"))
+os.execv("/usr/bin/crun", ["crun", *sys.argv[1:]])
+"""
+
+
+class Podman:
+    def __init__(self, folder):
+        self.folder = folder
+        (folder / "bin").mkdir()
+        crun = folder / "bin" / "crun"
+        crun.write_text(CRUN)
+        crun.chmod(0o755)
+        (folder / "storage.conf").write_text(STORAGE.format(driver="overlay", folder=folder))
+        (folder / "containers.conf").write_text(CONTAINERS.format(folder=folder))
+        self.environment = {**os.environ, "CONTAINERS_STORAGE_CONF": str(folder / "storage.conf"),
+                            "CONTAINERS_CONF": str(folder / "containers.conf")}
+
+    def __call__(self, *arguments, within=120, fails=False):
+        # A mount namespace of its own, without the second hierarchy of control groups that the runtime doesn't know.
+        words = ["unshare", "-m", "--propagation", "private", "sh", "-c",
+                 'umount /sys/fs/cgroup/unified 2>/dev/null; exec podman "$@"', "podman", *map(str, arguments)]
+        result = subprocess.run(words, capture_output=True, text=True, timeout=within, env=self.environment)
+        assert fails or result.returncode == 0, f"podman {' '.join(words[8:])}\n{result.stdout}{result.stderr}"
+        return result.stdout
+
+
+@pytest.fixture(scope="module")
+def podman(tmp_path_factory):
+    if os.getuid() != 0 or not shutil.which("podman") or not BASE.exists():
+        pytest.skip("needs root, podman, and the base image that ./dev setup makes with mmdebstrap")
+    folder = tmp_path_factory.mktemp("podman")
+    yield Podman(folder)
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+@pytest.fixture(scope="module")
+def image(podman, tmp_path_factory):
+    podman("import", BASE, "docker.io/library/debian:bookworm-slim")
+    context = tmp_path_factory.mktemp("context")
+    shutil.copytree(DOCKER, context / "docker", ignore=shutil.ignore_patterns("prebuilt"))
+    prebuilt = context / "docker" / "prebuilt"
+    for program, folder in [("rrgate", "bin"), ("demo/rrgate-demo-create", "libexec/rrgate"),
+                            ("demo/rrgate-demo-webcams", "libexec/rrgate")]:
+        (prebuilt / folder).mkdir(parents=True, exist_ok=True)
+        target = prebuilt / folder / program.split("/")[-1]
+        subprocess.run(["strip", "-o", target, BUILD / "server" / program], check=True)
+    shutil.copytree(ROOT / "web" / "dist", prebuilt / "share" / "rrgate" / "web")
+    # The format of Docker: the other one has no health check.
+    podman("build", "--format=docker", "--pull=never", "--isolation=chroot", "--network=host", "-t", "rrgate",
+           "-f", context / "docker" / "Dockerfile", context, within=300)
+    return "localhost/rrgate"
+
+
+def test_the_image_is_small_and_nobody_is_root(podman, image):
+    (about,) = json.loads(podman("image", "inspect", image))
+    assert about["Size"] <= LARGEST, about["Size"]
+    assert about["User"] == about["Config"]["User"] == "10001:10001"
+    assert about["Healthcheck"]["Test"][:3] == ["CMD", "/usr/bin/rrgate", "health"]
+    print(f"{about['Size'] / 1e6:.1f} MB")
+
+
+def test_a_container(podman, image, tmp_path):
+    """Read-only, without rights, with the demo device in a container of its own."""
+    port, device = free_port(), free_port()
+    config = tmp_path / "gateway.json"
+    config.write_text(json.dumps({"listen": [f"127.0.0.1:{port}"], "devices": [
+        {"name": "create", "url": f"rr+tcp://127.0.0.1:{device}/?service=Create"}]}))
+    config.chmod(0o644)
+    tmp_path.chmod(0o755)
+    bare = ["--network=host", "--cgroups=disabled", "--read-only", "--read-only-tmpfs=false", "--cap-drop=ALL",
+            "--security-opt=no-new-privileges"]
+    podman("run", "-d", "--name=create", *bare, "--no-healthcheck", "--entrypoint=/usr/libexec/rrgate/rrgate-demo-create",
+           image, "--host", "127.0.0.1", "--port", device)
+    (about,) = json.loads(podman("image", "inspect", image))
+    check = about["Healthcheck"]["Test"][1:]
+    assert check[-1] == "127.0.0.1:8080"
+    check[-1] = f"127.0.0.1:{port}"  # the machine's network is shared here
+    podman("run", "-d", "--name=gateway", *bare, f"--volume={config}:/etc/rrgate/gateway.json:ro",
+           "--health-interval=disable", "--health-cmd", json.dumps(check), image)
+    try:
+        deadline = time.monotonic() + START_DEADLINE
+        entries = []
+        while not (entries and entries[0]["state"] == "online"):
+            assert time.monotonic() < deadline, podman("logs", "gateway", fails=True)
+            try:
+                entries = json.loads(fetch(port, "/api/v1/devices")[2])["devices"]
+            except OSError:
+                time.sleep(0.05)
+        assert b'<div id="app">' in fetch(port, "/")[2]
+        podman("healthcheck", "run", "gateway")
+        (about,) = json.loads(podman("inspect", "gateway"))
+        status = open(f"/proc/{about['State']['Pid']}/status").read()
+        assert re.search(r"^Uid:\s10001\s10001\s", status, re.M)
+        assert re.search(r"^CapEff:\s0+$", status, re.M)
+        mounts = open(f"/proc/{about['State']['Pid']}/mounts").read()
+        assert re.search(r"^\S+ / \S+ ro", mounts, re.M)
+        assert about["State"]["Health"]["Status"] == "healthy"
+        podman("stop", "gateway", within=30)
+        (about,) = json.loads(podman("inspect", "gateway"))
+        assert about["State"]["ExitCode"] == 0
+    finally:
+        podman("rm", "-f", "gateway", "create", fails=True)
+
+
+def test_configurations_of_the_compose_files():
+    for name in ("gateway.json", "demo.json"):
+        result = subprocess.run([str(RRGATE), "check-config", DOCKER / name], capture_output=True, text=True, timeout=20)
+        assert result.returncode == 0, result.stderr
+    for compose in DOCKER.glob("compose.*.yaml"):
+        for file in re.findall(r'"?(\./[^:\s"]+):/', compose.read_text()):
+            assert (DOCKER / file).is_file(), f"{compose.name}: {file}"
+    # The proxy that is trusted is the one that has the address.
+    trusted = re.search(r'"trusted_proxies": \["([^"]+)"\]', (DOCKER / "demo.json").read_text())[1]
+    assert f"ipv4_address: {trusted} " in (DOCKER / "compose.caddy.yaml").read_text()
+
+
+def test_the_dashboard_asks_for_what_there_is(tmp_path):
+    from test_operations import running
+    with running(tmp_path, {"devices": [{"name": "x", "url": "rr+tcp://127.0.0.1:1/?service=x"}]}) as gateway:
+        known = {name.split("{")[0] for name in gateway.metrics()}
+    panels = json.loads((DOCKER / "grafana" / "rrgate.json").read_text())["panels"]
+    asked = {name for panel in panels for target in panel["targets"]
+             for name in re.findall(r"(?:rrgate|process)_\w+", target["expr"])}
+    assert len(asked) >= 8 and asked <= known, asked - known
+
+
+def test_the_unit_is_one(tmp_path):
+    """As systemd reads it, with a program that is there."""
+    if not shutil.which("systemd-analyze"):
+        pytest.skip("no systemd-analyze here")
+    for name in ("rrgate.service", "rrgate.socket"):
+        text = (ROOT / "gateway-config" / name).read_text()
+        (tmp_path / name).write_text(text.replace("/usr/bin/rrgate", "/bin/true"))
+    for name in ("rrgate.service", "rrgate.socket"):
+        result = subprocess.run(["systemd-analyze", "verify", tmp_path / name], capture_output=True, text=True, timeout=60)
+        assert (result.returncode, result.stderr) == (0, "")
+    result = subprocess.run(["systemd-analyze", "security", "--offline=true", "--threshold=20", tmp_path / "rrgate.service"],
+                            capture_output=True, text=True, timeout=60)
+    assert result.returncode == 0, result.stdout[-300:]

@@ -1,0 +1,319 @@
+"""The gateway as a service: metrics, configuration read anew, what a service manager gives and hears, stopping."""
+import contextlib
+import json
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import pytest
+
+from directions import PEERS
+from processes import BUILD, Background, free_port
+from test_proxies import fetch, open_websocket
+
+RRGATE = BUILD / "server" / "rrgate"
+
+
+@pytest.fixture(scope="module")
+def device(tmp_path_factory):
+    service = Background([sys.executable, PEERS / "service.py"], tmp_path_factory.mktemp("device") / "service.log")
+    yield json.loads(service.next_line())["url"]
+    service.stop()
+
+
+class Gateway:
+    """A gateway with its configuration file at hand."""
+
+    def __init__(self, folder, config, environment={}, command=()):
+        self.log = folder / "gateway.log"
+        self.file = folder / "gateway.json"
+        self.port = free_port()
+        self.config = {"listen": [f"127.0.0.1:{self.port}"], "log": {"format": "json"}, **config}
+        self.write(self.config)
+        self.process = Background([*command, RRGATE, "serve", "--config", self.file], self.log, environment)
+        self.wait_for("listening")
+
+    def write(self, config):
+        new = self.file.with_suffix(".new")
+        new.write_text(config if isinstance(config, str) else json.dumps(config))
+        new.rename(self.file)
+
+    def events(self):
+        return [json.loads(line) for line in self.log.read_text().splitlines() if line.endswith("}")]
+
+    def wait_for(self, event, count=1, **fields):
+        """The count-th event of this name with these fields."""
+        found = []
+
+        def is_there():
+            found[:] = [one for one in self.events() if one["event"] == event and fields.items() <= one.items()]
+            return len(found) >= count
+
+        self.process.wait_until(is_there)
+        return found[count - 1]
+
+    def hang_up(self):
+        self.process.process.send_signal(signal.SIGHUP)
+
+    def session(self, name="interop"):
+        """An open session that nobody uses."""
+        self.wait_for("device online", device=name)
+        count = sum(event["event"] == "client connected" for event in self.events())
+        link = open_websocket(self.port, f"/devices/{name}", f"Origin: http://127.0.0.1:{self.port}\r\n")
+        self.wait_for("client connected", count + 1)
+        return link
+
+    def metrics(self, port=None):
+        status, headers, body = fetch(port or self.port, "/metrics")
+        assert (status, headers["Content-Type"]) == (200, "text/plain; version=0.0.4; charset=utf-8")
+        return read_metrics(body.decode())
+
+
+def read_metrics(text):
+    """{"name{labels}": value}; every sample belongs to the family before it, every family is named once."""
+    values, families, current = {}, set(), None
+    for line in text.splitlines():
+        if line.startswith("# HELP "):
+            current = line.split()[2]
+            assert current not in families
+            families.add(current)
+        elif line.startswith("# TYPE "):
+            assert line.split()[2] == current and line.split()[3] in ("counter", "gauge")
+            assert (line.split()[3] == "counter") == current.endswith("_total")
+        else:
+            found = re.fullmatch(r'(\w+)(?:\{(?:\w+="[^"]*",?)+\})? (\d+)', line)
+            assert found and found[1] == current, line
+            name, value = line.rsplit(" ", 1)
+            assert name not in values
+            values[name] = int(value)
+    return values
+
+
+@contextlib.contextmanager
+def running(folder, config, *more):
+    gateway = Gateway(folder, config, *more)
+    try:
+        yield gateway
+    finally:
+        gateway.process.stop()
+
+
+def interop(device, **more):
+    return {"name": "interop", "url": device, **more}
+
+
+def is_alive(link):
+    link.settimeout(0.3)
+    try:
+        return link.recv(1) != b""
+    except TimeoutError:
+        return True
+
+
+def test_metrics(device, tmp_path):
+    dead = {"name": "dead", "url": f"rr+tcp://127.0.0.1:{free_port()}/?service=x"}
+    with running(tmp_path, {"devices": [interop(device, max_clients=1), dead]}) as gateway:
+        link = gateway.session()
+        before = gateway.metrics()
+        for name, value in {
+            'rrgate_device_up{device="interop"}': 1, 'rrgate_device_up{device="dead"}': 0,
+            'rrgate_sessions{device="interop"}': 1, 'rrgate_sessions_total{device="interop"}': 1,
+            'rrgate_relayed_bytes_total{device="interop",direction="to_device"}': 0,
+            'rrgate_waiting_bytes{device="interop",direction="to_clients"}': 0,
+            'rrgate_rejected_total{reason="origin"}': 0,
+        }.items():
+            assert before[name] == value, name
+        assert before["rrgate_connections"] == 2 and before["process_open_fds"] > 5
+
+        # One message of 64 bytes there, and what the service says to it back.
+        message = b"RRAC" + (64).to_bytes(4, "little") + (2).to_bytes(2, "little") + (64).to_bytes(2, "little") + bytes(52)
+        link.sendall(b"\x82" + bytes([0x80 | len(message)]) + bytes(4) + message)
+        for path, headers in [("/devices/dead", ""), ("/devices/nobody", ""), ("/devices/interop", ""),
+                              ("/devices/interop", "Origin: http://evil.example\r\n")]:
+            with pytest.raises(AssertionError):
+                open_websocket(gateway.port, path, headers)
+        with socket.create_connection(("127.0.0.1", gateway.port), 10) as noise:
+            noise.sendall(b"\0\0\0\0")
+            noise.recv(100)
+        after = gateway.metrics()
+        assert after['rrgate_relayed_bytes_total{device="interop",direction="to_device"}'] == 64
+        assert after['rrgate_relayed_messages_total{device="interop",direction="to_device"}'] == 1
+        for reason in ("device_offline", "no_such_device", "device_full", "origin", "unknown_protocol"):
+            assert after[f'rrgate_rejected_total{{reason="{reason}"}}'] == 1, reason
+        assert after["rrgate_connections_total"] > before["rrgate_connections_total"]
+        link.close()
+
+
+@pytest.mark.parametrize("way", ["signal", "watch"])
+def test_a_changed_configuration(device, tmp_path, way):
+    """Sessions of devices that stay go on; the others end, and say why; new devices and addresses are there."""
+    config = {"devices": [interop(device), {"name": "other", "url": device}]}
+    with running(tmp_path, config) as gateway:
+        stays, goes = gateway.session("interop"), gateway.session("other")
+        second = free_port()
+        gateway.write({**gateway.config, "devices": [{"name": "new", "url": device}, interop(device, max_clients=1)],
+                       "listen": [f"127.0.0.1:{second}"], "base_path": "/lab", "limits": {"header_bytes": 2000}})
+        if way == "signal":
+            gateway.hang_up()
+        gateway.wait_for("configuration read anew")
+        assert b"left the configuration" in goes.recv(4096)
+        assert is_alive(stays)
+        with pytest.raises(OSError):
+            socket.create_connection(("127.0.0.1", gateway.port), 5)
+        gateway.port = second
+        gateway.wait_for("device online", device="new")
+        status, _, body = fetch(second, "/lab/api/v1/devices")
+        entries = json.loads(body)["devices"]
+        assert [entry["name"] for entry in entries] == ["new", "interop"]
+        assert [entry["clients"] for entry in entries] == [0, 1]
+        with pytest.raises(AssertionError, match="503"):
+            open_websocket(second, "/devices/interop")  # max_clients
+        gateway.session("new").close()
+        assert gateway.metrics()['rrgate_config_reloads_total{result="ok"}'] == 1
+        stays.close()
+
+
+def test_discovery_comes_and_goes(tmp_path):
+    with running(tmp_path, {"devices": []}) as gateway:
+        quiet = {"scopes": ["node_local"], "hardware": False}
+        for count, discover in enumerate([quiet, {**quiet, "local": False}, {**quiet, "allow": [{"node_name": "x"}]}, None, quiet], 1):
+            gateway.write({**gateway.config, **({"discover": discover} if discover else {})})
+            gateway.hang_up()
+            gateway.wait_for("configuration read anew", count)
+            assert json.loads(fetch(gateway.port, "/api/v1/discovery")[2])["enabled"] == bool(discover)
+
+
+@pytest.mark.parametrize("wrong", ["no JSON", "no such option", "a certificate that is missing", "an address in use", "gone"])
+def test_a_configuration_that_cannot_be_used(device, tmp_path, wrong):
+    with running(tmp_path, {"devices": [interop(device)]}) as gateway:
+        link = gateway.session()
+        with socket.create_server(("127.0.0.1", 0)) as taken:
+            address = f"127.0.0.1:{taken.getsockname()[1]}"
+            if wrong == "gone":
+                gateway.file.unlink()
+            else:
+                gateway.write({
+                    "no JSON": '{"listen": [',
+                    "no such option": {**gateway.config, "colour": 1},
+                    "a certificate that is missing": {**gateway.config, "devices": [], "tls": {"certificates": [{"cert": "x", "key": "y"}]}},
+                    "an address in use": {**gateway.config, "devices": [], "listen": [address]},
+                }[wrong])
+            gateway.hang_up()
+            error = gateway.wait_for("configuration not used; that from before stays")["error"]
+            expected = {"no JSON": "not JSON", "no such option": "/colour", "a certificate that is missing": "x",
+                        "an address in use": address, "gone": "can't be read"}[wrong]
+            assert expected in error
+        assert is_alive(link)
+        values = gateway.metrics()
+        assert values['rrgate_config_reloads_total{result="failed"}'] == 1
+        assert values['rrgate_device_up{device="interop"}'] == 1
+        link.close()
+
+
+@pytest.fixture
+def manager(tmp_path):
+    """Where a service manager listens."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
+        listener.bind(str(tmp_path / "notify"))
+        listener.settimeout(10)
+        yield listener
+
+
+def test_what_a_service_manager_hears(device, tmp_path, manager):
+    environment = {"NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": "200000"}
+
+    def hear(*wanted):
+        deadline = time.monotonic() + 10
+        while time.monotonic() < deadline:
+            text = manager.recv(4096).decode().splitlines()
+            if text[0] in wanted:
+                return text
+            assert text[0] == "WATCHDOG=1", text
+        raise AssertionError(f"did not hear {wanted}")
+
+    with running(tmp_path, {"devices": [interop(device)], "timeouts": {"drain_ms": 1500}}, environment) as gateway:
+        assert hear("READY=1")[1] == "STATUS=serving"
+        started = time.monotonic()
+        for _ in range(4):
+            hear("WATCHDOG=1")
+        assert time.monotonic() - started < 5
+        gateway.hang_up()
+        assert hear("RELOADING=1")[1].startswith("MONOTONIC_USEC=")
+        hear("READY=1")
+        gateway.write("{")
+        gateway.hang_up()
+        hear("RELOADING=1")
+        assert "can't be used" in hear("READY=1")[1]
+
+        link = gateway.session()
+        gateway.process.process.send_signal(signal.SIGTERM)
+        hear("STOPPING=1")
+        hear("WATCHDOG=1")  # a session that may end in its own time is no hang
+        link.close()
+        assert gateway.process.process.wait(10) == 0
+
+
+def test_stopping_waits_for_sessions_and_not_for_ever(device, tmp_path):
+    with running(tmp_path, {"devices": [interop(device)], "timeouts": {"drain_ms": 700}}) as gateway:
+        link = gateway.session()
+        gateway.process.process.send_signal(signal.SIGTERM)
+        started = time.monotonic()
+        gateway.wait_for("stopping")
+        with pytest.raises(OSError):
+            socket.create_connection(("127.0.0.1", gateway.port), 5)
+        assert is_alive(link)
+        link.settimeout(10)
+        assert b"the gateway is stopping" in link.recv(4096)
+        assert 0.5 < time.monotonic() - started < 5
+        link.close()
+        assert gateway.process.process.wait(10) == 0
+
+
+def test_sockets_that_listen_already(device, tmp_path):
+    """As systemd hands them over: number 3, and the process that they are for."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        port = listener.getsockname()[1]
+        start = f"import os; os.dup2({listener.fileno()}, 3); os.set_inheritable(3, True); os.environ.update(LISTEN_FDS='1', LISTEN_PID=str(os.getpid())); os.execv(os.sys.argv[1], os.sys.argv[1:])"
+        config = tmp_path / "gateway.json"
+        config.write_text(json.dumps({"listen": ["127.0.0.1:1"], "devices": [interop(device)]}))
+        log = tmp_path / "gateway.log"
+        with open(log, "wb") as errors:
+            process = subprocess.Popen([sys.executable, "-c", "import sys;" + start, str(RRGATE), "serve", "--config", str(config)],
+                                       pass_fds=[listener.fileno()], stderr=errors)
+    try:
+        assert fetch(port, "/healthz")[0] == 200  # a connection waits until somebody takes it
+        process.send_signal(signal.SIGHUP)  # the address of the file is not listened on: nothing fails
+        deadline = time.monotonic() + 10
+        while "configuration read anew" not in log.read_text() and time.monotonic() < deadline:
+            time.sleep(0.02)
+        assert fetch(port, "/readyz")[0] == 200
+        assert "configuration read anew" in log.read_text()
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(10) == 0
+    finally:
+        process.kill()
+        process.wait()
+
+
+def test_a_socket_that_is_none(tmp_path):
+    config = tmp_path / "gateway.json"
+    config.write_text(json.dumps({"listen": ["127.0.0.1:0"], "devices": []}))
+    command = ["/bin/sh", "-c", 'exec 3</dev/null; LISTEN_FDS=1 LISTEN_PID=$$ exec "$@"', "sh", RRGATE, "serve", "--config", config]
+    result = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=20)
+    assert result.returncode == 1
+    assert "expected a TCP socket that listens" in result.stderr
+
+
+def test_health(device, tmp_path):
+    def ask(*arguments):
+        result = subprocess.run([str(RRGATE), "health", *arguments], capture_output=True, text=True, timeout=20)
+        return result.returncode, result.stdout + result.stderr
+
+    with running(tmp_path, {"devices": []}) as gateway:
+        address = f"127.0.0.1:{gateway.port}"
+        assert ask(address) == ask("--ready", address) == (0, f"{address}: HTTP/1.0 200 OK\n")
+    assert ask(address) == (1, f"{address}: no answer\n")
+    assert ask("nowhere")[0] == 2
