@@ -17,10 +17,6 @@ namespace rr {
 /// Errors   data_type_mismatch, data_type_error, out_of_range, null_value, invalid_argument.
 Result<Value> from_js(const JsValue& js, const TypeDefinition& type, const TypeRegistry& types, const FieldPath& path);
 
-/// A type as a definition would write it, with qualified names: "int16[]", "com.x.Pose[*]", "string{list}".
-/// Errors   invalid_argument.
-Result<TypeDefinition> parse_type_text(std::string_view text, const TypeRegistry& types);
-
 /// One use, one value; functions return false after the first failure, which take_error() then holds.
 class FromJs {
  public:
