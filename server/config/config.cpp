@@ -171,6 +171,7 @@ void read_proxy(ObjectReader& in, Config& config) {
 void read_limits(ObjectReader& in, Limits& limits) {
   in.size("max_message_size", limits.max_message_size, {16 * 1024, 100 * 1024 * 1024});
   in.size("header_bytes", limits.header_bytes, {1024, 65536});
+  in.size("body_bytes", limits.body_bytes, {1024, 104857600});
   in.duration("header_timeout_ms", limits.header_timeout, {100, hour_ms});
   in.size("outbox_bytes", limits.outbox_bytes, {16 * 1024, 64 * 1024 * 1024});
   in.size("clients", limits.clients, {1, 1'000'000});

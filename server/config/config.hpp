@@ -41,6 +41,7 @@ struct DeviceConfig {
 struct Limits {
   std::size_t max_message_size = 12u * 1024 * 1024;  ///< bytes of one Robot Raconteur message, both directions
   std::size_t header_bytes = 8192;                   ///< of an HTTP request, with its empty line
+  std::size_t body_bytes = 16u * 1024 * 1024;        ///< of an HTTP request
   milliseconds header_timeout{5000};                 ///< for the first bytes, and for a whole header
   std::size_t outbox_bytes = 256u * 1024;            ///< held for one client and direction before reading pauses
   std::size_t clients = 4000;                        ///< connections at a time, all addresses together

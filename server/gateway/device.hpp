@@ -25,6 +25,7 @@ class Device : public std::enable_shared_from_this<Device> {
   Device(const boost::asio::any_io_executor& executor, DeviceConfig config, const Config& whole);
 
   const DeviceConfig& config() const { return config_; }
+  boost::asio::any_io_executor executor() { return wake_.get_executor(); }
   DeviceState state() const { return state_; }
   /// Empty while the device is online.
   const std::string& last_error() const { return last_error_; }

@@ -43,6 +43,7 @@ Gateway::Gateway(asio::io_context& io, Config config)
       config_(std::move(config)),
       web_tls_(config_.tls.certificates.empty() ? nullptr : std::make_unique<TlsFiles>(config_.tls.certificates)),
       devices_(io.get_executor(), config_),
+      sessions_(io.get_executor()),
       admission_(config_.limits.clients, config_.limits.clients_per_address),
       router_(make_routes(*this)),
       node_id_(random_node_id()),
@@ -223,6 +224,7 @@ void Gateway::stop(std::function<void()> on_stopped) {
   }
   if (found_) found_->stop();
   devices_.stop();
+  sessions_.stop();
   tls_watch_.cancel();
   asio::co_spawn(io_, drain(), asio::detached);
 }

@@ -10,6 +10,7 @@
 #include "server/config/config.hpp"
 #include "server/gateway/admission.hpp"
 #include "server/gateway/device.hpp"
+#include "server/gateway/device_session.hpp"
 #include "server/gateway/found_devices.hpp"
 #include "server/gateway/tls_files.hpp"
 #include "server/http/router.hpp"
@@ -65,6 +66,7 @@ class Gateway {
   // What connections need.
   const Config& config() const { return config_; }
   DeviceRegistry& devices() { return devices_; }
+  DeviceSessions& sessions() { return sessions_; }
   /// Null where the configuration has no "discover", and before start().
   FoundDevices* found() { return config_.discover.is_enabled ? found_.get() : nullptr; }
   Metrics& metrics() { return metrics_; }
@@ -97,6 +99,7 @@ class Gateway {
   Config config_;
   std::unique_ptr<TlsFiles> web_tls_;
   DeviceRegistry devices_;
+  DeviceSessions sessions_;
   std::unique_ptr<FoundDevices> found_;
   Admission admission_;
   Router router_;

@@ -2,6 +2,7 @@
 
 #include "server/gateway/client_relay.hpp"
 #include "server/http/request_reader.hpp"
+#include "server/http/response_writer.hpp"
 #include "server/http/upgrade.hpp"
 #include "server/log/log.hpp"
 #include "server/transport/websocket.hpp"
@@ -18,12 +19,11 @@ rr::awaitable<rr::error_code> write_text(rr::ByteStream& stream, std::string_vie
   co_return co_await stream.write(slices);
 }
 
-rr::awaitable<rr::error_code> write_response(rr::ByteStream& stream, const Request* request, const Response& response) {
-  const bool keeps_alive = request && request->message.keep_alive() && !response.closes;
-  const auto head = format_response_head(response, keeps_alive, request && request->message.version() == 10 ? 0 : 1);
-  const bool has_body = response.body && !(request && request->message.method() == http::verb::head);
-  const rr::ByteSpan parts[] = {rr::as_bytes(head), has_body ? rr::as_bytes(*response.body) : rr::ByteSpan()};
-  const std::span<const rr::ByteSpan> slices(parts, has_body ? 2 : 1);
+/// Refuses what is not a request, or not one that goes on.
+rr::awaitable<rr::error_code> write_refusal(rr::ByteStream& stream, const Response& response) {
+  const auto head = format_response_head(response, false, 1);
+  const rr::ByteSpan parts[] = {rr::as_bytes(head), response.body ? rr::as_bytes(*response.body) : rr::ByteSpan()};
+  const std::span<const rr::ByteSpan> slices(parts, 2);
   co_return co_await stream.write(slices);
 }
 
@@ -60,10 +60,8 @@ rr::awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, st
                                     const Request& request, rr::ByteSpan unread) {
   auto& tcp = *stream;
   connection.client = request.arrival.peer;
-  const auto refuse = [&tcp, &request](const Response& refusal) -> rr::awaitable<void> {
-    auto response = refusal;
-    response.closes = true;
-    co_await write_response(tcp, &request, response);
+  const auto refuse = [&tcp](const Response& refusal) -> rr::awaitable<void> {
+    co_await write_refusal(tcp, refusal);
     co_await tcp.end(rr::no_reason);
   };
   if (auto refusal = refuse_upgrade(request, gateway.config().allowed_origins)) {
@@ -125,7 +123,8 @@ Response to_base_path(const Config& config) {
 rr::awaitable<void> serve_http_client(Gateway& gateway, Connection& connection,
                                       std::unique_ptr<rr::ByteStream> stream) {
   const auto& config = gateway.config();
-  const RequestLimits limits{config.limits.header_bytes, config.limits.header_timeout, config.timeouts.idle};
+  const RequestLimits limits{config.limits.header_bytes, config.limits.header_timeout, config.timeouts.idle,
+                             config.limits.body_bytes};
   RequestReader reader(*stream, limits);
   for (;;) {
     auto read = co_await reader.next();
@@ -135,7 +134,7 @@ rr::awaitable<void> serve_http_client(Gateway& gateway, Connection& connection,
       log(LogLevel::info, "request refused",
           {{"peer", connection.client}, {"status", read.refusal}, {"detail", read.detail}});
       const auto response = problem_response(read.refusal, read.detail);
-      co_await write_response(*stream, nullptr, response);
+      co_await write_refusal(*stream, response);
       co_await stream->end(rr::no_reason);
       break;
     }
@@ -148,13 +147,17 @@ rr::awaitable<void> serve_http_client(Gateway& gateway, Connection& connection,
       co_await serve_websocket(gateway, connection, std::move(stream), request, unread);
       break;
     }
-    auto response = is_base_path(request, config) ? to_base_path(config) : gateway.router().answer(request);
-    if (gateway.is_stopping()) response.closes = true;
+    std::vector<std::pair<std::string, std::string>> headers;
     if (request.arrival.is_encrypted && config.tls.hsts_seconds > 0)
-      response.set("Strict-Transport-Security", "max-age=" + std::to_string(config.tls.hsts_seconds));
-    const bool goes_on = request.message.keep_alive() && !response.closes;
-    if (co_await write_response(*stream, &request, response)) break;
-    if (!goes_on) {
+      headers.emplace_back("Strict-Transport-Security", "max-age=" + std::to_string(config.tls.hsts_seconds));
+    ResponseWriter writer(*stream, request, gateway.is_stopping(), std::move(headers));
+    const auto response = is_base_path(request, config) ? to_base_path(config) : gateway.router().answer(request);
+    if (response.answer_later) {
+      co_await response.answer_later(writer);
+    } else if (co_await writer.send(response)) {
+      break;
+    }
+    if (!writer.goes_on()) {
       co_await stream->end(rr::no_reason);
       break;
     }

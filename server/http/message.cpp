@@ -73,7 +73,9 @@ std::string format_response_head(const Response& response, bool keeps_alive, uns
   out += "\r\n";
   for (const auto& [name, value] : response.headers) out += name + ": " + value + "\r\n";
   const bool may_have_body = response.status >= 200 && response.status != 204 && response.status != 304;
-  if (may_have_body) out += "Content-Length: " + std::to_string(response.body ? response.body->size() : 0) + "\r\n";
+  if (response.is_streamed && http_minor_version > 0) out += "Transfer-Encoding: chunked\r\n";
+  if (may_have_body && !response.is_streamed)
+    out += "Content-Length: " + std::to_string(response.body ? response.body->size() : 0) + "\r\n";
   out += "X-Content-Type-Options: nosniff\r\nReferrer-Policy: no-referrer\r\n";
   if (!keeps_alive) {
     out += "Connection: close\r\n";

@@ -4,11 +4,14 @@
 #include <boost/asio/ip/address.hpp>
 #include <boost/beast/http/message.hpp>
 #include <boost/beast/http/string_body.hpp>
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
+
+#include "server/transport/byte_stream.hpp"
 
 namespace rrgate {
 
@@ -36,12 +39,17 @@ struct Request {
   std::string_view header(std::string_view name) const;
 };
 
+class ResponseWriter;
+
 struct Response {
   unsigned status = 200;
   std::vector<std::pair<std::string, std::string>> headers;
   /// Immutable, so that a cached file is shared by all who fetch it. Null: no body.
   std::shared_ptr<const std::string> body;
-  bool closes = false;  ///< end the connection after this
+  bool closes = false;       ///< end the connection after this
+  bool is_streamed = false;  ///< the body's length is not known yet
+  /// Where the answer has to be waited for: answers in place of this response.
+  std::function<rr::awaitable<void>(ResponseWriter& writer)> answer_later = {};
 
   Response& set(std::string name, std::string value) {
     headers.emplace_back(std::move(name), std::move(value));
@@ -54,7 +62,7 @@ Response json_response(unsigned status, std::string json);
 /// RFC 9457: {"type":"about:blank","title":...,"status":...,"detail":...} as application/problem+json.
 Response problem_response(unsigned status, std::string_view detail);
 
-/// Status line and headers, with Content-Length, Date-less, and the headers every response of ours has.
+/// Status line and headers, with Content-Length or chunks, Date-less, and the headers every response of ours has.
 std::string format_response_head(const Response& response, bool keeps_alive, unsigned http_minor_version);
 
 /// Whether a comma-separated header value has `token`, in any case.

@@ -64,7 +64,7 @@ rr::awaitable<ReadRequest> RequestReader::next() {
           ? refuse(408, "the request took longer than " + std::to_string(limits_.header_timeout.count()) + " ms")
           : ReadRequest{};
     }
-    if (!is_started) {
+    if (!is_started || parser.is_header_done()) {
       is_started = true;
       limit_.arm(limits_.header_timeout);
     }

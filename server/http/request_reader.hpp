@@ -11,7 +11,7 @@ namespace rrgate {
 
 struct RequestLimits {
   std::size_t header_bytes;
-  std::chrono::milliseconds header_timeout;  ///< for a whole request, from its first byte
+  std::chrono::milliseconds header_timeout;  ///< for a whole header from its first byte, and for each part of a body
   std::chrono::milliseconds idle_timeout;    ///< until that first byte
   std::size_t body_bytes = 64 * 1024;
 };

@@ -5,6 +5,7 @@
 #include "server/http/endpoints/discovery.hpp"
 #include "server/http/endpoints/health.hpp"
 #include "server/http/endpoints/metrics.hpp"
+#include "server/http/endpoints/objects.hpp"
 
 namespace rrgate {
 
@@ -14,6 +15,8 @@ Router make_routes(Gateway& gateway) {
   router.add(http::verb::get, "/readyz", ready_endpoint(gateway));
   router.add(http::verb::get, "/metrics", metrics_endpoint(gateway));
   router.add(http::verb::get, "/api/v1/devices", devices_endpoint(gateway));
+  for (const auto method : {http::verb::get, http::verb::put, http::verb::post, http::verb::options})
+    router.add(method, "/api/v1/devices/*", objects_endpoint(gateway));
   router.add(http::verb::get, "/api/v1/discovery", discovery_endpoint(gateway));
   router.add(http::verb::get, "/api/*", no_such_api_endpoint());
   router.add(http::verb::get, "/devices/*", device_endpoint(gateway));

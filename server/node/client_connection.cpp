@@ -44,6 +44,12 @@ void ClientOpening::cancel() {
 ClientConnection::ClientConnection(std::unique_ptr<ByteStream> stream, ClientOptions options, Opened opened)
     : SessionDriver(std::move(stream), std::move(options), read_clocks()), opened_(std::move(opened)) {}
 
+void ClientConnection::open(std::unique_ptr<ByteStream> stream, ClientOptions options, Opened done) {
+  options.connection.known_peer = stream->verified_peer();
+  if (options.connection.self.id.is_any()) options.connection.self.id = random_node_id();
+  std::make_shared<ClientConnection>(std::move(stream), std::move(options), std::move(done))->start();
+}
+
 std::shared_ptr<ClientOpening> ClientConnection::open(asio::io_context& io, std::string_view url,
                                                       ConnectOptions options, Opened done) {
   const auto opening = std::make_shared<ClientOpening>();

@@ -67,6 +67,8 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   /// Returns    what can give it up; it goes on without it as well.
   static std::shared_ptr<ClientOpening> open(boost::asio::io_context& io, std::string_view url, ConnectOptions options,
                                              Opened done);
+  /// Opens the session on a stream to the node, within options.connect_timeout.
+  static void open(std::unique_ptr<ByteStream> stream, ClientOptions options, Opened done);
 
   // Paths name objects: root_path(), or those of child_path() after find_object(). See ClientSession for what requests
   // complete with.

@@ -119,7 +119,7 @@ TEST_CASE("every option arrives") {
     "base_path": "/lab", "trusted_proxies": ["10.0.0.0/8", "::1"], "proxy_headers": "forwarded",
     "proxy_protocol": "required",
     "web_root": "web", "allowed_origins": ["https://a.example", "http://*.b.example:81"],
-    "limits": {"max_message_size": 20000, "header_bytes": 2000, "header_timeout_ms": 300, "outbox_bytes": 40000,
+    "limits": {"max_message_size": 20000, "header_bytes": 2000, "body_bytes": 3000, "header_timeout_ms": 300, "outbox_bytes": 40000,
                "clients": 5, "clients_per_address": 6},
     "timeouts": {"connect_ms": 101, "drain_ms": 102, "send_stall_ms": 103, "idle_ms": 104},
     "retry": {"min_ms": 51, "max_ms": 52, "online_ms": 53},
@@ -137,7 +137,7 @@ TEST_CASE("every option arrives") {
         ProxyConfig{{{*parse_address_range("10.0.0.0/8"), *parse_address_range("::1")}, ForwardedBy::forwarded}, true});
   CHECK(config.web_root == "web");
   CHECK(config.allowed_origins.size() == 2);
-  CHECK(config.limits == Limits{20000, 2000, milliseconds(300), 40000, 5, 6});
+  CHECK(config.limits == Limits{20000, 2000, 3000, milliseconds(300), 40000, 5, 6});
   CHECK(config.timeouts == Timeouts{milliseconds(101), milliseconds(102), milliseconds(103), milliseconds(104)});
   CHECK(config.retry == Retry{milliseconds(51), milliseconds(52), milliseconds(53)});
   CHECK(config.log == LogConfig{"debug", "json"});

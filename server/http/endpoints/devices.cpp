@@ -50,6 +50,11 @@ Handler devices_endpoint(Gateway& gateway) {
   };
 }
 
+Response describe_device(const Device& device, const Request& request) {
+  return json_response(
+      200, describe(device, request.arrival).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+}
+
 Handler no_such_api_endpoint() {
   return [](const Request& request, std::string_view) {
     return problem_response(404, "nothing is at " + rr::quoted(request.path()));

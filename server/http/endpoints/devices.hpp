@@ -5,6 +5,7 @@
 
 namespace rrgate {
 
+class Device;
 class Gateway;
 
 /// {"devices":[{"name","url","websocket_url","found","node_id","node_name","state","last_error","services":[{"name","type"}],"clients"}]};
@@ -12,6 +13,8 @@ class Gateway;
 /// came; found: by discovery, not configured; node_id and node_name are null until the device has answered once,
 /// last_error is null while it is online.
 Handler devices_endpoint(Gateway& gateway);
+/// One of them.
+Response describe_device(const Device& device, const Request& request);
 /// Everything else below /api/: 404.
 Handler no_such_api_endpoint();
 /// /devices/NAME without an upgrade: says that a WebSocket is expected, or 404.

@@ -352,6 +352,15 @@ rr::NodeOptions parse_options(int argc, char** argv) {
   return options;
 }
 
+/// "0", any, unless an option names one.
+std::string read_port(int argc, char** argv) {
+  constexpr std::string_view port = "--robotraconteur-tcp-port=";
+  for (int i = 1; i < argc; ++i)
+    if (const std::string_view argument = argv[i]; argument.starts_with(port))
+      return std::string(argument.substr(port.size()));
+  return "0";
+}
+
 /// Stops the node when standard input ends.
 void watch_input(rr::Node& node, boost::asio::posix::stream_descriptor& input, std::array<char, 64>& buffer) {
   input.async_read_some(boost::asio::buffer(buffer), [&](const boost::system::error_code& error, std::size_t) {
@@ -373,7 +382,8 @@ int main(int argc, char** argv) {
     const Guarded open(node, "open", make_security(false));
     const Guarded proven(node, "proven", make_security(true, true));
     const bool is_alone = std::find(argv + 1, argv + argc, everywhere) == argv + argc;
-    const std::string port = std::to_string(node.listen(is_alone ? "rr+tcp://127.0.0.1:0" : "rr+tcp://0.0.0.0:0"));
+    const auto url = (is_alone ? "rr+tcp://127.0.0.1:" : "rr+tcp://0.0.0.0:") + read_port(argc, argv);
+    const std::string port = std::to_string(node.listen(url));
     if (std::find(argv + 1, argv + argc, enable_local) != argv + argc) node.listen("rr+local:///");
     std::cout << R"({"port": )" << port << R"(, "url": "rr+tcp://127.0.0.1:)" << port << R"(/?service=interop"})"
               << std::endl;

@@ -1,0 +1,31 @@
+// What a device offers over HTTP, told from its service definitions. Layer: server/http.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/types/type_registry.hpp"
+#include "server/http/message.hpp"
+#include "server/json/json.hpp"
+
+namespace rrgate {
+
+/// A service as its session knows it.
+struct DescribedService {
+  std::string name;
+  std::string root_type;  ///< qualified
+  const rr::TypeRegistry* types;
+};
+
+/// Names of the documents: "openapi.json", "asyncapi.json", "thing-description.json", "types.d.ts".
+bool is_device_document(std::string_view name);
+
+/// One of them. `base` is the path of the device, "/api/v1/devices/NAME".
+/// `unavailable` are services that could not be asked.
+Response device_document(std::string_view document, std::string_view device, const std::string& base,
+                         const std::vector<DescribedService>& services, const std::vector<std::string>& unavailable);
+
+/// With an ETag of its content; 304 where the request has it already.
+Response with_etag(Response response, const Request& request);
+
+}  // namespace rrgate

@@ -1,0 +1,299 @@
+#include "server/http/endpoints/members.hpp"
+
+#include <charconv>
+
+#include "core/types/multidim.hpp"
+
+namespace rrgate {
+
+namespace {
+
+constexpr std::uint64_t max_memory_bytes = 16u * 1024 * 1024;
+
+/// An exception is how an error gets out of a coroutine here: one place answers them all.
+template <class T>
+T value_or_throw(rr::Result<T> result) {
+  if (!result) throw rr::Exception(result.error());
+  return std::move(*result);
+}
+
+[[noreturn]] void refuse(rr::ErrorCode code, std::string why) {
+  throw rr::Exception(rr::make_error(code, std::move(why)));
+}
+
+rr::OrderedJson to_json(const ObjectRequest& request, const Target& target, const rr::Value& value,
+                        const rr::TypeDefinition& type) {
+  auto json = rr::value_to_json(value, type, target.types(), request.form(), target.member->name);
+  if (!json) throw rr::Exception(json.error());
+  return std::move(*json);
+}
+
+rr::Value body_value(const ObjectRequest& request, const Target& target) {
+  const auto body = request.body();
+  if (!body) throw rr::Exception(body.error());
+  return value_or_throw(
+      rr::value_from_json(*body, target.member->type, target.types(), request.form(), target.member->name));
+}
+
+rr::awaitable<Response> answer_property(const ObjectRequest& request, const Target& target) {
+  const auto& member = *target.member;
+  const auto direction = member.direction();
+  const bool can_read = direction != rr::MemberDirection::writeonly;
+  const bool can_write = direction != rr::MemberDirection::readonly;
+  if (request.is_read() && can_read) {
+    const auto value = co_await target.object.get(member.name);
+    co_return request.value_response(to_json(request, target, value, member.type));
+  }
+  if (request.method() == http::verb::put && can_write) {
+    auto value = body_value(request, target);
+    co_await target.object.set(member.name, std::move(value));
+    co_return request.written_response();
+  }
+  co_return request.method_response(!can_write ? "GET, HEAD" : !can_read ? "PUT" : "GET, HEAD, PUT");
+}
+
+rr::awaitable<Response> answer_function(const ObjectRequest& request, const Target& target) {
+  const auto& member = *target.member;
+  if (request.method() != http::verb::post) co_return request.method_response("POST");
+  auto arguments = value_or_throw(read_arguments(request, member, target.types()));
+  const auto value = co_await target.object.call_values(member.name, std::move(arguments));
+  auto result = rr::OrderedJson::object();
+  rr::add_key(result, "result") = to_json(request, target, value, member.type);
+  co_return request.value_response(result);
+}
+
+/// A wire as a value: the newest in, the newest out.
+rr::awaitable<Response> answer_wire(const ObjectRequest& request, const Target& target) {
+  const auto& member = *target.member;
+  const auto direction = member.direction();
+  const bool has_in = direction != rr::MemberDirection::writeonly;
+  const bool has_out = direction != rr::MemberDirection::readonly;
+  if (request.is_read() && has_in) {
+    const auto value = co_await target.object.peek_in(member.name);
+    co_return request.value_response(to_json(request, target, value, member.type));
+  }
+  if (request.method() == http::verb::put && has_out) {
+    auto value = body_value(request, target);
+    co_await target.object.poke_out(member.name, std::move(value));
+    co_return request.written_response();
+  }
+  co_return request.method_response(!has_out ? "GET, HEAD" : !has_in ? "PUT" : "GET, HEAD, PUT");
+}
+
+// --- memories ---
+
+using Shape = std::vector<std::uint64_t>;
+
+/// "1,2,3"; nothing where the option is not there.
+std::optional<Shape> read_shape(const ObjectRequest& request, std::string_view name, std::size_t dimensions) {
+  const auto text = request.option(name);
+  if (!text) return std::nullopt;
+  Shape out;
+  const char* at = text->data();
+  const char* end = at + text->size();
+  for (;;) {
+    std::uint64_t number = 0;
+    const auto read = std::from_chars(at, end, number);
+    if (read.ec != std::errc() || (read.ptr != end && *read.ptr != ',')) break;
+    out.push_back(number);
+    if (read.ptr == end) {
+      if (out.size() != dimensions) break;
+      return out;
+    }
+    at = read.ptr + 1;
+  }
+  refuse(rr::ErrorCode::invalid_argument, std::string(name) + " is " + rr::quoted(*text) + ", expected " +
+                                              std::to_string(dimensions) + " whole numbers, separated by commas");
+}
+
+rr::ByteSpan payload_of(const rr::Value& items) {
+  if (const auto* array = items.get_if<rr::Array>()) return array->bytes();
+  if (const auto* array = items.get_if<rr::MultiDimArray>()) return array->array.bytes();
+  if (const auto* named = items.get_if<rr::NamedArray>()) return named->array.bytes();
+  refuse(rr::ErrorCode::invalid_argument, "items of this memory have no plain bytes; ask for application/json");
+}
+
+/// Bytes [first, last] of a whole of `size`, as the Range header asks for; nullopt: none asked for, or another unit.
+struct ByteRange {
+  std::uint64_t first = 0;
+  std::uint64_t last = 0;
+};
+std::optional<ByteRange> read_range(std::string_view header, std::uint64_t size, bool& is_unsatisfiable) {
+  constexpr std::string_view unit = "bytes=";
+  if (header.substr(0, unit.size()) != unit || header.find(',') != std::string_view::npos || size == 0)
+    return std::nullopt;
+  header.remove_prefix(unit.size());
+  const auto dash = header.find('-');
+  if (dash == std::string_view::npos) return std::nullopt;
+  const auto number = [](std::string_view text) {
+    std::uint64_t out = 0;
+    const auto read = std::from_chars(text.data(), text.data() + text.size(), out);
+    return read.ec == std::errc() && read.ptr == text.data() + text.size() ? std::optional(out) : std::nullopt;
+  };
+  const auto first = number(header.substr(0, dash));
+  const auto last = number(header.substr(dash + 1));
+  ByteRange out;
+  if (first && (last || dash + 1 == header.size())) {
+    out = {*first, std::min(last.value_or(size - 1), size - 1)};
+  } else if (dash == 0 && last) {
+    out = {size - std::min(*last, size), size - 1};
+  } else {
+    return std::nullopt;
+  }
+  is_unsatisfiable = out.first > out.last;
+  return out;
+}
+
+/// Bytes of a one-dimensional memory of numbers, as far as they are asked for.
+rr::awaitable<Response> answer_memory_bytes(const ObjectRequest& request, const Target& target, std::uint64_t length,
+                                            std::size_t item_bytes) {
+  const auto size = length * item_bytes;
+  bool is_unsatisfiable = false;
+  const auto range = read_range(request.request().header(http::field::range), size, is_unsatisfiable);
+  if (is_unsatisfiable) {
+    auto response = problem_response(416, "the memory has " + std::to_string(size) + " bytes");
+    response.set("Content-Range", "bytes */" + std::to_string(size));
+    co_return response;
+  }
+  const ByteRange wanted = range.value_or(ByteRange{0, size == 0 ? 0 : size - 1});
+  const auto first_item = wanted.first / item_bytes;
+  const auto count = size == 0 ? 0 : wanted.last / item_bytes + 1 - first_item;
+  if (count * item_bytes > max_memory_bytes)
+    refuse(rr::ErrorCode::buffer_limit_violation, "that are " + std::to_string(count * item_bytes) +
+                                                      " bytes; ask for at most " + std::to_string(max_memory_bytes) +
+                                                      " with Range");
+  rr::Value items;
+  if (count > 0) {
+    rr::MemoryShape position{first_item};
+    rr::MemoryShape counts{count};
+    items = co_await target.object.read_memory(target.member->name, std::move(position), std::move(counts));
+  }
+  const auto bytes = count > 0 ? payload_of(items) : rr::ByteSpan();
+  const auto skipped = wanted.first - first_item * item_bytes;
+  const auto length_wanted = size == 0 ? 0 : wanted.last + 1 - wanted.first;
+  const auto part = rr::as_text(bytes).substr(skipped, length_wanted);
+  auto response = text_response(range ? 206 : 200, "application/octet-stream", std::string(part));
+  if (range)
+    response.set("Content-Range", "bytes " + std::to_string(wanted.first) + "-" + std::to_string(wanted.last) + "/" +
+                                      std::to_string(size));
+  response.set("Accept-Ranges", "bytes").set("Cache-Control", "no-store");
+  co_return response;
+}
+
+std::size_t item_bytes_of(const Target& target) {
+  if (const auto size = rr::item_size(target.member->type.type)) return size;
+  const auto* entity = target.types().find_entity(target.member->type.qualified_name);
+  return entity ? entity->namedarray_count * rr::item_size(entity->namedarray_type) : 0;
+}
+
+rr::awaitable<Response> answer_memory(const ObjectRequest& request, const Target& target) {
+  const auto& member = *target.member;
+  const auto direction = member.direction();
+  const bool can_read = direction != rr::MemberDirection::writeonly;
+  const bool can_write = direction != rr::MemberDirection::readonly && !target.is_shape;
+  const auto allowed = !can_write ? "GET, HEAD" : !can_read ? "PUT" : "GET, HEAD, PUT";
+  if (request.is_read() ? !can_read && !target.is_shape : request.method() != http::verb::put || !can_write)
+    co_return request.method_response(allowed);
+
+  const auto shape_value = co_await target.object.memory_dimensions(member.name);
+  const auto shape_items = value_or_throw(shape_value.to_items<std::uint64_t>());
+  const Shape shape(shape_items.begin(), shape_items.end());
+  if (target.is_shape) co_return request.value_response(rr::OrderedJson(shape));
+
+  const auto position = read_shape(request, "offset", shape.size());
+  if (request.method() == http::verb::put) {
+    rr::Value items;
+    if (request.has_bytes_body()) {
+      const auto& body = request.request().message.body();
+      if (rr::is_multidim(member.type) || rr::item_size(member.type.type) == 0 ||
+          body.size() % rr::item_size(member.type.type) != 0)
+        refuse(rr::ErrorCode::invalid_argument,
+               "plain bytes are for whole items of one-dimensional memories of numbers");
+      items = rr::Array::copy(member.type.type, rr::as_bytes(body));
+    } else {
+      items = body_value(request, target);
+    }
+    rr::MemoryShape at = position.value_or(Shape(shape.size(), 0));
+    co_await target.object.write_memory(member.name, std::move(at), std::move(items));
+    co_return request.written_response();
+  }
+
+  const bool is_flat = shape.size() == 1 && !rr::is_multidim(member.type);
+  if (request.wanted() == BodyForm::bytes && is_flat && item_bytes_of(target) > 0)
+    co_return co_await answer_memory_bytes(request, target, shape[0], item_bytes_of(target));
+  rr::MemoryShape at = position.value_or(Shape(shape.size(), 0));
+  rr::MemoryShape count;
+  if (const auto given = read_shape(request, "count", shape.size())) {
+    count = *given;
+  } else {
+    for (std::size_t i = 0; i < shape.size(); ++i) count.push_back(shape[i] - std::min(at[i], shape[i]));
+  }
+  const auto items_wanted = rr::product_of(std::span<const std::uint64_t>(count));
+  if (!items_wanted || *items_wanted > max_memory_bytes / std::max<std::size_t>(1, item_bytes_of(target)))
+    refuse(rr::ErrorCode::buffer_limit_violation,
+           "that are more than " + std::to_string(max_memory_bytes) + " bytes; ask for parts with offset and count");
+  const auto items = co_await target.object.read_memory(member.name, std::move(at), std::move(count));
+  if (request.wanted() == BodyForm::bytes) {
+    const auto bytes = rr::as_text(payload_of(items));
+    co_return text_response(200, "application/octet-stream", std::string(bytes));
+  }
+  co_return request.value_response(to_json(request, target, items, member.type));
+}
+
+}  // namespace
+
+rr::Result<std::vector<rr::Value>> read_arguments(const ObjectRequest& request, const rr::MemberDefinition& member,
+                                                  const rr::TypeRegistry& types) {
+  std::vector<rr::Value> out;
+  if (member.parameters.empty() && request.request().message.body().empty()) return out;
+  const auto body = request.body();
+  if (!body) return body.error();
+  const auto refused = [&](std::string why) {
+    return rr::make_error(rr::ErrorCode::invalid_argument, member.name + " " + std::move(why));
+  };
+  if (!body->is_object()) return refused("takes its parameters as an object {\"name\": value}");
+  for (const auto& parameter : member.parameters) {
+    if (parameter.type.container == rr::ContainerKind::generator) continue;
+    const auto found = body->find(parameter.name);
+    if (found == body->end())
+      return refused("misses the parameter " + rr::quoted(parameter.name) + " (" + format_type(parameter.type) + ")");
+    auto value = rr::value_from_json(*found, parameter.type, types, request.form(), parameter.name);
+    if (!value) return value.error();
+    out.push_back(std::move(*value));
+  }
+  for (const auto& [key, unused] : body->items()) {
+    const auto is_known = std::any_of(member.parameters.begin(), member.parameters.end(),
+                                      [&key = key](const auto& parameter) { return parameter.name == key; });
+    if (!is_known) return refused("has no parameter " + rr::quoted(key));
+  }
+  return out;
+}
+
+rr::awaitable<void> answer_member(const ObjectRequest& request, const Target& target) {
+  Response response;
+  switch (target.member->kind) {
+    case rr::MemberKind::property:
+      response = co_await answer_property(request, target);
+      break;
+    case rr::MemberKind::function:
+      response = co_await answer_function(request, target);
+      break;
+    case rr::MemberKind::wire:
+      response = co_await answer_wire(request, target);
+      break;
+    case rr::MemberKind::memory:
+      response = co_await answer_memory(request, target);
+      break;
+    case rr::MemberKind::event:
+    case rr::MemberKind::pipe:
+      response = problem_response(406, "an " + std::string(member_kind_name(target.member->kind)) +
+                                           " comes as a stream: ask for it with Accept: text/event-stream");
+      break;
+    default:
+      response = problem_response(501, "a " + std::string(member_kind_name(target.member->kind)) +
+                                           " asks the client, which HTTP can't; use a WebSocket");
+  }
+  co_await request.writer().send(response);
+}
+
+}  // namespace rrgate

@@ -1,0 +1,212 @@
+#include "server/http/endpoints/object_request.hpp"
+
+#include "core/session/service_path.hpp"
+#include "server/json/base64.hpp"
+
+namespace rrgate {
+
+namespace {
+
+bool accepts(std::string_view header, std::string_view type) {
+  return header.find(type) != std::string_view::npos;
+}
+
+std::string_view media_type(std::string_view header) {
+  const auto type = header.substr(0, header.find(';'));
+  return type.substr(0, type.find_last_not_of(' ') + 1);
+}
+
+}  // namespace
+
+unsigned status_of(rr::ErrorCode code) {
+  using enum rr::ErrorCode;
+  switch (code) {
+    case service_not_found:
+    case object_not_found:
+    case node_not_found:
+    case member_not_found:
+    case key_not_found:
+    case resource_not_found:
+    case invalid_endpoint:
+      return 404;
+    case invalid_argument:
+    case data_type_mismatch:
+    case data_type_error:
+    case data_serialization_error:
+    case member_format_mismatch:
+    case message_element_not_found:
+    case null_value:
+    case out_of_range:
+      return 400;
+    case authentication_error:
+      return 401;
+    case permission_denied:
+    case system_resource_permission_denied:
+      return 403;
+    case read_only_member:
+    case write_only_member:
+      return 405;
+    case invalid_operation:
+    case invalid_state:
+    case member_busy:
+    case value_not_set:
+    case operation_aborted:
+    case abort_operation:
+    case operation_cancelled:
+      return 409;
+    case buffer_limit_violation:
+      return 413;
+    case object_locked_error:
+      return 423;
+    case not_implemented_error:
+      return 501;
+    case connection_error:
+    case out_of_system_resource:
+      return 503;
+    case request_timeout:
+    case operation_timeout:
+      return 504;
+    case remote_error:
+    case operation_failed:
+      return 422;
+    default:
+      return 502;
+  }
+}
+
+ObjectRequest::ObjectRequest(ResponseWriter& writer) : writer_(writer) {
+  const auto accept = request().header(http::field::accept);
+  wants_events_ = accepts(accept, "text/event-stream");
+  if (accepts(accept, "application/cbor")) wanted_ = BodyForm::cbor;
+  if (accepts(accept, "application/octet-stream")) wanted_ = BodyForm::bytes;
+  form_.has_bytes = wanted_ == BodyForm::cbor;
+  form_.packs_arrays = option("arrays") == "packed";
+  form_.numbers_enums = option("enums") == "number";
+  form_.ignores_unknown = option("unknown") == "ignore";
+}
+
+std::optional<std::string> ObjectRequest::option(std::string_view name) const {
+  return rr::query_value(request().query(), name);
+}
+
+SessionKey ObjectRequest::key(std::string service) const {
+  SessionKey key{std::move(service)};
+  constexpr std::string_view basic = "Basic ";
+  const auto header = request().header(http::field::authorization);
+  if (!equals_ignoring_case(header.substr(0, basic.size()), basic)) return key;
+  const auto decoded = rr::decode_base64(header.substr(basic.size()));
+  if (!decoded) return key;
+  const std::string text(decoded->begin(), decoded->end());
+  const auto colon = text.find(':');
+  key.username = text.substr(0, colon);
+  if (colon != std::string::npos) key.password = text.substr(colon + 1);
+  return key;
+}
+
+bool ObjectRequest::has_bytes_body() const {
+  return equals_ignoring_case(media_type(request().header(http::field::content_type)), "application/octet-stream");
+}
+
+rr::Result<rr::Json> ObjectRequest::body() const {
+  const auto type = media_type(request().header(http::field::content_type));
+  const auto& text = request().message.body();
+  if (equals_ignoring_case(type, "application/cbor")) return rr::read_cbor(rr::as_bytes(text));
+  // A page of another origin can send text/plain without being asked; JSON it can't.
+  if (!equals_ignoring_case(type, "application/json"))
+    return rr::make_error(rr::ErrorCode::invalid_argument,
+                          "Content-Type is " + rr::quoted(type) + ", expected application/json or application/cbor");
+  return rr::read_json(text);
+}
+
+Response ObjectRequest::value_response(const rr::OrderedJson& json) const {
+  Response response;
+  if (wanted_ == BodyForm::cbor) {
+    const auto bytes = rr::write_cbor(json);
+    response = text_response(200, "application/cbor", std::string(bytes.begin(), bytes.end()));
+  } else {
+    response = json_response(200, rr::write_json(json) + "\n");
+  }
+  response.set("Cache-Control", "no-store");
+  return response;
+}
+
+Response ObjectRequest::written_response() const {
+  Response response;
+  response.status = 204;
+  return response;
+}
+
+Response ObjectRequest::error_response(const rr::Error& error, const rr::TypeRegistry* types) const {
+  static const rr::TypeRegistry no_types;
+  const auto status = status_of(error.code);
+  auto problem = rr::OrderedJson::object();
+  const auto told = rr::error_to_json(error, types ? *types : no_types);
+  rr::add_key(problem, "type") = "about:blank";
+  rr::add_key(problem, "title") = std::string(error_code_name(error.code));
+  rr::add_key(problem, "status") = status;
+  rr::add_key(problem, "detail") = told["error"]["message"];
+  rr::add_key(problem, "error") = told["error"];
+  auto response = text_response(status, "application/problem+json", rr::write_json(problem) + "\n");
+  response.set("Cache-Control", "no-store");
+  if (status == 401) response.set("WWW-Authenticate", "Basic realm=\"device\"");
+  if (status == 503) response.set("Retry-After", "2");
+  return response;
+}
+
+Response ObjectRequest::method_response(std::string_view allowed) const {
+  auto response = problem_response(405, "method not supported here; supported: " + std::string(allowed));
+  response.set("Allow", std::string(allowed));
+  return response;
+}
+
+rr::awaitable<rr::Result<std::shared_ptr<Target>>> find_target(std::shared_ptr<DeviceSession> session,
+                                                               std::vector<std::string> segments) {
+  auto root = co_await session->root();
+  if (!root) co_return root.error();
+  auto target = std::make_shared<Target>();
+  target->session = std::move(session);
+  target->object = *root;
+  const auto type_of = [](const rr::AsyncObject& object) {
+    return object.connection()->session().object_type(object.path());
+  };
+  target->type = type_of(*root);
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    const auto& name = segments[i];
+    const auto* member = target->type->find_member(name);
+    if (!member)
+      co_return rr::make_error(rr::ErrorCode::member_not_found, "object " + rr::quoted(target->object.path()) + " (" +
+                                                                    target->type->qualified_name + ") has no member " +
+                                                                    rr::quoted(name));
+    if (member->kind != rr::MemberKind::objref) {
+      target->member = member;
+      target->is_shape =
+          member->kind == rr::MemberKind::memory && i + 2 == segments.size() && segments[i + 1] == "shape";
+      if (i + 1 == segments.size() || target->is_shape) break;
+      co_return rr::make_error(rr::ErrorCode::object_not_found,
+                               rr::quoted(name) + " is no object; nothing is below it");
+    }
+    std::optional<std::string> index;
+    if (member->type.array != rr::ArrayKind::none || member->type.container != rr::ContainerKind::none) {
+      if (++i == segments.size())
+        co_return rr::make_error(rr::ErrorCode::object_not_found,
+                                 "objref " + rr::quoted(name) + " needs an index: .../" + name + "/INDEX");
+      index = segments[i];
+    }
+    try {
+      const auto child_path = rr::child_path(target->object.path(), name, index);
+      const auto& connection = target->object.connection();
+      if (connection->session().object_type(child_path)) {
+        target->object = rr::AsyncObject(connection, child_path);
+      } else {
+        target->object = co_await target->object.object(name, index);
+      }
+    } catch (const rr::Exception& exception) {
+      co_return exception.error();
+    }
+    target->type = type_of(target->object);
+    if (!target->type) co_return rr::make_error(rr::ErrorCode::object_not_found, "the object has gone");
+  }
+  co_return target;
+}
+
+}  // namespace rrgate

@@ -1,0 +1,74 @@
+// One request to an object of a device: which object, which member, in which form. Layer: server/http.
+// Source: service definitions spec section 5.12, "JSON Schema / OpenAPI".
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/gateway/gateway.hpp"
+#include "server/http/response_writer.hpp"
+#include "server/json/value_from_json.hpp"
+
+namespace rrgate {
+
+enum class BodyForm : std::uint8_t { json, cbor, bytes };
+
+/// Where a path leads. `member` null: to the object itself.
+struct Target {
+  std::shared_ptr<DeviceSession> session;
+  rr::AsyncObject object;
+  const rr::EntityDefinition* type = nullptr;
+  const rr::MemberDefinition* member = nullptr;
+  bool is_shape = false;  ///< ".../MEMORY/shape"
+
+  const rr::TypeRegistry& types() const { return object.connection()->session().types(); }
+};
+
+/// Borrows the request.
+class ObjectRequest {
+ public:
+  explicit ObjectRequest(ResponseWriter& writer);
+
+  ResponseWriter& writer() const { return writer_; }
+  const Request& request() const { return writer_.request(); }
+  http::verb method() const { return request().message.method(); }
+  bool is_read() const { return method() == http::verb::get || method() == http::verb::head; }
+
+  /// Which form the answer has, by Accept: JSON unless CBOR or bytes are named first.
+  BodyForm wanted() const { return wanted_; }
+  bool wants_events() const { return wants_events_; }
+  const rr::JsonForm& form() const { return form_; }
+  std::optional<std::string> option(std::string_view name) const;
+  /// User and password of HTTP Basic authentication; for the device.
+  SessionKey key(std::string service) const;
+
+  /// The body by Content-Type. Errors   data_serialization_error; invalid_argument: another type.
+  rr::Result<rr::Json> body() const;
+  bool has_bytes_body() const;
+
+  Response value_response(const rr::OrderedJson& json) const;
+  Response written_response() const;  ///< 204
+  Response error_response(const rr::Error& error, const rr::TypeRegistry* types) const;
+  /// 405 with what is possible.
+  Response method_response(std::string_view allowed) const;
+
+ private:
+  ResponseWriter& writer_;
+  BodyForm wanted_ = BodyForm::json;
+  bool wants_events_ = false;
+  rr::JsonForm form_;
+};
+
+/// The HTTP status that says best what a Robot Raconteur error says.
+unsigned status_of(rr::ErrorCode code);
+
+/// Walks from the root object along `segments`, percent-decoded: objrefs by name, an index behind those that have one,
+/// at last a member or nothing.
+/// Errors   object_not_found, member_not_found, those of the device.
+rr::awaitable<rr::Result<std::shared_ptr<Target>>> find_target(std::shared_ptr<DeviceSession> session,
+                                                               std::vector<std::string> segments);
+
+}  // namespace rrgate

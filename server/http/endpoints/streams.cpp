@@ -1,0 +1,185 @@
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <charconv>
+#include <deque>
+
+#include "server/http/endpoints/members.hpp"
+
+namespace rrgate {
+
+namespace asio = boost::asio;
+
+namespace {
+
+/// A stream without news for so long gets a comment: proxies and clients see that it lives.
+constexpr std::chrono::seconds comment_period{15};
+/// What may wait for a slow reader before it is told and closed.
+constexpr std::size_t max_waiting_bytes = 4u * 1024 * 1024;
+
+/// What goes out next, filled by handlers, emptied by the one coroutine that writes.
+struct Outbox {
+  explicit Outbox(const asio::any_io_executor& executor) : news(executor) {}
+
+  void add(std::string text, bool replaces) {
+    if (is_over) return;
+    if (replaces && !waiting.empty() && is_replaceable) {
+      bytes -= waiting.back().size();
+      waiting.back() = std::move(text);
+      bytes += waiting.back().size();
+    } else {
+      bytes += text.size();
+      waiting.push_back(std::move(text));
+    }
+    is_replaceable = replaces;
+    if (bytes > max_waiting_bytes) {
+      waiting.clear();
+      bytes = 0;
+      waiting.push_back("event: error\ndata: {\"detail\":\"too slow: values were lost, so the stream ends\"}\n\n");
+      is_over = true;
+    }
+    news.cancel();
+  }
+
+  std::deque<std::string> waiting;
+  std::size_t bytes = 0;
+  bool is_replaceable = false;  ///< the last one is a wire's value: a newer one takes its place
+  bool is_over = false;
+  bool is_gone = false;
+  asio::steady_timer news;
+};
+
+/// What a sample says: a value, or an event's arguments by name.
+rr::Result<rr::OrderedJson> sample_to_json(const Sample& sample, const rr::MemberDefinition& member,
+                                           const rr::TypeRegistry& types, const rr::JsonForm& form) {
+  if (member.kind != rr::MemberKind::event)
+    return rr::value_to_json(sample.values.at(0), member.type, types, form, member.name);
+  auto out = rr::OrderedJson::object();
+  for (std::size_t i = 0; i < member.parameters.size() && i < sample.values.size(); ++i) {
+    const auto& parameter = member.parameters[i];
+    auto json = rr::value_to_json(sample.values[i], parameter.type, types, form, parameter.name);
+    if (!json) return json.error();
+    rr::add_key(out, parameter.name) = std::move(*json);
+  }
+  return {boost::system::in_place_value, std::move(out)};
+}
+
+std::string state_text(const rr::Error* error) {
+  auto out = rr::OrderedJson::object();
+  rr::add_key(out, "state") = error ? "connection_lost" : "connected";
+  if (error) rr::add_key(out, "detail") = rr::error_to_json(*error, {})["error"]["message"];
+  return "event: state\ndata: " + rr::write_json(out) + "\n\n";
+}
+
+std::string event_text(const rr::OrderedJson& json, std::uint64_t number, bool has_number) {
+  return (has_number ? "id: " + std::to_string(number) + "\n" : "") + "data: " + rr::write_json(json) + "\n\n";
+}
+
+Response stream_head(std::string_view content_type) {
+  Response head;
+  head.set("Content-Type", std::string(content_type)).set("Cache-Control", "no-store");
+  head.set("X-Accel-Buffering", "no");  // nginx passes it on as it comes
+  return head;
+}
+
+}  // namespace
+
+rr::awaitable<void> stream_topic(const ObjectRequest& request, const Target& target) {
+  auto& writer = request.writer();
+  const auto& member = *target.member;
+  const auto outbox = std::make_shared<Outbox>(writer.executor());
+  const bool is_wire = member.kind == rr::MemberKind::wire;
+  const bool is_event = member.kind == rr::MemberKind::event;
+  // Definitions outlive the connection that brought them only with it: keep it.
+  const auto connection = target.object.connection();
+  SampleHandler handler = [outbox, connection, &member, is_wire, is_event, form = request.form()](
+                              const SamplePtr& sample, const rr::Error* error) {
+    if (!sample) return outbox->add(state_text(error), false);
+    const auto json = sample_to_json(*sample, member, connection->session().types(), form);
+    if (json)
+      outbox->add(event_text(*json, sample->number, is_event), is_wire);
+    else
+      outbox->add("event: error\ndata: " + rr::write_json(rr::error_to_json(json.error(), {})) + "\n\n", false);
+  };
+  std::uint64_t after = 0;
+  const auto last_id = request.request().header("Last-Event-ID");
+  std::from_chars(last_id.data(), last_id.data() + last_id.size(), after);
+  TopicKey key(member.kind, target.object.path(), member.name);
+  auto listening = co_await target.session->listen(std::move(key), after, std::move(handler));
+  if (!listening) throw rr::Exception(listening.error());
+  const auto listener = std::move(*listening);
+
+  const auto head = stream_head("text/event-stream");
+  if (co_await writer.begin(head)) co_return;
+  writer.watch([outbox] {
+    outbox->is_gone = true;
+    outbox->news.cancel();
+  });
+  // The first byte tells clients and proxies that the stream is there.
+  auto failed = co_await writer.write(": connected\n\n");
+  while (!failed && !outbox->is_gone) {
+    if (outbox->waiting.empty()) {
+      if (outbox->is_over) break;
+      outbox->news.expires_after(comment_period);
+      const auto [cancelled] = co_await outbox->news.async_wait(asio::as_tuple(asio::use_awaitable));
+      if (!cancelled && outbox->waiting.empty()) failed = co_await writer.write(": \n\n");
+      continue;
+    }
+    std::string text;
+    for (const auto& each : outbox->waiting) text += each;
+    outbox->waiting.clear();
+    outbox->bytes = 0;
+    failed = co_await writer.write(text);
+  }
+  if (!failed && !outbox->is_gone) co_await writer.end();
+  co_await writer.unwatch();
+}
+
+rr::awaitable<void> stream_generator(const ObjectRequest& request, const Target& target) {
+  auto& writer = request.writer();
+  const auto& member = *target.member;
+  if (request.method() != http::verb::post) {
+    const auto response = request.method_response("POST");
+    co_await writer.send(response);
+    co_return;
+  }
+  if (!member.parameters.empty() && member.parameters.back().type.container == rr::ContainerKind::generator) {
+    const auto response =
+        problem_response(501, "the generator takes values while it runs, which HTTP can't; use a WebSocket");
+    co_await writer.send(response);
+    co_return;
+  }
+  auto arguments = read_arguments(request, member, target.types());
+  if (!arguments) throw rr::Exception(arguments.error());
+  const auto opened = co_await target.object.open_generator(member.name, std::move(*arguments));
+  const auto index = opened.to<std::int32_t>().value();
+
+  const bool as_events = request.wants_events();
+  const auto gone = std::make_shared<bool>(false);
+  const auto head = stream_head(as_events ? "text/event-stream" : "application/x-ndjson");
+  auto failed = co_await writer.begin(head);
+  writer.watch([gone] { *gone = true; });
+  bool has_ended = false;
+  while (!failed && !*gone && !has_ended) {
+    rr::OrderedJson line;
+    try {
+      const auto value = co_await target.object.next_generator(member.name, index);
+      auto json = rr::value_to_json(value, member.type, target.types(), request.form(), member.name);
+      if (!json) throw rr::Exception(json.error());
+      line = std::move(*json);
+    } catch (const rr::Exception& exception) {
+      has_ended = true;
+      if (exception.error().code == rr::ErrorCode::stop_iteration) break;
+      line = rr::error_to_json(exception.error(), target.types());
+    }
+    const auto text = rr::write_json(line);
+    const auto framed = !as_events ? text + "\n" : (has_ended ? "event: error\n" : "") + ("data: " + text + "\n\n");
+    failed = co_await writer.write(framed);
+  }
+  if (!has_ended)
+    target.object.connection()->close_generator(target.object.path(), member.name, index,
+                                                [](const rr::Result<rr::Value>&) {});
+  if (!failed && !*gone) co_await writer.end();
+  co_await writer.unwatch();
+}
+
+}  // namespace rrgate

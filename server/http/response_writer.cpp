@@ -1,0 +1,95 @@
+#include "server/http/response_writer.hpp"
+
+#include <array>
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <cstdio>
+
+namespace rrgate {
+
+namespace asio = boost::asio;
+
+struct ResponseWriter::Watch {
+  explicit Watch(const asio::any_io_executor& executor) : ended(executor, asio::steady_timer::time_point::max()) {}
+
+  std::function<void()> on_gone;
+  rr::Bytes early;  ///< what the client sent meanwhile: its next request
+  bool is_done = false;
+  asio::steady_timer ended;
+};
+
+std::string ResponseWriter::head_of(const Response& response) const {
+  Response whole;
+  whole.status = response.status;
+  whole.headers = response.headers;
+  whole.headers.insert(whole.headers.end(), headers_.begin(), headers_.end());
+  whole.body = response.body;
+  whole.is_streamed = is_streamed_;
+  return format_response_head(whole, goes_on(), minor_version());
+}
+
+rr::awaitable<rr::error_code> ResponseWriter::send(const Response& response) {
+  if (response.closes) closes_ = true;
+  const auto head = head_of(response);
+  const bool sends_body = response.body && has_body();
+  const rr::ByteSpan parts[] = {rr::as_bytes(head), sends_body ? rr::as_bytes(*response.body) : rr::ByteSpan()};
+  const std::span<const rr::ByteSpan> slices(parts, sends_body ? 2 : 1);
+  co_return co_await stream_.write(slices);
+}
+
+rr::awaitable<rr::error_code> ResponseWriter::begin(const Response& head) {
+  is_streamed_ = true;
+  if (minor_version() == 0) closes_ = true;
+  const auto text = head_of(head);
+  const auto slice = rr::as_bytes(text);
+  const std::span<const rr::ByteSpan> slices(&slice, 1);
+  co_return co_await stream_.write(slices);
+}
+
+rr::awaitable<rr::error_code> ResponseWriter::write(std::string_view text) {
+  if (text.empty() || !has_body()) co_return rr::error_code();
+  char size[24];
+  const auto length = std::snprintf(size, sizeof size, "%zx\r\n", text.size());
+  const bool is_chunked = minor_version() == 1;
+  const std::string_view size_line(size, is_chunked ? static_cast<std::size_t>(length) : 0);
+  const std::string_view line_end = is_chunked ? "\r\n" : "";
+  const rr::ByteSpan parts[] = {rr::as_bytes(size_line), rr::as_bytes(text), rr::as_bytes(line_end)};
+  const std::span<const rr::ByteSpan> slices(parts, 3);
+  co_return co_await stream_.write(slices);
+}
+
+rr::awaitable<rr::error_code> ResponseWriter::end() {
+  if (minor_version() == 0 || !has_body()) co_return rr::error_code();
+  const auto slice = rr::as_bytes("0\r\n\r\n");
+  const std::span<const rr::ByteSpan> slices(&slice, 1);
+  co_return co_await stream_.write(slices);
+}
+
+void ResponseWriter::watch(std::function<void()> on_gone) {
+  watch_ = std::make_shared<Watch>(stream_.executor());
+  watch_->on_gone = std::move(on_gone);
+  asio::co_spawn(stream_.executor(), read_while(watch_, stream_), asio::detached);
+}
+
+/// One read: bytes are the next request, which waits; their absence is the client's end.
+rr::awaitable<void> ResponseWriter::read_while(std::shared_ptr<Watch> watch, rr::ByteStream& stream) {
+  std::array<std::uint8_t, 4096> buffer;
+  const auto read = co_await stream.read_some(buffer);
+  watch->early.assign(buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(read.bytes));
+  watch->is_done = true;
+  if (read.bytes == 0 && watch->on_gone) watch->on_gone();
+  watch->ended.cancel();
+}
+
+rr::awaitable<void> ResponseWriter::unwatch() {
+  if (!watch_) co_return;
+  watch_->on_gone = nullptr;
+  if (!watch_->is_done) stream_.cancel();
+  while (!watch_->is_done) co_await watch_->ended.async_wait(asio::as_tuple(asio::use_awaitable));
+  stream_.put_back(watch_->early);
+  watch_.reset();
+}
+
+}  // namespace rrgate

@@ -1,0 +1,57 @@
+// Sends one response, whole or while it comes into being. Layer: server/http.
+#pragma once
+
+#include <boost/asio/steady_timer.hpp>
+#include <functional>
+#include <memory>
+#include <string_view>
+
+#include "server/http/message.hpp"
+#include "server/transport/byte_stream.hpp"
+
+namespace rrgate {
+
+/// For one request; call either send(), or begin(), write() as often as wanted, and end().
+class ResponseWriter {
+ public:
+  /// `headers`  go into every response of this connection.
+  ResponseWriter(rr::ByteStream& stream, const Request& request, bool closes,
+                 std::vector<std::pair<std::string, std::string>> headers)
+      : stream_(stream), request_(request), closes_(closes), headers_(std::move(headers)) {}
+
+  /// Goes into what is sent from now on.
+  void add_header(std::string name, std::string value) { headers_.emplace_back(std::move(name), std::move(value)); }
+
+  rr::awaitable<rr::error_code> send(const Response& response);
+
+  /// Status and headers; the length stays open. HTTP/1.0 clients see the end by the connection's.
+  rr::awaitable<rr::error_code> begin(const Response& head);
+  rr::awaitable<rr::error_code> write(std::string_view text);
+  rr::awaitable<rr::error_code> end();
+
+  /// Calls `on_gone` once when the client ends the connection before unwatch() is done. For streams that may have
+  /// nothing to write for long. Between begin() and end().
+  void watch(std::function<void()> on_gone);
+  rr::awaitable<void> unwatch();
+
+  const Request& request() const { return request_; }
+  boost::asio::any_io_executor executor() { return stream_.executor(); }
+  /// Whether the connection may carry another request.
+  bool goes_on() const { return request_.message.keep_alive() && !closes_; }
+
+ private:
+  struct Watch;
+  static rr::awaitable<void> read_while(std::shared_ptr<Watch> watch, rr::ByteStream& stream);
+  std::string head_of(const Response& response) const;
+  unsigned minor_version() const { return request_.message.version() == 10 ? 0 : 1; }
+  bool has_body() const { return request_.message.method() != http::verb::head; }
+
+  rr::ByteStream& stream_;
+  const Request& request_;
+  bool closes_;
+  std::vector<std::pair<std::string, std::string>> headers_;
+  bool is_streamed_ = false;
+  std::shared_ptr<Watch> watch_;
+};
+
+}  // namespace rrgate

@@ -1,0 +1,332 @@
+"""The objects of a device over plain HTTP, as curl would use them; the device is the reference and ours in turn."""
+import base64
+import http.client
+import json
+import threading
+import time
+
+import pytest
+
+from directions import DIRECTIONS, service_command
+from processes import Background, start_gateway
+
+SERVICES = {"reference": "reference-to-reference", "ours": "reference-to-ours"}
+BASE = "/api/v1/devices/interop/interop"
+
+
+@pytest.fixture(scope="module", params=SERVICES)
+def gateway(request, tmp_path_factory):
+    """The port of a gateway to a device."""
+    folder = tmp_path_factory.mktemp("http-api")
+    direction = next(each for each in DIRECTIONS if each.name == SERVICES[request.param])
+    service = Background(service_command(direction, "v4", "http://localhost"), folder / "service.log")
+    url = json.loads(service.next_line())["url"]
+    process, port = start_gateway(folder, url)
+    yield port
+    assert process.stop() == 0, process.description()
+    service.stop()
+
+
+class Answer:
+    def __init__(self, response):
+        self.status, self.headers, self.body = response.status, response.headers, response.read()
+
+    @property
+    def json(self):
+        return json.loads(self.body)
+
+
+def ask(port, method, path, body=None, headers={}, base=BASE):
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
+    try:
+        if body is not None and not isinstance(body, bytes):
+            body, headers = json.dumps(body), {"Content-Type": "application/json", **headers}
+        connection.request(method, base + path, body, headers)
+        return Answer(connection.getresponse())
+    finally:
+        connection.close()
+
+
+class Stream:
+    """Server-sent events: (id, event, data) as they come."""
+
+    def __init__(self, port, path, headers={}):
+        self.connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
+        self.connection.request("GET", BASE + path, headers={"Accept": "text/event-stream", **headers})
+        self.response = self.connection.getresponse()
+        assert self.response.status == 200, self.response.read()
+        assert self.response.headers["Content-Type"] == "text/event-stream"
+        assert self.response.readline() == b": connected\n"
+
+    def next(self):
+        fields = {}
+        while True:
+            line = self.response.readline().decode().rstrip("\n")
+            if not line and "data" in fields:
+                return fields.get("id"), fields.get("event"), json.loads(fields["data"])
+            name, colon, value = line.partition(": ")
+            if colon and name:
+                fields[name] = value
+
+    def close(self):
+        # The response holds the socket as well: this is what ends the connection.
+        self.response.close()
+        self.connection.close()
+
+
+def test_properties(gateway):
+    assert ask(gateway, "PUT", "/p_double", 2.5).status == 204
+    assert ask(gateway, "GET", "/p_double").json == 2.5
+    assert ask(gateway, "PUT", "/p_int64", "9007199254740993").status == 204
+    assert ask(gateway, "GET", "/p_int64").json == "9007199254740993"
+    pose = {"px": 1, "py": -0.5, "label": "grün"}
+    assert ask(gateway, "PUT", "/p_pose", pose).status == 204
+    assert ask(gateway, "GET", "/p_pose").json == pose
+    assert ask(gateway, "PUT", "/p_color", "green").status == 204
+    assert ask(gateway, "GET", "/p_color").json == "green"
+    assert ask(gateway, "GET", "/p_color?enums=number").json == 2
+    assert ask(gateway, "PUT", "/p_doubles", [1, "NaN"]).status == 204
+    assert ask(gateway, "GET", "/p_doubles?arrays=packed").json["count"] == 2
+    assert ask(gateway, "HEAD", "/p_double").body == b""
+    assert ask(gateway, "GET", "/version").json == "1"
+
+
+def test_what_is_refused(gateway):
+    def refusal(status, detail, *request, **more):
+        answer = ask(gateway, *request, **more)
+        assert (answer.status, answer.headers["Content-Type"]) == (status, "application/problem+json"), answer.body
+        assert detail in answer.json["detail"]
+        return answer
+
+    refusal(404, "no member 'nope'", "GET", "/nope")
+    refusal(404, "no device", "GET", "", base="/api/v1/devices/other/x")
+    refusal(404, "", "GET", "", base="/api/v1/devices/interop/other")
+    refusal(400, "read 'p_double': found a string", "PUT", "/p_double", "1")
+    refusal(400, "twice", "PUT", "/p_pose", b'{"px":1,"px":2}', headers={"Content-Type": "application/json"})
+    refusal(400, "Content-Type", "PUT", "/p_double", b"1", headers={"Content-Type": "text/plain"})
+    assert refusal(405, "GET, HEAD", "PUT", "/version", "2").headers["Allow"] == "GET, HEAD"
+    assert refusal(405, "PUT", "GET", "/secret").headers["Allow"] == "PUT"
+    refusal(405, "POST", "GET", "/add")
+    refusal(400, "misses the parameter 'right' (double)", "POST", "/add", {"left": 1})
+    refusal(400, "no parameter 'up'", "POST", "/add", {"left": 1, "right": 2, "up": 3})
+    refusal(404, "needs an index", "GET", "/parts")
+    refusal(404, "", "GET", "/parts/99/size")
+    refusal(404, "nothing is below it", "GET", "/p_double/x")
+    refusal(406, "text/event-stream", "GET", "/changed")
+    refusal(501, "WebSocket", "POST", "/ask", {})
+    refusal(501, "WebSocket", "POST", "/scale", {"factor": 2})
+    refusal(403, "origin", "GET", "/p_double", headers={"Origin": "http://elsewhere.example"})
+    error = refusal(422, "out of jam", "POST", "/fail", {"kind": "custom", "text": "out of jam"}).json["error"]
+    assert error == {"name": "experimental.interop.InteropError", "message": "out of jam"}
+    refusal(400, "too far", "POST", "/fail", {"kind": "out_of_range", "text": "too far"})
+
+
+def test_functions(gateway):
+    assert ask(gateway, "POST", "/add", {"left": 1, "right": 2.5}).json == {"result": 3.5}
+    assert ask(gateway, "POST", "/nothing").json == {"result": None}
+    assert ask(gateway, "POST", "/nothing", {}).json == {"result": None}
+    assert ask(gateway, "POST", "/join", {"words": ["a", "b"], "separator": "-"}).json == {"result": "a-b"}
+    echoed = ask(gateway, "POST", "/echo", {"value": {"type": "int16[]", "value": [1, 2]}}).json
+    assert echoed == {"result": {"type": "int16[]", "value": [1, 2]}}
+    values = list(range(300_000))
+    assert ask(gateway, "POST", "/sum", {"values": values}).json == {"result": sum(values)}
+    assert ask(gateway, "POST", "/ramp", {"count": 200_000}).json["result"][-1] == 199_999
+
+
+def test_objects(gateway):
+    assert ask(gateway, "GET", "/head/name").json == "head"
+    assert ask(gateway, "GET", "/head/inner/name").json == "head.inner"
+    assert ask(gateway, "GET", "/parts/7/name").json == "number 7"
+    assert ask(gateway, "GET", "/named/right%20hand/name").json == "named right hand"
+    assert ask(gateway, "GET", "/named/a.b/name").json == "named a.b"
+    assert ask(gateway, "GET", "/anything/feature").json == "none"
+    assert ask(gateway, "POST", "/head/identify").json == {"result": "part head"}
+    described = ask(gateway, "GET", "").json
+    assert described["type"] == "experimental.interop.Interop"
+    assert {"name": "version", "kind": "property", "type": "string", "direction": "readonly"} in described["members"]
+
+
+def test_memories(gateway):
+    assert ask(gateway, "GET", "/m_numbers/shape").json == [100]
+    assert ask(gateway, "GET", "/m_numbers?offset=3&count=2").json == [3, 4]
+    assert ask(gateway, "PUT", "/m_numbers?offset=3", [30, 40]).status == 204
+    assert ask(gateway, "GET", "/m_numbers?offset=2&count=4").json == [2, 30, 40, 5]
+    assert ask(gateway, "GET", "/m_grid?offset=0,1,0&count=4,1,1").json == {"dims": [4, 1, 1], "data": [4, 5, 6, 7]}
+    whole = ask(gateway, "GET", "/m_fixed", headers={"Accept": "application/octet-stream"})
+    assert whole.body == bytes(range(10)) and whole.headers["Accept-Ranges"] == "bytes"
+    part = ask(gateway, "GET", "/m_fixed", headers={"Accept": "application/octet-stream", "Range": "bytes=2-4"})
+    assert (part.status, part.body, part.headers["Content-Range"]) == (206, bytes([2, 3, 4]), "bytes 2-4/10")
+    tail = ask(gateway, "GET", "/m_fixed", headers={"Accept": "application/octet-stream", "Range": "bytes=-3"})
+    assert tail.body == bytes([7, 8, 9])
+    beyond = ask(gateway, "GET", "/m_fixed", headers={"Accept": "application/octet-stream", "Range": "bytes=10-"})
+    assert (beyond.status, beyond.headers["Content-Range"]) == (416, "bytes */10")
+    within = ask(gateway, "GET", "/m_large", headers={"Accept": "application/octet-stream", "Range": "bytes=9-16"})
+    assert within.status == 206 and len(within.body) == 8
+    assert ask(gateway, "GET", "/m_large").json[-1] == 49_999
+    assert ask(gateway, "GET", "/m_numbers?offset=1,2").status == 400
+    assert ask(gateway, "GET", "/m_numbers?offset=99&count=2").status == 400
+    assert ask(gateway, "PUT", "/m_fixed", "AA==").status == 405
+
+
+def test_wires_as_values(gateway):
+    assert ask(gateway, "PUT", "/target", 4.5).status == 204
+    assert ask(gateway, "GET", "/seen_target").json == 4.5
+    assert ask(gateway, "POST", "/publish_state", {"value": [1, 2]}).status == 200
+    assert ask(gateway, "GET", "/state").json == [1, 2]
+
+
+def test_wires_as_streams(gateway):
+    """Two readers of one wire; the one who comes later gets the newest value at once."""
+    ask(gateway, "POST", "/publish_state", {"value": [1]})
+    first = Stream(gateway, "/state")
+    for number in range(2, 5):
+        ask(gateway, "POST", "/publish_state", {"value": [number]})
+    while first.next()[2] != [4]:
+        pass
+    second = Stream(gateway, "/state")
+    assert second.next()[2] == [4]
+    ask(gateway, "POST", "/publish_state", {"value": [5]})
+    assert (first.next()[2], second.next()[2]) == ([5], [5])
+    first.close()
+    second.close()
+
+
+def test_events_with_resume(gateway):
+    stream = Stream(gateway, "/changed")
+    ask(gateway, "POST", "/fire", {"count": 3})
+    seen = [stream.next() for _ in range(3)]
+    assert sorted(data["value"] for _, _, data in seen) == [0, 1, 2]
+    assert all(data["why"] == f"number {data['value']:.0f}" for _, _, data in seen)
+    last = seen[0][0]
+    stream.close()
+    ask(gateway, "POST", "/fire", {"count": 1})
+    time.sleep(0.3)  # nobody listens: it is kept
+    again = Stream(gateway, "/changed", {"Last-Event-ID": last})
+    assert [again.next()[0] for _ in range(3)] == [str(int(last) + i) for i in (1, 2, 3)]
+    again.close()
+
+
+def test_pipes(gateway):
+    stream = Stream(gateway, "/greetings")
+    assert [stream.next()[2] for _ in range(2)] == ["hello", "world"]
+    stream.close()
+
+
+def test_generators(gateway):
+    def lines(path, body):
+        answer = ask(gateway, "POST", path, body)
+        assert answer.headers["Content-Type"] == "application/x-ndjson"
+        return [json.loads(line) for line in answer.body.splitlines()]
+
+    assert lines("/count_up", {"first": 5, "count": 3}) == [5, 6, 7]
+    failed = lines("/count_up", {"first": 5, "count": -2})
+    assert failed[:2] == [5, 6] and failed[2]["error"]["name"] == "RobotRaconteur.OutOfRange"
+
+
+def test_a_reader_who_leaves_ends_its_generator(gateway):
+    connection = http.client.HTTPConnection("127.0.0.1", gateway, timeout=20)
+    connection.request("POST", BASE + "/count_up", json.dumps({"first": 0, "count": 2_000_000_000}),
+                       {"Content-Type": "application/json"})
+    response = connection.getresponse()
+    assert response.readline() == b"0.0\n"
+    response.close()
+    connection.close()
+    deadline = time.monotonic() + 10
+    while ask(gateway, "GET", "/generator_end").json != "closed":
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def test_users_of_the_device(gateway):
+    def level(user, password, port=gateway):
+        credentials = base64.b64encode(f"{user}:{password}".encode()).decode()
+        return ask(port, "GET", "/level", headers={"Authorization": "Basic " + credentials},
+                   base="/api/v1/devices/interop/guarded")
+
+    refused = ask(gateway, "GET", "/level", base="/api/v1/devices/interop/guarded")
+    assert refused.status in (401, 403) and refused.json["error"]["name"].startswith("RobotRaconteur."), refused.body
+    assert level("alice", "wrong").status in (401, 403)
+    assert level("alice", "secret").json == 1.5
+
+
+def test_cbor(gateway):
+    ask(gateway, "PUT", "/p_doubles", [1.5])
+    answer = ask(gateway, "GET", "/p_doubles", headers={"Accept": "application/cbor"})
+    assert answer.headers["Content-Type"] == "application/cbor"
+    assert answer.body.hex() == "d85648000000000000f83f"  # RFC 8746: typed array of little-endian doubles
+    assert ask(gateway, "PUT", "/p_doubles", bytes.fromhex("d856480000000000000040"),
+               headers={"Content-Type": "application/cbor"}).status == 204
+    assert ask(gateway, "GET", "/p_doubles").json == [2.0]
+
+
+def test_documents(gateway):
+    base = "/api/v1/devices/interop"
+    answer = ask(gateway, "GET", "/openapi.json", base=base)
+    document = answer.json
+    assert document["openapi"] == "3.1.0"
+    assert "put" in document["paths"][BASE + "/p_pose"] and "put" not in document["paths"][BASE + "/version"]
+    assert BASE + "/parts/{parts}/inner/name" not in document["paths"]  # a Part within a Part: listed once
+    assert BASE + "/parts/{parts}/name" in document["paths"]
+    assert document["components"]["schemas"]["experimental.interop.Pose"]["required"] == ["px", "py", "label"]
+    again = ask(gateway, "GET", "/openapi.json", base=base, headers={"If-None-Match": answer.headers["ETag"]})
+    assert (again.status, again.body) == (304, b"")
+    assert ask(gateway, "GET", "/asyncapi.json", base=base).json["channels"]["interop_changed"]
+    description = ask(gateway, "GET", "/thing-description.json", base=base)
+    assert description.json["actions"]["interop_add"]["forms"][0]["href"] == BASE + "/add"
+    assert b"interface Interop" in ask(gateway, "GET", "/types.d.ts", base=base).body
+    definition = ask(gateway, "GET", "/experimental.interop.robdef", base=base)
+    assert definition.body.startswith(b"#") or b"service experimental.interop" in definition.body
+    assert ask(gateway, "GET", "/nope.robdef", base=base).status == 404
+
+
+def test_a_hundred_readers_are_one_client_of_the_device(gateway):
+    def clients():
+        return ask(gateway, "GET", "", base="/api/v1/devices").json["devices"][0]["clients"]
+
+    ask(gateway, "GET", "/version")
+    before = clients()
+    streams = [Stream(gateway, "/state") for _ in range(100)]
+    assert clients() == before
+    ask(gateway, "POST", "/publish_state", {"value": [77]})
+
+    def read(stream):
+        while stream.next()[2] != [77]:
+            pass
+
+    threads = [threading.Thread(target=read, args=(stream,)) for stream in streams]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(20)
+        assert not thread.is_alive()
+    for stream in streams:
+        stream.close()
+
+
+def test_streams_outlive_the_device(tmp_path):
+    """A device of its own, which goes and comes back on the same port."""
+    direction = next(each for each in DIRECTIONS if each.name == "reference-to-ours")
+    service = Background(service_command(direction, "v4", "http://localhost"), tmp_path / "service.log")
+    url = json.loads(service.next_line())["url"]
+    process, port = start_gateway(tmp_path, url)
+    try:
+        ask(port, "POST", "/publish_state", {"value": [1]})
+        stream = Stream(port, "/state")
+        assert stream.next()[2] == [1]
+        service.stop()
+        assert stream.next()[1:] == ("state", {"state": "connection_lost", "detail": "connection_lost: the service was closed"})
+        number = url.split(":")[2].split("/")[0]
+        service = Background([*service_command(direction, "v4", "http://localhost"),
+                              f"--robotraconteur-tcp-port={number}"], tmp_path / "again.log")
+        service.next_line()
+        while True:
+            _, event, data = stream.next()
+            if event == "state" and data["state"] == "connected":
+                break
+        ask(port, "POST", "/publish_state", {"value": [2]})
+        while stream.next()[2] != [2]:
+            pass
+        stream.close()
+    finally:
+        process.stop()
+        service.stop()
