@@ -36,11 +36,18 @@ def pytest_runtest_makereport(item, call):
     params = item.callspec.params if hasattr(item, "callspec") else {}
     if "scenario" in params and (report.when == "call" or report.failed):
         direction, level = params["link"]
-        matrix.note(params["scenario"].name, direction.name, level, report.passed)
+        report.user_properties.append(("matrix", [params["scenario"].name, direction.name, level]))
 
 
-def pytest_sessionfinish():
-    matrix.write(ROOT / "build" / "test-logs" / "interop-matrix.md")
+def pytest_runtest_logreport(report):
+    for name, value in report.user_properties:
+        if name == "matrix":
+            matrix.note(*value, report.passed)
+
+
+def pytest_sessionfinish(session):
+    if not hasattr(session.config, "workerinput"):  # of the process that hears from all others
+        matrix.write(ROOT / "build" / "test-logs" / "interop-matrix.md")
 
 
 @pytest.fixture(autouse=True)
@@ -75,6 +82,18 @@ def pytest_collection_modifyitems(config, items):
 
     config.hook.pytest_deselected(items=[item for item in items if not is_known(item)])
     items[:] = filter(is_known, items)
+    for item in items:
+        item.add_marker(pytest.mark.xdist_group(group_of(item)))
+
+
+def group_of(item):
+    """Tests of a group run one after the other: those of a link, those with the network's namespaces, else a file's."""
+    if "network" in item.fixturenames:
+        return "network"
+    if hasattr(item, "callspec") and "link" in item.callspec.params:
+        direction, level = item.callspec.params["link"]
+        return f"{direction.name}-{level}"
+    return item.path.stem
 
 
 @pytest.fixture
