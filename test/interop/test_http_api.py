@@ -2,13 +2,16 @@
 import base64
 import http.client
 import json
+import pathlib
+import subprocess
+import sys
 import threading
 import time
 
 import pytest
 
 from directions import DIRECTIONS, service_command
-from processes import Background, start_gateway
+from processes import BUILD, Background, start_gateway
 
 SERVICES = {"reference": "reference-to-reference", "ours": "reference-to-ours"}
 BASE = "/api/v1/devices/interop/interop"
@@ -330,3 +333,21 @@ def test_streams_outlive_the_device(tmp_path):
     finally:
         process.stop()
         service.stop()
+
+
+def test_a_device_keeps_what_its_openapi_says(tmp_path):
+    """The demo robot, every operation with what its schema allows and what it doesn't: no fault, nothing undocumented."""
+    robot = Background([BUILD / "server/demo/rrgate-demo-create", "--port", "0"], tmp_path / "robot.log")
+    gateway, port = start_gateway(tmp_path, robot.next_line().split(" ", 1)[1])
+    try:
+        program = pathlib.Path(sys.executable).parent / "schemathesis"
+        checks = "not_a_server_error,status_code_conformance,content_type_conformance,response_schema_conformance"
+        run = subprocess.run(
+            [program, "run", f"http://127.0.0.1:{port}/api/v1/devices/interop/openapi.json", "--url",
+             f"http://127.0.0.1:{port}", "--checks", checks, "--max-examples", "20", "--no-color"],
+            cwd=tmp_path, capture_output=True, text=True, timeout=100)
+        assert run.returncode == 0, run.stdout[-4000:] + run.stderr[-2000:]
+        assert "15 selected" in run.stdout
+    finally:
+        gateway.stop()
+        robot.stop()

@@ -185,7 +185,6 @@ rr::awaitable<void> answer(Gateway& gateway, ResponseWriter& writer, std::string
                                          " is not allowed; see allowed_origins of the gateway's configuration");
   } else if (request.message.method() == http::verb::options) {
     response.status = 204;
-    response.set("Allow", "GET, HEAD, PUT, POST, OPTIONS");
     response.set("Access-Control-Allow-Methods", "GET, HEAD, PUT, POST");
     response.set("Access-Control-Allow-Headers", "Accept, Authorization, Content-Type, Last-Event-ID, Range");
     response.set("Access-Control-Max-Age", "600");
