@@ -50,12 +50,12 @@ HTTPD_MODULES = ("mpm_event", "authz_core", "alias", "headers", "proxy", "proxy_
 
 
 def program(name):
-    """Installed, or unpacked from Debian's package beside the other dependencies (./dev setup)."""
+    """Installed, or unpacked from Debian's package beside the other dependencies (./dev test interop)."""
     path = os.environ["PATH"] + ":/usr/sbin"
     for folder in ("usr/sbin", "usr/bin"):
         path += f":{UNPACKED / folder}"
     found = shutil.which(name, path=path)
-    assert found, f"{name} is missing: ./dev setup brings it"
+    assert found, f"{name} is missing: ./dev test interop brings it"
     return found
 
 

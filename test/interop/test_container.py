@@ -13,7 +13,7 @@ from test_operations import RRGATE, read_metrics
 from test_proxies import fetch
 
 DOCKER = ROOT / "docker"
-BASE = ROOT / "build" / "deps" / "container-base.tar"  # ./dev setup made it; where it can't, images can't be built
+BASE = ROOT / "build" / "deps" / "container-base.tar"  # ./dev test made it; where it can't, images can't be built
 LARGEST = 90 * 1024 * 1024
 
 STORAGE = """[storage]
@@ -67,7 +67,7 @@ class Podman:
 @pytest.fixture(scope="module")
 def podman(tmp_path_factory):
     if os.getuid() != 0 or not shutil.which("podman") or not BASE.exists():
-        pytest.skip("needs root, podman, and the base image that ./dev setup makes with mmdebstrap")
+        pytest.skip("needs root, podman, and the base image that ./dev test makes with mmdebstrap")
     folder = tmp_path_factory.mktemp("podman")
     yield Podman(folder)
     shutil.rmtree(folder, ignore_errors=True)
