@@ -268,10 +268,10 @@ std::size_t resident_bytes() {
 
 TEST_CASE("64 clients hammer every kind of member: nothing is lost, everything is answered") {
   Anvil anvil;
+  std::list<asio::io_context> contexts(thread_count);  // outlive the clients
   std::list<Hammer> hammers;
   {
     RunningNode node([&](Node& into) { anvil.add_to(into); });
-    std::list<asio::io_context> contexts(thread_count);
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(setting("RRGATE_HAMMER_SECONDS", 2));
     auto io = contexts.begin();
     for (int i = 0; i < client_count; ++i) {
