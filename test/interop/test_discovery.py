@@ -125,6 +125,39 @@ def test_a_node_that_restarts_on_another_port_is_found_again(network, start, imp
     assert ":50002/" in service["url"]
 
 
+def subscribed(event, node_id):
+    return lambda found: (found["event"], found["id"]) == (event, node_id)
+
+
+@pytest.mark.parametrize("implementation", ["ours", "theirs"])
+def test_a_subscription_by_type_follows_nodes_that_come_and_restart(network, start, implementation):
+    # The reference can't listen on a port again for a minute: the system still holds its connections.
+    ports = {"ours": [50011, 50011, 50012], "theirs": [50021, 50022, 50023]}[implementation]
+    watch = Watch(start(0, OURS, "subscribe-type", TYPE))
+    first = serve(start, implementation, 1, "a.node", IDS[1], ports[0])
+    assert watch.wait_for(subscribed("connected", IDS[1]))["one"] == 1
+    serve(start, implementation, 2, "b.node", IDS[2])
+    watch.wait_for(subscribed("connected", IDS[2]))
+    for port in ports[1:]:
+        first.process.kill()
+        first.process.wait()
+        watch.wait_for(subscribed("lost", IDS[1]))
+        first = serve(start, implementation, 1, "a.node", IDS[1], port)
+        assert watch.wait_for(subscribed("connected", IDS[1]), seconds=10)["one"] == 1
+
+
+def test_a_subscription_by_url_outlives_the_service(network, start):
+    before = serve(start, "theirs", 1, "a.node", IDS[3], 50031, "ipv4")
+    urls = [f"rr+tcp://10.77.0.2:{port}/?service=thing" for port in (50031, 50032)]
+    watch = Watch(start(0, OURS, "subscribe", *urls))
+    watch.wait_for(subscribed("connected", IDS[3]))
+    before.process.kill()
+    before.process.wait()
+    watch.wait_for(subscribed("lost", IDS[3]))
+    serve(start, "theirs", 1, "a.node", IDS[3], 50032, "ipv4")
+    assert watch.wait_for(subscribed("connected", IDS[3]), seconds=10)["one"] == 1
+
+
 def test_a_gateway_finds_three_nodes_and_uses_those_it_may(network, start, tmp_path):
     config = tmp_path / "gateway.json"
     config.write_text(json.dumps({"listen": ["127.0.0.1:8080"], "devices": [], "retry": {"min_ms": 100, "online_ms": 1000},

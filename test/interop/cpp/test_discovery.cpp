@@ -5,6 +5,9 @@
 //   every line
 //                                                of input adds another service
 //   rr-test-discovery watch [ipv4]               nodes that come, change and go
+//   rr-test-discovery subscribe URL... | subscribe-type TYPE...   connections that come, with what their property "one"
+//   is, and
+//                                                go
 //   rr-test-discovery find-type TYPE | find-name NAME
 //                                                searches once
 #include <unistd.h>
@@ -18,6 +21,7 @@
 #include <nlohmann/json.hpp>
 
 #include "server/discovery/discovery.hpp"
+#include "server/discovery/subscribe_service_by_type.hpp"
 #include "server/node/node.hpp"
 
 namespace {
@@ -106,6 +110,34 @@ void watch(const std::string& ip) {
   io.run();
 }
 
+void say_client(const std::string& event, const rr::AsyncObject& client, const Json& one) {
+  const auto& node = client.connection()->session().connection().peer();
+  say({{"event", event},
+       {"id", rr::format_node_id(node.id, rr::NodeIdFormat::dashes)},
+       {"service", client.path()},
+       {"one", one}});
+}
+
+void subscribe(const std::string& what, std::vector<std::string> arguments) {
+  boost::asio::io_context io(1);
+  rr::Discovery discovery(io, options_for(""));
+  rr::SubscriptionOptions options;
+  options.first_retry = std::chrono::milliseconds(100);
+  auto things = what == "subscribe" ? rr::subscribe_service(io, std::move(arguments), options)
+                                    : rr::subscribe_service_by_type(discovery, std::move(arguments), {}, options);
+  things.on_connected([](const rr::AsyncObject& client) {
+    client.get("one", [client](std::exception_ptr failure, const rr::Value& one) {
+      if (!failure) say_client("connected", client, one.to<std::int32_t>().value());
+    });
+  });
+  things.on_lost([](const rr::AsyncObject& client, const rr::Error& reason) {
+    say_client("lost", client, static_cast<int>(reason.code));
+  });
+  say({{"ready", true}});
+  const Input input(io, [] {});
+  io.run();
+}
+
 rr::awaitable<void> search(rr::Discovery& discovery, std::string what, std::string argument) {
   Json found = Json::array();
   if (what == "find-type") {
@@ -134,6 +166,8 @@ int main(int argc, char** argv) {
       serve(words[1], words[2], words.size() > 3 ? words[3] : "0", words.size() > 4 ? words[4] : "");
     else if (!words.empty() && words[0] == "watch")
       watch(words.size() > 1 ? words[1] : "");
+    else if (words.size() >= 2 && words[0].rfind("subscribe", 0) == 0)
+      subscribe(words[0], {words.begin() + 1, words.end()});
     else if (words.size() >= 2 && words[0].rfind("find-", 0) == 0)
       find(words[0], words[1], words.size() > 2 ? words[2] : "");
     else
