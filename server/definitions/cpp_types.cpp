@@ -81,7 +81,7 @@ std::string CppTypes::member_name(std::string_view name) const {
   // A member that is called like its class would be a constructor.
   const auto& own = entity_->qualified_name;
   while (chosen == declared_name(own) || chosen == declared_name(own, "Client") ||
-         chosen == declared_name(own, "Service"))
+         chosen == declared_name(own, "AsyncClient") || chosen == declared_name(own, "Service"))
     chosen += '_';
   return chosen;
 }
@@ -93,7 +93,9 @@ std::string CppTypes::declared_name(std::string_view qualified_name, std::string
   // Classes that are made from an object's name give way to names of the definition; all do to inner namespaces.
   const auto is_taken = [&] {
     if (set_.has_service_within(std::string(service) + '.' + chosen)) return true;
-    return !suffix.empty() && definition && has_name(*definition, chosen);
+    if (suffix.empty() || !definition) return false;
+    return has_name(*definition, chosen) ||
+           (suffix == "AsyncClient" && has_name(*definition, std::string(name) + "Async"));
   };
   while (is_taken()) chosen += '_';
   return chosen;

@@ -32,6 +32,7 @@ class CppTypes {
   /// The class of a type or constant of the definition, or of another one: with its namespace where it needs that.
   std::string type_name(std::string_view qualified_name) const { return name(qualified_name, {}); }
   std::string client_name(std::string_view qualified_name) const { return name(qualified_name, "Client"); }
+  std::string async_client_name(std::string_view qualified_name) const { return name(qualified_name, "AsyncClient"); }
   std::string service_name(std::string_view qualified_name) const { return name(qualified_name, "Service"); }
   /// The same, without namespace: as it is declared.
   std::string declared_name(std::string_view qualified_name, std::string_view suffix = {}) const;

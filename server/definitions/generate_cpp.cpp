@@ -4,68 +4,9 @@
 #include <functional>
 #include <set>
 
-#include "core/types/multidim.hpp"
-#include "server/definitions/constant_literal.hpp"
-#include "server/definitions/cpp_types.hpp"
-#include "server/definitions/source_writer.hpp"
+#include "server/definitions/cpp_emitter.hpp"
 
 namespace rrgate {
-
-namespace {
-
-using namespace rr;
-
-/// Walks a definition once and writes header and source side by side.
-class CppEmitter {
- public:
-  CppEmitter(const DefinitionSet& set, const ServiceDefinition& definition)
-      : set_(set), definition_(definition), types_(set, definition) {}
-
-  CppFiles emit();
-
- private:
-  std::string qualified(std::string_view name) const { return definition_.name + '.' + std::string(name); }
-  void emit_definition_text();
-  void emit_exceptions();
-  void emit_enum(const EnumDefinition& item);
-  void emit_exception(const ExceptionDefinition& item);
-  /// `scope`  where they are declared, with "::" behind.
-  void emit_constants(const std::vector<ConstantDefinition>& constants, std::string_view storage,
-                      const std::string& scope);
-  void emit_constants_of(const EntityDefinition& item) {
-    emit_constants(all_constants(item), "static constexpr ", types_.declared_name(item.qualified_name) + "::");
-  }
-  void emit_namedarray(const EntityDefinition& item);
-  void emit_fields(const EntityDefinition& item);
-  void emit_packing(const EntityDefinition& item);
-  void emit_object(const EntityDefinition& item);
-
-  void emit_client(const EntityDefinition& item);
-  void emit_client_member(const std::string& name, const MemberDefinition& member);
-  void emit_service(const EntityDefinition& item);
-  void emit_service_member(const EntityDefinition& item, const MemberDefinition& member);
-  void emit_binding(const EntityDefinition& item);
-
-  /// Structs come in source order; pods and named arrays hold others by value and come behind those.
-  std::vector<const EntityDefinition*> in_order(EntityKind kind) const;
-
-  /// Those of a call; the generator parameter is given later.
-  static std::span<const ParameterDefinition> call_parameters(const MemberDefinition& member);
-  /// What a generator takes with each step: "void" where it takes nothing.
-  std::string step_parameter(const MemberDefinition& member) const;
-  std::string parameters(const MemberDefinition& member) const;
-  /// What hands the parameters on: ", a, std::move(b)".
-  std::string arguments(const MemberDefinition& member) const;
-  std::string moved(const TypeDefinition& type, const std::string& name) const;
-  static std::string direction(const MemberDefinition& member);
-  static std::string index_parameter(const TypeDefinition& objref);
-
-  const DefinitionSet& set_;
-  const ServiceDefinition& definition_;
-  CppTypes types_;
-  SourceWriter header_{DocStyle::lines};
-  SourceWriter source_{DocStyle::lines};
-};
 
 CppFiles CppEmitter::emit() {
   const auto file = cpp_file_name(definition_.name);
@@ -79,7 +20,7 @@ CppFiles CppEmitter::emit() {
     header_.line("#include <" + std::string(name) + ">");
   header_.gap();
   for (const auto& import : definition_.imports) header_.line("#include \"" + cpp_file_name(import.name) + ".hpp\"");
-  for (const auto* name : {"client_stub", "service_stub"})
+  for (const auto* name : {"async_stub", "client_stub", "service_stub"})
     header_.line("#include \"server/node/" + std::string(name) + ".hpp\"");
   header_.gap();
   header_.documentation(definition_.documentation);
@@ -105,6 +46,7 @@ CppFiles CppEmitter::emit() {
   const auto objects = in_order(EntityKind::object);
   for (const auto* item : objects) {
     header_.line("class " + types_.declared_name(item->qualified_name, "Client") + ";");
+    header_.line("class " + types_.declared_name(item->qualified_name, "AsyncClient") + ";");
     header_.line("class " + types_.declared_name(item->qualified_name, "Service") + ";");
   }
   header_.gap();
@@ -178,81 +120,6 @@ void CppEmitter::emit_exceptions() {
   source_.gap();
 }
 
-// --- values ---
-
-void CppEmitter::emit_namedarray(const EntityDefinition& item) {
-  types_.enter(&item);
-  header_.documentation(item.documentation);
-  header_.open("struct " + types_.declared_name(item.qualified_name) + " {");
-  TypeDefinition number;
-  number.type = item.namedarray_type;
-  header_.line("static constexpr std::string_view rr_type = \"" + item.qualified_name + "\";");
-  header_.line("static constexpr rr::EntityKind rr_kind = rr::EntityKind::namedarray;");
-  header_.line("using rr_item = " + types_.value(number) + ";");
-  header_.line("static constexpr std::size_t rr_count = " + std::to_string(item.namedarray_count) + ";");
-  emit_constants_of(item);
-  header_.gap();
-  for (const auto& field : item.members) {
-    header_.documentation(field.documentation);
-    // Always without indirection: the fields are the numbers of the wire, one behind the other.
-    auto scalar = field.type;
-    scalar.array = ArrayKind::none;
-    const auto type = types_.value(scalar);
-    const auto name = types_.member_name(field.name);
-    if (field.type.array == ArrayKind::none)
-      header_.line(types_.field(field.type, name) + ";");
-    else
-      header_.line("std::array<" + type + ", " + std::to_string(field.type.sizes.front()) + "> " + name + " = {};");
-  }
-  header_.gap();
-  header_.line("bool operator==(const " + types_.declared_name(item.qualified_name) + "&) const = default;");
-  header_.close("};");
-  header_.gap();
-  types_.enter(nullptr);
-}
-
-/// Structs and pods.
-void CppEmitter::emit_fields(const EntityDefinition& item) {
-  types_.enter(&item);
-  const auto name = types_.declared_name(item.qualified_name);
-  header_.documentation(item.documentation);
-  header_.open("struct " + name + " {");
-  header_.line("static constexpr std::string_view rr_type = \"" + item.qualified_name + "\";");
-  header_.line("static constexpr rr::EntityKind rr_kind = rr::EntityKind::" +
-               std::string(item.kind == EntityKind::pod ? "pod" : "structure") + ";");
-  emit_constants_of(item);
-  header_.gap();
-  for (const auto& field : item.members) {
-    header_.documentation(field.documentation);
-    header_.line(types_.field(field.type, types_.member_name(field.name)) + ";");
-  }
-  header_.gap();
-  header_.line("bool operator==(const " + name + "&) const = default;");
-  header_.close("};");
-  emit_packing(item);
-  types_.enter(nullptr);
-}
-
-void CppEmitter::emit_packing(const EntityDefinition& item) {
-  const auto name = types_.declared_name(item.qualified_name);
-  header_.line("rr::Structure rr_pack(" + name + " value);");
-  header_.line("void rr_unpack(const rr::Structure& fields, " + name + "& value);");
-  header_.gap();
-  source_.open("rr::Structure rr_pack([[maybe_unused]] " + name + " value) {");
-  source_.line("rr::FieldPacker fields(" + name + "::rr_type, " + std::to_string(item.members.size()) + ");");
-  for (const auto& field : item.members)
-    source_.line("fields.add(\"" + field.name + "\", " + moved(field.type, "value." + types_.member_name(field.name)) +
-                 ");");
-  source_.line("return fields.take();");
-  source_.close();
-  source_.gap();
-  source_.open("void rr_unpack([[maybe_unused]] const rr::Structure& fields, [[maybe_unused]] " + name + "& value) {");
-  for (const auto& field : item.members)
-    source_.line("rr::unpack_field(fields, \"" + field.name + "\", value." + types_.member_name(field.name) + ");");
-  source_.close();
-  source_.gap();
-}
-
 std::vector<const EntityDefinition*> CppEmitter::in_order(EntityKind kind) const {
   std::vector<const EntityDefinition*> order;
   std::set<std::string_view> seen;
@@ -281,206 +148,9 @@ void CppEmitter::emit_object(const EntityDefinition& item) {
   header_.close("};");
   header_.gap();
   emit_client(item);
+  emit_async_client(item);
   emit_service(item);
   types_.enter(nullptr);
-}
-
-void CppEmitter::emit_client(const EntityDefinition& item) {
-  const auto name = types_.declared_name(item.qualified_name, "Client");
-  header_.documentation(item.documentation);
-  header_.line("class " + name + " : public rr::ClientStub {");
-  header_.open(" public:");
-  header_.line("/// The root object: rr::connect(url). Throws rr::ClientException: not an object of this type.");
-  header_.line("explicit " + name + "(rr::RemoteObject object);");
-  header_.gap();
-  source_.line(name + "::" + name + "(rr::RemoteObject object)");
-  source_.line("    : ClientStub(std::move(object), " + types_.type_name(item.qualified_name) +
-               "::rr_type, rr_throw_declared) {}");
-  source_.gap();
-  for (const auto& member : item.members) emit_client_member(name, member);
-  header_.close("};");
-  header_.gap();
-}
-
-void CppEmitter::emit_client_member(const std::string& client, const MemberDefinition& member) {
-  const auto name = types_.member_name(member.name);
-  const auto emit_handle = [&](const std::string& type) {
-    header_.documentation(member.documentation);
-    header_.line(type + ' ' + name + "() const { return {*this, \"" + member.name + "\"}; }");
-  };
-  const auto emit_function = [&](const std::string& type, const std::string& taken, const std::string& body) {
-    header_.documentation(member.documentation);
-    header_.line(type + ' ' + name + "(" + taken + ") const;");
-    source_.open(type + ' ' + client + "::" + name + "(" + taken + ") const {");
-    source_.line("return " + body + ";");
-    source_.close();
-    source_.gap();
-  };
-  switch (member.kind) {
-    case MemberKind::property:
-      return emit_handle("rr::TypedProperty<" + types_.value(member.type) + direction(member) + ">");
-    case MemberKind::wire:
-      return emit_handle("rr::TypedWire<" + types_.value(member.type) + direction(member) + ">");
-    case MemberKind::memory:
-      return emit_handle("rr::TypedMemory<" + types_.value(member.type) + direction(member) + ">");
-    case MemberKind::event:
-    case MemberKind::callback: {
-      std::vector<std::string> arguments;
-      if (member.kind == MemberKind::callback) arguments.push_back(types_.value(member.type));
-      for (const auto& parameter : member.parameters) arguments.push_back(types_.value(parameter.type));
-      const std::string handle = member.kind == MemberKind::event ? "rr::TypedEvent<" : "rr::TypedCallback<";
-      return emit_handle(handle + joined(arguments) + ">");
-    }
-    case MemberKind::objref: {
-      const bool is_any = member.type.type == DataType::varobject_t;
-      const auto child = is_any ? "rr::RemoteObject" : types_.client_name(member.type.qualified_name);
-      const auto index = index_parameter(member.type);
-      const auto given = index.empty() ? "" : index.starts_with("std::string") ? ", index" : ", std::to_string(index)";
-      return emit_function(child, index, "rr_child<" + child + ">(\"" + member.name + "\"" + given + ")");
-    }
-    case MemberKind::pipe:
-      return emit_handle("rr::TypedPipe<" + types_.value(member.type) + direction(member) + ">");
-    case MemberKind::function: {
-      const auto type = types_.value(member.type);
-      if (member.is_generator()) {
-        const auto both = "<" + type + ", " + step_parameter(member) + ">";
-        return emit_function("rr::TypedGenerator" + both, parameters(member),
-                             "rr_generator" + both + "(\"" + member.name + "\"" + arguments(member) + ")");
-      }
-      return emit_function(type, parameters(member),
-                           "rr_call<" + type + ">(\"" + member.name + "\"" + arguments(member) + ")");
-    }
-    case MemberKind::field:
-      break;
-  }
-}
-
-void CppEmitter::emit_service(const EntityDefinition& item) {
-  const auto name = types_.declared_name(item.qualified_name, "Service");
-  std::vector<std::string> bases;
-  for (const auto& base : item.implements)
-    bases.push_back("public virtual " + types_.service_name(base.qualified_name));
-  if (bases.empty()) bases.push_back("public virtual rr::ServiceStub");
-  header_.documentation(item.documentation);
-  header_.line("class " + name + " : " + joined(bases) + " {");
-  header_.open(" public:");
-  for (const auto& member : item.members) emit_service_member(item, member);
-  header_.gap();
-  header_.line("std::string_view rr_object_type() const override;");
-  header_.line("std::vector<std::string> rr_object_definitions() const override;");
-  header_.gap();
-  header_.label("protected:");
-  header_.line("void rr_bind(rr::Object& object) override;");
-  header_.close("};");
-  header_.gap();
-
-  source_.open("std::string_view " + name + "::rr_object_type() const {");
-  source_.line("return " + types_.type_name(item.qualified_name) + "::rr_type;");
-  source_.close();
-  source_.gap();
-  source_.open("std::vector<std::string> " + name + "::rr_object_definitions() const {");
-  source_.line("return rr_definitions();");
-  source_.close();
-  source_.gap();
-  emit_binding(item);
-}
-
-void CppEmitter::emit_service_member(const EntityDefinition& item, const MemberDefinition& member) {
-  const auto name = types_.member_name(member.name);
-  const auto type = types_.value(member.type);
-  const bool is_inherited = std::any_of(item.implements.begin(), item.implements.end(), [&](const auto& base) {
-    const auto* entity = set_.find_entity(base.qualified_name);
-    return entity && entity->find_member(member.name);
-  });
-  const auto emit_virtual = [&](const std::string& signature, std::string_view body) {
-    header_.line((is_inherited ? "" : "virtual ") + signature + (is_inherited ? " override" : "") + std::string(body));
-  };
-  const auto emit_telling = [&](const std::string& result, const std::string& taken, const std::string& body) {
-    header_.line(result + ' ' + name + "(" + taken + ");");
-    source_.open(result + ' ' + types_.declared_name(item.qualified_name, "Service") + "::" + name + "(" + taken +
-                 ") {");
-    source_.line(body);
-    source_.close();
-    source_.gap();
-  };
-  header_.documentation(member.documentation);
-  const auto way = member.direction();
-  switch (member.kind) {
-    case MemberKind::function:
-      if (member.is_generator()) {
-        const auto next = step_parameter(member);
-        const auto result = type == "void" ? "bool" : "std::optional<" + type + ">";
-        return emit_virtual("std::function<" + result + "(" + (next == "void" ? "" : next) + ")> " + name + "(" +
-                                parameters(member) + ")",
-                            " = 0;");
-      }
-      return emit_virtual(type + ' ' + name + "(" + parameters(member) + ")", " = 0;");
-    case MemberKind::property:
-      if (way != MemberDirection::writeonly) emit_virtual(type + " get_" + member.name + "()", " = 0;");
-      if (way != MemberDirection::readonly) emit_virtual("void set_" + member.name + "(" + type + " value)", " = 0;");
-      return;
-    case MemberKind::wire:
-      if (way != MemberDirection::readonly) emit_virtual("void set_" + member.name + "(" + type + " /*value*/)", " {}");
-      if (way != MemberDirection::writeonly)
-        emit_telling("void", type + " value",
-                     "rr_set_wire(\"" + member.name + "\", rr::pack_value(" + moved(member.type, "value") + "));");
-      return;
-    case MemberKind::pipe:
-      if (way != MemberDirection::readonly)
-        emit_virtual("void set_" + member.name + "(const rr::PipeEndpoint& /*from*/, " + type + " /*packet*/)", " {}");
-      if (way != MemberDirection::writeonly)
-        emit_telling(
-            "std::size_t", type + " packet",
-            "return rr_broadcast(\"" + member.name + "\", rr::pack_value(" + moved(member.type, "packet") + "));");
-      return;
-    case MemberKind::event:
-      return emit_telling("void", parameters(member), "rr_fire(\"" + member.name + "\"" + arguments(member) + ");");
-    case MemberKind::objref: {
-      const bool is_any = member.type.type == DataType::varobject_t;
-      const auto child = is_any ? "rr::ServiceStub" : types_.service_name(member.type.qualified_name);
-      return emit_virtual(
-          "std::shared_ptr<" + child + "> get_" + member.name + "(" + index_parameter(member.type) + ")", " = 0;");
-    }
-    case MemberKind::callback: {
-      const auto taken = parameters(member);
-      return emit_telling(
-          "void",
-          "rr::ClientId rr_client, " + taken + (taken.empty() ? "" : ", ") + "std::function<void(rr::Result<" + type +
-              ">)> rr_done",
-          "rr_ask<" + type + ">(rr_client, \"" + member.name + "\", std::move(rr_done)" + arguments(member) + ");");
-    }
-    case MemberKind::memory: {
-      auto item = member.type;
-      item.array = ArrayKind::none;
-      return emit_virtual("std::shared_ptr<rr::MemoryBuffer<" + types_.value(item) + ">> get_" + member.name + "()",
-                          " = 0;");
-    }
-    case MemberKind::field:
-      break;
-  }
-}
-
-void CppEmitter::emit_binding(const EntityDefinition& item) {
-  const auto name = types_.declared_name(item.qualified_name, "Service");
-  source_.open("void " + name + "::rr_bind([[maybe_unused]] rr::Object& object) {");
-  for (const auto& member : item.members) {
-    const auto bind = [&](std::string_view how, const std::string& function) {
-      source_.line(std::string(how) + "(object, \"" + member.name + "\", &" + name + "::" + function + ");");
-    };
-    const bool is_read = member.direction() != MemberDirection::writeonly;
-    const bool is_written = member.direction() != MemberDirection::readonly;
-    if (member.kind == MemberKind::function)
-      bind(member.is_generator() ? "rr_generator" : "rr_function", types_.member_name(member.name));
-    if (member.kind == MemberKind::property && is_read) bind("rr_getter", "get_" + member.name);
-    if (member.kind == MemberKind::property && is_written) bind("rr_setter", "set_" + member.name);
-    if (member.kind == MemberKind::wire && is_written) bind("rr_wire_setter", "set_" + member.name);
-    if (member.kind == MemberKind::pipe && is_written) bind("rr_pipe_setter", "set_" + member.name);
-    if (member.kind == MemberKind::memory)
-      bind(is_multidim(member.type) ? "rr_multidim_memory" : "rr_memory", "get_" + member.name);
-    if (member.kind == MemberKind::objref) bind("rr_objref", "get_" + member.name);
-  }
-  source_.close();
-  source_.gap();
 }
 
 // --- the definition itself ---
@@ -543,10 +213,13 @@ std::string CppEmitter::arguments(const MemberDefinition& member) const {
   return out;
 }
 
-std::string CppEmitter::moved(const TypeDefinition& type, const std::string& name) const {
-  const bool is_small = type.container == ContainerKind::none && type.array == ArrayKind::none &&
-                        (is_numeric(type.type) || type.type == DataType::enum_t);
-  return is_small ? name : "std::move(" + name + ")";
+bool CppEmitter::is_small(const TypeDefinition& type) {
+  return type.container == ContainerKind::none && type.array == ArrayKind::none &&
+         (is_numeric(type.type) || type.type == DataType::enum_t);
+}
+
+std::string CppEmitter::moved(const TypeDefinition& type, const std::string& name) {
+  return is_small(type) ? name : "std::move(" + name + ")";
 }
 
 std::string CppEmitter::direction(const MemberDefinition& member) {
@@ -559,7 +232,10 @@ std::string CppEmitter::index_parameter(const TypeDefinition& objref) {
   return objref.container == ContainerKind::none && objref.array == ArrayKind::none ? "" : "std::int32_t index";
 }
 
-}  // namespace
+std::string CppEmitter::index_argument(const TypeDefinition& objref) {
+  const auto index = index_parameter(objref);
+  return index.empty() ? "" : index.starts_with("std::string") ? ", index" : ", std::to_string(index)";
+}
 
 CppFiles generate_cpp(const DefinitionSet& set, const ServiceDefinition& definition) {
   return CppEmitter(set, definition).emit();

@@ -14,15 +14,9 @@
 #include <tuple>
 
 #include "server/node/client.hpp"
-#include "server/node/typed_value.hpp"
+#include "server/node/typed_handler.hpp"
 
 namespace rr {
-
-inline constexpr auto readonly = MemberDirection::readonly;
-inline constexpr auto writeonly = MemberDirection::writeonly;
-
-/// Throws the class that a definition declares for an error; returns where there is none.
-using ThrowDeclared = void (*)(const Error& error);
 
 template <class T, class Parameter>
 class TypedGenerator;
@@ -107,12 +101,7 @@ class TypedWire : public MemberHandle {
   template <class F>
   void connect(F handler) const requires(direction != MemberDirection::writeonly) {
     ask([&](const RemoteObject& object, const char* name) {
-      object.connect_wire(name, [handler = std::move(handler)](const Value& value, TimeSpec time) mutable {
-        if constexpr (std::is_invocable_v<F&, T, TimeSpec>)
-          handler(unpack_value<T>(value), time);
-        else
-          handler(unpack_value<T>(value));
-      });
+      object.connect_wire(name, detail::typed_wire_handler<T>(std::move(handler)));
     });
   }
   /// To send alone.
@@ -148,16 +137,8 @@ class TypedEvent : public MemberHandle {
   template <class F>
   void on(F handler) const {
     ask([&](const RemoteObject& object, const char* name) {
-      object.on_event(name, [handler = std::move(handler)](std::span<const Value> arguments) mutable {
-        call(handler, arguments, std::index_sequence_for<Args...>{});
-      });
+      object.on_event(name, detail::typed_event_handler<Args...>(std::move(handler)));
     });
-  }
-
- private:
-  template <class F, std::size_t... index>
-  static void call(F& handler, [[maybe_unused]] std::span<const Value> arguments, std::index_sequence<index...>) {
-    if (arguments.size() == sizeof...(Args)) handler(unpack_value<Args>(arguments[index])...);
   }
 };
 
@@ -210,23 +191,8 @@ class TypedCallback : public MemberHandle {
   template <class F>
   void on(F handler) const {
     ask([&](const RemoteObject& object, const char* name) {
-      object.on_callback_values(name, [handler = std::move(handler)](std::span<const Value> arguments) mutable {
-        return answer(handler, arguments, std::index_sequence_for<Args...>{});
-      });
+      object.on_callback_values(name, detail::typed_callback_handler<R, Args...>(std::move(handler)));
     });
-  }
-
- private:
-  template <class F, std::size_t... index>
-  static Result<Value> answer(F& handler, std::span<const Value> arguments, std::index_sequence<index...>) {
-    if (arguments.size() != sizeof...(Args))
-      return make_error(ErrorCode::invalid_argument, "wrong number of arguments");
-    if constexpr (std::is_void_v<R>) {
-      handler(unpack_value<Args>(arguments[index])...);
-      return Value{};
-    } else {
-      return pack_value<R>(handler(unpack_value<Args>(arguments[index])...));
-    }
   }
 };
 

@@ -18,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "server/node/async_stub.hpp"
 #include "server/node/member_subscription.hpp"
 #include "server/node/subscription_core.hpp"
 
@@ -26,6 +27,38 @@ namespace rr {
 struct MemberSubscriptionOptions {
   std::string path = "*";             ///< of the object: "*" is the root, "*.arm" one of its object references
   std::size_t packet_limit = 10'000;  ///< that wait for PipeSubscription::next(); of more the oldest are dropped
+};
+
+/// A wire with the C++ type of generated classes; next() has the value as it came.
+template <class T>
+class TypedWireSubscription : public WireSubscription {
+ public:
+  explicit TypedWireSubscription(WireSubscription wire) : WireSubscription(std::move(wire)) {}
+  /// nullopt before the first value.
+  std::optional<T> value() const {
+    return newest() ? std::optional<T>(unpack_value<T>(newest()->value)) : std::nullopt;
+  }
+  /// handler(T) gets each value. One handler.
+  template <class F>
+  void on_value(F handler) {
+    WireSubscription::on_value([handler = std::move(handler)](const ReceivedValue& received) mutable {
+      handler(unpack_value<T>(received.value));
+    });
+  }
+};
+
+/// The same for a pipe.
+template <class T>
+class TypedPipeSubscription : public PipeSubscription {
+ public:
+  explicit TypedPipeSubscription(PipeSubscription pipe) : PipeSubscription(std::move(pipe)) {}
+  /// handler(T) gets each packet, and next() none. One handler.
+  template <class F>
+  void on_packet(F handler) {
+    PipeSubscription::on_packet([handler = std::move(handler)](const ReceivedValue& received) mutable {
+      handler(unpack_value<T>(received.value));
+    });
+  }
 };
 
 /// Services that are wanted; owns its connections. Calls that are under way when one is lost fail: they are not
@@ -71,6 +104,17 @@ class ServiceSubscription {
   /// A wire of all clients. Once for each wire: a client has one connection of it.
   WireSubscription wire(std::string member, const MemberSubscriptionOptions& options = {}) const;
   PipeSubscription pipe(std::string member, const MemberSubscriptionOptions& options = {}) const;
+  /// The same by the member of a generated class: wire(&ThermostatAsyncClient::reading).
+  template <class Client, class T, MemberDirection direction>
+  TypedWireSubscription<T> wire(AsyncWire<T, direction> (Client::*member)() const,
+                                const MemberSubscriptionOptions& options = {}) const {
+    return TypedWireSubscription<T>(wire(std::string((Client().*member)().name()), options));
+  }
+  template <class Client, class T, MemberDirection direction>
+  TypedPipeSubscription<T> pipe(AsyncPipe<T, direction> (Client::*member)() const,
+                                const MemberSubscriptionOptions& options = {}) const {
+    return TypedPipeSubscription<T>(pipe(std::string((Client().*member)().name()), options));
+  }
 
   /// Ends connections and attempts, its wires and pipes, and whoever waits for it. Services are told, which takes half
   /// a second at most.

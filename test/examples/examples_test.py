@@ -40,16 +40,33 @@ class Examples(unittest.TestCase):
                 url = device.stdout.readline().strip()
                 self.assertEqual(run(os.path.join(build, "thermostat_client"), url), "21 degrees\n")
             finally:
-                device.terminate()
-                device.stdout.close()
-                self.assertEqual(device.wait(timeout=10), 0)
+                self.end(device)
+            self.outlives_the_device(build, url)
+
+    def outlives_the_device(self, build, url):
+        listen = url.split("/?")[0]
+        with subprocess.Popen([os.path.join(build, "thermostat_subscriber"), url], stdout=subprocess.PIPE, text=True) as subscriber:
+            try:
+                for _ in range(2):
+                    device = subprocess.Popen([os.path.join(build, "thermostat_device"), listen], stdout=subprocess.PIPE, text=True)
+                    try:
+                        self.assertIn("21 degrees\n", iter(subscriber.stdout.readline, ""))
+                    finally:
+                        self.end(device)
+            finally:
+                subscriber.kill()
+
+    def end(self, device):
+        device.terminate()
+        device.stdout.close()
+        self.assertEqual(device.wait(timeout=10), 0)
 
 
 class Text(unittest.TestCase):
     """The examples say how little it takes: the device 40 lines at most, each file of a client 15."""
 
     def test_examples_are_short(self):
-        limits = {"device.cpp": 40, "client.cpp": 15, "client.mjs": 15, "site/index.html": 15, "site/client.js": 15}
+        limits = {"device.cpp": 40, "client.cpp": 15, "subscriber.cpp": 15, "client.mjs": 15, "site/index.html": 15, "site/client.js": 15}
         for name, limit in limits.items():
             self.assertLessEqual(len(text_of(name).splitlines()), limit, name)
 
