@@ -1,5 +1,6 @@
 // Many clients that use every kind of member at once, and clients that come and go. RRGATE_HAMMER_SECONDS (2) and
 // RRGATE_HAMMER_CYCLES (10000) say how long; `./dev asan` and `./dev tsan` hammer for a minute.
+#include <atomic>
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <catch2/catch.hpp>
@@ -104,8 +105,15 @@ struct Anvil {
 /// One client; its loops run on one thread.
 class Hammer {
  public:
-  Hammer(asio::io_context& io, std::string url, int number, std::chrono::steady_clock::time_point end)
-      : io_(io), url_(std::move(url)), number_(number), end_(end), packet_arrived_(io), loop_ended_(io) {}
+  /// Hammers for `duration` once `ready` clients are `client_count`.
+  Hammer(asio::io_context& io, std::string url, int number, std::chrono::seconds duration, std::atomic<int>& ready)
+      : io_(io),
+        url_(std::move(url)),
+        number_(number),
+        duration_(duration),
+        ready_(ready),
+        packet_arrived_(io),
+        loop_ended_(io) {}
 
   void start() {
     asio::co_spawn(io_, run(), [this](std::exception_ptr what) {
@@ -132,6 +140,7 @@ class Hammer {
     } catch (const std::exception& exception) {
       failure = exception.what();
     }
+    ready_ = client_count;  // nobody waits for one who won't come
     packet_arrived_.cancel();
     loop_ended_.cancel();
   }
@@ -145,6 +154,15 @@ class Hammer {
     auto [error] = co_await signal.async_wait(asio::as_tuple(asio::use_awaitable));
     if (!error) throw std::runtime_error("nothing happened for " + std::to_string(patience.count()) + " s");
   }
+  /// Those who come late would find a node that is too busy to answer them in time.
+  awaitable<void> wait_for_all() {
+    asio::steady_timer pause(io_);
+    for (++ready_; ready_ < client_count;) {
+      pause.expires_after(10ms);
+      co_await pause.async_wait(asio::use_awaitable);
+    }
+    end_ = std::chrono::steady_clock::now() + duration_;
+  }
   void spawn(awaitable<void> loop) {
     ++loops_;
     asio::co_spawn(io_, std::move(loop), [this](std::exception_ptr what) {
@@ -156,6 +174,7 @@ class Hammer {
 
   awaitable<void> run() {
     anvil_ = co_await async_connect(io_, url_);
+    co_await wait_for_all();
     anvil_.on_event("struck", [this](std::span<const Value> arguments) {
       const auto number = arguments[0].to<std::uint64_t>().value();
       if (last_event_ != 0 && number != last_event_ + 1) ++wrong;
@@ -245,6 +264,8 @@ class Hammer {
   asio::io_context& io_;
   std::string url_;
   int number_;
+  std::chrono::seconds duration_;
+  std::atomic<int>& ready_;
   std::chrono::steady_clock::time_point end_;
   asio::steady_timer packet_arrived_;
   asio::steady_timer loop_ended_;
@@ -269,13 +290,14 @@ std::size_t resident_bytes() {
 TEST_CASE("64 clients hammer every kind of member: nothing is lost, everything is answered") {
   Anvil anvil;
   std::list<asio::io_context> contexts(thread_count);  // outlive the clients
+  std::atomic<int> ready{0};
   std::list<Hammer> hammers;
   {
     RunningNode node([&](Node& into) { anvil.add_to(into); });
-    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(setting("RRGATE_HAMMER_SECONDS", 2));
+    const std::chrono::seconds duration(setting("RRGATE_HAMMER_SECONDS", 2));
     auto io = contexts.begin();
     for (int i = 0; i < client_count; ++i) {
-      hammers.emplace_back(*io, node.url("Anvil"), i, end).start();
+      hammers.emplace_back(*io, node.url("Anvil"), i, duration, ready).start();
       if (++io == contexts.end()) io = contexts.begin();
     }
     std::vector<std::thread> threads;
