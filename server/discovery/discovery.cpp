@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <boost/asio/as_tuple.hpp>
+#include <boost/asio/bind_cancellation_slot.hpp>
+#include <boost/asio/cancellation_signal.hpp>
 #include <boost/asio/co_spawn.hpp>
-#include <boost/asio/detached.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <iostream>
+#include <list>
 #include <map>
 
 #include "core/discovery/schedules.hpp"
@@ -31,15 +33,31 @@ bool has_scheme(const NodeDiscoveryInfo& node, const std::vector<std::string>& s
          });
 }
 
-/// One search for services over many nodes. Shared by its queries, the slowest of which outlive it.
+/// One search for services over many nodes. Shared by its queries, since they end a little after it.
 struct TypeSearch {
   explicit TypeSearch(const asio::any_io_executor& executor) : changed(executor) {}
 
   std::string type;
+  DialOptions dial;
   std::vector<std::vector<ConnectionUrl>> nodes;  ///< taken from the back
   std::size_t open_queries = 0;
   std::vector<ServiceInfo> found;
-  asio::steady_timer changed;  ///< cancelled when a query ends
+  asio::steady_timer changed;                    ///< cancelled when a query ends
+  std::list<asio::cancellation_signal> queries;  ///< those that have ended, too
+};
+
+/// Cancels what is still asked when the search is over, also when it is given up.
+class SearchGuard {
+ public:
+  explicit SearchGuard(std::shared_ptr<TypeSearch> search) : search_(std::move(search)) {}
+  SearchGuard(const SearchGuard&) = delete;
+  SearchGuard& operator=(const SearchGuard&) = delete;
+  ~SearchGuard() {
+    for (auto& query : search_->queries) query.emit(asio::cancellation_type::terminal);
+  }
+
+ private:
+  std::shared_ptr<TypeSearch> search_;
 };
 
 awaitable<void> query_nodes(std::shared_ptr<TypeSearch> search, std::chrono::steady_clock::time_point deadline) {
@@ -49,6 +67,7 @@ awaitable<void> query_nodes(std::shared_ptr<TypeSearch> search, std::chrono::ste
     auto urls = std::move(search->nodes.back());
     search->nodes.pop_back();
     ServiceQueryOptions options;
+    options.dial = search->dial;
     options.dial.timeout = std::min(left, options.dial.timeout);
     auto answer = co_await query_node(std::move(urls), options);
     if (!answer) continue;  // gone, or not what it says it is
@@ -75,7 +94,7 @@ class Discovery::Implementation : public std::enable_shared_from_this<Implementa
       ip_.emplace(io_.get_executor(), *options_.ip, options_.listens, std::move(callbacks));
       if (options_.listens) requests_.start(std::chrono::steady_clock::now());
     }
-    if (options_.listens && (options_.local || options_.hardware)) find_machine_nodes();
+    if (options_.listens && (options_.intra || options_.local || options_.hardware)) find_machine_nodes();
     wait();
   }
 
@@ -122,13 +141,17 @@ class Discovery::Implementation : public std::enable_shared_from_this<Implementa
     co_await self->wait_for(pause);
 
     auto search = std::make_shared<TypeSearch>(self->io_.get_executor());
+    const SearchGuard guard(search);
     search->type = std::move(type);
+    search->dial = self->options_.dial;
     for (const auto& [id, node] : self->nodes_.nodes())
       if (auto urls = candidate_urls(node, schemes); !urls.empty()) search->nodes.push_back(std::move(urls));
     search->open_queries = std::min(search->nodes.size(), max_queries);
     for (auto left = search->open_queries; left > 0; --left) {
       auto queries = query_nodes(search, deadline);
-      asio::co_spawn(self->io_, std::move(queries), asio::detached);
+      auto& signal = search->queries.emplace_back();
+      asio::co_spawn(self->io_, std::move(queries),
+                     asio::bind_cancellation_slot(signal.slot(), [search](std::exception_ptr) {}));
     }
     while (search->open_queries > 0 && !self->is_closed_ && std::chrono::steady_clock::now() < deadline) {
       search->changed.expires_at(deadline);
@@ -205,6 +228,7 @@ class Discovery::Implementation : public std::enable_shared_from_this<Implementa
 
   void find_machine_nodes() {
     MachineNodesOptions machine;
+    machine.intra = options_.intra;
     machine.local = options_.local;
     machine.hardware = options_.hardware;
     machine.refresh = std::min(machine.refresh, options_.cache.expiry * 9 / 10);

@@ -30,12 +30,15 @@ struct DiscoveryOptions {
   std::optional<IpDiscoveryScopes> ip =
       IpDiscoveryScopes{};  ///< nullopt: no packets; announcements come from elsewhere
   bool listens = true;      ///< false: hears of nobody, and does not answer those who ask
+  bool intra = true;        ///< nodes of this process (rr+intra)
   /// Nodes of this machine (rr+local): this user's, and the public ones of all users.
   bool local = true;
   /// Nodes that are plugged in (rr+usb, rr+pci), where the system shows them; nullopt: none.
   std::optional<DriverRoots> hardware = DriverRoots{};
   std::chrono::milliseconds announce_period{55'000};
   DetectedNodesOptions cache = {};
+  /// How nodes are asked for their services: whose certificates are trusted, how long one may take.
+  DialOptions dial = {};
   /// A sentence about something that went wrong; the default writes it to stderr.
   std::function<void(const std::string& problem)> report = {};
 };

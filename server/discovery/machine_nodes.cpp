@@ -13,6 +13,14 @@ constexpr std::chrono::milliseconds hardware_refresh{30'000};
 MachineNodes::MachineNodes(const boost::asio::any_io_executor& executor, const MachineNodesOptions& options,
                            Callbacks callbacks)
     : callbacks_(std::move(callbacks)) {
+  if (options.intra) {
+    auto found = [this](const std::vector<IntraNode>& nodes) {
+      std::vector<Announcement> news;
+      for (const auto& [node, url, nonce] : nodes) news.push_back({node.id, node.name, url, nonce});
+      tell(intra_nodes_, news);
+    };
+    intra_.emplace(executor, std::move(found), options.refresh);
+  }
   if (options.local) {
     auto found = [this](const std::vector<LocalNode>& nodes) {
       std::vector<Announcement> news;
@@ -34,6 +42,7 @@ MachineNodes::MachineNodes(const boost::asio::any_io_executor& executor, const M
 }
 
 void MachineNodes::refresh() {
+  if (intra_) intra_->refresh();
   if (local_) local_->refresh();
 }
 

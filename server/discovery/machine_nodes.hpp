@@ -1,5 +1,5 @@
-// Nodes that are found without packets: those of this machine, and those that are plugged into it. Layer:
-// server/discovery. Source: transports spec section 8.5; hardware spec.
+// Nodes that are found without packets: those of this process and this machine, and those that are plugged into it.
+// Layer: server/discovery. Source: transports spec section 8.5; hardware spec.
 #pragma once
 
 #include <boost/asio/any_io_executor.hpp>
@@ -13,11 +13,13 @@
 
 #include "core/discovery/announcement.hpp"
 #include "server/transport/hardware.hpp"
+#include "server/transport/intra.hpp"
 #include "server/transport/local_watch.hpp"
 
 namespace rr {
 
 struct MachineNodesOptions {
+  bool intra = true;
   bool local = true;
   std::optional<DriverRoots> hardware = DriverRoots{};  ///< nullopt: none
   std::chrono::milliseconds refresh{55'000};            ///< every node is told of again at least so often
@@ -45,8 +47,10 @@ class MachineNodes {
   void tell(Told& before, const std::vector<Announcement>& nodes);
 
   Callbacks callbacks_;
+  Told intra_nodes_;
   Told local_nodes_;
   Told hardware_nodes_;
+  std::optional<IntraWatch> intra_;
   std::optional<LocalWatch> local_;
   std::optional<HardwareWatch> hardware_;
 };

@@ -1,20 +1,12 @@
 #include "server/discovery/service_query.hpp"
 
 #include <algorithm>
-#include <boost/asio/as_tuple.hpp>
-#include <boost/asio/bind_cancellation_slot.hpp>
-#include <boost/asio/cancellation_signal.hpp>
-#include <boost/asio/co_spawn.hpp>
-#include <boost/asio/detached.hpp>
-#include <boost/asio/steady_timer.hpp>
-#include <boost/asio/this_coro.hpp>
-#include <boost/asio/use_awaitable.hpp>
-#include <list>
 
 #include "core/session/client_session.hpp"
 #include "core/session/service_index.hpp"
 #include "core/support/random.hpp"
 #include "server/node/clocks.hpp"
+#include "server/transport/race.hpp"
 #include "server/transport/watchdog.hpp"
 
 namespace rr {
@@ -28,7 +20,6 @@ std::string url_of_service(ConnectionUrl url, const NodeIdentity& node, std::str
 
 namespace {
 
-constexpr std::chrono::milliseconds stagger{15};
 constexpr std::size_t max_candidates = 8;
 
 ClientOptions index_options(const ConnectionUrl& url, const ServiceQueryOptions& options) {
@@ -156,64 +147,16 @@ std::vector<ConnectionUrl> candidate_urls(const NodeDiscoveryInfo& node, const s
   return out;
 }
 
-namespace {
-
-/// Attempts that run side by side. Shared by them, since they end a little after the race.
-struct Race {
-  explicit Race(const asio::any_io_executor& executor) : changed(executor) {}
-
-  asio::steady_timer changed;                     ///< cancelled when an attempt ends
-  std::list<asio::cancellation_signal> attempts;  ///< those that have ended, too
-  std::size_t failed = 0;
-  std::optional<NodeServices> winner;
-  Error last_failure = make_error(ErrorCode::connection_error, "node: no URL of it can be dialed");
-};
-
-awaitable<void> attempt(std::shared_ptr<Race> race, ConnectionUrl url, ServiceQueryOptions options) {
-  auto answer = co_await query_services(std::move(url), std::move(options));
-  if (!answer) {
-    ++race->failed;
-    race->last_failure = std::move(answer.error());
-  } else if (!race->winner) {
-    race->winner = std::move(*answer);
-  }
-  race->changed.cancel();
-}
-
-/// Cancels the attempts when the race is over, also when it is given up.
-class RaceGuard {
- public:
-  explicit RaceGuard(std::shared_ptr<Race> race) : race_(std::move(race)) {}
-  RaceGuard(const RaceGuard&) = delete;
-  RaceGuard& operator=(const RaceGuard&) = delete;
-  ~RaceGuard() {
-    for (auto& attempt : race_->attempts) attempt.emit(asio::cancellation_type::terminal);
-  }
-
- private:
-  std::shared_ptr<Race> race_;
-};
-
-}  // namespace
-
 awaitable<Result<NodeServices>> query_node(std::vector<ConnectionUrl> urls, ServiceQueryOptions options) {
-  const auto executor = co_await asio::this_coro::executor;
-  auto race = std::make_shared<Race>(executor);
-  const RaceGuard guard(race);
-  std::size_t started = 0;
-  while (!race->winner && race->failed < urls.size()) {
-    if (started < urls.size()) {
-      auto next = attempt(race, urls[started], options);
-      auto& signal = race->attempts.emplace_back();
-      asio::co_spawn(executor, std::move(next), asio::bind_cancellation_slot(signal.slot(), asio::detached));
-      ++started;
-    }
-    // Each attempt ends in its own time, so the last needs no deadline here.
-    race->changed.expires_after(started < urls.size() ? stagger : options.dial.timeout * 2);
-    co_await race->changed.async_wait(asio::as_tuple(asio::use_awaitable));
+  std::vector<Runner<NodeServices>> runners;
+  for (auto& url : urls) {
+    Runner<NodeServices> runner;
+    runner.name = format_url(url);
+    runner.run = [url = std::move(url), options] { return query_services(url, options); };
+    runners.push_back(std::move(runner));
   }
-  if (!race->winner) co_return race->last_failure;
-  co_return std::move(*race->winner);
+  const auto nothing = make_error(ErrorCode::connection_error, "node: no URL of it can be dialed");
+  co_return co_await race(std::move(runners), candidate_stagger, nothing);
 }
 
 }  // namespace rr

@@ -52,8 +52,8 @@ std::vector<ConnectionUrl> candidate_urls(const NodeDiscoveryInfo& node, const s
 /// of a link-local address, and might name anybody: a way that is known is better.
 std::string url_of_service(ConnectionUrl url, const NodeIdentity& node, std::string_view service);
 
-/// Asks a node over several URLs, 15 ms apart; the first answer counts. Can be cancelled, and leaves nothing behind.
-/// Errors   as query_services, of the last attempt to fail; connection_error: no URL.
+/// Asks a node over several URLs, 15 ms apart; the first answer counts and ends the other attempts. Can be cancelled,
+/// and leaves nothing behind. Errors   as of race(), with the cause for each URL; connection_error: no URL.
 awaitable<Result<NodeServices>> query_node(std::vector<ConnectionUrl> urls, ServiceQueryOptions options);
 
 }  // namespace rr

@@ -26,7 +26,7 @@ constexpr std::size_t max_open_queries = 8;
 
 /// Where a scheme comes in the order of candidates.
 std::size_t rank(std::string_view scheme) {
-  constexpr std::array<std::string_view, 5> order{"rr+local", "rr+pci", "rr+usb", "rrs+tcp", "rr+tcp"};
+  constexpr std::array<std::string_view, 6> order{"rr+intra", "rr+local", "rr+pci", "rr+usb", "rrs+tcp", "rr+tcp"};
   return static_cast<std::size_t>(std::find(order.begin(), order.end(), scheme) - order.begin());
 }
 

@@ -2,7 +2,6 @@
 
 #include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/co_spawn.hpp>
-#include <boost/asio/detached.hpp>
 #include <boost/asio/post.hpp>
 #include <variant>
 
@@ -16,12 +15,23 @@ namespace asio = boost::asio;
 
 namespace {
 
+/// Whichever URL is taken, a peer that is gone is noticed as soon as it should be.
+Heartbeat quickest_heartbeat(const std::vector<ConnectionUrl>& urls) {
+  auto out = heartbeat_of(urls.front().scheme);
+  for (const auto& url : urls)
+    if (const auto other = heartbeat_of(url.scheme); other.period < out.period) out = other;
+  return out;
+}
+
 /// Throws   boost::system::system_error: it was cancelled.
-awaitable<void> dial_and_start(ConnectionUrl url, ConnectOptions options, std::shared_ptr<ClientOpening> opening,
-                               ClientConnection::Opened done) {
+awaitable<void> dial_and_start(std::vector<ConnectionUrl> urls, ConnectOptions options,
+                               std::shared_ptr<ClientOpening> opening, ClientConnection::Opened done) {
   const auto deadline = std::chrono::steady_clock::now() + options.connect_timeout;
   options.dial.timeout = options.connect_timeout;
-  auto stream = co_await dial(std::move(url), std::move(options.dial));
+  const auto heartbeat = options.heartbeat.value_or(quickest_heartbeat(urls));
+  options.connection.heartbeat_period = heartbeat.period;
+  options.connection.receive_timeout = heartbeat.timeout;
+  auto stream = co_await dial_any(std::move(urls), std::move(options.dial));
   if (opening->is_over()) co_return;
   if (!stream) co_return done(stream.error());
   const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
@@ -60,19 +70,26 @@ std::shared_ptr<ClientOpening> ClientConnection::open(asio::io_context& io, std:
     asio::post(io, [tell, error = make_error(code, std::move(why))] { tell(error); });
     return opening;
   };
-  const auto parsed = parse_url(url);
-  if (!parsed) return refuse(parsed.error().code, parsed.error().message);
-  if (!can_dial(parsed->scheme))
-    return refuse(ErrorCode::connection_error, "connect to " + quoted(url) + ": scheme '" + parsed->scheme +
-                                                   "' is not available here, expected " + dialable_schemes());
-  options.service = parsed->service;
-  options.connection.target = {parsed->node_id.value_or(NodeId{}), parsed->node_name};
+  std::vector<std::string> texts{std::string(url)};
+  texts.insert(texts.end(), options.other_urls.begin(), options.other_urls.end());
+  std::vector<ConnectionUrl> urls;
+  for (const auto& text : texts) {
+    const auto parsed = parse_url(text);
+    if (!parsed) return refuse(parsed.error().code, parsed.error().message);
+    if (!can_dial(parsed->scheme))
+      return refuse(ErrorCode::connection_error, "connect to " + quoted(text) + ": scheme '" + parsed->scheme +
+                                                     "' is not available here, expected " + dialable_schemes());
+    urls.push_back(*parsed);
+  }
+  options.service = urls.front().service;
+  options.connection.target = {urls.front().node_id.value_or(NodeId{}), urls.front().node_name};
   if (options.connection.self.id.is_any()) options.connection.self.id = random_node_id();
-  auto work = dial_and_start(*parsed, std::move(options), opening, std::move(tell));
+  auto work = dial_and_start(std::move(urls), std::move(options), opening, std::move(tell));
   // Posted: `done` is not called before this returns.
   asio::post(io, [&io, opening, work = std::move(work)]() mutable {
-    if (!opening->is_over_)
-      asio::co_spawn(io, std::move(work), asio::bind_cancellation_slot(opening->dialing_.slot(), asio::detached));
+    if (opening->is_over_) return;
+    const auto keep = [opening](std::exception_ptr) {};  // the coroutine uses the slot until this is called
+    asio::co_spawn(io, std::move(work), asio::bind_cancellation_slot(opening->dialing_.slot(), keep));
   });
   return opening;
 }

@@ -27,6 +27,10 @@ struct ConnectOptions : ClientOptions {
   ConnectOptions(ClientOptions options) : ClientOptions(std::move(options)) {}
 
   DialOptions dial = {};  ///< its timeout is connect_timeout
+  /// More URLs of the same service: all are dialed side by side, and the first that is reached is used.
+  std::vector<std::string> other_urls = {};
+  /// None: as the reference on the transport (heartbeat_of()). What `connection` says of it is not used.
+  std::optional<Heartbeat> heartbeat = {};
 };
 
 /// A connection that is being opened.

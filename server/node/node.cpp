@@ -18,6 +18,7 @@
 #include "server/node/accept.hpp"
 #include "server/node/service_client.hpp"
 #include "server/platform/node_id_store.hpp"
+#include "server/transport/intra.hpp"
 #include "server/transport/local.hpp"
 #include "server/transport/tcp.hpp"
 
@@ -48,7 +49,7 @@ ListenUrl parse_listen_url(std::string_view url) {
   constexpr std::string_view secure_scheme = "rrs+tcp://";
   const auto fail = [&](const std::string& why) {
     throw std::invalid_argument("listen on " + rr::quoted(url) + ": " + why +
-                                ", expected rr+tcp://HOST:PORT or rr+local:///");
+                                ", expected rr+tcp://HOST:PORT, rr+local:/// or rr+intra:///");
   };
   const bool is_secure = url.substr(0, secure_scheme.size()) == secure_scheme;
   if (!is_secure && url.substr(0, scheme.size()) != scheme) fail("unknown scheme");
@@ -118,6 +119,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     }
     services_.push_back(service);
     nonce_ = make_service_state_nonce();
+    if (intra_) intra_->publish(nonce_);
     if (local_)
       if (auto published = local_->publish(nonce_); !published) report(published.error().message);
     if (services_changed_) services_changed_();
@@ -125,6 +127,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
 
   std::uint16_t listen(std::string_view url) {
     if (url == "rr+local:///") return listen_locally();
+    if (url == "rr+intra:///") return listen_in_process();
     const auto parsed = parse_listen_url(url);
     const bool requires_tls = parsed.requires_tls || options_.require_tls;
     if (requires_tls && !(options_.tls && options_.tls->has_certificate()))
@@ -143,18 +146,22 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   std::uint16_t listen_locally() {
     if (local_) throw std::invalid_argument("listen on rr+local:///: the node does so already");
     auto listener = std::make_unique<LocalListener>(io_.get_executor());
-    if (auto opened = listener->open(identity(), nonce_); !opened)
+    if (auto opened = listener->open(identity(), nonce_, options_.local_is_public); !opened)
       throw std::runtime_error("listen on rr+local:///: " + opened.error().message);
-    auto welcome = [this](std::unique_ptr<ByteStream> stream) {
-      if (clients_.size() + arriving_ >= options_.max_clients) return;
-      Accepted accepted;
-      accepted.stream = std::move(stream);
-      accepted.scheme = "rr+local";
-      add_client(std::move(accepted), "");
-    };
+    auto welcome = [this](std::unique_ptr<ByteStream> stream) { accept_near(std::move(stream), "rr+local"); };
     listener->start(
         std::move(welcome), [this](const std::string& problem) { report(problem); }, send_stall);
     local_ = std::move(listener);
+    return 0;
+  }
+
+  std::uint16_t listen_in_process() {
+    if (intra_) throw std::invalid_argument("listen on rr+intra:///: the node does so already");
+    auto welcome = [this](std::unique_ptr<ByteStream> stream) { accept_near(std::move(stream), "rr+intra"); };
+    auto listener = std::make_unique<IntraListener>(io_.get_executor(), std::move(welcome), send_stall);
+    if (auto opened = listener->open(identity(), nonce_); !opened)
+      throw std::runtime_error("listen on rr+intra:///: " + opened.error().message);
+    intra_ = std::move(listener);
     return 0;
   }
 
@@ -206,6 +213,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
       if (options_.tls && options_.tls->has_certificate()) out.push_back("rrs+tcp" + at);
     }
     if (local_) out.push_back("rr+local:///?nodeid=" + format_node_id(identity().id, NodeIdFormat::dashes));
+    if (intra_) out.push_back("rr+intra:///?nodeid=" + format_node_id(identity().id, NodeIdFormat::dashes));
     return out;
   }
   const std::string& nonce() const { return nonce_; }
@@ -310,6 +318,15 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     asio::co_spawn(io_, welcome(std::move(stream), format_host_port(host, local.port()), requires_tls), asio::detached);
   }
 
+  /// From this machine: nothing has to be found out first.
+  void accept_near(std::unique_ptr<ByteStream> stream, std::string scheme) {
+    if (is_stopping_ || clients_.size() + arriving_ >= options_.max_clients) return;
+    Accepted accepted;
+    accepted.stream = std::move(stream);
+    accepted.scheme = std::move(scheme);
+    add_client(std::move(accepted), "");
+  }
+
   awaitable<void> welcome(std::unique_ptr<ByteStream> stream, std::string local, bool requires_tls) {
     AcceptOptions how;
     how.allowed_origins = options_.allowed_origins;
@@ -326,6 +343,9 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     ServiceSessionOptions session;
     session.connection.features = options_.features;
     session.connection.max_message_size = options_.max_message_size;
+    const auto heartbeat = options_.heartbeat.value_or(heartbeat_of(accepted.scheme));
+    session.connection.heartbeat_period = heartbeat.period * 12 / 10;
+    session.connection.receive_timeout = heartbeat.timeout;
     session.connection.known_peer = accepted.known_peer;
     session.connection.is_encrypted = accepted.is_encrypted;
     if (const auto verified = accepted.stream->verified_peer(); !verified.is_any()) session.verified_node_id = verified;
@@ -346,6 +366,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     for (const auto& listener : listeners_) listener->close();
     listeners_.clear();
     local_.reset();
+    intra_.reset();
     listens_.clear();
     for (const auto& job : repeats_) {
       job->is_stopped = true;
@@ -364,6 +385,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   std::function<void()> services_changed_;
   std::vector<std::unique_ptr<TcpListener>> listeners_;
   std::unique_ptr<LocalListener> local_;
+  std::unique_ptr<IntraListener> intra_;
   std::vector<ListenUrl> listens_;  ///< of the listeners: addresses with their true ports
   std::vector<std::shared_ptr<Repeat>> repeats_;
   std::map<ClientId, std::shared_ptr<ServiceClient>> clients_;

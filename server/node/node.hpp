@@ -5,12 +5,14 @@
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "server/node/service.hpp"
 #include "server/security/tls_context.hpp"
+#include "server/transport/schemes.hpp"
 
 namespace rr {
 
@@ -28,6 +30,10 @@ struct NodeOptions {
   /// makes one the first time. The name is then this node's alone; `id` is not used.
   bool keeps_id = false;
   bool require_tls = false;  ///< clients without TLS are refused
+  /// rr+local: for the users of this machine whom the administrator has let in, not for this user alone.
+  bool local_is_public = false;
+  /// None: as the reference on each transport (heartbeat_of()).
+  std::optional<Heartbeat> heartbeat = {};
   /// A sentence about something that went wrong and that no client hears of; the default writes it to stderr.
   std::function<void(const std::string& problem)> report = {};
 };
@@ -47,9 +53,10 @@ class Node {
   /// "rr+tcp://0.0.0.0:52222", "rr+tcp://[::]:0" (IPv4 as well), "rr+tcp://localhost:0"; port 0 takes a free one.
   /// WebSockets (rr+ws) are taken on the same port, and TLS (rrs+tcp, rrs+ws) where the node has a certificate;
   /// "rrs+tcp://HOST:PORT" takes nothing but TLS.
-  /// "rr+local:///": programs of this user on this machine, who find the node by its ID or name.
-  /// Returns  the port, 0 for rr+local. Throws std::invalid_argument; std::runtime_error ("listen on ...: Address
-  /// already in use").
+  /// "rr+local:///": programs on this machine, who find the node by its ID or name.
+  /// "rr+intra:///": clients in this process, likewise.
+  /// Returns  the port, 0 for rr+local and rr+intra. Throws std::invalid_argument; std::runtime_error ("listen on ...:
+  /// Address already in use").
   std::uint16_t listen(std::string_view url);
 
   /// Runs until stop(), SIGINT or SIGTERM; what else was given to io_context() does not hold it up then.

@@ -29,6 +29,7 @@ struct flock whole_file() {
 Result<LockedFile> LockedFile::open(const fs::path& path) {
   const int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0640);
   if (descriptor < 0) return make_error(ErrorCode::system_resource_error, "open " + path.string() + ": " + reason());
+  ::fchmod(descriptor, 0640);  // whatever the umask says: the group of a public node reads it
   LockedFile file(descriptor, path);
   auto lock = whole_file();
   if (::fcntl(descriptor, F_OFD_SETLK, &lock) != 0) {

@@ -2,7 +2,9 @@
 
 #include "server/security/certificate_files.hpp"
 #include "server/transport/hardware.hpp"
+#include "server/transport/intra.hpp"
 #include "server/transport/local.hpp"
+#include "server/transport/race.hpp"
 #include "server/transport/start_tls.hpp"
 #include "server/transport/tcp.hpp"
 #include "server/transport/tls.hpp"
@@ -127,6 +129,7 @@ constexpr Dialer dialers[] = {
     {"rrs+tcp", dial_secure<dial_tcp>},
     {"rr+ws", dial_websocket},
     {"rr+local", dial_local},
+    {"rr+intra", dial_intra},
     {"rrs+ws", dial_secure<dial_websocket>},
     {"rr+wss", dial_https_websocket},
     {"rrs+wss", dial_secure<dial_https_websocket>},
@@ -141,6 +144,15 @@ const Dialer* find_dialer(std::string_view scheme) {
 }
 
 }  // namespace
+
+Heartbeat heartbeat_of(std::string_view scheme) {
+  using std::chrono::milliseconds;
+  if (scheme == "rr+intra") return {std::chrono::hours(24 * 365), std::chrono::hours(24)};  // none: it can't be cut
+  if (scheme == "rr+local") return {milliseconds(30'000), milliseconds(600'000)};
+  const auto* known = find_url_scheme(scheme);
+  if (known && !known->needs_host) return {milliseconds(5'000), milliseconds(15'000)};
+  return {};
+}
 
 bool can_dial(std::string_view scheme) {
   return find_dialer(scheme) != nullptr;
@@ -158,6 +170,18 @@ awaitable<Dialed> dial(ConnectionUrl url, DialOptions options) {
     co_return make_error(ErrorCode::connection_error,
                          "scheme " + rr::quoted(url.scheme) + " can't be dialed; available: " + dialable_schemes());
   co_return co_await dialer->dial(std::move(url), options);
+}
+
+awaitable<Dialed> dial_any(std::vector<ConnectionUrl> urls, DialOptions options) {
+  std::vector<Runner<std::unique_ptr<ByteStream>>> runners;
+  for (auto& url : urls) {
+    Runner<std::unique_ptr<ByteStream>> runner;
+    runner.name = format_url(url);
+    runner.run = [url = std::move(url), options] { return dial(url, options); };
+    runners.push_back(std::move(runner));
+  }
+  const auto nothing = make_error(ErrorCode::connection_error, "connect: no URL that can be dialed");
+  co_return co_await race(std::move(runners), candidate_stagger, nothing);
 }
 
 }  // namespace rr

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <memory>
+#include <vector>
 
 #include "server/security/tls_context.hpp"
 #include "server/transport/byte_stream.hpp"
@@ -27,6 +28,11 @@ struct DialOptions {
 /// Connects to the device of `url`; nothing is sent but what the scheme itself needs.
 /// Errors   connection_error: not reached in time, refused, or a scheme that isn't in the list; those of
 ///          start_tls_client(), TlsStream::handshake() and make_node_tls().
+/// Throws   boost::system::system_error: it was cancelled.
 awaitable<Result<std::unique_ptr<ByteStream>>> dial(ConnectionUrl url, DialOptions options);
+
+/// Dials several URLs of one device, 15 ms apart and side by side, best first; the first to be reached wins.
+/// Errors   as of race(), with the cause for each URL.
+awaitable<Result<std::unique_ptr<ByteStream>>> dial_any(std::vector<ConnectionUrl> urls, DialOptions options);
 
 }  // namespace rr

@@ -46,8 +46,8 @@ std::optional<uid_t> user_number(const std::string& name) {
 
 }  // namespace
 
-Result<> LocalListener::open(const NodeIdentity& node, std::string nonce) {
-  const auto folders = make_local_folders();
+Result<> LocalListener::open(const NodeIdentity& node, std::string nonce, bool is_public) {
+  const auto folders = is_public ? make_public_folders() : make_local_folders();
   if (!folders) return folders.error();
   clean_local_base(folders->base, folders->sockets);
   auto files = LocalNodeFiles::take(folders->base, node);

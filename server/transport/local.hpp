@@ -12,7 +12,7 @@
 
 namespace rr {
 
-/// Takes the connections of other programs of this user.
+/// Takes the connections of other programs of this user, or of all users that the administrator lets.
 class LocalListener {
  public:
   explicit LocalListener(const boost::asio::any_io_executor& executor)
@@ -21,8 +21,9 @@ class LocalListener {
 
   /// Takes the node's ID and name among this user's nodes, opens its socket, and tells where it is. What nodes that
   /// crashed have left is cleaned up.
-  /// Errors   system_resource_permission_denied: ID or name are in use; system_resource_error.
-  [[nodiscard]] Result<> open(const NodeIdentity& node, std::string nonce);
+  /// Errors   system_resource_permission_denied: ID or name are in use; system_resource_error, also where
+  ///          the machine is not set up for public nodes.
+  [[nodiscard]] Result<> open(const NodeIdentity& node, std::string nonce, bool is_public = false);
   /// As TcpListener::start().
   using OnAccept = std::function<void(std::unique_ptr<ByteStream>)>;
   using OnProblem = std::function<void(const std::string& problem)>;

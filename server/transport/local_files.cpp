@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <map>
+#include <system_error>
 
 #include "server/platform/folders.hpp"
 
@@ -228,6 +229,30 @@ Result<LocalFolders> make_local_folders() {
   for (const auto& folder : {folders.base, folders.sockets}) {
     fs::create_directories(folder, error);
     if (error) return file_error("create", folder, error.message());
+  }
+  return folders;
+}
+
+Result<LocalFolders> make_public_folders() {
+  const auto publics = public_bases_folder();
+  if (!publics) return publics.error();
+  const auto user = user_name();
+  if (user.empty()) return make_error(ErrorCode::system_resource_error, "public nodes: this user has no name");
+  const LocalFolders folders{*publics / user, *publics / user / "socket"};
+  struct stat status {};
+  if (::stat(folders.base.c_str(), &status) != 0 || !S_ISDIR(status.st_mode))
+    return make_error(ErrorCode::system_resource_error,
+                      "this machine is not set up for public nodes of " + user + ": " + folders.base.string() +
+                          " is not there; its administrator makes it: install -d -m 2750 -o " + user +
+                          " -g robotraconteur " + folders.base.string());
+  for (const auto& folder : {folders.base / "by-nodeid", folders.base / "by-nodename", folders.sockets}) {
+    if (::mkdir(folder.c_str(), 0750) != 0) {
+      if (errno == EEXIST) continue;
+      return file_error("create", folder, std::generic_category().message(errno));
+    }
+    // In this order: a change of the group takes the bit away that gives it on to the files.
+    if (::chown(folder.c_str(), static_cast<uid_t>(-1), status.st_gid) != 0 || ::chmod(folder.c_str(), 02750) != 0)
+      return file_error("hand to its group", folder, std::generic_category().message(errno));
   }
   return folders;
 }

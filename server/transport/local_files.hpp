@@ -73,5 +73,9 @@ struct LocalFolders {
 /// Creates them, for this user alone.
 /// Errors   system_resource_error; system_resource_permission_denied: the folder is another user's.
 [[nodiscard]] Result<LocalFolders> make_local_folders();
+/// The same for nodes that others may use: below this user's public base, which the administrator has made, with its
+/// group.
+/// Errors   system_resource_error: there is no such base, or folders can't be made in it.
+[[nodiscard]] Result<LocalFolders> make_public_folders();
 
 }  // namespace rr

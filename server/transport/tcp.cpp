@@ -1,5 +1,7 @@
 #include "server/transport/tcp.hpp"
 
+#include <ifaddrs.h>
+#include <net/if.h>
 #include <netinet/tcp.h>
 
 #include <boost/asio/as_tuple.hpp>
@@ -8,6 +10,7 @@
 #include <boost/asio/ip/v6_only.hpp>
 #include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <set>
 
 #include "server/transport/accept_all.hpp"
 #include "server/transport/socket_stream.hpp"
@@ -167,13 +170,41 @@ awaitable<void> look_up(std::shared_ptr<Lookup> lookup, std::string host, std::s
   lookup->finished.cancel();
 }
 
+/// The interfaces with a link-local IPv6 address of their own.
+std::set<unsigned> link_local_zones() {
+  std::set<unsigned> zones;
+  ifaddrs* all = nullptr;
+  if (::getifaddrs(&all) != 0) return zones;
+  for (const auto* each = all; each != nullptr; each = each->ifa_next) {
+    if (each->ifa_addr == nullptr || each->ifa_addr->sa_family != AF_INET6) continue;
+    const auto* address = reinterpret_cast<const sockaddr_in6*>(each->ifa_addr);
+    if (IN6_IS_ADDR_LINKLOCAL(&address->sin6_addr)) zones.insert(address->sin6_scope_id);
+  }
+  ::freeifaddrs(all);
+  return zones;
+}
+
+/// A literal, in all zones that it may mean.
+std::vector<tcp::endpoint> endpoints_of(const asio::ip::address& literal, std::uint16_t port) {
+  std::vector<tcp::endpoint> endpoints;
+  if (literal.is_v6() && literal.to_v6().is_link_local() && literal.to_v6().scope_id() == 0) {
+    auto address = literal.to_v6();
+    for (const auto zone : link_local_zones()) {
+      address.scope_id(zone);
+      endpoints.emplace_back(address, port);
+    }
+  }
+  if (endpoints.empty()) endpoints.emplace_back(literal, port);
+  return endpoints;
+}
+
 /// IPv4 first, order kept otherwise; a literal needs no look-up.
 awaitable<Result<std::vector<tcp::endpoint>>> resolve(std::string host, std::uint16_t port,
                                                       std::chrono::milliseconds timeout) {
   std::vector<tcp::endpoint> endpoints;
   error_code error;
   if (const auto literal = asio::ip::make_address(host, error); !error) {
-    endpoints.emplace_back(literal, port);
+    endpoints = endpoints_of(literal, port);
     co_return endpoints;
   }
   const auto executor = co_await asio::this_coro::executor;

@@ -41,7 +41,8 @@ class TcpListener {
   std::vector<std::shared_ptr<Acceptor>> acceptors_;
 };
 
-/// Connects to a host: all its addresses, IPv4 first, 5 ms apart and side by side; the first to connect wins.
+/// Connects to a host: all its addresses, IPv4 first, 5 ms apart and side by side; the first to connect wins. A
+/// link-local IPv6 address without zone is tried in the zone of each interface.
 /// Errors   connection_error with the cause of each address, or that `timeout` has passed.
 awaitable<Result<boost::asio::ip::tcp::socket>> connect_tcp(std::string host, std::uint16_t port,
                                                             std::chrono::milliseconds timeout);

@@ -23,6 +23,7 @@ EVIDENCE = {
     ("usb", r"client on USB: .*"): "ours ours rr+usb",
     ("usb", r"through rrgate and USB: .*"): "ours ours rr+tcp rr+usb",
     ("usb", r"the reference uses the device"): "reference ours rr+usb",
+    ("native", r"test_dial/nodes of one process are reached by name and by ID, each on its thread"): "ours ours rr+intra",
     ("native", r"test_transport/an open device carries bytes both ways; each stream opens it anew"): "ours - rr+pci",
 }
 

@@ -7,6 +7,7 @@
 #include <catch2/catch.hpp>
 
 #include "test/server/node/node_fixture.hpp"
+#include "test/server/transport/certificate_lab.hpp"
 
 using namespace rr;
 using std::chrono::milliseconds;
@@ -32,7 +33,8 @@ std::shared_ptr<Service> make_thing(const std::string& name, const std::string& 
 
 /// A Discovery that hears only what the test says.
 struct Listener {
-  Listener() : discovery(io, DiscoveryOptions{.ip = std::nullopt, .local = false, .hardware = std::nullopt}) {}
+  Listener()
+      : discovery(io, DiscoveryOptions{.ip = std::nullopt, .intra = false, .local = false, .hardware = std::nullopt}) {}
 
   void hear(const NodeId& id, std::uint16_t port, const std::string& name = "test.node") {
     discovery.handle_announcement({id, name,
@@ -165,7 +167,9 @@ TEST_CASE("a node expires by itself") {
   constexpr milliseconds expiry{50};
   boost::asio::io_context io;
   Discovery discovery(
-      io, DiscoveryOptions{.ip = std::nullopt, .local = false, .hardware = std::nullopt, .cache = {.expiry = expiry}});
+      io,
+      DiscoveryOptions{
+          .ip = std::nullopt, .intra = false, .local = false, .hardware = std::nullopt, .cache = {.expiry = expiry}});
   const auto begin = std::chrono::steady_clock::now();
   discovery.handle_announcement({NodeId{{1}}, "n", "rr+tcp://127.0.0.1:1/?service=x", ""});
   CHECK(discovery.detected_nodes().size() == 1);
@@ -179,8 +183,8 @@ TEST_CASE("a node expires by itself") {
 
 TEST_CASE("a search that outlives its Discovery finds nothing") {
   boost::asio::io_context io;
-  auto discovery =
-      std::make_unique<Discovery>(io, DiscoveryOptions{.ip = std::nullopt, .local = false, .hardware = std::nullopt});
+  auto discovery = std::make_unique<Discovery>(
+      io, DiscoveryOptions{.ip = std::nullopt, .intra = false, .local = false, .hardware = std::nullopt});
   int ended = 0;
   const auto count = [&](std::exception_ptr, auto found) { ended += found.empty() ? 1 : 100; };
   boost::asio::co_spawn(io, discovery->find_service_by_type("a"), count);
@@ -206,4 +210,29 @@ TEST_CASE("a node says where it listens, and when it has another service") {
                                      "?nodeid=" + format_node_id(node.identity().id, NodeIdFormat::dashes));
   node.stop();
   CHECK(node.listen_urls().empty());
+}
+
+TEST_CASE("found nodes are asked by TLS where their CA is trusted") {
+  rr::test::CertificateLab lab;
+  NodeOptions options;
+  options.id = rr::test::service_node;
+  options.tls = lab.context(lab.good(rr::test::service_node));
+  options.require_tls = true;
+  RunningNode node([](Node& made) { made.add(make_thing("thing")); }, options);
+  for (const bool is_trusted : {false, true}) {
+    boost::asio::io_context io(1);
+    DiscoveryOptions how{.ip = std::nullopt, .intra = false, .local = false, .hardware = std::nullopt};
+    if (is_trusted) how.dial.tls = lab.anonymous();
+    Discovery discovery(io, how);
+    discovery.handle_announcement({options.id, "test.node",
+                                   "rrs+tcp://127.0.0.1:" + std::to_string(node.port()) +
+                                       "/?nodeid=" + format_node_id(options.id, NodeIdFormat::dashes) +
+                                       "&service=RobotRaconteurServiceIndex",
+                                   "nonce"});
+    std::optional<std::vector<ServiceInfo>> found;
+    boost::asio::co_spawn(io, discovery.find_service_by_type("experimental.found.Thing", {}, milliseconds(4000)),
+                          [&](std::exception_ptr, auto services) { found = std::move(services); });
+    while (!found) io.run_one_for(milliseconds(50));
+    CHECK(found->size() == (is_trusted ? 1 : 0));
+  }
 }

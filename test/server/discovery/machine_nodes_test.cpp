@@ -26,6 +26,7 @@ namespace {
 struct Watcher {
   explicit Watcher(std::optional<DriverRoots> hardware = std::nullopt, bool local = true)
       : discovery(io, DiscoveryOptions{.ip = std::nullopt,
+                                       .intra = false,
                                        .local = local,
                                        .hardware = std::move(hardware),
                                        .report = [this](const std::string& problem) { problems.push_back(problem); }}) {
@@ -239,6 +240,7 @@ TEST_CASE("devices are found where the system shows them, and gone with them") {
     io.stop();
   };
   MachineNodesOptions options;
+  options.intra = false;
   options.local = false;
   options.hardware = DriverRoots{root / "class", root / "dev"};
   options.refresh = milliseconds(50);

@@ -145,6 +145,32 @@ TEST_CASE("a name keeps its NodeID, for one node at a time") {
   CHECK(format_node_id(NodeIdClaim::take("old.robot").value().id()) == "{0dfc24e5-8305-4b9f-a4f7-431ef45913a7}");
 }
 
+TEST_CASE("public nodes are for those whom the administrator lets in") {
+  const Sandbox sandbox;
+  NodeOptions options;
+  options.local_is_public = true;
+  Node early("early.node", options);
+  CHECK_THROWS_WITH(early.listen("rr+local:///"), Contains("not set up for public nodes of " + user_name()));
+
+  const auto base = public_bases_folder().value() / user_name();
+  fs::create_directories(base);
+  const auto umask_before = ::umask(077);
+  RunningNode node(add_adder, options);
+  ::umask(umask_before);
+  const auto mode_of = [](const fs::path& path) {
+    struct stat status {};
+    REQUIRE(::stat(path.c_str(), &status) == 0);
+    return status.st_mode & 07777;
+  };
+  for (const auto* folder : {"by-nodeid", "by-nodename", "socket"}) CHECK(mode_of(base / folder) == 02750);
+  CHECK(mode_of(base / "by-nodename" / "test.node.info") == 0640);
+  CHECK(mode_of(base / "by-nodename" / "test.node.pid") == 0640);
+  CHECK(mode_of(list_local_nodes(base).at(0).socket) == 0770);
+  CHECK(list_local_nodes(*user_run_folder() / "transport" / "local").empty());
+  CHECK(add_at("rr+local://" + user_name() + "@localhost/?nodename=test.node&service=Sum") == 3.75);
+  CHECK(add_at("rr+local:///?nodename=test.node&service=Sum") == 3.75);
+}
+
 TEST_CASE("folders follow the reference's variables, but never a relative one") {
   Sandbox sandbox;
   CHECK_THAT(user_run_folder().value().string(), Contains(sandbox.folder()));
