@@ -82,6 +82,9 @@ def test_nodes_are_found_by_ours(network, start, implementation):
     assert (event["event"], event["name"]) == ("found", "a.node")
     assert event["urls"][0].startswith("rr+tcp://[fe80::") and "%eth0]" in event["urls"][0]
     assert len(event["nonce"]) == 16
+    # Without its zone the address is tried on every interface.
+    bare = event["urls"][0].replace("%eth0", "").replace("RobotRaconteurServiceIndex", "thing")
+    assert search(network, 0, OURS, "call", bare) == {"one": 1}
     # One that is there already is asked for.
     late = Watch(start(2, OURS, "watch"))
     late.wait_for(lambda event: event["id"] == IDS[1])

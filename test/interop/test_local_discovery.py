@@ -1,5 +1,8 @@
 """Nodes of the reference on this machine, found through the file system: when they start, end and crash."""
+import getpass
 import json
+import os
+import pathlib
 import urllib.request
 
 import pytest
@@ -51,6 +54,30 @@ def test_a_node_of_the_reference_comes_crashes_and_comes_back(start):
     again.process.stdin.close()
     assert again.process.wait(10) == 0
     watch.wait_for(lambda event: event["id"] == node_id and event["event"] == "lost")
+
+
+@pytest.fixture
+def public_base():
+    """What the administrator makes for users who may offer public nodes."""
+    base = pathlib.Path(os.environ["ROBOTRACONTEUR_SYSTEM_PREFIX"]) / "var/run/robotraconteur/transport/local" / getpass.getuser()
+    base.mkdir(parents=True, exist_ok=True)
+    return base
+
+
+def test_public_nodes_are_found_and_used_both_ways(start, public_base):
+    watch = Watch(start(OURS, "watch", "local"))
+    theirs = start(*THEIRS, "serve-local", "public.theirs", "public")
+    node_id = json.loads(theirs.next_line())["id"]
+    event = watch.wait_for(is_ours(node_id))
+    assert event["urls"] == [f"rr+local://{public_base.name}@localhost/?nodeid={node_id}&service=RobotRaconteurServiceIndex"]
+    url = f"rr+local://{public_base.name}@localhost/?nodeid={node_id}&service=thing"
+    assert json.loads(run(OURS, "call", url).stdout) == {"one": 1}
+
+    ours = start(OURS, "serve-public", "public.ours")
+    node_id = json.loads(ours.next_line())["id"]
+    watch.wait_for(is_ours(node_id))
+    done = run(*THEIRS, "call-local", f"rr+local://{public_base.name}@localhost/?nodename=public.ours&service=thing")
+    assert json.loads(done.stdout) == {"one": 1}, done.stderr
 
 
 def test_the_gateway_makes_a_device_of_it(start, tmp_path):

@@ -22,6 +22,7 @@
 
 #include "server/discovery/discovery.hpp"
 #include "server/discovery/subscribe_service_by_type.hpp"
+#include "server/node/client.hpp"
 #include "server/node/node.hpp"
 
 namespace {
@@ -96,6 +97,18 @@ void serve(const std::string& name, const std::string& id, const std::string& po
   io.run();
 }
 
+void serve_public(const std::string& name) {
+  boost::asio::io_context io(1);
+  rr::NodeOptions options;
+  options.local_is_public = true;
+  rr::Node node(io, name, options);
+  node.add(make_thing("thing"));
+  node.listen("rr+local:///");
+  say({{"ready", true}, {"id", rr::format_node_id(node.identity().id, rr::NodeIdFormat::dashes)}});
+  const Input input(io, [] {});
+  io.run();
+}
+
 void watch(const std::string& ip) {
   boost::asio::io_context io(1);
   rr::Discovery discovery(io, options_for(ip));
@@ -164,6 +177,10 @@ int main(int argc, char** argv) {
   try {
     if (words.size() >= 3 && words[0] == "serve")
       serve(words[1], words[2], words.size() > 3 ? words[3] : "0", words.size() > 4 ? words[4] : "");
+    else if (words.size() == 2 && words[0] == "serve-public")
+      serve_public(words[1]);
+    else if (words.size() == 2 && words[0] == "call")
+      say({{"one", rr::connect(words[1]).get("one").to<std::int32_t>().value()}});
     else if (!words.empty() && words[0] == "watch")
       watch(words.size() > 1 ? words[1] : "");
     else if (words.size() >= 2 && words[0].rfind("subscribe", 0) == 0)
@@ -172,7 +189,8 @@ int main(int argc, char** argv) {
       find(words[0], words[1], words.size() > 2 ? words[2] : "");
     else
       throw std::invalid_argument(
-          "usage: serve NAME NODEID [PORT [ipv4]] | watch [ipv4|local] | find-type TYPE [local] | find-name NAME "
+          "usage: serve NAME NODEID [PORT [ipv4]] | serve-public NAME | call URL | watch [ipv4|local] | find-type TYPE "
+          "[local] | find-name NAME "
           "[local]");
   } catch (const std::exception& failure) {
     std::cerr << "rr-test-discovery: " << failure.what() << '\n';

@@ -1,7 +1,8 @@
 """The reference implementation in the discovery tests: announces a node, or searches. One line of JSON on standard output.
 
 found_node.py serve NAME NODEID [PORT] [ipv4]   a node with the service "thing"; runs until its standard input ends
-found_node.py serve-local NAME                  the same by rr+local alone, with the NodeID that the machine keeps for NAME
+found_node.py serve-local NAME [public]         the same by rr+local alone, with the NodeID that the machine keeps for NAME
+found_node.py call-local URL                    what the thing at this rr+local URL says
 found_node.py find-type TYPE                    its services, on nodes that it hears of within three seconds
 found_node.py detected [ipv4]                   those nodes
 """
@@ -43,10 +44,16 @@ def offer_thing():
     sys.stdin.read()
 
 
-def serve_local(name):
-    given = [*QUIET[2:], "tcp-enable=false", "local-enable=true", "local-start-server=true"]
+def serve_local(name, reach="private"):
+    given = [*QUIET[2:], "tcp-enable=false", "local-enable=true", "local-start-server=true",
+             f"local-server-public={'true' if reach == 'public' else 'false'}"]
     with RR.ServerNodeSetup(name, 0, argv=[f"--robotraconteur-{option}" for option in given]):
         offer_thing()
+
+
+def call_local(url):
+    with RR.ClientNodeSetup(argv=["--robotraconteur-local-enable=true", "--robotraconteur-log-level=WARNING"]):
+        print(json.dumps({"one": RR.RobotRaconteurNode.s.ConnectService(url).one}))
 
 
 def search(what, argument=None):
@@ -67,5 +74,7 @@ if __name__ == "__main__":
         serve(*sys.argv[2:])
     elif sys.argv[1] == "serve-local":
         serve_local(*sys.argv[2:])
+    elif sys.argv[1] == "call-local":
+        call_local(*sys.argv[2:])
     else:
         search(*sys.argv[1:])
