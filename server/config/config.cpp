@@ -144,6 +144,7 @@ void read_discover(ObjectReader& in, Discover& discover) {
   in.size("max_devices", discover.max_devices, {1, 4096});
   in.flag("local", discover.local);
   in.flag("hardware", discover.hardware);
+  in.object("tls", [&](ObjectReader& part) { part.texts("ca", false, read_file_name(discover.tls.ca)); });
 }
 
 void read_proxy(ObjectReader& in, Config& config) {
@@ -176,6 +177,7 @@ void read_limits(ObjectReader& in, Limits& limits) {
   in.size("outbox_bytes", limits.outbox_bytes, {16 * 1024, 64 * 1024 * 1024});
   in.size("clients", limits.clients, {1, 1'000'000});
   in.size("clients_per_address", limits.clients_per_address, {1, 1'000'000});
+  in.size("opaque_rate", limits.opaque_rate, {1024, 1'000'000'000'000});
 }
 
 void read_timeouts(ObjectReader& in, Timeouts& timeouts) {
@@ -291,6 +293,7 @@ ParsedConfig load_config(const std::string& file) {
   }
   for (auto& device : parsed.config.devices)
     for (auto& ca : device.tls.ca) locate(ca);
+  for (auto& ca : parsed.config.discover.tls.ca) locate(ca);
   return parsed;
 }
 

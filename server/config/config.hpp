@@ -18,7 +18,7 @@ namespace rrgate {
 
 using std::chrono::milliseconds;
 
-/// How a device that is reached by TLS is checked. The gateway itself shows no certificate: the clients whose messages
+/// How devices that are reached by TLS are checked. The gateway itself shows no certificate: the clients whose messages
 /// it relays are other nodes than it.
 struct DeviceTls {
   std::vector<std::string> ca;  ///< PEM files; empty: what every Robot Raconteur program on this machine trusts
@@ -46,6 +46,7 @@ struct Limits {
   std::size_t outbox_bytes = 256u * 1024;            ///< held for one client and direction before reading pauses
   std::size_t clients = 4000;                        ///< connections at a time, all addresses together
   std::size_t clients_per_address = 1000;
+  std::size_t opaque_rate = 128u * 1024 * 1024;  ///< bytes a second and direction of what is encrypted end to end
 
   bool operator==(const Limits&) const = default;
 };
@@ -107,6 +108,7 @@ struct Discover {
   std::size_t max_devices = 64;  ///< found ones at a time
   bool local = true;             ///< nodes of this machine, by rr+local
   bool hardware = true;          ///< nodes that are plugged in: rr+usb, rr+pci
+  DeviceTls tls;                 ///< of found devices
 
   bool operator==(const Discover&) const = default;
 };

@@ -24,7 +24,8 @@ rr::awaitable<rr::Result<std::unique_ptr<Boarding>>> board(Gateway& gateway, Dev
 
 rr::awaitable<void> relay_client(Gateway& gateway, Connection& connection, rr::ByteStream& client, Boarding& boarding) {
   const auto& limits = gateway.config().limits;
-  Relay relay(client, *boarding.stream, {limits.max_message_size, limits.outbox_bytes}, boarding.device.traffic());
+  Relay relay(client, *boarding.stream, {limits.max_message_size, limits.outbox_bytes, limits.opaque_rate},
+              boarding.device.traffic());
   connection.device = &boarding.device;
   connection.stop = [&relay](rr::EndReason reason) { relay.stop(std::move(reason)); };
   const auto& name = boarding.device.config().name;

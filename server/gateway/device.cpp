@@ -2,13 +2,16 @@
 
 #include <algorithm>
 #include <boost/asio/as_tuple.hpp>
+#include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
+#include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <random>
 
 #include "core/session/connection.hpp"
 #include "server/log/log.hpp"
+#include "server/transport/race.hpp"
 
 namespace rrgate {
 
@@ -20,6 +23,30 @@ namespace {
 milliseconds with_jitter(milliseconds wait) {
   static thread_local std::minstd_rand random(std::random_device{}());
   return wait * std::uniform_int_distribution<int>(75, 125)(random) / 100;
+}
+
+struct Reached {
+  rr::ConnectionUrl url;
+  ProbeResult answer;
+};
+
+rr::awaitable<rr::Result<Reached>> probe_at(rr::ConnectionUrl url, rr::DialOptions options) {
+  auto answer = co_await probe(url, std::move(options));
+  if (!answer) co_return answer.error();
+  Reached reached{std::move(url), std::move(*answer)};
+  co_return reached;
+}
+
+rr::awaitable<rr::Result<Reached>> probe_any(std::vector<rr::ConnectionUrl> urls, rr::DialOptions options) {
+  std::vector<rr::Runner<Reached>> runners;
+  for (auto& url : urls) {
+    rr::Runner<Reached> runner;
+    runner.name = rr::format_url(url);
+    runner.run = [url = std::move(url), options] { return probe_at(url, options); };
+    runners.push_back(std::move(runner));
+  }
+  const auto nothing = rr::make_error(rr::ErrorCode::connection_error, "no URL");
+  co_return co_await rr::race(std::move(runners), rr::candidate_stagger, nothing);
 }
 
 bool is_secure(const rr::ConnectionUrl& url) {
@@ -41,10 +68,13 @@ std::string_view to_string(DeviceState state) {
   return "unknown";
 }
 
-Device::Device(const asio::any_io_executor& executor, DeviceConfig config, const Config& whole)
+Device::Device(const asio::any_io_executor& executor, DeviceConfig config, const Config& whole,
+               std::shared_ptr<TlsFiles> tls)
     : config_(std::move(config)),
       dial_options_{whole.timeouts.connect, whole.timeouts.send_stall, config_.proxy, config_.headers},
-      tls_(is_secure(config_.url) ? std::make_unique<TlsFiles>(config_.tls) : nullptr),
+      tls_(tls                      ? std::move(tls)
+           : is_secure(config_.url) ? std::make_shared<TlsFiles>(config_.tls)
+                                    : nullptr),
       retry_(whole.retry),
       wake_(executor) {}
 
@@ -65,12 +95,24 @@ void Device::reload_tls(bool is_forced) {
   if (tls_ && (is_forced || tls_->has_changed()) && tls_->reload()) look_again();
 }
 
+template <class T>
+rr::awaitable<rr::Result<T>> Device::until_stopped(rr::awaitable<rr::Result<T>> work) {
+  const auto keep = shared_from_this();
+  const auto given_up = rr::make_error(rr::ErrorCode::operation_aborted, "given up: the device is not wanted any more");
+  if (is_stopping_) co_return given_up;
+  const auto executor = co_await asio::this_coro::executor;
+  const auto signal = dialing_.emplace(dialing_.end());
+  auto token = asio::bind_cancellation_slot(signal->slot(), asio::as_tuple(asio::use_awaitable));
+  auto [failure, result] = co_await asio::co_spawn(executor, std::move(work), std::move(token));
+  dialing_.erase(signal);
+  if (is_stopping_) co_return given_up;
+  if (failure) std::rethrow_exception(failure);
+  co_return std::move(result);
+}
+
 rr::awaitable<rr::Result<std::unique_ptr<rr::ByteStream>>> Device::connect() {
-  rr::Result<std::unique_ptr<rr::ByteStream>> stream = rr::Error{};
-  for (const auto& url : urls_to_try()) {
-    stream = co_await rr::dial(url, dial_options());
-    if (stream) break;
-  }
+  auto dialed = rr::dial_any(urls_to_try(), dial_options());
+  auto stream = co_await until_stopped(std::move(dialed));
   // News either way: it was thought online and can't be reached, or it is back before the next look was due.
   if (stream.has_value() != (state_ == DeviceState::online)) look_again();
   co_return stream;
@@ -99,15 +141,16 @@ rr::awaitable<void> Device::watch() {
   auto backoff = retry_.min;
   while (!is_stopping_) {
     looks_again_ = false;
-    rr::Result<ProbeResult> result = rr::Error{};
-    for (const auto& url : urls_to_try()) {
-      result = co_await probe(url, dial_options());
-      if (is_stopping_) break;
-      if (!result) continue;
-      config_.url = url;
-      break;
-    }
+    auto probed = probe_any(urls_to_try(), dial_options());
+    auto reached = co_await until_stopped(std::move(probed));
     if (is_stopping_) break;
+    rr::Result<ProbeResult> result = rr::Error{};
+    if (reached) {
+      config_.url = std::move(reached->url);
+      result = std::move(reached->answer);
+    } else {
+      result = std::move(reached.error());
+    }
     note(result);
     const auto looked = std::chrono::steady_clock::now();
     wake_.expires_at(looked + with_jitter(result ? retry_.online : backoff));
@@ -142,6 +185,7 @@ void Device::look_again() {
 
 void Device::stop() {
   is_stopping_ = true;
+  for (auto& each : dialing_) each.emit(asio::cancellation_type::terminal);
   wake_.cancel();
 }
 
@@ -176,7 +220,8 @@ rr::Result<> DeviceRegistry::load_tls() {
 }
 
 void DeviceRegistry::reload_tls(bool is_forced) {
-  for (const auto& device : devices_) device->reload_tls(is_forced);
+  for (const auto& device : devices_)
+    if (!device->config().is_found) device->reload_tls(is_forced);  // those have theirs together
 }
 
 namespace {
@@ -226,8 +271,8 @@ bool DeviceRegistry::has(const Device& device) const {
   return std::any_of(devices_.begin(), devices_.end(), [&](const auto& each) { return each.get() == &device; });
 }
 
-Device& DeviceRegistry::add(DeviceConfig device) {
-  devices_.push_back(std::make_shared<Device>(executor_, std::move(device), config_));
+Device& DeviceRegistry::add(DeviceConfig device, std::shared_ptr<TlsFiles> tls) {
+  devices_.push_back(std::make_shared<Device>(executor_, std::move(device), config_, std::move(tls)));
   asio::co_spawn(executor_, watch(devices_.back()), asio::detached);
   return *devices_.back();
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <boost/asio/steady_timer.hpp>
+#include <list>
 #include <memory>
 #include <optional>
 #include <string>
@@ -22,7 +23,9 @@ std::string_view to_string(DeviceState state);
 /// One device. Looks at it from time to time; connects clients to it. Those who use it over a wait hold a Seat.
 class Device : public std::enable_shared_from_this<Device> {
  public:
-  Device(const boost::asio::any_io_executor& executor, DeviceConfig config, const Config& whole);
+  /// `tls`  of all found devices; null: files of its own, where its URL wants them.
+  Device(const boost::asio::any_io_executor& executor, DeviceConfig config, const Config& whole,
+         std::shared_ptr<TlsFiles> tls = nullptr);
 
   const DeviceConfig& config() const { return config_; }
   boost::asio::any_io_executor executor() { return wake_.get_executor(); }
@@ -42,7 +45,7 @@ class Device : public std::enable_shared_from_this<Device> {
   /// The ways to a found device, best first; the first that works becomes config().url.
   void set_urls(std::vector<rr::ConnectionUrl> urls);
 
-  /// A connection for one client. A failure makes the device be looked at again soon.
+  /// A connection for one client, by whichever URL is the quickest. A failure makes the device be looked at again soon.
   rr::awaitable<rr::Result<std::unique_ptr<rr::ByteStream>>> connect();
   /// A client's connection to the device broke: look at it again soon.
   void note_trouble() { look_again(); }
@@ -67,12 +70,15 @@ class Device : public std::enable_shared_from_this<Device> {
   [[nodiscard]] rr::Result<> load_tls();
   void reload_tls(bool is_forced);
 
-  /// Probes until stop().
+  /// Probes until stop(), all URLs side by side; stop() ends what is being dialed.
   rr::awaitable<void> watch();
   void stop();
 
  private:
   rr::DialOptions dial_options() const;
+  /// Errors   those of `work`; operation_aborted: stop() was called.
+  template <class T>
+  rr::awaitable<rr::Result<T>> until_stopped(rr::awaitable<rr::Result<T>> work);
   void look_again();
   /// The one that worked last, then the others.
   std::vector<rr::ConnectionUrl> urls_to_try() const;
@@ -81,7 +87,8 @@ class Device : public std::enable_shared_from_this<Device> {
   DeviceConfig config_;
   std::vector<rr::ConnectionUrl> urls_;  ///< of a found device
   rr::DialOptions dial_options_;
-  std::unique_ptr<TlsFiles> tls_;  ///< null: the URL wants none
+  std::shared_ptr<TlsFiles> tls_;                        ///< null: the URL wants none
+  std::list<boost::asio::cancellation_signal> dialing_;  ///< what stop() ends
   Retry retry_;
   DeviceState state_ = DeviceState::connecting;
   std::string last_error_;
@@ -112,7 +119,7 @@ class DeviceRegistry {
   bool has(const Device& device) const;
 
   /// A found device joins; its name is nobody's yet.
-  Device& add(DeviceConfig device);
+  Device& add(DeviceConfig device, std::shared_ptr<TlsFiles> tls);
   /// A found device goes; clients that are connected to it stay so.
   void remove(const Device& device);
 

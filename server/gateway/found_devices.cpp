@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <boost/asio/as_tuple.hpp>
+#include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/use_awaitable.hpp>
@@ -25,6 +26,7 @@ rr::DiscoveryOptions discovery_options(const Discover& discover) {
   rr::DiscoveryOptions options;
   options.ip = rr::IpDiscoveryScopes{has("node_local"), has("link_local"), has("site_local"), has("ipv4_broadcast")};
   if (discover.scopes.empty()) options.ip.reset();
+  options.intra = false;  // none in this process
   options.local = discover.local;
   if (!discover.hardware) options.hardware.reset();
   options.report = [](const std::string& problem) { log(LogLevel::warning, "discovery", {{"error", problem}}); };
@@ -37,8 +39,25 @@ std::string id_text(const rr::NodeId& id) {
 
 }  // namespace
 
-FoundDevices::FoundDevices(asio::io_context& io, const Config& config, DeviceRegistry& devices)
-    : io_(io), config_(config), devices_(devices), wake_(io) {}
+rr::Result<std::shared_ptr<TlsFiles>> FoundDevices::load_tls(const Discover& discover) {
+  auto tls = std::make_shared<TlsFiles>(discover.tls);
+  if (auto loaded = tls->load(); !loaded) {
+    const auto why = "found devices: " + loaded.error().message;
+    if (!discover.tls.ca.empty()) return rr::make_error(loaded.error().code, why);
+    log(LogLevel::warning, "found devices can't be reached by TLS", {{"error", why}});
+  }
+  return tls;
+}
+
+FoundDevices::FoundDevices(asio::io_context& io, const Config& config, DeviceRegistry& devices,
+                           std::shared_ptr<TlsFiles> tls)
+    : io_(io), config_(config), devices_(devices), tls_(std::move(tls)), wake_(io) {}
+
+void FoundDevices::reload_tls(bool is_forced) {
+  if (!(is_forced || tls_->has_changed()) || !tls_->reload()) return;
+  for (const auto& [id, node] : nodes_)
+    if (const auto device = node.device.lock()) device->note_trouble();  // it may be reached now
+}
 
 void FoundDevices::start() {
   listen();
@@ -50,7 +69,7 @@ void FoundDevices::listen() {
   discovery_->watch([this](const rr::NodeEvent& event) { handle(event); });
 }
 
-void FoundDevices::note_change(const Discover& before) {
+void FoundDevices::note_change(const Discover& before, std::shared_ptr<TlsFiles> tls) {
   const auto& now = config_.discover;
   auto other_rules = before;
   other_rules.allow = now.allow;
@@ -59,6 +78,7 @@ void FoundDevices::note_change(const Discover& before) {
     for (auto& [id, node] : nodes_) drop_device(node);
     nodes_.clear();
     discovery_.reset();
+    if (tls) tls_ = std::move(tls);
     if (now.is_enabled) listen();
   }
   next_review_ = {};
@@ -67,6 +87,7 @@ void FoundDevices::note_change(const Discover& before) {
 
 void FoundDevices::stop() {
   is_stopping_ = true;
+  for (auto& question : questions_) question.emit(asio::cancellation_type::terminal);
   discovery_.reset();
   wake_.cancel();
 }
@@ -104,7 +125,7 @@ void FoundDevices::review(Node& node) {
   made.is_found = true;
   log(LogLevel::info, "device found",
       {{"device", made.name}, {"node_id", id_text(node.info.node_id)}, {"url", rr::format_url(made.url)}});
-  auto& device = devices_.add(std::move(made));
+  auto& device = devices_.add(std::move(made), tls_);
   device.set_urls(urls);
   node.device = device.weak_from_this();
   ++device_count_;
@@ -141,21 +162,29 @@ rr::awaitable<void> FoundDevices::run() {
     if (reviews) next_review_ = now + review_period;
     for (auto& [id, node] : nodes_) {
       if (reviews) review(node);
-      if (node.verdict.urls_to_ask.empty() || open_questions_ >= max_open_questions || !node.refresh.take_due(now))
+      if (node.verdict.urls_to_ask.empty() || questions_.size() >= max_open_questions || !node.refresh.take_due(now))
         continue;
-      ++open_questions_;
-      auto question = ask(id, node.verdict.urls_to_ask);
-      asio::co_spawn(io_, std::move(question), asio::detached);
+      begin_question(id, node.verdict.urls_to_ask);
     }
   }
 }
 
 std::chrono::steady_clock::time_point FoundDevices::next_work() const {
   auto next = next_review_;
-  if (open_questions_ >= max_open_questions) return next;
+  if (questions_.size() >= max_open_questions) return next;
   for (const auto& [id, node] : nodes_)
     if (!node.verdict.urls_to_ask.empty()) next = std::min(next, node.refresh.poll_timeout().value_or(next));
   return next;
+}
+
+void FoundDevices::begin_question(const rr::NodeId& id, std::vector<rr::ConnectionUrl> urls) {
+  const auto question = questions_.emplace(questions_.end());
+  auto asked = ask(id, std::move(urls));
+  asio::co_spawn(io_, std::move(asked),
+                 asio::bind_cancellation_slot(question->slot(), [this, question](std::exception_ptr) {
+                   questions_.erase(question);
+                   wake_.cancel();
+                 }));
 }
 
 rr::awaitable<void> FoundDevices::ask(rr::NodeId id, std::vector<rr::ConnectionUrl> urls) {
@@ -163,8 +192,8 @@ rr::awaitable<void> FoundDevices::ask(rr::NodeId id, std::vector<rr::ConnectionU
   options.self_name = "rrgate";
   options.dial.timeout = config_.timeouts.connect;
   options.dial.send_stall = config_.timeouts.send_stall;
+  options.dial.tls = tls_->context();
   auto answer = co_await rr::query_node(std::move(urls), std::move(options));
-  --open_questions_;
   if (is_stopping_) co_return;
   const auto asked = nodes_.find(id);  // it may have been lost meanwhile
   if (asked == nodes_.end()) co_return;
@@ -178,7 +207,6 @@ rr::awaitable<void> FoundDevices::ask(rr::NodeId id, std::vector<rr::ConnectionU
     node.refresh.handle_failure(now);
   }
   review(node);
-  wake_.cancel();
 }
 
 std::vector<FoundDevices::Entry> FoundDevices::list() const {

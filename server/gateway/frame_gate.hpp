@@ -26,6 +26,7 @@ class FrameGate {
 
   /// After in-stream TLS began: everything passes, unread.
   void make_opaque() { is_opaque_ = true; }
+  bool is_opaque() const { return is_opaque_; }
   /// Whether one of the first messages was a service's consent to TLS: what follows, both ways, is no message. Asked of
   /// the gate from the device.
   bool has_seen_start_tls() const { return has_seen_start_tls_; }

@@ -88,6 +88,11 @@ rr::Result<std::vector<rr::HostPort>> Gateway::start(const std::vector<int>& soc
   if (web_tls_)
     if (auto loaded = web_tls_->load(); !loaded) return loaded.error();
   if (auto loaded = devices_.load_tls(); !loaded) return loaded.error();
+  if (config_.discover.is_enabled) {
+    auto tls = FoundDevices::load_tls(config_.discover);
+    if (!tls) return tls.error();
+    found_ = std::make_unique<FoundDevices>(io_, config_, devices_, std::move(*tls));
+  }
   std::vector<rr::HostPort> bound;
   for (const int socket : sockets)
     if (auto adopted = adopt(socket, bound); !adopted) return adopted.error();
@@ -106,10 +111,7 @@ rr::Result<std::vector<rr::HostPort>> Gateway::start(const std::vector<int>& soc
     asio::co_spawn(io_, std::move(accepting), asio::detached);
   }
   devices_.start();
-  if (config_.discover.is_enabled) {
-    found_ = std::make_unique<FoundDevices>(io_, config_, devices_);
-    found_->start();
-  }
+  if (found_) found_->start();
   asio::co_spawn(io_, watch_tls(), asio::detached);
   return bound;
 }
@@ -121,6 +123,7 @@ rr::awaitable<void> Gateway::watch_tls() {
     if (is_stopping_) break;
     if (web_tls_ && web_tls_->has_changed()) web_tls_->reload();
     devices_.reload_tls(false);
+    if (found_) found_->reload_tls(false);
   }
 }
 
@@ -131,6 +134,12 @@ rr::Result<> Gateway::reconfigure(Config next) {
   if (has_other_tls && !next.tls.certificates.empty()) {
     web_tls = std::make_unique<TlsFiles>(next.tls.certificates);
     if (auto loaded = web_tls->load(); !loaded) return loaded;
+  }
+  std::shared_ptr<TlsFiles> found_tls;
+  if (next.discover.is_enabled) {
+    auto loaded = FoundDevices::load_tls(next.discover);
+    if (!loaded) return loaded.error();
+    found_tls = std::move(*loaded);
   }
   auto devices = devices_.prepare(next);
   if (!devices) return devices.error();
@@ -160,9 +169,9 @@ rr::Result<> Gateway::reconfigure(Config next) {
   admission_.set_limits(config_.limits.clients, config_.limits.clients_per_address);
   devices_.replace(std::move(*devices));
   if (found_) {
-    found_->note_change(before.discover);
+    found_->note_change(before.discover, std::move(found_tls));
   } else if (config_.discover.is_enabled) {
-    found_ = std::make_unique<FoundDevices>(io_, config_, devices_);
+    found_ = std::make_unique<FoundDevices>(io_, config_, devices_, std::move(found_tls));
     found_->start();
   }
   router_ = make_routes(*this);
@@ -178,6 +187,7 @@ rr::Result<> Gateway::reconfigure(Config next) {
 void Gateway::reload_tls() {
   if (web_tls_) web_tls_->reload();
   devices_.reload_tls(true);
+  if (found_) found_->reload_tls(true);
 }
 
 void Gateway::accept(asio::ip::tcp::socket socket) {

@@ -1,11 +1,13 @@
 #include "server/gateway/relay.hpp"
 
+#include <algorithm>
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/error.hpp>
 #include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <chrono>
 #include <cstring>
 #include <memory>
 
@@ -18,14 +20,27 @@ namespace {
 /// After the client has ended its side, the answers on their way may still come for so long.
 constexpr std::chrono::milliseconds half_closed_time{1000};
 
+/// Time that a direction of opaque bytes saves up while it is idle.
+constexpr std::chrono::milliseconds pace_credit{100};
+
 }  // namespace
 
 Relay::Relay(rr::ByteStream& client, rr::ByteStream& device, RelayOptions options, Traffic& traffic)
     : client_(client),
       device_(device),
       options_(options),
-      to_device_{client, device, FrameGate(options.max_message_size), false, traffic.to_device},
-      to_client_{device, client, FrameGate(options.max_message_size), true, traffic.to_clients},
+      to_device_{client,
+                 device,
+                 FrameGate(options.max_message_size),
+                 false,
+                 traffic.to_device,
+                 asio::steady_timer(client.executor())},
+      to_client_{device,
+                 client,
+                 FrameGate(options.max_message_size),
+                 true,
+                 traffic.to_clients,
+                 asio::steady_timer(client.executor())},
       half_closed_limit_(client.executor(),
                          [this] {
                            stop({1000, "the client has ended"});
@@ -49,6 +64,8 @@ void Relay::stop(rr::EndReason reason) {
   end_reason_ = std::move(reason);
   device_.close();
   client_.cancel();
+  to_device_.pace.cancel();
+  to_client_.pace.cancel();
 }
 
 rr::awaitable<void> Relay::pump_to_device() {
@@ -95,7 +112,18 @@ rr::awaitable<void> Relay::pump(Direction& direction) {
     direction.flow.bytes += *passed;
     held -= *passed;
     if (held > 0) std::memmove(buffer.get(), buffer.get() + *passed, held);
+    if (direction.gate.is_opaque()) co_await keep_pace(direction, *passed);
   }
+}
+
+rr::awaitable<void> Relay::keep_pace(Direction& direction, std::size_t bytes) {
+  const auto now = std::chrono::steady_clock::now();
+  const std::chrono::nanoseconds cost(
+      static_cast<std::int64_t>(1e9 * static_cast<double>(bytes) / static_cast<double>(options_.opaque_rate)));
+  direction.pace.expires_at(std::max(direction.pace.expiry(), now - pace_credit) + cost);
+  // Bytes come in bursts: only what is ahead of the rate by more than that waits.
+  if (direction.pace.expiry() > now && !end_reason_)
+    co_await direction.pace.async_wait(asio::as_tuple(asio::use_awaitable));
 }
 
 void Relay::end_of(Direction& direction, rr::error_code error) {

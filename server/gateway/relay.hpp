@@ -18,6 +18,8 @@ struct RelayOptions {
   /// Bytes held for each direction. While they wait to be written nothing is read from the other side: a reader that
   /// stops makes its writer stop, and costs this much memory at most.
   std::size_t outbox_bytes;
+  /// Bytes a second and direction, once both sides have agreed to TLS: no limit of messages holds there.
+  std::size_t opaque_rate;
 };
 
 /// Both streams outlive the relay. One relay, one run().
@@ -42,11 +44,13 @@ class Relay {
     FrameGate gate;
     bool is_from_device;
     Flow& flow;
+    boost::asio::steady_timer pace;  ///< when what has passed opaquely will have taken its time
     std::uint64_t bytes = 0;
   };
 
   rr::awaitable<void> pump_to_device();
   rr::awaitable<void> pump(Direction& direction);
+  rr::awaitable<void> keep_pace(Direction& direction, std::size_t bytes);
   void end_of(Direction& direction, rr::error_code error);
   rr::EndReason broken_rule(const Direction& direction, const rr::Error& error) const;
 

@@ -114,13 +114,14 @@ TEST_CASE("every option arrives") {
     "listen": ["[::1]:1", "localhost:2"],
     "devices": [{"name": "a", "url": "rr+tcp://h:1/?service=s", "max_clients": 3}],
     "discover": {"scopes": ["node_local", "ipv4_broadcast"], "max_devices": 7, "local": false, "hardware": false,
+                 "tls": {"ca": ["lab.pem"]},
                  "allow": [{"node_name": "lab.*", "node_id": "{82301bf1-e1ef-4e89-8d8f-0848291587ac}",
                             "service_type": "com.x.Arm"}]},
     "base_path": "/lab", "trusted_proxies": ["10.0.0.0/8", "::1"], "proxy_headers": "forwarded",
     "proxy_protocol": "required",
     "web_root": "web", "allowed_origins": ["https://a.example", "http://*.b.example:81"],
     "limits": {"max_message_size": 20000, "header_bytes": 2000, "body_bytes": 3000, "header_timeout_ms": 300, "outbox_bytes": 40000,
-               "clients": 5, "clients_per_address": 6},
+               "clients": 5, "clients_per_address": 6, "opaque_rate": 7000},
     "timeouts": {"connect_ms": 101, "drain_ms": 102, "send_stall_ms": 103, "idle_ms": 104},
     "retry": {"min_ms": 51, "max_ms": 52, "online_ms": 53},
     "log": {"level": "debug", "format": "json"} // the end
@@ -131,13 +132,13 @@ TEST_CASE("every option arrives") {
   CHECK(config.devices.at(0).max_clients == 3);
   const auto id = rr::parse_node_id("82301bf1-e1ef-4e89-8d8f-0848291587ac").value();
   CHECK(config.discover ==
-        Discover{true, {"node_local", "ipv4_broadcast"}, {{"lab.*", id, "com.x.Arm"}}, 7, false, false});
+        Discover{true, {"node_local", "ipv4_broadcast"}, {{"lab.*", id, "com.x.Arm"}}, 7, false, false, {{"lab.pem"}}});
   CHECK(config.base_path == "/lab");
   CHECK(config.proxy ==
         ProxyConfig{{{*parse_address_range("10.0.0.0/8"), *parse_address_range("::1")}, ForwardedBy::forwarded}, true});
   CHECK(config.web_root == "web");
   CHECK(config.allowed_origins.size() == 2);
-  CHECK(config.limits == Limits{20000, 2000, 3000, milliseconds(300), 40000, 5, 6});
+  CHECK(config.limits == Limits{20000, 2000, 3000, milliseconds(300), 40000, 5, 6, 7000});
   CHECK(config.timeouts == Timeouts{milliseconds(101), milliseconds(102), milliseconds(103), milliseconds(104)});
   CHECK(config.retry == Retry{milliseconds(51), milliseconds(52), milliseconds(53)});
   CHECK(config.log == LogConfig{"debug", "json"});

@@ -4,6 +4,7 @@
 
 #include "test/server/node/node_fixture.hpp"
 #include "test/server/support/test_gateway.hpp"
+#include "test/server/transport/certificate_lab.hpp"
 
 using namespace rrgate;
 using namespace rrgate::test;
@@ -145,6 +146,30 @@ TEST_CASE("a configured device is not found a second time, and names stay unique
   const auto nodes = wait_for_nodes(gateway, [](const json& all) { return all.size() == 3; });
   for (const auto& node : nodes)
     if (node["node_name"] == "node.x") CHECK(node["device"] == "x");
+}
+
+TEST_CASE("found nodes with TLS are checked by the CA for found nodes") {
+  rr::test::CertificateLab lab;
+  rr::NodeOptions options;
+  options.id = rr::test::service_node;
+  options.tls = lab.context(lab.good(rr::test::service_node));
+  options.require_tls = true;
+  rr::RunningNode node([](rr::Node& made) { made.add(make_thing()); }, options);
+  auto news = at(options.id, node.port(), "test.node");
+  news.url.replace(0, 2, "rrs");
+  const auto allow = allowing({{"", {}, "com.x.Arm"}});
+  {
+    TestGateway untrusting(0, allow);
+    untrusting.announce(news);
+    wait_for_nodes(untrusting, [](const json& all) { return all.size() == 1; });
+    CHECK(wait_for_devices(untrusting, [](const json&) { return true; }).empty());
+  }
+  TestGateway gateway(0, [&](Config& config) {
+    allow(config);
+    config.discover.tls.ca = lab.trust().files;
+  });
+  gateway.announce(news);
+  wait_for_devices(gateway, [](const json& all) { return all.size() == 1 && all[0]["state"] == "online"; });
 }
 
 TEST_CASE("a flood of nodes makes no more devices than may be") {

@@ -1,6 +1,8 @@
 // Stopping: listeners first, relays within their time, then everything.
 #include <catch2/catch.hpp>
 
+#include <boost/asio/ip/tcp.hpp>
+
 #include "test/server/support/test_gateway.hpp"
 
 using namespace rrgate;
@@ -57,6 +59,30 @@ TEST_CASE("what is left at the deadline is ended with a reason") {
   CHECK((frame.payload.at(0) << 8 | frame.payload.at(1)) == 1001);
   CHECK(peer.receive_all().empty());
   CHECK(stopped.wait_for(std::chrono::seconds(5)) == std::future_status::ready);
+}
+
+TEST_CASE("a device that hangs while it is dialed doesn't hold up the end") {
+  boost::asio::io_context never_run;
+  using boost::asio::ip::tcp;
+  tcp::acceptor hanging(never_run, tcp::v4());
+  hanging.bind({boost::asio::ip::address_v4::loopback(), 0});
+  hanging.listen(0);
+  std::vector<tcp::socket> fillers;  // a full accept queue: further connections wait for an answer that never comes
+  for (int i = 0; i < 8; ++i) {
+    fillers.emplace_back(never_run, tcp::v4());
+    fillers.back().async_connect(hanging.local_endpoint(), [](const auto&) {});
+  }
+  const auto url = "rr+tcp://127.0.0.1:" + std::to_string(hanging.local_endpoint().port()) + "/?service=x";
+  auto gateway = std::make_unique<TestGateway>(1, [&](Config& config) {
+    config.devices[0].url = rr::parse_url(url).value();
+    config.timeouts.connect = std::chrono::seconds(60);
+  });
+  TestClient client(gateway->port());
+  client.send(make_greeting());
+  gateway->wait_for_state("connecting");
+  const auto begin = std::chrono::steady_clock::now();
+  gateway.reset();  // waits until its loop has nothing left to do
+  CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(10));
 }
 
 TEST_CASE("a client that takes nothing doesn't hold up the end") {

@@ -1,0 +1,101 @@
+// A device of the gateway by itself: which of its URLs is taken, and how it stops.
+#include "server/gateway/device.hpp"
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <catch2/catch.hpp>
+
+#include "test/server/node/node_fixture.hpp"
+
+using namespace rrgate;
+using boost::asio::ip::tcp;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+namespace {
+
+/// Listens, but answers no further connection: its queue is full.
+class Hanging {
+ public:
+  Hanging() : acceptor_(io_, tcp::v4()) {
+    acceptor_.bind({boost::asio::ip::address_v4::loopback(), 0});
+    acceptor_.listen(0);
+    for (int i = 0; i < 8; ++i) {
+      fillers_.emplace_back(io_, tcp::v4());
+      fillers_.back().async_connect(acceptor_.local_endpoint(), [](const auto&) {});
+    }
+  }
+  rr::ConnectionUrl url() const {
+    return rr::parse_url("rr+tcp://127.0.0.1:" + std::to_string(acceptor_.local_endpoint().port()) + "/?service=x")
+        .value();
+  }
+
+ private:
+  boost::asio::io_context io_;  // never run
+  tcp::acceptor acceptor_;
+  std::vector<tcp::socket> fillers_;
+};
+
+/// A device on a loop of its own, watched.
+struct Watched {
+  explicit Watched(rr::ConnectionUrl url) {
+    config.timeouts.connect = seconds(60);
+    DeviceConfig made;
+    made.name = "x";
+    made.url = std::move(url);
+    device = std::make_shared<Device>(io.get_executor(), std::move(made), config);
+  }
+  void start() {
+    const auto watch = [kept = device]() -> rr::awaitable<void> { co_await kept->watch(); };
+    boost::asio::co_spawn(io, watch, boost::asio::detached);
+  }
+  /// Until nothing is left to do.
+  milliseconds run_out() {
+    const auto begin = std::chrono::steady_clock::now();
+    io.restart();
+    io.run();
+    return std::chrono::duration_cast<milliseconds>(std::chrono::steady_clock::now() - begin);
+  }
+
+  Config config;
+  boost::asio::io_context io{1};
+  std::shared_ptr<Device> device;
+};
+
+}  // namespace
+
+TEST_CASE("a device that hangs while it is dialed stops at once, for its clients too") {
+  const Hanging hanging;
+  Watched watched(hanging.url());
+  watched.start();
+  std::optional<rr::Error> failure;
+  boost::asio::co_spawn(watched.io, watched.device->connect(), [&](std::exception_ptr, auto stream) {
+    if (!stream) failure = stream.error();
+  });
+  watched.io.run_for(milliseconds(200));
+  CHECK_FALSE(failure);
+  watched.device->stop();
+  CHECK(watched.run_out() < seconds(5));
+  REQUIRE(failure);
+  CHECK(failure->code == rr::ErrorCode::operation_aborted);
+}
+
+TEST_CASE("of the URLs of a found device the one that answers is taken, whichever hangs") {
+  const Hanging hanging;
+  rr::RunningNode node([](rr::Node&) {});
+  const auto good = rr::parse_url(node.url("x")).value();
+  Watched watched(hanging.url());
+  watched.device->set_urls({hanging.url(), good});
+  watched.start();
+  for (int i = 0; i < 100 && watched.device->state() != DeviceState::online; ++i) {
+    watched.io.restart();
+    watched.io.run_for(milliseconds(50));
+  }
+  CHECK(watched.device->state() == DeviceState::online);
+  CHECK(watched.device->config().url == good);
+  CHECK(watched.device->identity()->node_name == "test.node");
+  watched.device->stop();
+  CHECK(watched.run_out() < seconds(5));
+}

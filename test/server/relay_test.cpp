@@ -1,0 +1,80 @@
+// What the relay does that the gateway's own tests can't wait for: streams in memory.
+#include "server/gateway/relay.hpp"
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/io_context.hpp>
+#include <catch2/catch.hpp>
+
+#include "core/session/start_tls.hpp"
+#include "test/server/transport/memory_stream.hpp"
+
+using namespace rrgate;
+using std::chrono::milliseconds;
+
+namespace {
+
+rr::awaitable<void> send_all(rr::ByteStream& stream, rr::Bytes bytes) {
+  const rr::ByteSpan slice(bytes);
+  const std::span<const rr::ByteSpan> slices(&slice, 1);
+  co_await stream.write(slices);
+  stream.finish_sending();
+}
+
+rr::awaitable<void> receive_all(rr::ByteStream& stream, std::size_t& received) {
+  rr::Bytes buffer(65536);
+  for (;;) {
+    const auto read = co_await stream.read_some(buffer);
+    if (read.error || read.is_end()) break;
+    received += read.bytes;
+  }
+}
+
+/// A device that agrees to TLS, then sends `bytes` that are no message, through a relay of `rate`.
+struct OpaqueRun {
+  explicit OpaqueRun(std::size_t bytes, std::size_t rate, milliseconds stop_after = milliseconds(60'000)) {
+    boost::asio::io_context io(1);
+    rr::test::MemoryStreams client(io.get_executor());
+    rr::test::MemoryStreams device(io.get_executor());
+    Traffic traffic;
+    Relay relay(*client.server, *device.client, {5'000'000, 65'536, rate}, traffic);
+    const rr::NodeIdentity self{rr::NodeId{{1}}, "device"};
+    auto out = rr::answer_first_request(rr::make_start_tls({}, true), self, true).value().reply;
+    sent = out.size() + bytes;
+    out.resize(sent);
+    const auto begin = std::chrono::steady_clock::now();
+    boost::asio::co_spawn(io, send_all(*device.server, std::move(out)), boost::asio::detached);
+    boost::asio::co_spawn(io, receive_all(*client.client, received), boost::asio::detached);
+    boost::asio::co_spawn(io, relay.run(), [&](std::exception_ptr, rr::EndReason why) {
+      reason = std::move(why);
+      took = std::chrono::duration_cast<milliseconds>(std::chrono::steady_clock::now() - begin);
+    });
+    io.run_for(stop_after);
+    relay.stop({1001, "stopped"});
+    client.client->close();
+    device.server->close();
+    io.restart();
+    io.run();
+  }
+
+  std::size_t sent = 0;
+  std::size_t received = 0;
+  rr::EndReason reason;
+  milliseconds took{};
+};
+
+}  // namespace
+
+TEST_CASE("what is encrypted end to end passes whole, at a bounded rate") {
+  const OpaqueRun run(600'000, 1'000'000);
+  CHECK(run.received == run.sent);
+  CHECK(run.took >= milliseconds(400));
+  CHECK(run.took < milliseconds(10'000));
+}
+
+TEST_CASE("a relay that keeps its pace stops at once") {
+  const OpaqueRun run(600'000, 1024, milliseconds(100));
+  CHECK(run.received < run.sent);
+  CHECK(run.reason.text == "stopped");
+  CHECK(run.took < milliseconds(5'000));
+}
