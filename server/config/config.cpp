@@ -33,7 +33,8 @@ std::string check_device_name(const std::string& name) {
 std::string read_device_url(const std::string& text, rr::ConnectionUrl& target) {
   auto url = rr::parse_url(text, rr::ServiceInUrl::optional);
   if (!url) return url.error().message;
-  if (!rr::can_dial(url->scheme))
+  // No node of this process is a device.
+  if (!rr::can_dial(url->scheme) || url->scheme == "rr+intra")
     return "scheme " + rr::quoted(url->scheme) + " is not available for devices; available: " + rr::dialable_schemes();
   target = *url;
   return {};

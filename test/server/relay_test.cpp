@@ -4,6 +4,8 @@
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/use_awaitable.hpp>
 #include <catch2/catch.hpp>
 
 #include "core/session/start_tls.hpp"
@@ -14,10 +16,19 @@ using std::chrono::milliseconds;
 
 namespace {
 
-rr::awaitable<void> send_all(rr::ByteStream& stream, rr::Bytes bytes) {
-  const rr::ByteSpan slice(bytes);
-  const std::span<const rr::ByteSpan> slices(&slice, 1);
-  co_await stream.write(slices);
+/// As a device does: what follows its consent waits until the client has that.
+rr::awaitable<void> send_all(rr::ByteStream& stream, rr::Bytes consent, rr::Bytes rest, const std::size_t& received) {
+  const rr::ByteSpan first(consent);
+  const std::span<const rr::ByteSpan> consent_slices(&first, 1);
+  co_await stream.write(consent_slices);
+  boost::asio::steady_timer pause(stream.executor());
+  while (received < consent.size()) {
+    pause.expires_after(milliseconds(1));
+    co_await pause.async_wait(boost::asio::use_awaitable);
+  }
+  const rr::ByteSpan second(rest);
+  const std::span<const rr::ByteSpan> rest_slices(&second, 1);
+  co_await stream.write(rest_slices);
   stream.finish_sending();
 }
 
@@ -41,9 +52,9 @@ struct OpaqueRun {
     const rr::NodeIdentity self{rr::NodeId{{1}}, "device"};
     auto out = rr::answer_first_request(rr::make_start_tls({}, true), self, true).value().reply;
     sent = out.size() + bytes;
-    out.resize(sent);
     const auto begin = std::chrono::steady_clock::now();
-    boost::asio::co_spawn(io, send_all(*device.server, std::move(out)), boost::asio::detached);
+    boost::asio::co_spawn(io, send_all(*device.server, std::move(out), rr::Bytes(bytes), received),
+                          boost::asio::detached);
     boost::asio::co_spawn(io, receive_all(*client.client, received), boost::asio::detached);
     boost::asio::co_spawn(io, relay.run(), [&](std::exception_ptr, rr::EndReason why) {
       reason = std::move(why);
