@@ -4,6 +4,7 @@ import http.client
 import json
 import os
 import pathlib
+import random
 import selectors
 import signal
 import socket
@@ -17,9 +18,15 @@ START_DEADLINE = 30.0  # seconds until a process must be ready
 
 
 def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
+    """Below those that the system gives to connections: until somebody listens on it, no connection takes it."""
+    while True:
+        port = random.randrange(10000, 32768)
+        with socket.socket() as probe:
+            try:
+                probe.bind(("127.0.0.1", port))
+                return port
+            except OSError:
+                pass
 
 
 class Background:

@@ -367,8 +367,7 @@ int main(int argc, char** argv) {
       constexpr std::string_view heartbeat = "--heartbeat-ms=";
       if (argument.substr(0, heartbeat.size()) == heartbeat) {
         const std::chrono::milliseconds period(std::stoi(std::string(argument.substr(heartbeat.size()))));
-        connect_options.connection.heartbeat_period = period;
-        connect_options.connection.receive_timeout = period * 3 / 2;  // as of the protocol's own figures
+        connect_options.heartbeat = rr::Heartbeat{period, period * 3 / 2};  // as of the protocol's own figures
       }
       if (argument == "--robotraconteur-load-tls=true")
         connect_options.dial.tls = rr::load_node_tls(connect_options.connection.self.id).value();
