@@ -18,8 +18,9 @@ if(EMSCRIPTEN)
   # Catch2 reports by exceptions; the core below it stays built without them.
   target_compile_options(rr_test_headers INTERFACE -fexceptions)
   target_compile_definitions(rr_test_headers INTERFACE CATCH_CONFIG_NO_POSIX_SIGNALS)
+  # -O1: at -O3 a test program is optimised for a minute after linking.
   target_link_options(rr_test_headers INTERFACE -fexceptions -sNODERAWFS=1 -sEXIT_RUNTIME=1 -sALLOW_MEMORY_GROWTH=1
-                                                -sENVIRONMENT=node)
+                                                -sENVIRONMENT=node -O1)
 else()
   find_package(Catch2 2.13 REQUIRED)
   find_package(nlohmann_json 3.11 REQUIRED)

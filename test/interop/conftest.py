@@ -73,6 +73,7 @@ def pytest_generate_tests(metafunc):
                              ids=[f"{direction.name}-{level}" for direction, level in pairs])
 
 
+@pytest.hookimpl(tryfirst=True)  # before the groups are read
 def pytest_collection_modifyitems(config, items):
     """Scenarios that a client or a service cannot carry out are not its tests."""
     def is_known(item):
