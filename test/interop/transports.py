@@ -31,12 +31,15 @@ TCP_ONLY = "the gateway's clients come by TCP"
 INTRA = "stays within one process, the gateway is another"
 IN_PROCESS = "the reference's is of its own process: no other implementation can be in it"
 
+HOST_ONLY = "the reference is a USB host; what it connects to is firmware"
+
 # Why a cell can have no test; an entry without route or role is for all of them.
 REASONS = {
     ("rr+local", "gateway", "our client"): TCP_ONLY,
     ("rr+local", "gateway", "reference client"): TCP_ONLY,
     ("rr+usb", "gateway", "our client"): TCP_ONLY,
     ("rr+usb", "gateway", "reference client"): TCP_ONLY,
+    ("rr+usb", None, "reference service"): HOST_ONLY,
     ("rr+pci", "gateway", "our client"): TCP_ONLY,
     ("rr+pci", "gateway", "reference client"): TCP_ONLY,
     ("rr+intra", "gateway", None): INTRA,
