@@ -1,11 +1,11 @@
 #include "server/http/static_files.hpp"
 
 #include <algorithm>
-#include <cstdio>
 #include <fstream>
 #include <sstream>
 
 #include "core/session/url.hpp"
+#include "server/http/etag.hpp"
 
 namespace rrgate {
 
@@ -34,15 +34,6 @@ bool is_safe_path(std::string_view path) {
     if (slash == std::string_view::npos) return true;
     path.remove_prefix(slash + 1);
   }
-}
-
-/// FNV-1a: an ETag must differ when the content does, not resist an attacker.
-std::string make_etag(std::string_view content, std::string_view encoding) {
-  std::uint64_t hash = 14695981039346656037u;
-  for (const char c : content) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211u;
-  char text[32];
-  std::snprintf(text, sizeof(text), "\"%016llx", static_cast<unsigned long long>(hash));
-  return std::string(text) + std::string(encoding) + "\"";
 }
 
 /// A token of Accept-Encoding that isn't refused by q=0.

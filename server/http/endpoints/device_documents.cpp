@@ -1,12 +1,12 @@
 #include "server/http/endpoints/device_documents.hpp"
 
 #include <algorithm>
-#include <cstdio>
 #include <set>
 
 #include "core/session/url.hpp"
 #include "server/definitions/definition_set.hpp"
 #include "server/definitions/generate_typescript.hpp"
+#include "server/http/etag.hpp"
 #include "server/json/schema.hpp"
 
 namespace rrgate {
@@ -373,11 +373,7 @@ Response device_document(std::string_view document, std::string_view device, con
 }
 
 Response with_etag(Response response, const Request& request) {
-  // FNV-1a: an ETag must differ when the content does, not resist an attacker.
-  std::uint64_t hash = 14695981039346656037u;
-  for (const char c : *response.body) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211u;
-  char etag[24];
-  std::snprintf(etag, sizeof etag, "\"%016llx\"", static_cast<unsigned long long>(hash));
+  const auto etag = make_etag(*response.body);
   response.set("ETag", etag).set("Cache-Control", "no-cache");
   if (!has_token(request.header(http::field::if_none_match), etag)) return response;
   response.status = 304;

@@ -1,0 +1,12 @@
+// What tells one content from another. Layer: server/http.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace rrgate {
+
+/// Quoted, as a header has it; the same for the same content, in every run. `suffix` tells encodings of it apart.
+std::string make_etag(std::string_view content, std::string_view suffix = {});
+
+}  // namespace rrgate
