@@ -23,6 +23,15 @@ constexpr std::chrono::milliseconds half_closed_time{1000};
 /// Time that a direction of opaque bytes saves up while it is idle.
 constexpr std::chrono::milliseconds pace_credit{100};
 
+rr::EndReason lost_client(std::uint16_t code, const rr::error_code& error) {
+  if (error == asio::error::timed_out) return {1013, "client too slow"};
+  return {code, "client lost: " + error.message()};
+}
+
+rr::EndReason lost_device(const rr::error_code& error) {
+  return {1011, error == asio::error::timed_out ? "device takes no data" : "device lost: " + error.message()};
+}
+
 }  // namespace
 
 Relay::Relay(rr::ByteStream& client, rr::ByteStream& device, RelayOptions options, Traffic& traffic)
@@ -102,10 +111,7 @@ rr::awaitable<void> Relay::pump(Direction& direction) {
     const auto error = co_await direction.to.write({&slice, 1});
     direction.flow.waiting -= *passed;
     if (error) {
-      const bool is_slow = error == asio::error::timed_out;
-      stop(direction.is_from_device
-               ? rr::EndReason{1013, is_slow ? "client too slow" : "client lost: " + error.message()}
-               : rr::EndReason{1011, is_slow ? "device takes no data" : "device lost: " + error.message()});
+      stop(direction.is_from_device ? lost_client(1013, error) : lost_device(error));
       break;
     }
     direction.bytes += *passed;
@@ -128,10 +134,9 @@ rr::awaitable<void> Relay::keep_pace(Direction& direction, std::size_t bytes) {
 
 void Relay::end_of(Direction& direction, rr::error_code error) {
   if (direction.is_from_device) {
-    stop(error ? rr::EndReason{1011, "device lost: " + error.message()}
-               : rr::EndReason{1000, "device closed the connection"});
+    stop(error ? lost_device(error) : rr::EndReason{1000, "device closed the connection"});
   } else if (error) {
-    stop({1000, "client lost: " + error.message()});
+    stop(lost_client(1000, error));
   } else if (!end_reason_) {
     device_.finish_sending();
     half_closed_limit_.arm(half_closed_time);

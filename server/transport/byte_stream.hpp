@@ -41,7 +41,7 @@ class ByteStream {
   ByteStream& operator=(const ByteStream&) = delete;
   virtual ~ByteStream() = default;
 
-  /// Waits for at least one byte. `into` is not empty and outlives the wait.
+  /// Waits for at least one byte. `into` is not empty and outlives the wait. Errors: also timed_out, as of write().
   virtual awaitable<ReadResult> read_some(std::span<std::uint8_t> into) = 0;
 
   /// Writes as much of the slices as goes without waiting.

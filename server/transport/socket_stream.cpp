@@ -36,6 +36,7 @@ awaitable<ReadResult> SocketStream::read_some(std::span<std::uint8_t> into) {
   if (const auto count = take_put_back(into)) co_return ReadResult{{}, count};
   auto [error, bytes] = co_await socket_.async_read_some(asio::buffer(into.data(), into.size()), await_tuple);
   if (error == asio::error::eof) error = {};
+  if (error && is_stalled_) error = asio::error::timed_out;  // as the write says: who hears of it first does not matter
   co_return ReadResult{error, bytes};
 }
 

@@ -1,0 +1,164 @@
+"""The load programs as processes, and what the kernel knows of them. For test/interop/test_shared_load.py."""
+import contextlib
+import json
+import os
+import pathlib
+import re
+import signal
+import sys
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "interop"))
+
+from processes import BUILD, Background, free_port, read_json  # noqa: E402
+
+PROGRAMS = BUILD / "test" / "load"
+NEVER_MS = 3_600_000  # looks at the device are connections too
+
+
+class Device:
+    """A device with a wire, `rate` values a second, and a pipe, `packet_rate` packets of `packet_bytes` a second."""
+
+    def __init__(self, folder, rate=100, packet_rate=0, packet_bytes=16384):
+        self.process = Background([PROGRAMS / "load_device", "--rate", rate, "--packet-rate", packet_rate,
+                                   "--packet-bytes", packet_bytes], folder / "device.log")
+        ready = json.loads(self.process.next_line())
+        self.url, self.port, self.pid = ready["url"], ready["port"], self.process.process.pid
+
+    def cpu_seconds(self):
+        return cpu_seconds(self.pid)
+
+    def connections(self):
+        """How many clients are connected now, whatever for."""
+        return connections_to(self.pid, self.port)
+
+    def stop(self):
+        self.process.stop()
+
+
+class Gateway:
+    """A gateway to one device, "load", that can be killed and started again on the same port."""
+
+    def __init__(self, folder, device_url, device={}, **more):
+        self.port = free_port()
+        self.log = folder / "gateway.log"
+        self._file = folder / "gateway.json"
+        self._file.write_text(json.dumps({
+            "listen": [f"127.0.0.1:{self.port}"],
+            "devices": [{"name": "load", "url": device_url, **device}],
+            "log": {"format": "json"},
+            "limits": {"clients": 10000, "clients_per_address": 10000, **more.pop("limits", {})},
+            "retry": {"online_ms": NEVER_MS},
+            **more,
+        }))
+        self.start()
+
+    def start(self):
+        self.process = Background([BUILD / "server" / "rrgate", "serve", "--config", self._file], self.log)
+        try:
+            self.process.wait_until(self._device_is_up)
+        except BaseException:
+            self.process.stop()
+            raise
+        self.pid = self.process.process.pid
+
+    def _device_is_up(self):
+        answer = read_json(f"http://127.0.0.1:{self.port}/api/v1/devices")
+        return answer is not None and answer["devices"][0]["state"] == "online"
+
+    def kill(self):
+        """As the kernel does it: nobody is told."""
+        self.process.process.send_signal(signal.SIGKILL)
+        self.process.stop()
+
+    def url(self, scheme="rr+tcp"):
+        if scheme == "rr+tcp":
+            return f"rr+tcp://127.0.0.1:{self.port}/?service=Load"
+        return f"{scheme}://127.0.0.1:{self.port}/devices/load?service=Load"
+
+    def events(self, name):
+        lines = self.log.read_text().splitlines()
+        return [event for event in (json.loads(line) for line in lines if line.endswith("}")) if event["event"] == name]
+
+    def wait_for(self, name, is_the_one=lambda event: True):
+        """The first event of this name that is the one."""
+        found = []
+
+        def is_there():
+            found[:] = [event for event in self.events(name) if is_the_one(event)]
+            return bool(found)
+
+        self.process.wait_until(is_there)
+        return found[0]
+
+    def resident_bytes(self):
+        return resident_bytes(self.pid)
+
+    def stop(self):
+        self.process.stop()
+
+
+class Clients:
+    """A process with many clients; begins at once."""
+
+    def __init__(self, folder, url, clients, *options, name="clients", wire="state", pipe=None):
+        command = [PROGRAMS / "load_clients", "--url", url, "--clients", clients, "--wire", wire, *options]
+        self.process = Background(command + (["--pipe", pipe] if pipe else []), folder / f"{name}.log")
+
+    def wait_until_ready(self, within=60.0):
+        """{"ready": how many, "seconds": since they began, or since the first was lost, "failed": {reason: count}}."""
+        answer = json.loads(self.process.next_line(within))
+        assert answer["event"] == "ready", answer
+        return answer
+
+    def report(self, within=60.0):
+        """What they noticed, as load_clients.cpp has it; waits for those with --seconds."""
+        answer = json.loads(self.process.next_line(within))
+        while answer["event"] != "end":
+            answer = json.loads(self.process.next_line(within))
+        return answer
+
+    def resume(self):
+        """The stalled ones read on. Returns the reason by which the first of them is lost."""
+        self.process.process.send_signal(signal.SIGUSR1)
+        answer = json.loads(self.process.next_line())
+        assert answer["event"] == "stalled_lost", answer
+        return answer["reason"]
+
+    def finish(self):
+        """Ends them. Returns the report."""
+        self.process.process.send_signal(signal.SIGTERM)
+        return self.report()
+
+    def stop(self):
+        self.process.stop()
+
+
+@contextlib.contextmanager
+def running(process):
+    try:
+        yield process
+    finally:
+        process.stop()
+
+
+def cpu_seconds(pid):
+    fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def resident_bytes(pid):
+    return int(re.search(r"VmRSS:\s+(\d+) kB", pathlib.Path(f"/proc/{pid}/status").read_text())[1]) * 1024
+
+
+def connections_to(pid, port):
+    """Connections that a process has accepted on a port of 127.0.0.1."""
+    established = set()
+    for line in pathlib.Path("/proc/net/tcp").read_text().splitlines()[1:]:
+        _, local, _, state, *_, = line.split()
+        if state == "01" and int(local.rsplit(":", 1)[1], 16) == port:
+            established.add(f"socket:[{line.split()[9]}]")
+    count = 0
+    for file in pathlib.Path(f"/proc/{pid}/fd").iterdir():
+        with contextlib.suppress(FileNotFoundError):
+            count += os.readlink(file) in established
+    return count
