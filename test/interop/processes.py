@@ -105,11 +105,11 @@ def read_json(url, asked_from=""):
         connection.close()
 
 
-def start_gateway(folder, device_url, page_origin=None, device={}, asked_from="", host=None, on=None, **more):
+def start_gateway(folder, device_url, page_origin=None, device={}, asked_from="", host=None, on=None, port=None, **more):
     """A gateway to one device, called "interop", when it has reached it: (process, port). `device` and `more` are
     further members of the device's configuration and of the whole; it is asked how it is from `asked_from`. `on` makes
-    the command that runs it elsewhere, `host` is a network.Network and a host of it to run it on."""
-    port = free_port()
+    the command that runs it elsewhere, `host` is a network.Network and a host of it to run it on. `port`: that one."""
+    port = port or free_port()
     config = folder / "gateway.json"
     config.write_text(json.dumps({
         "listen": [f"127.0.0.1:{port}"],

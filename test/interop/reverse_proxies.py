@@ -60,17 +60,18 @@ def program(name):
 
 
 class ReverseProxy:
-    """One proxy before a gateway; `root` is the port of its site at "/", `below` of the one at "/robots/"."""
+    """One proxy before a gateway; `root` is the port of its site at "/", `below` of the one at "/robots/". `ports` are
+    further ones of the file, and what stands for each."""
 
-    def __init__(self, name, config, folder, gateway_port):
+    def __init__(self, name, config, folder, gateway_port=8080, ports={}):
         self.name = name
         self.folder = pathlib.Path(folder)
         self.root, self.below = free_port(), free_port()
         text = (CONFIGS / config).read_text()
-        for port, ours in ((8080, gateway_port), (8081, self.root), (8082, self.below)):
+        for port, ours in {8080: gateway_port, 8081: self.root, 8082: self.below, **ports}.items():
             text = re.sub(rf"\b{port}\b", str(ours), text)
         self._admin = free_port()
-        self.file = self.folder / config
+        self.file = self.folder / pathlib.Path(config).name
         self.file.write_text(self._whole(text))
         self._process = Background(self._command(), self.folder / f"{name}.log", {"HOME": str(self.folder)})
         try:
