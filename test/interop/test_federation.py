@@ -1,0 +1,125 @@
+"""A gateway behind a gateway: device <- far gateway <- near gateway <- client, each of the ways with TLS somewhere."""
+import json
+import signal
+import sys
+
+import pytest
+
+from directions import LEVELS, PEERS
+from processes import Background, read_json, start_gateway
+from scenarios import SCENARIOS
+from test_http_api import Stream, ask
+from test_https import make_web_certificates
+from test_tls import SERVICE, check_all, lab, run_steps, start_service  # noqa: F401
+
+STEPS = [step for name in ("functions", "large_arrays", "events", "wires", "pipes") for scenario in SCENARIOS
+         if scenario.name == name for step in scenario.steps]
+
+
+class Chain:
+    """A device of either make with a certificate, and two gateways in a row before it."""
+
+    def __init__(self, lab, maker, folder, far_scheme, near_scheme):  # noqa: F811
+        """`far_scheme`: how the far gateway reaches the device; `near_scheme`: how the near one reaches the far one."""
+        self._lab, self._folder, self._maker = lab, folder, maker
+        self._tls = make_web_certificates(folder / "web")
+        self.processes = []
+        try:
+            device, self.device_port = start_service(maker, lab, "good", folder, *LEVELS["v4"])
+            self.processes.append(device)
+            self.far_port = self._start("far", far_scheme, self.device_port)
+            self.near_port = self._start("near", near_scheme, self.far_port)
+            self._far_scheme = far_scheme
+        except BaseException:
+            self.stop()
+            raise
+
+    def _start(self, name, scheme, port, own_port=None):
+        (self._folder / name).mkdir(exist_ok=True)
+        path = "devices/interop" if "+ws" in scheme and name == "near" else ""
+        url = f"{scheme}://127.0.0.1:{port}/{path}?nodeid={SERVICE}&service=interop"
+        trust = {"tls": {"ca": [str(self._lab / "ca.pem")]}} if scheme.startswith("rrs") else {}
+        gateway, port = start_gateway(self._folder / name, url, device=trust, tls=self._tls, port=own_port)
+        self.processes.append(gateway)
+        return port
+
+    def kill_far(self):
+        far = self.processes.pop(1)
+        far.process.send_signal(signal.SIGKILL)
+        far.stop()
+
+    def restart_far(self):
+        self._start("far", self._far_scheme, self.device_port, self.far_port)
+
+    def near_device(self):
+        return read_json(f"http://127.0.0.1:{self.near_port}/api/v1/devices")["devices"][0]
+
+    def stop(self):
+        for process in reversed(self.processes):
+            process.stop()
+
+
+@pytest.fixture(params=["reference", "ours"])
+def maker(request):
+    return request.param
+
+
+WAYS = {
+    # The near gateway checks the certificate of the device itself; the far one carries what it cannot read.
+    "end to end": ("rr+tcp", "rrs+tcp"),
+    # Each way for itself: what the far gateway reads in clear, it hands on by HTTPS.
+    "hop by hop": ("rrs+tcp", "rr+wss"),
+    "in clear behind the far one": ("rrs+tcp", "rr+tcp"),
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_two_gateways(lab, maker, tmp_path, monkeypatch, way):  # noqa: F811
+    monkeypatch.setenv("SSL_CERT_FILE", str(tmp_path / "web" / "web-ca.pem"))
+    chain = Chain(lab, maker, tmp_path, *WAYS[way])
+    try:
+        for scheme in ("rr+tcp", "rr+ws"):
+            check_all(STEPS, run_steps("reference", lab, chain.near_port, STEPS, scheme=scheme))
+        assert ask(chain.near_port, "GET", "/version").json == "1"
+        assert ask(chain.near_port, "POST", "/add", {"left": 1, "right": 2}).json == {"result": 3}
+        stream = Stream(chain.near_port, "/changed")
+        ask(chain.near_port, "POST", "/fire", {"count": 1})
+        assert stream.next()[2]["value"] == 0
+        stream.close()
+    finally:
+        chain.stop()
+
+
+def test_tls_from_the_client_through_both(lab, maker, tmp_path):  # noqa: F811
+    """With a certificate of the client's own too."""
+    chain = Chain(lab, maker, tmp_path, "rr+tcp", "rr+tcp")
+    try:
+        check_all(STEPS, run_steps("reference", lab, chain.near_port, STEPS, scheme="rrs+tcp", has_certificate=True))
+    finally:
+        chain.stop()
+
+
+def test_the_far_gateway_dies(lab, tmp_path):  # noqa: F811
+    """The near one says so and goes on; subscriptions and streams of its clients are back when the far one is."""
+    chain = Chain(lab, "ours", tmp_path, "rr+tcp", "rrs+tcp")
+    url = f"rr+ws://127.0.0.1:{chain.near_port}/devices/interop?service=interop"
+    client = Background([sys.executable, PEERS / "subscriber.py", url], tmp_path / "subscriber.log")
+    try:
+        client.next_line()
+        stream = Stream(chain.near_port, "/changed")
+        chain.kill_far()
+        assert stream.next()[2]["state"] == "connection_lost"
+        chain.processes[-1].wait_until(lambda: chain.near_device()["state"] == "offline")
+        assert "refused" in chain.near_device()["last_error"]
+        chain.restart_far()
+        assert stream.next()[2]["state"] == "connected"
+        client.write_line("tell")
+        (told,) = json.loads(client.next_line(60))
+        assert told == {"losses": 1, "value": 3}
+        ask(chain.near_port, "POST", "/fire", {"count": 1})
+        assert stream.next()[2]["value"] == 0
+        stream.close()
+        assert chain.near_device()["state"] == "online"
+    finally:
+        client.stop()
+        chain.stop()
