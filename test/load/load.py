@@ -1,4 +1,4 @@
-"""The load programs as processes, and what the kernel knows of them. For test/interop/test_shared_load.py."""
+"""The load programs as processes, and what the kernel knows of them. For measure.py and test/interop/test_shared_load.py."""
 import contextlib
 import json
 import os
