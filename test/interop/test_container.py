@@ -1,4 +1,5 @@
 """The container image: built by podman from programs that were compiled already, run as it is meant to be run."""
+import ipaddress
 import json
 import os
 import re
@@ -6,9 +7,12 @@ import shutil
 import subprocess
 import time
 
+import jsonschema_rs
 import pytest
+import yaml
 
 from processes import BUILD, ROOT, START_DEADLINE, free_port
+from reverse_proxies import UNPACKED
 from test_operations import RRGATE, read_metrics
 from test_proxies import fetch
 
@@ -152,6 +156,40 @@ def test_configurations_of_the_compose_files():
     # The proxy that is trusted is the one that has the address.
     trusted = re.search(r'"trusted_proxies": \["([^"]+)"\]', (DOCKER / "demo.json").read_text())[1]
     assert f"ipv4_address: {trusted} " in (DOCKER / "compose.caddy.yaml").read_text()
+
+
+def merged(first, second):
+    """As Compose does it with two files: maps by their keys, lists one behind the other, else the second."""
+    if isinstance(first, dict) and isinstance(second, dict):
+        return {key: merged(first[key], second[key]) if key in first and key in second else {**first, **second}[key]
+                for key in {**first, **second}}
+    return first + second if isinstance(first, list) and isinstance(second, list) else second
+
+
+@pytest.mark.parametrize("names", [("demo",), ("demo", "caddy"), ("demo", "monitoring"), ("demo", "caddy", "monitoring")],
+                         ids="+".join)
+def test_the_compose_files_are_such(names):
+    """By the schema of Debian's docker-compose, alone and one upon the other; and they say nothing that they don't have."""
+    schema = UNPACKED / "usr/lib/python3/dist-packages/compose/config/compose_spec.json"
+    assert schema.is_file(), f"{schema} is missing: ./dev test interop brings it"
+    validator = jsonschema_rs.validator_for(json.loads(schema.read_text()))
+    whole = {}
+    for name in names:
+        whole = merged(whole, yaml.safe_load((DOCKER / f"compose.{name}.yaml").read_text()))
+        # The schema is older than the name of a project.
+        errors = [f"{error.instance_path}: {error.message}" for error in
+                  validator.iter_errors({key: value for key, value in whole.items() if key != "name"})]
+        assert not errors, errors
+    ports = [port.rsplit(":", 1)[0] for service in whole["services"].values() for port in service.get("ports", [])]
+    assert len(ports) == len(set(ports)), "two services have one port"
+    subnet = ipaddress.ip_network(whole["networks"]["default"]["ipam"]["config"][0]["subnet"])
+    for name, service in whole["services"].items():
+        assert "image" in service, name
+        for volume in service.get("volumes", []):
+            source = volume.split(":")[0]
+            assert source.startswith("./") or source in whole["volumes"], f"{name}: {volume}"
+        for network in service.get("networks", {}).values():
+            assert ipaddress.ip_address(network["ipv4_address"]) in subnet, name
 
 
 def test_the_dashboard_asks_for_what_there_is(tmp_path):

@@ -9,6 +9,7 @@ import sys
 import time
 
 import pytest
+import yaml
 
 from clients import JS, run_program
 from directions import PEERS
@@ -278,3 +279,30 @@ def test_proxy_protocol(device, tmp_path, monkeypatch, version):
     finally:
         proxy.stop()
         process.stop()
+
+
+TRAEFIK = {  # of what the file uses: the reference of Traefik's dynamic configuration
+    "routers": {"rule", "service", "middlewares"},
+    "services": {"loadBalancer": {"servers"}},
+    "middlewares": {"redirectRegex": {"regex", "replacement"}, "stripPrefix": {"prefixes"}},
+}
+
+
+def test_traefiks_configuration_fits_together():
+    """It is not started here: its options are known ones, its rules are rules, and what it names is there."""
+    parts = yaml.safe_load((CONFIGS / "traefik.yaml").read_text())["http"]
+    assert parts.keys() == TRAEFIK.keys()
+    for router in parts["routers"].values():
+        assert router.keys() <= TRAEFIK["routers"]
+        assert router["service"] in parts["services"]
+        assert set(router.get("middlewares", [])) <= parts["middlewares"].keys()
+        assert re.fullmatch(r"!?(Host|Path|PathPrefix)\(`[^`]+`\)( && !?(Host|Path|PathPrefix)\(`[^`]+`\))*", router["rule"])
+    for kind in ("services", "middlewares"):
+        for entry in parts[kind].values():
+            ((name, options),) = entry.items()
+            assert options.keys() <= TRAEFIK[kind][name]
+    (service,) = parts["services"].values()
+    assert all(server.keys() == {"url"} for server in service["loadBalancer"]["servers"])
+    redirect = parts["middlewares"]["rrgate-slash"]["redirectRegex"]
+    to = re.sub(redirect["regex"], redirect["replacement"].replace("${1}", r"\1"), "https://lab.example/robots")
+    assert to == "https://lab.example/robots/"
