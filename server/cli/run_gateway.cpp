@@ -44,9 +44,10 @@ int run_gateway(Config config, const OnStarted& on_started, const std::string& c
   ConfigFile file(io, gateway, config_file);
   Heartbeat heartbeat(io);
   boost::asio::signal_set signals(io, SIGTERM, SIGINT, SIGHUP);
+  bool has_stopped = false;
   std::function<void()> wait_for_signal = [&] {
     signals.async_wait([&](const boost::system::error_code& error, int number) {
-      if (error) return;
+      if (error || has_stopped) return;  // a signal that came in the last moment is not cancelled
       log(LogLevel::info, "signal", {{"number", number}});
       if (number == SIGHUP) {
         file.reload();
@@ -58,6 +59,7 @@ int run_gateway(Config config, const OnStarted& on_started, const std::string& c
       notify_service_manager("STOPPING=1\nSTATUS=sessions may end");
       file.stop();
       gateway.stop([&] {
+        has_stopped = true;
         heartbeat.stop();
         signals.cancel();
       });

@@ -65,6 +65,7 @@ DeviceSession::DeviceSession(std::shared_ptr<Device> device, SessionKey key)
     : device_(std::move(device)),
       key_(std::move(key)),
       connected_(device_->executor(), asio::steady_timer::time_point::max()),
+      attached_(device_->executor(), asio::steady_timer::time_point::max()),
       retry_(device_->executor()) {}
 
 rr::awaitable<rr::Result<rr::AsyncObject>> DeviceSession::root() {
@@ -129,11 +130,13 @@ void DeviceSession::lost(const rr::Error& reason) {
   bool has_listeners = false;
   auto topics = topics_;  // handlers may leave
   for (auto& [key, topic] : topics_) topic.is_attached = false;
-  for (const auto& [key, topic] : topics)
+  for (const auto& [key, topic] : topics) {
+    if (topic.callback) has_listeners = true;
     for (const auto& [id, handler] : topic.handlers) {
       has_listeners = true;
       (*handler)(nullptr, &error);
     }
+  }
   if (has_listeners) asio::co_spawn(device_->executor(), reattach(shared_from_this()), asio::detached);
 }
 
@@ -161,47 +164,57 @@ rr::awaitable<void> DeviceSession::reattach(std::shared_ptr<DeviceSession> self)
 
 rr::awaitable<rr::Result<>> DeviceSession::attach(TopicKey key) {
   const auto self = shared_from_this();
-  const auto root = co_await this->root();
-  if (!root) co_return root.error();
-  try {
-    co_await find_objects(*root, key.path);
-    const auto found = topics_.find(key);
-    if (found == topics_.end() || found->second.is_attached) co_return rr::Result<>();
-    found->second.is_attached = true;
-    const rr::AsyncObject object(root->connection(), key.path);
-    const std::weak_ptr<DeviceSession> weak = self;
-    if (key.kind == rr::MemberKind::event) {
-      rr::ClientConnection::EventHandler handler = [weak, key](std::span<const rr::Value> arguments) {
-        if (const auto session = weak.lock())
-          session->publish(key, Sample{0, {}, {arguments.begin(), arguments.end()}});
-      };
-      object.on_event(key.member, std::move(handler));
-    } else if (key.kind == rr::MemberKind::wire) {
-      rr::ClientConnection::WireHandler handler = [weak, key](const rr::Value& value, rr::TimeSpec time) {
-        if (const auto session = weak.lock()) session->publish(key, Sample{0, time, {value}});
-      };
-      co_await object.connect_wire(key.member, std::move(handler));
-    } else {
-      rr::ClientConnection::PipeHandlers handlers;
-      handlers.received = [weak, key](rr::Value packet) {
-        if (const auto session = weak.lock()) session->publish(key, Sample{0, {}, {std::move(packet)}});
-      };
-      handlers.closed = [weak, key] {
-        const auto session = weak.lock();
-        const auto closed = rr::make_error(rr::ErrorCode::connection_error, "the device closed the pipe");
-        if (!session || !session->topics_.contains(key)) return;
-        session->topics_[key].is_attached = false;
-        const auto listening = session->topics_[key].handlers;
-        for (const auto& [id, handler] : listening) (*handler)(nullptr, &closed);
-      };
-      const auto index = co_await object.connect_pipe(key.member, std::move(handlers));
-      if (topics_.contains(key)) topics_[key].pipe_index = index.to<std::int32_t>().value();
+  const auto is_attaching = [&] { return topics_.contains(key) && topics_[key].is_attaching; };
+  while (is_attaching()) co_await attached_.async_wait(wait_token);
+  if (!topics_.contains(key) || topics_[key].is_attached) co_return rr::Result<>();
+  topics_[key].is_attaching = true;
+  auto root = co_await this->root();
+  auto attached = root ? rr::Result<>() : rr::Result<>(root.error());
+  if (root) try {
+      co_await find_objects(*root, key.path);
+      const rr::AsyncObject object(root->connection(), key.path);
+      co_await attach_to(object, key);
+    } catch (const rr::Exception& exception) {
+      attached = exception.error();
     }
-  } catch (const rr::Exception& exception) {
-    if (topics_.contains(key)) topics_[key].is_attached = false;
-    co_return exception.error();
+  topics_[key].is_attaching = false;
+  topics_[key].is_attached = attached && root->connection() == connection_;
+  attached_.cancel();
+  drop_if_unused(key);
+  co_return attached;
+}
+
+rr::awaitable<void> DeviceSession::attach_to(rr::AsyncObject object, TopicKey key) {
+  const std::weak_ptr<DeviceSession> weak = weak_from_this();
+  if (key.kind == rr::MemberKind::callback) {
+    if (const auto handler = topics_[key].callback)
+      object.connection()->on_callback_later(key.path, key.member, *handler);
+  } else if (key.kind == rr::MemberKind::event) {
+    rr::ClientConnection::EventHandler handler = [weak, key](std::span<const rr::Value> arguments) {
+      if (const auto session = weak.lock()) session->publish(key, Sample{0, {}, {arguments.begin(), arguments.end()}});
+    };
+    object.on_event(key.member, std::move(handler));
+  } else if (key.kind == rr::MemberKind::wire) {
+    rr::ClientConnection::WireHandler handler = [weak, key](const rr::Value& value, rr::TimeSpec time) {
+      if (const auto session = weak.lock()) session->publish(key, Sample{0, time, {value}});
+    };
+    co_await object.connect_wire(key.member, std::move(handler));
+  } else {
+    rr::ClientConnection::PipeHandlers handlers;
+    handlers.received = [weak, key](rr::Value packet) {
+      if (const auto session = weak.lock()) session->publish(key, Sample{0, {}, {std::move(packet)}});
+    };
+    handlers.closed = [weak, key] {
+      const auto session = weak.lock();
+      const auto closed = rr::make_error(rr::ErrorCode::invalid_state, "the device closed the pipe");
+      if (!session || !session->topics_.contains(key)) return;
+      session->topics_[key].is_attached = false;
+      const auto listening = session->topics_[key].handlers;
+      for (const auto& [id, handler] : listening) (*handler)(nullptr, &closed);
+    };
+    const auto index = co_await object.connect_pipe(key.member, std::move(handlers));
+    topics_[key].pipe_index = index.to<std::int32_t>().value();
   }
-  co_return rr::Result<>();
 }
 
 rr::awaitable<rr::Result<std::unique_ptr<DeviceSession::Listener>>> DeviceSession::listen(TopicKey key,
@@ -220,6 +233,30 @@ rr::awaitable<rr::Result<std::unique_ptr<DeviceSession::Listener>>> DeviceSessio
   co_return listener;
 }
 
+rr::awaitable<rr::Result<std::unique_ptr<DeviceSession::Listener>>> DeviceSession::answer_callback(
+    TopicKey key, rr::ClientConnection::LateCallbackHandler handler) {
+  const auto self = shared_from_this();
+  if (topics_.contains(key))
+    co_return rr::make_error(rr::ErrorCode::member_busy, rr::quoted(key.member) + " is answered already");
+  topics_[key].callback = std::make_shared<rr::ClientConnection::LateCallbackHandler>(std::move(handler));
+  auto listener = std::make_unique<Listener>(self, key, ++last_id_);
+  const auto attached = co_await attach(key);
+  if (!attached) co_return attached.error();
+  co_return listener;
+}
+
+rr::awaitable<rr::Result<>> DeviceSession::send(TopicKey key, rr::Value value) {
+  const auto self = shared_from_this();
+  const auto attached = co_await attach(key);
+  if (!attached) co_return attached.error();
+  const auto found = topics_.find(key);
+  if (!connection_ || found == topics_.end() || !found->second.is_attached)
+    co_return rr::make_error(rr::ErrorCode::invalid_operation, rr::quoted(key.member) + " is not connected");
+  co_return key.kind == rr::MemberKind::wire
+      ? connection_->send_wire(key.path, key.member, value)
+      : connection_->send_pipe(key.path, key.member, found->second.pipe_index, value);
+}
+
 void DeviceSession::publish(const TopicKey& key, Sample sample) {
   const auto found = topics_.find(key);
   if (found == topics_.end()) return;
@@ -236,17 +273,28 @@ void DeviceSession::publish(const TopicKey& key, Sample sample) {
 void DeviceSession::leave(const TopicKey& key, std::uint64_t id) {
   const auto found = topics_.find(key);
   if (found == topics_.end()) return;
-  auto& topic = found->second;
-  topic.handlers.erase(id);
+  found->second.handlers.erase(id);
+  if (key.kind == rr::MemberKind::callback) {
+    found->second.callback.reset();
+    if (connection_) connection_->forget_callback(key.path, key.member);
+  }
+  drop_if_unused(key);
+}
+
+void DeviceSession::drop_if_unused(const TopicKey& key) {
+  const auto found = topics_.find(key);
+  if (found == topics_.end()) return;
+  const auto& topic = found->second;
+  if (!topic.handlers.empty() || topic.callback || topic.is_attaching) return;
   // An event costs the device nothing, and who comes back wants to know what happened meanwhile.
-  if (!topic.handlers.empty() || (key.kind == rr::MemberKind::event && topic.is_attached)) return;
+  if (key.kind == rr::MemberKind::event && topic.is_attached) return;
   const auto ignore = [](const rr::Result<rr::Value>&) {};
   if (connection_ && topic.is_attached) {
     if (key.kind == rr::MemberKind::wire) connection_->disconnect_wire(key.path, key.member, ignore);
     if (key.kind == rr::MemberKind::pipe && topic.pipe_index >= 0)
       connection_->disconnect_pipe(key.path, key.member, topic.pipe_index, ignore);
   }
-  topics_.erase(key);
+  topics_.erase(found);
 }
 
 void DeviceSession::stop() {

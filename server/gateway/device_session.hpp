@@ -35,7 +35,7 @@ struct Sample {
 };
 using SamplePtr = std::shared_ptr<const Sample>;
 
-/// A wire, pipe or event that somebody listens to.
+/// A wire, pipe or event that somebody listens to, or a callback that somebody answers.
 struct TopicKey {
   TopicKey(rr::MemberKind kind_of, std::string at_path, std::string name)
       : kind(kind_of), path(std::move(at_path)), member(std::move(name)) {}
@@ -74,6 +74,14 @@ class DeviceSession : public std::enable_shared_from_this<DeviceSession> {
   /// number `after` as far as they are kept. Errors   those of connecting wire or pipe.
   rr::awaitable<rr::Result<std::unique_ptr<Listener>>> listen(TopicKey key, std::uint64_t after, SampleHandler handler);
 
+  /// Answers a callback until the Listener is destroyed, also across reconnects. The object must have been found.
+  /// Errors   member_busy: somebody answers it already.
+  rr::awaitable<rr::Result<std::unique_ptr<Listener>>> answer_callback(
+      TopicKey key, rr::ClientConnection::LateCallbackHandler handler);
+  /// A wire's OutValue, or a packet, over the connection that a listener holds; once lost, or closed by the device, it
+  /// is opened anew. Errors   invalid_operation: nobody listens; those of connecting and sending.
+  rr::awaitable<rr::Result<>> send(TopicKey key, rr::Value value);
+
   const Device& device() const { return *device_; }
   /// Ends the session and whatever waits for it.
   void stop();
@@ -82,17 +90,21 @@ class DeviceSession : public std::enable_shared_from_this<DeviceSession> {
   struct Topic {
     std::map<std::uint64_t, std::shared_ptr<SampleHandler>> handlers;
     std::vector<SamplePtr> recent;  ///< a wire's newest value; an event's last ones
+    std::shared_ptr<rr::ClientConnection::LateCallbackHandler> callback;
     std::uint64_t last_number = 0;
     std::int32_t pipe_index = -1;
     bool is_attached = false;
+    bool is_attaching = false;  ///< somebody waits for the device; others for them
   };
 
   rr::awaitable<rr::Result<>> connect();
   rr::awaitable<rr::Result<>> attach(TopicKey key);
+  rr::awaitable<void> attach_to(rr::AsyncObject object, TopicKey key);
   static rr::awaitable<void> reattach(std::shared_ptr<DeviceSession> self);
   void lost(const rr::Error& reason);
   void publish(const TopicKey& key, Sample sample);
   void leave(const TopicKey& key, std::uint64_t id);
+  void drop_if_unused(const TopicKey& key);
 
   std::shared_ptr<Device> device_;
   SessionKey key_;
@@ -103,6 +115,7 @@ class DeviceSession : public std::enable_shared_from_this<DeviceSession> {
   bool is_connecting_ = false;
   bool is_stopped_ = false;
   boost::asio::steady_timer connected_;  ///< cancelled when an attempt has ended
+  boost::asio::steady_timer attached_;   ///< the same for topics
   boost::asio::steady_timer retry_;
   rr::Error last_error_;
 };

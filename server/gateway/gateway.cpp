@@ -240,7 +240,8 @@ void Gateway::stop(std::function<void()> on_stopped) {
 }
 
 bool Gateway::has_relay() const {
-  return std::any_of(connections_.begin(), connections_.end(), [](const auto& each) { return each.device != nullptr; });
+  return std::any_of(connections_.begin(), connections_.end(),
+                     [](const auto& each) { return each.device != nullptr && !each.ends_with_gateway; });
 }
 
 void Gateway::end_all(const rr::EndReason& reason) {
@@ -253,7 +254,7 @@ void Gateway::end_all(const rr::EndReason& reason) {
 rr::awaitable<void> Gateway::drain() {
   for (auto it = connections_.begin(); it != connections_.end();) {
     auto& connection = *it++;
-    if (!connection.device) connection.stop({1001, "the gateway is stopping"});
+    if (!connection.device || connection.ends_with_gateway) connection.stop({1001, "the gateway is stopping"});
   }
   log(LogLevel::info, "stopping", {{"connections", open_connections_}, {"drain_ms", config_.timeouts.drain.count()}});
   const auto wait_until = [this](std::chrono::steady_clock::time_point deadline) -> rr::awaitable<void> {

@@ -30,6 +30,8 @@ struct Connection : boost::intrusive::list_base_hook<boost::intrusive::link_mode
   std::function<void(rr::EndReason)> stop;
   /// Set while it carries a client's session, which may go on for a while when the gateway stops.
   const Device* device = nullptr;
+  /// It uses a device session of the gateway, and ends as soon as that stops.
+  bool ends_with_gateway = false;
   Peer peer;
   Admission::Ticket ticket;
   /// The client as logs name it: as `peer`, or as a trusted proxy says.

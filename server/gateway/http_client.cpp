@@ -1,6 +1,7 @@
 #include "server/gateway/http_client.hpp"
 
 #include "server/gateway/client_relay.hpp"
+#include "server/http/endpoints/json_socket.hpp"
 #include "server/http/request_reader.hpp"
 #include "server/http/response_writer.hpp"
 #include "server/http/upgrade.hpp"
@@ -55,6 +56,23 @@ rr::Result<Device*> find_device(Gateway& gateway, const Request& request) {
   return device;
 }
 
+/// 101, then JSON messages.
+rr::awaitable<void> accept_json_socket(Gateway& gateway, Connection& connection, std::unique_ptr<rr::ByteStream> stream,
+                                       const Request& request, rr::ByteSpan unread) {
+  const auto place = find_json_socket(gateway, request);
+  if (!place) {
+    gateway.reject(Rejection::no_such_device);
+    const auto response = problem_response(404, place.error().message);
+    co_await write_refusal(*stream, response);
+    co_await stream->end(rr::no_reason);
+    co_return;
+  }
+  const auto accepted = format_upgrade_response(request, json_subprotocol);
+  if (co_await write_text(*stream, accepted)) co_return;
+  stream->put_back(unread);
+  co_await serve_json_socket(gateway, connection, std::move(stream), *place);
+}
+
 /// Carries an upgrade through. The stream is used up.
 rr::awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, std::unique_ptr<rr::ByteStream> stream,
                                     const Request& request, rr::ByteSpan unread) {
@@ -64,7 +82,8 @@ rr::awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, st
     co_await write_refusal(tcp, refusal);
     co_await tcp.end(rr::no_reason);
   };
-  if (auto refusal = refuse_upgrade(request, gateway.config().allowed_origins)) {
+  const auto subprotocol = is_json_socket(request) ? json_subprotocol : rr::websocket_subprotocol;
+  if (auto refusal = refuse_upgrade(request, gateway.config().allowed_origins, subprotocol)) {
     gateway.reject(refusal->status == 403 ? Rejection::origin : Rejection::bad_request);
     log(LogLevel::info, "upgrade refused",
         {{"peer", connection.client}, {"status", refusal->status}, {"origin", request.header(http::field::origin)}});
@@ -76,6 +95,10 @@ rr::awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, st
     log(LogLevel::warning, "connection refused: too many", {{"peer", connection.client}});
     const auto response = problem_response(503, "too many connections from " + request.arrival.address.to_string());
     co_await refuse(response);
+    co_return;
+  }
+  if (is_json_socket(request)) {
+    co_await accept_json_socket(gateway, connection, std::move(stream), request, unread);
     co_return;
   }
   auto device = find_device(gateway, request);

@@ -2,7 +2,6 @@
 
 #include "core/support/error.hpp"
 #include "server/http/origin.hpp"
-#include "server/transport/websocket_frames.hpp"
 
 namespace rrgate {
 
@@ -10,39 +9,42 @@ bool asks_for_websocket(const Request& request) {
   return has_token(request.header(http::field::upgrade), "websocket");
 }
 
-Response upgrade_required(std::string_view detail) {
+Response upgrade_required(std::string_view detail, std::string_view subprotocol) {
   auto response = problem_response(426, detail);
   response.set("Upgrade", "websocket");
-  response.set("Sec-WebSocket-Protocol", std::string(rr::websocket_subprotocol));
+  response.set("Sec-WebSocket-Protocol", std::string(subprotocol));
   response.set("Sec-WebSocket-Version", "13");
   response.closes = true;
   return response;
 }
 
-std::optional<Response> refuse_upgrade(const Request& request, const std::vector<std::string>& allowed_origins) {
+std::optional<Response> refuse_upgrade(const Request& request, const std::vector<std::string>& allowed_origins,
+                                       std::string_view subprotocol) {
   const auto& message = request.message;
   if (message.method() != http::verb::get) {
     auto response = problem_response(405, "a WebSocket begins with GET");
     response.set("Allow", "GET");
     return response;
   }
-  if (message.version() != 11) return upgrade_required("a WebSocket needs HTTP/1.1");
+  if (message.version() != 11) return upgrade_required("a WebSocket needs HTTP/1.1", subprotocol);
   if (request.header(http::field::sec_websocket_key).empty())
-    return upgrade_required("no Sec-WebSocket-Key in the request");
+    return upgrade_required("no Sec-WebSocket-Key in the request", subprotocol);
   if (!has_token(request.header(http::field::sec_websocket_version), "13"))
-    return upgrade_required("Sec-WebSocket-Version " + rr::quoted(request.header(http::field::sec_websocket_version)) +
-                            ": expected 13");
+    return upgrade_required(
+        "Sec-WebSocket-Version " + rr::quoted(request.header(http::field::sec_websocket_version)) + ": expected 13",
+        subprotocol);
   // A header may be repeated; then any of its lines will do.
   bool has_protocol = false;
   bool has_ours = false;
   const auto lines = message.equal_range(http::field::sec_websocket_protocol);
   for (auto it = lines.first; it != lines.second; ++it) {
     has_protocol = true;
-    has_ours = has_ours || has_token({it->value().data(), it->value().size()}, rr::websocket_subprotocol);
+    has_ours = has_ours || has_token({it->value().data(), it->value().size()}, subprotocol);
   }
   if (has_protocol && !has_ours)
     return upgrade_required("subprotocol " + rr::quoted(request.header(http::field::sec_websocket_protocol)) +
-                            ": expected " + std::string(rr::websocket_subprotocol));
+                                ": expected " + std::string(subprotocol),
+                            subprotocol);
   const auto origins = message.count(http::field::origin);
   const auto origin = request.header(http::field::origin);
   const std::string_view host =
@@ -57,11 +59,14 @@ std::optional<Response> refuse_upgrade(const Request& request, const std::vector
   return std::nullopt;
 }
 
-std::string format_upgrade_response(const Request& request) {
-  return "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Accept: " +
-         rr::websocket_accept(request.header(http::field::sec_websocket_key)) +
-         "\r\nSec-WebSocket-Protocol: " + std::string(rr::websocket_subprotocol) +
-         "\r\nSec-WebSocket-Version: 13\r\n\r\n";
+std::string format_upgrade_response(const Request& request, std::string_view subprotocol) {
+  std::string out =
+      "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Accept: " +
+      rr::websocket_accept(request.header(http::field::sec_websocket_key)) + "\r\n";
+  // A browser gives a socket up whose answer has a subprotocol that it has not named.
+  if (subprotocol == rr::websocket_subprotocol || request.message.count(http::field::sec_websocket_protocol) != 0)
+    out += "Sec-WebSocket-Protocol: " + std::string(subprotocol) + "\r\n";
+  return out + "Sec-WebSocket-Version: 13\r\n\r\n";
 }
 
 bool takes_close_frames(const Request& request) {

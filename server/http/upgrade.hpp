@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "server/http/message.hpp"
+#include "server/transport/websocket_frames.hpp"
 
 namespace rrgate {
 
@@ -14,13 +15,15 @@ bool asks_for_websocket(const Request& request);
 
 /// Checks an upgrade, by the host that the client named (Request::arrival): method and version, Upgrade, key and
 /// version (426), subprotocol if named (426), Origin if sent (403). nullopt: all is well.
-std::optional<Response> refuse_upgrade(const Request& request, const std::vector<std::string>& allowed_origins);
+std::optional<Response> refuse_upgrade(const Request& request, const std::vector<std::string>& allowed_origins,
+                                       std::string_view subprotocol = rr::websocket_subprotocol);
 
 /// The 101 response, with `Connection: Upgrade` alone: native clients compare it as a single token.
-std::string format_upgrade_response(const Request& request);
+/// Those expect the subprotocol in any case; other clients only where they have named it.
+std::string format_upgrade_response(const Request& request, std::string_view subprotocol = rr::websocket_subprotocol);
 
 /// 426, with the headers that say what is expected.
-Response upgrade_required(std::string_view detail);
+Response upgrade_required(std::string_view detail, std::string_view subprotocol = rr::websocket_subprotocol);
 
 /// Whether the peer is a browser or another full WebSocket client, which takes close frames. Native Robot Raconteur
 /// peers send neither Origin nor extensions, and take a close frame for an error.

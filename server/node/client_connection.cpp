@@ -212,8 +212,20 @@ Result<> ClientConnection::send_pipe(std::string_view path, std::string_view pip
 }
 
 void ClientConnection::on_callback(std::string_view path, std::string_view callback, CallbackHandler handler) {
+  on_callback_later(path, callback,
+                    [handler = std::move(handler)](std::span<const Value> arguments, const auto& reply) {
+                      reply(handler(arguments));
+                    });
+}
+
+void ClientConnection::on_callback_later(std::string_view path, std::string_view callback,
+                                         LateCallbackHandler handler) {
   callback_handlers_[{std::string(path), std::string(callback)}] =
-      std::make_shared<CallbackHandler>(std::move(handler));
+      std::make_shared<LateCallbackHandler>(std::move(handler));
+}
+
+void ClientConnection::forget_callback(std::string_view path, std::string_view callback) {
+  callback_handlers_.erase({std::string(path), std::string(callback)});
 }
 
 void ClientConnection::on_event(std::string_view path, std::string_view event, EventHandler handler) {
@@ -300,17 +312,23 @@ void ClientConnection::handle(PipeClosedByService&& closed) {
 }
 
 void ClientConnection::handle(CallbackCalled&& called) {
-  Result<Value> answer = make_error(ErrorCode::invalid_operation, "Callback function not set");
-  if (const auto found = callback_handlers_.find({std::move(called.path), std::move(called.member)});
-      found != callback_handlers_.end()) {
-    const auto handler = found->second;  // it may replace itself
-    try {
-      answer = (*handler)(called.arguments);
-    } catch (const std::exception& exception) {
-      answer = Error{ErrorCode::remote_error, exception.what(), "rrgate.UnhandledException"};
-    }
+  const auto found = callback_handlers_.find({std::move(called.path), std::move(called.member)});
+  if (found == callback_handlers_.end())
+    return session_.reply_callback(called.id, make_error(ErrorCode::invalid_operation, "Callback function not set"),
+                                   read_clocks());
+  const auto handler = found->second;  // it may replace itself
+  const std::weak_ptr<StreamDriver> weak = weak_from_this();
+  const CallbackReply reply = [weak, id = called.id](const Result<Value>& answer) {
+    const auto self = std::static_pointer_cast<ClientConnection>(weak.lock());
+    if (!self) return;
+    self->session_.reply_callback(id, answer, read_clocks());
+    self->settle();
+  };
+  try {
+    (*handler)(called.arguments, reply);
+  } catch (const std::exception& exception) {
+    reply(Error{ErrorCode::remote_error, exception.what(), "rrgate.UnhandledException"});
   }
-  session_.reply_callback(called.id, answer, read_clocks());
 }
 
 /// Whoever uses objects below the path hears of it when the next request fails; their handlers have to go now.

@@ -59,6 +59,9 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   using EventHandler = std::function<void(std::span<const Value> arguments)>;
   using WireHandler = std::function<void(const Value& value, TimeSpec time)>;
   using CallbackHandler = std::function<Result<Value>(std::span<const Value> arguments)>;
+  /// For on_callback_later().
+  using CallbackReply = std::function<void(const Result<Value>& answer)>;
+  using LateCallbackHandler = std::function<void(std::span<const Value> arguments, CallbackReply reply)>;
   struct PipeHandlers {
     std::function<void(Value packet)> received;
     std::function<void()> closed = {};  ///< by the service; not for disconnect_pipe() and the session's end
@@ -120,6 +123,11 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   /// What the service gets when it calls: a value, null for void callbacks, or an error; an exception reaches it as
   /// one. One handler a callback; a second replaces the first.
   void on_callback(std::string_view path, std::string_view callback, CallbackHandler handler);
+  /// As on_callback(), where the answer takes its time: `reply` is called once, on the thread of the io_context, also
+  /// when the connection has ended. The service waits as long as it wants to.
+  void on_callback_later(std::string_view path, std::string_view callback, LateCallbackHandler handler);
+  /// From now on the service hears that nobody answers.
+  void forget_callback(std::string_view path, std::string_view callback);
   /// One handler an event; a second replaces the first.
   void on_event(std::string_view path, std::string_view event, EventHandler handler);
   /// Called once, when the session has ended for whatever reason; not after a failed open(). Each handler that is
@@ -158,7 +166,7 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   std::map<MemberKey, std::shared_ptr<EventHandler>> event_handlers_;
   std::map<MemberKey, std::shared_ptr<WireHandler>> wire_handlers_;
   std::map<MemberKey, std::function<void()>> wire_closed_handlers_;
-  std::map<MemberKey, std::shared_ptr<CallbackHandler>> callback_handlers_;
+  std::map<MemberKey, std::shared_ptr<LateCallbackHandler>> callback_handlers_;
   std::map<PipeKey, std::shared_ptr<PipeHandlers>> pipe_handlers_;
   std::vector<std::function<void(const Error&)>> on_closed_;
 };

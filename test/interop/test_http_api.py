@@ -273,7 +273,10 @@ def test_documents(gateway):
     assert document["components"]["schemas"]["experimental.interop.Pose"]["required"] == ["px", "py", "label"]
     again = ask(gateway, "GET", "/openapi.json", base=base, headers={"If-None-Match": answer.headers["ETag"]})
     assert (again.status, again.body) == (304, b"")
-    assert ask(gateway, "GET", "/asyncapi.json", base=base).json["channels"]["interop_changed"]
+    asynchronous = ask(gateway, "GET", "/asyncapi.json", base=base).json
+    assert asynchronous["channels"]["interop_changed"]
+    assert asynchronous["channels"]["socket_interop"]["address"] == BASE
+    assert "callback" in asynchronous["channels"]["socket_interop"]["messages"]["question"]["payload"]["properties"]
     description = ask(gateway, "GET", "/thing-description.json", base=base)
     assert description.json["actions"]["interop_add"]["forms"][0]["href"] == BASE + "/add"
     assert b"interface Interop" in ask(gateway, "GET", "/types.d.ts", base=base).body

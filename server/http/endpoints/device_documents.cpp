@@ -253,14 +253,80 @@ class OpenApi {
   }
 };
 
-// --- AsyncAPI 3.0: what comes as server-sent events ---
+// --- AsyncAPI 3.0: what comes as server-sent events, and the WebSocket of each service ---
 
-OrderedJson async_api(std::string_view device, const std::vector<Place>& places, OrderedJson schemas) {
+/// What goes over the WebSocket of a service, either way.
+OrderedJson socket_messages() {
+  const OrderedJson id{{"type", {"integer", "string"}}};
+  const OrderedJson text{{"type", "string"}};
+  const OrderedJson any_object{{"type", "object"}};
+  const auto object = [](OrderedJson properties, OrderedJson required) {
+    return OrderedJson{
+        {"payload", {{"type", "object"}, {"properties", std::move(properties)}, {"required", std::move(required)}}}};
+  };
+  const auto names = OrderedJson::array({"describe", "get", "set", "call", "open", "next", "close", "abort",
+                                         "subscribe", "unsubscribe", "send", "callback", "answer", "shape", "read",
+                                         "write", "lock", "unlock", "login"});
+  OrderedJson out;
+  out["request"] = object({{"id", id},
+                           {"op", {{"enum", names}}},
+                           {"path", text},
+                           {"value", OrderedJson::object()},
+                           {"args", any_object},
+                           {"generator", id},
+                           {"subscription", id},
+                           {"call", {{"type", "integer"}}},
+                           {"after", {{"type", "integer"}}}},
+                          OrderedJson::array({"op"}));
+  const OrderedJson error{
+      {"type", "object"}, {"properties", {{"name", text}, {"message", text}}}, {"required", {"name", "message"}}};
+  out["answer"] =
+      object({{"id", {{"type", {"integer", "string", "null"}}}}, {"result", OrderedJson::object()}, {"error", error}},
+             OrderedJson::array({"id"}));
+  const OrderedJson states{{"enum", {"connection_lost", "connected", "closed"}}};
+  out["news"] = object({{"subscription", id},
+                        {"value", OrderedJson::object()},
+                        {"number", {{"type", "integer"}}},
+                        {"time", any_object},
+                        {"state", states},
+                        {"detail", text},
+                        {"error", error}},
+                       OrderedJson::array({"subscription"}));
+  out["question"] = object({{"callback", id}, {"call", {{"type", "integer"}}}, {"args", any_object}},
+                           OrderedJson::array({"callback", "call", "args"}));
+  return out;
+}
+
+void add_sockets(const std::string& base, const std::vector<DescribedService>& services, OrderedJson& channels,
+                 OrderedJson& operations) {
+  for (const auto& service : services) {
+    const auto id = "socket_" + service.name;
+    add_key(channels, id) = {
+        {"address", base + "/" + rr::percent_encode(service.name)},
+        {"description", "JSON messages over a WebSocket, subprotocol rrgate.json.v1; also at objects below."},
+        {"bindings", {{"ws", {{"method", "GET"}}}}},
+        {"messages", socket_messages()}};
+    const auto reference = [&](std::string_view message) {
+      return OrderedJson{{"$ref", "#/channels/" + id + "/messages/" + std::string(message)}};
+    };
+    const OrderedJson channel{{"$ref", "#/channels/" + id}};
+    add_key(operations, "send_" + id) = {
+        {"action", "send"}, {"channel", channel}, {"messages", OrderedJson::array({reference("request")})}};
+    add_key(operations, "receive_" + id) = {
+        {"action", "receive"},
+        {"channel", channel},
+        {"messages", OrderedJson::array({reference("answer"), reference("news"), reference("question")})}};
+  }
+}
+
+OrderedJson async_api(std::string_view device, const std::string& base, const std::vector<DescribedService>& services,
+                      const std::vector<Place>& places, OrderedJson schemas) {
   OrderedJson out{{"asyncapi", "3.0.0"}};
   add_info(out, device);
   out["defaultContentType"] = "application/json";
   auto channels = OrderedJson::object();
   auto operations = OrderedJson::object();
+  add_sockets(base, services, channels, operations);
   for (const auto& place : places) {
     const auto& member = *place.member;
     const bool is_event = member.kind == rr::MemberKind::event;
@@ -364,7 +430,7 @@ Response device_document(std::string_view document, std::string_view device, con
   if (document == "openapi.json") {
     out = OpenApi().write(device, places, std::move(schemas), unavailable);
   } else if (document == "asyncapi.json") {
-    out = async_api(device, places, std::move(schemas));
+    out = async_api(device, base, services, places, std::move(schemas));
   } else {
     out = thing_description(device, places, std::move(schemas));
     type = "application/td+json";

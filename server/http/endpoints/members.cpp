@@ -3,23 +3,11 @@
 #include <charconv>
 
 #include "core/types/multidim.hpp"
+#include "server/http/endpoints/member_values.hpp"
 
 namespace rrgate {
 
 namespace {
-
-constexpr std::uint64_t max_memory_bytes = 16u * 1024 * 1024;
-
-/// An exception is how an error gets out of a coroutine here: one place answers them all.
-template <class T>
-T value_or_throw(rr::Result<T> result) {
-  if (!result) throw rr::Exception(result.error());
-  return std::move(*result);
-}
-
-[[noreturn]] void refuse(rr::ErrorCode code, std::string why) {
-  throw rr::Exception(rr::make_error(code, std::move(why)));
-}
 
 rr::OrderedJson to_json(const ObjectRequest& request, const Target& target, const rr::Value& value,
                         const rr::TypeDefinition& type) {
@@ -81,8 +69,6 @@ rr::awaitable<Response> answer_wire(const ObjectRequest& request, const Target& 
 }
 
 // --- memories ---
-
-using Shape = std::vector<std::uint64_t>;
 
 /// "1,2,3"; nothing where the option is not there.
 std::optional<Shape> read_shape(const ObjectRequest& request, std::string_view name, std::size_t dimensions) {
@@ -180,12 +166,6 @@ rr::awaitable<Response> answer_memory_bytes(const ObjectRequest& request, const 
   co_return response;
 }
 
-std::size_t item_bytes_of(const Target& target) {
-  if (const auto size = rr::item_size(target.member->type.type)) return size;
-  const auto* entity = target.types().find_entity(target.member->type.qualified_name);
-  return entity ? entity->namedarray_count * rr::item_size(entity->namedarray_type) : 0;
-}
-
 rr::awaitable<Response> answer_memory(const ObjectRequest& request, const Target& target) {
   const auto& member = *target.member;
   const auto direction = member.direction();
@@ -195,9 +175,7 @@ rr::awaitable<Response> answer_memory(const ObjectRequest& request, const Target
   if (request.is_read() ? !can_read && !target.is_shape : request.method() != http::verb::put || !can_write)
     co_return request.method_response(allowed);
 
-  const auto shape_value = co_await target.object.memory_dimensions(member.name);
-  const auto shape_items = value_or_throw(shape_value.to_items<std::uint64_t>());
-  const Shape shape(shape_items.begin(), shape_items.end());
+  const auto shape = co_await memory_shape(target);
   if (target.is_shape) co_return request.value_response(rr::OrderedJson(shape));
 
   const auto position = read_shape(request, "offset", shape.size());
@@ -221,18 +199,8 @@ rr::awaitable<Response> answer_memory(const ObjectRequest& request, const Target
   const bool is_flat = shape.size() == 1 && !rr::is_multidim(member.type);
   if (request.wanted() == BodyForm::bytes && is_flat && item_bytes_of(target) > 0)
     co_return co_await answer_memory_bytes(request, target, shape[0], item_bytes_of(target));
-  rr::MemoryShape at = position.value_or(Shape(shape.size(), 0));
-  rr::MemoryShape count;
-  if (const auto given = read_shape(request, "count", shape.size())) {
-    count = *given;
-  } else {
-    for (std::size_t i = 0; i < shape.size(); ++i) count.push_back(shape[i] - std::min(at[i], shape[i]));
-  }
-  const auto items_wanted = rr::product_of(std::span<const std::uint64_t>(count));
-  if (!items_wanted || *items_wanted > max_memory_bytes / std::max<std::size_t>(1, item_bytes_of(target)))
-    refuse(rr::ErrorCode::buffer_limit_violation,
-           "that are more than " + std::to_string(max_memory_bytes) + " bytes; ask for parts with offset and count");
-  const auto items = co_await target.object.read_memory(member.name, std::move(at), std::move(count));
+  const auto count = read_shape(request, "count", shape.size());
+  const auto items = co_await read_items(target, shape, position, count);
   if (request.wanted() == BodyForm::bytes) {
     const auto bytes = rr::as_text(payload_of(items));
     co_return text_response(200, "application/octet-stream", std::string(bytes));
@@ -244,29 +212,10 @@ rr::awaitable<Response> answer_memory(const ObjectRequest& request, const Target
 
 rr::Result<std::vector<rr::Value>> read_arguments(const ObjectRequest& request, const rr::MemberDefinition& member,
                                                   const rr::TypeRegistry& types) {
-  std::vector<rr::Value> out;
-  if (member.parameters.empty() && request.request().message.body().empty()) return out;
+  if (member.parameters.empty() && request.request().message.body().empty()) return std::vector<rr::Value>();
   const auto body = request.body();
   if (!body) return body.error();
-  const auto refused = [&](std::string why) {
-    return rr::make_error(rr::ErrorCode::invalid_argument, member.name + " " + std::move(why));
-  };
-  if (!body->is_object()) return refused("takes its parameters as an object {\"name\": value}");
-  for (const auto& parameter : member.parameters) {
-    if (parameter.type.container == rr::ContainerKind::generator) continue;
-    const auto found = body->find(parameter.name);
-    if (found == body->end())
-      return refused("misses the parameter " + rr::quoted(parameter.name) + " (" + format_type(parameter.type) + ")");
-    auto value = rr::value_from_json(*found, parameter.type, types, request.form(), parameter.name);
-    if (!value) return value.error();
-    out.push_back(std::move(*value));
-  }
-  for (const auto& [key, unused] : body->items()) {
-    const auto is_known = std::any_of(member.parameters.begin(), member.parameters.end(),
-                                      [&key = key](const auto& parameter) { return parameter.name == key; });
-    if (!is_known) return refused("has no parameter " + rr::quoted(key));
-  }
-  return out;
+  return arguments_from_json(*body, member, types, request.form());
 }
 
 rr::awaitable<void> answer_member(const ObjectRequest& request, const Target& target) {

@@ -7,6 +7,8 @@ namespace rrgate {
 
 namespace {
 
+constexpr std::size_t max_segments = 64;
+
 bool accepts(std::string_view header, std::string_view type) {
   return header.find(type) != std::string_view::npos;
 }
@@ -74,25 +76,10 @@ unsigned status_of(rr::ErrorCode code) {
   }
 }
 
-ObjectRequest::ObjectRequest(ResponseWriter& writer) : writer_(writer) {
-  const auto accept = request().header(http::field::accept);
-  wants_events_ = accepts(accept, "text/event-stream");
-  if (accepts(accept, "application/cbor")) wanted_ = BodyForm::cbor;
-  if (accepts(accept, "application/octet-stream")) wanted_ = BodyForm::bytes;
-  form_.has_bytes = wanted_ == BodyForm::cbor;
-  form_.packs_arrays = option("arrays") == "packed";
-  form_.numbers_enums = option("enums") == "number";
-  form_.ignores_unknown = option("unknown") == "ignore";
-}
-
-std::optional<std::string> ObjectRequest::option(std::string_view name) const {
-  return rr::query_value(request().query(), name);
-}
-
-SessionKey ObjectRequest::key(std::string service) const {
+SessionKey session_key(const Request& request, std::string service) {
   SessionKey key{std::move(service)};
   constexpr std::string_view basic = "Basic ";
-  const auto header = request().header(http::field::authorization);
+  const auto header = request.header(http::field::authorization);
   if (!equals_ignoring_case(header.substr(0, basic.size()), basic)) return key;
   const auto decoded = rr::decode_base64(header.substr(basic.size()));
   if (!decoded) return key;
@@ -101,6 +88,27 @@ SessionKey ObjectRequest::key(std::string service) const {
   key.username = text.substr(0, colon);
   if (colon != std::string::npos) key.password = text.substr(colon + 1);
   return key;
+}
+
+rr::JsonForm json_form(const Request& request) {
+  rr::JsonForm out;
+  out.packs_arrays = rr::query_value(request.query(), "arrays") == "packed";
+  out.numbers_enums = rr::query_value(request.query(), "enums") == "number";
+  out.ignores_unknown = rr::query_value(request.query(), "unknown") == "ignore";
+  return out;
+}
+
+ObjectRequest::ObjectRequest(ResponseWriter& writer) : writer_(writer) {
+  const auto accept = request().header(http::field::accept);
+  wants_events_ = accepts(accept, "text/event-stream");
+  if (accepts(accept, "application/cbor")) wanted_ = BodyForm::cbor;
+  if (accepts(accept, "application/octet-stream")) wanted_ = BodyForm::bytes;
+  form_ = json_form(request());
+  form_.has_bytes = wanted_ == BodyForm::cbor;
+}
+
+std::optional<std::string> ObjectRequest::option(std::string_view name) const {
+  return rr::query_value(request().query(), name);
 }
 
 bool ObjectRequest::has_bytes_body() const {
@@ -157,6 +165,19 @@ Response ObjectRequest::method_response(std::string_view allowed) const {
   auto response = problem_response(405, "method not supported here; supported: " + std::string(allowed));
   response.set("Allow", std::string(allowed));
   return response;
+}
+
+rr::Result<std::vector<std::string>> split_path(std::string_view path) {
+  std::vector<std::string> out;
+  while (!path.empty()) {
+    const auto slash = path.find('/');
+    auto segment = rr::percent_decode(path.substr(0, slash));
+    if (!segment) return segment.error();
+    out.push_back(std::move(*segment));
+    if (out.size() > max_segments) return rr::make_error(rr::ErrorCode::object_not_found, "the path is too long");
+    path = slash == std::string_view::npos ? std::string_view() : path.substr(slash + 1);
+  }
+  return out;
 }
 
 rr::awaitable<rr::Result<std::shared_ptr<Target>>> find_target(std::shared_ptr<DeviceSession> session,

@@ -14,6 +14,9 @@
 
 namespace rrgate {
 
+/// What somebody does to an object or a member.
+enum class Verb : std::uint8_t { read, write, call, subscribe, lock };
+
 enum class BodyForm : std::uint8_t { json, cbor, bytes };
 
 /// Where a path leads. `member` null: to the object itself.
@@ -26,6 +29,11 @@ struct Target {
 
   const rr::TypeRegistry& types() const { return object.connection()->session().types(); }
 };
+
+/// Whose session a request uses: user and password of HTTP Basic authentication, for the device.
+SessionKey session_key(const Request& request, std::string service);
+/// What the query says of the form of values.
+rr::JsonForm json_form(const Request& request);
 
 /// Borrows the request.
 class ObjectRequest {
@@ -42,8 +50,7 @@ class ObjectRequest {
   bool wants_events() const { return wants_events_; }
   const rr::JsonForm& form() const { return form_; }
   std::optional<std::string> option(std::string_view name) const;
-  /// User and password of HTTP Basic authentication; for the device.
-  SessionKey key(std::string service) const;
+  SessionKey key(std::string service) const { return session_key(request(), std::move(service)); }
 
   /// The body by Content-Type. Errors   data_serialization_error; invalid_argument: another type.
   rr::Result<rr::Json> body() const;
@@ -67,6 +74,9 @@ unsigned status_of(rr::ErrorCode code);
 
 /// Walks from the root object along `segments`, percent-decoded: objrefs by name, an index behind those that have one,
 /// at last a member or nothing.
+/// Between the slashes, decoded. A slash at the end adds nothing. Errors   a bad escape; object_not_found: too long.
+rr::Result<std::vector<std::string>> split_path(std::string_view path);
+
 /// Errors   object_not_found, member_not_found, those of the device.
 rr::awaitable<rr::Result<std::shared_ptr<Target>>> find_target(std::shared_ptr<DeviceSession> session,
                                                                std::vector<std::string> segments);

@@ -2,6 +2,7 @@
 
 #include "server/http/endpoints/device_documents.hpp"
 #include "server/http/endpoints/devices.hpp"
+#include "server/http/endpoints/member_values.hpp"
 #include "server/http/endpoints/members.hpp"
 #include "server/http/origin.hpp"
 #include "server/log/log.hpp"
@@ -10,50 +11,10 @@ namespace rrgate {
 
 namespace {
 
-constexpr std::size_t max_segments = 64;
-
-/// Between the slashes, decoded. A slash at the end adds nothing.
-rr::Result<std::vector<std::string>> split_path(std::string_view path) {
-  std::vector<std::string> out;
-  while (!path.empty()) {
-    const auto slash = path.find('/');
-    auto segment = rr::percent_decode(path.substr(0, slash));
-    if (!segment) return segment.error();
-    out.push_back(std::move(*segment));
-    if (out.size() > max_segments) return rr::make_error(rr::ErrorCode::object_not_found, "the path is too long");
-    path = slash == std::string_view::npos ? std::string_view() : path.substr(slash + 1);
-  }
-  return out;
-}
-
-/// What an object has: for people who look around, and programs that do.
-rr::OrderedJson describe(const Target& target) {
-  auto out = rr::OrderedJson::object();
-  rr::add_key(out, "path") = target.object.path();
-  rr::add_key(out, "type") = target.type->qualified_name;
-  if (!target.type->documentation.empty()) rr::add_key(out, "documentation") = target.type->documentation;
-  auto& members = rr::add_key(out, "members") = rr::OrderedJson::array();
-  for (const auto& member : target.type->members) {
-    auto& item = members.emplace_back(rr::OrderedJson::object());
-    rr::add_key(item, "name") = member.name;
-    rr::add_key(item, "kind") = std::string(member_kind_name(member.kind));
-    rr::add_key(item, "type") = format_type(member.type);
-    if (member.kind == rr::MemberKind::function || member.kind == rr::MemberKind::event ||
-        member.kind == rr::MemberKind::callback) {
-      auto& parameters = rr::add_key(item, "parameters") = rr::OrderedJson::array();
-      for (const auto& parameter : member.parameters)
-        parameters.push_back({{"name", parameter.name}, {"type", format_type(parameter.type)}});
-    }
-    if (member.direction() != rr::MemberDirection::both)
-      rr::add_key(item, "direction") = member.direction() == rr::MemberDirection::readonly ? "readonly" : "writeonly";
-    if (!member.documentation.empty()) rr::add_key(item, "documentation") = member.documentation;
-  }
-  return out;
-}
-
 rr::awaitable<void> serve_target(const ObjectRequest& request, const Target& target) {
   if (!target.member) {
-    auto response = request.is_read() ? request.value_response(describe(target)) : request.method_response("GET, HEAD");
+    auto response =
+        request.is_read() ? request.value_response(describe_object(target)) : request.method_response("GET, HEAD");
     co_await request.writer().send(response);
     co_return;
   }

@@ -3,6 +3,7 @@
 #include <charconv>
 #include <deque>
 
+#include "server/http/endpoints/member_values.hpp"
 #include "server/http/endpoints/members.hpp"
 
 namespace rrgate {
@@ -48,24 +49,9 @@ struct Outbox {
   asio::steady_timer news;
 };
 
-/// What a sample says: a value, or an event's arguments by name.
-rr::Result<rr::OrderedJson> sample_to_json(const Sample& sample, const rr::MemberDefinition& member,
-                                           const rr::TypeRegistry& types, const rr::JsonForm& form) {
-  if (member.kind != rr::MemberKind::event)
-    return rr::value_to_json(sample.values.at(0), member.type, types, form, member.name);
-  auto out = rr::OrderedJson::object();
-  for (std::size_t i = 0; i < member.parameters.size() && i < sample.values.size(); ++i) {
-    const auto& parameter = member.parameters[i];
-    auto json = rr::value_to_json(sample.values[i], parameter.type, types, form, parameter.name);
-    if (!json) return json.error();
-    rr::add_key(out, parameter.name) = std::move(*json);
-  }
-  return {boost::system::in_place_value, std::move(out)};
-}
-
 std::string state_text(const rr::Error* error) {
   auto out = rr::OrderedJson::object();
-  rr::add_key(out, "state") = error ? "connection_lost" : "connected";
+  rr::add_key(out, "state") = state_name(error);
   if (error) rr::add_key(out, "detail") = rr::error_to_json(*error, {})["error"]["message"];
   return "event: state\ndata: " + rr::write_json(out) + "\n\n";
 }

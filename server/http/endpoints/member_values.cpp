@@ -1,0 +1,108 @@
+#include "server/http/endpoints/member_values.hpp"
+
+#include <algorithm>
+
+#include "core/types/multidim.hpp"
+
+namespace rrgate {
+
+rr::OrderedJson describe_object(const Target& target) {
+  auto out = rr::OrderedJson::object();
+  rr::add_key(out, "path") = target.object.path();
+  rr::add_key(out, "type") = target.type->qualified_name;
+  if (!target.type->documentation.empty()) rr::add_key(out, "documentation") = target.type->documentation;
+  auto& members = rr::add_key(out, "members") = rr::OrderedJson::array();
+  for (const auto& member : target.type->members) {
+    auto& item = members.emplace_back(rr::OrderedJson::object());
+    rr::add_key(item, "name") = member.name;
+    rr::add_key(item, "kind") = std::string(member_kind_name(member.kind));
+    rr::add_key(item, "type") = format_type(member.type);
+    if (member.kind == rr::MemberKind::function || member.kind == rr::MemberKind::event ||
+        member.kind == rr::MemberKind::callback) {
+      auto& parameters = rr::add_key(item, "parameters") = rr::OrderedJson::array();
+      for (const auto& parameter : member.parameters)
+        parameters.push_back({{"name", parameter.name}, {"type", format_type(parameter.type)}});
+    }
+    if (member.direction() != rr::MemberDirection::both)
+      rr::add_key(item, "direction") = member.direction() == rr::MemberDirection::readonly ? "readonly" : "writeonly";
+    if (!member.documentation.empty()) rr::add_key(item, "documentation") = member.documentation;
+  }
+  return out;
+}
+
+rr::Result<std::vector<rr::Value>> arguments_from_json(const rr::Json& json, const rr::MemberDefinition& member,
+                                                       const rr::TypeRegistry& types, const rr::JsonForm& form) {
+  std::vector<rr::Value> out;
+  const auto refused = [&](std::string why) {
+    return rr::make_error(rr::ErrorCode::invalid_argument, member.name + " " + std::move(why));
+  };
+  if (!json.is_object()) return refused("takes its parameters as an object {\"name\": value}");
+  for (const auto& parameter : member.parameters) {
+    if (parameter.type.container == rr::ContainerKind::generator) continue;
+    const auto found = json.find(parameter.name);
+    if (found == json.end())
+      return refused("misses the parameter " + rr::quoted(parameter.name) + " (" + format_type(parameter.type) + ")");
+    auto value = rr::value_from_json(*found, parameter.type, types, form, parameter.name);
+    if (!value) return value.error();
+    out.push_back(std::move(*value));
+  }
+  for (const auto& [key, unused] : json.items()) {
+    const auto is_known = std::any_of(member.parameters.begin(), member.parameters.end(),
+                                      [&key = key](const auto& parameter) { return parameter.name == key; });
+    if (!is_known) return refused("has no parameter " + rr::quoted(key));
+  }
+  return out;
+}
+
+rr::Result<rr::OrderedJson> arguments_to_json(std::span<const rr::Value> arguments, const rr::MemberDefinition& member,
+                                              const rr::TypeRegistry& types, const rr::JsonForm& form) {
+  auto out = rr::OrderedJson::object();
+  for (std::size_t i = 0; i < member.parameters.size() && i < arguments.size(); ++i) {
+    const auto& parameter = member.parameters[i];
+    auto json = rr::value_to_json(arguments[i], parameter.type, types, form, parameter.name);
+    if (!json) return json.error();
+    rr::add_key(out, parameter.name) = std::move(*json);
+  }
+  return {boost::system::in_place_value, std::move(out)};
+}
+
+rr::Result<rr::OrderedJson> sample_to_json(const Sample& sample, const rr::MemberDefinition& member,
+                                           const rr::TypeRegistry& types, const rr::JsonForm& form) {
+  if (member.kind == rr::MemberKind::event) return arguments_to_json(sample.values, member, types, form);
+  return rr::value_to_json(sample.values.at(0), member.type, types, form, member.name);
+}
+
+std::string_view state_name(const rr::Error* error) {
+  if (!error) return "connected";
+  return error->code == rr::ErrorCode::invalid_state ? "closed" : "connection_lost";
+}
+
+std::size_t item_bytes_of(const Target& target) {
+  if (const auto size = rr::item_size(target.member->type.type)) return size;
+  const auto* entity = target.types().find_entity(target.member->type.qualified_name);
+  return entity ? entity->namedarray_count * rr::item_size(entity->namedarray_type) : 0;
+}
+
+rr::awaitable<Shape> memory_shape(const Target& target) {
+  const auto value = co_await target.object.memory_dimensions(target.member->name);
+  const auto items = value_or_throw(value.to_items<std::uint64_t>());
+  co_return Shape(items.begin(), items.end());
+}
+
+rr::awaitable<rr::Value> read_items(const Target& target, const Shape& shape, const std::optional<Shape>& offset,
+                                    const std::optional<Shape>& count) {
+  rr::MemoryShape at = offset.value_or(Shape(shape.size(), 0));
+  rr::MemoryShape counts;
+  if (count) {
+    counts = *count;
+  } else {
+    for (std::size_t i = 0; i < shape.size(); ++i) counts.push_back(shape[i] - std::min(at[i], shape[i]));
+  }
+  const auto wanted = rr::product_of(std::span<const std::uint64_t>(counts));
+  if (!wanted || *wanted > max_memory_bytes / std::max<std::size_t>(1, item_bytes_of(target)))
+    refuse(rr::ErrorCode::buffer_limit_violation,
+           "that are more than " + std::to_string(max_memory_bytes) + " bytes; ask for parts with offset and count");
+  co_return co_await target.object.read_memory(target.member->name, std::move(at), std::move(counts));
+}
+
+}  // namespace rrgate

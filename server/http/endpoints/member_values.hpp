@@ -1,0 +1,55 @@
+// What members take and give, as JSON, whatever carries it. Layer: server/http.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "server/http/endpoints/object_request.hpp"
+
+namespace rrgate {
+
+/// What one request may read of a memory.
+inline constexpr std::uint64_t max_memory_bytes = 16u * 1024 * 1024;
+
+/// An exception is how an error gets out of a coroutine here: one place answers them all.
+template <class T>
+T value_or_throw(rr::Result<T> result) {
+  if (!result) throw rr::Exception(result.error());
+  return std::move(*result);
+}
+
+[[noreturn]] inline void refuse(rr::ErrorCode code, std::string why) {
+  throw rr::Exception(rr::make_error(code, std::move(why)));
+}
+
+/// What an object has: for people who look around, and programs that do.
+rr::OrderedJson describe_object(const Target& target);
+
+/// The arguments of a function from {"name": value, ...}.
+/// Errors   those of value_from_json(); invalid_argument: missing, unknown or superfluous names.
+rr::Result<std::vector<rr::Value>> arguments_from_json(const rr::Json& json, const rr::MemberDefinition& member,
+                                                       const rr::TypeRegistry& types, const rr::JsonForm& form);
+/// The other way, for what events tell and callbacks ask.
+rr::Result<rr::OrderedJson> arguments_to_json(std::span<const rr::Value> arguments, const rr::MemberDefinition& member,
+                                              const rr::TypeRegistry& types, const rr::JsonForm& form);
+
+/// What a sample says: a value, or an event's arguments by name.
+rr::Result<rr::OrderedJson> sample_to_json(const Sample& sample, const rr::MemberDefinition& member,
+                                           const rr::TypeRegistry& types, const rr::JsonForm& form);
+/// "connected", "connection_lost", "closed" (a pipe, by the device): what listeners hear beside samples.
+std::string_view state_name(const rr::Error* error);
+
+using Shape = std::vector<std::uint64_t>;
+
+/// Bytes of an item of a memory; 0 where its items have no fixed size.
+std::size_t item_bytes_of(const Target& target);
+/// Items a dimension. Throws   rr::Exception.
+rr::awaitable<Shape> memory_shape(const Target& target);
+/// A part of a memory of `shape`; from the first item, to the last one, where nothing else is said.
+/// Throws   rr::Exception: buffer_limit_violation for more than max_memory_bytes; what the device said.
+rr::awaitable<rr::Value> read_items(const Target& target, const Shape& shape, const std::optional<Shape>& offset,
+                                    const std::optional<Shape>& count);
+
+}  // namespace rrgate

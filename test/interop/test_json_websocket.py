@@ -1,0 +1,397 @@
+"""The objects of a device as JSON over a WebSocket, as a page would use them; the device is the reference and ours in
+turn."""
+import base64
+import json
+import socket
+import struct
+import time
+
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+
+from directions import DIRECTIONS, service_command
+from processes import Background, start_gateway
+from test_http_api import BASE, ask, gateway  # noqa: F401 - a fixture
+
+PROTOCOL = "rrgate.json.v1"
+
+
+class Socket:
+    def __init__(self, port, path=BASE, **options):
+        self._connecting = connect(f"ws://127.0.0.1:{port}{path}", subprotocols=[PROTOCOL], max_size=None, **options)
+        self._others = []  # read, but not asked for yet
+        self._last_id = 0
+
+    def __enter__(self):
+        self.socket = self._connecting.__enter__()
+        return self
+
+    def __exit__(self, *reason):
+        self._connecting.__exit__(*reason)
+
+    def send(self, op, path="", **more):
+        self._last_id += 1
+        self.socket.send(json.dumps({"id": self._last_id, "op": op, "path": path, **more}))
+        return self._last_id
+
+    def next(self, **wanted):
+        """The next message with these members."""
+        def fits(message):
+            return all(key in message and message[key] == value for key, value in wanted.items())
+
+        for message in self._others:
+            if fits(message):
+                self._others.remove(message)
+                return message
+        while True:
+            message = json.loads(self.socket.recv(timeout=20))
+            if fits(message):
+                return message
+            self._others.append(message)
+
+    def ask(self, op, path="", **more):
+        answer = self.next(id=self.send(op, path, **more))
+        assert "error" not in answer, answer
+        return answer["result"]
+
+    def refusal(self, op, path="", **more):
+        error = self.next(id=self.send(op, path, **more))["error"]
+        return error["name"].removeprefix("RobotRaconteur."), error["message"]
+
+    def open(self, op, path, **more):
+        """The id of what has been opened."""
+        number = self.send(op, path, **more)
+        answer = self.next(id=number)
+        assert "error" not in answer, answer
+        return number
+
+
+@pytest.fixture
+def page(gateway):
+    with Socket(gateway) as made:
+        yield made
+
+
+def wait_until(is_so):
+    deadline = time.monotonic() + 15
+    while not is_so():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def test_values_and_calls(page):
+    assert page.socket.subprotocol == PROTOCOL
+    assert page.ask("set", "p_double", value=2.5) is None
+    assert page.ask("get", "p_double") == 2.5
+    assert page.ask("set", "p_int64", value="9007199254740993") is None
+    assert page.ask("get", "p_int64") == "9007199254740993"
+    assert page.ask("call", "add", args={"left": 1, "right": 2.5}) == 3.5
+    assert page.ask("call", "nothing") is None
+    assert page.ask("get", "parts/7/name") == "number 7"
+    assert page.ask("get", "named/right%20hand/name") == "named right hand"
+    assert page.ask("set", "target", value=4.5) is None
+    wait_until(lambda: page.ask("get", "seen_target") == 4.5)
+    described = page.ask("describe", "head")
+    assert described["type"] == "experimental.interop.Part"
+    # Many at once: each answer finds its question.
+    asked = {page.send("call", "add", args={"left": i, "right": 1}): i + 1 for i in range(50)}
+    for number, total in asked.items():
+        assert page.next(id=number)["result"] == total
+
+
+def test_a_socket_of_an_object_below(gateway):
+    with Socket(gateway, BASE + "/parts/7?enums=number") as part:
+        assert part.ask("get", "name") == "number 7"
+        assert part.ask("call", "identify") == "part number 7"
+
+
+def test_what_is_refused(page):
+    assert page.refusal("get", "nope") == ("MemberNotFound", "object 'interop' (experimental.interop.Interop) has no member 'nope'")
+    assert page.refusal("set", "version", value="2")[0] == "ReadOnlyMember"
+    assert page.refusal("get", "secret")[0] == "WriteOnlyMember"
+    assert page.refusal("set", "p_double", value="1")[1].startswith("read 'p_double': found a string, expected a number")
+    assert page.refusal("set", "p_double")[1] == '"value" is missing'
+    assert "misses the parameter 'right'" in page.refusal("call", "add", args={"left": 1})[1]
+    assert page.refusal("call", "count_up", args={"first": 1, "count": 1})[1] == "'count_up' is a generator; use \"open\""
+    assert page.refusal("fly")[0] == "InvalidArgument"
+    assert page.refusal("get")[1] == "'interop' is a object; \"get\" is not for that"
+    assert page.refusal("next", generator=99)[0] == "InvalidArgument"
+    number = page.send("call", "fail", args={"kind": "custom", "text": "out of jam"})
+    assert page.next(id=number)["error"] == {"name": "experimental.interop.InteropError", "message": "out of jam"}
+
+
+def test_messages_that_are_none(page):
+    for text in ["", "{", "[]", "7", '{"id":{},"op":"get"}', '{"op":7}', '{"id":1,"id":2,"op":"get"}', "[" * 5000]:
+        page.socket.send(text)
+        assert page.next(id=None)["error"]["name"].startswith("RobotRaconteur.")
+    assert page.ask("get", "version") == "1"
+
+
+@pytest.mark.parametrize("frame, code", [
+    (b"\x82\x81\0\0\0\0x", 1003),  # binary
+    (b"\x81\x82\0\0\0\0\xc3\x28", 1007),  # no UTF-8
+    (b"\x81\x01x", 1002),  # without mask
+    (b"\xc1\x81\0\0\0\0x", 1002),  # a reserved bit
+    (b"\x80\x81\0\0\0\0x", 1002),  # goes on with nothing
+    (b"\x81\xff\x7f\xff\xff\xff\xff\xff\xff\xff\0\0\0\0", 1009),
+    (b"\x01\x81\0\0\0\0x" * 2, 1002),
+])
+def test_frames_that_are_wrong_close_the_socket(gateway, frame, code):
+    with socket.create_connection(("127.0.0.1", gateway), timeout=20) as raw:
+        raw.sendall(f"GET {BASE} HTTP/1.1\r\nHost: x\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
+                    "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n".encode())
+        stream = raw.makefile("rb")
+        while (line := stream.readline().strip()):
+            assert not line.lower().startswith(b"sec-websocket-protocol")  # none was named
+        raw.sendall(frame)
+        opcode, length = stream.read(2)
+        assert opcode == 0x88
+        assert struct.unpack(">H", stream.read(length)[:2]) == (code,)
+
+
+def test_who_may_not_open_one(gateway):
+    def status(path=BASE, protocol=PROTOCOL, **options):
+        with pytest.raises(InvalidStatus) as refused:
+            connect(f"ws://127.0.0.1:{gateway}{path}", subprotocols=[protocol], **options).__enter__()
+        return refused.value.response.status_code
+
+    assert status(origin="http://elsewhere.example") == 403
+    assert status(protocol="soap") == 426
+    assert status("/api/v1/devices/other/x") == 404
+    assert status("/api/v1/devices/interop") == 404
+
+
+def test_events(page):
+    changed = page.open("subscribe", "changed")
+    page.ask("call", "fire", args={"count": 3})
+    seen = [page.next(subscription=changed) for _ in range(3)]
+    assert sorted(each["value"]["value"] for each in seen) == [0, 1, 2]
+    numbers = [each["number"] for each in seen]
+    assert numbers == list(range(numbers[0], numbers[0] + 3))
+    assert page.ask("unsubscribe", subscription=changed) is None
+    assert page.refusal("unsubscribe", subscription=changed)[0] == "InvalidArgument"
+    again = page.open("subscribe", "changed", after=numbers[0])
+    assert [page.next(subscription=again)["number"] for _ in range(2)] == numbers[1:]
+
+
+def test_wires(page):
+    page.ask("call", "publish_state", args={"value": [1]})
+    state = page.open("subscribe", "state")
+    page.ask("call", "publish_state", args={"value": [2]})
+    while (news := page.next(subscription=state))["value"] != [2]:
+        pass
+    assert int(news["time"]["seconds"]) > 0
+    page.ask("send", "target", value=7.5)
+    wait_until(lambda: page.ask("get", "seen_target") == 7.5)
+    both = page.open("subscribe", "both")
+    page.ask("send", "both", value=21)
+    while page.next(subscription=both)["value"] != 42:
+        pass
+
+
+def test_pipes(gateway):
+    """A two-way pipe answers who has sent, and nobody else."""
+    with Socket(gateway) as one, Socket(gateway) as other:
+        first, second = one.open("subscribe", "doubled"), other.open("subscribe", "doubled")
+        for value in range(100):
+            one.send("send", "doubled", value=value)
+        assert [one.next(subscription=first)["value"] for _ in range(100)] == [2 * value for value in range(100)]
+        other.ask("send", "doubled", value=0.5)
+        assert other.next(subscription=second)["value"] == 1
+        one.ask("send", "doubled", value=-1)
+        assert one.next(subscription=first)["state"] == "closed"
+        one.ask("send", "doubled", value=4)  # opens it anew
+        assert one.next(subscription=first)["value"] == 8
+        poses = one.open("subscribe", "poses")
+        one.ask("call", "publish_poses", args={"pose": {"px": 0, "py": 1, "label": "x"}, "count": 2})
+        assert [one.next(subscription=poses)["value"]["px"] for _ in range(2)] == [0, 1]
+
+
+def test_generators(page):
+    counting = page.open("open", "count_up", args={"first": 5, "count": 2})
+    assert [page.ask("next", generator=counting) for _ in range(3)] == [
+        {"value": 5, "done": False}, {"value": 6, "done": False}, {"done": True}]
+    assert page.refusal("next", generator=counting)[0] == "InvalidArgument"
+    scaling = page.open("open", "scale", args={"factor": 2})
+    assert [page.ask("next", generator=scaling, value=value)["value"] for value in (1, 2.5)] == [2, 5]
+    assert page.refusal("next", generator=scaling)[1] == '"value" is missing'
+    page.ask("close", generator=scaling)
+    collecting = page.open("open", "collect")
+    for part in ([1, 2], [3]):
+        page.ask("next", generator=collecting, value=part)
+    page.ask("close", generator=collecting)
+    wait_until(lambda: page.ask("get", "collected") == [1, 2, 3])
+    endless = page.open("open", "count_up", args={"first": 0, "count": 1_000_000})
+    page.ask("abort", generator=endless)
+    wait_until(lambda: page.ask("get", "generator_end") == "aborted")
+
+
+def test_a_client_who_leaves_ends_its_generators(gateway):
+    with Socket(gateway) as page:
+        page.open("open", "count_up", args={"first": 0, "count": 1_000_000})
+        page.ask("next", generator=1)
+    wait_until(lambda: ask(gateway, "GET", "/generator_end").json == "closed")
+
+
+def test_callbacks(page):
+    asked = page.open("callback", "ask")
+    assert page.refusal("callback", "ask")[0] == "MemberBusy"
+    page.ask("call", "start_ask", args={"question": "how far?"})
+    question = page.next(callback=asked)
+    assert question["args"] == {"question": "how far?"}
+    assert page.ask("answer", call=question["call"], result=12.5) is None
+    wait_until(lambda: page.ask("get", "answered") == 12.5)
+    assert page.refusal("answer", call=question["call"], result=1)[0] == "InvalidArgument"
+
+    page.ask("call", "start_ask", args={"question": "and now?"})
+    page.ask("answer", call=page.next(callback=asked)["call"], error={"message": "no idea"})
+    wait_until(lambda: page.ask("get", "answer_error") == "RobotRaconteur.OperationFailed")
+    page.ask("call", "start_ask", args={"question": "a number?"})
+    assert "expected a number" in page.refusal("answer", call=page.next(callback=asked)["call"], result="12")[1]
+    wait_until(lambda: page.ask("get", "answer_error") != "")
+    notice = page.open("callback", "notice")
+    page.ask("call", "start_notice", args={"number": 3})
+    page.ask("answer", call=page.next(callback=notice)["call"])
+    wait_until(lambda: page.ask("get", "answered") == 3)
+    page.ask("unsubscribe", subscription=asked)
+    page.ask("call", "start_ask", args={"question": "anybody?"})
+    wait_until(lambda: page.ask("get", "answer_error") == "RobotRaconteur.InvalidOperation")
+
+
+def test_a_question_that_is_not_answered(page):
+    asked = page.open("callback", "ask")
+    page.ask("call", "start_ask", args={"question": "hello?"})
+    page.next(callback=asked)
+    wait_until(lambda: page.ask("get", "answer_error") == "RobotRaconteur.OperationTimeout")
+
+
+def test_memories(page):
+    assert page.ask("shape", "m_grid") == [4, 3, 2]
+    assert page.ask("read", "m_grid", offset=[0, 1, 0], count=[4, 1, 1]) == {"dims": [4, 1, 1], "data": [4, 5, 6, 7]}
+    page.ask("write", "m_numbers", offset=[3], value=[30, 40])
+    assert page.ask("read", "m_numbers", offset=[2], count=[4]) == [2, 30, 40, 5]
+    page.ask("write", "m_numbers", offset=[3], value=[3, 4])
+    assert len(page.ask("read", "m_large")) == 50_000
+    assert page.refusal("read", "m_numbers", offset=[1, 2])[0] == "InvalidArgument"
+    assert page.refusal("write", "m_fixed", value="AA==")[0] == "ReadOnlyMember"
+    assert page.refusal("read", "m_numbers", count=[2**40])[0] == "BufferLimitViolation"
+
+
+def test_users_and_locks(gateway):
+    guarded = "/api/v1/devices/interop/guarded"
+    with Socket(gateway, guarded) as page:
+        assert page.refusal("get", "level")[0] in ("AuthenticationError", "PermissionDenied")
+        assert page.refusal("login", username="alice", password="wrong")[0] == "AuthenticationError"
+        page.ask("login", username="alice", password="secret")
+        assert page.ask("call", "who") == "alice"
+        credentials = base64.b64encode(b"bob:hunter2").decode()
+        with Socket(gateway, guarded, additional_headers={"Authorization": "Basic " + credentials}) as other:
+            assert other.ask("call", "who") == "bob"
+            page.ask("lock", kind="client")
+            assert other.refusal("set", "level", value=3)[0] == "ObjectLockedError"
+            page.ask("set", "level", value=2)
+            page.ask("unlock")
+            other.ask("set", "level", value=1.5)
+
+
+def test_bounds(page):
+    for _ in range(256):
+        page.send("subscribe", "changed")
+    for number in range(1, 257):
+        assert "error" not in page.next(id=number)
+    assert page.refusal("subscribe", "changed")[0] == "OutOfSystemResource"
+    assert page.ask("unsubscribe", subscription=7) is None
+    page.ask("subscribe", "changed")
+
+
+def test_a_reader_that_stops_is_told_and_closed(gateway):
+    """It asks for 30 MB and does not read. The gateway keeps a bounded part, and goes on for everybody else."""
+    with Socket(gateway) as busy:
+        raw = socket.socket()
+        raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 65536)
+        raw.settimeout(60)
+        raw.connect(("127.0.0.1", gateway))
+        raw.sendall(f"GET {BASE} HTTP/1.1\r\nHost: x\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
+                    "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n".encode())
+        stream = raw.makefile("rb")
+        while stream.readline().strip():
+            pass
+
+        def request(**message):
+            text = json.dumps(message).encode()
+            raw.sendall(b"\x81\xfe" + struct.pack(">H", len(text)) + b"\0\0\0\0" + text)
+
+        def frame():
+            first, length = stream.read(2)
+            if length >= 126:
+                length = struct.unpack(">H" if length == 126 else ">Q", stream.read(2 if length == 126 else 8))[0]
+            return first, stream.read(length)
+
+        for number in range(40):
+            request(id=number, op="call", path="ramp", args={"count": 100_000}, padding="x" * 100)
+            assert busy.ask("call", "add", args={"left": number, "right": 1}) == number + 1
+        last = None
+        answers = 0
+        while True:
+            first, payload = frame()
+            if first != 0x81:
+                break
+            last = payload
+            answers += 1
+        assert first == 0x88 and struct.unpack(">H", payload[:2]) == (1008,), payload
+        assert answers < 40
+        assert json.loads(last)["error"]["message"] == "too slow: messages were lost, so the connection ends"
+        raw.close()
+        assert busy.ask("get", "version") == "1"
+
+
+def test_two_thousand_values_of_a_wire(gateway):
+    with Socket(gateway) as page:
+        state = page.open("subscribe", "state")
+        for _ in range(40):
+            asked = [page.send("call", "publish_state", args={"value": [0] * 500}) for _ in range(50)]
+            for number in asked:
+                page.next(id=number)
+        page.ask("call", "publish_state", args={"value": [1]})
+        while page.next(subscription=state)["value"] != [1]:
+            pass
+
+
+def test_subscriptions_and_callbacks_outlive_the_device(tmp_path):
+    direction = next(each for each in DIRECTIONS if each.name == "reference-to-ours")
+    service = Background(service_command(direction, "v4", "http://localhost"), tmp_path / "service.log")
+    url = json.loads(service.next_line())["url"]
+    process, port = start_gateway(tmp_path, url)
+    try:
+        with Socket(port) as page:
+            asked, state = page.open("callback", "ask"), page.open("subscribe", "state")
+            service.stop()
+            assert page.next(subscription=state)["state"] == "connection_lost"
+            assert page.refusal("get", "version")[0] == "ConnectionError"
+            number = url.split(":")[2].split("/")[0]
+            service = Background([*service_command(direction, "v4", "http://localhost"),
+                                  f"--robotraconteur-tcp-port={number}"], tmp_path / "again.log")
+            service.next_line()
+            while page.next(subscription=state).get("state") != "connected":
+                pass
+            page.ask("call", "publish_state", args={"value": [2]})
+            while page.next(subscription=state)["value"] != [2]:
+                pass
+
+            def is_asked():
+                page.ask("call", "start_ask", args={"question": "still there?"})
+                return page.ask("get", "answer_error") == ""
+
+            wait_until(is_asked)
+            page.ask("answer", call=page.next(callback=asked)["call"], result=1)
+            # The gateway ends: so does the socket, with a reason.
+            process.process.terminate()
+            with pytest.raises(ConnectionClosed) as closed:
+                while True:
+                    page.socket.recv(timeout=20)
+            assert closed.value.rcvd.code == 1001
+        assert process.stop() == 0, process.description()
+    finally:
+        process.stop()
+        service.stop()
