@@ -6,6 +6,7 @@
 #include "core/session/url.hpp"
 #include "server/definitions/definition_set.hpp"
 #include "server/definitions/generate_typescript.hpp"
+#include "server/http/endpoints/image_values.hpp"
 #include "server/http/etag.hpp"
 #include "server/json/schema.hpp"
 
@@ -167,6 +168,15 @@ class OpenApi {
     return {{"text/event-stream", {{"schema", {{"type", "string"}}}, {"x-rr-data", std::move(schema)}}}};
   }
 
+  /// What a value is also given as.
+  static void add_images(const Place& place, OrderedJson& content, bool is_stream) {
+    if (!is_image_type(place.member->type, *place.service->types)) return;
+    const OrderedJson binary{{"schema", {{"type", "string"}, {"contentEncoding", "binary"}}}};
+    for (const auto& type : is_stream ? std::vector<std::string>{"multipart/x-mixed-replace"}
+                                      : std::vector<std::string>{std::string(png_type), std::string(jpeg_type)})
+      content[type] = binary;
+  }
+
   static void add_place(const Place& place, OrderedJson& paths) {
     const auto& member = *place.member;
     OrderedJson item = OrderedJson::object();
@@ -176,7 +186,11 @@ class OpenApi {
     const auto schema = rr::type_schema(member.type);
     switch (member.kind) {
       case rr::MemberKind::property:
-        if (can_read(member)) item["get"] = operation(place, "get", with_content("the value", json_content(schema)));
+        if (can_read(member)) {
+          auto content = json_content(schema);
+          add_images(place, content, false);
+          item["get"] = operation(place, "get", with_content("the value", std::move(content)));
+        }
         if (can_write(member)) {
           item["put"] = operation(place, "set", written());
           item["put"]["requestBody"] = body(schema);
@@ -189,6 +203,8 @@ class OpenApi {
         if (can_read(member)) {
           auto content = json_content(schema);
           content.update(events(schema));
+          add_images(place, content, false);
+          add_images(place, content, true);
           item["get"] = operation(place, "get", with_content("the newest value, or each as it comes", content));
         }
         if (can_write(member)) {
@@ -197,7 +213,11 @@ class OpenApi {
         }
         break;
       case rr::MemberKind::pipe:
-        if (can_read(member)) item["get"] = operation(place, "stream", with_content("each packet", events(schema)));
+        if (can_read(member)) {
+          auto content = events(schema);
+          add_images(place, content, true);
+          item["get"] = operation(place, "stream", with_content("each packet", std::move(content)));
+        }
         break;
       case rr::MemberKind::event:
         item["get"] =
@@ -219,6 +239,7 @@ class OpenApi {
       content = {{"application/x-ndjson", {{"schema", {{"type", "string"}}}, {"x-rr-line", schema}}}};
     else
       content = json_content({{"type", "object"}, {"properties", {{"result", schema}}}, {"required", {"result"}}});
+    if (!member.is_generator()) add_images(place, content, false);
     auto out = operation(place, "call", with_content("the result", std::move(content)));
     if (takes_values_while_running(member)) out["deprecated"] = true;  // its parameter stream needs a WebSocket
     if (!member.parameters.empty()) out["requestBody"] = body(arguments_schema(member.parameters));

@@ -3,6 +3,7 @@
 #include <charconv>
 
 #include "core/types/multidim.hpp"
+#include "server/http/endpoints/image_values.hpp"
 #include "server/http/endpoints/member_values.hpp"
 
 namespace rrgate {
@@ -14,6 +15,17 @@ rr::OrderedJson to_json(const ObjectRequest& request, const Target& target, cons
   auto json = rr::value_to_json(value, type, target.types(), request.form(), target.member->name);
   if (!json) throw rr::Exception(json.error());
   return std::move(*json);
+}
+
+/// A value of the member as an image, where that is wanted and it is one. Throws   rr::Exception.
+std::optional<Response> image_response(const ObjectRequest& request, const Target& target, const rr::Value& value) {
+  const auto& type = target.member->type;
+  const auto wanted = request.wanted_image();
+  if (wanted.empty() || !is_image_type(type, target.types())) return std::nullopt;
+  auto bytes = value_or_throw(image_bytes(value, type, target.types(), wanted));
+  auto response = text_response(200, wanted, std::move(bytes));
+  response.set("Cache-Control", "no-store");
+  return response;
 }
 
 rr::Value body_value(const ObjectRequest& request, const Target& target) {
@@ -30,6 +42,7 @@ rr::awaitable<Response> answer_property(const ObjectRequest& request, const Targ
   const bool can_write = direction != rr::MemberDirection::readonly;
   if (request.is_read() && can_read) {
     const auto value = co_await target.object.get(member.name);
+    if (auto image = image_response(request, target, value)) co_return std::move(*image);
     co_return request.value_response(to_json(request, target, value, member.type));
   }
   if (request.method() == http::verb::put && can_write) {
@@ -45,6 +58,7 @@ rr::awaitable<Response> answer_function(const ObjectRequest& request, const Targ
   if (request.method() != http::verb::post) co_return request.method_response("POST");
   auto arguments = value_or_throw(read_arguments(request, member, target.types()));
   const auto value = co_await target.object.call_values(member.name, std::move(arguments));
+  if (auto image = image_response(request, target, value)) co_return std::move(*image);
   auto result = rr::OrderedJson::object();
   rr::add_key(result, "result") = to_json(request, target, value, member.type);
   co_return request.value_response(result);
@@ -58,6 +72,7 @@ rr::awaitable<Response> answer_wire(const ObjectRequest& request, const Target& 
   const bool has_out = direction != rr::MemberDirection::readonly;
   if (request.is_read() && has_in) {
     const auto value = co_await target.object.peek_in(member.name);
+    if (auto image = image_response(request, target, value)) co_return std::move(*image);
     co_return request.value_response(to_json(request, target, value, member.type));
   }
   if (request.method() == http::verb::put && has_out) {

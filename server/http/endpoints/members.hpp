@@ -17,6 +17,8 @@ rr::Result<std::vector<rr::Value>> read_arguments(const ObjectRequest& request, 
 /// Answers while values come: events, pipes and wires as server-sent events, generators as those or as JSON lines.
 /// Throws   rr::Exception, before anything was sent.
 rr::awaitable<void> stream_topic(const ObjectRequest& request, const Target& target);
+/// Values of a pipe or a wire that are images, as JPEG one after another; the newest for who reads slowly.
+rr::awaitable<void> stream_images(const ObjectRequest& request, const Target& target);
 rr::awaitable<void> stream_generator(const ObjectRequest& request, const Target& target);
 
 }  // namespace rrgate

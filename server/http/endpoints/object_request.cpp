@@ -1,6 +1,7 @@
 #include "server/http/endpoints/object_request.hpp"
 
 #include "core/session/service_path.hpp"
+#include "server/http/endpoints/image_values.hpp"
 #include "server/json/base64.hpp"
 
 namespace rrgate {
@@ -103,6 +104,12 @@ ObjectRequest::ObjectRequest(ResponseWriter& writer) : writer_(writer) {
   wants_events_ = accepts(accept, "text/event-stream");
   if (accepts(accept, "application/cbor")) wanted_ = BodyForm::cbor;
   if (accepts(accept, "application/octet-stream")) wanted_ = BodyForm::bytes;
+  const auto as = option("as").value_or("");
+  wants_motion_ = as == "mjpeg" || (as.empty() && accepts(accept, "multipart/x-mixed-replace"));
+  const bool takes_jpeg = as == "jpeg" || (as.empty() && accepts(accept, jpeg_type));
+  const bool takes_png = as == "png" || (as.empty() && (accepts(accept, png_type) || accepts(accept, "image/*")));
+  if (takes_png || takes_jpeg) wanted_image_ = takes_jpeg && !accepts(accept, png_type) ? jpeg_type : png_type;
+  if (as == "jpeg") wanted_image_ = jpeg_type;
   form_ = json_form(request());
   form_.has_bytes = wanted_ == BodyForm::cbor;
 }

@@ -48,6 +48,10 @@ class ObjectRequest {
   /// Which form the answer has, by Accept: JSON unless CBOR or bytes are named first.
   BodyForm wanted() const { return wanted_; }
   bool wants_events() const { return wants_events_; }
+  /// The type of image that the answer has where the value is one, by Accept or ?as=png, ?as=jpeg; empty: none.
+  std::string_view wanted_image() const { return wanted_image_; }
+  /// Images one after another: multipart/x-mixed-replace, or ?as=mjpeg.
+  bool wants_motion() const { return wants_motion_; }
   const rr::JsonForm& form() const { return form_; }
   std::optional<std::string> option(std::string_view name) const;
   SessionKey key(std::string service) const { return session_key(request(), std::move(service)); }
@@ -66,6 +70,8 @@ class ObjectRequest {
   ResponseWriter& writer_;
   BodyForm wanted_ = BodyForm::json;
   bool wants_events_ = false;
+  std::string_view wanted_image_;
+  bool wants_motion_ = false;
   rr::JsonForm form_;
 };
 

@@ -2,6 +2,7 @@
 
 #include "server/http/endpoints/device_documents.hpp"
 #include "server/http/endpoints/devices.hpp"
+#include "server/http/endpoints/image_values.hpp"
 #include "server/http/endpoints/member_values.hpp"
 #include "server/http/endpoints/members.hpp"
 #include "server/http/origin.hpp"
@@ -21,7 +22,10 @@ rr::awaitable<void> serve_target(const ObjectRequest& request, const Target& tar
   const auto& member = *target.member;
   const bool is_topic = member.kind == rr::MemberKind::event || member.kind == rr::MemberKind::pipe ||
                         (member.kind == rr::MemberKind::wire && member.direction() != rr::MemberDirection::writeonly);
-  if (is_topic && request.is_read() && request.wants_events()) {
+  const bool is_motion = is_topic && member.kind != rr::MemberKind::event && is_image_type(member.type, target.types());
+  if (is_motion && request.is_read() && request.wants_motion()) {
+    co_await stream_images(request, target);
+  } else if (is_topic && request.is_read() && request.wants_events()) {
     co_await stream_topic(request, target);
   } else if (member.kind == rr::MemberKind::function && member.is_generator()) {
     co_await stream_generator(request, target);

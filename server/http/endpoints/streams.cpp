@@ -3,8 +3,10 @@
 #include <charconv>
 #include <deque>
 
+#include "server/http/endpoints/image_values.hpp"
 #include "server/http/endpoints/member_values.hpp"
 #include "server/http/endpoints/members.hpp"
+#include "server/log/log.hpp"
 
 namespace rrgate {
 
@@ -117,6 +119,54 @@ rr::awaitable<void> stream_topic(const ObjectRequest& request, const Target& tar
     failed = co_await writer.write(text);
   }
   if (!failed && !outbox->is_gone) co_await writer.end();
+  co_await writer.unwatch();
+}
+
+rr::awaitable<void> stream_images(const ObjectRequest& request, const Target& target) {
+  struct Newest {
+    explicit Newest(const asio::any_io_executor& executor) : news(executor, asio::steady_timer::time_point::max()) {}
+    SamplePtr sample;
+    bool is_gone = false;
+    asio::steady_timer news;
+  };
+  auto& writer = request.writer();
+  const auto& member = *target.member;
+  const auto newest = std::make_shared<Newest>(writer.executor());
+  const auto connection = target.object.connection();  // keeps the definitions
+  SampleHandler handler = [newest](const SamplePtr& sample, const rr::Error*) {
+    if (!sample) return;
+    newest->sample = sample;
+    newest->news.cancel();
+  };
+  TopicKey key(member.kind, target.object.path(), member.name);
+  auto listening = co_await target.session->listen(std::move(key), 0, std::move(handler));
+  if (!listening) throw rr::Exception(listening.error());
+  const auto listener = std::move(*listening);
+
+  const auto head = stream_head("multipart/x-mixed-replace; boundary=frame");
+  if (co_await writer.begin(head)) co_return;
+  writer.watch([newest] {
+    newest->is_gone = true;
+    newest->news.cancel();
+  });
+  // Browsers show a part when the next one's boundary has come: each is followed by it at once.
+  auto failed = co_await writer.write("--frame\r\n");
+  while (!failed && !newest->is_gone) {
+    if (!newest->sample) {
+      co_await newest->news.async_wait(asio::as_tuple(asio::use_awaitable));
+      continue;
+    }
+    const auto sample = std::exchange(newest->sample, nullptr);
+    const auto jpeg = image_bytes(sample->values.at(0), member.type, connection->session().types(), jpeg_type);
+    if (!jpeg) {
+      log(LogLevel::debug, "frame left out", {{"member", member.name}, {"error", jpeg.error().message}});
+      continue;
+    }
+    const auto part = "Content-Type: image/jpeg\r\nContent-Length: " + std::to_string(jpeg->size()) + "\r\n\r\n" +
+                      *jpeg + "\r\n--frame\r\n";
+    failed = co_await writer.write(part);
+  }
+  if (!failed && !newest->is_gone) co_await writer.end();
   co_await writer.unwatch();
 }
 

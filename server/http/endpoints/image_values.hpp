@@ -1,0 +1,24 @@
+// Values that are images, as browsers show them. Layer: server/http. See docs/http-api.md.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "core/types/type_registry.hpp"
+#include "core/types/value.hpp"
+
+namespace rrgate {
+
+inline constexpr std::string_view png_type = "image/png";
+inline constexpr std::string_view jpeg_type = "image/jpeg";
+
+/// Whether values of the type are images: a structure with `data` (uint8[]), `width` and `height`, these either in it
+/// or in a structure `image_info` within it (com.robotraconteur.image).
+bool is_image_type(const rr::TypeDefinition& type, const rr::TypeRegistry& types);
+
+/// `value`  of such a type.
+/// Errors   operation_failed: sizes that don't fit, an encoding that is none of ours, compressed as something else.
+rr::Result<std::string> image_bytes(const rr::Value& value, const rr::TypeDefinition& type,
+                                    const rr::TypeRegistry& types, std::string_view media_type);
+
+}  // namespace rrgate
