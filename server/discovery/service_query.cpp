@@ -24,7 +24,7 @@ constexpr std::size_t max_candidates = 8;
 
 ClientOptions index_options(const ConnectionUrl& url, const ServiceQueryOptions& options) {
   ClientOptions out;
-  out.connection.self = {random_node_id(), options.self_name};
+  out.connection.self = {options.self_id.is_any() ? random_node_id() : options.self_id, options.self_name};
   out.connection.target = {url.node_id.value_or(NodeId{}), url.node_name};
   out.connection.handshake_timeout = options.dial.timeout;
   out.connection.max_message_size = options.max_answer_bytes;

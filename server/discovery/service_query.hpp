@@ -34,6 +34,7 @@ struct NodeServices {
 
 struct ServiceQueryOptions {
   std::string self_name = {};  ///< node name to come under
+  NodeId self_id = {};         ///< any: a random one
   DialOptions dial = {};       ///< timeout: for all that follows, too
   std::size_t max_answer_bytes = 64 * 1024;
 };

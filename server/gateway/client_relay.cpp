@@ -5,7 +5,7 @@
 
 namespace rrgate {
 
-rr::awaitable<rr::Result<std::unique_ptr<Boarding>>> board(Gateway& gateway, Device& device) {
+rr::awaitable<rr::Result<std::unique_ptr<Boarding>>> board(Gateway& gateway, Device& device, std::string way) {
   const auto label = "device " + rr::quoted(device.config().name);
   auto seat = device.take_seat();
   if (!seat) {
@@ -13,7 +13,7 @@ rr::awaitable<rr::Result<std::unique_ptr<Boarding>>> board(Gateway& gateway, Dev
     co_return rr::make_error(rr::ErrorCode::connection_error,
                              label + " has all the clients it may have (" + std::to_string(device.clients()) + ")");
   }
-  auto stream = co_await device.connect();
+  auto stream = co_await device.connect(std::move(way));
   if (!stream) {
     gateway.reject(Rejection::device_offline);
     co_return rr::make_error(rr::ErrorCode::connection_error, label + " is offline: " + stream.error().message);

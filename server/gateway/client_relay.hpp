@@ -16,8 +16,9 @@ struct Boarding {
   std::unique_ptr<rr::ByteStream> stream;
 };
 
+/// `way`    see Device::connect().
 /// Errors   connection_error: the device is full or can't be reached; the text is for the client.
-rr::awaitable<rr::Result<std::unique_ptr<Boarding>>> board(Gateway& gateway, Device& device);
+rr::awaitable<rr::Result<std::unique_ptr<Boarding>>> board(Gateway& gateway, Device& device, std::string way = {});
 
 /// Relays until one side ends; ends both. `client` is at the start of its Robot Raconteur stream.
 rr::awaitable<void> relay_client(Gateway& gateway, Connection& connection, rr::ByteStream& client, Boarding& boarding);

@@ -10,6 +10,7 @@
 #include <random>
 
 #include "core/session/connection.hpp"
+#include "core/support/random.hpp"
 #include "server/log/log.hpp"
 #include "server/transport/race.hpp"
 
@@ -25,24 +26,27 @@ milliseconds with_jitter(milliseconds wait) {
   return wait * std::uniform_int_distribution<int>(75, 125)(random) / 100;
 }
 
+constexpr const char* circle = "its URL leads back to this gateway";
+
 struct Reached {
   rr::ConnectionUrl url;
   ProbeResult answer;
 };
 
-rr::awaitable<rr::Result<Reached>> probe_at(rr::ConnectionUrl url, rr::DialOptions options) {
-  auto answer = co_await probe(url, std::move(options));
+rr::awaitable<rr::Result<Reached>> probe_at(rr::ConnectionUrl url, rr::DialOptions options, rr::NodeId self_id) {
+  auto answer = co_await probe(url, std::move(options), self_id);
   if (!answer) co_return answer.error();
   Reached reached{std::move(url), std::move(*answer)};
   co_return reached;
 }
 
-rr::awaitable<rr::Result<Reached>> probe_any(std::vector<rr::ConnectionUrl> urls, rr::DialOptions options) {
+rr::awaitable<rr::Result<Reached>> probe_any(std::vector<rr::ConnectionUrl> urls, rr::DialOptions options,
+                                             rr::NodeId self_id) {
   std::vector<rr::Runner<Reached>> runners;
   for (auto& url : urls) {
     rr::Runner<Reached> runner;
     runner.name = rr::format_url(url);
-    runner.run = [url = std::move(url), options] { return probe_at(url, options); };
+    runner.run = [url = std::move(url), options, self_id] { return probe_at(url, options, self_id); };
     runners.push_back(std::move(runner));
   }
   const auto nothing = rr::make_error(rr::ErrorCode::connection_error, "no URL");
@@ -76,10 +80,13 @@ Device::Device(const asio::any_io_executor& executor, DeviceConfig config, const
            : is_secure(config_.url) ? std::make_shared<TlsFiles>(config_.tls)
                                     : nullptr),
       retry_(whole.retry),
+      look_id_(rr::random_node_id()),
       wake_(executor) {}
 
-rr::DialOptions Device::dial_options() const {
+rr::DialOptions Device::dial_options(std::string_view way) const {
   auto options = dial_options_;
+  const auto own = rr::format_node_id(look_id_, rr::NodeIdFormat::dashes);
+  options.headers.emplace_back(way_header, way.empty() ? own : std::string(way) + ", " + own);
   if (tls_) options.tls = tls_->context();
   return options;
 }
@@ -110,8 +117,18 @@ rr::awaitable<rr::Result<T>> Device::until_stopped(rr::awaitable<rr::Result<T>> 
   co_return std::move(result);
 }
 
-rr::awaitable<rr::Result<std::unique_ptr<rr::ByteStream>>> Device::connect() {
-  auto dialed = rr::dial_any(urls_to_try(), dial_options());
+bool Device::is_on_way(std::string_view way) const {
+  return way.find(rr::format_node_id(look_id_, rr::NodeIdFormat::dashes)) != std::string_view::npos;
+}
+
+void Device::note_circle() {
+  has_come_back_ = true;
+  is_circle_ = state_ != DeviceState::online;  // one of several URLs may lead elsewhere
+}
+
+rr::awaitable<rr::Result<std::unique_ptr<rr::ByteStream>>> Device::connect(std::string way) {
+  if (is_circle_) co_return rr::make_error(rr::ErrorCode::connection_error, circle);
+  auto dialed = rr::dial_any(urls_to_try(), dial_options(way));
   auto stream = co_await until_stopped(std::move(dialed));
   // News either way: it was thought online and can't be reached, or it is back before the next look was due.
   if (stream.has_value() != (state_ == DeviceState::online)) look_again();
@@ -141,7 +158,8 @@ rr::awaitable<void> Device::watch() {
   auto backoff = retry_.min;
   while (!is_stopping_) {
     looks_again_ = false;
-    auto probed = probe_any(urls_to_try(), dial_options());
+    has_come_back_ = false;
+    auto probed = probe_any(urls_to_try(), dial_options(), look_id_);
     auto reached = co_await until_stopped(std::move(probed));
     if (is_stopping_) break;
     rr::Result<ProbeResult> result = rr::Error{};
@@ -151,6 +169,8 @@ rr::awaitable<void> Device::watch() {
     } else {
       result = std::move(reached.error());
     }
+    is_circle_ = has_come_back_ && !result;
+    if (is_circle_) result = rr::make_error(rr::ErrorCode::connection_error, circle);
     note(result);
     const auto looked = std::chrono::steady_clock::now();
     wake_.expires_at(looked + with_jitter(result ? retry_.online : backoff));

@@ -46,7 +46,14 @@ class Device : public std::enable_shared_from_this<Device> {
   void set_urls(std::vector<rr::ConnectionUrl> urls);
 
   /// A connection for one client, by whichever URL is the quickest. A failure makes the device be looked at again soon.
-  rr::awaitable<rr::Result<std::unique_ptr<rr::ByteStream>>> connect();
+  /// `way`    looks of the gateways that the client has come through (see way_header); empty: none that says so.
+  /// Errors   also: the device's URL leads back to this gateway.
+  rr::awaitable<rr::Result<std::unique_ptr<rr::ByteStream>>> connect(std::string way = {});
+  /// Whether it is this device's own look that comes from this node, or by this way: then its URL leads back here.
+  bool is_own_look(const rr::NodeId& sender) const { return sender == look_id_; }
+  bool is_on_way(std::string_view way) const;
+  /// Such a look has come. Until one is answered no client is connected, or each would go round in circles.
+  void note_circle();
   /// A client's connection to the device broke: look at it again soon.
   void note_trouble() { look_again(); }
 
@@ -75,7 +82,7 @@ class Device : public std::enable_shared_from_this<Device> {
   void stop();
 
  private:
-  rr::DialOptions dial_options() const;
+  rr::DialOptions dial_options(std::string_view way = {}) const;
   /// Errors   those of `work`; operation_aborted: stop() was called.
   template <class T>
   rr::awaitable<rr::Result<T>> until_stopped(rr::awaitable<rr::Result<T>> work);
@@ -90,6 +97,9 @@ class Device : public std::enable_shared_from_this<Device> {
   std::shared_ptr<TlsFiles> tls_;                        ///< null: the URL wants none
   std::list<boost::asio::cancellation_signal> dialing_;  ///< what stop() ends
   Retry retry_;
+  const rr::NodeId look_id_;    ///< the node that looks come from: none but they have it
+  bool has_come_back_ = false;  ///< the look that is on its way
+  bool is_circle_ = false;      ///< the last look came back, and was not answered
   DeviceState state_ = DeviceState::connecting;
   std::string last_error_;
   std::optional<ProbeResult> identity_;
@@ -99,6 +109,10 @@ class Device : public std::enable_shared_from_this<Device> {
   bool looks_again_ = false;
   boost::asio::steady_timer wake_;
 };
+
+/// HTTP header of WebSockets from gateway to gateway: the look ids of the devices that the connection is for, one
+/// behind the other.
+inline constexpr const char* way_header = "X-Rrgate-Way";
 
 class DeviceRegistry {
  public:

@@ -12,6 +12,9 @@ namespace rrgate {
 
 namespace {
 
+/// Of way_header: 25 gateways in a row.
+constexpr std::size_t longest_way = 1024;
+
 constexpr std::string_view devices_prefix = "/devices/";
 
 rr::awaitable<rr::error_code> write_text(rr::ByteStream& stream, std::string_view text) {
@@ -109,7 +112,15 @@ rr::awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, st
     co_await refuse(response);
     co_return;
   }
-  auto boarding = co_await board(gateway, **device);
+  std::string way(request.header(way_header));
+  const bool is_circle = (*device)->is_on_way(way);
+  if (is_circle) (*device)->note_circle();
+  if (is_circle || way.size() > longest_way) {
+    const auto response = problem_response(508, "the way leads back to the gateway that it began at");
+    co_await refuse(response);
+    co_return;
+  }
+  auto boarding = co_await board(gateway, **device, std::move(way));
   const bool takes_close = takes_close_frames(request);
   if (!boarding && !takes_close) {
     auto response = problem_response(503, boarding.error().message);

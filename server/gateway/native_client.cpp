@@ -84,7 +84,10 @@ rr::awaitable<void> serve_native_client(Gateway& gateway, Connection& connection
 
   auto* device = gateway.devices().route(request.header.receiver_node_id, request.header.receiver_node_name);
   rr::Error refusal;
-  if (device) {
+  if (device && device->is_own_look(request.header.sender_node_id)) {
+    device->note_circle();
+    refusal = rr::make_error(rr::ErrorCode::connection_error, "the way leads back to the gateway that it began at");
+  } else if (device) {
     auto boarding = co_await board(gateway, *device);
     if (boarding) {
       co_await relay_client(gateway, connection, client, **boarding);

@@ -24,8 +24,9 @@ struct ProbeResult {
   bool operator==(const ProbeResult&) const = default;
 };
 
-/// Connects to the service index, asks for the services, disconnects; all of it within options.timeout.
+/// Connects to the service index as the node `self_id`, asks for the services, disconnects; all of it within
+/// options.timeout.
 /// Errors   connection_error: not reached, no or a wrong answer. node_not_found: another node than the URL names.
-rr::awaitable<rr::Result<ProbeResult>> probe(rr::ConnectionUrl url, rr::DialOptions options);
+rr::awaitable<rr::Result<ProbeResult>> probe(rr::ConnectionUrl url, rr::DialOptions options, rr::NodeId self_id);
 
 }  // namespace rrgate

@@ -6,11 +6,12 @@ import sys
 import pytest
 
 from directions import LEVELS, PEERS
-from processes import Background, read_json, start_gateway
+from processes import Background, free_port, read_json, start_gateway
 from scenarios import SCENARIOS
 from test_http_api import Stream, ask
 from test_https import make_web_certificates
-from test_tls import SERVICE, check_all, lab, run_steps, start_service  # noqa: F401
+from test_operations import Gateway
+from test_tls import FUNCTIONS, SERVICE, check_all, lab, run_steps, start_service  # noqa: F401
 
 STEPS = [step for name in ("functions", "large_arrays", "events", "wires", "pipes") for scenario in SCENARIOS
          if scenario.name == name for step in scenario.steps]
@@ -123,3 +124,41 @@ def test_the_far_gateway_dies(lab, tmp_path):  # noqa: F811
     finally:
         client.stop()
         chain.stop()
+
+
+@pytest.mark.parametrize("count", [1, 2], ids=["itself", "each other"])
+@pytest.mark.parametrize("scheme", ["rr+tcp", "rr+ws"])
+def test_a_circle(lab, tmp_path, scheme, count):  # noqa: F811
+    """Gateways that have each other as a device, or one that has itself, say so; no connection goes round and round."""
+    def device(port):
+        path = "devices/interop" if scheme == "rr+ws" else ""
+        return {"name": "interop", "url": f"{scheme}://127.0.0.1:{port}/{path}?service=interop"}
+
+    folders = [tmp_path / str(number) for number in range(count)]
+    for folder in folders:
+        folder.mkdir()
+    ports = [free_port() for _ in folders]
+    gateways = []
+    service, service_port = start_service("ours", lab, "good", tmp_path)
+    try:
+        for folder, port, to in zip(folders, ports, ports[1:] + ports[:1]):
+            gateways.append(Gateway(folder, {"listen": [f"127.0.0.1:{port}"], "devices": [device(to)]}))
+        gateways[-1].process.wait_until(lambda: any(
+            "its URL leads back to this gateway" in event.get("error", "")
+            for gateway in gateways for event in gateway.events() if event["event"] == "device offline"))
+        for port in ports:
+            answer = run_steps("reference", lab, port, scheme="rr+tcp", node="")
+            assert "connect_error" in answer, answer
+        # How often a connection went from hand to hand.
+        assert sum(event["event"] == "client connected" for gateway in gateways for event in gateway.events()) < 20
+        # One who is put right makes all right.
+        gateways[0].write({**gateways[0].config, "devices": [
+            {"name": "interop", "url": f"rr+tcp://127.0.0.1:{service_port}/?service=interop"}]})
+        gateways[0].hang_up()
+        for gateway, port in zip(gateways, ports):
+            gateway.wait_for("device online")
+            check_all(FUNCTIONS.steps, run_steps("reference", lab, port, scheme="rr+tcp", node=""))
+    finally:
+        for gateway in gateways:
+            gateway.process.stop()
+        service.stop()
