@@ -128,6 +128,7 @@ rr::awaitable<void> serve_connection(Gateway& gateway, std::unique_ptr<rr::ByteS
 
   switch (protocol) {
     case Protocol::robot_raconteur:
+      if (gateway.is_stopping()) break;
       co_await serve_native_client(gateway, connection, std::move(stream));
       break;
     case Protocol::http:

@@ -227,16 +227,19 @@ void Gateway::stop(std::function<void()> on_stopped) {
   is_stopping_ = true;
   on_stopped_ = std::move(on_stopped);
   if (on_stop_) on_stop_();
-  for (const auto& listener : listeners_) listener.socket->close();
-  for (const auto& acceptor : adopted_) {
-    rr::error_code ignored;
-    acceptor->close(ignored);
-  }
   if (found_) found_->stop();
   devices_.stop();
   sessions_.stop();
   tls_watch_.cancel();
   asio::co_spawn(io_, drain(), asio::detached);
+}
+
+void Gateway::close_listeners() {
+  for (const auto& listener : listeners_) listener.socket->close();
+  for (const auto& acceptor : adopted_) {
+    rr::error_code ignored;
+    acceptor->close(ignored);
+  }
 }
 
 bool Gateway::has_relay() const {
@@ -263,6 +266,7 @@ rr::awaitable<void> Gateway::drain() {
   };
   auto deadline = std::chrono::steady_clock::now() + config_.timeouts.drain;
   while (has_relay() && !ends_at_once_ && std::chrono::steady_clock::now() < deadline) co_await wait_until(deadline);
+  close_listeners();
   const rr::EndReason reason{1001, "the gateway is stopping"};
   end_all(reason);
   deadline = std::chrono::steady_clock::now() + last_wait;

@@ -55,8 +55,8 @@ class Gateway {
   /// Errors   certificates or CAs that can't be used, an address that can't be listened on; then nothing has changed.
   [[nodiscard]] rr::Result<> reconfigure(Config next);
 
-  /// Closes the listeners, lets relays end within timeouts.drain, then ends them; calls `on_stopped` when nothing is
-  /// left. A second call ends them at once.
+  /// Lets relays end within timeouts.drain, then ends them; calls `on_stopped` when nothing is left. A second call ends
+  /// them at once. Meanwhile nobody new gets to a device, but who asks for /readyz hears why.
   void stop(std::function<void()> on_stopped);
   bool is_stopping() const { return is_stopping_; }
   /// Reads certificates, keys and CAs anew. What can't be used stays as it was, and the log says why. Connections that
@@ -94,6 +94,7 @@ class Gateway {
   void accept(boost::asio::ip::tcp::socket socket);
   rr::awaitable<void> drain();
   rr::awaitable<void> watch_tls();
+  void close_listeners();
   bool has_relay() const;
   void end_all(const rr::EndReason& reason);
 

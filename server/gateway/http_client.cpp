@@ -141,6 +141,19 @@ rr::awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, st
   co_await relay_client(gateway, connection, socket, **boarding);
 }
 
+/// While the gateway stops, it says so, and nothing else.
+bool is_answered_while_stopping(const Request& request) {
+  const auto path = request.path();
+  return path == "/healthz" || path == "/readyz" || path == "/metrics";
+}
+
+Response stopping_response() {
+  auto response = problem_response(503, "the gateway is stopping");
+  response.set("Retry-After", "5");
+  response.closes = true;
+  return response;
+}
+
 /// The page's own links are relative: they need the '/' at the end.
 bool is_base_path(const Request& request, const Config& config) {
   return !config.base_path.empty() && request.path() == config.base_path;
@@ -176,7 +189,8 @@ rr::awaitable<void> serve_http_client(Gateway& gateway, Connection& connection,
     ++gateway.metrics().requests;
     request.arrival = see_through_proxies(request, connection.peer, config.proxy.trust);
     take_base_path(request, config.base_path);
-    if (asks_for_websocket(request)) {
+    const bool is_refused = gateway.is_stopping() && !is_answered_while_stopping(request);
+    if (!is_refused && asks_for_websocket(request)) {
       const rr::Bytes unread(reader.unread().begin(), reader.unread().end());
       co_await serve_websocket(gateway, connection, std::move(stream), request, unread);
       break;
@@ -185,7 +199,9 @@ rr::awaitable<void> serve_http_client(Gateway& gateway, Connection& connection,
     if (request.arrival.is_encrypted && config.tls.hsts_seconds > 0)
       headers.emplace_back("Strict-Transport-Security", "max-age=" + std::to_string(config.tls.hsts_seconds));
     ResponseWriter writer(*stream, request, gateway.is_stopping(), std::move(headers));
-    const auto response = is_base_path(request, config) ? to_base_path(config) : gateway.router().answer(request);
+    const auto response = is_refused                      ? stopping_response()
+                          : is_base_path(request, config) ? to_base_path(config)
+                                                          : gateway.router().answer(request);
     if (response.answer_later) {
       co_await response.answer_later(writer);
     } else if (co_await writer.send(response)) {

@@ -3,6 +3,7 @@
 #include "server/http/endpoints/dashboard.hpp"
 #include "server/http/endpoints/devices.hpp"
 #include "server/http/endpoints/discovery.hpp"
+#include "server/http/endpoints/gateway_document.hpp"
 #include "server/http/endpoints/health.hpp"
 #include "server/http/endpoints/metrics.hpp"
 #include "server/http/endpoints/objects.hpp"
@@ -14,6 +15,7 @@ Router make_routes(Gateway& gateway) {
   router.add(http::verb::get, "/healthz", health_endpoint());
   router.add(http::verb::get, "/readyz", ready_endpoint(gateway));
   router.add(http::verb::get, "/metrics", metrics_endpoint(gateway));
+  router.add(http::verb::get, "/api/v1/openapi.json", gateway_document_endpoint(gateway));
   router.add(http::verb::get, "/api/v1/devices", devices_endpoint(gateway));
   for (const auto method : {http::verb::get, http::verb::put, http::verb::post, http::verb::options})
     router.add(method, "/api/v1/devices/*", objects_endpoint(gateway));

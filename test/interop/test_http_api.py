@@ -338,19 +338,47 @@ def test_streams_outlive_the_device(tmp_path):
         service.stop()
 
 
-def test_a_device_keeps_what_its_openapi_says(tmp_path):
-    """The demo robot, every operation with what its schema allows and what it doesn't: no fault, nothing undocumented."""
+def schemathesis(folder, port, document):
+    """Every operation of a document with what its schema allows and what it doesn't: no fault, nothing undocumented."""
+    program = pathlib.Path(sys.executable).parent / "schemathesis"
+    checks = "not_a_server_error,status_code_conformance,content_type_conformance,response_schema_conformance"
+    run = subprocess.run(
+        [program, "run", f"http://127.0.0.1:{port}{document}", "--url", f"http://127.0.0.1:{port}", "--checks", checks,
+         "--max-examples", "20", "--no-color"], cwd=folder, capture_output=True, text=True, timeout=100)
+    assert run.returncode == 0, run.stdout[-4000:] + run.stderr[-2000:]
+    return run.stdout
+
+
+def test_gateway_and_device_keep_what_their_openapi_says(tmp_path):
+    """The demo robot, and the gateway to it."""
     robot = Background([BUILD / "server/demo/rrgate-demo-create", "--port", "0"], tmp_path / "robot.log")
     gateway, port = start_gateway(tmp_path, robot.next_line().split(" ", 1)[1])
     try:
-        program = pathlib.Path(sys.executable).parent / "schemathesis"
-        checks = "not_a_server_error,status_code_conformance,content_type_conformance,response_schema_conformance"
-        run = subprocess.run(
-            [program, "run", f"http://127.0.0.1:{port}/api/v1/devices/interop/openapi.json", "--url",
-             f"http://127.0.0.1:{port}", "--checks", checks, "--max-examples", "20", "--no-color"],
-            cwd=tmp_path, capture_output=True, text=True, timeout=100)
-        assert run.returncode == 0, run.stdout[-4000:] + run.stderr[-2000:]
-        assert "15 selected" in run.stdout
+        assert "15 selected" in schemathesis(tmp_path, port, "/api/v1/devices/interop/openapi.json")
+        assert "7 selected" in schemathesis(tmp_path, port, "/api/v1/openapi.json")  # all but itself
+        whole = ask(port, "GET", "/api/v1/openapi.json", base="").json
+        assert whole["tags"] == [{"name": "interop", "externalDocs": {"url": "/api/v1/devices/interop/openapi.json"}}]
+        paths = ask(port, "GET", whole["tags"][0]["externalDocs"]["url"], base="").json["paths"]
+        told = [operation["description"] for item in paths.values() for operation in item.values() if "description" in operation]
+        assert told and not any(line.startswith(" ") for text in told for line in text.splitlines())
     finally:
         gateway.stop()
         robot.stop()
+
+
+def test_a_trace_goes_into_the_log(tmp_path):
+    direction = next(each for each in DIRECTIONS if each.name == "reference-to-ours")
+    service = Background(service_command(direction, "v4", "http://localhost"), tmp_path / "service.log")
+    process, port = start_gateway(tmp_path, json.loads(service.next_line())["url"])
+    try:
+        trace = "4bf92f3577b34da6a3ce929d0e0e4736"
+        parent = f"00-{trace}-00f067aa0ba902b7-01"
+        answer = ask(port, "GET", "/version", headers={"traceparent": parent})
+        assert answer.headers["traceparent"] == parent
+        assert ask(port, "GET", "/version", headers={"traceparent": "00-nonsense"}).headers["traceparent"] is None
+        lines = [line for line in (tmp_path / "gateway.log").read_text().splitlines() if " call " in line]
+        assert len(lines) == 1 and f"trace={trace}" in lines[0] and "device=interop" in lines[0]
+        assert f"member={BASE}/version" in lines[0] and " us=" in lines[0]
+    finally:
+        process.stop()
+        service.stop()

@@ -36,7 +36,17 @@ TEST_CASE("relays go on while the gateway stops, new connections are refused") {
 
   const auto stopped = gateway.stop();
   CHECK(idle.receive_all().empty());
-  CHECK_THROWS(TestClient(gateway.port()));
+  const auto status_of = [&](const std::string& path) {
+    TestClient late(gateway.port());
+    late.send("GET " + path + " HTTP/1.1\r\nHost: gw\r\n\r\n");
+    return late.receive_response().status;
+  };
+  CHECK(status_of("/readyz") == 503);
+  CHECK(status_of("/healthz") == 200);
+  CHECK(status_of("/api/v1/devices/x/x") == 503);
+  TestClient late(gateway.port());
+  late.send(make_greeting());
+  CHECK(late.receive_all().empty());
   const auto message = make_message("echo", 100'000);
   client.send(message);
   CHECK(client.receive_message() == message);

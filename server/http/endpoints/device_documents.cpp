@@ -7,6 +7,7 @@
 #include "server/definitions/definition_set.hpp"
 #include "server/definitions/generate_typescript.hpp"
 #include "server/http/endpoints/image_values.hpp"
+#include "server/http/endpoints/member_values.hpp"
 #include "server/http/etag.hpp"
 #include "server/json/schema.hpp"
 
@@ -152,7 +153,7 @@ class OpenApi {
  private:
   static OrderedJson operation(const Place& place, std::string_view verb, OrderedJson responses) {
     OrderedJson out{{"operationId", std::string(verb) + "_" + place.id}, {"tags", {place.service->name}}};
-    if (!place.member->documentation.empty()) out["description"] = place.member->documentation;
+    if (!place.member->documentation.empty()) out["description"] = plain_documentation(place.member->documentation);
     responses["default"] = {{"$ref", "#/components/responses/Problem"}};
     out["responses"] = std::move(responses);
     return out;
@@ -358,7 +359,7 @@ OrderedJson async_api(std::string_view device, const std::string& base, const st
     auto& channel = add_key(channels, place.id) = OrderedJson{{"address", place.path}};
     for (const auto& index : place.indices) channel["parameters"][index] = OrderedJson::object();
     channel["messages"]["value"]["payload"] = std::move(payload);
-    if (!member.documentation.empty()) channel["description"] = member.documentation;
+    if (!member.documentation.empty()) channel["description"] = plain_documentation(member.documentation);
     add_key(operations, "receive_" + place.id) = {{"action", "receive"},
                                                   {"channel", {{"$ref", "#/channels/" + place.id}}}};
   }
@@ -389,7 +390,8 @@ OrderedJson thing_description(std::string_view device, const std::vector<Place>&
   auto events = OrderedJson::object();
   const auto with_variables = [](OrderedJson affordance, const Place& place) {
     for (const auto& index : place.indices) affordance["uriVariables"][index] = {{"type", "string"}};
-    if (!place.member->documentation.empty()) affordance["description"] = place.member->documentation;
+    if (!place.member->documentation.empty())
+      affordance["description"] = plain_documentation(place.member->documentation);
     return affordance;
   };
   for (const auto& place : places) {

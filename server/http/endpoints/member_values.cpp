@@ -6,11 +6,22 @@
 
 namespace rrgate {
 
+std::string plain_documentation(std::string_view documentation) {
+  std::string out;
+  bool begins_line = true;
+  for (const char c : documentation) {
+    if (!begins_line || c != ' ') out += c;
+    begins_line = c == '\n';
+  }
+  return out;
+}
+
 rr::OrderedJson describe_object(const Target& target) {
   auto out = rr::OrderedJson::object();
   rr::add_key(out, "path") = target.object.path();
   rr::add_key(out, "type") = target.type->qualified_name;
-  if (!target.type->documentation.empty()) rr::add_key(out, "documentation") = target.type->documentation;
+  if (!target.type->documentation.empty())
+    rr::add_key(out, "documentation") = plain_documentation(target.type->documentation);
   auto& members = rr::add_key(out, "members") = rr::OrderedJson::array();
   for (const auto& member : target.type->members) {
     auto& item = members.emplace_back(rr::OrderedJson::object());
@@ -25,7 +36,7 @@ rr::OrderedJson describe_object(const Target& target) {
     }
     if (member.direction() != rr::MemberDirection::both)
       rr::add_key(item, "direction") = member.direction() == rr::MemberDirection::readonly ? "readonly" : "writeonly";
-    if (!member.documentation.empty()) rr::add_key(item, "documentation") = member.documentation;
+    if (!member.documentation.empty()) rr::add_key(item, "documentation") = plain_documentation(member.documentation);
   }
   return out;
 }

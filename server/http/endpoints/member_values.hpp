@@ -24,6 +24,9 @@ T value_or_throw(rr::Result<T> result) {
   throw rr::Exception(rr::make_error(code, std::move(why)));
 }
 
+/// Documentation without the blank that follows "##" in each line of a definition.
+std::string plain_documentation(std::string_view documentation);
+
 /// What an object has: for people who look around, and programs that do.
 rr::OrderedJson describe_object(const Target& target);
 

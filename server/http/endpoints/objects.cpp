@@ -1,5 +1,6 @@
 #include "server/http/endpoints/objects.hpp"
 
+#include "server/http/endpoints/call_log.hpp"
 #include "server/http/endpoints/device_documents.hpp"
 #include "server/http/endpoints/devices.hpp"
 #include "server/http/endpoints/image_values.hpp"
@@ -107,6 +108,12 @@ rr::awaitable<void> serve(Gateway& gateway, ResponseWriter& writer, std::vector<
     }
     co_return;
   }
+  const auto traceparent = writer.request().header("traceparent");
+  auto trace = trace_id_of(traceparent);
+  if (!trace.empty()) writer.add_header("traceparent", std::string(traceparent));
+  const auto method = writer.request().message.method_string();
+  const CallLog logged(std::move(trace), device->config().name, {method.data(), method.size()},
+                       std::string(writer.request().path()));
   auto session = gateway.sessions().open(*device, request.key(segments[1]));
   segments.erase(segments.begin(), segments.begin() + 2);
   std::optional<rr::Error> error;
@@ -151,7 +158,8 @@ rr::awaitable<void> answer(Gateway& gateway, ResponseWriter& writer, std::string
   } else if (request.message.method() == http::verb::options) {
     response.status = 204;
     response.set("Access-Control-Allow-Methods", "GET, HEAD, PUT, POST");
-    response.set("Access-Control-Allow-Headers", "Accept, Authorization, Content-Type, Last-Event-ID, Range");
+    response.set("Access-Control-Allow-Headers",
+                 "Accept, Authorization, Content-Type, Last-Event-ID, Range, traceparent");
     response.set("Access-Control-Max-Age", "600");
   } else if (!segments || segments->empty()) {
     response = problem_response(404, segments ? "expected /api/v1/devices/NAME" : segments.error().message);
