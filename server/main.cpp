@@ -14,6 +14,8 @@ int main(int count, char** values) {
        rrgate::run_generate},
       {"cert", "cert ca|node|web FOLDER [NODE | HOST...] [--force]", "make certificates for nodes and HTTPS",
        rrgate::run_cert},
+      {"passwd", "passwd FILE NAME [--roles A,B] [--delete]", "set a user's password and roles", rrgate::run_passwd},
+      {"token", "token FILE NAME [--roles A,B] [--days N] [--delete]", "make an API token", rrgate::run_token},
       {"health", "health [--ready] [HOST:PORT]", "ask a running gateway whether it is well", rrgate::run_health},
   };
   const std::vector<std::string_view> arguments(values + 1, values + count);

@@ -1,9 +1,6 @@
 // rrgate cert: certificates of one's own, for a lab that has no CA. Layer: server/cli.
 //
 // Nodes and web servers have a CA each: what marks a node's CA is unknown to browsers, and critical.
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <charconv>
 #include <filesystem>
 #include <iostream>
@@ -13,6 +10,7 @@
 #include "server/cli/command.hpp"
 #include "server/definitions/text_file.hpp"
 #include "server/platform/folders.hpp"
+#include "server/platform/secret_file.hpp"
 #include "server/security/certificate_files.hpp"
 #include "server/security/issue_certificates.hpp"
 #include "server/security/node_certificate_check.hpp"
@@ -34,38 +32,14 @@ int fail(const std::string& what) {
   return exit_failed;
 }
 
-/// Writes for the owner's eyes alone.
-/// Errors   operation_failed: the file is there already and may not be replaced; io_error.
-rr::Result<> write_secret(const fs::path& path, std::string_view text, bool may_replace) {
-  std::error_code error;
-  if (!path.parent_path().empty() && !fs::exists(path.parent_path(), error)) {
-    fs::create_directories(path.parent_path(), error);
-    fs::permissions(path.parent_path(), fs::perms::owner_all, error);
-  }
-  if (!may_replace && fs::exists(path, error))
-    return rr::make_error(rr::ErrorCode::operation_failed, path.string() + ": is there already; --force replaces it");
-  // Beside it first, so that whoever reads meanwhile finds the old file or the new one whole.
-  const auto fresh = path.string() + ".new";
-  ::unlink(fresh.c_str());
-  const int file = ::open(fresh.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-  bool is_written = file >= 0;
-  if (is_written) {
-    is_written = ::write(file, text.data(), text.size()) == static_cast<ssize_t>(text.size());
-    ::close(file);
-  }
-  if (is_written) is_written = ::rename(fresh.c_str(), path.c_str()) == 0;
-  if (!is_written) return rr::make_error(rr::ErrorCode::io_error, path.string() + ": can't be written");
-  return {};
-}
-
 rr::Result<> write_pair(const fs::path& stem, const rr::CertificateAndKey& pair, std::string_view chain, bool force) {
   std::error_code error;
   for (const auto* ending : {".pem", ".key"})
     if (!force && fs::exists(stem.string() + ending, error))
       return rr::make_error(rr::ErrorCode::operation_failed,
                             stem.string() + ending + ": is there already; --force replaces it");
-  if (auto done = write_secret(stem.string() + ".key", pair.key, force); !done) return done;
-  return write_secret(stem.string() + ".pem", pair.certificate + std::string(chain), force);
+  if (auto done = rr::write_secret(stem.string() + ".key", pair.key, force); !done) return done;
+  return rr::write_secret(stem.string() + ".pem", pair.certificate + std::string(chain), force);
 }
 
 rr::Result<rr::CertificateAndKey> read_ca(const fs::path& folder, std::string_view name) {
@@ -129,7 +103,7 @@ rr::Result<rr::NodeId> id_of_name(const std::string& name) {
     return id;
   }
   const auto id = rr::random_node_id();
-  if (auto done = write_secret(path, rr::format_node_id(id), true); !done) return done.error();
+  if (auto done = rr::write_secret(path, rr::format_node_id(id), true); !done) return done.error();
   return id;
 }
 
@@ -154,7 +128,7 @@ int make_node(const Wishes& wishes, const std::string& output) {
   if (!made) return fail(made.error().message);
   const auto bundle = rr::make_node_bundle(*made, ca->certificate);
   if (!bundle) return fail(bundle.error().message);
-  if (auto done = write_secret(*path, rr::as_text(*bundle), wishes.force); !done) return fail(done.error().message);
+  if (auto done = rr::write_secret(*path, rr::as_text(*bundle), wishes.force); !done) return fail(done.error().message);
   std::cout << *path << "\n";
   return exit_ok;
 }

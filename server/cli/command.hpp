@@ -53,6 +53,8 @@ int run_check(Arguments arguments);
 int run_fmt(Arguments arguments);
 int run_generate(Arguments arguments);
 int run_cert(Arguments arguments);
+int run_passwd(Arguments arguments);
+int run_token(Arguments arguments);
 int run_health(Arguments arguments);
 
 }  // namespace rrgate

@@ -1,0 +1,214 @@
+#include "server/access/access.hpp"
+
+#include <algorithm>
+
+#include "core/support/glob.hpp"
+#include "server/definitions/text_file.hpp"
+#include "server/log/log.hpp"
+#include "server/platform/file_look.hpp"
+
+namespace rrgate {
+
+namespace {
+
+/// How often the log says that the audit log can't be written.
+constexpr std::chrono::seconds complaint_period{60};
+
+rr::Result<std::string> read_file(std::string_view what, const std::string& path) {
+  auto text = read_text_file(path);
+  if (!text)
+    return rr::make_error(rr::ErrorCode::io_error, std::string(what) + " " + rr::quoted(path, 200) + ": can't be read");
+  return std::move(*text);
+}
+
+rr::Error in_file(std::string_view what, const std::string& path, const rr::Error& error) {
+  return rr::make_error(error.code, std::string(what) + " " + rr::quoted(path, 200) + ": " + error.message);
+}
+
+rr::Result<JwtVerifier> load_jwt(const JwtConfig& config) {
+  const bool has_keys = !config.jwks_file.empty();
+  const auto& path = has_keys ? config.jwks_file : config.secret_file;
+  const std::string_view what = has_keys ? "JSON Web Key Set" : "secret";
+  const auto text = read_file(what, path);
+  if (!text) return text.error();
+  auto made = has_keys ? JwtVerifier::from_jwks(*text, config.claims) : JwtVerifier::from_secret(*text, config.claims);
+  if (!made) return in_file(what, path, made.error());
+  return made;
+}
+
+std::map<std::string, std::string> look(const AccessConfig& config) {
+  std::map<std::string, std::string> out;
+  for (const auto* file : {&config.users_file, &config.tokens_file, &config.jwt.jwks_file, &config.jwt.secret_file})
+    if (!file->empty()) out[*file] = rr::file_look(*file);
+  return out;
+}
+
+void add_role(std::vector<std::string>& roles, const std::string& role) {
+  if (std::find(roles.begin(), roles.end(), role) == roles.end()) roles.push_back(role);
+}
+
+/// What goes into the audit log though it was allowed.
+bool is_recorded(Verb verb) {
+  return verb == Verb::write || verb == Verb::call || verb == Verb::lock || verb == Verb::admin;
+}
+
+}  // namespace
+
+rr::Result<AccessStatePtr> load_access(const AccessConfig& config) {
+  auto out = std::make_shared<AccessState>();
+  out->config = config;
+  out->looks = look(config);
+  out->rules = AccessRules(config.rules, config.has_users());
+  if (!config.users_file.empty()) {
+    const auto text = read_file("users file", config.users_file);
+    if (!text) return text.error();
+    auto users = rr::PasswordFileAuthenticator::from_text(*text);
+    if (!users) return in_file("users file", config.users_file, users.error());
+    out->users = std::move(*users);
+  }
+  if (!config.tokens_file.empty()) {
+    const auto text = read_file("tokens file", config.tokens_file);
+    if (!text) return text.error();
+    auto tokens = ApiTokens::from_text(*text);
+    if (!tokens) return in_file("tokens file", config.tokens_file, tokens.error());
+    out->tokens = std::move(*tokens);
+  }
+  if (config.jwt.is_used()) {
+    auto jwt = load_jwt(config.jwt);
+    if (!jwt) return jwt.error();
+    out->jwt = std::move(*jwt);
+  }
+  return AccessStatePtr(std::move(out));
+}
+
+/// The users of now, for logins that are judged on other threads.
+class Access::Users final : public rr::Authenticator {
+ public:
+  explicit Users(std::shared_ptr<AuditLog> audit) : audit_(std::move(audit)) {}
+
+  void set(std::shared_ptr<const rr::PasswordFileAuthenticator> users) {
+    const std::lock_guard lock(mutex_);
+    users_ = std::move(users);
+  }
+
+  rr::Result<rr::AuthenticatedUser> authenticate(const rr::LoginAttempt& attempt) const override {
+    std::shared_ptr<const rr::PasswordFileAuthenticator> users;
+    {
+      const std::lock_guard lock(mutex_);
+      users = users_;
+    }
+    if (!users) return rr::make_error(rr::ErrorCode::authentication_error, "Invalid username or password");
+    auto user = users->authenticate(attempt);
+    Identity who;
+    who.name = attempt.username;
+    if (user) who.roles = user->privileges;
+    who.proof = user ? Proof::password : Proof::none;
+    const AccessRequest what{.service = attempt.service, .verb = Verb::read};
+    audit_->write({user ? "login" : "login_failed", &who, attempt.service.empty() ? nullptr : &what,
+                   user ? std::string_view() : std::string_view(user.error().message)});
+    return user;
+  }
+
+ private:
+  std::shared_ptr<AuditLog> audit_;
+  mutable std::mutex mutex_;
+  std::shared_ptr<const rr::PasswordFileAuthenticator> users_;
+};
+
+Access::Access(const AccessConfig& config)
+    : audit_(std::make_shared<AuditLog>()), users_(std::make_shared<Users>(audit_)) {
+  // Until load() has read who may, nobody may who must show it.
+  auto empty = std::make_shared<AccessState>();
+  empty->config = config;
+  empty->rules = AccessRules(config.rules, config.has_users());
+  state_ = std::move(empty);
+}
+
+rr::Result<> Access::load() {
+  auto loaded = load_access(state_->config);
+  if (!loaded) return loaded.error();
+  return replace(std::move(*loaded));
+}
+
+rr::Result<> Access::replace(AccessStatePtr next) {
+  if (auto opened = audit_->open(next->config.audit_file); !opened) return opened;
+  state_ = std::move(next);
+  seen_ = state_->looks;
+  users_->set(state_->users);
+  return {};
+}
+
+void Access::reload(bool is_forced) {
+  auto looks = look(state_->config);
+  if (is_forced) {
+    if (auto opened = audit_->reopen(); !opened)
+      log(LogLevel::error, "audit log can't be opened anew", {{"error", opened.error().message}});
+  }
+  if (!is_forced && looks == seen_) return;
+  const bool has_files = !looks.empty();
+  seen_ = std::move(looks);
+  auto loaded = load_access(state_->config);
+  if (!loaded) {
+    log(LogLevel::error, "users and rights can't be used; those from before stay in use",
+        {{"error", loaded.error().message}});
+    return;
+  }
+  state_ = std::move(*loaded);
+  users_->set(state_->users);
+  if (has_files) log(LogLevel::info, "users and rights read anew", {{"files", seen_.size()}});
+}
+
+rr::Result<> Access::check(const Identity& who, const AccessRequest& what) {
+  auto checked = state_->rules.check(who, what);
+  if (!checked)
+    record({"refused", &who, &what, {}});
+  else if (is_recorded(what.verb))
+    record({to_string(what.verb), &who, &what, {}});
+  return checked;
+}
+
+rr::Result<> Access::check_whole_device(const Identity& who, std::string_view device) {
+  auto checked = state_->rules.check_whole_device(who, device);
+  const AccessRequest what{.device = device, .verb = Verb::call};
+  record({checked ? "relay" : "refused", &who, &what, checked ? "" : "not every right on the whole device"});
+  return checked;
+}
+
+std::shared_ptr<const rr::Authenticator> Access::authenticator() const {
+  return state_->users ? users_ : nullptr;
+}
+
+Identity Access::anonymous(std::string client) const {
+  Identity out;
+  out.client = std::move(client);
+  if (!state_->config.anonymous_role.empty()) out.roles.push_back(state_->config.anonymous_role);
+  return out;
+}
+
+Identity Access::logged_in(const rr::AuthenticatedUser& user, std::string client) const {
+  Identity out;
+  out.name = user.name;
+  out.roles = user.privileges;
+  out.proof = Proof::password;
+  out.client = std::move(client);
+  return with_grants(std::move(out));
+}
+
+Identity Access::with_grants(Identity identity) const {
+  for (const auto& grant : state_->config.grants) {
+    const auto is_of = [&](const std::string& pattern) { return rr::glob_matches(pattern, identity.name); };
+    if (std::any_of(grant.users.begin(), grant.users.end(), is_of))
+      for (const auto& role : grant.roles) add_role(identity.roles, role);
+  }
+  return identity;
+}
+
+void Access::record(const AuditEvent& event) {
+  if (audit_->write(event)) return;
+  const auto now = std::chrono::steady_clock::now();
+  if (last_complaint_ != std::chrono::steady_clock::time_point() && now - last_complaint_ < complaint_period) return;
+  last_complaint_ = now;
+  log(LogLevel::error, "audit log can't be written; lines are lost", {{"lost", audit_->lost_lines()}});
+}
+
+}  // namespace rrgate

@@ -1,0 +1,85 @@
+// Who may do what with the gateway and its devices: users, tokens, rights, and the record of it. Layer: server/access.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "core/session/authenticator.hpp"
+#include "server/access/access_config.hpp"
+#include "server/access/access_rules.hpp"
+#include "server/access/api_tokens.hpp"
+#include "server/access/audit_log.hpp"
+#include "server/security/password_file.hpp"
+
+namespace rrgate {
+
+/// What the configuration and its files say at one time. Never changes once made.
+struct AccessState {
+  AccessConfig config = {};
+  std::map<std::string, std::string> looks = {};  ///< of each file what tells that it was changed, before it was read
+  AccessRules rules = {};
+  std::shared_ptr<const rr::PasswordFileAuthenticator> users = {};  ///< null: no users file
+  std::optional<ApiTokens> tokens = {};
+  std::optional<JwtVerifier> jwt = {};
+};
+using AccessStatePtr = std::shared_ptr<const AccessState>;
+
+/// Reads the files. Errors   invalid_configuration, io_error: which can't be used, and why.
+[[nodiscard]] rr::Result<AccessStatePtr> load_access(const AccessConfig& config);
+
+/// Used from the gateway's thread, the authenticator from any. Rights that change hold for the next request; sessions
+/// that are open go on.
+class Access {
+ public:
+  explicit Access(const AccessConfig& config);
+
+  /// Reads all files, and opens the audit log. Errors   as load_access(); nothing has changed.
+  [[nodiscard]] rr::Result<> load();
+  /// Goes on with another configuration, whose files load_access() has read.
+  /// Errors   io_error: an audit file that can't be opened; nothing has changed.
+  [[nodiscard]] rr::Result<> replace(AccessStatePtr next);
+  /// Reads the files anew: those that changed, or all. What can't be used stays as it was, and the log says why.
+  void reload(bool is_forced);
+
+  /// Whether somebody may do something. Refusals, writes, calls and locks go into the audit log.
+  /// Errors   permission_denied: a sentence for the client.
+  [[nodiscard]] rr::Result<> check(const Identity& who, const AccessRequest& what);
+  /// Whether somebody's bytes may pass unread, to and from a device. Errors   permission_denied.
+  [[nodiscard]] rr::Result<> check_whole_device(const Identity& who, std::string_view device);
+  /// See AccessRules::sees().
+  bool sees(const Identity& who, std::string_view device, std::optional<std::string_view> service = {},
+            std::optional<std::string_view> path = {}) const {
+    return state_->rules.sees(who, device, service, path);
+  }
+  /// Everybody may do everything.
+  bool is_open() const { return state_->rules.is_open(); }
+  const AccessState& state() const { return *state_; }
+
+  /// Logins of Robot Raconteur by the users file; follows its changes. Null where there is none.
+  std::shared_ptr<const rr::Authenticator> authenticator() const;
+
+  // Identities, with the roles that the configuration adds. `client`: where from, as logs name it.
+  Identity anonymous(std::string client) const;
+  /// A user who has logged in by authenticator().
+  Identity logged_in(const rr::AuthenticatedUser& user, std::string client) const;
+  /// Any other that is proven.
+  Identity with_grants(Identity identity) const;
+
+  /// Writes into the audit log; a line that can't be written is noted in the gateway's log, not too often.
+  void record(const AuditEvent& event);
+  const AuditLog& audit() const { return *audit_; }
+
+ private:
+  class Users;
+
+  AccessStatePtr state_;
+  std::map<std::string, std::string> seen_;
+  std::shared_ptr<AuditLog> audit_;
+  std::shared_ptr<Users> users_;
+  std::chrono::steady_clock::time_point last_complaint_{};
+};
+
+}  // namespace rrgate

@@ -1,0 +1,82 @@
+#include "server/access/access_requests.hpp"
+
+#include <algorithm>
+
+#include "server/access/access_text.hpp"
+#include "server/access/base64url.hpp"
+#include "server/security/digest.hpp"
+
+namespace rrgate {
+
+namespace {
+
+rr::Error no_such_request() {
+  return rr::make_error(rr::ErrorCode::resource_not_found, "there is no such request of access, or it is too old");
+}
+
+}  // namespace
+
+std::string_view to_string(RequestState state) {
+  constexpr std::string_view names[] = {"pending", "approved", "denied"};
+  return names[static_cast<std::size_t>(state)];
+}
+
+void AccessRequests::forget_old(Time now) {
+  std::erase_if(entries_, [now](const auto& item) { return now - item.second.request.asked >= lifetime; });
+}
+
+rr::Result<AccessRequests::Asked> AccessRequests::ask(std::string name, std::string reason, std::string client,
+                                                      std::string address, Time now) {
+  forget_old(now);
+  if (auto checked = check_name("name", name); !checked) return checked.error();
+  if (reason.size() > max_reason)
+    return rr::make_error(rr::ErrorCode::invalid_argument,
+                          "the reason has " + std::to_string(reason.size()) + " bytes, expected at most 500");
+  const auto of_address = std::count_if(entries_.begin(), entries_.end(), [&](const auto& item) {
+    return item.second.address == address && item.second.request.state == RequestState::pending;
+  });
+  if (entries_.size() >= max_requests || static_cast<std::size_t>(of_address) >= max_of_address)
+    return rr::make_error(rr::ErrorCode::out_of_system_resource,
+                          "there are too many requests of access already; somebody must decide on them first");
+  Asked out{encode_base64url(rr::random_bytes(9)), encode_base64url(rr::random_bytes(24))};
+  RequestOfAccess request{out.id, std::move(name), std::move(reason), std::move(client), RequestState::pending, now};
+  entries_.emplace(out.id, Entry{std::move(request), std::move(address), rr::sha256(rr::as_bytes(out.secret)), {}});
+  return out;
+}
+
+std::vector<RequestOfAccess> AccessRequests::list(Time now) {
+  forget_old(now);
+  std::vector<RequestOfAccess> out;
+  for (const auto& [id, entry] : entries_) out.push_back(entry.request);
+  std::sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.asked < b.asked; });
+  return out;
+}
+
+rr::Result<RequestOfAccess> AccessRequests::find_pending(const std::string& id, Time now) {
+  forget_old(now);
+  const auto found = entries_.find(id);
+  if (found == entries_.end()) return no_such_request();
+  const auto& request = found->second.request;
+  if (request.state != RequestState::pending)
+    return rr::make_error(rr::ErrorCode::invalid_state, "it was " + std::string(to_string(request.state)) + " already");
+  return request;
+}
+
+void AccessRequests::decide(const std::string& id, std::string token) {
+  const auto found = entries_.find(id);
+  if (found == entries_.end()) return;
+  found->second.request.state = token.empty() ? RequestState::denied : RequestState::approved;
+  found->second.token = std::move(token);
+}
+
+rr::Result<AccessRequests::Answer> AccessRequests::claim(const std::string& id, std::string_view secret, Time now) {
+  forget_old(now);
+  const auto found = entries_.find(id);
+  if (found == entries_.end() || !rr::equal_secrets(rr::sha256(rr::as_bytes(secret)), found->second.secret_hash))
+    return no_such_request();
+  Answer out{found->second.request.state, found->second.token};
+  if (out.state != RequestState::pending) entries_.erase(found);
+  return out;
+}
+
+}  // namespace rrgate

@@ -1,0 +1,100 @@
+#include "server/access/access_rules.hpp"
+
+#include <algorithm>
+#include <iterator>
+
+#include "core/support/glob.hpp"
+
+namespace rrgate {
+
+namespace {
+
+constexpr std::string_view verb_names[] = {"read", "write", "call", "subscribe", "lock", "metrics", "admin"};
+
+bool fits(const std::vector<std::string>& patterns, std::string_view text) {
+  return patterns.empty() || std::any_of(patterns.begin(), patterns.end(),
+                                         [&](const auto& pattern) { return rr::glob_matches(pattern, text); });
+}
+
+/// Whether the patterns fit every text there is.
+bool fits_all(const std::vector<std::string>& patterns) {
+  const auto is_stars = [](const std::string& pattern) {
+    return !pattern.empty() && pattern.find_first_not_of('*') == std::string::npos;
+  };
+  return patterns.empty() || std::any_of(patterns.begin(), patterns.end(), is_stars);
+}
+
+bool is_for(const AccessRule& rule, const Identity& who) {
+  return std::any_of(rule.roles.begin(), rule.roles.end(),
+                     [&](const auto& role) { return role == "*" ? who.is_proven() : who.has_role(role); });
+}
+
+bool gives(const AccessRule& rule, Verb verb) {
+  return std::find(rule.may.begin(), rule.may.end(), verb) != rule.may.end();
+}
+
+std::string describe(const Identity& who) {
+  if (who.name.empty()) return "who is not logged in";
+  std::string roles;
+  for (const auto& role : who.roles) roles += (roles.empty() ? "" : ", ") + role;
+  return rr::quoted(who.name) + " (" + (roles.empty() ? "no roles" : roles) + ")";
+}
+
+std::string describe(const AccessRequest& what) {
+  if (!is_device_verb(what.verb))
+    return what.verb == Verb::metrics ? "read the gateway's metrics" : "manage the gateway";
+  std::string out(to_string(what.verb));
+  if (!what.member.empty()) out += " " + rr::quoted(what.member) + " of";
+  return out + " " + rr::quoted(what.path.empty() ? what.service : what.path) + " on device " + rr::quoted(what.device);
+}
+
+rr::Error denied(const Identity& who, const std::string& what) {
+  return rr::make_error(rr::ErrorCode::permission_denied, describe(who) + " may not " + what);
+}
+
+}  // namespace
+
+std::string_view to_string(Verb verb) {
+  return verb_names[static_cast<std::size_t>(verb)];
+}
+
+std::optional<Verb> parse_verb(std::string_view text) {
+  const auto* found = std::find(std::begin(verb_names), std::end(verb_names), text);
+  if (found == std::end(verb_names)) return std::nullopt;
+  return static_cast<Verb>(found - std::begin(verb_names));
+}
+
+rr::Result<> AccessRules::check(const Identity& who, const AccessRequest& what) const {
+  if (is_open() || (!has_rules() && who.is_proven())) return {};
+  for (const auto& rule : rules_)
+    if (gives(rule, what.verb) && is_for(rule, who) && fits(rule.devices, what.device) &&
+        fits(rule.services, what.service) && fits(rule.paths, what.path) && fits(rule.members, what.member))
+      return {};
+  return denied(who, describe(what));
+}
+
+rr::Result<> AccessRules::check_whole_device(const Identity& who, std::string_view device) const {
+  if (is_open() || (!has_rules() && who.is_proven())) return {};
+  const auto has_all_of = [&](Verb verb) {
+    return std::any_of(rules_.begin(), rules_.end(), [&](const AccessRule& rule) {
+      return gives(rule, verb) && is_for(rule, who) && fits(rule.devices, device) && fits_all(rule.services) &&
+             fits_all(rule.paths) && fits_all(rule.members);
+    });
+  };
+  if (std::all_of(std::begin(device_verbs), std::end(device_verbs), has_all_of)) return {};
+  return denied(who, "do everything to device " + rr::quoted(device) +
+                         ", which a connection needs that passes through the gateway unread; with \"mode\": \"shared\" "
+                         "of the device rights hold for each member");
+}
+
+bool AccessRules::sees(const Identity& who, std::string_view device, std::optional<std::string_view> service,
+                       std::optional<std::string_view> path) const {
+  if (is_open() || (!has_rules() && who.is_proven())) return true;
+  return std::any_of(rules_.begin(), rules_.end(), [&](const AccessRule& rule) {
+    return std::any_of(rule.may.begin(), rule.may.end(), is_device_verb) && is_for(rule, who) &&
+           fits(rule.devices, device) && (!service || fits(rule.services, *service)) &&
+           (!path || fits(rule.paths, *path));
+  });
+}
+
+}  // namespace rrgate

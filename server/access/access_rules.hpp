@@ -1,0 +1,80 @@
+// Who may do what: rules that allow. Layer: server/access.
+//
+// A right is there when one rule gives it: no order, no refusing rules, nothing that takes away again. So a rule can be
+// read alone. docs/access.md tells operators the same.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/support/error.hpp"
+#include "server/access/identity.hpp"
+
+namespace rrgate {
+
+/// What one may do. Those up to `lock` are done to members and objects of devices, the others to the gateway itself.
+enum class Verb : std::uint8_t { read, write, call, subscribe, lock, metrics, admin };
+inline constexpr Verb device_verbs[] = {Verb::read, Verb::write, Verb::call, Verb::subscribe, Verb::lock};
+inline constexpr Verb all_verbs[] = {Verb::read, Verb::write,   Verb::call, Verb::subscribe,
+                                     Verb::lock, Verb::metrics, Verb::admin};
+std::string_view to_string(Verb verb);
+/// nullopt: no such verb.
+std::optional<Verb> parse_verb(std::string_view text);
+constexpr bool is_device_verb(Verb verb) {
+  return verb <= Verb::lock;
+}
+
+/// What somebody wants. Borrowed for the call.
+struct AccessRequest {
+  std::string_view device = {};   ///< its name in the gateway; empty for the gateway itself
+  std::string_view service = {};  ///< "Create"
+  std::string_view path = {};     ///< of the object, as Robot Raconteur says it: "Create", "Create.axes[2]"
+  std::string_view member = {};   ///< empty: the object itself
+  Verb verb = Verb::read;
+};
+
+/// Gives everybody who has one of the roles all of `may` on whatever fits one pattern of each list. Patterns have '*'
+/// for any characters ('.' too) and '?' for one; an empty list fits everything.
+struct AccessRule {
+  std::vector<std::string> roles = {};  ///< by their whole name; "*": everybody who has proven who he is
+  std::vector<std::string> devices = {};
+  std::vector<std::string> services = {};
+  std::vector<std::string> paths = {};
+  std::vector<std::string> members = {};
+  std::vector<Verb> may = {};
+
+  bool operator==(const AccessRule&) const = default;
+};
+
+/// Never changes once made.
+class AccessRules {
+ public:
+  /// Everybody may do everything.
+  AccessRules() = default;
+  /// Without rules everybody may do everything who has proven who he is, and with `needs_login` false everybody at all.
+  /// With rules all else is refused.
+  AccessRules(std::vector<AccessRule> rules, bool needs_login)
+      : rules_(std::move(rules)), needs_login_(needs_login || !rules_.empty()) {}
+
+  /// Errors   permission_denied: a sentence that says who may not do what, for the client.
+  [[nodiscard]] rr::Result<> check(const Identity& who, const AccessRequest& what) const;
+  /// Whether somebody may do all of device_verbs to everything of a device: only then can his bytes pass unread.
+  /// Errors   permission_denied.
+  [[nodiscard]] rr::Result<> check_whole_device(const Identity& who, std::string_view device) const;
+  /// Whether there is anything of a device, of a service of it, of an object of that, that somebody may do something
+  /// to.
+  bool sees(const Identity& who, std::string_view device, std::optional<std::string_view> service = {},
+            std::optional<std::string_view> path = {}) const;
+
+  bool is_open() const { return !needs_login_; }
+  bool has_rules() const { return !rules_.empty(); }
+
+ private:
+  std::vector<AccessRule> rules_;
+  bool needs_login_ = false;
+};
+
+}  // namespace rrgate

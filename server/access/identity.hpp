@@ -1,0 +1,38 @@
+// Who a client is, as far as it has shown. Layer: server/access.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace rrgate {
+
+/// How somebody has shown who he is.
+enum class Proof : std::uint8_t {
+  none,         ///< anonymous
+  password,     ///< of the users file: HTTP Basic, a login of Robot Raconteur
+  token,        ///< an API token
+  jwt,          ///< a JSON Web Token
+  certificate,  ///< of a TLS client
+  proxy,        ///< a trusted proxy says so
+};
+
+constexpr std::string_view to_string(Proof proof) {
+  constexpr std::string_view names[] = {"none", "password", "token", "jwt", "certificate", "proxy"};
+  return names[static_cast<std::size_t>(proof)];
+}
+
+struct Identity {
+  std::string name = {};  ///< empty: anonymous
+  std::vector<std::string> roles = {};
+  Proof proof = Proof::none;
+  std::string client = {};  ///< where it comes from, as logs name it: "192.0.2.1:40000"
+
+  bool is_proven() const { return proof != Proof::none; }
+  bool has_role(std::string_view role) const { return std::find(roles.begin(), roles.end(), role) != roles.end(); }
+  bool operator==(const Identity&) const = default;
+};
+
+}  // namespace rrgate

@@ -1,0 +1,130 @@
+// rrgate passwd: users and their passwords, in the file that "users_file" names. Layer: server/cli.
+#include <termios.h>
+#include <unistd.h>
+
+#include <iostream>
+#include <optional>
+
+#include "server/access/access_text.hpp"
+#include "server/cli/command.hpp"
+#include "server/definitions/text_file.hpp"
+#include "server/platform/secret_file.hpp"
+#include "server/security/password_file.hpp"
+
+namespace rrgate {
+
+namespace {
+
+constexpr std::size_t max_password_size = 1024;  // as logins take it
+
+int fail(const std::string& what) {
+  std::cerr << "rrgate passwd: " << what << "\n";
+  return exit_failed;
+}
+
+/// Nothing is shown of what is typed while this is there.
+class NoEcho {
+ public:
+  NoEcho() {
+    if (::tcgetattr(STDIN_FILENO, &before_) != 0) return;
+    auto silent = before_;
+    silent.c_lflag &= ~static_cast<tcflag_t>(ECHO);
+    is_silent_ = ::tcsetattr(STDIN_FILENO, TCSAFLUSH, &silent) == 0;
+  }
+  NoEcho(const NoEcho&) = delete;
+  NoEcho& operator=(const NoEcho&) = delete;
+  ~NoEcho() {
+    if (is_silent_) ::tcsetattr(STDIN_FILENO, TCSAFLUSH, &before_);
+  }
+
+ private:
+  termios before_{};
+  bool is_silent_ = false;
+};
+
+std::optional<std::string> ask(const char* prompt) {
+  const NoEcho silence;
+  std::cerr << prompt << std::flush;
+  std::string line;
+  const bool has_line = static_cast<bool>(std::getline(std::cin, line));
+  std::cerr << "\n";
+  return has_line ? std::optional(line) : std::nullopt;
+}
+
+/// From the terminal, twice; else the first line of the standard input.
+rr::Result<std::string> read_password(const std::string& name) {
+  std::optional<std::string> password;
+  if (::isatty(STDIN_FILENO)) {
+    password = ask(("Password of " + rr::quoted(name) + ": ").c_str());
+    if (password && ask("The same again: ") != password)
+      return rr::make_error(rr::ErrorCode::invalid_argument, "the two passwords differ; nothing was changed");
+  } else {
+    std::string line;
+    if (std::getline(std::cin, line)) password = line;
+  }
+  if (!password || password->empty() || password->size() > max_password_size)
+    return rr::make_error(rr::ErrorCode::invalid_argument,
+                          "expected a password of 1 to 1024 bytes; nothing was changed");
+  return std::move(*password);
+}
+
+rr::Result<std::string> make_line(const std::string& name, std::string_view before,
+                                  const std::optional<std::string>& roles) {
+  // Roles and nodes stay as they are where nothing is said of them.
+  const auto fields = split_words(before);
+  std::string privileges(fields.size() > 2 ? fields[2] : "_");
+  if (roles) {
+    const auto parsed = parse_roles(*roles);
+    if (!parsed) return parsed.error();
+    privileges = format_roles(*parsed);
+  }
+  const auto password = read_password(name);
+  if (!password) return password.error();
+  const auto hash = rr::PasswordHash::make_scrypt(*password);
+  if (!hash) return hash.error();
+  std::string line = name;
+  line.append(" ").append(hash->text()).append(" ").append(privileges);
+  if (fields.size() > 3) line.append(" ").append(fields[3]);
+  return line;
+}
+
+}  // namespace
+
+int run_passwd(Arguments arguments) {
+  constexpr std::string_view options[] = {"--roles"};
+  constexpr std::string_view flags[] = {"--delete"};
+  const auto parsed = parse_arguments(arguments, {options, flags});
+  if (!parsed.error.empty()) return usage_error("passwd", parsed.error);
+  if (parsed.operands.size() != 2) return usage_error("passwd", "expected FILE and NAME");
+  const auto& file = parsed.operands[0];
+  const auto& name = parsed.operands[1];
+  const bool deletes = parsed.flags.contains("--delete");
+  const auto roles = parsed.options.find("--roles");
+  if (deletes && roles != parsed.options.end()) return usage_error("passwd", "--delete leaves no roles");
+  if (auto checked = check_name("user name", name); !checked) return usage_error("passwd", checked.error().message);
+
+  std::error_code error;
+  const auto old = read_text_file(file);
+  if (!old && std::filesystem::exists(file, error)) return fail(file + ": can't be read");
+  const auto text = old.value_or("");
+  if (const auto users = rr::PasswordFileAuthenticator::from_text(text, {.accepts_md5 = true}); !users)
+    return fail(file + ": " + users.error().message);
+  const auto before = find_line(text, name);
+  if (deletes && before.empty()) return fail(file + " has no user " + rr::quoted(name));
+  std::string line;
+  if (!deletes) {
+    auto made = make_line(name, before,
+                          roles == parsed.options.end() ? std::nullopt : std::optional<std::string>(roles->second));
+    if (!made) return fail(made.error().message);
+    line = std::move(*made);
+  }
+  if (auto done = rr::write_secret(file, with_line(text, name, line), true); !done) return fail(done.error().message);
+  std::cout << file << ": user " << rr::quoted(name)
+            << (deletes          ? " is deleted"
+                : before.empty() ? " is added"
+                                 : " is changed")
+            << "\n";
+  return exit_ok;
+}
+
+}  // namespace rrgate

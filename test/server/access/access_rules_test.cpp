@@ -1,0 +1,193 @@
+#include "server/access/access_rules.hpp"
+
+#include <catch2/catch.hpp>
+#include <map>
+#include <random>
+#include <set>
+
+#include "test/support/print.hpp"
+
+using namespace rrgate;
+
+namespace {
+
+Identity who(std::string name, std::vector<std::string> roles, Proof proof = Proof::password) {
+  Identity out;
+  out.name = std::move(name);
+  out.roles = std::move(roles);
+  out.proof = proof;
+  return out;
+}
+
+// --- the naive model: every pattern is spelt out as the texts that it means ---
+
+const std::vector<std::string> all_roles{"viewer", "operator", "admin"};
+const std::vector<std::string> all_devices{"create", "arm1", "arm2"};
+const std::vector<std::string> all_services{"Create", "Arm"};
+const std::vector<std::string> all_paths{"Create", "Create.axes[0]", "Create.axes[1]", "Arm", "Arm.tool"};
+const std::vector<std::string> all_members{"", "Drive", "DistanceTraveled", "packets"};
+
+using Meanings = std::map<std::string, std::set<std::string>>;
+const Meanings device_meanings{{"*", {"create", "arm1", "arm2"}}, {"arm?", {"arm1", "arm2"}}, {"create", {"create"}}};
+const Meanings service_meanings{{"*", {"Create", "Arm"}}, {"Arm", {"Arm"}}, {"C*", {"Create"}}};
+const Meanings path_meanings{{"**", {"Create", "Create.axes[0]", "Create.axes[1]", "Arm", "Arm.tool"}},
+                             {"Create.*", {"Create.axes[0]", "Create.axes[1]"}},
+                             {"*.axes[1]", {"Create.axes[1]"}},
+                             {"Arm", {"Arm"}}};
+const Meanings member_meanings{{"*", {"", "Drive", "DistanceTraveled", "packets"}},
+                               {"D*", {"Drive", "DistanceTraveled"}},
+                               {"packets", {"packets"}},
+                               {"", {""}}};
+
+bool means(const Meanings& meanings, const std::vector<std::string>& patterns, const std::string& text) {
+  if (patterns.empty()) return true;
+  for (const auto& pattern : patterns)
+    if (meanings.at(pattern).contains(text)) return true;
+  return false;
+}
+
+bool model_allows(const std::vector<AccessRule>& rules, const Identity& identity, const std::string& device,
+                  const std::string& service, const std::string& path, const std::string& member, Verb verb) {
+  for (const auto& rule : rules) {
+    bool is_for = false;
+    for (const auto& role : rule.roles)
+      is_for = is_for || (role == "*" && identity.is_proven()) ||
+               std::set<std::string>(identity.roles.begin(), identity.roles.end()).contains(role);
+    if (is_for && std::set<Verb>(rule.may.begin(), rule.may.end()).contains(verb) &&
+        means(device_meanings, rule.devices, device) && means(service_meanings, rule.services, service) &&
+        means(path_meanings, rule.paths, path) && means(member_meanings, rule.members, member))
+      return true;
+  }
+  return false;
+}
+
+class RandomRules {
+ public:
+  explicit RandomRules(unsigned seed) : random_(seed) {}
+
+  std::vector<AccessRule> rules() {
+    std::vector<AccessRule> out(1 + pick(4));
+    for (auto& rule : out) {
+      rule.roles = some({"viewer", "operator", "admin", "*"});
+      rule.devices = some(keys(device_meanings));
+      rule.services = some(keys(service_meanings));
+      rule.paths = some(keys(path_meanings));
+      rule.members = some(keys(member_meanings));
+      for (const auto verb : all_verbs)
+        if (pick(2)) rule.may.push_back(verb);
+    }
+    return out;
+  }
+  Identity identity() {
+    auto out = who("somebody", some(all_roles));
+    if (pick(4) == 0) out.proof = Proof::none;
+    return out;
+  }
+
+ private:
+  std::size_t pick(std::size_t below) { return random_() % below; }
+  static std::vector<std::string> keys(const Meanings& meanings) {
+    std::vector<std::string> out;
+    for (const auto& [key, unused] : meanings) out.push_back(key);
+    return out;
+  }
+  std::vector<std::string> some(const std::vector<std::string>& from) {
+    std::vector<std::string> out;
+    for (const auto& each : from)
+      if (pick(3) == 0) out.push_back(each);
+    return out;
+  }
+
+  std::mt19937 random_;
+};
+
+}  // namespace
+
+TEST_CASE("rights: every verb, path and role, against a plain model of the rules") {
+  std::size_t allowed = 0;
+  std::size_t refused = 0;
+  for (unsigned seed = 0; seed < 400; ++seed) {
+    INFO("seed " << seed);
+    RandomRules random(seed);
+    const auto list = random.rules();
+    const AccessRules rules(list, true);
+    const auto identity = random.identity();
+    for (const auto& device : all_devices) {
+      bool has_all = true;
+      for (const auto& service : all_services)
+        for (const auto& path : all_paths)
+          for (const auto& member : all_members)
+            for (const auto verb : all_verbs) {
+              const bool expected = model_allows(list, identity, device, service, path, member, verb);
+              const auto checked = rules.check(identity, {device, service, path, member, verb});
+              ++(expected ? allowed : refused);
+              if (expected != checked.has_value()) {
+                INFO(device << " " << service << " " << path << " " << member << " " << to_string(verb));
+                REQUIRE(checked.has_value() == expected);
+              }
+              if (!checked) REQUIRE(checked.error().code == rr::ErrorCode::permission_denied);
+              if (expected && is_device_verb(verb)) {
+                REQUIRE(rules.sees(identity, device));
+                REQUIRE(rules.sees(identity, device, service));
+                REQUIRE(rules.sees(identity, device, service, path));
+              }
+              if (!expected && is_device_verb(verb)) has_all = false;
+            }
+      // Bytes that nobody reads pass for those alone who could have done anything.
+      if (rules.check_whole_device(identity, device)) REQUIRE(has_all);
+    }
+  }
+  CHECK(allowed > 10'000);
+  CHECK(refused > 10'000);
+}
+
+TEST_CASE("rights: without rules those may everything who have proven who they are") {
+  const AccessRequest request{"create", "Create", "Create", "Drive", Verb::call};
+  CHECK(AccessRules().check(Identity{}, request));
+  CHECK(AccessRules().is_open());
+  const AccessRules rules({}, true);
+  CHECK(rules.check(who("alice", {}), request));
+  CHECK(rules.check_whole_device(who("alice", {}), "create"));
+  CHECK_FALSE(rules.check(Identity{}, request));
+  CHECK_FALSE(rules.check_whole_device(Identity{}, "create"));
+  CHECK_FALSE(rules.sees(Identity{}, "create"));
+}
+
+TEST_CASE("rights: a refusal says who may not do what") {
+  const AccessRules rules({AccessRule{.roles = {"viewer"}, .may = {Verb::read}}}, true);
+  const AccessRequest request{"create", "Create", "Create.axes[0]", "speed", Verb::write};
+  CHECK(rules.check(who("alice", {"viewer", "guest"}), request).error().message ==
+        "'alice' (viewer, guest) may not write 'speed' of 'Create.axes[0]' on device 'create'");
+  CHECK(rules.check(Identity{}, request).error().message ==
+        "who is not logged in may not write 'speed' of 'Create.axes[0]' on device 'create'");
+  CHECK(rules.check(who("bob", {}), {.verb = Verb::admin}).error().message ==
+        "'bob' (no roles) may not manage the gateway");
+  CHECK_THAT(rules.check_whole_device(who("alice", {"viewer"}), "create").error().message,
+             Catch::Contains(R"("mode": "shared")"));
+}
+
+TEST_CASE("rights: all of a device is what rules give that name no service, path or member") {
+  const auto all = std::vector<Verb>(std::begin(device_verbs), std::end(device_verbs));
+  const auto has = [&](AccessRule rule) {
+    rule.roles = {"r"};
+    return AccessRules({std::move(rule)}, true).check_whole_device(who("a", {"r"}), "arm1").has_value();
+  };
+  CHECK(has({.may = all}));
+  CHECK(has({.devices = {"arm*"}, .services = {"*"}, .paths = {"**"}, .members = {"*"}, .may = all}));
+  CHECK_FALSE(has({.devices = {"create"}, .may = all}));
+  CHECK_FALSE(has({.services = {"Arm"}, .may = all}));
+  CHECK_FALSE(has({.paths = {"Arm*"}, .may = all}));
+  CHECK_FALSE(has({.members = {"?*"}, .may = all}));
+  CHECK_FALSE(has({.may = {Verb::read, Verb::write, Verb::call, Verb::subscribe}}));
+  // Two rules together may give it.
+  CHECK(AccessRules({AccessRule{.roles = {"a"}, .may = {Verb::read, Verb::subscribe}},
+                     AccessRule{.roles = {"b"}, .may = {Verb::write, Verb::call, Verb::lock}}},
+                    true)
+            .check_whole_device(who("x", {"a", "b"}), "arm1"));
+}
+
+TEST_CASE("verbs by name") {
+  for (const auto verb : all_verbs) CHECK(parse_verb(to_string(verb)) == verb);
+  CHECK_FALSE(parse_verb("execute"));
+  CHECK_FALSE(parse_verb(""));
+}
