@@ -65,7 +65,7 @@ void StreamDriver::settle(Now now) {
 }
 
 void StreamDriver::write(Now now) {
-  while (!is_writing_) {
+  while (!is_writing_ && !is_closed_) {
     const auto slices = poll_transmit();
     if (slices.empty()) return;
     error_code error;
@@ -73,7 +73,9 @@ void StreamDriver::write(Now now) {
     if (error) return finish(stream_error(error), now);
     if (bytes == 0) {
       is_writing_ = true;
-      return asio::co_spawn(executor(), write_waiting(shared_from_this()), asio::detached);
+      // A stream that takes all at once is done when this returns, with the first slices: the others are due as well.
+      asio::co_spawn(executor(), write_waiting(shared_from_this()), asio::detached);
+      continue;
     }
     handle_transmitted(bytes, now);
   }

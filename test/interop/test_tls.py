@@ -101,6 +101,16 @@ def test_over_websockets(lab, service, client, carries):
     check_all(FUNCTIONS.steps, run_steps(client, lab, port, scheme="rrs+ws", has_certificate=True))
 
 
+@pytest.mark.parametrize("scheme", ["rrs+tcp", "rrs+ws", "rr+ws"])
+def test_much_at_once(lab, service, scheme):
+    """More messages than are written at a time, and nothing behind them that would take the rest along."""
+    _, port = service
+    fired = [[float(number), f"number {number}"] for number in range(500)]
+    steps = [{"listen": "changed", "expect": None}, {"call": "fire", "args": [{"int32": len(fired)}], "expect": None},
+             {"events": "changed", "count": len(fired), "any_order": True, "expect": {"list": fired}}]
+    check_all(steps, run_steps("ours", lab, port, steps, scheme=scheme))
+
+
 def test_both_ways_on_one_port(lab, service):
     maker, port = service
     check_all(FUNCTIONS.steps, run_steps("ours", lab, port, scheme="rr+tcp"))
