@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "core/member/ledger.hpp"
 #include "core/support/time.hpp"
 #include "core/types/pack.hpp"
 
@@ -33,10 +34,13 @@ enum class WireState : std::uint8_t { connecting, connected };
 struct WireConnection {
   WireState state = WireState::connecting;
   const MemberDefinition* member = nullptr;
+  std::uint32_t request_id = 0;  ///< of the connect, while a service answers it later
   std::optional<TimeSpec> last_received = {};
   std::optional<TimeSpec> last_sent = {};
   std::optional<WireValue> early = {};  ///< came before the connect reply; newest only
-  std::optional<Value> waiting = {};    ///< to be sent when the stream has room; newest only
+  std::optional<WireValue> waiting = {};  ///< to be sent when the stream has room; newest only
+  TimePoint waiting_since = {};           ///< when that came here
+  Ledger ledger = {};
 
   /// Whether a packet of this time is newer than all before; remembers it.
   bool accept(TimeSpec time);

@@ -276,7 +276,7 @@ Result<> ClientSession::send_wire(std::string_view path, std::string_view member
     return make_error(ErrorCode::invalid_operation, "wire " + quoted(member) + " is not connected");
   if (auto allowed = check_direction(EntryType::wire_packet, *found->second.member); !allowed) return allowed;
   if (connection_.queued_bytes() >= wire_high_mark) {
-    found->second.waiting = value;
+    found->second.waiting = WireValue{now.utc, value};
     return {};
   }
   return send_wire_packet(found->first, found->second, value, now);
@@ -295,7 +295,7 @@ Result<> ClientSession::send_wire_packet(const PathMember& key, WireConnection& 
 void ClientSession::flush_wires(Now now) {
   for (auto& [key, wire] : wires_) {
     if (!wire.waiting || state_ == ClientState::closed) continue;
-    const Value value = std::move(*wire.waiting);
+    const Value value = std::move(wire.waiting->value);
     // The value was checked when it came in; what can fail here is the connection, and that ends the session elsewhere.
     if (!send_wire_packet(key, wire, value, now) || connection_.queued_bytes() >= wire_high_mark) return;
   }

@@ -118,6 +118,21 @@ Result<HostedService::Found> HostedService::find_object(std::string_view path) {
   return found;
 }
 
+Result<> HostedService::add_object(const std::string& path, std::shared_ptr<ServiceObject> object) {
+  const auto* type = types_->find_entity(object->type_name());
+  if (!type || type->kind != EntityKind::object)
+    return make_error(ErrorCode::service_definition_error,
+                      "object " + quoted(path) + " has the unknown type " + quoted(object->type_name()));
+  if (objects_.size() >= max_cached_objects && !objects_.contains(path)) {
+    auto victim = objects_.upper_bound(path);
+    if (victim == objects_.end()) victim = objects_.begin();
+    if (victim->first == name_ && ++victim == objects_.end()) victim = objects_.begin();
+    objects_.erase(victim);
+  }
+  objects_.insert_or_assign(path, Found{std::move(object), type});
+  return {};
+}
+
 Result<std::string> HostedService::canonical_path(std::string_view path) {
   if (path == name_) return name_;
   const auto segments = parse_service_path(path);

@@ -61,6 +61,10 @@ class HostedService {
   void set_policy(SecurityPolicy policy) { policy_ = std::move(policy); }
   LoginLimit& login_limit() { return login_limit_; }
   SessionId next_session_id() { return ++last_session_id_; }
+  /// The objects are another node's: what they are takes time to find out, so that sessions ask for them (ObjectWanted)
+  /// and for locks (LockWanted). To be set before clients come.
+  bool is_remote() const { return is_remote_; }
+  void set_remote() { is_remote_ = true; }
   ObjectLocks& object_locks() { return object_locks_; }
   MonitorLocks& monitor_locks() { return monitor_locks_; }
   /// The definition that holds the root type.
@@ -76,6 +80,10 @@ class HostedService {
   /// Errors   those of parse_service_path; object_not_found (not this service, null object); member_not_found;
   ///          invalid_argument (a missing or malformed index).
   Result<Found> find_object(std::string_view path);
+  bool has_object(std::string_view path) const { return objects_.contains(path); }
+  /// An object of a remote service that was found. Another one may be forgotten for it.
+  /// Errors   service_definition_error: its type is not known.
+  Result<> add_object(const std::string& path, std::shared_ptr<ServiceObject> object);
   /// The one spelling of `path` by which locks know its object. Errors as find_object().
   Result<std::string> canonical_path(std::string_view path);
   /// Forgets `path` and everything below it. Returns whether anything was there.
@@ -97,8 +105,15 @@ class HostedService {
   SessionId last_session_id_ = 0;
   ObjectLocks object_locks_;
   MonitorLocks monitor_locks_;
+  bool is_remote_ = false;
   std::map<std::string, Found, std::less<>> objects_;
   static constexpr std::size_t max_cached_objects = 4096;  ///< hostile paths may not grow it; the root always stays
+};
+
+/// Another node that a service index tells of.
+struct KnownNode {
+  NodeIdentity node;
+  std::vector<std::string> index_urls;  ///< of its service index
 };
 
 /// Identity and services of one node; outlives its sessions.
@@ -113,12 +128,25 @@ class ServiceDirectory {
   std::shared_ptr<HostedService> find(std::string_view name) const;  ///< nullptr where there is none
   /// In order of names; the service index is one of them.
   const std::map<std::string, std::shared_ptr<HostedService>, std::less<>>& services() const { return services_; }
+  /// Nodes that this one leads to, and those that it has discovered, for the service index; asked with the URL of the
+  /// connection that the question came by.
+  using ListNodes = std::function<std::vector<KnownNode>(std::string_view base_url)>;
+  void set_routed_nodes(ListNodes list) { routed_ = std::move(list); }
+  void set_detected_nodes(ListNodes list) { detected_ = std::move(list); }
+  std::vector<KnownNode> routed_nodes(std::string_view base_url) const {
+    return routed_ ? routed_(base_url) : std::vector<KnownNode>();
+  }
+  std::vector<KnownNode> detected_nodes(std::string_view base_url) const {
+    return detected_ ? detected_(base_url) : std::vector<KnownNode>();
+  }
   /// A definition by name, from any service.
   const ServiceDefinition* find_definition(std::string_view name) const;
 
  private:
   NodeIdentity identity_;
   std::map<std::string, std::shared_ptr<HostedService>, std::less<>> services_;
+  ListNodes routed_;
+  ListNodes detected_;
 };
 
 }  // namespace rr

@@ -56,6 +56,21 @@ Value describe(const HostedService& service, const NodeIdentity& node, std::stri
                     {"Attributes", service.attributes()}}};
 }
 
+Value describe(const std::vector<KnownNode>& nodes) {
+  MapInt32 out;
+  for (const auto& [node, index_urls] : nodes) {
+    MapInt32 urls;
+    for (const auto& url : index_urls) urls.items.emplace_back(static_cast<std::int32_t>(urls.items.size()), Value(url));
+    const std::vector<std::uint8_t> id(node.id.bytes.begin(), node.id.bytes.end());
+    out.items.emplace_back(static_cast<std::int32_t>(out.items.size()),
+                           Structure{"RobotRaconteurServiceIndex.NodeInfo",
+                                     {{"NodeName", Value(node.name)},
+                                      {"NodeID", Value(id)},
+                                      {"ServiceIndexConnectionURL", Value(std::move(urls))}}});
+  }
+  return out;
+}
+
 }  // namespace
 
 std::shared_ptr<HostedService> make_service_index() {
@@ -69,8 +84,8 @@ std::shared_ptr<HostedService> make_service_index() {
 Result<Value> answer_service_index_call(std::string_view function, const ServiceDirectory& directory,
                                         std::string_view base_url) {
   MapInt32 answer;
-  // Routed and detected nodes: none, as long as nobody routes or detects.
-  if (function == "GetRoutedNodes" || function == "GetDetectedNodes") return Value(std::move(answer));
+  if (function == "GetRoutedNodes") return describe(directory.routed_nodes(base_url));
+  if (function == "GetDetectedNodes") return describe(directory.detected_nodes(base_url));
   if (function != "GetLocalNodeServices")
     return make_error(ErrorCode::member_not_found, "the service index has no function " + quoted(function));
   if (base_url.empty()) return make_error(ErrorCode::service_error, "this transport has no URL");

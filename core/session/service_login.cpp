@@ -95,8 +95,11 @@ void ServiceSession::finish_authenticate(const OpenLogin& login, Result<Authenti
 /// ClientSessionOpReq: logins and logouts here, locks and monitors elsewhere.
 Result<> ServiceSession::answer_session_op(const Message& message, const MessageEntry& entry, Now now) {
   const auto command = entry.member_name;
+  if (service_->is_remote() && command != "AuthenticateUser" && command != "LogoutUser")
+    return ask_for_lock(message, entry, now);
   if (command.substr(0, 7) == "Monitor") {
     if (!may_use_service()) return make_error(ErrorCode::authentication_error, "User is not authenticated");
+    if (auto admitted = admit(entry.type, entry.service_path, nullptr); !admitted) return admitted;
     return answer_monitor(message, entry, now);
   }
   if (!service_->policy().authenticator)
@@ -110,6 +113,7 @@ Result<> ServiceSession::answer_session_op(const Message& message, const Message
     return {};
   }
   if (command == "RequestObjectLock" || command == "RequestClientObjectLock" || command == "ReleaseObjectLock") {
+    if (auto admitted = admit(entry.type, entry.service_path, nullptr); !admitted) return admitted;
     begin_reply(entry);
     if (auto done = answer_object_lock(entry); !done) return done;
     send_outgoing(now);

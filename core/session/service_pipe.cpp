@@ -80,7 +80,10 @@ Result<std::uint32_t> ServiceSession::send_pipe_packet(PipeId id, const Value& v
   const auto number = state.take_number();
   Result<> sent = write_pipe_packet(outgoing_, pipe->index, number, value, wants_ack, member, service_->types());
   if (sent) sent = connection_.send(outgoing_, now);
-  if (sent) return number;
+  if (sent) {
+    pipe->ledger.note_delivery({});
+    return number;
+  }
   state.return_number();
   if (connection_.state() == ConnectionState::closed) leave(sent.error(), now);
   return sent.error();
@@ -167,6 +170,10 @@ void ServiceSession::handle_pipe_packets(const Message& message, const MessageEn
     const auto index = read_pipe_index(element);
     auto* pipe = index ? find_pipe(entry, *index) : nullptr;
     if (!pipe) continue;
+    if (!admit(entry.type, entry.service_path, &pipe->state.member())) {
+      broken.push_back(pipe->id);
+      continue;
+    }
     is_unreliable = is_unreliable || pipe->is_unreliable;
     if (!handle_pipe_packet(message, element, *pipe)) broken.push_back(pipe->id);
   }

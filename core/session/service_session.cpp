@@ -76,6 +76,7 @@ void ServiceSession::handle_timeout(Now now) {
   if (auto alive = connection_.handle_timeout(now); !alive) return leave(alive.error(), now);
   end_generators(generators_.remove_idle(now));
   handle_locks_changed(now);
+  continue_late_locks(now);
   expire_callbacks(now);
   const bool is_late = service_ ? now.steady - last_session_message_ >= options_.endpoint_timeout
                                 : now.steady - opened_ >= options_.connect_timeout;
@@ -91,7 +92,9 @@ TimePoint ServiceSession::poll_timeout() const {
   if (closing_deadline_) return *closing_deadline_;
   const auto end = service_ ? last_session_message_ + options_.endpoint_timeout : opened_ + options_.connect_timeout;
   const auto callback = callbacks_.empty() ? TimePoint::max() : callbacks_.begin()->second.deadline;
-  return std::min({connection_.poll_timeout(), generators_.deadline(), next_enter_deadline(), callback, end});
+  auto lock = TimePoint::max();
+  for (const auto& open : locks_) lock = std::min(lock, open.answer_by);
+  return std::min({connection_.poll_timeout(), generators_.deadline(), next_enter_deadline(), lock, callback, end});
 }
 
 std::optional<ServiceEvent> ServiceSession::poll_event() {
@@ -114,6 +117,8 @@ void ServiceSession::leave(Error reason, Now now) {
   wires_.clear();
   pipes_.clear();
   pipe_indices_.clear();
+  parked_.clear();
+  locks_.clear();
   end_callbacks(reason);
   events_.push_back(ClientGone{std::move(reason)});
 }
@@ -162,14 +167,15 @@ void ServiceSession::reply(CallId id, const Result<Value>& result, Now now) {
     begin();
     write_error(outgoing_, written.error());
   }
-  send_outgoing(now, call.member->has_modifier("urgent"));
+  // Behind a gateway, where many share a link, no answer waits for a stream of values.
+  send_outgoing(now, call.member->has_modifier("urgent") || service_->is_remote());
   if (call.generator != 0) finish_generator_call(call, !written, now);
 }
 
 Result<> ServiceSession::send_event(std::string_view path, const MemberDefinition& member,
                                     std::span<const Value> arguments, Now now) {
   if (!service_) return make_error(ErrorCode::connection_error, "no client is connected");
-  if (!may_use_service()) return {};
+  if (!may_use_service() || !admit(EntryType::event_req, path, &member)) return {};
   connection_.begin_message(outgoing_);
   outgoing_.begin_entry(EntryType::event_req, path, member.name);
   if (auto written = write_arguments(outgoing_, arguments, member, service_->types()); !written) return written;
@@ -178,38 +184,70 @@ Result<> ServiceSession::send_event(std::string_view path, const MemberDefinitio
 }
 
 Result<> ServiceSession::send_wire(std::string_view path, const MemberDefinition& member, const Value& value, Now now) {
-  const auto found = wires_.find(PathMemberView{path, member.name});
-  if (!may_use_service() || found == wires_.end()) return {};
-  if (connection_.queued_bytes() >= wire_high_mark) {
-    found->second.waiting = value;
-    return {};
-  }
-  return send_wire_packet(found->first, found->second, value, now);
+  return send_wire(path, member, WireValue{now.utc, value}, now.steady, now);
 }
 
-Result<> ServiceSession::send_wire_packet(const PathMember& key, WireConnection& wire, const Value& value, Now now) {
-  wire.waiting.reset();
+Result<> ServiceSession::send_wire(std::string_view path, const MemberDefinition& member, const WireValue& value,
+                                   TimePoint arrived, Now now) {
+  const auto found = wires_.find(PathMemberView{path, member.name});
+  if (!may_use_service() || found == wires_.end()) return {};
+  auto& wire = found->second;
+  const bool has_room = wire.state == WireState::connected && connection_.queued_bytes() < wire_high_mark;
+  if (has_room) return send_wire_packet(found->first, wire, value, arrived, now);
+  if (wire.waiting) ++wire.ledger.conflated;
+  wire.waiting = value;
+  wire.waiting_since = arrived;
+  return {};
+}
+
+Result<> ServiceSession::send_wire_packet(const PathMember& key, WireConnection& wire, const WireValue& value,
+                                          TimePoint arrived, Now now) {
+  if (wire.waiting) {  // an older one
+    ++wire.ledger.conflated;
+    wire.waiting.reset();
+  }
   connection_.begin_message(outgoing_);
   outgoing_.header.metadata = unreliable_metadata;
   outgoing_.begin_entry(EntryType::wire_packet, key.path, key.member).metadata = unreliable_metadata;
-  if (auto written = write_wire_value(outgoing_, value, wire.stamp(now.utc), *wire.member, service_->types()); !written)
+  if (auto written =
+          write_wire_value(outgoing_, value.value, wire.stamp(value.time), *wire.member, service_->types());
+      !written)
     return written;
   send_outgoing(now);
+  wire.ledger.note_delivery(now.steady - arrived);
   return {};
 }
 
 void ServiceSession::flush_wires(Now now) {
   for (auto& [key, wire] : wires_) {
-    if (!wire.waiting || !may_use_service()) continue;
-    const Value value = std::move(*wire.waiting);
+    if (!wire.waiting || wire.state == WireState::connecting || !may_use_service()) continue;
+    const WireValue value = std::move(*wire.waiting);
+    wire.waiting.reset();
     // A value that does not fit its definition was refused or not when it was set; here only the stream counts.
-    if (!send_wire_packet(key, wire, value, now) || connection_.queued_bytes() >= wire_high_mark) return;
+    if (!send_wire_packet(key, wire, value, wire.waiting_since, now) || connection_.queued_bytes() >= wire_high_mark)
+      return;
   }
+}
+
+void ServiceSession::answer_wire(std::string_view path, const MemberDefinition& member, const Result<>& result,
+                                 Now now) {
+  const auto wire = wires_.find(PathMemberView{path, member.name});
+  if (wire == wires_.end() || wire->second.state == WireState::connected) return;
+  const auto request_id = wire->second.request_id;
+  wire->second.state = WireState::connected;
+  if (!result) wires_.erase(wire);
+  connection_.begin_message(outgoing_);
+  outgoing_.begin_entry(EntryType::wire_connect_ret, path, member.name, request_id);
+  if (!result) write_error(outgoing_, result.error());
+  send_outgoing(now);
+  flush_wires(now);
 }
 
 void ServiceSession::close_wire(std::string_view path, const MemberDefinition& member, Now now) {
   const auto wire = wires_.find(PathMemberView{path, member.name});
   if (wire == wires_.end()) return;
+  if (wire->second.state == WireState::connecting)
+    return answer_wire(path, member, make_error(ErrorCode::service_error, "the wire was closed"), now);
   wires_.erase(wire);
   connection_.begin_message(outgoing_);
   outgoing_.header.metadata = unreliable_metadata;
@@ -300,7 +338,9 @@ void ServiceSession::handle_entry(const Message& message, const MessageEntry& en
   if (entry.type == EntryType::pipe_packet_ret) return handle_pipe_acks(message, entry);
   if (!is_request(entry.type) || is_packet(entry.type)) return;
   Result<> done;
-  if (find_member_request(entry.type)) {
+  if (must_wait_for_object(entry)) {
+    done = park(message, entry);
+  } else if (find_member_request(entry.type)) {
     done = dispatch_member(message, entry, now);
   } else if (entry.type == EntryType::client_session_op_req) {
     done = answer_session_op(message, entry, now);
@@ -342,6 +382,7 @@ Result<> ServiceSession::dispatch_member(const Message& message, const MessageEn
                       "Member not found: " + found->type->name + " has no " +
                           std::string(member_kind_name(find_member_request(entry.type)->kind)) + " " +
                           quoted(entry.member_name));
+  if (auto admitted = admit(entry.type, entry.service_path, member); !admitted) return admitted;
   if (auto allowed = check_locks(entry, *found, *member, now); !allowed) return allowed;
   if (auto allowed = check_direction(entry.type, *member); !allowed) return allowed;
   switch (entry.type) {
@@ -416,6 +457,7 @@ Result<> ServiceSession::answer_wire(const MessageEntry& entry, const HostedServ
   PathMember key{std::string(entry.service_path), std::string(entry.member_name)};
   if (entry.type == EntryType::wire_disconnect_req) {
     if (wires_.erase(key) == 0) return make_error(ErrorCode::service_error, "Invalid wire connection");
+    events_.push_back(WireDisconnected{key.path, &member});
     begin_reply(entry);
     send_outgoing(now);
     return {};
@@ -424,7 +466,13 @@ Result<> ServiceSession::answer_wire(const MessageEntry& entry, const HostedServ
     return make_error(ErrorCode::out_of_system_resource,
                       "this client has " + std::to_string(options_.max_wires) + " wires connected already");
   // A second request of a connected client is accepted: it is the same connection.
-  const bool is_new = wires_.try_emplace(key, WireConnection{WireState::connected, &member}).second;
+  const bool is_remote = service_->is_remote();
+  const WireConnection fresh{is_remote ? WireState::connecting : WireState::connected, &member, entry.request_id};
+  const bool is_new = wires_.try_emplace(key, fresh).second;
+  if (is_new && is_remote) {
+    events_.push_back(WireConnected{key.path, found.object, &member});
+    return {};
+  }
   begin_reply(entry);
   send_outgoing(now);
   if (is_new) events_.push_back(WireConnected{key.path, found.object, &member});
@@ -443,6 +491,7 @@ Result<> ServiceSession::answer_service_index(const MessageEntry& entry, const M
 void ServiceSession::handle_wire_packet(const Message& message, const MessageEntry& entry) {
   const auto wire = wires_.find(PathMemberView{entry.service_path, entry.member_name});
   if (wire == wires_.end() || !check_direction(entry.type, *wire->second.member)) return;
+  if (!admit(entry.type, entry.service_path, wire->second.member)) return;
   auto packet = read_wire_value(message, entry, *wire->second.member, service_->types());
   if (!packet || !wire->second.accept(packet->time)) return;
   auto found = service_->find_object(entry.service_path);

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -15,6 +16,7 @@
 
 #include "core/member/callback.hpp"
 #include "core/member/generator.hpp"
+#include "core/member/ledger.hpp"
 #include "core/member/memory.hpp"
 #include "core/member/pipe.hpp"
 #include "core/member/wire.hpp"
@@ -24,6 +26,14 @@
 #include "core/session/service_path.hpp"
 
 namespace rr {
+
+/// What a client is about to do with a member, or (no member) with the locks of an object.
+struct MemberAccess {
+  EntryType type;  ///< of the request or packet
+  std::string_view path;
+  const MemberDefinition* member;
+  const AuthenticatedUser* user;  ///< null: has not logged in
+};
 
 struct ServiceSessionOptions {
   ConnectionOptions connection;  ///< `self` is taken from the directory
@@ -40,6 +50,9 @@ struct ServiceSessionOptions {
   std::size_t max_open_callbacks = 1024;                  ///< not answered yet; above: out_of_system_resource
   std::size_t max_pipe_endpoints = 4096;                  ///< of one client; above: out_of_system_resource
   std::size_t max_pipe_queued_bytes = 32u * 1024 * 1024;  ///< waiting for the stream; above, pipes take no packets
+  std::size_t max_parked_requests = 64;  ///< for objects of a remote service that are looked for
+  /// Asked before anything is done with a member; what it refuses with is what the client gets. None: all is allowed.
+  std::function<Result<>(const MemberAccess&)> admit = {};
 };
 
 using CallId = std::uint64_t;
@@ -84,10 +97,17 @@ struct LoginRequested {
   LoginAttempt attempt;
   LoginLimit::Ticket ticket;  ///< to be kept until the answer
 };
-/// A wire was connected: send the current value, if there is one.
+/// A wire was connected: send the current value, if there is one. Of a remote service: a client wants to connect it; to
+/// be answered with answer_wire().
 struct WireConnected {
   std::string path;
   std::shared_ptr<ServiceObject> object;
+  const MemberDefinition* member = nullptr;
+};
+/// The client has enough of a wire. Wires that are connected when the client goes, or whose object is released, end with
+/// it: there is only ClientGone or nothing.
+struct WireDisconnected {
+  std::string path;
   const MemberDefinition* member = nullptr;
 };
 /// A newer OutValue of the client.
@@ -135,13 +155,30 @@ struct CallbackCompleted {
   CallbackId id = 0;
   Result<Value> result;
 };
+/// Of a remote service: an object that the client names is not known. To be answered with handle_object_found().
+struct ObjectWanted {
+  std::string path;
+};
+using LockRequestId = std::uint64_t;
+enum class LockCommand : std::uint8_t { lock_for_user, lock_for_client, unlock, enter_monitor, exit_monitor };
+/// Of a remote service: to be answered exactly once, with answer_lock().
+struct LockWanted {
+  LockRequestId id = 0;
+  LockCommand command = LockCommand::unlock;
+  std::string path;
+  std::chrono::milliseconds timeout{0};  ///< enter_monitor; negative: for ever
+};
+/// Of a remote service: the client disconnects. Once what it holds there is given up: to be answered with answer_leave(),
+/// which ends the session.
+struct LeaveWanted {};
 /// The last event.
 struct ClientGone {
   Error reason;
 };
 using ServiceEvent =
-    std::variant<Called, ClientConnected, LoginRequested, LocksChanged, WireConnected, WireReceived, PipeConnected,
-                 PipeReceived, PipeAcknowledged, PipeClosed, GeneratorEnded, CallbackCompleted, ClientGone>;
+    std::variant<Called, ClientConnected, LoginRequested, LocksChanged, WireConnected, WireDisconnected, WireReceived,
+                 PipeConnected, PipeReceived, PipeAcknowledged, PipeClosed, GeneratorEnded, CallbackCompleted,
+                 ObjectWanted, LockWanted, LeaveWanted, ClientGone>;
 
 /// One client of a node. Node-level requests (definitions, attributes, the service index) are answered in here.
 class ServiceSession {
@@ -172,6 +209,11 @@ class ServiceSession {
   Result<> send_event(std::string_view path, const MemberDefinition& member, std::span<const Value> arguments, Now now);
   /// Sends InValue if the client has connected this wire; a value that waits for a slow stream is replaced.
   Result<> send_wire(std::string_view path, const MemberDefinition& member, const Value& value, Now now);
+  /// The same for a value that is of another time, and came here at `arrived`.
+  Result<> send_wire(std::string_view path, const MemberDefinition& member, const WireValue& value, TimePoint arrived,
+                     Now now);
+  /// Answers WireConnected of a remote service, where it is not answered yet.
+  void answer_wire(std::string_view path, const MemberDefinition& member, const Result<>& result, Now now);
   /// Ends the client's connection to this wire, if it has one, and tells the client.
   void close_wire(std::string_view path, const MemberDefinition& member, Now now);
   /// Answers PipeConnected. Unknown ids, answered and closed ones are ignored.
@@ -191,6 +233,12 @@ class ServiceSession {
                                    std::span<const Value> arguments, Now now);
   /// Tells the client to look up `path` again.
   void release_path(std::string_view path, Now now);
+  /// Answers ObjectWanted: the service has the object now (HostedService::add_object()), or not.
+  void handle_object_found(std::string_view path, const Result<>& found, Now now);
+  /// Answers LockWanted. Unknown ids (the client is gone) are ignored.
+  void answer_lock(LockRequestId id, const Result<>& result, Now now);
+  /// Answers LeaveWanted.
+  void answer_leave(Now now);
   /// Tells the client that its service is gone (ServiceClosed), then closes.
   void close_service(Now now);
 
@@ -208,6 +256,12 @@ class ServiceSession {
   /// The service that the client is connected to; nullptr before and after.
   HostedService* service() const { return service_.get(); }
   bool has_wire(std::string_view path, std::string_view member) const;
+  /// Calls `visit(path, member, ledger)` for each wire and pipe endpoint that the client has connected.
+  template <class Visit>
+  void visit_ledgers(Visit&& visit) const {
+    for (const auto& [key, wire] : wires_) visit(key.path, *wire.member, wire.ledger);
+    for (const auto& [id, pipe] : pipes_) visit(pipe.key->path, pipe.state.member(), pipe.ledger);
+  }
   /// Who has logged in; nullptr while nobody has.
   const AuthenticatedUser* user() const { return user_ ? &*user_ : nullptr; }
   /// This side's number of the session; 0 before the client is connected.
@@ -250,6 +304,23 @@ class ServiceSession {
     const EntityDefinition* type_for_client = nullptr;
     bool wants_definitions = true;
   };
+  /// A request that waits for its object to be found.
+  struct ParkedRequest {
+    std::string path;
+    Bytes message;
+    std::size_t entry = 0;
+  };
+  /// A LockWanted. MonitorEnter is answered "Continue" now and then; the client then asks again.
+  struct OpenLock {
+    LockRequestId id = 0;
+    std::uint32_t request_id = 0;  ///< of the request that waits; none between two of them
+    bool is_asked = true;
+    std::string path;
+    std::string member;
+    bool is_monitor_enter = false;
+    TimePoint answer_by = TimePoint::max();
+    std::optional<Result<>> result = {};  ///< came between two requests
+  };
   struct OpenCallback {
     const MemberDefinition* member = nullptr;
     TimePoint deadline;
@@ -263,6 +334,7 @@ class ServiceSession {
     std::int32_t index = 0;
     std::uint32_t request_id = 0;  ///< of the connect
     bool is_unreliable = false;    ///< defined and asked for
+    Ledger ledger;
   };
   using PipeIndices = std::map<std::int32_t, ServicePipe*>;
 
@@ -314,6 +386,16 @@ class ServiceSession {
   Result<> answer_service_index(const MessageEntry& entry, const MemberDefinition& member, Now now);
   void handle_wire_packet(const Message& message, const MessageEntry& entry);
 
+  // remote services (service_remote.cpp)
+  bool must_wait_for_object(const MessageEntry& entry) const;
+  Result<> park(const Message& message, const MessageEntry& entry);
+  Result<> ask_for_lock(const Message& message, const MessageEntry& entry, Now now);
+  Result<> continue_entering(const MessageEntry& entry, Now now);
+  void finish_lock(const OpenLock& lock, const Result<std::string_view>& answer, Now now);
+  void continue_late_locks(Now now);
+
+  Result<> admit(EntryType type, std::string_view path, const MemberDefinition* member) const;
+
   // callbacks (service_callback.cpp)
   void handle_callback_reply(const Message& message, const MessageEntry& entry);
   void expire_callbacks(Now now);
@@ -348,7 +430,8 @@ class ServiceSession {
 
   void begin_reply(const MessageEntry& request);
   void send_error(const MessageEntry& request, const Error& error, Now now);
-  Result<> send_wire_packet(const PathMember& key, WireConnection& wire, const Value& value, Now now);
+  Result<> send_wire_packet(const PathMember& key, WireConnection& wire, const WireValue& value, TimePoint arrived,
+                            Now now);
   void flush_wires(Now now);
 
   ServiceDirectory& directory_;
@@ -373,6 +456,18 @@ class ServiceSession {
   std::vector<OpenCall> calls_;
   GeneratorTable generators_;
   std::map<PathMember, WireConnection, PathMemberLess> wires_;
+  /// A DisconnectClient that is not answered yet.
+  struct OpenLeave {
+    NodeIdentity client;
+    std::uint32_t client_endpoint = 0;
+    std::string path;
+    std::string member;
+    std::uint32_t request_id = 0;
+  };
+  std::optional<OpenLeave> leaving_;
+  std::vector<ParkedRequest> parked_;
+  LockRequestId last_lock_id_ = 0;
+  std::vector<OpenLock> locks_;  ///< at most a handful
   CallbackId last_callback_id_ = 0;
   std::map<CallbackId, OpenCallback> callbacks_;  ///< in order of their deadlines, which are equally far
   PipeStore pipe_store_;                          ///< outlives pipes_

@@ -91,6 +91,7 @@ void ServiceSession::handle_special(const Message& message, Now now) {
     if (static_cast<std::uint16_t>(entry.type) % 2 == 0) continue;  // replies are not for a service
     outgoing_.begin_entry(reply_type(entry.type), entry.service_path, entry.member_name, entry.request_id);
     const bool had_login = login_.has_value();
+    const bool was_leaving = leaving_.has_value();
     const Result<> done = is_for_us ? answer_special(message, entry, now)
                                     : make_error(ErrorCode::node_not_found, "Could not find route to remote node");
     if (!done) {
@@ -99,8 +100,8 @@ void ServiceSession::handle_special(const Message& message, Now now) {
       outgoing_.entries.pop_back();
       outgoing_.begin_entry(reply_type(entry.type), entry.service_path, entry.member_name, entry.request_id);
       write_error(outgoing_, done.error());
-    } else if (login_ && !had_login) {
-      outgoing_.entries.pop_back();  // it is answered once the login is judged
+    } else if ((login_ && !had_login) || (leaving_ && !was_leaving)) {
+      outgoing_.entries.pop_back();  // it is answered once the login is judged, or the client's things are given up
     }
   }
   if (!outgoing_.entries.empty()) send_outgoing(now);
@@ -138,7 +139,10 @@ Result<> ServiceSession::write_service_desc(const Message& message, const Messag
   const auto* type = find_text(message, entry, "ServiceType");
   if (!type) type = find_text(message, entry, "servicetype");
   if (type) {
-    const auto* definition = directory_.find_definition(type->text());
+    // Services of a node may have definitions of one name and two texts: the one that the client asks counts.
+    const auto asked = directory_.find(entry.service_path);
+    const auto* definition = asked ? asked->types().find_service(type->text()) : nullptr;
+    if (!definition) definition = directory_.find_definition(type->text());
     if (!definition) return service_not_found();
     outgoing_.add_text("servicedef", definition->text);
     return {};
@@ -191,8 +195,10 @@ Result<> ServiceSession::write_combined(const Message& message, const MessageEnt
   const auto elements = message.elements_of(entry);
   const bool has_login = elements.find("username") && elements.find("credentials");
   const auto& policy = service->policy();
-  // As the reference does: where no user is required, a login in this request fails; AuthenticateUser is for that.
-  if (has_login != policy.require_valid_user || (has_login && !policy.authenticator)) return login_failed();
+  // As the reference does: where no user is required, a login in this request fails; AuthenticateUser is for that. In
+  // front of a remote service nobody knows what that one requires.
+  const bool may_log_in = policy.authenticator && (policy.require_valid_user || service->is_remote());
+  if (has_login ? !may_log_in : policy.require_valid_user) return login_failed();
   if (!has_login) return accept_combined(request, std::nullopt, now);
   if (service_) return has_session_already();
   if (auto begun = begin_login(message, entry, service, now); !begun) return begun;
@@ -254,7 +260,17 @@ Result<> ServiceSession::disconnect(const Message& message, const MessageEntry& 
   const auto* name = find_text(message, entry, "servicename");
   if (!service_ || message.header.receiver_endpoint != endpoint_ || !name || name->text() != service_->name())
     return service_not_found();
-  leave({ErrorCode::none, "the client disconnected"}, now);
+  if (!service_->is_remote()) {
+    leave({ErrorCode::none, "the client disconnected"}, now);
+  } else if (!leaving_) {
+    leaving_.emplace(OpenLeave());
+    leaving_->client = {message.header.sender_node_id, std::string(message.header.sender_node_name)};
+    leaving_->client_endpoint = message.header.sender_endpoint;
+    leaving_->path = entry.service_path;
+    leaving_->member = entry.member_name;
+    leaving_->request_id = entry.request_id;
+    events_.push_back(LeaveWanted{});
+  }
   return {};
 }
 

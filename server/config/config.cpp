@@ -87,6 +87,49 @@ void read_way(ObjectReader& in, DeviceConfig& device) {
   });
 }
 
+void read_mode(ObjectReader& in, DeviceMode& mode) {
+  std::string text = "relay";
+  in.choice("mode", text, {"relay", "shared"});
+  mode = text == "shared" ? DeviceMode::shared : DeviceMode::relay;
+}
+
+void read_login(ObjectReader& in, UpstreamLogin& login) {
+  in.required_text("username", [&](const std::string& text) -> std::string {
+    login.username = text;
+    return {};
+  });
+  in.required_text("password", [&](const std::string& text) -> std::string {
+    login.credentials.items.emplace_back("password", rr::Value(text));
+    return {};
+  });
+}
+
+void read_callback_rule(ObjectReader& in, CallbackRule& rule) {
+  in.required_text("member", [&](const std::string& text) -> std::string {
+    rule.member = text;
+    return {};
+  });
+  std::string answer = "owner";
+  in.choice("answer", answer, {"owner", "first", "all"});
+  rule.policy = answer == "first" ? CallbackPolicy::first
+                : answer == "all" ? CallbackPolicy::all
+                                  : CallbackPolicy::owner;
+}
+
+void read_node(ObjectReader& in, NodeConfig& node) {
+  std::string id;
+  in.text("name", node.name);
+  in.text("id", id);
+  if (!rr::is_valid_node_name(node.name))
+    in.finding("name", "found " + rr::quoted(node.name) + ", expected letters, digits, '_', '-', '.', a letter first");
+  if (id.empty()) return;
+  const auto parsed = rr::parse_node_id(id);
+  if (parsed && !parsed->is_any())
+    node.id = *parsed;
+  else
+    in.finding("id", "found " + rr::quoted(id) + ", expected a UUID that is not all zeros");
+}
+
 void read_device(ObjectReader& in, DeviceConfig& device) {
   in.required_text("name", [&](const std::string& text) {
     device.name = text;
@@ -94,6 +137,12 @@ void read_device(ObjectReader& in, DeviceConfig& device) {
   });
   in.required_text("url", [&](const std::string& text) { return read_device_url(text, device.url); });
   in.size("max_clients", device.max_clients, {0, 1'000'000});
+  read_mode(in, device.mode);
+  in.object("login", [&](ObjectReader& part) { read_login(part, device.login); });
+  in.objects("callbacks", false, [&](ObjectReader& item) { read_callback_rule(item, device.callbacks.emplace_back()); });
+  in.flag("shares_reads", device.shares_reads);
+  if (device.mode == DeviceMode::relay && (!device.login.username.empty() || !device.callbacks.empty()))
+    in.finding("mode", "login and callbacks are of shared devices: clients of a relayed one have sessions of their own");
   read_way(in, device);
   in.object("tls", [&](ObjectReader& part) { part.texts("ca", false, read_file_name(device.tls.ca)); });
 }
@@ -145,6 +194,7 @@ void read_discover(ObjectReader& in, Discover& discover) {
   in.size("max_devices", discover.max_devices, {1, 4096});
   in.flag("local", discover.local);
   in.flag("hardware", discover.hardware);
+  read_mode(in, discover.mode);
   in.object("tls", [&](ObjectReader& part) { part.texts("ca", false, read_file_name(discover.tls.ca)); });
 }
 
@@ -178,6 +228,7 @@ void read_limits(ObjectReader& in, Limits& limits) {
   in.size("outbox_bytes", limits.outbox_bytes, {16 * 1024, 64 * 1024 * 1024});
   in.size("clients", limits.clients, {1, 1'000'000});
   in.size("clients_per_address", limits.clients_per_address, {1, 1'000'000});
+  in.size("client_queue_bytes", limits.client_queue_bytes, {64 * 1024, 1'000'000'000});
   in.size("opaque_rate", limits.opaque_rate, {1024, 1'000'000'000'000});
 }
 
@@ -210,6 +261,7 @@ void read_config(ObjectReader& in, Config& config) {
     config.devices.push_back(std::move(device));
   });
   in.object("discover", [&](ObjectReader& part) { read_discover(part, config.discover); });
+  in.object("node", [&](ObjectReader& part) { read_node(part, config.node); });
   in.text("web_root", config.web_root);
   read_proxy(in, config);
   in.texts("allowed_origins", false, [&](const std::string& text) -> std::string {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/session/url.hpp"
+#include "core/types/value.hpp"
 #include "server/config/finding.hpp"
 #include "server/http/forwarded.hpp"
 #include "server/security/tls_context.hpp"
@@ -26,6 +27,36 @@ struct DeviceTls {
   bool operator==(const DeviceTls&) const = default;
 };
 
+/// Whose session with a device it is.
+struct UpstreamLogin {
+  std::string username;  ///< empty: without a login
+  rr::MapString credentials;
+  bool is_late = false;  ///< once the session is there: what services take that require no user
+
+  bool operator==(const UpstreamLogin&) const = default;
+};
+
+/// Which client of a shared device answers a callback.
+enum class CallbackPolicy : std::uint8_t {
+  owner,  ///< the client whose call is being answered; where none is, the only client there is
+  first,  ///< the client that has been there longest
+  all,    ///< every client; the first answer that is no error counts
+};
+
+/// For the callbacks whose "path.member" fits a pattern with * and ?.
+struct CallbackRule {
+  std::string member;
+  CallbackPolicy policy = CallbackPolicy::owner;
+
+  bool operator==(const CallbackRule&) const = default;
+};
+
+/// How clients reach a device.
+enum class DeviceMode : std::uint8_t {
+  relay,   ///< each by a connection of its own, byte for byte
+  shared,  ///< all by one session of the gateway's
+};
+
 struct DeviceConfig {
   std::string name;  ///< the path segment of /devices/<name>
   rr::ConnectionUrl url;
@@ -34,6 +65,10 @@ struct DeviceConfig {
   DeviceTls tls;
   rr::HostPort proxy;       ///< HTTP proxy on the way; empty host: none
   rr::HttpHeaders headers;  ///< for WebSocket URLs
+  DeviceMode mode = DeviceMode::relay;
+  UpstreamLogin login;                  ///< of the shared session; no user name: none
+  std::vector<CallbackRule> callbacks;  ///< of a shared device; the first that fits a callback counts
+  bool shares_reads = false;            ///< of a shared device: clients that read a property at once are one to it
 
   bool operator==(const DeviceConfig&) const = default;
 };
@@ -46,6 +81,7 @@ struct Limits {
   std::size_t outbox_bytes = 256u * 1024;            ///< held for one client and direction before reading pauses
   std::size_t clients = 4000;                        ///< connections at a time, all addresses together
   std::size_t clients_per_address = 1000;
+  std::size_t client_queue_bytes = 8u * 1024 * 1024;  ///< a client of a shared device that leaves more waiting is cut
   std::size_t opaque_rate = 128u * 1024 * 1024;  ///< bytes a second and direction of what is encrypted end to end
 
   bool operator==(const Limits&) const = default;
@@ -85,6 +121,14 @@ struct ProxyConfig {
   bool operator==(const ProxyConfig&) const = default;
 };
 
+/// The gateway as a Robot Raconteur node.
+struct NodeConfig {
+  std::string name = "rrgate";
+  rr::NodeId id;  ///< any: another one at each start
+
+  bool operator==(const NodeConfig&) const = default;
+};
+
 struct LogConfig {
   std::string level = "info";
   std::string format = "text";
@@ -109,6 +153,7 @@ struct Discover {
   bool local = true;             ///< nodes of this machine, by rr+local
   bool hardware = true;          ///< nodes that are plugged in: rr+usb, rr+pci
   DeviceTls tls;                 ///< of found devices
+  DeviceMode mode = DeviceMode::relay;
 
   bool operator==(const Discover&) const = default;
 };
@@ -117,6 +162,7 @@ struct Config {
   std::vector<rr::HostPort> listen;
   std::vector<DeviceConfig> devices;
   Discover discover;
+  NodeConfig node;
   std::string web_root;   ///< folder of the dashboard; empty: the one that was installed with the program
   std::string base_path;  ///< "" or "/robots": before all paths, where a proxy passes it on
   ProxyConfig proxy;

@@ -20,12 +20,6 @@ namespace asio = boost::asio;
 
 namespace {
 
-/// Many gateways, or many devices of one, must not knock in step: 75 to 125 percent.
-milliseconds with_jitter(milliseconds wait) {
-  static thread_local std::minstd_rand random(std::random_device{}());
-  return wait * std::uniform_int_distribution<int>(75, 125)(random) / 100;
-}
-
 constexpr const char* circle = "its URL leads back to this gateway";
 
 struct Reached {
@@ -59,6 +53,11 @@ bool is_secure(const rr::ConnectionUrl& url) {
 }
 
 }  // namespace
+
+milliseconds with_jitter(milliseconds wait) {
+  static thread_local std::minstd_rand random(std::random_device{}());
+  return wait * std::uniform_int_distribution<int>(75, 125)(random) / 100;
+}
 
 std::string_view to_string(DeviceState state) {
   switch (state) {
@@ -135,14 +134,27 @@ rr::awaitable<rr::Result<std::unique_ptr<rr::ByteStream>>> Device::connect(std::
   co_return stream;
 }
 
+rr::awaitable<rr::Result<std::unique_ptr<rr::ByteStream>>> Device::connect_client() {
+  if (!is_shared()) co_return co_await connect();
+  if (!open_shared_) co_return rr::make_error(rr::ErrorCode::connection_error, "the gateway stops");
+  co_return open_shared_();
+}
+
+rr::NodeIdentity Device::client_target() const {
+  if (is_shared()) return {};
+  return {config_.url.node_id.value_or(rr::NodeId{}), config_.url.node_name};
+}
+
 bool Device::can_become(const DeviceConfig& config) const {
   auto same = config;
   same.max_clients = config_.max_clients;
+  same.callbacks = config_.callbacks;
   return same == config_;
 }
 
 void Device::become(const DeviceConfig& config, const Config& whole) {
   config_.max_clients = config.max_clients;
+  config_.callbacks = config.callbacks;
   dial_options_.timeout = whole.timeouts.connect;
   dial_options_.send_stall = whole.timeouts.send_stall;
   retry_ = whole.retry;
@@ -211,6 +223,12 @@ void Device::stop() {
 
 void Device::note(const rr::Result<ProbeResult>& result) {
   const auto before = state_;
+  const auto known = identity_;
+  note_answer(result, before);
+  if (on_change_ && (state_ != before || identity_ != known)) on_change_();
+}
+
+void Device::note_answer(const rr::Result<ProbeResult>& result, DeviceState before) {
   if (result) {
     if (state_ != DeviceState::online || identity_ != *result)
       log(LogLevel::info, "device online",
@@ -293,8 +311,10 @@ bool DeviceRegistry::has(const Device& device) const {
 
 Device& DeviceRegistry::add(DeviceConfig device, std::shared_ptr<TlsFiles> tls) {
   devices_.push_back(std::make_shared<Device>(executor_, std::move(device), config_, std::move(tls)));
+  auto& added = *devices_.back();
   asio::co_spawn(executor_, watch(devices_.back()), asio::detached);
-  return *devices_.back();
+  if (on_change_) on_change_();
+  return added;
 }
 
 void DeviceRegistry::remove(const Device& device) {
@@ -303,6 +323,7 @@ void DeviceRegistry::remove(const Device& device) {
   if (found == devices_.end()) return;
   (*found)->stop();
   devices_.erase(found);
+  if (on_change_) on_change_();
 }
 
 void DeviceRegistry::stop() {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <boost/asio/steady_timer.hpp>
+#include <functional>
 #include <list>
 #include <memory>
 #include <optional>
@@ -9,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/session/connection.hpp"
 #include "server/config/config.hpp"
 #include "server/gateway/metrics.hpp"
 #include "server/gateway/probe.hpp"
@@ -19,6 +21,9 @@ namespace rrgate {
 
 enum class DeviceState { connecting, online, offline };
 std::string_view to_string(DeviceState state);
+
+/// Many gateways, or many devices of one, must not knock in step: 75 to 125 percent.
+milliseconds with_jitter(milliseconds wait);
 
 /// One device. Looks at it from time to time; connects clients to it. Those who use it over a wait hold a Seat.
 class Device : public std::enable_shared_from_this<Device> {
@@ -45,7 +50,7 @@ class Device : public std::enable_shared_from_this<Device> {
   /// The ways to a found device, best first; the first that works becomes config().url.
   void set_urls(std::vector<rr::ConnectionUrl> urls);
 
-  /// A connection for one client, by whichever URL is the quickest. A failure makes the device be looked at again soon.
+  /// A connection to the device, by whichever URL is the quickest. A failure makes the device be looked at again soon.
   /// `way`    looks of the gateways that the client has come through (see way_header); empty: none that says so.
   /// Errors   also: the device's URL leads back to this gateway.
   rr::awaitable<rr::Result<std::unique_ptr<rr::ByteStream>>> connect(std::string way = {});
@@ -54,6 +59,15 @@ class Device : public std::enable_shared_from_this<Device> {
   bool is_on_way(std::string_view way) const;
   /// Such a look has come. Until one is answered no client is connected, or each would go round in circles.
   void note_circle();
+  /// The same for one client of it: where the device is shared, a connection to the gateway's session with it.
+  rr::awaitable<rr::Result<std::unique_ptr<rr::ByteStream>>> connect_client();
+  /// Which node answers there: empty where any will do.
+  rr::NodeIdentity client_target() const;
+  using OpenShared = std::function<rr::Result<std::unique_ptr<rr::ByteStream>>()>;
+  void share_by(OpenShared open) { open_shared_ = std::move(open); }
+  bool is_shared() const { return config_.mode == DeviceMode::shared; }
+  /// Called when state() or identity() has changed.
+  void on_change(std::function<void()> handler) { on_change_ = std::move(handler); }
   /// A client's connection to the device broke: look at it again soon.
   void note_trouble() { look_again(); }
 
@@ -90,9 +104,12 @@ class Device : public std::enable_shared_from_this<Device> {
   /// The one that worked last, then the others.
   std::vector<rr::ConnectionUrl> urls_to_try() const;
   void note(const rr::Result<ProbeResult>& result);
+  void note_answer(const rr::Result<ProbeResult>& result, DeviceState before);
 
   DeviceConfig config_;
   std::vector<rr::ConnectionUrl> urls_;  ///< of a found device
+  OpenShared open_shared_;
+  std::function<void()> on_change_;
   rr::DialOptions dial_options_;
   std::shared_ptr<TlsFiles> tls_;                        ///< null: the URL wants none
   std::list<boost::asio::cancellation_signal> dialing_;  ///< what stop() ends
@@ -132,6 +149,8 @@ class DeviceRegistry {
   void replace(std::vector<std::shared_ptr<Device>> configured);
   bool has(const Device& device) const;
 
+  /// Called when devices have joined or gone.
+  void on_change(std::function<void()> handler) { on_change_ = std::move(handler); }
   /// A found device joins; its name is nobody's yet.
   Device& add(DeviceConfig device, std::shared_ptr<TlsFiles> tls);
   /// A found device goes; clients that are connected to it stay so.
@@ -150,6 +169,7 @@ class DeviceRegistry {
   boost::asio::any_io_executor executor_;
   const Config& config_;
   std::vector<std::shared_ptr<Device>> devices_;
+  std::function<void()> on_change_;
 };
 
 }  // namespace rrgate

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "core/session/service_path.hpp"
+#include "server/gateway/open_session.hpp"
 #include "server/log/log.hpp"
 
 namespace rrgate {
@@ -20,19 +21,6 @@ constexpr std::size_t kept_events = 256;
 constexpr milliseconds first_retry{500};
 constexpr milliseconds last_retry{30'000};
 constexpr auto wait_token = asio::as_tuple(asio::use_awaitable);
-
-using ConnectionPtr = std::shared_ptr<rr::ClientConnection>;
-
-auto open_session(std::unique_ptr<rr::ByteStream> stream, rr::ClientOptions options) {
-  const auto executor = stream->executor();
-  constexpr asio::use_awaitable_t<> token;
-  return asio::async_initiate<const asio::use_awaitable_t<>, void(std::exception_ptr, ConnectionPtr)>(
-      [executor, stream = std::move(stream), options = std::move(options)](auto handler) mutable {
-        const rr::detail::CompleteOnce<ConnectionPtr, decltype(handler)> complete(std::move(handler), executor);
-        rr::ClientConnection::open(std::move(stream), std::move(options), complete);
-      },
-      token);
-}
 
 /// Every object on the way to `path`, root first.
 std::vector<std::string> objects_on_the_way(const std::string& path) {
@@ -91,23 +79,15 @@ rr::awaitable<rr::Result<>> DeviceSession::connect() {
   if (!seat)
     co_return rr::make_error(rr::ErrorCode::out_of_system_resource,
                              label + " has all the clients it may have (" + std::to_string(device_->clients()) + ")");
-  auto stream = co_await device_->connect();
+  auto stream = co_await device_->connect_client();
   if (!stream)
     co_return rr::make_error(rr::ErrorCode::connection_error, label + " is offline: " + stream.error().message);
-  rr::ClientOptions options;
-  options.service = key_.service;
-  options.connection.self.name = "rrgate";
-  const auto& url = device_->config().url;
-  options.connection.target = {url.node_id.value_or(rr::NodeId{}), url.node_name};
-  if (!key_.username.empty()) {
-    options.username = key_.username;
-    options.credentials = rr::MapString{{{"password", rr::Value(key_.password)}}};
-  }
-  try {
-    connection_ = co_await open_session(std::move(*stream), std::move(options));
-  } catch (const rr::Exception& exception) {
-    co_return exception.error();
-  }
+  rr::MapString credentials;
+  if (!key_.username.empty()) credentials.items.emplace_back("password", rr::Value(key_.password));
+  auto opened =
+      co_await open_session(std::move(*stream), key_.service, device_->client_target(), key_.username, credentials);
+  if (!opened) co_return opened.error();
+  connection_ = std::move(*opened);
   if (is_stopped_) {
     connection_->disconnect();
     connection_.reset();

@@ -123,6 +123,7 @@ void FoundDevices::review(Node& node) {
   made.name = free_name(node.info);
   made.url = urls.front();
   made.is_found = true;
+  made.mode = config_.discover.mode;
   log(LogLevel::info, "device found",
       {{"device", made.name}, {"node_id", id_text(node.info.node_id)}, {"url", rr::format_url(made.url)}});
   auto& device = devices_.add(std::move(made), tls_);

@@ -107,9 +107,10 @@ rr::awaitable<std::unique_ptr<rr::ByteStream>> accept_https(Gateway& gateway, co
 }  // namespace
 
 rr::awaitable<void> serve_connection(Gateway& gateway, std::unique_ptr<rr::ByteStream> stream,
-                                     boost::asio::ip::tcp::endpoint peer, Admission::Ticket ticket) {
+                                     boost::asio::ip::tcp::endpoint peer, boost::asio::ip::tcp::endpoint local,
+                                     Admission::Ticket ticket) {
   rr::ByteStream* current = stream.get();
-  Connection connection(Peer{std::move(peer), false}, std::move(ticket));
+  Connection connection(Peer{std::move(peer), false}, std::move(local), std::move(ticket));
   connection.stop = [&current](const rr::EndReason&) { current->close(); };
   gateway.add(connection);
   const auto patience = gateway.config().limits.header_timeout;

@@ -26,6 +26,7 @@ Protocol detect_protocol(rr::ByteSpan first_bytes);
 
 /// Serves one accepted connection to its end.
 rr::awaitable<void> serve_connection(Gateway& gateway, std::unique_ptr<rr::ByteStream> stream,
-                                     boost::asio::ip::tcp::endpoint peer, Admission::Ticket ticket);
+                                     boost::asio::ip::tcp::endpoint peer, boost::asio::ip::tcp::endpoint local,
+                                     Admission::Ticket ticket);
 
 }  // namespace rrgate

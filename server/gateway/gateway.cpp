@@ -7,9 +7,10 @@
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/use_awaitable.hpp>
-#include <random>
 #include <utility>
 
+#include "core/session/service_index.hpp"
+#include "core/support/random.hpp"
 #include "server/gateway/front_door.hpp"
 #include "server/http/routes.hpp"
 #include "server/log/log.hpp"
@@ -27,15 +28,6 @@ constexpr std::chrono::milliseconds last_wait{2000};
 /// How often the files of certificates and CAs are looked at.
 constexpr std::chrono::seconds tls_watch_period{2};
 
-rr::NodeId random_node_id() {
-  std::random_device random;
-  rr::NodeId id;
-  for (auto& byte : id.bytes) byte = static_cast<std::uint8_t>(random());
-  id.bytes[6] = static_cast<std::uint8_t>((id.bytes[6] & 0x0f) | 0x40);  // UUID version 4
-  id.bytes[8] = static_cast<std::uint8_t>((id.bytes[8] & 0x3f) | 0x80);
-  return id;
-}
-
 }  // namespace
 
 Gateway::Gateway(asio::io_context& io, Config config)
@@ -46,7 +38,7 @@ Gateway::Gateway(asio::io_context& io, Config config)
       sessions_(io.get_executor()),
       admission_(config_.limits.clients, config_.limits.clients_per_address),
       router_(make_routes(*this)),
-      node_id_(random_node_id()),
+      shared_(config_.node.id.is_any() ? rr::random_node_id() : config_.node.id, config_),
       tls_watch_(io),
       drained_(io) {}
 
@@ -111,9 +103,47 @@ rr::Result<std::vector<rr::HostPort>> Gateway::start(const std::vector<int>& soc
     asio::co_spawn(io_, std::move(accepting), asio::detached);
   }
   devices_.start();
+  tell_of_nodes();
+  devices_.on_change([this] { shared_.sync(devices_); });
+  shared_.sync(devices_);
+  own_service_ = std::make_unique<GatewayService>(io_, *this);
+  own_service_->start();
+  shared_.add_own(own_service_->device(), std::string(GatewayService::name));
   if (found_) found_->start();
   asio::co_spawn(io_, watch_tls(), asio::detached);
   return bound;
+}
+
+/// The service index leads to all devices: to a shared one by the node that stands for it, to others through the relay.
+void Gateway::tell_of_nodes() {
+  auto& directory = shared_.node().directory();
+  const auto index_url = [](std::string_view base_url, const rr::NodeIdentity& node) {
+    return std::string(base_url) + "?nodeid=" + rr::format_node_id(node.id, rr::NodeIdFormat::dashes) +
+           "&service=" + std::string(rr::service_index_name);
+  };
+  const auto routed = [this, index_url](std::string_view base_url) {
+    std::vector<rr::KnownNode> out;
+    for (const auto& device : devices_.all()) {
+      auto* shared = shared_.find(*device);
+      const auto& identity = device->identity();
+      if (!shared && !identity) continue;
+      const auto node = shared ? shared->node().identity() : rr::NodeIdentity{identity->node_id, identity->node_name};
+      out.push_back({node, {index_url(base_url, node)}});
+    }
+    return out;
+  };
+  directory.set_routed_nodes(routed);
+  directory.set_detected_nodes([this, routed](std::string_view base_url) {
+    auto out = routed(base_url);
+    if (!found()) return out;
+    for (const auto& entry : found()->list()) {
+      if (entry.device) continue;
+      rr::KnownNode node{{entry.node.node_id, entry.node.node_name}, {}};
+      for (const auto& each : entry.node.urls) node.index_urls.push_back(each.url);
+      out.push_back(std::move(node));
+    }
+    return out;
+  });
 }
 
 rr::awaitable<void> Gateway::watch_tls() {
@@ -168,6 +198,7 @@ rr::Result<> Gateway::reconfigure(Config next) {
     log(LogLevel::info, "listening", {{"address", rr::format_host_port(address.host, address.port)}});
   admission_.set_limits(config_.limits.clients, config_.limits.clients_per_address);
   devices_.replace(std::move(*devices));
+  shared_.sync(devices_);
   if (found_) {
     found_->note_change(before.discover, std::move(found_tls));
   } else if (config_.discover.is_enabled) {
@@ -194,6 +225,7 @@ void Gateway::accept(asio::ip::tcp::socket socket) {
   rr::error_code error;
   const auto peer = socket.remote_endpoint(error);
   if (error) return;  // gone already
+  const auto local = socket.local_endpoint(error);
   ++metrics_.connections;
   const bool is_proxy = config_.proxy.trust.trusts(peer.address());
   auto ticket = admission_.admit(is_proxy ? std::nullopt : std::optional(peer.address()));
@@ -205,7 +237,7 @@ void Gateway::accept(asio::ip::tcp::socket socket) {
   }
   ++open_connections_;
   auto stream = rr::make_tcp_stream(std::move(socket), config_.timeouts.send_stall);
-  auto serve = serve_connection(*this, std::move(stream), peer, std::move(*ticket));
+  auto serve = serve_connection(*this, std::move(stream), peer, local, std::move(*ticket));
   asio::co_spawn(io_, std::move(serve), [this](std::exception_ptr failure) {
     --open_connections_;
     if (is_stopping_) drained_.cancel();
@@ -230,6 +262,9 @@ void Gateway::stop(std::function<void()> on_stopped) {
   if (found_) found_->stop();
   devices_.stop();
   sessions_.stop();
+  devices_.on_change(nullptr);
+  shared_.stop();
+  if (own_service_) own_service_->stop();
   tls_watch_.cancel();
   asio::co_spawn(io_, drain(), asio::detached);
 }

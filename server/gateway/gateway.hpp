@@ -12,6 +12,8 @@
 #include "server/gateway/device.hpp"
 #include "server/gateway/device_session.hpp"
 #include "server/gateway/found_devices.hpp"
+#include "server/gateway/gateway_service.hpp"
+#include "server/gateway/shared/shared_devices.hpp"
 #include "server/gateway/tls_files.hpp"
 #include "server/http/router.hpp"
 #include "server/transport/tcp.hpp"
@@ -20,8 +22,8 @@ namespace rrgate {
 
 /// One open connection as the gateway knows it, so that it can be asked to end.
 struct Connection : boost::intrusive::list_base_hook<boost::intrusive::link_mode<boost::intrusive::auto_unlink>> {
-  Connection(Peer from, Admission::Ticket held)
-      : peer(std::move(from)), ticket(std::move(held)), client(describe(peer)) {}
+  Connection(Peer from, boost::asio::ip::tcp::endpoint at, Admission::Ticket held)
+      : peer(std::move(from)), local(std::move(at)), ticket(std::move(held)), client(describe(peer)) {}
   static std::string describe(const Peer& peer) {
     return rr::format_host_port(peer.endpoint.address().to_string(), peer.endpoint.port());
   }
@@ -33,6 +35,7 @@ struct Connection : boost::intrusive::list_base_hook<boost::intrusive::link_mode
   /// It uses a device session of the gateway, and ends as soon as that stops.
   bool ends_with_gateway = false;
   Peer peer;
+  boost::asio::ip::tcp::endpoint local;  ///< where it came in
   Admission::Ticket ticket;
   /// The client as logs name it: as `peer`, or as a trusted proxy says.
   std::string client;
@@ -69,6 +72,7 @@ class Gateway {
   const Config& config() const { return config_; }
   DeviceRegistry& devices() { return devices_; }
   DeviceSessions& sessions() { return sessions_; }
+  SharedDevices& shared() { return shared_; }
   /// Null where the configuration has no "discover", and before start().
   FoundDevices* found() { return config_.discover.is_enabled ? found_.get() : nullptr; }
   Metrics& metrics() { return metrics_; }
@@ -78,7 +82,7 @@ class Gateway {
   /// What new connections are encrypted with; null: TLS is not served.
   rr::TlsContextPtr tls() const { return web_tls_ ? web_tls_->context() : nullptr; }
   /// Our own node id, for answers to native clients that no device takes.
-  const rr::NodeId& node_id() const { return node_id_; }
+  const rr::NodeId& node_id() { return shared_.node().identity().id; }
   void add(Connection& connection) { connections_.push_back(connection); }
 
  private:
@@ -95,6 +99,7 @@ class Gateway {
   rr::awaitable<void> drain();
   rr::awaitable<void> watch_tls();
   void close_listeners();
+  void tell_of_nodes();
   bool has_relay() const;
   void end_all(const rr::EndReason& reason);
 
@@ -106,7 +111,8 @@ class Gateway {
   std::unique_ptr<FoundDevices> found_;
   Admission admission_;
   Router router_;
-  rr::NodeId node_id_;
+  SharedDevices shared_;
+  std::unique_ptr<GatewayService> own_service_;
   Metrics metrics_;
   std::vector<Listener> listeners_;
   std::vector<std::shared_ptr<Acceptor>> adopted_;  ///< sockets that listened already

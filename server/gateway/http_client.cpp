@@ -1,6 +1,7 @@
 #include "server/gateway/http_client.hpp"
 
 #include "server/gateway/client_relay.hpp"
+#include "server/gateway/shared/serve_shared_client.hpp"
 #include "server/http/endpoints/json_socket.hpp"
 #include "server/http/request_reader.hpp"
 #include "server/http/response_writer.hpp"
@@ -31,8 +32,8 @@ rr::awaitable<rr::error_code> write_refusal(rr::ByteStream& stream, const Respon
   co_return co_await stream.write(slices);
 }
 
-/// The device of an upgrade: by path, or at "/" by the node that native clients put into the query.
-rr::Result<Device*> find_device(Gateway& gateway, const Request& request) {
+/// Where an upgrade leads: by path, or at "/" by the node that native clients put into the query.
+rr::Result<Destination> find_destination(Gateway& gateway, const Request& request) {
   const auto path = request.path();
   const auto not_found = [](std::string text) {
     return rr::make_error(rr::ErrorCode::node_not_found, std::move(text));
@@ -42,7 +43,7 @@ rr::Result<Device*> find_device(Gateway& gateway, const Request& request) {
     if (!name.empty() && name.back() == '/') name.remove_suffix(1);
     auto* device = gateway.devices().find(name);
     if (!device) return not_found("no device " + rr::quoted(name) + "; /api/v1/devices lists them");
-    return device;
+    return destination_of(gateway, *device);
   }
   if (path != "/") return not_found("no WebSocket at " + rr::quoted(path) + "; expected /devices/NAME or /");
   rr::NodeId node_id;
@@ -52,11 +53,16 @@ rr::Result<Device*> find_device(Gateway& gateway, const Request& request) {
     node_id = *parsed;
   }
   const auto node_name = rr::query_value(request.query(), "nodename").value_or("");
-  auto* device = gateway.devices().route(node_id, node_name);
-  if (!device)
-    return not_found(node_id.is_any() && node_name.empty() ? "several devices; expected /devices/NAME"
-                                                           : "no device is the node that the query names");
-  return device;
+  const auto destination = find_destination(gateway, node_id, node_name);
+  if (!destination) return not_found("no device is the node that the query names");
+  return *destination;
+}
+
+/// The URL of the node as the client knows it; empty where it has not told its own.
+std::string node_url(const Request& request) {
+  const auto& arrival = request.arrival;
+  if (arrival.host.empty()) return {};
+  return (arrival.is_encrypted ? "rrs+ws://" : "rr+ws://") + arrival.host + arrival.prefix + std::string(request.path());
 }
 
 /// 101, then JSON messages.
@@ -104,24 +110,33 @@ rr::awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, st
     co_await accept_json_socket(gateway, connection, std::move(stream), request, unread);
     co_return;
   }
-  auto device = find_device(gateway, request);
-  if (!device) {
+  const auto destination = find_destination(gateway, request);
+  if (!destination) {
     gateway.reject(Rejection::no_such_device);
-    const auto response =
-        problem_response(device.error().code == rr::ErrorCode::node_not_found ? 404 : 400, device.error().message);
+    const auto& error = destination.error();
+    const auto response = problem_response(error.code == rr::ErrorCode::node_not_found ? 404 : 400, error.message);
     co_await refuse(response);
     co_return;
   }
   std::string way(request.header(way_header));
-  const bool is_circle = (*device)->is_on_way(way);
-  if (is_circle) (*device)->note_circle();
+  const bool is_circle = destination->device && destination->device->is_on_way(way);
+  if (is_circle) destination->device->note_circle();
   if (is_circle || way.size() > longest_way) {
     const auto response = problem_response(508, "the way leads back to the gateway that it began at");
     co_await refuse(response);
     co_return;
   }
-  auto boarding = co_await board(gateway, **device, std::move(way));
   const bool takes_close = takes_close_frames(request);
+  if (destination->node) {
+    const auto accepted = format_upgrade_response(request);
+    if (co_await write_text(tcp, accepted)) co_return;
+    tcp.put_back(unread);
+    auto socket = std::make_unique<rr::WebSocketStream>(std::move(stream), rr::WebSocketRole::server, takes_close);
+    auto base_url = node_url(request);
+    co_await serve_shared_client(gateway, connection, *destination, std::move(socket), std::move(base_url));
+    co_return;
+  }
+  auto boarding = co_await board(gateway, *destination->device, std::move(way));
   if (!boarding && !takes_close) {
     auto response = problem_response(503, boarding.error().message);
     response.set("Retry-After", "2");

@@ -5,6 +5,7 @@
 #include "core/wire/codec.hpp"
 #include "core/wire/frame_scanner.hpp"
 #include "server/gateway/client_relay.hpp"
+#include "server/gateway/shared/serve_shared_client.hpp"
 #include "server/log/log.hpp"
 #include "server/transport/watchdog.hpp"
 
@@ -33,6 +34,16 @@ rr::awaitable<rr::Result<rr::Bytes>> read_first_message(rr::ByteStream& stream, 
     seen.resize(seen.size() - (bytes.size() - *consumed));
     co_return seen;
   }
+}
+
+/// Whether it is the look of a device of ours that comes in here: then the device's URL leads back to us.
+bool note_circle(Gateway& gateway, const rr::NodeId& sender) {
+  for (const auto& device : gateway.devices().all()) {
+    if (!device->is_own_look(sender)) continue;
+    device->note_circle();
+    return true;
+  }
+  return false;
 }
 
 std::string describe_wish(const rr::MessageHeader& header) {
@@ -82,13 +93,17 @@ rr::awaitable<void> serve_native_client(Gateway& gateway, Connection& connection
     co_return;
   }
 
-  auto* device = gateway.devices().route(request.header.receiver_node_id, request.header.receiver_node_name);
+  const auto destination =
+      find_destination(gateway, request.header.receiver_node_id, request.header.receiver_node_name);
   rr::Error refusal;
-  if (device && device->is_own_look(request.header.sender_node_id)) {
-    device->note_circle();
+  if (note_circle(gateway, request.header.sender_node_id)) {
     refusal = rr::make_error(rr::ErrorCode::connection_error, "the way leads back to the gateway that it began at");
-  } else if (device) {
-    auto boarding = co_await board(gateway, *device);
+  } else if (destination && destination->node) {
+    auto base_url = "rr+tcp://" + rr::format_host_port(connection.local.address().to_string(), connection.local.port());
+    co_await serve_shared_client(gateway, connection, *destination, std::move(stream), base_url + "/");
+    co_return;
+  } else if (destination) {
+    auto boarding = co_await board(gateway, *destination->device);
     if (boarding) {
       co_await relay_client(gateway, connection, client, **boarding);
       co_return;

@@ -198,6 +198,17 @@ class AsyncObject {
     connection_->on_event(path_, event, std::move(handler));
   }
 
+  /// Logs in; one login a connection.
+  template <class Token = boost::asio::use_awaitable_t<>>
+  auto authenticate(std::string_view username, Value credentials, Token&& token = {}) const {
+    return boost::asio::async_initiate<Token, void(std::exception_ptr, Value)>(
+        [connection = connection_, username = std::string(username),
+         credentials = std::move(credentials)](auto handler) {
+          const detail::CompleteOnce<Value, decltype(handler)> complete(std::move(handler), connection->executor());
+          connection->authenticate(username, credentials, complete);
+        },
+        token);
+  }
   template <class Token = boost::asio::use_awaitable_t<>>
   auto lock(LockKind kind = LockKind::user, Token&& token = {}) const {
     return request<&ClientConnection::lock>(token, kind);

@@ -337,6 +337,8 @@ void ClientConnection::handle(PathReleased&& released) {
   std::erase_if(event_handlers_, is_released);
   std::erase_if(wire_handlers_, is_released);
   std::erase_if(callback_handlers_, is_released);
+  const auto handler = path_released_;
+  if (handler) handler(released.path);
 }
 
 void ClientConnection::handle(SessionClosed&& closed) {
@@ -345,6 +347,7 @@ void ClientConnection::handle(SessionClosed&& closed) {
   wire_closed_handlers_.clear();
   callback_handlers_.clear();
   pipe_handlers_.clear();
+  path_released_ = nullptr;
   if (const Opened opened = std::exchange(opened_, nullptr)) return opened(std::move(closed.reason));
   for (const auto& handler : std::exchange(on_closed_, {}))
     if (handler) handler(closed.reason);

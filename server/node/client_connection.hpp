@@ -130,6 +130,8 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   void forget_callback(std::string_view path, std::string_view callback);
   /// One handler an event; a second replaces the first.
   void on_event(std::string_view path, std::string_view event, EventHandler handler);
+  /// `handler` hears that the service has replaced the objects at and below a path; its other handlers there are gone.
+  void on_path_released(std::function<void(const std::string& path)> handler) { path_released_ = std::move(handler); }
   /// Called once, when the session has ended for whatever reason; not after a failed open(). Each handler that is
   /// given.
   void on_closed(std::function<void(const Error& reason)> handler) { on_closed_.push_back(std::move(handler)); }
@@ -167,6 +169,7 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   std::map<MemberKey, std::shared_ptr<WireHandler>> wire_handlers_;
   std::map<MemberKey, std::function<void()>> wire_closed_handlers_;
   std::map<MemberKey, std::shared_ptr<LateCallbackHandler>> callback_handlers_;
+  std::function<void(const std::string& path)> path_released_;
   std::map<PipeKey, std::shared_ptr<PipeHandlers>> pipe_handlers_;
   std::vector<std::function<void(const Error&)>> on_closed_;
 };

@@ -1,6 +1,8 @@
 #include "server/transport/socket_stream.hpp"
 
 #include <boost/asio/as_tuple.hpp>
+#include <boost/asio/local/connect_pair.hpp>
+#include <boost/asio/local/stream_protocol.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/container/static_vector.hpp>
 
@@ -112,6 +114,20 @@ awaitable<void> SocketStream::end(const EndReason&) {
 void SocketStream::close() {
   error_code ignored;
   socket_.close(ignored);
+}
+
+Result<std::pair<std::unique_ptr<ByteStream>, std::unique_ptr<ByteStream>>> make_stream_pair(
+    const boost::asio::any_io_executor& executor, std::chrono::milliseconds send_stall) {
+  boost::asio::local::stream_protocol::socket near(executor);
+  boost::asio::local::stream_protocol::socket far(executor);
+  error_code error;
+  boost::asio::local::connect_pair(near, far, error);
+  if (error) return make_error(ErrorCode::system_resource_error, "a pair of sockets: " + error.message());
+  near.non_blocking(true, error);
+  far.non_blocking(true, error);
+  auto first = std::make_unique<SocketStream>(std::move(near), "this process", send_stall);
+  auto second = std::make_unique<SocketStream>(std::move(far), "this process", send_stall);
+  return std::pair<std::unique_ptr<ByteStream>, std::unique_ptr<ByteStream>>(std::move(first), std::move(second));
 }
 
 }  // namespace rr

@@ -4,8 +4,11 @@
 
 #include <boost/asio/generic/stream_protocol.hpp>
 #include <chrono>
+#include <memory>
 #include <string>
+#include <utility>
 
+#include "core/support/error.hpp"
 #include "server/transport/byte_stream.hpp"
 #include "server/transport/watchdog.hpp"
 
@@ -39,5 +42,9 @@ class SocketStream final : public ByteStream {
   unsigned cancel_count_ = 0;  ///< a write that was between two waits notices cancel() by it
   std::string peer_;
 };
+
+/// Two ends of one connection inside this process. Errors   system_resource_error.
+Result<std::pair<std::unique_ptr<ByteStream>, std::unique_ptr<ByteStream>>> make_stream_pair(
+    const boost::asio::any_io_executor& executor, std::chrono::milliseconds send_stall);
 
 }  // namespace rr

@@ -25,7 +25,7 @@ def run_client(direction, port, scenario, chromium=None):
 
 def client_url(direction, port):
     if direction.speaks_javascript:
-        path = "devices/interop" if direction.route == "gateway-ws" else ""
+        path = "devices/interop" if direction.route.startswith("gateway") else ""
         return f"ws://127.0.0.1:{port}/{path}?service=interop"
     return {
         "direct": f"rr+tcp://127.0.0.1:{port}/?service=interop",
@@ -33,6 +33,9 @@ def client_url(direction, port):
         "local": LOCAL_URL,
         # A native client names the device that it wants; the gateway is only the way to it.
         "gateway-tcp": f"rr+tcp://127.0.0.1:{port}/?nodename=interop.service&service=interop",
+        # What is shared is a node of the gateway's, with the name that the gateway has for the device.
+        "gateway-shared-tcp": f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop",
+        "gateway-shared-ws": f"rr+ws://127.0.0.1:{port}/devices/interop?service=interop",
         "gateway-ws": f"rr+ws://127.0.0.1:{port}/devices/interop?service=interop",
         "gateway-ws-local": f"rr+ws://127.0.0.1:{port}/devices/interop?service=interop",
     }[direction.route]

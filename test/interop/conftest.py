@@ -127,7 +127,8 @@ def link(request, chromium, tmp_path_factory):
         port = ready["port"]
         if direction.route.startswith("gateway"):
             device_url = LOCAL_URL if direction.route == "gateway-ws-local" else ready["url"]
-            gateway, port = start_gateway(folder, device_url, chromium.origin)
+            mode = {"mode": "shared"} if direction.is_shared else {}
+            gateway, port = start_gateway(folder, device_url, chromium.origin, device=mode)
         yield direction, level, port
         if gateway:
             code, description = gateway.stop(), gateway.description()

@@ -18,7 +18,8 @@ LEVELS = {
 class Direction:
     name: str
     client: str  # reference, ours, node, chromium
-    route: str  # direct, direct-ws, local, gateway-tcp, gateway-ws, gateway-ws-local (which reaches the device by rr+local)
+    route: str  # direct, direct-ws, local, gateway-tcp, gateway-ws, gateway-ws-local (which reaches the device by rr+local),
+    # gateway-shared-tcp, gateway-shared-ws (all clients in one session with the device)
     service: str  # reference, ours
     levels: tuple = tuple(LEVELS)
 
@@ -26,7 +27,12 @@ class Direction:
     def schemes(self):
         """Those of the client and, through the gateway, of the device."""
         return {"direct": ["rr+tcp"], "direct-ws": ["rr+ws"], "local": ["rr+local"], "gateway-tcp": ["rr+tcp", "rr+tcp"],
-                "gateway-ws": ["rr+ws", "rr+tcp"], "gateway-ws-local": ["rr+ws", "rr+local"]}[self.route]
+                "gateway-ws": ["rr+ws", "rr+tcp"], "gateway-ws-local": ["rr+ws", "rr+local"],
+                "gateway-shared-tcp": ["rr+tcp", "rr+tcp"], "gateway-shared-ws": ["rr+ws", "rr+tcp"]}[self.route]
+
+    @property
+    def is_shared(self):
+        return self.route.startswith("gateway-shared")
 
     @property
     def speaks_javascript(self):
@@ -64,6 +70,12 @@ DIRECTIONS = [
     Direction("node-gateway-ws-ours", "node", "gateway-ws", "ours"),
     Direction("chromium-gateway-ws-reference", "chromium", "gateway-ws", "reference"),
     Direction("chromium-gateway-ws-ours", "chromium", "gateway-ws", "ours"),
+    Direction("reference-gateway-shared-tcp-reference", "reference", "gateway-shared-tcp", "reference", ("v4",)),
+    Direction("reference-gateway-shared-ws-ours", "reference", "gateway-shared-ws", "ours", ("v4+table",)),
+    Direction("ours-gateway-shared-tcp-reference", "ours", "gateway-shared-tcp", "reference", ("v2",)),
+    Direction("ours-gateway-shared-tcp-ours", "ours", "gateway-shared-tcp", "ours", ("v4",)),
+    Direction("node-gateway-shared-ws-reference", "node", "gateway-shared-ws", "reference", ("v4",)),
+    Direction("node-gateway-shared-ws-ours", "node", "gateway-shared-ws", "ours", ("v4+table",)),
 ]
 
 

@@ -20,6 +20,7 @@ nlohmann::ordered_json describe(const Device& device, const Arrival& arrival) {
   out["name"] = device.config().name;
   out["url"] = rr::format_url(device.config().url);
   out["websocket_url"] = websocket_url(arrival, device.config().name);
+  out["mode"] = device.is_shared() ? "shared" : "relay";
   out["found"] = device.config().is_found;
   out["node_id"] = nullptr;
   out["node_name"] = nullptr;
@@ -53,6 +54,26 @@ Handler devices_endpoint(Gateway& gateway) {
 Response describe_device(const Device& device, const Request& request) {
   return json_response(
       200, describe(device, request.arrival).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+}
+
+Response list_subscriptions(Gateway& gateway, const Device& device) {
+  nlohmann::ordered_json out;
+  auto& list = out["subscriptions"] = nlohmann::ordered_json::array();
+  gateway.shared().visit_ledgers([&](const SharedDevice& shared, const SharedClient& client, const std::string& path,
+                                     const rr::MemberDefinition& member, const rr::Ledger& ledger) {
+    if (shared.device().get() != &device) return;
+    list.push_back({{"client", client.peer()},
+                    {"service", client.service() ? client.service()->name() : std::string()},
+                    {"path", path},
+                    {"member", member.name},
+                    {"kind", std::string(member_kind_name(member.kind))},
+                    {"delivered", ledger.delivered},
+                    {"conflated", ledger.conflated},
+                    {"dropped", ledger.dropped},
+                    {"age_p50_ms", static_cast<double>(ledger.ages.quantile(0.5).count()) / 1000},
+                    {"age_p99_ms", static_cast<double>(ledger.ages.quantile(0.99).count()) / 1000}});
+  });
+  return json_response(200, out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
 }
 
 Handler no_such_api_endpoint() {

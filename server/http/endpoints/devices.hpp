@@ -14,6 +14,8 @@ class Gateway;
 /// last_error is null while it is online.
 Handler devices_endpoint(Gateway& gateway);
 /// One of them.
+/// What every client of a shared device has subscribed to, and what came of it.
+Response list_subscriptions(Gateway& gateway, const Device& device);
 Response describe_device(const Device& device, const Request& request);
 /// Everything else below /api/: 404.
 Handler no_such_api_endpoint();

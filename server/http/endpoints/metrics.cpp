@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <map>
 
 #include "server/gateway/gateway.hpp"
 
@@ -74,6 +75,34 @@ void write_devices(Exposition& out, const Devices& devices) {
   write_flows(out, devices, &Flow::waiting);
 }
 
+/// Of all clients of a device and kind of member together: labels must not grow with clients.
+void write_ledgers(Exposition& out, const SharedDevices& shared) {
+  std::map<std::string, rr::Ledger> ledgers;
+  shared.visit_ledgers([&](const SharedDevice& device, const SharedClient&, const std::string&,
+                           const rr::MemberDefinition& member, const rr::Ledger& ledger) {
+    const auto key = "device=\"" + label(device.device()->config().name) + "\",kind=\"" +
+                     std::string(member_kind_name(member.kind)) + "\"";
+    ledgers[key].add(ledger);
+  });
+  const auto each = [&](std::string_view name, std::string_view help, std::uint64_t rr::Ledger::*count) {
+    out.family(name, "gauge", help);
+    for (const auto& [key, ledger] : ledgers) out.sample(ledger.*count, key);
+  };
+  each("rrgate_subscription_delivered", "Values that the subscriptions of now were handed.", &rr::Ledger::delivered);
+  each("rrgate_subscription_conflated", "Values that were replaced by newer ones.", &rr::Ledger::conflated);
+  each("rrgate_subscription_dropped", "Values that were lost.", &rr::Ledger::dropped);
+  out.family("rrgate_subscription_age_us", "gauge", "Age of values when they left the gateway, in microseconds.");
+  for (const auto& [key, ledger] : ledgers)
+    for (const auto& [name, share] : {std::pair("0.5", 0.5), std::pair("0.99", 0.99)})
+      out.sample(static_cast<std::uint64_t>(ledger.ages.quantile(share).count()),
+                 key + ",quantile=\"" + name + "\"");
+  out.family("rrgate_shared_session_up", "gauge", "Whether the session with a service of a shared device is open.");
+  for (const auto& [key, device] : shared.all())
+    for (const auto& [name, service] : device->services())
+      out.sample(service->upstream()->is_open() ? 1 : 0,
+                 "device=\"" + label(device->device()->config().name) + "\",service=\"" + label(name) + "\"");
+}
+
 std::uint64_t resident_bytes() {
   std::ifstream in("/proc/self/statm");
   std::uint64_t whole = 0;
@@ -107,6 +136,7 @@ Handler metrics_endpoint(Gateway& gateway) {
     for (std::size_t i = 0; i < rejection_names.size(); ++i)
       out.sample(metrics.rejected[i], "reason=\"" + std::string(rejection_names[i]) + "\"");
     write_devices(out, gateway.devices().all());
+    write_ledgers(out, gateway.shared());
     out.family("rrgate_config_reloads_total", "counter", "Times that the configuration was read anew.");
     out.sample(metrics.reloads, "result=\"ok\"");
     out.sample(metrics.failed_reloads, "result=\"failed\"");

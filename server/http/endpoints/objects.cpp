@@ -99,6 +99,12 @@ rr::awaitable<void> serve(Gateway& gateway, ResponseWriter& writer, std::vector<
     co_await writer.send(response);
     co_return;
   }
+  if (segments.size() == 2 && segments[1] == "subscriptions") {
+    const auto response =
+        request.is_read() ? list_subscriptions(gateway, *device) : request.method_response("GET, HEAD");
+    co_await writer.send(response);
+    co_return;
+  }
   if (segments.size() == 2 && (is_device_document(segments[1]) || is_definition(segments[1]))) {
     if (request.is_read()) {
       co_await serve_document(gateway, *device, request, segments[1]);

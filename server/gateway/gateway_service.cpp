@@ -1,0 +1,151 @@
+#include "server/gateway/gateway_service.hpp"
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+
+#include "server/gateway/gateway.hpp"
+#include "server/gateway/robdef_text.hpp"
+#include "server/log/log.hpp"
+
+namespace rrgate {
+
+namespace asio = boost::asio;
+
+namespace {
+
+constexpr std::chrono::seconds look_period{1};
+
+rr::NodeOptions node_options() {
+  rr::NodeOptions options;
+  options.report = [](const std::string& problem) { log(LogLevel::error, problem, {}); };
+  return options;
+}
+
+DeviceConfig device_config(const rr::Node& node) {
+  DeviceConfig config;
+  config.name = GatewayService::name;
+  config.url.scheme = "rr+intra";
+  config.url.node_id = node.identity().id;
+  config.mode = DeviceMode::shared;
+  return config;
+}
+
+double seconds(std::chrono::microseconds time) {
+  return std::chrono::duration<double>(time).count();
+}
+
+rr::awaitable<void> watch(std::shared_ptr<Device> device) {
+  co_await device->watch();
+}
+
+}  // namespace
+
+GatewayService::GatewayService(asio::io_context& io, Gateway& gateway)
+    : gateway_(gateway),
+      node_(io, "", node_options()),
+      service_(rr::Service::from_text({std::string(robdef_gateway)}, std::string(name), "Gateway")),
+      device_(std::make_shared<Device>(io.get_executor(), device_config(node_), gateway.config())) {
+  add_members();
+}
+
+void GatewayService::add_members() {
+  service_->property("version").get([] { return std::string(RRGATE_VERSION); });
+  service_->property("uptime").get([this] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun_).count();
+  });
+  service_->property("devices").get([this] { return list_devices(); });
+  service_->property("subscriptions").get([this] { return list_subscriptions(); });
+  service_->function("find_device", [this](const std::string& wanted) {
+    const auto* device = gateway_.devices().find(wanted);
+    if (!device) throw rr::Exception(rr::make_error(rr::ErrorCode::key_not_found, "no device " + rr::quoted(wanted)));
+    return describe(*device);
+  });
+}
+
+void GatewayService::start() {
+  node_.add(service_);
+  node_.listen("rr+intra:///");
+  node_.every(look_period, [this] { look_at_devices(); });
+  asio::co_spawn(device_->executor(), watch(device_), asio::detached);
+}
+
+void GatewayService::stop() {
+  device_->stop();
+  node_.stop();
+}
+
+void GatewayService::look_at_devices() {
+  auto before = std::exchange(known_, {});
+  for (const auto& device : gateway_.devices().all()) {
+    const auto& device_name = device->config().name;
+    known_[device_name] = device->state();
+    const auto known = before.extract(device_name);
+    if (!known || known.mapped() != device->state()) service_->fire("device_changed", describe(*device));
+  }
+  for (const auto& [device_name, state] : before) service_->fire("device_removed", device_name);
+  service_->set_wire("statistics", list_statistics());
+}
+
+rr::Value GatewayService::describe(const Device& device) const {
+  std::string node_name;
+  std::vector<std::uint8_t> node_id;
+  rr::List services;
+  if (const auto& identity = device.identity()) {
+    node_name = identity->node_name;
+    node_id.assign(identity->node_id.bytes.begin(), identity->node_id.bytes.end());
+    for (const auto& service : identity->services) services.items.emplace_back(service.name);
+  }
+  return rr::Structure{"org.rrgate.gateway.Device",
+                       {{"name", device.config().name},
+                        {"state", std::string(to_string(device.state()))},
+                        {"mode", device.is_shared() ? "shared" : "relay"},
+                        {"last_error", device.last_error()},
+                        {"node_name", node_name},
+                        {"node_id", rr::Value(std::move(node_id))},
+                        {"services", std::move(services)},
+                        {"clients", static_cast<std::uint32_t>(device.clients())},
+                        {"found", device.config().is_found}}};
+}
+
+rr::Value GatewayService::list_devices() const {
+  rr::List out;
+  for (const auto& device : gateway_.devices().all()) out.items.push_back(describe(*device));
+  return out;
+}
+
+rr::Value GatewayService::list_statistics() const {
+  rr::List out;
+  for (const auto& device : gateway_.devices().all()) {
+    const auto& traffic = device->traffic();
+    out.items.push_back(rr::Structure{"org.rrgate.gateway.DeviceStatistics",
+                                      {{"device", device->config().name},
+                                       {"sessions", traffic.sessions},
+                                       {"messages_to_device", traffic.to_device.messages},
+                                       {"messages_to_clients", traffic.to_clients.messages},
+                                       {"bytes_to_device", traffic.to_device.bytes},
+                                       {"bytes_to_clients", traffic.to_clients.bytes}}});
+  }
+  return out;
+}
+
+rr::Value GatewayService::list_subscriptions() const {
+  rr::List out;
+  gateway_.shared().visit_ledgers([&](const SharedDevice& device, const SharedClient& client, const std::string& path,
+                                      const rr::MemberDefinition& member, const rr::Ledger& ledger) {
+    out.items.push_back(rr::Structure{"org.rrgate.gateway.Subscription",
+                                      {{"device", device.device()->config().name},
+                                       {"service_name", client.service() ? client.service()->name() : std::string()},
+                                       {"client", client.peer()},
+                                       {"path", path},
+                                       {"member", member.name},
+                                       {"kind", member.kind == rr::MemberKind::wire ? "wire" : "pipe"},
+                                       {"delivered", ledger.delivered},
+                                       {"conflated", ledger.conflated},
+                                       {"dropped", ledger.dropped},
+                                       {"age_p50", seconds(ledger.ages.quantile(0.5))},
+                                       {"age_p99", seconds(ledger.ages.quantile(0.99))}}});
+  });
+  return out;
+}
+
+}  // namespace rrgate

@@ -1,0 +1,48 @@
+// The gateway's own service: robdef/org.rrgate.gateway.robdef. Layer: server/gateway.
+#pragma once
+
+#include <boost/asio/io_context.hpp>
+#include <chrono>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "server/gateway/device.hpp"
+#include "server/node/node.hpp"
+#include "server/node/service.hpp"
+
+namespace rrgate {
+
+class Gateway;
+
+/// Runs on a node inside the process, which the gateway shares as it shares a device: its clients are clients of the
+/// gateway, with all that holds for those.
+class GatewayService {
+ public:
+  static constexpr std::string_view name = "gateway";
+
+  /// Both outlive it.
+  GatewayService(boost::asio::io_context& io, Gateway& gateway);
+
+  /// What stands for it among the shared devices.
+  const std::shared_ptr<Device>& device() const { return device_; }
+  void start();
+  void stop();
+
+ private:
+  void add_members();
+  void look_at_devices();
+  rr::Value describe(const Device& device) const;
+  rr::Value list_devices() const;
+  rr::Value list_statistics() const;
+  rr::Value list_subscriptions() const;
+
+  Gateway& gateway_;
+  rr::Node node_;
+  std::shared_ptr<rr::Service> service_;
+  std::shared_ptr<Device> device_;
+  std::map<std::string, DeviceState> known_;
+  std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace rrgate

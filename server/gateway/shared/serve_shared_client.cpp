@@ -1,0 +1,73 @@
+#include "server/gateway/shared/serve_shared_client.hpp"
+
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/use_awaitable.hpp>
+
+#include "server/log/log.hpp"
+
+namespace rrgate {
+
+namespace asio = boost::asio;
+
+Destination destination_of(Gateway& gateway, Device& device) {
+  auto* shared = gateway.shared().find(device);
+  return {&device, shared ? &shared->node() : nullptr};
+}
+
+std::optional<Destination> find_destination(Gateway& gateway, const rr::NodeId& node_id, std::string_view node_name) {
+  auto& own = gateway.shared().node();
+  if (auto* shared = gateway.shared().find(node_id, node_name))
+    return Destination{shared->device().get(), &shared->node()};
+  const bool asks_for_none = node_id.is_any() && node_name.empty();
+  const bool asks_for_us = (node_id.is_any() || node_id == own.identity().id) &&
+                           (node_name.empty() || node_name == own.identity().name);
+  if (asks_for_us && !asks_for_none) return Destination{nullptr, &own};
+  auto* device = gateway.devices().route(node_id, node_name);
+  if (device && !device->is_shared()) return Destination{device, nullptr};
+  if (asks_for_none) return Destination{nullptr, &own};
+  return std::nullopt;
+}
+
+rr::awaitable<void> serve_shared_client(Gateway& gateway, Connection& connection, Destination destination,
+                                        std::unique_ptr<rr::ByteStream> client, std::string base_url) {
+  std::optional<Device::Seat> seat;
+  if (destination.device) {
+    if (auto taken = destination.device->take_seat()) {
+      seat.emplace(std::move(*taken));
+    } else {
+      gateway.reject(Rejection::device_full);
+      const rr::EndReason reason{1013, "device " + rr::quoted(destination.device->config().name) +
+                                           " has all the clients it may have"};
+      co_await client->end(reason);
+      co_return;
+    }
+  }
+  const auto name = destination.device ? destination.device->config().name : std::string("the gateway");
+  log(LogLevel::info, "client connected", {{"device", name}, {"peer", connection.client}, {"mode", "shared"}});
+  SharedArrival arrival;
+  arrival.peer = connection.client;
+  arrival.base_url = std::move(base_url);
+  arrival.is_encrypted = connection.peer.is_encrypted;
+  asio::steady_timer over(client->executor(), asio::steady_timer::time_point::max());
+  bool has_ended = false;
+  const auto ended = [&] {
+    has_ended = true;
+    over.cancel();
+  };
+  const auto session = destination.node->add(std::move(client), std::move(arrival), ended);
+  connection.device = destination.device;
+  connection.stop = [session](const rr::EndReason& reason) {
+    session->close_service();
+    session->close(rr::make_error(rr::ErrorCode::connection_error, reason.text));
+  };
+  while (!has_ended) co_await over.async_wait(asio::as_tuple(asio::use_awaitable));
+  connection.device = nullptr;
+  connection.stop = [](const rr::EndReason&) {};
+  log(LogLevel::info, "client disconnected",
+      {{"device", name},
+       {"peer", connection.client},
+       {"reason", session->end_reason().empty() ? session->session().connection().close_reason().message
+                                                : session->end_reason()}});
+}
+
+}  // namespace rrgate

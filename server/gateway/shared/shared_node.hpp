@@ -1,0 +1,54 @@
+// A node that is the gateway: its own, or the one that stands for a shared device. Layer: server/gateway.
+#pragma once
+
+#include <boost/asio/steady_timer.hpp>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "server/gateway/shared/shared_client.hpp"
+
+namespace rrgate {
+
+/// What a connection brings with it.
+struct SharedArrival {
+  std::string peer;      ///< for logs
+  std::string base_url;  ///< of the node, as this client reaches it: "rr+tcp://10.0.0.5:52222/"
+  std::function<rr::Result<>(const rr::MemberAccess&)> admit;  ///< none: everything is allowed
+  bool is_encrypted = false;
+};
+
+class SharedNode final : public ServiceBoard, public SharedClientOwner {
+ public:
+  /// `config`  outlives it.
+  SharedNode(rr::NodeIdentity identity, const Config& config) : config_(config), directory_(std::move(identity)) {}
+  ~SharedNode() { close(); }
+  SharedNode(const SharedNode&) = delete;
+  SharedNode& operator=(const SharedNode&) = delete;
+
+  rr::ServiceDirectory& directory() { return directory_; }
+  const rr::NodeIdentity& identity() const { return directory_.identity(); }
+
+  /// A client on a stream, from now until one of the two ends; `ended` is called then.
+  std::shared_ptr<SharedClient> add(std::unique_ptr<rr::ByteStream> stream, SharedArrival arrival,
+                                    std::function<void()> ended);
+  const std::map<SharedClient*, std::shared_ptr<SharedClient>>& clients() const { return clients_; }
+  /// Tells all clients that their services end.
+  void close();
+
+  void publish(const std::shared_ptr<rr::HostedService>& hosted, SharedService& service) override;
+  void withdraw(const rr::HostedService& hosted) override;
+
+ private:
+  std::shared_ptr<SharedService> find_service(std::string_view name) const override;
+  void client_ended(SharedClient& client) override;
+
+  const Config& config_;
+  rr::ServiceDirectory directory_;
+  std::map<std::string, std::pair<const rr::HostedService*, std::weak_ptr<SharedService>>, std::less<>> services_;
+  std::map<SharedClient*, std::shared_ptr<SharedClient>> clients_;
+  std::map<SharedClient*, std::function<void()>> ended_;
+};
+
+}  // namespace rrgate

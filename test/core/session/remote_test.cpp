@@ -1,0 +1,218 @@
+// Services whose objects are another node's: what waits for them, and what clients see meanwhile.
+#include <catch2/catch.hpp>
+
+#include "test/core/session/loopback.hpp"
+#include "test/support/print.hpp"
+
+using namespace rr;
+using namespace rr::test;
+
+namespace {
+
+class Remote : public Loopback {
+ public:
+  Remote() {
+    hosted().set_remote();
+    connect();
+  }
+  HostedService& hosted() { return *directory.find("arm"); }
+  const MemberDefinition& member(std::string_view name) { return *hosted().root_type().find_member(name); }
+  void find(const std::string& path) {
+    hosted().add_object(path, std::make_shared<PlainObject>("experimental.loopback.Tool")).value();
+    service->handle_object_found(path, {}, now);
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a remote service is asked for objects, and requests wait for them") {
+  Remote pair;
+  const auto looked_up = pair.client->find_object("arm.tool", pair.now);
+  pair.pump();
+  CHECK(pair.next_service<ObjectWanted>().path == "arm.tool");
+  CHECK_FALSE(pair.client->poll_event());
+  pair.find("arm.tool");
+  CHECK(pair.completion(looked_up).value() == Value("experimental.loopback.Tool"));
+
+  SECTION("what is known is not asked for again") {
+    const auto got = pair.client->get_property("arm.tool", "name", pair.now);
+    pair.pump();
+    const auto called = pair.next_service<Called>();
+    pair.service->reply(called.id, Value("gripper"), pair.now);
+    CHECK(pair.completion(got).value() == Value("gripper"));
+  }
+  SECTION("a client that has found it before the service forgot it just goes on") {
+    CHECK(pair.hosted().forget_path("arm.tool"));
+    const auto first = pair.client->get_property("arm.tool", "name", pair.now);
+    const auto second = pair.client->set_property("arm.tool", "name", Value("hammer"), pair.now);
+    pair.pump();
+    CHECK(pair.next_service<ObjectWanted>().path == "arm.tool");
+    CHECK_FALSE(pair.service->poll_event());  // asked for once
+    pair.find("arm.tool");
+    auto called = pair.next_service<Called>();
+    CHECK(called.kind == CallKind::property_get);
+    pair.service->reply(called.id, Value("gripper"), pair.now);
+    CHECK(pair.completion(first).value() == Value("gripper"));
+    called = pair.next_service<Called>();
+    CHECK(called.arguments.front() == Value("hammer"));
+    pair.service->reply(called.id, Value(), pair.now);
+    CHECK(pair.completion(second));
+  }
+}
+
+TEST_CASE("what a remote object is refused with reaches the client as it is") {
+  Remote pair;
+  const auto looked_up = pair.client->find_object("arm.tools[a]", pair.now);
+  pair.pump();
+  pair.next_service<ObjectWanted>();
+  pair.service->handle_object_found("arm.tools[a]", Error{ErrorCode::remote_error, "jammed", "com.x.Jammed"}, pair.now);
+  const auto error = pair.completion(looked_up).error();
+  CHECK(error.qualified_name() == "com.x.Jammed");
+  CHECK(error.message == "jammed");
+}
+
+TEST_CASE("requests that wait for objects are bounded") {
+  Remote pair;
+  std::vector<RequestId> ids;
+  for (int i = 0; i < 65; ++i) ids.push_back(pair.client->find_object("arm.slots[" + std::to_string(i) + "]", pair.now));
+  CHECK(pair.completion(ids.back()).error().code == ErrorCode::out_of_system_resource);
+}
+
+TEST_CASE("paths of other services are refused at once") {
+  Remote pair;
+  const auto error = pair.answer_to([](Message& message) {
+    message.begin_entry(EntryType::property_get_req, "leg.tool", "name", 7);
+  });
+  CHECK(error.code == ErrorCode::object_not_found);
+}
+
+TEST_CASE("a wire of a remote service is connected when that one says so") {
+  Remote pair;
+  const auto connecting = pair.client->connect_wire("arm", "torque", pair.now);
+  pair.pump();
+  pair.next_service<WireConnected>();
+  const auto& torque = pair.member("torque");
+  const WireValue early{TimeSpec{1'600'000'000, 5}, Value(2.5)};
+
+  SECTION("the newest value follows the answer, with its own time") {
+    CHECK(pair.service->send_wire("arm", torque, WireValue{TimeSpec{1'600'000'000, 4}, Value(1.5)}, pair.now.steady,
+                                  pair.now));
+    CHECK(pair.service->send_wire("arm", torque, early, pair.now.steady, pair.now));
+    pair.pump();
+    CHECK_FALSE(pair.client->poll_event());
+    pair.advance(std::chrono::milliseconds(3));
+    pair.service->answer_wire("arm", torque, {}, pair.now);
+    CHECK(pair.completion(connecting));
+    const auto received = pair.next_client<WireValueReceived>();
+    CHECK(received.value == Value(2.5));
+    CHECK(received.time == early.time);
+    std::size_t count = 0;
+    pair.service->visit_ledgers([&](const std::string& path, const MemberDefinition& member, const Ledger& ledger) {
+      ++count;
+      CHECK(path == "arm");
+      CHECK(member.name == "torque");
+      CHECK(ledger.delivered == 1);
+      CHECK(ledger.conflated == 1);
+      CHECK(ledger.ages.quantile(0.5) >= std::chrono::milliseconds(3));
+      CHECK(ledger.ages.quantile(0.5) <= std::chrono::milliseconds(6));
+    });
+    CHECK(count == 1);
+  }
+  SECTION("times go forward even where the other node's clock does not") {
+    pair.service->answer_wire("arm", torque, {}, pair.now);
+    CHECK(pair.completion(connecting));
+    for (int i = 0; i < 2; ++i) {
+      CHECK(pair.service->send_wire("arm", torque, early, pair.now.steady, pair.now));
+      pair.pump();
+      CHECK(pair.next_client<WireValueReceived>().time.nanoseconds == 5 + i);
+    }
+  }
+  SECTION("it refuses") {
+    pair.service->answer_wire("arm", torque, make_error(ErrorCode::object_locked_error, "locked"), pair.now);
+    CHECK(pair.completion(connecting).error().code == ErrorCode::object_locked_error);
+    CHECK_FALSE(pair.service->has_wire("arm", "torque"));
+  }
+  SECTION("the client has enough") {
+    pair.service->answer_wire("arm", torque, {}, pair.now);
+    CHECK(pair.completion(connecting));
+    pair.client->disconnect_wire("arm", "torque", pair.now);
+    pair.pump();
+    CHECK(pair.next_service<WireDisconnected>().path == "arm");
+  }
+}
+
+TEST_CASE("locks are a remote service's own") {
+  Remote pair;
+  const auto entering = pair.client->enter_monitor("arm", std::chrono::milliseconds(-1), pair.now);
+  pair.pump();
+  const auto wanted = pair.next_service<LockWanted>();
+  CHECK(wanted.command == LockCommand::enter_monitor);
+  CHECK(wanted.path == "arm");
+  CHECK(wanted.timeout == std::chrono::milliseconds(-1));
+
+  SECTION("granted") {
+    pair.service->answer_lock(wanted.id, {}, pair.now);
+    CHECK(pair.completion(entering));
+  }
+  SECTION("refused") {
+    pair.service->answer_lock(wanted.id, make_error(ErrorCode::operation_timeout, "no"), pair.now);
+    CHECK(pair.completion(entering).error().code == ErrorCode::operation_timeout);
+  }
+  SECTION("a client that waits long is told to go on waiting") {
+    for (int i = 0; i < 3; ++i) {
+      CHECK(pair.service->poll_timeout() <= pair.now.steady + std::chrono::seconds(5));
+      pair.advance(std::chrono::seconds(5));
+      pair.service->handle_timeout(pair.now);
+      pair.client->handle_timeout(pair.now);
+      pair.pump();
+      CHECK_FALSE(pair.client->poll_event());
+      CHECK_FALSE(pair.service->poll_event());
+    }
+    pair.service->answer_lock(wanted.id, {}, pair.now);
+    CHECK(pair.completion(entering));
+  }
+}
+
+TEST_CASE("whoever leaves a remote service is told so when everything is given up there") {
+  Remote pair;
+  pair.client->disconnect(pair.now);
+  pair.pump();
+  pair.next_service<LeaveWanted>();
+  CHECK(pair.client->state() == ClientState::closing);
+  pair.service->answer_leave(pair.now);
+  pair.next_service<ClientGone>();
+  pair.pump();
+  pair.next_client<SessionClosed>();
+  CHECK(pair.client->state() == ClientState::closed);
+}
+
+TEST_CASE("what a client may do is asked before it is done") {
+  Loopback pair;
+  std::vector<std::pair<EntryType, std::string>> asked;
+  ServiceSessionOptions options;
+  options.admit = [&](const MemberAccess& access) -> Result<> {
+    asked.emplace_back(access.type, access.member ? access.member->name : "-");
+    if (!access.member || access.member->name != "speed") return make_error(ErrorCode::permission_denied, "not you");
+    return {};
+  };
+  pair.service = std::make_unique<ServiceSession>(pair.directory, options, pair.now);
+  pair.connect();
+  const auto denied = [&](RequestId id) { return pair.completion(id).error().code == ErrorCode::permission_denied; };
+  const auto speed = pair.client->get_property("arm", "speed", pair.now);
+  pair.pump();
+  pair.service->reply(pair.next_service<Called>().id, Value(1.5), pair.now);
+  CHECK(pair.completion(speed).value() == Value(1.5));
+  CHECK(denied(pair.client->set_property("arm", "pose", Value(Structure{"experimental.loopback.Pose", {}}), pair.now)) ==
+        false);  // does not even fit
+  CHECK(denied(pair.client->get_property("arm", "serial", pair.now)));
+  CHECK(denied(pair.client->call_function("arm", "stop", {}, pair.now)));
+  CHECK(denied(pair.client->connect_wire("arm", "torque", pair.now)));
+  CHECK(denied(pair.client->connect_pipe("arm", "samples", any_pipe_index, pair.now)));
+  CHECK(denied(pair.client->enter_monitor("arm", std::chrono::milliseconds(0), pair.now)));
+  CHECK_FALSE(pair.service->poll_event());
+  CHECK(pair.service->send_event("arm", *pair.directory.find("arm")->root_type().find_member("bumped"),
+                                 std::vector<Value>{Value(std::int32_t{1}), Value("left")}, pair.now));
+  pair.pump();
+  CHECK_FALSE(pair.client->poll_event());
+  CHECK(asked.back() == std::pair(EntryType::event_req, std::string("bumped")));
+}

@@ -1,0 +1,216 @@
+"""Shared devices: many clients, one session with the device. The clients here are those of the real package; what single
+members do is test_interop.py's, whose scenarios all run through a shared device as well."""
+import json
+import pathlib
+import sys
+import threading
+
+import pytest
+import RobotRaconteur as RR
+
+from directions import DIRECTIONS, service_command
+from processes import Background, read_json, start_gateway
+from scenarios import POSE
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent / "peers"))
+import quiet_node  # noqa: E402
+from values import Values  # noqa: E402
+
+OURS = next(each for each in DIRECTIONS if each.name == "reference-to-ours")
+SERVICES = {"interop", "guarded", "open", "proven", "RobotRaconteurServiceIndex"}  # of the test service's node
+PATIENCE = 20.0  # seconds for what has to come by itself
+GATEWAY_ID = "5c0ffee0-1111-4222-8333-944455556666"
+
+
+@pytest.fixture(scope="module")
+def node():
+    argv = [f"--robotraconteur-{name}={value}" for name, value in quiet_node.QUIET.items()]
+    setup = RR.ClientNodeSetup(argv=["test", *argv])
+    yield RR.RobotRaconteurNode.s
+    setup.close()
+
+
+def start_service(folder, *options):
+    service = Background([*service_command(OURS, "v4", "http://localhost"), *options], folder / "service.log")
+    return service, json.loads(service.next_line())["url"]
+
+
+@pytest.fixture
+def site(tmp_path):
+    """(gateway process, its port, URL of the device)"""
+    service, url = start_service(tmp_path)
+    gateway, port = start_gateway(tmp_path, url, device={"mode": "shared"}, node={"name": "lab.gateway", "id": GATEWAY_ID})
+    yield gateway, port, url
+    assert gateway.stop() == 0, gateway.description()
+    service.stop()
+
+
+def port_of(url):
+    return int(url.split(":")[2].split("/")[0])
+
+
+def connections_to(port):
+    """Established connections of this machine to a port, as the kernel lists them."""
+    lines = pathlib.Path("/proc/net/tcp").read_text().splitlines()[1:]
+    return sum(1 for line in lines if line.split()[2].endswith(f":{port:04X}") and line.split()[3] == "01")
+
+
+class News:
+    """What came by itself, to be waited for."""
+
+    def __init__(self):
+        self._changed = threading.Condition()
+        self._all = []
+
+    def add(self, item):
+        with self._changed:
+            self._all.append(item)
+            self._changed.notify_all()
+
+    def wait_for(self, is_it):
+        with self._changed:
+            assert self._changed.wait_for(lambda: any(is_it(item) for item in self._all), PATIENCE), self._all[-5:]
+
+
+def wire_news(connection):
+    news = News()
+    connection.WireValueChanged += lambda wire, value, time: news.add(list(value) if hasattr(value, "__len__") else value)
+    return news
+
+
+def test_many_clients_are_one_to_the_device(node, site):
+    gateway, port, url = site
+    before = connections_to(port_of(url))
+    roots = [node.ConnectService(f"rr+ws://127.0.0.1:{port}/devices/interop?service=interop") for _ in range(8)]
+    wires = [root.state.Connect() for root in roots]
+    news = [wire_news(wire) for wire in wires]
+    assert connections_to(port_of(url)) == before
+    roots[0].publish_state([4.0])
+    for each in news:
+        each.wait_for(lambda value: value == [4.0])
+    late = node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop")
+    newest = late.state.Connect()
+    gateway.wait_until(lambda: newest.InValueValid and list(newest.InValue) == [4.0])
+    answer = read_json(f"http://127.0.0.1:{port}/api/v1/devices/interop/interop/version")
+    assert answer == "1"
+    assert connections_to(port_of(url)) == before
+    assert read_json(f"http://127.0.0.1:{port}/api/v1/devices")["devices"][0]["mode"] == "shared"
+    for root in (*roots, late):
+        node.DisconnectService(root)
+
+
+def test_the_index_tells_of_shared_services(node, site):
+    _, port, _ = site
+    index = node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=lab.gateway&service=RobotRaconteurServiceIndex")
+    services = {service.Name: service for service in index.GetLocalNodeServices().values()}
+    assert set(services) == {*SERVICES, "gateway"}
+    assert services["interop"].RootObjectType == "experimental.interop.Interop"
+    url = services["interop"].ConnectionURL[1]
+    assert GATEWAY_ID in url
+    root = node.ConnectService(url)
+    assert root.version == "1"
+    assert node.GetServiceAttributes(root)["rrgate.mode"].data == "shared"
+    routed = index.GetRoutedNodes()
+    assert [each.NodeName for each in routed.values()] == ["interop"]
+    behind = node.ConnectService(routed[0].ServiceIndexConnectionURL[0])
+    names = {service.Name for service in behind.GetLocalNodeServices().values()}
+    assert names == SERVICES
+    for each in (index, root, behind):
+        node.DisconnectService(each)
+
+
+def test_the_gateway_is_a_service(node, site, tmp_path):
+    gateway, port, _ = site
+    root = node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=lab.gateway&service=gateway")
+    devices = root.devices
+    assert [(each.name, each.state, each.mode) for each in devices] == [("interop", "online", "shared")]
+    assert root.find_device("interop").node_name == "interop.service"
+    with pytest.raises(RR.KeyNotFoundException):
+        root.find_device("nothing")
+    client = node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop")
+    wire_news(client.state.Connect())
+    client.publish_state([1.0])
+    statistics = News()
+    connection = root.statistics.Connect()
+    connection.WireValueChanged += lambda wire, value, time: statistics.add(value[0].device)
+    statistics.wait_for(lambda device: device == "interop")
+    (subscription,) = root.subscriptions
+    assert (subscription.path, subscription.member, subscription.kind) == ("interop", "state", "wire")
+    assert subscription.delivered >= 1 and subscription.conflated == 0
+    assert 0 < subscription.age_p99 < 5
+    changes = News()
+    root.device_changed += lambda device: changes.add(("changed", device.name, device.state))
+    root.device_removed += lambda name: changes.add(("removed", name))
+    config = json.loads((tmp_path / "gateway.json").read_text())
+    config["devices"].append({"name": "nobody", "url": "rr+tcp://127.0.0.1:9/"})
+    (tmp_path / "gateway.json").write_text(json.dumps(config))
+    changes.wait_for(lambda change: change == ("changed", "nobody", "offline"))
+    config["devices"].pop()
+    (tmp_path / "gateway.json").write_text(json.dumps(config))
+    changes.wait_for(lambda change: change == ("removed", "nobody"))
+    for each in (root, client):
+        node.DisconnectService(each)
+
+
+def test_clients_stay_when_the_device_goes(node, tmp_path):
+    service, url = start_service(tmp_path)
+    gateway, port = start_gateway(tmp_path, url, device={"mode": "shared"}, retry={"min_ms": 50, "max_ms": 200})
+    try:
+        root = node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop")
+        state = wire_news(root.state.Connect())
+        poses = News()
+        pipe = root.poses.Connect(-1)
+
+        def received(endpoint):
+            while endpoint.Available:
+                poses.add(endpoint.ReceivePacket().px)
+        pipe.PacketReceivedEvent += received
+        root.publish_state([1.0])
+        state.wait_for(lambda value: value == [1.0])
+        service.stop()
+        with pytest.raises(RR.ConnectionException, match="connection_lost"):
+            while True:
+                root.version
+        service, _ = start_service(tmp_path, f"--robotraconteur-tcp-port={port_of(url)}")
+
+        def is_back():
+            try:
+                return root.version == "1"
+            except RR.ConnectionException:
+                return False
+        gateway.wait_until(is_back)
+        root.publish_state([2.0])
+        state.wait_for(lambda value: value == [2.0])
+        root.publish_poses(Values(root).build(POSE), 2)
+        poses.wait_for(lambda px: px == 1.0)
+        node.DisconnectService(root)
+    finally:
+        gateway.stop()
+        service.stop()
+
+
+@pytest.mark.parametrize("answer", ["first", "all"])
+def test_who_answers_callbacks(node, tmp_path, answer):
+    service, url = start_service(tmp_path)
+    device = {"mode": "shared", "callbacks": [{"member": "interop.as*", "answer": answer}]}
+    gateway, port = start_gateway(tmp_path, url, device=device)
+    try:
+        own_url = f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop"
+        first, second = node.ConnectService(own_url), node.ConnectService(own_url)
+        asked = News()
+        for number, root in enumerate((first, second)):
+            def reply(question, number=number):
+                asked.add(number)
+                return float(number + 10)
+            root.ask.Function = reply
+        second.start_ask("how many?")
+        asked.wait_for(lambda number: number == 0)
+        if answer == "all":
+            asked.wait_for(lambda number: number == 1)
+        gateway.wait_until(lambda: second.answered != 0)
+        assert second.answered in ((10.0,) if answer == "first" else (10.0, 11.0))
+        node.DisconnectService(first)
+        node.DisconnectService(second)
+    finally:
+        gateway.stop()
+        service.stop()
