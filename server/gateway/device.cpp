@@ -149,12 +149,14 @@ bool Device::can_become(const DeviceConfig& config) const {
   auto same = config;
   same.max_clients = config_.max_clients;
   same.callbacks = config_.callbacks;
+  same.shares_reads = config_.shares_reads;
   return same == config_;
 }
 
 void Device::become(const DeviceConfig& config, const Config& whole) {
   config_.max_clients = config.max_clients;
   config_.callbacks = config.callbacks;
+  config_.shares_reads = config.shares_reads;
   dial_options_.timeout = whole.timeouts.connect;
   dial_options_.send_stall = whole.timeouts.send_stall;
   retry_ = whole.retry;

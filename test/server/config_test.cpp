@@ -112,8 +112,11 @@ TEST_CASE("the smallest configuration works, with the defaults") {
 TEST_CASE("every option arrives") {
   const auto parsed = parse_config(R"(/* all of them */ {
     "listen": ["[::1]:1", "localhost:2"],
-    "devices": [{"name": "a", "url": "rr+tcp://h:1/?service=s", "max_clients": 3}],
-    "discover": {"scopes": ["node_local", "ipv4_broadcast"], "max_devices": 7, "local": false, "hardware": false,
+    "devices": [{"name": "a", "url": "rr+tcp://h:1/?service=s", "max_clients": 3, "mode": "shared", "shares_reads": true,
+                 "login": {"username": "u", "password": "p"},
+                 "callbacks": [{"member": "s.ask*", "answer": "all"}, {"member": "*", "answer": "first"}]}],
+    "node": {"name": "lab.gateway", "id": "82301bf1-e1ef-4e89-8d8f-0848291587ac"},
+    "discover": {"scopes": ["node_local", "ipv4_broadcast"], "max_devices": 7, "local": false, "hardware": false, "mode": "shared",
                  "tls": {"ca": ["lab.pem"]},
                  "allow": [{"node_name": "lab.*", "node_id": "{82301bf1-e1ef-4e89-8d8f-0848291587ac}",
                             "service_type": "com.x.Arm"}]},
@@ -121,7 +124,7 @@ TEST_CASE("every option arrives") {
     "proxy_protocol": "required",
     "web_root": "web", "allowed_origins": ["https://a.example", "http://*.b.example:81"],
     "limits": {"max_message_size": 20000, "header_bytes": 2000, "body_bytes": 3000, "header_timeout_ms": 300, "outbox_bytes": 40000,
-               "clients": 5, "clients_per_address": 6, "opaque_rate": 7000},
+               "clients": 5, "clients_per_address": 6, "client_queue_bytes": 70000, "opaque_rate": 7000},
     "timeouts": {"connect_ms": 101, "drain_ms": 102, "send_stall_ms": 103, "idle_ms": 104},
     "retry": {"min_ms": 51, "max_ms": 52, "online_ms": 53},
     "log": {"level": "debug", "format": "json"} // the end
@@ -129,16 +132,24 @@ TEST_CASE("every option arrives") {
   CHECK(parsed.findings.empty());
   const auto& config = parsed.config;
   CHECK(config.listen == std::vector<rr::HostPort>{{"::1", 1}, {"localhost", 2}});
-  CHECK(config.devices.at(0).max_clients == 3);
+  const auto& device = config.devices.at(0);
+  CHECK(device.max_clients == 3);
+  CHECK(device.mode == DeviceMode::shared);
+  CHECK(device.shares_reads);
+  CHECK(device.login.username == "u");
+  CHECK(*device.login.credentials.find("password") == rr::Value("p"));
+  CHECK(device.callbacks == std::vector<CallbackRule>{{"s.ask*", CallbackPolicy::all}, {"*", CallbackPolicy::first}});
   const auto id = rr::parse_node_id("82301bf1-e1ef-4e89-8d8f-0848291587ac").value();
   CHECK(config.discover ==
-        Discover{true, {"node_local", "ipv4_broadcast"}, {{"lab.*", id, "com.x.Arm"}}, 7, false, false, {{"lab.pem"}}});
+        Discover{true, {"node_local", "ipv4_broadcast"}, {{"lab.*", id, "com.x.Arm"}}, 7, false, false, {{"lab.pem"}},
+                 DeviceMode::shared});
+  CHECK(config.node == NodeConfig{"lab.gateway", id});
   CHECK(config.base_path == "/lab");
   CHECK(config.proxy ==
         ProxyConfig{{{*parse_address_range("10.0.0.0/8"), *parse_address_range("::1")}, ForwardedBy::forwarded}, true});
   CHECK(config.web_root == "web");
   CHECK(config.allowed_origins.size() == 2);
-  CHECK(config.limits == Limits{20000, 2000, 3000, milliseconds(300), 40000, 5, 6, 7000});
+  CHECK(config.limits == Limits{20000, 2000, 3000, milliseconds(300), 40000, 5, 6, 70000, 7000});
   CHECK(config.timeouts == Timeouts{milliseconds(101), milliseconds(102), milliseconds(103), milliseconds(104)});
   CHECK(config.retry == Retry{milliseconds(51), milliseconds(52), milliseconds(53)});
   CHECK(config.log == LogConfig{"debug", "json"});
@@ -149,6 +160,19 @@ TEST_CASE("proxies before the gateway") {
   finds(with(R"("base_path": "/robots/")"), "gateway.json: /base_path: ");
   finds(with(R"("trusted_proxies": ["10.0.0.1/8"])"), "gateway.json: /trusted_proxies/0: ", "no bits set behind it");
   finds(with(R"("proxy_protocol": "required")"), "gateway.json: /proxy_protocol: ", "trusted_proxies");
+}
+
+TEST_CASE("what only shared devices have") {
+  const auto device = [](const std::string& more) {
+    return R"({"listen": ["127.0.0.1:0"], "devices": [{"name": "a", "url": "rr+tcp://h:1/", )" + more + "}]}";
+  };
+  finds(device(R"("mode": "both")"), "gateway.json: /devices/0/mode: found 'both', expected one of: relay, shared");
+  finds(device(R"("login": {"username": "u", "password": "p"})"), "gateway.json: /devices/0/mode: ", "shared");
+  finds(device(R"("mode": "shared", "login": {"username": "u"})"), "gateway.json: /devices/0/login/password: missing");
+  finds(device(R"("mode": "shared", "callbacks": [{"answer": "all"}])"),
+        "gateway.json: /devices/0/callbacks/0/member: missing");
+  finds(with(R"("node": {"name": "9"})"), "gateway.json: /node/name: found '9'");
+  finds(with(R"("node": {"id": "x"})"), "gateway.json: /node/id: found 'x', expected a UUID");
 }
 
 TEST_CASE("mistakes are named by path, with what was found and expected") {
