@@ -8,8 +8,9 @@ import threading
 import pytest
 import RobotRaconteur as RR
 
+from clients import run_program
 from directions import DIRECTIONS, service_command
-from processes import Background, read_json, start_gateway
+from processes import BUILD, Background, read_json, start_gateway
 from scenarios import POSE
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent / "peers"))
@@ -79,7 +80,7 @@ def wire_news(connection):
 
 
 def test_many_clients_are_one_to_the_device(node, site):
-    gateway, port, url = site
+    _, port, url = site
     before = connections_to(port_of(url))
     roots = [node.ConnectService(f"rr+ws://127.0.0.1:{port}/devices/interop?service=interop") for _ in range(8)]
     wires = [root.state.Connect() for root in roots]
@@ -88,14 +89,16 @@ def test_many_clients_are_one_to_the_device(node, site):
     roots[0].publish_state([4.0])
     for each in news:
         each.wait_for(lambda value: value == [4.0])
-    late = node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop")
-    newest = late.state.Connect()
-    gateway.wait_until(lambda: newest.InValueValid and list(newest.InValue) == [4.0])
+    # Who comes late gets the newest value at once: after so long the device has not sent another. (A client of the
+    # package takes messages side by side, and may miss a value that comes with the answer to its connect.)
+    steps = [{"connect": "state"}, {"in_value": "state", "until": [4.0]}]
+    late = run_program([BUILD / "test/interop/cpp/rr-test-client", f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop"], steps)
+    assert late["results"][1] == {"value": [4.0]}
     answer = read_json(f"http://127.0.0.1:{port}/api/v1/devices/interop/interop/version")
     assert answer == "1"
     assert connections_to(port_of(url)) == before
     assert read_json(f"http://127.0.0.1:{port}/api/v1/devices")["devices"][0]["mode"] == "shared"
-    for root in (*roots, late):
+    for root in roots:
         node.DisconnectService(root)
 
 
