@@ -305,45 +305,68 @@ def test_bounds(page):
     page.ask("subscribe", "changed")
 
 
-def test_a_reader_that_stops_is_told_and_closed(gateway):
-    """It asks for 30 MB and does not read. The gateway keeps a bounded part, and goes on for everybody else."""
-    with Socket(gateway) as busy:
-        raw = socket.socket()
-        raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 65536)
-        raw.settimeout(60)
-        raw.connect(("127.0.0.1", gateway))
-        raw.sendall(f"GET {BASE} HTTP/1.1\r\nHost: x\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
-                    "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n".encode())
-        stream = raw.makefile("rb")
-        while stream.readline().strip():
+class Lazy:
+    """A client that reads only when it is told to: with a socket of its own, and little room in it."""
+
+    def __init__(self, port):
+        self.socket = socket.socket()
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 65536)
+        self.socket.settimeout(60)
+        self.socket.connect(("127.0.0.1", port))
+        self.socket.sendall(f"GET {BASE} HTTP/1.1\r\nHost: x\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
+                            "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n".encode())
+        self.stream = self.socket.makefile("rb")
+        while self.stream.readline().strip():
             pass
 
-        def request(**message):
-            text = json.dumps(message).encode()
-            raw.sendall(b"\x81\xfe" + struct.pack(">H", len(text)) + b"\0\0\0\0" + text)
+    def __enter__(self):
+        return self
 
-        def frame():
-            first, length = stream.read(2)
-            if length >= 126:
-                length = struct.unpack(">H" if length == 126 else ">Q", stream.read(2 if length == 126 else 8))[0]
-            return first, stream.read(length)
+    def __exit__(self, *_):
+        self.stream.close()
+        self.socket.close()
 
+    def send(self, **message):
+        text = json.dumps({**message, "padding": "x" * 100}).encode()
+        self.socket.sendall(b"\x81\xfe" + struct.pack(">H", len(text)) + b"\0\0\0\0" + text)
+
+    def frame(self):
+        first, length = self.stream.read(2)
+        if length >= 126:
+            length = struct.unpack(">H" if length == 126 else ">Q", self.stream.read(2 if length == 126 else 8))[0]
+        return first, self.stream.read(length)
+
+
+def test_a_reader_that_stops_is_told_and_closed(gateway):
+    """It asks for 30 MB and does not read. The gateway keeps a bounded part, and goes on for everybody else."""
+    with Lazy(gateway) as lazy, Socket(gateway) as busy:
         for number in range(40):
-            request(id=number, op="call", path="ramp", args={"count": 100_000}, padding="x" * 100)
+            lazy.send(id=number, op="call", path="ramp", args={"count": 100_000})
             assert busy.ask("call", "add", args={"left": number, "right": 1}) == number + 1
-        last = None
-        answers = 0
-        while True:
-            first, payload = frame()
-            if first != 0x81:
-                break
-            last = payload
-            answers += 1
-        assert first == 0x88 and struct.unpack(">H", payload[:2]) == (1008,), payload
-        assert answers < 40
-        assert json.loads(last)["error"]["message"] == "too slow: messages were lost, so the connection ends"
-        raw.close()
+        texts = []
+        while (frame := lazy.frame())[0] == 0x81:
+            texts.append(frame[1])
+        assert frame[0] == 0x88 and struct.unpack(">H", frame[1][:2]) == (1008,), frame
+        assert len(texts) < 40
+        assert json.loads(texts[-1])["error"]["message"] == "too slow: messages were lost, so the connection ends"
         assert busy.ask("get", "version") == "1"
+
+
+def test_who_reads_a_wire_slowly_gets_the_newest(gateway):
+    """30 MB of values while nobody reads: nobody is closed, and what comes in the end is the newest."""
+    with Lazy(gateway) as lazy, Socket(gateway) as busy:
+        lazy.send(id=1, op="subscribe", path="state")
+        for number in range(60):
+            busy.ask("call", "publish_state", args={"value": [number] * 100_000})
+        busy.ask("call", "publish_state", args={"value": [-1]})
+        seen = 0
+        while True:
+            first, text = lazy.frame()
+            assert first == 0x81, text
+            seen += 1
+            if json.loads(text).get("value") == [-1]:
+                break
+        assert seen < 60
 
 
 def test_two_thousand_values_of_a_wire(gateway):
