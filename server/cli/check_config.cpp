@@ -1,6 +1,8 @@
 // rrgate check-config: whether `rrgate serve` would take a file. Layer: server/cli.
+#include "server/access/access.hpp"
 #include "server/cli/command.hpp"
 #include "server/cli/findings.hpp"
+#include "server/security/client_certificates.hpp"
 
 namespace rrgate {
 
@@ -12,10 +14,14 @@ int run_check_config(Arguments arguments) {
   const auto config = load_config(file);
   if (!report_findings(file, config)) return exit_usage;
   if (const auto& certificates = config.config.tls.certificates; !certificates.empty())
-    if (const auto tls = rr::make_web_tls(certificates); !tls) {
+    if (const auto tls = rr::make_web_tls(certificates, config.config.access.client_ca); !tls) {
       std::cerr << short_name(file) << ": /tls/certificates: " << tls.error().message << "\n";
       return exit_usage;
     }
+  if (const auto access = load_access(config.config.access); !access) {
+    std::cerr << short_name(file) << ": /access: " << access.error().message << "\n";
+    return exit_usage;
+  }
   std::cout << short_name(file) << ": good; " << config.config.devices.size() << " devices\n";
   return exit_ok;
 }

@@ -1,13 +1,14 @@
 #include "server/cli/config_file.hpp"
 
 #include <sys/resource.h>
-#include <sys/stat.h>
 
 #include <algorithm>
 
 #include "server/cli/run_gateway.hpp"
 #include "server/cli/service_manager.hpp"
+#include "server/config/access_options.hpp"
 #include "server/log/log.hpp"
+#include "server/platform/file_look.hpp"
 
 namespace rrgate {
 
@@ -38,19 +39,14 @@ void fit_descriptors(Limits& limits) {
 
 void complete_config(Config& config) {
   configure_log(config.log.level, config.log.format);
+  if (const auto problem = exposure(config.listen, config); !problem.empty())
+    log(LogLevel::warning, "insecure", {{"why", problem}});
   fit_descriptors(config.limits);
   if (config.web_root.empty()) config.web_root = find_web_root();
 }
 
 ConfigFile::ConfigFile(boost::asio::io_context& io, Gateway& gateway, std::string path)
-    : gateway_(gateway), path_(std::move(path)), used_(look()), seen_(used_), timer_(io) {}
-
-std::string ConfigFile::look() const {
-  struct stat status {};
-  if (::stat(path_.c_str(), &status) != 0) return {};
-  return std::to_string(status.st_mtim.tv_sec) + "." + std::to_string(status.st_mtim.tv_nsec) + " " +
-         std::to_string(status.st_ino) + " " + std::to_string(status.st_size);
-}
+    : gateway_(gateway), path_(std::move(path)), used_(rr::file_look(path_)), seen_(used_), timer_(io) {}
 
 void ConfigFile::watch() {
   if (!path_.empty()) wait();
@@ -60,7 +56,7 @@ void ConfigFile::wait() {
   timer_.expires_after(watch_period);
   timer_.async_wait([this](const rr::error_code& error) {
     if (error || gateway_.is_stopping()) return;
-    const auto before = std::exchange(seen_, look());
+    const auto before = std::exchange(seen_, rr::file_look(path_));
     if (seen_ != used_ && seen_ == before) reload();
     wait();
   });
@@ -73,7 +69,7 @@ void ConfigFile::stop() {
 bool ConfigFile::reload() {
   if (path_.empty() || gateway_.is_stopping()) return false;
   notify_reloading();
-  used_ = seen_ = look();
+  used_ = seen_ = rr::file_look(path_);
   auto parsed = load_config(path_);
   bool is_used = parsed.findings.empty();
   for (const auto& finding : parsed.findings)

@@ -24,8 +24,6 @@ class ConfigFile {
   bool reload();
 
  private:
-  /// What tells that a file was changed or replaced.
-  std::string look() const;
   void wait();
 
   Gateway& gateway_;

@@ -51,7 +51,7 @@ int run_gateway(Config config, const OnStarted& on_started, const std::string& c
       log(LogLevel::info, "signal", {{"number", number}});
       if (number == SIGHUP) {
         file.reload();
-        gateway.reload_tls();
+        gateway.reload_files();
         wait_for_signal();
         return;
       }

@@ -8,6 +8,7 @@
 #include <set>
 #include <sstream>
 
+#include "server/config/access_options.hpp"
 #include "server/config/object_reader.hpp"
 #include "server/http/origin.hpp"
 #include "server/transport/schemes.hpp"
@@ -232,6 +233,17 @@ void read_limits(ObjectReader& in, Limits& limits) {
   in.size("opaque_rate", limits.opaque_rate, {1024, 1'000'000'000'000});
 }
 
+void read_rate(ObjectReader& in, RateLimit& rate) {
+  in.size("per_second", rate.per_second, {0, 1'000'000});
+  in.size("at_once", rate.at_once, {0, 1'000'000});
+}
+
+void read_rates(ObjectReader& in, Rates& rates) {
+  in.object("client", [&](ObjectReader& part) { read_rate(part, rates.client); });
+  in.object("user", [&](ObjectReader& part) { read_rate(part, rates.user); });
+  in.object("device", [&](ObjectReader& part) { read_rate(part, rates.device); });
+}
+
 void read_timeouts(ObjectReader& in, Timeouts& timeouts) {
   in.duration("connect_ms", timeouts.connect, {100, hour_ms});
   in.duration("drain_ms", timeouts.drain, {0, hour_ms});
@@ -271,7 +283,10 @@ void read_config(ObjectReader& in, Config& config) {
     return {};
   });
   in.object("tls", [&](ObjectReader& part) { read_tls(part, config.tls); });
+  in.object("access", [&](ObjectReader& part) { read_access(part, config.access); });
+  in.flag("insecure", config.insecure);
   in.object("limits", [&](ObjectReader& part) { read_limits(part, config.limits); });
+  in.object("rates", [&](ObjectReader& part) { read_rates(part, config.rates); });
   in.object("timeouts", [&](ObjectReader& part) { read_timeouts(part, config.timeouts); });
   in.object("retry", [&](ObjectReader& part) { read_retry(part, config.retry); });
   in.object("log", [&](ObjectReader& part) {
@@ -287,6 +302,7 @@ void check_whole(const Config& config, const nlohmann::json& document, std::vect
     findings.push_back({"/retry/min_ms", "found " + std::to_string(config.retry.min.count()) +
                                              ", expected at most max_ms (" + std::to_string(config.retry.max.count()) +
                                              ")"});
+  check_access(config, findings);
 }
 
 /// Parses JSON with comments. nlohmann keeps the last of two equal keys; here that is a finding.
@@ -347,6 +363,7 @@ ParsedConfig load_config(const std::string& file) {
   for (auto& device : parsed.config.devices)
     for (auto& ca : device.tls.ca) locate(ca);
   for (auto& ca : parsed.config.discover.tls.ca) locate(ca);
+  for_each_file(parsed.config.access, locate);
   return parsed;
 }
 

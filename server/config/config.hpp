@@ -10,6 +10,7 @@
 
 #include "core/session/url.hpp"
 #include "core/types/value.hpp"
+#include "server/access/access_config.hpp"
 #include "server/config/finding.hpp"
 #include "server/http/forwarded.hpp"
 #include "server/security/tls_context.hpp"
@@ -85,6 +86,21 @@ struct Limits {
   std::size_t opaque_rate = 128u * 1024 * 1024;  ///< bytes a second and direction of what is encrypted end to end
 
   bool operator==(const Limits&) const = default;
+};
+
+/// Requests over HTTP; 0: no bound.
+struct RateLimit {
+  std::size_t per_second = 0;
+  std::size_t at_once = 0;
+
+  bool operator==(const RateLimit&) const = default;
+};
+struct Rates {
+  RateLimit client;  ///< of one address
+  RateLimit user;    ///< of one who has proven who he is
+  RateLimit device;  ///< to one device, of all together
+
+  bool operator==(const Rates&) const = default;
 };
 
 struct Timeouts {
@@ -168,7 +184,10 @@ struct Config {
   ProxyConfig proxy;
   std::vector<std::string> allowed_origins;
   TlsConfig tls;
+  AccessConfig access;
+  bool insecure = false;  ///< other machines may come without TLS, or without saying who they are
   Limits limits;
+  Rates rates;
   Timeouts timeouts;
   Retry retry;
   LogConfig log;

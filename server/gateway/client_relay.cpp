@@ -5,6 +5,15 @@
 
 namespace rrgate {
 
+rr::Result<> may_relay(Gateway& gateway, const Connection& connection, const Device* device) {
+  auto& access = gateway.access();
+  if (access.is_open()) return {};
+  auto allowed = device ? access.check_whole_device(connection.identity, device->config().name)
+                        : access.check(connection.identity, {.verb = Verb::admin});
+  if (!allowed) gateway.reject(Rejection::forbidden);
+  return allowed;
+}
+
 rr::awaitable<rr::Result<std::unique_ptr<Boarding>>> board(Gateway& gateway, Device& device, std::string way) {
   const auto label = "device " + rr::quoted(device.config().name);
   auto seat = device.take_seat();

@@ -85,7 +85,7 @@ rr::awaitable<Protocol> look_at_first_bytes(rr::ByteStream& stream, const std::s
 }
 
 /// The stream inside TLS; null where there is none.
-rr::awaitable<std::unique_ptr<rr::ByteStream>> accept_https(Gateway& gateway, const Connection& connection,
+rr::awaitable<std::unique_ptr<rr::ByteStream>> accept_https(Gateway& gateway, Connection& connection,
                                                             std::unique_ptr<rr::ByteStream> stream) {
   const auto context = gateway.tls();
   if (!context) {
@@ -100,6 +100,10 @@ rr::awaitable<std::unique_ptr<rr::ByteStream>> accept_https(Gateway& gateway, co
     gateway.reject(Rejection::tls);
     log(LogLevel::info, "connection closed", {{"error", done.error().message}});
     co_return nullptr;
+  }
+  if (auto name = tls->client_name(); !name.empty()) {
+    connection.identity.name = std::move(name);
+    connection.identity.proof = Proof::certificate;
   }
   co_return tls;
 }
@@ -127,6 +131,10 @@ rr::awaitable<void> serve_connection(Gateway& gateway, std::unique_ptr<rr::ByteS
     protocol = co_await look_at_first_bytes(*stream, connection.client, patience);
   }
 
+  auto& identity = connection.identity;
+  identity.client = connection.client;
+  identity = identity.is_proven() ? gateway.access().with_grants(std::move(identity))
+                                  : gateway.access().anonymous(connection.client);
   switch (protocol) {
     case Protocol::robot_raconteur:
       if (gateway.is_stopping()) break;

@@ -11,7 +11,9 @@
 
 #include "core/session/service_index.hpp"
 #include "core/support/random.hpp"
+#include "server/config/access_options.hpp"
 #include "server/gateway/front_door.hpp"
+#include "server/gateway/http_access.hpp"
 #include "server/http/routes.hpp"
 #include "server/log/log.hpp"
 #include "server/transport/accept_all.hpp"
@@ -25,22 +27,28 @@ namespace {
 /// After connections were told to end: close frames leave, answers come, sockets close.
 constexpr std::chrono::milliseconds last_wait{2000};
 
-/// How often the files of certificates and CAs are looked at.
-constexpr std::chrono::seconds tls_watch_period{2};
+/// How often the files of certificates, CAs, users and rights are looked at.
+constexpr std::chrono::seconds files_watch_period{2};
 
 }  // namespace
 
 Gateway::Gateway(asio::io_context& io, Config config)
     : io_(io),
       config_(std::move(config)),
-      web_tls_(config_.tls.certificates.empty() ? nullptr : std::make_unique<TlsFiles>(config_.tls.certificates)),
+      access_(config_.access),
+      http_access_(std::make_unique<HttpAccess>(io.get_executor(), access_)),
+      web_tls_(config_.tls.certificates.empty()
+                   ? nullptr
+                   : std::make_unique<TlsFiles>(config_.tls.certificates, config_.access.client_ca)),
       devices_(io.get_executor(), config_),
       sessions_(io.get_executor()),
       admission_(config_.limits.clients, config_.limits.clients_per_address),
       router_(make_routes(*this)),
       shared_(config_.node.id.is_any() ? rr::random_node_id() : config_.node.id, config_),
-      tls_watch_(io),
+      files_watch_(io),
       drained_(io) {}
+
+Gateway::~Gateway() = default;
 
 rr::Result<Gateway::Listener> Gateway::open(const rr::HostPort& address, std::vector<rr::HostPort>& bound) {
   Listener out{address, std::make_unique<rr::TcpListener>(io_.get_executor())};
@@ -77,6 +85,7 @@ rr::Result<> Gateway::adopt(int socket, std::vector<rr::HostPort>& bound) {
 }
 
 rr::Result<std::vector<rr::HostPort>> Gateway::start(const std::vector<int>& sockets) {
+  if (auto loaded = access_.load(); !loaded) return loaded.error();
   if (web_tls_)
     if (auto loaded = web_tls_->load(); !loaded) return loaded.error();
   if (auto loaded = devices_.load_tls(); !loaded) return loaded.error();
@@ -95,6 +104,8 @@ rr::Result<std::vector<rr::HostPort>> Gateway::start(const std::vector<int>& soc
       if (!listener) return listener.error();
       opened.push_back(std::move(*listener));
     }
+  if (const auto problem = exposure(bound, config_); !problem.empty() && !config_.insecure)
+    return rr::make_error(rr::ErrorCode::invalid_configuration, problem);
   for (auto& listener : opened) serve(std::move(listener));
   for (const auto& acceptor : adopted_) {
     auto accepting = rr::accept_all(
@@ -110,7 +121,7 @@ rr::Result<std::vector<rr::HostPort>> Gateway::start(const std::vector<int>& soc
   own_service_->start();
   shared_.add_own(own_service_->device(), std::string(GatewayService::name));
   if (found_) found_->start();
-  asio::co_spawn(io_, watch_tls(), asio::detached);
+  asio::co_spawn(io_, watch_files(), asio::detached);
   return bound;
 }
 
@@ -146,11 +157,12 @@ void Gateway::tell_of_nodes() {
   });
 }
 
-rr::awaitable<void> Gateway::watch_tls() {
+rr::awaitable<void> Gateway::watch_files() {
   while (!is_stopping_) {
-    tls_watch_.expires_after(tls_watch_period);
-    co_await tls_watch_.async_wait(asio::as_tuple(asio::use_awaitable));
+    files_watch_.expires_after(files_watch_period);
+    co_await files_watch_.async_wait(asio::as_tuple(asio::use_awaitable));
     if (is_stopping_) break;
+    access_.reload(false);
     if (web_tls_ && web_tls_->has_changed()) web_tls_->reload();
     devices_.reload_tls(false);
     if (found_) found_->reload_tls(false);
@@ -160,9 +172,10 @@ rr::awaitable<void> Gateway::watch_tls() {
 rr::Result<> Gateway::reconfigure(Config next) {
   // All that can fail comes first.
   std::unique_ptr<TlsFiles> web_tls;
-  const bool has_other_tls = next.tls.certificates != config_.tls.certificates;
+  const bool has_other_tls =
+      next.tls.certificates != config_.tls.certificates || next.access.client_ca != config_.access.client_ca;
   if (has_other_tls && !next.tls.certificates.empty()) {
-    web_tls = std::make_unique<TlsFiles>(next.tls.certificates);
+    web_tls = std::make_unique<TlsFiles>(next.tls.certificates, next.access.client_ca);
     if (auto loaded = web_tls->load(); !loaded) return loaded;
   }
   std::shared_ptr<TlsFiles> found_tls;
@@ -173,6 +186,8 @@ rr::Result<> Gateway::reconfigure(Config next) {
   }
   auto devices = devices_.prepare(next);
   if (!devices) return devices.error();
+  auto access = load_access(next.access);
+  if (!access) return access.error();
   const auto has = [](const std::vector<rr::HostPort>& addresses, const rr::HostPort& address) {
     return std::find(addresses.begin(), addresses.end(), address) != addresses.end();
   };
@@ -185,6 +200,7 @@ rr::Result<> Gateway::reconfigure(Config next) {
       if (!listener) return listener.error();
       opened.push_back(std::move(*listener));
     }
+  if (auto replaced = access_.replace(std::move(*access)); !replaced) return replaced;
 
   const auto before = std::exchange(config_, std::move(next));
   if (has_other_tls) web_tls_ = std::move(web_tls);
@@ -215,7 +231,8 @@ rr::Result<> Gateway::reconfigure(Config next) {
   return {};
 }
 
-void Gateway::reload_tls() {
+void Gateway::reload_files() {
+  access_.reload(true);
   if (web_tls_) web_tls_->reload();
   devices_.reload_tls(true);
   if (found_) found_->reload_tls(true);
@@ -265,7 +282,7 @@ void Gateway::stop(std::function<void()> on_stopped) {
   devices_.on_change(nullptr);
   shared_.stop();
   if (own_service_) own_service_->stop();
-  tls_watch_.cancel();
+  files_watch_.cancel();
   asio::co_spawn(io_, drain(), asio::detached);
 }
 

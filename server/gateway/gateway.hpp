@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "server/access/access.hpp"
 #include "server/config/config.hpp"
 #include "server/gateway/admission.hpp"
 #include "server/gateway/device.hpp"
@@ -19,6 +20,8 @@
 #include "server/transport/tcp.hpp"
 
 namespace rrgate {
+
+class HttpAccess;
 
 /// One open connection as the gateway knows it, so that it can be asked to end.
 struct Connection : boost::intrusive::list_base_hook<boost::intrusive::link_mode<boost::intrusive::auto_unlink>> {
@@ -39,6 +42,8 @@ struct Connection : boost::intrusive::list_base_hook<boost::intrusive::link_mode
   Admission::Ticket ticket;
   /// The client as logs name it: as `peer`, or as a trusted proxy says.
   std::string client;
+  /// Who it is, as far as it has shown: by its certificate, by the request that became a WebSocket.
+  Identity identity;
 };
 
 /// Uses one thread: that of the io_context. Outlives its run().
@@ -47,6 +52,7 @@ class Gateway {
   Gateway(boost::asio::io_context& io, Config config);
   Gateway(const Gateway&) = delete;
   Gateway& operator=(const Gateway&) = delete;
+  ~Gateway();
 
   /// Opens all listeners and starts to look at the devices. Returns the addresses with their true ports.
   /// `sockets`  that listen already, instead of the addresses of the configuration; they become the gateway's.
@@ -62,9 +68,9 @@ class Gateway {
   /// them at once. Meanwhile nobody new gets to a device, but who asks for /readyz hears why.
   void stop(std::function<void()> on_stopped);
   bool is_stopping() const { return is_stopping_; }
-  /// Reads certificates, keys and CAs anew. What can't be used stays as it was, and the log says why. Connections that
-  /// are open keep what they have.
-  void reload_tls();
+  /// Reads certificates, keys, CAs, users and rights anew, and opens the audit log anew. What can't be used stays as it
+  /// was, and the log says why. Connections that are open keep what they have.
+  void reload_files();
   /// Called when stopping begins.
   void on_stop(std::function<void()> call) { on_stop_ = std::move(call); }
 
@@ -78,6 +84,10 @@ class Gateway {
   Metrics& metrics() { return metrics_; }
   void reject(Rejection why) { metrics_.reject(why); }
   Admission& admission() { return admission_; }
+  /// Who may do what.
+  Access& access() { return access_; }
+  /// How clients of HTTP show who they are, and how much they may ask for.
+  HttpAccess& http_access() { return *http_access_; }
   const Router& router() const { return router_; }
   /// What new connections are encrypted with; null: TLS is not served.
   rr::TlsContextPtr tls() const { return web_tls_ ? web_tls_->context() : nullptr; }
@@ -97,7 +107,7 @@ class Gateway {
   rr::Result<> adopt(int socket, std::vector<rr::HostPort>& bound);
   void accept(boost::asio::ip::tcp::socket socket);
   rr::awaitable<void> drain();
-  rr::awaitable<void> watch_tls();
+  rr::awaitable<void> watch_files();
   void close_listeners();
   void tell_of_nodes();
   bool has_relay() const;
@@ -105,6 +115,8 @@ class Gateway {
 
   boost::asio::io_context& io_;
   Config config_;
+  Access access_;
+  std::unique_ptr<HttpAccess> http_access_;
   std::unique_ptr<TlsFiles> web_tls_;
   DeviceRegistry devices_;
   DeviceSessions sessions_;
@@ -122,7 +134,7 @@ class Gateway {
   bool ends_at_once_ = false;
   std::function<void()> on_stop_;
   std::function<void()> on_stopped_;
-  boost::asio::steady_timer tls_watch_;
+  boost::asio::steady_timer files_watch_;
   boost::asio::steady_timer drained_;  ///< cancelled when a connection ends while stopping
 };
 

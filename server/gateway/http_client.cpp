@@ -1,6 +1,7 @@
 #include "server/gateway/http_client.hpp"
 
 #include "server/gateway/client_relay.hpp"
+#include "server/gateway/http_access.hpp"
 #include "server/gateway/shared/serve_shared_client.hpp"
 #include "server/http/endpoints/json_socket.hpp"
 #include "server/http/request_reader.hpp"
@@ -62,7 +63,8 @@ rr::Result<Destination> find_destination(Gateway& gateway, const Request& reques
 std::string node_url(const Request& request) {
   const auto& arrival = request.arrival;
   if (arrival.host.empty()) return {};
-  return (arrival.is_encrypted ? "rrs+ws://" : "rr+ws://") + arrival.host + arrival.prefix + std::string(request.path());
+  return (arrival.is_encrypted ? "rrs+ws://" : "rr+ws://") + arrival.host + arrival.prefix +
+         std::string(request.path());
 }
 
 /// 101, then JSON messages.
@@ -70,8 +72,10 @@ rr::awaitable<void> accept_json_socket(Gateway& gateway, Connection& connection,
                                        const Request& request, rr::ByteSpan unread) {
   const auto place = find_json_socket(gateway, request);
   if (!place) {
-    gateway.reject(Rejection::no_such_device);
-    const auto response = problem_response(404, place.error().message);
+    const bool is_denied = place.error().code == rr::ErrorCode::permission_denied;
+    gateway.reject(is_denied ? Rejection::forbidden : Rejection::no_such_device);
+    const auto response = is_denied ? gateway.http_access().refusal(request.identity, place.error())
+                                    : problem_response(404, place.error().message);
     co_await write_refusal(*stream, response);
     co_await stream->end(rr::no_reason);
     co_return;
@@ -87,6 +91,7 @@ rr::awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, st
                                     const Request& request, rr::ByteSpan unread) {
   auto& tcp = *stream;
   connection.client = request.arrival.peer;
+  connection.identity = request.identity;
   const auto refuse = [&tcp](const Response& refusal) -> rr::awaitable<void> {
     co_await write_refusal(tcp, refusal);
     co_await tcp.end(rr::no_reason);
@@ -127,7 +132,14 @@ rr::awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, st
     co_return;
   }
   const bool takes_close = takes_close_frames(request);
-  if (destination->node) {
+  const auto allowed = may_relay(gateway, connection, destination->device);
+  // A page can read why a WebSocket closes; but to show who one is, where that was not done, is for the upgrade.
+  if (!allowed && !(takes_close && request.identity.is_proven())) {
+    const auto response = gateway.http_access().refusal(request.identity, allowed.error());
+    co_await refuse(response);
+    co_return;
+  }
+  if (allowed && destination->node) {
     const auto accepted = format_upgrade_response(request);
     if (co_await write_text(tcp, accepted)) co_return;
     tcp.put_back(unread);
@@ -136,7 +148,11 @@ rr::awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, st
     co_await serve_shared_client(gateway, connection, *destination, std::move(socket), std::move(base_url));
     co_return;
   }
-  auto boarding = co_await board(gateway, *destination->device, std::move(way));
+  rr::Result<std::unique_ptr<Boarding>> boarding(nullptr);
+  if (allowed)
+    boarding = co_await board(gateway, *destination->device, std::move(way));
+  else
+    boarding = allowed.error();
   if (!boarding && !takes_close) {
     auto response = problem_response(503, boarding.error().message);
     response.set("Retry-After", "2");
@@ -149,7 +165,8 @@ rr::awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, st
   rr::WebSocketStream socket(std::move(stream), rr::WebSocketRole::server, takes_close);
   if (!boarding) {  // a page can't read the status of a refused upgrade, but it can read why a WebSocket closes
     log(LogLevel::info, "client refused", {{"peer", connection.client}, {"error", boarding.error().message}});
-    const rr::EndReason reason{1013, boarding.error().message};
+    const auto code = static_cast<std::uint16_t>(allowed ? 1013 : 1008);
+    const rr::EndReason reason{code, boarding.error().message};
     co_await socket.end(reason);
     co_return;
   }
@@ -167,6 +184,16 @@ Response stopping_response() {
   response.set("Retry-After", "5");
   response.closes = true;
   return response;
+}
+
+/// Whether it matters who asks. The page itself and how the gateway is are no secrets.
+bool is_guarded(const Request& request) {
+  const auto path = request.path();
+  return asks_for_websocket(request) || path == "/metrics" || path.substr(0, 5) == "/api/";
+}
+
+Rejection rejection_of(unsigned status) {
+  return status == 429 ? Rejection::rate : status == 401 ? Rejection::unauthorized : Rejection::forbidden;
 }
 
 /// The page's own links are relative: they need the '/' at the end.
@@ -205,7 +232,17 @@ rr::awaitable<void> serve_http_client(Gateway& gateway, Connection& connection,
     request.arrival = see_through_proxies(request, connection.peer, config.proxy.trust);
     take_base_path(request, config.base_path);
     const bool is_refused = gateway.is_stopping() && !is_answered_while_stopping(request);
+    HttpAccess::Admitted admitted;
+    if (!is_refused && is_guarded(request))
+      admitted = co_await gateway.http_access().admit(request, connection, config);
+    if (admitted.refusal) gateway.reject(rejection_of(admitted.refusal->status));
+    if (admitted.refusal && asks_for_websocket(request)) {
+      co_await write_refusal(*stream, *admitted.refusal);
+      co_await stream->end(rr::no_reason);
+      break;
+    }
     if (!is_refused && asks_for_websocket(request)) {
+      admitted = {};  // connections have bounds of their own
       const rr::Bytes unread(reader.unread().begin(), reader.unread().end());
       co_await serve_websocket(gateway, connection, std::move(stream), request, unread);
       break;
@@ -215,6 +252,7 @@ rr::awaitable<void> serve_http_client(Gateway& gateway, Connection& connection,
       headers.emplace_back("Strict-Transport-Security", "max-age=" + std::to_string(config.tls.hsts_seconds));
     ResponseWriter writer(*stream, request, gateway.is_stopping(), std::move(headers));
     const auto response = is_refused                      ? stopping_response()
+                          : admitted.refusal              ? *admitted.refusal
                           : is_base_path(request, config) ? to_base_path(config)
                                                           : gateway.router().answer(request);
     if (response.answer_later) {

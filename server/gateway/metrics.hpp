@@ -18,10 +18,13 @@ enum class Rejection {
   no_such_device,
   device_full,
   device_offline,
+  unauthorized,  ///< a wrong password or token, or none where one is needed
+  forbidden,     ///< no right to it
+  rate,          ///< asked for more than "rates" allow
 };
-inline constexpr std::array<std::string_view, 9> rejection_names = {
-    "too_many", "unknown_protocol", "tls",         "proxy_header",  "bad_request",
-    "origin",   "no_such_device",   "device_full", "device_offline"};
+inline constexpr std::array<std::string_view, 12> rejection_names = {
+    "too_many",    "unknown_protocol", "tls",          "proxy_header", "bad_request", "origin", "no_such_device",
+    "device_full", "device_offline",   "unauthorized", "forbidden",    "rate"};
 
 struct Metrics {
   std::uint64_t connections = 0;  ///< accepted

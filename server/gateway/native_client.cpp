@@ -96,8 +96,11 @@ rr::awaitable<void> serve_native_client(Gateway& gateway, Connection& connection
   const auto destination =
       find_destination(gateway, request.header.receiver_node_id, request.header.receiver_node_name);
   rr::Error refusal;
+  const auto allowed = destination ? may_relay(gateway, connection, destination->device) : rr::Result<>();
   if (note_circle(gateway, request.header.sender_node_id)) {
     refusal = rr::make_error(rr::ErrorCode::connection_error, "the way leads back to the gateway that it began at");
+  } else if (!allowed) {
+    refusal = allowed.error();
   } else if (destination && destination->node) {
     auto base_url = "rr+tcp://" + rr::format_host_port(connection.local.address().to_string(), connection.local.port());
     co_await serve_shared_client(gateway, connection, *destination, std::move(stream), base_url + "/");

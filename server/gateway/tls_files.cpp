@@ -1,9 +1,9 @@
 #include "server/gateway/tls_files.hpp"
 
-#include <sys/stat.h>
-
 #include "server/log/log.hpp"
+#include "server/platform/file_look.hpp"
 #include "server/security/certificate_files.hpp"
+#include "server/security/client_certificates.hpp"
 
 namespace rrgate {
 
@@ -16,17 +16,12 @@ rr::TlsTrust TlsFiles::trust() const {
 
 TlsFiles::Looks TlsFiles::look() const {
   Looks looks;
-  const auto add = [&looks](const std::string& file) {
-    struct stat status {};
-    auto& look = looks[file];
-    if (::stat(file.c_str(), &status) == 0)
-      look = std::to_string(status.st_mtim.tv_sec) + "." + std::to_string(status.st_mtim.tv_nsec) + " " +
-             std::to_string(status.st_ino) + " " + std::to_string(status.st_size);
-  };
+  const auto add = [&looks](const std::string& file) { looks[file] = rr::file_look(file); };
   for (const auto& certificate : certificates_) {
     add(certificate.certificate_file);
     add(certificate.key_file);
   }
+  for (const auto& file : client_ca_) add(file);
   if (!certificates_.empty()) return looks;
   const auto trusted = trust();
   for (const auto* files : {&trusted.files, &trusted.directories, &trusted.published_roots})
@@ -38,7 +33,7 @@ rr::Result<> TlsFiles::load() {
   seen_ = look();  // before reading: what changes meanwhile is seen at the next look
   rr::NodeTlsOptions device;
   device.trust = trust();
-  auto made = certificates_.empty() ? rr::make_node_tls(device) : rr::make_web_tls(certificates_);
+  auto made = certificates_.empty() ? rr::make_node_tls(device) : rr::make_web_tls(certificates_, client_ca_);
   if (!made) return made.error();
   context_ = std::move(*made);
   return {};

@@ -15,7 +15,9 @@ namespace rrgate {
 class TlsFiles {
  public:
   /// For HTTPS.
-  explicit TlsFiles(std::vector<rr::WebCertificate> certificates) : certificates_(std::move(certificates)) {}
+  /// `client_ca`  PEM files of the CAs whose certificates clients may show; empty: they are not asked.
+  explicit TlsFiles(std::vector<rr::WebCertificate> certificates, std::vector<std::string> client_ca = {})
+      : certificates_(std::move(certificates)), client_ca_(std::move(client_ca)) {}
   /// For connections to a device. Without CAs: default_trust().
   explicit TlsFiles(DeviceTls device) : device_(std::move(device)) {}
 
@@ -35,6 +37,7 @@ class TlsFiles {
   Looks look() const;
 
   std::vector<rr::WebCertificate> certificates_;
+  std::vector<std::string> client_ca_;
   DeviceTls device_;
   Looks seen_;
   rr::TlsContextPtr context_;

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/access/identity.hpp"
 #include "server/transport/byte_stream.hpp"
 
 namespace rrgate {
@@ -30,6 +31,7 @@ struct Arrival {
 struct Request {
   http::request<http::string_body> message;
   Arrival arrival = {};
+  Identity identity = {};  ///< of who sent it; of nobody until that was found out
 
   /// The target before and after '?'. The path is as received, not percent-decoded.
   std::string_view path() const;

@@ -1,5 +1,6 @@
 #include "server/http/routes.hpp"
 
+#include "server/http/endpoints/access.hpp"
 #include "server/http/endpoints/dashboard.hpp"
 #include "server/http/endpoints/devices.hpp"
 #include "server/http/endpoints/discovery.hpp"
@@ -20,6 +21,11 @@ Router make_routes(Gateway& gateway) {
   for (const auto method : {http::verb::get, http::verb::put, http::verb::post, http::verb::options})
     router.add(method, "/api/v1/devices/*", objects_endpoint(gateway));
   router.add(http::verb::get, "/api/v1/discovery", discovery_endpoint(gateway));
+  router.add(http::verb::get, "/api/v1/access", who_endpoint(gateway));
+  router.add(http::verb::post, "/api/v1/tickets", tickets_endpoint(gateway));
+  router.add(http::verb::post, "/api/v1/access/requests", ask_endpoint(gateway));
+  router.add(http::verb::get, "/api/v1/access/requests", requests_endpoint(gateway));
+  router.add(http::verb::post, "/api/v1/access/requests/*", request_endpoint(gateway));
   router.add(http::verb::get, "/api/*", no_such_api_endpoint());
   router.add(http::verb::get, "/devices/*", device_endpoint(gateway));
   router.add(http::verb::get, "/*", dashboard_endpoint(gateway));

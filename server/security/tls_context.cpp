@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "core/session/start_tls.hpp"
+#include "server/security/client_certificates.hpp"
 #include "server/security/node_certificate_check.hpp"
 #include "server/security/openssl.hpp"
 
@@ -164,6 +165,24 @@ Result<> load_web_certificate(SSL_CTX* context, const WebCertificate& files) {
   return {};
 }
 
+/// Says whose certificates clients may show.
+Result<> ask_clients(SSL_CTX* context, std::span<const std::string> client_ca) {
+  if (client_ca.empty()) return {};
+  TlsTrust trust;
+  trust.files.assign(client_ca.begin(), client_ca.end());
+  if (auto done = set_trust(context, trust); !done) return done;
+  // Of several certificates a browser offers those of these CAs.
+  STACK_OF(X509_NAME)* const names = sk_X509_NAME_new_null();
+  for (const auto& file : client_ca) SSL_add_file_cert_subjects_to_stack(names, file.c_str());
+  SSL_CTX_set_client_CA_list(context, names);  // takes them over
+  SSL_CTX_set_purpose(context, X509_PURPOSE_SSL_CLIENT);
+  SSL_CTX_set_verify(context, SSL_VERIFY_PEER, nullptr);  // who shows none may come all the same
+  // Shown each time: nothing is resumed.
+  SSL_CTX_set_options(context, SSL_OP_NO_TICKET);
+  SSL_CTX_set_num_tickets(context, 0);
+  return {};
+}
+
 /// A key with a password would ask for it on the terminal.
 int no_password(char*, int, int, void*) {
   return -1;
@@ -204,6 +223,11 @@ Result<TlsContextPtr> make_web_client_tls(const TlsTrust& trust) {
 }
 
 Result<TlsContextPtr> make_web_tls(std::span<const WebCertificate> certificates) {
+  return make_web_tls(certificates, {});
+}
+
+Result<TlsContextPtr> make_web_tls(std::span<const WebCertificate> certificates,
+                                   std::span<const std::string> client_ca) {
   ERR_clear_error();
   if (certificates.empty()) return unusable("TLS without a certificate");
   std::vector<openssl::Context> contexts;
@@ -212,6 +236,7 @@ Result<TlsContextPtr> make_web_tls(std::span<const WebCertificate> certificates)
     SSL_CTX_set_default_passwd_cb(context.get(), no_password);
     if (auto done = load_web_certificate(context.get(), files); !done) return done.error();
     SSL_CTX_set_alpn_select_cb(context.get(), choose_protocol, nullptr);
+    if (auto done = ask_clients(context.get(), client_ca); !done) return done.error();
     contexts.push_back(std::move(context));
   }
   std::vector<SSL_CTX*> native;

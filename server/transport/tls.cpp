@@ -35,6 +35,29 @@ bool is_alert_of_peer(const error_code& error) {
   return error.category() == tls_category && error.value() >= SSL_AD_REASON_OFFSET;
 }
 
+std::string text_of(const ASN1_STRING* string) {
+  unsigned char* text = nullptr;
+  const int size = ASN1_STRING_to_UTF8(&text, string);
+  const openssl::Text owner(text);
+  std::string out = size > 0 ? std::string(reinterpret_cast<const char*>(text), static_cast<std::size_t>(size)) : "";
+  // A name with a zero inside is one to people and another to programs.
+  return out.find('\0') == std::string::npos ? out : std::string();
+}
+
+/// The common name, else the first alternative name that is a text.
+std::string certified_name(X509* certificate) {
+  const X509_NAME* subject = X509_get_subject_name(certificate);
+  const int at = X509_NAME_get_index_by_NID(subject, NID_commonName, -1);
+  if (at >= 0) return text_of(X509_NAME_ENTRY_get_data(X509_NAME_get_entry(subject, at)));
+  using Names = std::unique_ptr<GENERAL_NAMES, openssl::Free<GENERAL_NAMES_free>>;
+  const Names names(static_cast<GENERAL_NAMES*>(X509_get_ext_d2i(certificate, NID_subject_alt_name, nullptr, nullptr)));
+  for (int i = 0; names && i < sk_GENERAL_NAME_num(names.get()); ++i) {
+    const auto* name = sk_GENERAL_NAME_value(names.get(), i);
+    if (name->type == GEN_EMAIL || name->type == GEN_DNS || name->type == GEN_URI) return text_of(name->d.ia5);
+  }
+  return {};
+}
+
 }  // namespace
 
 void TlsStream::Free::operator()(ssl_st* ssl) const {
@@ -58,7 +81,9 @@ TlsStream::TlsStream(std::unique_ptr<ByteStream> inner, TlsContextPtr context, T
     if (!context_->checks_nodes() && !set_host(peer.host)) throw std::bad_alloc();
   } else {
     SSL_set_accept_state(ssl_.get());
-    const bool asks = context_->checks_nodes() && peer.asks_certificate;
+    // Contexts of HTTPS say it themselves.
+    const bool asks = context_->checks_nodes() ? peer.asks_certificate
+                                               : SSL_CTX_get_verify_mode(context_->native()) != SSL_VERIFY_NONE;
     SSL_set_verify(ssl_.get(), asks ? SSL_VERIFY_PEER : SSL_VERIFY_NONE, nullptr);
   }
 }
@@ -72,6 +97,12 @@ bool TlsStream::set_host(const std::string& host) {
   ERR_clear_error();
   X509_VERIFY_PARAM_set_hostflags(parameters, X509_CHECK_FLAG_NO_PARTIAL_WILDCARDS);
   return SSL_set1_host(ssl_.get(), host.c_str()) == 1 && SSL_set_tlsext_host_name(ssl_.get(), host.c_str()) == 1;
+}
+
+std::string TlsStream::client_name() const {
+  if (context_->checks_nodes()) return {};
+  const openssl::Certificate certificate(SSL_get1_peer_certificate(ssl_.get()));
+  return certificate ? certified_name(certificate.get()) : std::string();
 }
 
 std::string TlsStream::version() const {

@@ -46,6 +46,9 @@ class TlsStream final : public ByteStream {
   NodeId verified_peer() const override { return check_.found; }
   boost::asio::any_io_executor executor() override { return inner_->executor(); }
 
+  /// Whose certificate the client of a server of HTTPS has shown: its common name, else its first alternative name;
+  /// empty where it has shown none.
+  std::string client_name() const;
   /// "TLSv1.3", for logs.
   std::string version() const;
 

@@ -1,15 +1,424 @@
-"""Who may do what: the files of users and tokens."""
+"""Who may do what: users, tokens, certificates, proxies and rights, over HTTP, WebSockets and Robot Raconteur."""
+import base64
+import contextlib
+import http.client
+import itertools
+import json
+import socket
+import ssl
 import subprocess
+import sys
+import threading
+import time
 
-from processes import BUILD
+import issuers
+import pytest
+import websockets.sync.client
 
-RRGATE = BUILD / "server" / "rrgate"
+from directions import PEERS
+from processes import Background
+from test_https import make_web_certificates
+from test_http_api import Answer
+from test_operations import RRGATE, Gateway, is_alive
+from test_proxies import open_websocket
+
+
+PASSWORDS = {"alice": "wonderland", "vera": "look only", "root": "of it all"}
+ROLES = {"alice": "operator", "vera": "viewer", "root": "admin"}
+RULES = [
+    {"roles": ["viewer", "operator"], "may": ["read", "subscribe"]},
+    {"roles": ["operator"], "paths": ["interop"], "members": ["p_double", "add"], "may": ["write", "call"]},
+    {"roles": ["admin"], "may": ["read", "write", "call", "subscribe", "lock", "metrics", "admin"]},
+]
+BASE = "/api/v1/devices/interop/interop"
 
 
 def rrgate(*arguments, given=""):
     done = subprocess.run([RRGATE, *map(str, arguments)], input=given, capture_output=True, text=True, timeout=30)
     assert done.returncode == 0, done.stderr
     return done.stdout.strip()
+
+
+def make_users(folder):
+    for name, password in PASSWORDS.items():
+        rrgate("passwd", folder / "users", name, "--roles", ROLES[name], given=password + "\n")
+
+
+@pytest.fixture(scope="module")
+def device(tmp_path_factory):
+    service = Background([sys.executable, PEERS / "service.py"], tmp_path_factory.mktemp("device") / "service.log")
+    yield json.loads(service.next_line())["url"]
+    service.stop()
+
+
+@contextlib.contextmanager
+def running(folder, device, access, **more):
+    gateway = Gateway(folder, {"devices": [{"name": "interop", "url": device}], "access": access, **more})
+    gateway.folder = folder
+    try:
+        gateway.wait_for("device online", device="interop")
+        yield gateway
+    finally:
+        assert gateway.process.stop() == 0, gateway.process.description()
+
+
+@pytest.fixture(scope="module")
+def guarded(device, tmp_path_factory):
+    """A gateway with users, tokens, rules and an audit log."""
+    folder = tmp_path_factory.mktemp("guarded")
+    make_users(folder)
+    token = rrgate("token", folder / "tokens", "ci", "--roles", "operator", "--days", 30)
+    access = {"users_file": "users", "tokens_file": "tokens", "rules": RULES, "audit_file": "audit"}
+    with running(folder, device, access) as gateway:
+        gateway.token = token
+        yield gateway
+
+
+def basic(name, password=None):
+    text = f"{name}:{PASSWORDS[name] if password is None else password}"
+    return {"Authorization": "Basic " + base64.b64encode(text.encode()).decode()}
+
+
+def bearer(token):
+    return {"Authorization": "Bearer " + token}
+
+
+def ask(port, method, path, body=None, headers={}, context=None):
+    made = http.client.HTTPSConnection("localhost", port, timeout=20, context=context) if context else \
+        http.client.HTTPConnection("127.0.0.1", port, timeout=20)
+    try:
+        if body is not None:
+            body, headers = json.dumps(body), {"Content-Type": "application/json", **headers}
+        made.request(method, path, body, headers)
+        return Answer(made.getresponse())
+    finally:
+        made.close()
+
+
+def audit_of(gateway):
+    return [json.loads(line) for line in (gateway.folder / "audit").read_text().splitlines()]
+
+
+def upgrade_status(port, path, headers={}):
+    """What an upgrade is answered with, and the close reason of one that succeeds."""
+    lines = "".join(f"{name}: {value}\r\n" for name, value in headers.items())
+    with socket.create_connection(("127.0.0.1", port), 10) as link:
+        link.sendall(f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+                     f"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n{lines}\r\n".encode())
+        received = b""
+        while b"\r\n\r\n" not in received:
+            chunk = link.recv(4096)
+            assert chunk, received
+            received += chunk
+        return int(received.split()[1])
+
+
+def test_everybody_sees_what_he_may(guarded):
+    port = guarded.port
+    for path in ("/api/v1/devices", "/api/v1/devices/interop", BASE, BASE + "/p_double", "/metrics"):
+        refused = ask(port, "GET", path)
+        assert refused.status == 401, path
+        assert refused.headers.get_all("WWW-Authenticate") == ['Basic realm="rrgate", charset="UTF-8"', 'Bearer realm="rrgate"']
+        assert refused.headers["Content-Type"] == "application/problem+json"
+    for path in ("/healthz", "/readyz"):
+        assert ask(port, "GET", path).status == 200, path
+    devices = ask(port, "GET", "/api/v1/devices", headers=basic("vera")).json["devices"]
+    assert [each["name"] for each in devices] == ["interop"]
+    who = ask(port, "GET", "/api/v1/access", headers=basic("alice")).json
+    assert (who["user"], who["roles"], who["proof"]) == ("alice", ["operator"], "password")
+    assert ask(port, "GET", "/api/v1/access").json["user"] is None
+
+
+def test_rights_of_one_member(guarded):
+    """Each verb for each user, against what the rules say."""
+    requests = {
+        "read": ("GET", "/p_double", None), "write": ("PUT", "/p_double", 1.5), "call": ("POST", "/add", {"left": 1, "right": 2}),
+        "other write": ("PUT", "/p_int32", 1), "other call": ("POST", "/nothing", {}), "memory": ("PUT", "/m_numbers?offset=3", [1]),
+        "below": ("GET", "/head/name", None), "below call": ("POST", "/head/identify", None),
+    }
+    may = {"vera": {"read", "below"}, "alice": {"read", "write", "call", "below"}, "root": set(requests)}
+    for user, (what, (method, path, body)) in itertools.product(may, requests.items()):
+        answer = ask(guarded.port, method, BASE + path, body, basic(user))
+        if what in may[user]:
+            assert answer.status in (200, 204), (user, what, answer.body)
+        else:
+            assert answer.status == 403, (user, what, answer.body)
+            assert answer.json["error"]["name"] == "RobotRaconteur.PermissionDenied"
+            assert user in answer.json["detail"] and "may not" in answer.json["detail"]
+    assert ask(guarded.port, "GET", "/metrics", headers=basic("alice")).status == 403
+    assert ask(guarded.port, "GET", "/metrics", headers=basic("root")).status == 200
+    documents = ask(guarded.port, "GET", "/api/v1/devices/interop/openapi.json", headers=basic("vera"))
+    assert documents.status == 200 and "/p_double" in documents.body.decode()
+
+
+def test_wrong_proofs(guarded):
+    for headers in (basic("alice", "wonderlan"), basic("nobody", "x"), {"Authorization": "Basic !"}, bearer("rrg_" + "A" * 43),
+                    bearer("a.b.c"), bearer("")):
+        answer = ask(guarded.port, "GET", BASE + "/p_double", headers=headers)
+        assert answer.status == 401, (headers, answer.body)
+    refused = [line for line in audit_of(guarded) if line["event"] == "login_failed"]
+    assert {"alice", "nobody"} <= {line.get("user") for line in refused}
+    assert "wonderlan" not in (guarded.folder / "audit").read_text()
+
+
+def test_api_tokens(guarded):
+    answer = ask(guarded.port, "POST", BASE + "/add", {"left": 1, "right": 2}, bearer(guarded.token))
+    assert answer.json == {"result": 3.0}
+    assert ask(guarded.port, "POST", BASE + "/nothing", {}, bearer(guarded.token)).status == 403
+    assert guarded.token not in (guarded.folder / "tokens").read_text()
+
+
+def test_connections_that_pass_unread_are_for_those_who_may_everything(guarded):
+    for path in ("/devices/interop", "/"):
+        assert upgrade_status(guarded.port, path) == 401
+        assert upgrade_status(guarded.port, path, basic("alice")) == 403
+        assert upgrade_status(guarded.port, path, basic("root")) == 101
+    # Native clients cannot show anything without a certificate.
+    done = subprocess.run([sys.executable, "-c", NATIVE_CLIENT, f"rr+tcp://127.0.0.1:{guarded.port}/?service=interop"],
+                          capture_output=True, text=True, timeout=60)
+    assert done.stdout.startswith("PermissionDeniedException"), done
+    assert '"mode": "shared"' in done.stdout
+
+
+NATIVE_CLIENT = """
+import sys
+import RobotRaconteur as RR
+with RR.ClientNodeSetup():
+    try:
+        print(RR.RobotRaconteurNode.s.ConnectService(sys.argv[1]).p_double)
+    except Exception as error:
+        print(type(error).__name__, error)
+"""
+
+
+def test_tickets_for_pages(guarded):
+    assert ask(guarded.port, "POST", "/api/v1/tickets").status == 401
+    made = ask(guarded.port, "POST", "/api/v1/tickets", headers=basic("root"))
+    assert made.status == 201 and made.json["expires_in"] == 30
+    path = "/devices/interop?ticket=" + made.json["ticket"]
+    assert upgrade_status(guarded.port, path) == 101
+    assert upgrade_status(guarded.port, path) == 401  # once
+    assert upgrade_status(guarded.port, "/devices/interop?ticket=" + "A" * 32) == 401
+    weak = ask(guarded.port, "POST", "/api/v1/tickets", headers=basic("vera")).json["ticket"]
+    assert upgrade_status(guarded.port, "/devices/interop?ticket=" + weak) == 403
+    foreign = ask(guarded.port, "POST", "/api/v1/tickets", headers={**basic("root"), "Origin": "https://evil.example"})
+    assert foreign.status == 403
+
+
+def test_the_audit_log_tells_who_did_what(guarded):
+    ask(guarded.port, "PUT", BASE + "/p_double", 2.5, basic("alice"))
+    ask(guarded.port, "PUT", BASE + "/p_int32", 2, basic("vera"))
+    lines = audit_of(guarded)
+    wrote = next(line for line in reversed(lines) if line["event"] == "write")
+    assert (wrote["user"], wrote["proof"], wrote["device"], wrote["path"], wrote["member"]) == \
+        ("alice", "password", "interop", "interop", "p_double")
+    refused = next(line for line in reversed(lines) if line["event"] == "refused")
+    assert (refused["user"], refused["verb"], refused["member"]) == ("vera", "write", "p_int32")
+    assert wrote["client"].startswith("127.0.0.1:") and wrote["time"].endswith("Z")
+    assert {"login", "write", "call", "refused"} <= {line["event"] for line in lines}
+
+
+def test_a_new_audit_file_after_a_hang_up(guarded):
+    (guarded.folder / "audit").rename(guarded.folder / "audit.1")
+    ask(guarded.port, "PUT", BASE + "/p_double", 3.5, basic("alice"))
+    guarded.hang_up()
+    guarded.process.wait_until(lambda: (guarded.folder / "audit").exists())
+    ask(guarded.port, "PUT", BASE + "/p_double", 4.5, basic("alice"))
+    assert [line["event"] for line in audit_of(guarded)][-1] == "write"
+
+
+def test_a_full_disk_costs_lines_of_the_audit_log_alone(device, tmp_path):
+    make_users(tmp_path)
+    with running(tmp_path, device, {"users_file": "users", "audit_file": "/dev/full"}) as gateway:
+        for _ in range(3):
+            assert ask(gateway.port, "PUT", BASE + "/p_double", 1.5, basic("alice")).status == 204
+        assert len([event for event in gateway.events() if event["event"].startswith("audit log can't be written")]) == 1
+
+
+def test_a_client_asks_and_an_admin_decides(guarded):
+    requests = "/api/v1/access/requests"
+    asked = ask(guarded.port, "POST", requests, {"name": "tablet", "reason": "cell 3"})
+    assert asked.status == 202, asked.body
+    one, secret = asked.json["id"], asked.json["secret"]
+    claim = lambda: ask(guarded.port, "POST", f"{requests}/{one}/claim", {"secret": secret})
+    assert claim().json == {"state": "pending"}
+    assert ask(guarded.port, "GET", requests).status == 401
+    assert ask(guarded.port, "GET", requests, headers=basic("alice")).status == 403
+    assert ask(guarded.port, "POST", f"{requests}/{one}/approve", {}, basic("alice")).status == 403
+    (listed,) = ask(guarded.port, "GET", requests, headers=basic("root")).json["requests"]
+    assert (listed["name"], listed["reason"], listed["state"]) == ("tablet", "cell 3", "pending")
+    assert secret not in json.dumps(listed)
+    assert ask(guarded.port, "POST", f"{requests}/{one}/claim", {"secret": "x"}).status == 404
+    approved = ask(guarded.port, "POST", f"{requests}/{one}/approve", {"roles": ["viewer"], "days": 7}, basic("root"))
+    assert approved.json == {"state": "approved"}
+    token = claim().json["token"]
+    assert claim().status == 404  # once
+    assert ask(guarded.port, "GET", BASE + "/p_double", headers=bearer(token)).status == 200
+    assert ask(guarded.port, "PUT", BASE + "/p_double", 1, bearer(token)).status == 403
+    refused = ask(guarded.port, "POST", requests, {"name": "other"}).json
+    assert ask(guarded.port, "POST", f"{requests}/{refused['id']}/deny", {}, basic("root")).json == {"state": "denied"}
+    again = ask(guarded.port, "POST", f"{requests}/{refused['id']}/claim", {"secret": refused["secret"]})
+    assert again.json == {"state": "denied"}
+    for wrong in ({"name": ""}, {"name": "a b"}, {"name": 7}, {"name": "a", "reason": "x" * 600}):
+        assert ask(guarded.port, "POST", requests, wrong).status == 400
+    statuses = [ask(guarded.port, "POST", requests, {"name": f"n{i}"}).status for i in range(4)]
+    assert statuses == [202, 202, 202, 429]
+
+
+def test_json_web_tokens(device, tmp_path):
+    issuer = issuers.Issuer("https://id.example", "rrgate")
+    (tmp_path / "keys.json").write_text(json.dumps(issuer.key_set()))
+    access = {"jwt": {"jwks_file": "keys.json", "issuer": "https://id.example", "audience": "rrgate"}, "rules": RULES}
+    with running(tmp_path, device, access) as gateway:
+        for algorithm in issuers.ALGORITHMS:
+            good = issuer.token("alice", ["viewer"], algorithm)
+            assert ask(gateway.port, "GET", BASE + "/p_double", headers=bearer(good)).status == 200, algorithm
+            assert ask(gateway.port, "PUT", BASE + "/p_double", 1, bearer(good)).status == 403
+            late = issuer.token("alice", ["viewer"], algorithm, seconds=-60)
+            refused = ask(gateway.port, "GET", BASE + "/p_double", headers=bearer(late))
+            assert refused.status == 401 and "expired" in refused.json["detail"]
+        for forged in (issuer.unsigned("alice", ["admin"]), issuer.signed_with_public_key("alice", ["admin"])):
+            assert ask(gateway.port, "GET", BASE + "/p_double", headers=bearer(forged)).status == 401
+
+
+def test_client_certificates(device, tmp_path):
+    tls = make_web_certificates(tmp_path / "web")
+    people = issuers.People(tmp_path)
+    access = {"client_ca": [str(people.ca)], "rules": RULES, "grants": [{"users": ["alice"], "roles": ["admin"]},
+                                                                        {"users": ["v*"], "roles": ["viewer"]}]}
+    with running(tmp_path, device, access, tls=tls) as gateway:
+        def status(name, method="GET", path=BASE + "/p_double", body=None):
+            context = ssl.create_default_context(cafile=tmp_path / "web" / "web-ca.pem")
+            if name:
+                context.load_cert_chain(*people.certificate(name))
+            return ask(gateway.port, method, path, body, context=context).status
+
+        assert status("alice") == 200 and status("alice", "PUT", body=1.5) == 204
+        assert status("vera") == 200 and status("vera", "PUT", body=1.5) == 403
+        assert status("stranger") == 403
+        assert status(None) == 403  # there is nothing to ask for but a certificate
+        mallory = issuers.People(tmp_path / "mallory")
+        context = ssl.create_default_context(cafile=tmp_path / "web" / "web-ca.pem")
+        context.load_cert_chain(*mallory.certificate("alice"))
+        with pytest.raises((ssl.SSLError, ConnectionError)):
+            ask(gateway.port, "GET", BASE + "/p_double", context=context)
+
+
+def test_what_a_trusted_proxy_says(device, tmp_path):
+    access = {"identity_headers": {"user": "X-User", "roles": "X-Roles"}, "rules": RULES}
+    says = {"X-User": "alice", "X-Roles": "viewer, operator"}
+    with running(tmp_path, device, access, trusted_proxies=["127.0.0.2"]) as gateway:
+        def status(source, headers):
+            made = http.client.HTTPConnection("127.0.0.1", gateway.port, timeout=20, source_address=(source, 0))
+            made.request("PUT", BASE + "/p_double", "1.5", {"Content-Type": "application/json", **headers})
+            with contextlib.closing(made):
+                return made.getresponse().status
+
+        assert status("127.0.0.2", says) == 204
+        assert status("127.0.0.2", {**says, "X-Roles": "viewer"}) == 403
+        assert status("127.0.0.1", says) == 403
+        assert status("127.0.0.2", {}) == 403
+
+
+def test_an_anonymous_role(device, tmp_path):
+    make_users(tmp_path)
+    rules = [*RULES, {"roles": ["guest"], "members": ["p_double"], "may": ["read"]}]
+    with running(tmp_path, device, {"users_file": "users", "anonymous_role": "guest", "rules": rules}) as gateway:
+        assert ask(gateway.port, "GET", BASE + "/p_double").status == 200
+        assert ask(gateway.port, "GET", BASE + "/p_int32").status == 401
+        assert ask(gateway.port, "GET", BASE + "/p_int32", headers=basic("vera")).status == 200
+
+
+def test_rates(device, tmp_path):
+    make_users(tmp_path)
+    rates = {"user": {"per_second": 5}, "device": {"at_once": 2}}
+    with running(tmp_path, device, {"users_file": "users"}, rates=rates) as gateway:
+        answers = [ask(gateway.port, "GET", BASE + "/p_double", headers=basic("alice")) for _ in range(40)]
+        statuses = {answer.status for answer in answers}
+        assert statuses == {200, 429}
+        assert next(answer for answer in answers if answer.status == 429).headers["Retry-After"] == "1"
+        assert ask(gateway.port, "GET", BASE + "/p_double", headers=basic("vera")).status == 200
+        streams = []
+        for _ in range(2):
+            stream = http.client.HTTPConnection("127.0.0.1", gateway.port, timeout=20)
+            stream.request("GET", BASE + "/cleared", headers={"Accept": "text/event-stream", **basic("root")})
+            response = stream.getresponse()
+            assert response.status == 200
+            streams.append((stream, response))
+        third = ask(gateway.port, "GET", BASE + "/p_double", headers=basic("vera"))
+        assert third.status == 429 and "device" in third.json["detail"]
+        for stream, response in streams:
+            response.close()
+            stream.close()
+        deadline = time.monotonic() + 10
+        while ask(gateway.port, "GET", BASE + "/p_double", headers=basic("vera")).status == 429:
+            assert time.monotonic() < deadline
+            time.sleep(0.3)
+
+
+def test_users_and_rights_are_read_anew_and_sessions_go_on(device, tmp_path):
+    make_users(tmp_path)
+    access = {"users_file": "users", "rules": RULES}
+    with running(tmp_path, device, access) as gateway:
+        link = open_websocket(gateway.port, "/devices/interop", "Authorization: " + basic("root")["Authorization"] + "\r\n")
+        failures, ended = [], threading.Event()
+
+        def load():
+            while not ended.is_set():
+                answer = ask(gateway.port, "GET", BASE + "/p_double", headers=basic("vera"))
+                if answer.status != 200:
+                    failures.append(answer.body)
+
+        loads = [threading.Thread(target=load) for _ in range(3)]
+        for thread in loads:
+            thread.start()
+        # A new user.
+        PASSWORDS["carol"] = "new"
+        rrgate("passwd", tmp_path / "users", "carol", "--roles", "operator", given="new\n")
+        gateway.wait_for("users and rights read anew")
+        assert ask(gateway.port, "PUT", BASE + "/p_double", 1.5, basic("carol")).status == 204
+        # Other rights.
+        gateway.write({**gateway.config, "access": {**access, "rules": RULES[:1] + RULES[2:]}})
+        gateway.wait_for("configuration read anew")
+        assert ask(gateway.port, "PUT", BASE + "/p_double", 1.5, basic("carol")).status == 403
+        # A file that can't be used changes nothing.
+        (tmp_path / "users").write_text("broken\n")
+        gateway.hang_up()
+        gateway.wait_for("configuration not used; that from before stays")
+        assert ask(gateway.port, "GET", BASE + "/p_double", headers=basic("vera")).status == 200
+        # A user who is gone.
+        make_users_again = tmp_path / "fresh"
+        make_users_again.mkdir()
+        rrgate("passwd", make_users_again / "users", "vera", "--roles", "viewer", given=PASSWORDS["vera"] + "\n")
+        (make_users_again / "users").replace(tmp_path / "users")
+        gateway.wait_for("users and rights read anew", 2)
+        assert ask(gateway.port, "GET", BASE + "/p_double", headers=basic("carol")).status == 401
+        ended.set()
+        for thread in loads:
+            thread.join()
+        assert failures == []
+        assert is_alive(link)
+        link.close()
+
+
+def test_credentials_are_the_devices_where_the_gateway_has_no_users(device, tmp_path):
+    with running(tmp_path, device, {}) as gateway:
+        assert ask(gateway.port, "GET", BASE + "/p_double").status == 200
+        assert ask(gateway.port, "GET", "/api/v1/access").json["login"] is False
+        # The device has no users either, and says so: they got there.
+        assert ask(gateway.port, "GET", BASE + "/p_double", headers=basic("alice")).status != 200
+
+
+def test_who_lets_everybody_in_must_say_so(tmp_path):
+    config = tmp_path / "gateway.json"
+    config.write_text(json.dumps({"listen": ["0.0.0.0:0"], "devices": []}))
+    done = subprocess.run([RRGATE, "check-config", config], capture_output=True, text=True, timeout=30)
+    assert done.returncode == 2 and '"insecure": true' in done.stderr
+    gateway = Gateway(tmp_path, {"listen": ["0.0.0.0:0"], "devices": [], "insecure": True})
+    try:
+        assert "without TLS" in gateway.wait_for("insecure")["why"]
+    finally:
+        gateway.process.stop()
 
 
 def test_passwd_and_token(tmp_path):
@@ -35,3 +444,39 @@ def test_passwd_and_token(tmp_path):
         done = subprocess.run([RRGATE, *map(str, arguments)], input=given, capture_output=True, text=True, timeout=30)
         assert done.returncode in (1, 2) and done.stderr.startswith("rrgate "), (arguments, done)
     assert users.read_text() == bob + "\n"
+
+
+def json_socket(port, headers={}, path=BASE):
+    return websockets.sync.client.connect(f"ws://127.0.0.1:{port}{path}", additional_headers=headers,
+                                          subprotocols=["rrgate.json.v1"], proxy=None)
+
+
+def test_rights_over_json_on_a_websocket(guarded):
+    for headers, status in (({}, 401), (basic("alice", "wrong"), 401)):
+        with pytest.raises(websockets.exceptions.InvalidStatus) as refused:
+            json_socket(guarded.port, headers)
+        assert refused.value.response.status_code == status
+    requests = {
+        "read": {"op": "get", "path": "p_double"}, "write": {"op": "set", "path": "p_double", "value": 1.5},
+        "call": {"op": "call", "path": "add", "args": {"left": 1, "right": 2}}, "other write": {"op": "set", "path": "p_int32", "value": 1},
+        "other call": {"op": "call", "path": "nothing"}, "memory": {"op": "write", "path": "m_numbers", "offset": [3], "value": [1]},
+        "below": {"op": "get", "path": "head/name"}, "below call": {"op": "call", "path": "head/identify"},
+        "event": {"op": "subscribe", "path": "cleared"}, "lock": {"op": "lock", "path": ""}, "unlock": {"op": "unlock", "path": ""},
+    }
+    may = {"vera": {"read", "below", "event"}, "alice": {"read", "write", "call", "below", "event"}}
+    for user in may:
+        with json_socket(guarded.port, basic(user)) as link:
+            for number, (what, request) in enumerate(requests.items()):
+                link.send(json.dumps({"id": number, **request}))
+                answer = json.loads(link.recv(10))
+                while "id" not in answer:
+                    answer = json.loads(link.recv(10))
+                if what in may[user]:
+                    assert "result" in answer, (user, what, answer)
+                else:
+                    assert answer["error"]["name"] == "RobotRaconteur.PermissionDenied", (user, what, answer)
+                    assert "may not" in answer["error"]["message"]
+    ticket = ask(guarded.port, "POST", "/api/v1/tickets", headers=basic("vera")).json["ticket"]
+    with json_socket(guarded.port, path=f"{BASE}?ticket={ticket}") as link:
+        link.send(json.dumps({"id": 1, "op": "get", "path": "p_double"}))
+        assert "result" in json.loads(link.recv(10))

@@ -77,6 +77,60 @@ TEST_CASE("certificates, and how devices are checked") {
   finds(with(R"("tls": {"certificate": []})"), "gateway.json: /tls/certificate: ");
 }
 
+TEST_CASE("who may do what") {
+  const auto parsed = parse_config(R"({
+    "listen": ["127.0.0.1:0"], "devices": [], "trusted_proxies": ["127.0.0.1"],
+    "tls": {"certificates": [{"cert": "c", "key": "k"}]},
+    "access": {
+      "users_file": "users", "tokens_file": "tokens", "client_ca": ["ca.pem"], "anonymous_role": "guest",
+      "jwt": {"jwks_file": "keys", "issuer": "i", "audience": "a", "user_claim": "u", "roles_claim": "r"},
+      "identity_headers": {"user": "X-User", "roles": "X-Roles"}, "audit_file": "audit",
+      "grants": [{"users": ["*@lab"], "roles": ["viewer"]}],
+      "rules": [{"roles": ["*"], "devices": ["a"], "services": ["s"], "paths": ["s.*"], "members": [""],
+                 "may": ["read", "lock"]},
+                {"roles": ["ops"], "may": ["metrics", "admin"]}]}})");
+  REQUIRE(parsed.findings.empty());
+  const auto& access = parsed.config.access;
+  CHECK(access.users_file == "users");
+  CHECK(access.jwt == JwtConfig{"keys", "", {"i", "a", "u", "r"}});
+  CHECK(access.identity_headers == IdentityHeaders{"X-User", "X-Roles"});
+  CHECK(access.anonymous_role == "guest");
+  CHECK(access.grants == std::vector<RoleGrant>{{{"*@lab"}, {"viewer"}}});
+  CHECK(access.rules == std::vector<AccessRule>{{{"*"}, {"a"}, {"s"}, {"s.*"}, {""}, {Verb::read, Verb::lock}},
+                                                {{"ops"}, {}, {}, {}, {}, {Verb::metrics, Verb::admin}}});
+  CHECK(access.audit_file == "audit");
+  CHECK(access.has_users());
+  const auto access_finds = [](const std::string& part, const std::string& path, const std::string& contains) {
+    finds(with(R"("access": {)" + part + "}"), "gateway.json: /access" + path + ": ", contains);
+  };
+  access_finds(R"("rules": [{"roles": ["a"], "may": ["reed"]}])", "/rules/0/may/0", "expected one of");
+  access_finds(R"("rules": [{"may": ["read"]}])", "/rules/0/roles", "missing");
+  access_finds(R"("rules": [{"roles": ["a b"], "may": ["read"]}])", "/rules/0/roles/0", "role");
+  access_finds(R"("rules": [{"roles": ["a"], "devices": ["d"], "may": ["admin"]}])", "/rules/0/may", "as a whole");
+  access_finds(R"("jwt": {})", "/jwt/jwks_file", "either");
+  access_finds(R"("jwt": {"jwks_file": "a", "secret_file": "b"})", "/jwt/jwks_file", "either");
+  access_finds(R"("identity_headers": {"user": "X-User"})", "/identity_headers", "trusted_proxies");
+  access_finds(R"("client_ca": ["ca.pem"])", "/client_ca", "tls.certificates");
+  access_finds(R"("anonymous_role": "guest")", "/anonymous_role", "rules");
+}
+
+TEST_CASE("who lets other machines in without TLS or users must say so") {
+  const auto config = [](const std::string& address, const std::string& more) {
+    return R"({"listen": [")" + address + R"("], "devices": [])" + more + "}";
+  };
+  const std::string tls = R"(, "tls": {"certificates": [{"cert": "c", "key": "k"}]})";
+  const std::string users = R"(, "access": {"users_file": "u"})";
+  for (const auto* address : {"127.0.0.1:1", "127.8.0.1:1", "[::1]:1", "localhost:1"})
+    CHECK(findings_of(config(address, "")).empty());
+  for (const auto* address : {"0.0.0.0:1", "[::]:1", "192.0.2.1:1", "gateway.example:1"}) {
+    finds(config(address, ""), "gateway.json: /insecure: ", "without TLS");
+    finds(config(address, tls), "gateway.json: /insecure: ", "without users");
+    finds(config(address, users), "gateway.json: /insecure: ", "without TLS");
+    CHECK(findings_of(config(address, tls + users)).empty());
+    CHECK(findings_of(config(address, R"(, "insecure": true)")).empty());
+  }
+}
+
 TEST_CASE("what stands between the gateway and a device") {
   const auto device = [](const std::string& url, const std::string& more) {
     return R"({"listen": ["127.0.0.1:0"], "devices": [{"name": "a", "url": ")" + url + R"(", )" + more + "}]}";

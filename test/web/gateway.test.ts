@@ -1,8 +1,24 @@
 import { format_route, parse_route } from "../../web/src/app/router";
+import { read_requests, read_who } from "../../web/src/gateway/access";
 import { read_devices, relay_url } from "../../web/src/gateway/devices";
 import { read_frame } from "../../web/src/camera/frame";
 import { fit, grid_step, include, START, to_canvas } from "../../web/src/chart/view";
 import { sentence, span } from "../../web/src/ui/words";
+
+describe("access", () => {
+  it("reads who the gateway takes the page for", () => {
+    const who = { user: "root", login: true, requests: true, admin: true };
+    expect(read_who({ ...who, roles: ["admin"], proof: "password" })).toEqual(who);
+    expect(read_who(null)).toEqual({ user: null, login: false, requests: false, admin: false });
+  });
+
+  it("lists the requests that are to be decided on", () => {
+    const request = { id: "a", name: "tablet", reason: "cell 3", client: "192.0.2.1:5" };
+    const answer = { requests: [{ ...request, state: "pending" }, { ...request, state: "approved" }, null, { state: "pending" }] };
+    expect(read_requests(answer)).toEqual([request]);
+    expect(read_requests({})).toEqual([]);
+  });
+});
 
 describe("list of devices", () => {
   it("reads what the gateway says", () => {

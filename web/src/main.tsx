@@ -4,6 +4,7 @@
 import { render } from "preact";
 import { App } from "./app/app";
 import { watch_route } from "./app/router";
+import { AccessDesk } from "./gateway/access";
 import { DeviceList } from "./gateway/devices";
 import { UsbDeviceList } from "./gateway/usb_devices";
 import "./styles/tokens.css";
@@ -17,7 +18,9 @@ const list = new DeviceList();
 list.start();
 const usb = new UsbDeviceList();
 usb.start();
+const access = new AccessDesk();
+access.start();
 
 const place = document.getElementById("app");
 if (!place) throw new Error("index.html has no element #app");
-render(<App route={watch_route()} list={list} usb={usb} />, place);
+render(<App route={watch_route()} list={list} usb={usb} access={access} />, place);

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "server/gateway/gateway.hpp"
+#include "server/gateway/http_access.hpp"
 #include "server/http/upgrade.hpp"
 
 namespace rrgate {
@@ -15,7 +16,8 @@ nlohmann::ordered_json websocket_url(const Arrival& arrival, const std::string& 
   return (arrival.is_encrypted ? "wss://" : "ws://") + arrival.host + arrival.prefix + "/devices/" + device;
 }
 
-nlohmann::ordered_json describe(const Device& device, const Arrival& arrival) {
+nlohmann::ordered_json describe(const Device& device, const Request& request, const Access& access) {
+  const auto& arrival = request.arrival;
   nlohmann::ordered_json out;
   out["name"] = device.config().name;
   out["url"] = rr::format_url(device.config().url);
@@ -35,7 +37,8 @@ nlohmann::ordered_json describe(const Device& device, const Arrival& arrival) {
   out["services"] = nlohmann::ordered_json::array();
   if (identity)
     for (const auto& service : identity->services)
-      out["services"].push_back({{"name", service.name}, {"type", service.type}});
+      if (access.sees(request.identity, device.config().name, service.name))
+        out["services"].push_back({{"name", service.name}, {"type", service.type}});
   out["clients"] = device.clients();
   return out;
 }
@@ -46,14 +49,20 @@ Handler devices_endpoint(Gateway& gateway) {
   return [&gateway](const Request& request, std::string_view) {
     nlohmann::ordered_json out;
     out["devices"] = nlohmann::ordered_json::array();
-    for (const auto& device : gateway.devices().all()) out["devices"].push_back(describe(*device, request.arrival));
+    const auto& access = gateway.access();
+    for (const auto& device : gateway.devices().all())
+      if (access.sees(request.identity, device->config().name))
+        out["devices"].push_back(describe(*device, request, access));
+    if (out["devices"].empty() && !access.is_open() && !request.identity.is_proven())
+      return gateway.http_access().refusal(
+          request.identity, rr::make_error(rr::ErrorCode::permission_denied, "who is not logged in may see no device"));
     return json_response(200, out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
   };
 }
 
-Response describe_device(const Device& device, const Request& request) {
+Response describe_device(const Device& device, const Request& request, const Access& access) {
   return json_response(
-      200, describe(device, request.arrival).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+      200, describe(device, request, access).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
 }
 
 Response list_subscriptions(Gateway& gateway, const Device& device) {

@@ -47,14 +47,18 @@ Json describe(const FoundDevices::Entry& entry, std::chrono::steady_clock::time_
 }  // namespace
 
 Handler discovery_endpoint(Gateway& gateway) {
-  return [&gateway](const Request&, std::string_view) {
+  return [&gateway](const Request& request, std::string_view) {
+    const auto& access = gateway.access();
+    const bool sees_all = access.state().rules.check(request.identity, {.verb = Verb::admin}).has_value();
     const auto now = std::chrono::steady_clock::now();
     const auto* found = gateway.found();
     Json out;
     out["enabled"] = found != nullptr;
     out["nodes"] = Json::array();
     if (found)
-      for (const auto& entry : found->list()) out["nodes"].push_back(describe(entry, now));
+      for (const auto& entry : found->list())
+        if (sees_all || (entry.device && access.sees(request.identity, entry.device->config().name)))
+          out["nodes"].push_back(describe(entry, now));
     return json_response(200, out.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n");
   };
 }

@@ -205,7 +205,8 @@ rr::awaitable<JsonOperations::TargetPtr> JsonOperations::find(RequestPtr request
     target = value_or_throw(co_await find_target(own_, segments));
   }
   if (is_stopped_) refuse(rr::ErrorCode::operation_cancelled, "the WebSocket has ended");
-  // Here it is known who (place_.key) wants to do what (operation.verb) to which object or member (*target).
+  if (const auto allowed = check_access(gateway_, place_.who, place_.key.service, *target, operation.verb); !allowed)
+    throw rr::Exception(allowed.error());
   co_return target;
 }
 

@@ -16,6 +16,7 @@ namespace rrgate {
 /// Which object a socket is about, in which form.
 struct JsonSocketPlace {
   std::shared_ptr<Device> device;
+  Identity who;  ///< of the gateway's users
   SessionKey key;
   std::vector<std::string> segments;  ///< below the service's root
   rr::JsonForm form;

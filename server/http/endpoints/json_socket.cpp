@@ -105,7 +105,13 @@ rr::Result<std::shared_ptr<JsonSocketPlace>> find_json_socket(Gateway& gateway, 
                           "no device " + rr::quoted(segments->front()) + "; /api/v1/devices lists them");
   auto place = std::make_shared<JsonSocketPlace>();
   place->device = device->shared_from_this();
-  place->key = session_key(request, (*segments)[1]);
+  place->who = request.identity;
+  place->key = session_key(gateway, request, (*segments)[1]);
+  // What is done to which member is judged when it is asked for.
+  if (!gateway.access().sees(place->who, device->config().name, place->key.service)) {
+    const AccessRequest all{device->config().name, place->key.service, place->key.service, {}, Verb::read};
+    if (const auto allowed = gateway.access().check(place->who, all); !allowed) return allowed.error();
+  }
   place->segments.assign(segments->begin() + 2, segments->end());
   place->form = json_form(request);
   place->trace = trace_id_of(request.header("traceparent"));

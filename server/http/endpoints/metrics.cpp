@@ -7,6 +7,7 @@
 #include <map>
 
 #include "server/gateway/gateway.hpp"
+#include "server/gateway/http_access.hpp"
 
 namespace rrgate {
 
@@ -123,7 +124,9 @@ std::uint64_t open_files() {
 }  // namespace
 
 Handler metrics_endpoint(Gateway& gateway) {
-  return [&gateway](const Request&, std::string_view) {
+  return [&gateway](const Request& request, std::string_view) {
+    if (const auto allowed = gateway.access().check(request.identity, {.verb = Verb::metrics}); !allowed)
+      return gateway.http_access().refusal(request.identity, allowed.error());
     const auto& metrics = gateway.metrics();
     Exposition out;
     out.family("rrgate_build_info", "gauge", "Which rrgate this is.");

@@ -1,6 +1,7 @@
 #include "server/http/endpoints/object_request.hpp"
 
 #include "core/session/service_path.hpp"
+#include "server/gateway/http_access.hpp"
 #include "server/http/endpoints/image_values.hpp"
 #include "server/json/base64.hpp"
 
@@ -77,8 +78,9 @@ unsigned status_of(rr::ErrorCode code) {
   }
 }
 
-SessionKey session_key(const Request& request, std::string service) {
+SessionKey session_key(Gateway& gateway, const Request& request, std::string service) {
   SessionKey key{std::move(service)};
+  if (gateway.http_access().takes_basic()) return key;
   constexpr std::string_view basic = "Basic ";
   const auto header = request.header(http::field::authorization);
   if (!equals_ignoring_case(header.substr(0, basic.size()), basic)) return key;
@@ -89,6 +91,15 @@ SessionKey session_key(const Request& request, std::string service) {
   key.username = text.substr(0, colon);
   if (colon != std::string::npos) key.password = text.substr(colon + 1);
   return key;
+}
+
+rr::Result<> check_access(Gateway& gateway, const Identity& who, std::string_view service, const Target& target,
+                          Verb verb) {
+  auto& access = gateway.access();
+  const auto& device = target.session->device().config().name;
+  const auto& path = target.object.path();
+  if (!target.member && verb == Verb::read && access.sees(who, device, service, path)) return {};
+  return access.check(who, {device, service, path, target.member ? target.member->name : std::string_view(), verb});
 }
 
 rr::JsonForm json_form(const Request& request) {

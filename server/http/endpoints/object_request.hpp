@@ -14,9 +14,6 @@
 
 namespace rrgate {
 
-/// What somebody does to an object or a member.
-enum class Verb : std::uint8_t { read, write, call, subscribe, lock };
-
 enum class BodyForm : std::uint8_t { json, cbor, bytes };
 
 /// Where a path leads. `member` null: to the object itself.
@@ -30,8 +27,12 @@ struct Target {
   const rr::TypeRegistry& types() const { return object.connection()->session().types(); }
 };
 
-/// Whose session a request uses: user and password of HTTP Basic authentication, for the device.
-SessionKey session_key(const Request& request, std::string service);
+/// Whose session a request uses: user and password of HTTP Basic authentication, where they are not for the gateway.
+SessionKey session_key(Gateway& gateway, const Request& request, std::string service);
+/// Whether somebody may do something to what a path leads to. To look at an object as such is for whoever may do
+/// anything within it. Errors   permission_denied.
+rr::Result<> check_access(Gateway& gateway, const Identity& who, std::string_view service, const Target& target,
+                          Verb verb);
 /// What the query says of the form of values.
 rr::JsonForm json_form(const Request& request);
 
@@ -54,7 +55,6 @@ class ObjectRequest {
   bool wants_motion() const { return wants_motion_; }
   const rr::JsonForm& form() const { return form_; }
   std::optional<std::string> option(std::string_view name) const;
-  SessionKey key(std::string service) const { return session_key(request(), std::move(service)); }
 
   /// The body by Content-Type. Errors   data_serialization_error; invalid_argument: another type.
   rr::Result<rr::Json> body() const;

@@ -1,5 +1,6 @@
 #include "server/http/endpoints/objects.hpp"
 
+#include "server/gateway/http_access.hpp"
 #include "server/http/endpoints/call_log.hpp"
 #include "server/http/endpoints/device_documents.hpp"
 #include "server/http/endpoints/devices.hpp"
@@ -12,6 +13,26 @@
 namespace rrgate {
 
 namespace {
+
+/// What a request does to a member.
+Verb verb_of(const ObjectRequest& request, const Target& target) {
+  if (!target.member) return Verb::read;
+  const auto& member = *target.member;
+  const bool writes = request.method() == http::verb::put;
+  switch (member.kind) {
+    case rr::MemberKind::property:
+    case rr::MemberKind::memory:
+      return writes ? Verb::write : Verb::read;
+    case rr::MemberKind::wire:
+      if (writes) return Verb::write;
+      return request.wants_events() || request.wants_motion() ? Verb::subscribe : Verb::read;
+    case rr::MemberKind::event:
+    case rr::MemberKind::pipe:
+      return Verb::subscribe;
+    default:
+      return Verb::call;
+  }
+}
 
 rr::awaitable<void> serve_target(const ObjectRequest& request, const Target& target) {
   if (!target.member) {
@@ -35,6 +56,26 @@ rr::awaitable<void> serve_target(const ObjectRequest& request, const Target& tar
   }
 }
 
+/// Why a request for a device, or a service of it, goes no further: there is no right to anything of it, or it is asked
+/// for too much. nullopt: go on, with the pass.
+std::optional<Response> refuse_device(Gateway& gateway, const Request& request, const Device& device,
+                                      std::optional<std::string_view> service, std::optional<RateGate::Pass>& pass) {
+  auto& access = gateway.access();
+  const auto& name = device.config().name;
+  if (!access.sees(request.identity, name, service)) {
+    const auto denied =
+        access.check(request.identity, {name, service.value_or(""), service.value_or(""), {}, Verb::read});
+    if (!denied) {
+      gateway.reject(Rejection::forbidden);
+      return gateway.http_access().refusal(request.identity, denied.error());
+    }
+  }
+  pass = gateway.http_access().enter_device(name, gateway.config().rates);
+  if (pass) return std::nullopt;
+  gateway.reject(Rejection::rate);
+  return HttpAccess::too_much("to device " + rr::quoted(name));
+}
+
 constexpr std::string_view definition_suffix = ".robdef";
 
 bool is_definition(std::string_view name) {
@@ -50,11 +91,13 @@ rr::awaitable<void> serve_document(Gateway& gateway, Device& device, const Objec
   std::vector<std::string> unavailable;
   std::vector<std::string> names;
   if (const auto& identity = device.identity())
-    for (const auto& service : identity->services) names.push_back(service.name);
+    for (const auto& service : identity->services)
+      if (gateway.access().sees(request.request().identity, device.config().name, service.name))
+        names.push_back(service.name);
   const auto device_name = device.config().name;  // a found device may be lost meanwhile
   for (const auto& service : names) {
     auto* still_there = gateway.devices().find(device_name);
-    auto session = still_there ? gateway.sessions().open(*still_there, request.key(service))
+    auto session = still_there ? gateway.sessions().open(*still_there, session_key(gateway, writer.request(), service))
                                : rr::Result<std::shared_ptr<DeviceSession>>(rr::Error{});
     if (session) {
       sessions.push_back(*session);
@@ -93,9 +136,19 @@ rr::awaitable<void> serve(Gateway& gateway, ResponseWriter& writer, std::vector<
     co_await writer.send(response);
     co_return;
   }
+  const bool is_about_all = segments.size() == 2 && (segments[1] == "subscriptions" ||
+                                                     is_device_document(segments[1]) || is_definition(segments[1]));
+  const bool is_object = segments.size() > 1 && !is_about_all;
+  const auto service = is_object ? segments[1] : std::string();
+  std::optional<RateGate::Pass> pass;
+  const auto wanted = is_object ? std::optional<std::string_view>(service) : std::nullopt;
+  if (const auto refusal = refuse_device(gateway, writer.request(), *device, wanted, pass)) {
+    co_await writer.send(*refusal);
+    co_return;
+  }
   if (segments.size() == 1) {
-    auto response =
-        request.is_read() ? describe_device(*device, writer.request()) : request.method_response("GET, HEAD");
+    auto response = request.is_read() ? describe_device(*device, writer.request(), gateway.access())
+                                      : request.method_response("GET, HEAD");
     co_await writer.send(response);
     co_return;
   }
@@ -105,7 +158,7 @@ rr::awaitable<void> serve(Gateway& gateway, ResponseWriter& writer, std::vector<
     co_await writer.send(response);
     co_return;
   }
-  if (segments.size() == 2 && (is_device_document(segments[1]) || is_definition(segments[1]))) {
+  if (!is_object) {
     if (request.is_read()) {
       co_await serve_document(gateway, *device, request, segments[1]);
     } else {
@@ -120,7 +173,7 @@ rr::awaitable<void> serve(Gateway& gateway, ResponseWriter& writer, std::vector<
   const auto method = writer.request().message.method_string();
   const CallLog logged(std::move(trace), device->config().name, {method.data(), method.size()},
                        std::string(writer.request().path()));
-  auto session = gateway.sessions().open(*device, request.key(segments[1]));
+  auto session = gateway.sessions().open(*device, session_key(gateway, writer.request(), service));
   segments.erase(segments.begin(), segments.begin() + 2);
   std::optional<rr::Error> error;
   std::shared_ptr<Target> target;
@@ -133,6 +186,15 @@ rr::awaitable<void> serve(Gateway& gateway, ResponseWriter& writer, std::vector<
   } else {
     error = session.error();
   }
+  if (target)
+    if (const auto allowed =
+            check_access(gateway, writer.request().identity, service, *target, verb_of(request, *target));
+        !allowed) {
+      gateway.reject(Rejection::forbidden);
+      const auto refusal = gateway.http_access().refusal(writer.request().identity, allowed.error());
+      co_await writer.send(refusal);
+      co_return;
+    }
   try {
     if (target) co_await serve_target(request, *target);
   } catch (const rr::Exception& exception) {

@@ -10,11 +10,19 @@ import { theme } from "./theme";
 import type { Theme } from "./theme";
 import type { DeviceList } from "../gateway/devices";
 import type { UsbDeviceList } from "../gateway/usb_devices";
+import type { AccessDesk } from "../gateway/access";
 import { DevicesPage } from "../pages/devices_page";
 import { ServicePage } from "../pages/service_page";
 import { Mark, SunMoonIcon } from "../ui/icons";
 
-export function App({ route, list, usb }: { route: Store<Route>; list: DeviceList; usb: UsbDeviceList }) {
+interface AppParts {
+  route: Store<Route>;
+  list: DeviceList;
+  usb: UsbDeviceList;
+  access: AccessDesk;
+}
+
+export function App({ route, list, usb, access }: AppParts) {
   const where = useStore(route);
   const main = useRef<HTMLElement>(null);
   const title = title_of(where);
@@ -39,7 +47,7 @@ export function App({ route, list, usb }: { route: Store<Route>; list: DeviceLis
         <ThemeButton />
       </header>
       <main id="main" ref={main} tabIndex={-1}>
-        {where.page === "devices" && <DevicesPage list={list} usb={usb} />}
+        {where.page === "devices" && <DevicesPage list={list} usb={usb} access={access} />}
         {where.page === "service" && <ServicePage key={`${where.device}/${where.service}`} route={where} list={list} />}
         {where.page === "unknown" && <UnknownPage address={where.address} />}
       </main>

@@ -7,10 +7,12 @@ import { devices_of } from "../gateway/devices";
 import type { Device, DeviceList, GatewayState, Service } from "../gateway/devices";
 import { is_usb } from "../gateway/usb_devices";
 import type { UsbDeviceList } from "../gateway/usb_devices";
+import type { AccessDesk } from "../gateway/access";
+import { AccessPart } from "./access_part";
 import { StateBadge } from "../ui/state_badge";
 import { clock_time, sentence, span } from "../ui/words";
 
-export function DevicesPage({ list, usb }: { list: DeviceList; usb: UsbDeviceList }) {
+export function DevicesPage({ list, usb, access }: { list: DeviceList; usb: UsbDeviceList; access: AccessDesk }) {
   const state = useStore(list.state);
   const devices = devices_of(state);
   return (
@@ -27,6 +29,7 @@ export function DevicesPage({ list, usb }: { list: DeviceList; usb: UsbDeviceLis
         </ul>
       )}
       {usb.is_possible && <UsbPart usb={usb} />}
+      <AccessPart access={access} />
     </div>
   );
 }

@@ -1,0 +1,238 @@
+#include "server/http/endpoints/access.hpp"
+
+#include "server/access/access_text.hpp"
+#include "server/access/api_tokens.hpp"
+#include "server/definitions/text_file.hpp"
+#include "server/gateway/gateway.hpp"
+#include "server/gateway/http_access.hpp"
+#include "server/http/origin.hpp"
+#include "server/json/json.hpp"
+#include "server/log/log.hpp"
+#include "server/platform/secret_file.hpp"
+
+namespace rrgate {
+
+namespace {
+
+using Json = rr::OrderedJson;
+using Clock = std::chrono::system_clock;
+
+constexpr std::size_t largest_body = 8 * 1024;
+
+Response answer(unsigned status, const Json& json) {
+  return json_response(status, json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+rr::Error bad(std::string what) {
+  return rr::make_error(rr::ErrorCode::invalid_argument, std::move(what));
+}
+
+Response error_answer(const rr::Error& error) {
+  switch (error.code) {
+    case rr::ErrorCode::invalid_argument:
+    case rr::ErrorCode::data_serialization_error:
+      return problem_response(400, error.message);
+    case rr::ErrorCode::resource_not_found:
+      return problem_response(404, error.message);
+    case rr::ErrorCode::invalid_state:
+      return problem_response(409, error.message);
+    case rr::ErrorCode::out_of_system_resource: {
+      auto response = problem_response(429, error.message);
+      response.set("Retry-After", "60");
+      return response;
+    }
+    default:
+      return problem_response(500, error.message);
+  }
+}
+
+/// The body as an object; an empty one is {}. JSON alone: a page of another origin can't send that unasked.
+rr::Result<rr::Json> body_of(const Request& request) {
+  const auto& text = request.message.body();
+  if (text.empty()) return {boost::system::in_place_value, rr::Json::object()};
+  const auto type = request.header(http::field::content_type);
+  if (!equals_ignoring_case(type.substr(0, type.find(';')), "application/json"))
+    return bad("Content-Type is " + rr::quoted(type) + ", expected application/json");
+  if (text.size() > largest_body) return bad("the body has more than 8 KiB");
+  auto json = rr::read_json(text);
+  if (json && !json->is_object()) return bad("expected an object");
+  return json;
+}
+
+/// Empty where it is not there. Errors   invalid_argument: no text.
+rr::Result<std::string> text_of(const rr::Json& body, const char* key) {
+  const auto found = body.find(key);
+  if (found == body.end()) return std::string();
+  if (!found->is_string()) return bad(std::string(key) + " is no string");
+  return found->get<std::string>();
+}
+
+/// Browsers send what they know of a user to other pages' requests too.
+bool is_own_page(Gateway& gateway, const Request& request) {
+  const auto origin = request.header(http::field::origin);
+  return origin.empty() ||
+         is_origin_allowed(origin, request.header(http::field::host), gateway.config().allowed_origins);
+}
+
+std::optional<Response> refuse_page(Gateway& gateway, const Request& request) {
+  if (is_own_page(gateway, request)) return std::nullopt;
+  return problem_response(403, "origin " + rr::quoted(request.header(http::field::origin)) + " is not allowed");
+}
+
+std::optional<Response> refuse_stranger(Gateway& gateway, const Request& request) {
+  const auto allowed = gateway.access().check(request.identity, {.verb = Verb::admin});
+  if (allowed) return std::nullopt;
+  gateway.reject(Rejection::forbidden);
+  return gateway.http_access().refusal(request.identity, allowed.error());
+}
+
+/// Writes a new token into the tokens file, and has it read. Returns it.
+rr::Result<std::string> add_token(Gateway& gateway, const std::string& name, const std::vector<std::string>& roles,
+                                  std::optional<std::chrono::sys_days> last_day) {
+  const auto& file = gateway.access().state().config.tokens_file;
+  if (file.empty())
+    return rr::make_error(rr::ErrorCode::invalid_state, "the gateway has no tokens_file that a token could go into");
+  const auto text = read_text_file(file);
+  if (!text) return rr::make_error(rr::ErrorCode::io_error, "the tokens file can't be read");
+  if (!find_line(*text, name).empty())
+    return rr::make_error(rr::ErrorCode::invalid_state,
+                          "there is a token of the name " + rr::quoted(name) + " already");
+  auto token = make_api_token();
+  const auto line =
+      name + " " + hash_api_token(token) + " " + format_roles(roles) + " " + (last_day ? format_day(*last_day) : "_");
+  if (auto done = rr::write_secret(file, with_line(*text, name, line), true); !done) return done.error();
+  gateway.access().reload(false);
+  return token;
+}
+
+Response approve(Gateway& gateway, const Request& request, const std::string& id) {
+  const auto body = body_of(request);
+  if (!body) return error_answer(body.error());
+  std::vector<std::string> roles;
+  if (const auto found = body->find("roles"); found != body->end()) {
+    if (!found->is_array()) return error_answer(bad("roles is no array"));
+    for (const auto& role : *found) {
+      if (!role.is_string()) return error_answer(bad("a role is no string"));
+      if (auto checked = check_name("role", role.get<std::string>()); !checked) return error_answer(checked.error());
+      roles.push_back(role.get<std::string>());
+    }
+  }
+  std::optional<std::chrono::sys_days> last_day;
+  if (const auto days = body->find("days"); days != body->end()) {
+    if (!days->is_number_integer() || *days < 1 || *days > 36500) return error_answer(bad("days: expected 1 to 36500"));
+    last_day = std::chrono::floor<std::chrono::days>(Clock::now()) + std::chrono::days(days->get<int>());
+  }
+  auto& requests = gateway.http_access().requests();
+  const auto pending = requests.find_pending(id, Clock::now());
+  if (!pending) return error_answer(pending.error());
+  auto token = add_token(gateway, pending->name, roles, last_day);
+  if (!token) return error_answer(token.error());
+  requests.decide(id, std::move(*token));
+  gateway.access().record({"approved", &request.identity, nullptr, pending->name + " of " + pending->client});
+  return answer(200, {{"state", "approved"}});
+}
+
+Response deny(Gateway& gateway, const Request& request, const std::string& id) {
+  auto& requests = gateway.http_access().requests();
+  const auto pending = requests.find_pending(id, Clock::now());
+  if (!pending) return error_answer(pending.error());
+  requests.decide(id, {});
+  gateway.access().record({"denied", &request.identity, nullptr, pending->name + " of " + pending->client});
+  return answer(200, {{"state", "denied"}});
+}
+
+Response claim(Gateway& gateway, const Request& request, const std::string& id) {
+  const auto body = body_of(request);
+  if (!body) return error_answer(body.error());
+  const auto secret = text_of(*body, "secret");
+  if (!secret) return error_answer(secret.error());
+  const auto found = gateway.http_access().requests().claim(id, *secret, Clock::now());
+  if (!found) return error_answer(found.error());
+  Json out{{"state", std::string(to_string(found->state))}};
+  if (!found->token.empty()) out["token"] = found->token;
+  return answer(200, out);
+}
+
+}  // namespace
+
+Handler who_endpoint(Gateway& gateway) {
+  return [&gateway](const Request& request, std::string_view) {
+    const auto& who = request.identity;
+    const auto& access = gateway.access();
+    Json out;
+    out["user"] = nullptr;
+    if (who.is_proven()) out["user"] = who.name;
+    out["roles"] = who.roles;
+    out["proof"] = std::string(to_string(who.proof));
+    out["login"] = !access.is_open();
+    out["requests"] = !access.state().config.tokens_file.empty();
+    out["admin"] = !access.is_open() && access.state().rules.check(who, {.verb = Verb::admin}).has_value();
+    return answer(200, out);
+  };
+}
+
+Handler tickets_endpoint(Gateway& gateway) {
+  return [&gateway](const Request& request, std::string_view) {
+    auto& http_access = gateway.http_access();
+    if (auto refusal = refuse_page(gateway, request)) return std::move(*refusal);
+    if (!request.identity.is_proven() && !gateway.access().is_open())
+      return http_access.refusal(request.identity, rr::make_error(rr::ErrorCode::authentication_error,
+                                                                  "a ticket is for who has shown who he is"));
+    const auto ticket = http_access.tickets().issue(request.identity, std::chrono::steady_clock::now());
+    if (!ticket) return HttpAccess::too_much("for tickets");
+    return answer(201, {{"ticket", *ticket}, {"expires_in", Tickets::lifetime.count()}});
+  };
+}
+
+Handler ask_endpoint(Gateway& gateway) {
+  return [&gateway](const Request& request, std::string_view) {
+    if (auto refusal = refuse_page(gateway, request)) return std::move(*refusal);
+    if (gateway.access().state().config.tokens_file.empty())
+      return problem_response(409, "nobody can be given access here: the gateway has no tokens_file");
+    const auto body = body_of(request);
+    if (!body) return error_answer(body.error());
+    const auto name = text_of(*body, "name");
+    const auto reason = text_of(*body, "reason");
+    if (!name || !reason) return error_answer(name ? reason.error() : name.error());
+    const auto asked = gateway.http_access().requests().ask(*name, *reason, request.arrival.peer,
+                                                            request.arrival.address.to_string(), Clock::now());
+    if (!asked) return error_answer(asked.error());
+    log(LogLevel::info, "access asked for", {{"name", *name}, {"peer", request.arrival.peer}, {"reason", *reason}});
+    gateway.access().record({"asked", &request.identity, nullptr, *name});
+    const auto lifetime = std::chrono::seconds(AccessRequests::lifetime).count();
+    return answer(202, {{"id", asked->id}, {"secret", asked->secret}, {"expires_in", lifetime}});
+  };
+}
+
+Handler requests_endpoint(Gateway& gateway) {
+  return [&gateway](const Request& request, std::string_view) {
+    if (auto refusal = refuse_stranger(gateway, request)) return std::move(*refusal);
+    auto list = Json::array();
+    for (const auto& each : gateway.http_access().requests().list(Clock::now()))
+      list.push_back({{"id", each.id},
+                      {"name", each.name},
+                      {"reason", each.reason},
+                      {"client", each.client},
+                      {"state", std::string(to_string(each.state))},
+                      {"asked", Clock::to_time_t(each.asked)}});
+    Json out;
+    out["requests"] = std::move(list);
+    return answer(200, out);
+  };
+}
+
+Handler request_endpoint(Gateway& gateway) {
+  return [&gateway](const Request& request, std::string_view rest) {
+    if (auto refusal = refuse_page(gateway, request)) return std::move(*refusal);
+    const auto slash = rest.find('/');
+    const std::string id(rest.substr(0, slash));
+    const auto what = slash == std::string_view::npos ? std::string_view() : rest.substr(slash + 1);
+    if (what == "claim") return claim(gateway, request, id);
+    if (what != "approve" && what != "deny")
+      return problem_response(404, "expected .../requests/ID/approve, deny or claim");
+    if (auto refusal = refuse_stranger(gateway, request)) return std::move(*refusal);
+    return what == "approve" ? approve(gateway, request, id) : deny(gateway, request, id);
+  };
+}
+
+}  // namespace rrgate

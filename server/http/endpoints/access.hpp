@@ -1,0 +1,24 @@
+// Who one is, tickets for upgrades, requests of access. Layer: server/http.
+#pragma once
+
+#include "server/http/router.hpp"
+
+namespace rrgate {
+
+class Gateway;
+
+/// GET /api/v1/access: {"user","roles","proof","login": whether there is anything to prove,"requests": whether one may
+/// ask for access,"admin": whether one decides on that}; user is null for who has shown nothing.
+Handler who_endpoint(Gateway& gateway);
+/// POST /api/v1/tickets: {"ticket","expires_in"}, for the upgrade .../devices/NAME?ticket=TICKET, once.
+Handler tickets_endpoint(Gateway& gateway);
+
+/// POST /api/v1/access/requests {"name","reason"}, by anybody: 202 {"id","secret","expires_in"}.
+Handler ask_endpoint(Gateway& gateway);
+/// GET /api/v1/access/requests, for admins: {"requests":[{"id","name","reason","client","state","asked"}]}.
+Handler requests_endpoint(Gateway& gateway);
+/// POST /api/v1/access/requests/ID/approve {"roles":[...],"days":N}, .../deny, for admins; .../claim {"secret"}, by who
+/// has asked: {"state"} and, the first time after approval, {"token"}.
+Handler request_endpoint(Gateway& gateway);
+
+}  // namespace rrgate

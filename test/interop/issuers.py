@@ -1,0 +1,93 @@
+"""What an operator's other programs make: JSON Web Tokens, and certificates of people."""
+import base64
+import datetime
+import hashlib
+import hmac
+import json
+import time
+
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import ec, ed25519, padding, rsa, utils
+from cryptography.x509.oid import NameOID
+
+ALGORITHMS = ("RS256", "ES256", "EdDSA")
+
+
+def encoded(data):
+    data = data if isinstance(data, bytes) else json.dumps(data).encode()
+    return base64.urlsafe_b64encode(data).rstrip(b"=").decode()
+
+
+def number(value, size=None):
+    return encoded(value.to_bytes(size or (value.bit_length() + 7) // 8, "big"))
+
+
+class Issuer:
+    def __init__(self, name, audience):
+        self.name, self.audience = name, audience
+        self.rsa = rsa.generate_private_key(public_exponent=65537, key_size=2048)
+        self.ec = ec.generate_private_key(ec.SECP256R1())
+        self.ed = ed25519.Ed25519PrivateKey.generate()
+
+    def key_set(self):
+        public = self.rsa.public_key().public_numbers()
+        point = self.ec.public_key().public_numbers()
+        raw = self.ed.public_key().public_bytes(serialization.Encoding.Raw, serialization.PublicFormat.Raw)
+        return {"keys": [
+            {"kty": "RSA", "kid": "RS256", "use": "sig", "alg": "RS256", "n": number(public.n), "e": number(public.e)},
+            {"kty": "EC", "kid": "ES256", "crv": "P-256", "x": number(point.x, 32), "y": number(point.y, 32)},
+            {"kty": "OKP", "kid": "EdDSA", "crv": "Ed25519", "x": encoded(raw)},
+        ]}
+
+    def _text(self, user, roles, header, seconds=600):
+        claims = {"iss": self.name, "aud": [self.audience], "sub": user, "roles": roles, "exp": int(time.time()) + seconds}
+        return encoded(header) + "." + encoded(claims)
+
+    def token(self, user, roles, algorithm, seconds=600):
+        text = self._text(user, roles, {"alg": algorithm, "kid": algorithm, "typ": "JWT"}, seconds)
+        if algorithm == "RS256":
+            signature = self.rsa.sign(text.encode(), padding.PKCS1v15(), hashes.SHA256())
+        elif algorithm == "ES256":
+            r, s = utils.decode_dss_signature(self.ec.sign(text.encode(), ec.ECDSA(hashes.SHA256())))
+            signature = r.to_bytes(32, "big") + s.to_bytes(32, "big")
+        else:
+            signature = self.ed.sign(text.encode())
+        return text + "." + encoded(signature)
+
+    def unsigned(self, user, roles):
+        return self._text(user, roles, {"alg": "none"}) + "."
+
+    def signed_with_public_key(self, user, roles):
+        """With what everybody knows, taken for a secret."""
+        secret = self.rsa.public_key().public_bytes(serialization.Encoding.PEM, serialization.PublicFormat.SubjectPublicKeyInfo)
+        text = self._text(user, roles, {"alg": "HS256", "kid": "RS256"})
+        return text + "." + encoded(hmac.digest(secret, text.encode(), hashlib.sha256))
+
+
+class People:
+    """A CA, and certificates of it by name."""
+
+    def __init__(self, folder):
+        folder.mkdir(exist_ok=True)
+        self.folder, self.ca = folder, folder / "people-ca.pem"
+        self._key = ec.generate_private_key(ec.SECP256R1())
+        self._name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "People of the lab")])
+        self.ca.write_bytes(self._make(self._name, self._key, True).public_bytes(serialization.Encoding.PEM))
+
+    def _make(self, name, key, is_ca):
+        now = datetime.datetime.now(datetime.timezone.utc)
+        return x509.CertificateBuilder().subject_name(name).issuer_name(self._name).public_key(key.public_key()) \
+            .serial_number(x509.random_serial_number()).not_valid_before(now - datetime.timedelta(hours=1)) \
+            .not_valid_after(now + datetime.timedelta(days=1)) \
+            .add_extension(x509.BasicConstraints(is_ca, None), True).sign(self._key, hashes.SHA256())
+
+    def certificate(self, name):
+        """The files of certificate and key."""
+        key = ec.generate_private_key(ec.SECP256R1())
+        made = self._make(x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)]), key, False)
+        files = self.folder / f"{name}.pem", self.folder / f"{name}.key"
+        files[0].write_bytes(made.public_bytes(serialization.Encoding.PEM))
+        files[1].write_bytes(key.private_bytes(serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8,
+                                               serialization.NoEncryption()))
+        return files

@@ -1,0 +1,60 @@
+// Requests of access, for those who decide on them.
+// Layer: web/pages.
+
+import { useState } from "preact/hooks";
+import { useStore } from "../app/store";
+import type { AccessDesk, AccessRequest } from "../gateway/access";
+import { sentence } from "../ui/words";
+
+export function AccessPart({ access }: { access: AccessDesk }) {
+  const who = useStore(access.who);
+  const pending = useStore(access.pending);
+  const trouble = useStore(access.trouble);
+  if (!who?.login || (pending.length === 0 && trouble === null)) return null;
+  return (
+    <section class="access-part" aria-label="Requests of access">
+      <h2 class="place-name">Access</h2>
+      <ul class="devices">
+        {pending.map((request) => (
+          <RequestRow key={request.id} request={request} access={access} />
+        ))}
+      </ul>
+      {trouble !== null && (
+        <p class="failure" role="alert">
+          {sentence(trouble)}
+        </p>
+      )}
+    </section>
+  );
+}
+
+function RequestRow({ request, access }: { request: AccessRequest; access: AccessDesk }) {
+  const [roles, set_roles] = useState("viewer");
+  const words = roles.split(/[\s,]+/).filter((role) => role !== "");
+  return (
+    <li class="device" data-request={request.name}>
+      <p>
+        <strong>{request.name}</strong> from <span class="code">{request.client}</span> asks for access
+        {request.reason !== "" && <>: {request.reason}</>}
+      </p>
+      <form
+        class="access-form"
+        onSubmit={(event) => {
+          event.preventDefault();
+          void access.approve(request, words);
+        }}
+      >
+        <label>
+          Roles{" "}
+          <input type="text" value={roles} onInput={(event) => set_roles(event.currentTarget.value)} />
+        </label>
+        <button class="button" type="submit" disabled={words.length === 0}>
+          Approve
+        </button>
+        <button class="button" type="button" onClick={() => void access.deny(request)}>
+          Deny
+        </button>
+      </form>
+    </li>
+  );
+}
