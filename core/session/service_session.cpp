@@ -229,6 +229,11 @@ void ServiceSession::flush_wires(Now now) {
   }
 }
 
+void ServiceSession::note_conflated(std::string_view path, const MemberDefinition& member, std::uint64_t count) {
+  const auto wire = wires_.find(PathMemberView{path, member.name});
+  if (wire != wires_.end()) wire->second.ledger.conflated += count;
+}
+
 void ServiceSession::answer_wire(std::string_view path, const MemberDefinition& member, const Result<>& result,
                                  Now now) {
   const auto wire = wires_.find(PathMemberView{path, member.name});

@@ -212,6 +212,8 @@ class ServiceSession {
   /// The same for a value that is of another time, and came here at `arrived`.
   Result<> send_wire(std::string_view path, const MemberDefinition& member, const WireValue& value, TimePoint arrived,
                      Now now);
+  /// Values of a wire were replaced before they came here: for its ledger.
+  void note_conflated(std::string_view path, const MemberDefinition& member, std::uint64_t count);
   /// Answers WireConnected of a remote service, where it is not answered yet.
   void answer_wire(std::string_view path, const MemberDefinition& member, const Result<>& result, Now now);
   /// Ends the client's connection to this wire, if it has one, and tells the client.

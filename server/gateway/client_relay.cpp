@@ -5,11 +5,10 @@
 
 namespace rrgate {
 
-rr::Result<> may_relay(Gateway& gateway, const Connection& connection, const Device* device) {
+rr::Result<> may_relay(Gateway& gateway, const Connection& connection, const Device& device) {
   auto& access = gateway.access();
   if (access.is_open()) return {};
-  auto allowed = device ? access.check_whole_device(connection.identity, device->config().name)
-                        : access.check(connection.identity, {.verb = Verb::admin});
+  auto allowed = access.check_whole_device(connection.identity, device.config().name);
   if (!allowed) gateway.reject(Rejection::forbidden);
   return allowed;
 }

@@ -16,10 +16,9 @@ struct Boarding {
   std::unique_ptr<rr::ByteStream> stream;
 };
 
-/// Whether a client's bytes may pass to a device unread: only where he could do everything to it. The same holds for
-/// shared devices, until each member is judged there. Null: the gateway's own node, which is for admins.
+/// Whether a client's bytes may pass to a device unread: only where he could do everything to it.
 /// Errors   permission_denied; the text is for the client.
-rr::Result<> may_relay(Gateway& gateway, const Connection& connection, const Device* device);
+rr::Result<> may_relay(Gateway& gateway, const Connection& connection, const Device& device);
 
 /// `way`    see Device::connect().
 /// Errors   connection_error: the device is full or can't be reached; the text is for the client.

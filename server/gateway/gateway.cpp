@@ -44,7 +44,8 @@ Gateway::Gateway(asio::io_context& io, Config config)
       sessions_(io.get_executor()),
       admission_(config_.limits.clients, config_.limits.clients_per_address),
       router_(make_routes(*this)),
-      shared_(config_.node.id.is_any() ? rr::random_node_id() : config_.node.id, config_),
+      shared_(config_.node.id.is_any() ? rr::random_node_id() : config_.node.id, config_,
+              [this] { return access_.authenticator(); }),
       files_watch_(io),
       drained_(io) {}
 

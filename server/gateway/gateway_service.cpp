@@ -50,9 +50,8 @@ GatewayService::GatewayService(asio::io_context& io, Gateway& gateway)
 
 void GatewayService::add_members() {
   service_->property("version").get([] { return std::string(RRGATE_VERSION); });
-  service_->property("uptime").get([this] {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun_).count();
-  });
+  service_->property("uptime").get(
+      [this] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun_).count(); });
   service_->property("devices").get([this] { return list_devices(); });
   service_->property("subscriptions").get([this] { return list_subscriptions(); });
   service_->function("find_device", [this](const std::string& wanted) {

@@ -96,7 +96,8 @@ rr::awaitable<void> serve_native_client(Gateway& gateway, Connection& connection
   const auto destination =
       find_destination(gateway, request.header.receiver_node_id, request.header.receiver_node_name);
   rr::Error refusal;
-  const auto allowed = destination ? may_relay(gateway, connection, destination->device) : rr::Result<>();
+  const bool is_relayed = destination && !destination->node;
+  const auto allowed = is_relayed ? may_relay(gateway, connection, *destination->device) : rr::Result<>();
   if (note_circle(gateway, request.header.sender_node_id)) {
     refusal = rr::make_error(rr::ErrorCode::connection_error, "the way leads back to the gateway that it began at");
   } else if (!allowed) {

@@ -16,6 +16,7 @@ namespace {
 constexpr std::size_t max_slices = 32;
 
 Error stream_error(const error_code& error) {
+  if (error == asio::error::timed_out) return make_error(ErrorCode::connection_error, "peer too slow: it takes no data");
   return make_error(ErrorCode::connection_error, "connection lost: " + error.message());
 }
 
@@ -91,7 +92,7 @@ awaitable<void> StreamDriver::write_waiting(std::shared_ptr<StreamDriver> self) 
     slices.push_back(slice);
     bytes += slice.size();
   }
-  const auto error = co_await driver.stream_->write(slices);
+  const auto error = co_await driver.stream_->write(slices);  // timed_out: the peer took nothing for too long
   driver.is_writing_ = false;
   if (driver.is_closed_) co_return;
   const Now now = read_clocks();

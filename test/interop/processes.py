@@ -105,10 +105,11 @@ def read_json(url, asked_from=""):
         connection.close()
 
 
-def start_gateway(folder, device_url, page_origin=None, device={}, asked_from="", host=None, on=None, port=None, **more):
+def start_gateway(folder, device_url, page_origin=None, device={}, asked_from="", host=None, on=None, port=None, is_up=None, **more):
     """A gateway to one device, called "interop", when it has reached it: (process, port). `device` and `more` are
     further members of the device's configuration and of the whole; it is asked how it is from `asked_from`. `on` makes
-    the command that runs it elsewhere, `host` is a network.Network and a host of it to run it on. `port`: that one."""
+    the command that runs it elsewhere, `host` is a network.Network and a host of it to run it on. `port`: that one.
+    `is_up` says when the device is reached, where that is not for everybody to see."""
     port = port or free_port()
     config = folder / "gateway.json"
     config.write_text(json.dumps({
@@ -127,7 +128,7 @@ def start_gateway(folder, device_url, page_origin=None, device={}, asked_from=""
         return answer is not None and answer["devices"][0]["state"] == "online"
 
     try:
-        gateway.wait_until(device_is_up)
+        gateway.wait_until(is_up or device_is_up)
     except BaseException:
         gateway.stop()
         raise

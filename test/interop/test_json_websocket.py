@@ -296,10 +296,11 @@ def test_users_and_locks(gateway):
 
 
 def test_bounds(page):
-    for _ in range(256):
-        page.send("subscribe", "changed")
-    for number in range(1, 257):
-        assert "error" not in page.next(id=number)
+    for first in range(1, 257, 32):  # 64 may be unanswered at a time
+        for _ in range(32):
+            page.send("subscribe", "changed")
+        for number in range(first, first + 32):
+            assert "error" not in page.next(id=number)
     assert page.refusal("subscribe", "changed")[0] == "OutOfSystemResource"
     assert page.ask("unsubscribe", subscription=7) is None
     page.ask("subscribe", "changed")

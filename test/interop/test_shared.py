@@ -5,6 +5,7 @@ import pathlib
 import sys
 import threading
 
+import numpy
 import pytest
 import RobotRaconteur as RR
 
@@ -12,6 +13,7 @@ from clients import run_program
 from directions import DIRECTIONS, service_command
 from processes import BUILD, Background, read_json, start_gateway
 from scenarios import POSE
+from test_access import PASSWORDS, RULES, make_users
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent / "peers"))
 import quiet_node  # noqa: E402
@@ -214,6 +216,65 @@ def test_who_answers_callbacks(node, tmp_path, answer):
         assert second.answered in ((10.0,) if answer == "first" else (10.0, 11.0))
         node.DisconnectService(first)
         node.DisconnectService(second)
+    finally:
+        gateway.stop()
+        service.stop()
+
+
+def test_rights_member_by_member(node, tmp_path):
+    """Users of the gateway in a shared session, each verb against what the rules say."""
+    service, url = start_service(tmp_path)
+    make_users(tmp_path)
+    gateway, port = start_gateway(tmp_path, url, device={"mode": "shared"}, is_up=lambda: True,
+                                  access={"users_file": "users", "rules": RULES, "audit_file": "audit"})
+    shared_url = f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop"
+
+    def write_memory(root):
+        root.m_numbers.Write(0, numpy.array([1.0]), 0, 1)
+
+    attempts = {
+        "read": lambda root: root.p_double,
+        "write": lambda root: setattr(root, "p_double", 2.5),
+        "call": lambda root: root.add(1.0, 2.0),
+        "other write": lambda root: setattr(root, "p_int32", 1),
+        "other call": lambda root: root.nothing(),
+        "memory": write_memory,
+        "peek": lambda root: root.both.PeekInValue(),
+        "poke": lambda root: root.both.PokeOutValue(1.0),
+        "subscribe": lambda root: root.state.Connect().Close(),
+        "pipe": lambda root: root.greetings.Connect(-1).Close(),
+        "below": lambda root: root.get_head().size,
+        "below call": lambda root: root.get_head().identify(),
+        "lock": lambda root: node.RequestObjectLock(root, RR.RobotRaconteurObjectLockFlags_CLIENT_LOCK),
+    }
+    looks = {"read", "peek", "subscribe", "pipe", "below"}
+    may = {None: set(), "vera": looks, "alice": looks | {"write", "call"}, "root": set(attempts)}
+    try:
+        def is_online():
+            try:
+                node.DisconnectService(node.ConnectService(shared_url))
+                return True
+            except (RR.ServiceNotFoundException, RR.ConnectionException, RR.NodeNotFoundException):
+                return False
+        gateway.wait_until(is_online)
+        with pytest.raises(RR.AuthenticationException):
+            node.ConnectService(shared_url, "alice", {"password": RR.VarValue("wrong", "string")})
+        for user, allowed in may.items():
+            login = (user, {"password": RR.VarValue(PASSWORDS[user], "string")}) if user else ()
+            root = node.ConnectService(shared_url, *login)
+            for what, attempt in attempts.items():
+                try:
+                    attempt(root)
+                    denied = False
+                except RR.PermissionDeniedException as error:
+                    assert "may not" in str(error), str(error)
+                    denied = True
+                except RR.RobotRaconteurException:  # the device's own affair: it was asked
+                    denied = False
+                assert denied == (what not in allowed), (user, what)
+            node.DisconnectService(root)
+        lines = [json.loads(line) for line in (tmp_path / "audit").read_text().splitlines()]
+        assert any(line.get("user") == "vera" and line.get("member") == "p_double" for line in lines), lines[-5:]
     finally:
         gateway.stop()
         service.stop()

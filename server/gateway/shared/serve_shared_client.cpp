@@ -3,6 +3,7 @@
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/use_awaitable.hpp>
 
+#include "server/gateway/shared/shared_access.hpp"
 #include "server/log/log.hpp"
 
 namespace rrgate {
@@ -48,6 +49,7 @@ rr::awaitable<void> serve_shared_client(Gateway& gateway, Connection& connection
   arrival.peer = connection.client;
   arrival.base_url = std::move(base_url);
   arrival.is_encrypted = connection.peer.is_encrypted;
+  arrival.admit = make_admission(gateway.access(), *destination.node, connection.identity);
   asio::steady_timer over(client->executor(), asio::steady_timer::time_point::max());
   bool has_ended = false;
   const auto ended = [&] {

@@ -147,6 +147,10 @@ void SharedClient::answer_wire(const std::string& path, const rr::MemberDefiniti
   settle();
 }
 
+void SharedClient::note_conflated(const std::string& path, const rr::MemberDefinition& wire, std::uint64_t count) {
+  session_.note_conflated(path, wire, count);
+}
+
 void SharedClient::close_wire(const std::string& path, const rr::MemberDefinition& wire) {
   wires_.erase({path, &wire});
   session_.close_wire(path, wire, rr::read_clocks());
@@ -239,7 +243,12 @@ void SharedClient::handle(const rr::CallbackCompleted& completed) {
   if (found) found.mapped()(completed.result);
 }
 
-// --- logins: the device judges them, by a session of this client's own ---
+void SharedClient::answer_login(rr::LoginId id, rr::Result<rr::AuthenticatedUser> result) {
+  session_.answer_login(id, std::move(result), rr::read_clocks());
+  settle();
+}
+
+// --- logins: where the gateway has no users, the device judges them, by a session of this client's own ---
 
 void SharedClient::handle(const rr::LoginRequested& login) {
   const auto service = service_ ? service_ : owner_->find_service(login.attempt.service);
@@ -247,6 +256,7 @@ void SharedClient::handle(const rr::LoginRequested& login) {
     return session_.answer_login(
         login.id, rr::make_error(rr::ErrorCode::authentication_error, "Authentication Failed"), rr::read_clocks());
   const auto self = std::static_pointer_cast<SharedClient>(shared_from_this());
+  if (!service->is_for_device(*login.authenticator)) return owner_->judge_login(login, self);
   asio::co_spawn(executor(), log_in_at_device(self, service, login), asio::detached);
 }
 
@@ -324,6 +334,7 @@ void SharedClient::handle(const rr::LockWanted& wanted) {
 
 rr::awaitable<void> SharedClient::take_lock(std::shared_ptr<SharedClient> self, rr::LockWanted wanted) {
   auto& client = *self;
+  if (!client.service_) co_return;
   if (!client.locker_) {
     const auto upstream = client.service_->make_upstream(client.service_->device()->config().login);
     const auto opened = co_await upstream->open();

@@ -19,6 +19,8 @@ class SharedClientOwner {
  public:
   /// Null: the service index.
   virtual std::shared_ptr<SharedService> find_service(std::string_view name) const = 0;
+  /// Has a login judged, and answered with client.answer_login().
+  virtual void judge_login(const rr::LoginRequested& login, const std::shared_ptr<SharedClient>& client) = 0;
   virtual void client_ended(SharedClient& client) = 0;
 
  protected:
@@ -34,6 +36,7 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   const std::string& peer() const { return peer_; }
   /// Null while it has not connected to a service.
   const std::shared_ptr<SharedService>& service() const { return service_; }
+  void answer_login(rr::LoginId id, rr::Result<rr::AuthenticatedUser> result);
   /// Tells the client that its service ends, then closes.
   void close_service();
   /// Why the gateway has closed it; empty where it has not.
@@ -73,6 +76,7 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   void receive_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::WireValue& value,
                     rr::TimePoint arrived) override;
   void answer_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::Result<>& result) override;
+  void note_conflated(const std::string& path, const rr::MemberDefinition& wire, std::uint64_t count) override;
   void close_wire(const std::string& path, const rr::MemberDefinition& wire) override;
   void accept_pipe(rr::PipeId id) override;
   void refuse_pipe(rr::PipeId id, const rr::Error& error) override;

@@ -14,7 +14,8 @@ namespace rrgate {
 class SharedDevice {
  public:
   /// The other arguments outlive it.
-  SharedDevice(std::shared_ptr<Device> device, SharedNode& gateway_node, const Config& config);
+  SharedDevice(std::shared_ptr<Device> device, SharedNode& gateway_node, const Config& config,
+               SharedNode::FindAuthenticator find_authenticator);
   ~SharedDevice();
 
   SharedNode& node() { return node_; }
@@ -35,8 +36,8 @@ class SharedDevice {
 
 class SharedDevices {
  public:
-  /// `config`  outlives it.
-  SharedDevices(const rr::NodeId& id, const Config& config);
+  /// `config`  outlives it. `find_authenticator`: see SharedNode.
+  SharedDevices(const rr::NodeId& id, const Config& config, SharedNode::FindAuthenticator find_authenticator);
   ~SharedDevices() { stop(); }
 
   /// The gateway's own node: services of shared devices whose names are free there.
@@ -64,6 +65,7 @@ class SharedDevices {
 
  private:
   const Config& config_;
+  SharedNode::FindAuthenticator find_authenticator_;
   SharedNode node_;
   std::map<const Device*, std::unique_ptr<SharedDevice>> devices_;
   std::shared_ptr<SharedService> own_service_;

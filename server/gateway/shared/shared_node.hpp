@@ -1,7 +1,7 @@
 // A node that is the gateway: its own, or the one that stands for a shared device. Layer: server/gateway.
 #pragma once
 
-#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/thread_pool.hpp>
 #include <functional>
 #include <map>
 #include <memory>
@@ -23,7 +23,7 @@ class SharedNode final : public ServiceBoard, public SharedClientOwner {
  public:
   /// `config`  outlives it.
   SharedNode(rr::NodeIdentity identity, const Config& config) : config_(config), directory_(std::move(identity)) {}
-  ~SharedNode() { close(); }
+  ~SharedNode();
   SharedNode(const SharedNode&) = delete;
   SharedNode& operator=(const SharedNode&) = delete;
 
@@ -37,15 +37,27 @@ class SharedNode final : public ServiceBoard, public SharedClientOwner {
   /// Tells all clients that their services end.
   void close();
 
+  /// Who judges logins; asked when a service is published. None: each device its own.
+  using FindAuthenticator = std::function<std::shared_ptr<const rr::Authenticator>()>;
+  void set_authenticator(FindAuthenticator find) { find_authenticator_ = std::move(find); }
+  /// The name of the device that a service is of; empty where there is no such service, or the index.
+  std::string device_of(std::string_view service) const;
+
+  std::shared_ptr<const rr::Authenticator> authenticator() const override {
+    return find_authenticator_ ? find_authenticator_() : nullptr;
+  }
   void publish(const std::shared_ptr<rr::HostedService>& hosted, SharedService& service) override;
   void withdraw(const rr::HostedService& hosted) override;
 
  private:
   std::shared_ptr<SharedService> find_service(std::string_view name) const override;
+  void judge_login(const rr::LoginRequested& login, const std::shared_ptr<SharedClient>& client) override;
   void client_ended(SharedClient& client) override;
 
   const Config& config_;
   rr::ServiceDirectory directory_;
+  FindAuthenticator find_authenticator_;
+  std::unique_ptr<boost::asio::thread_pool> judges_;  ///< of logins; there once somebody has tried to log in
   std::map<std::string, std::pair<const rr::HostedService*, std::weak_ptr<SharedService>>, std::less<>> services_;
   std::map<SharedClient*, std::shared_ptr<SharedClient>> clients_;
   std::map<SharedClient*, std::function<void()>> ended_;

@@ -138,7 +138,8 @@ rr::Result<> SharedService::publish() {
   hosted_ = std::move(*hosted);
   hosted_->set_remote();
   rr::SecurityPolicy policy;
-  policy.authenticator = for_device_;
+  policy.authenticator = boards_.front()->authenticator();
+  if (!policy.authenticator) policy.authenticator = for_device_;
   policy.require_valid_user = upstream_->requires_user();
   hosted_->set_policy(policy);
   for (auto* board : boards_) board->publish(hosted_, *this);

@@ -19,6 +19,8 @@ class SharedService;
 /// Where a service is offered: on the node of its device, and on the gateway's.
 class ServiceBoard {
  public:
+  /// Who judges logins; null: the device does.
+  virtual std::shared_ptr<const rr::Authenticator> authenticator() const = 0;
   /// Where the name is taken already, the service is not offered there.
   virtual void publish(const std::shared_ptr<rr::HostedService>& hosted, SharedService& service) = 0;
   virtual void withdraw(const rr::HostedService& hosted) = 0;

@@ -1,6 +1,7 @@
 #include "server/gateway/shared/upstream.hpp"
 
 #include <algorithm>
+#include <boost/asio/post.hpp>
 
 #include "core/session/service_path.hpp"
 #include "core/support/glob.hpp"
@@ -9,6 +10,8 @@
 #include "server/node/async_object.hpp"
 
 namespace rrgate {
+
+namespace asio = boost::asio;
 
 namespace {
 
@@ -140,9 +143,7 @@ void Upstream::watch_object(const std::string& path, const rr::EntityDefinition&
                               if (!self) return;
                               const auto clients = self->clients_;  // they may leave
                               for (auto* client : clients)
-                                if (std::find(self->clients_.begin(), self->clients_.end(), client) !=
-                                    self->clients_.end())
-                                  client->receive_event(path, member, arguments);
+                                if (self->has(*client)) client->receive_event(path, member, arguments);
                             });
     } else if (member.kind == rr::MemberKind::callback) {
       connection_->on_callback_later(
@@ -188,7 +189,8 @@ void Upstream::handle_released(const std::string& path) {
   std::erase_if(generators_, [&](const auto& each) { return rr::is_within(each.second.path, path); });
   if (on_released_) on_released_(path);
   const auto clients = clients_;
-  for (auto* client : clients) client->release_path(path);
+  for (auto* client : clients)
+    if (has(*client)) client->release_path(path);
 }
 
 // --- requests ---
@@ -274,9 +276,7 @@ void Upstream::answer_generator(UpstreamClient& client, const rr::Called& called
       const auto self = weak.lock();
       if (index && self && self->connection_) {
         const auto number = index->to<std::int32_t>().value();
-        const bool is_there =
-            std::find(self->clients_.begin(), self->clients_.end(), key.first) != self->clients_.end();
-        if (is_there)
+        if (self->has(*key.first))
           self->generators_[key] = {path, name, number};
         else
           self->connection_->close_generator(path, name, number, ignore);
@@ -341,8 +341,9 @@ void Upstream::join_wire(UpstreamClient& client, const std::string& path, const 
   if (wire.is_attached) {
     const auto newest = wire.newest;  // the client may leave
     const auto arrived = wire.arrived;
+    const bool is_due = wire.is_due;
     client.answer_wire(path, member, {});
-    if (newest) client.receive_wire(path, member, *newest, arrived);
+    if (newest && !is_due) client.receive_wire(path, member, *newest, arrived);
   } else if (wire.clients.size() == 1) {
     attach_wire(key);
   }
@@ -394,6 +395,23 @@ void Upstream::publish_wire(const MemberKey& key, const rr::Value& value, rr::Ti
   auto& wire = found->second;
   wire.newest = rr::WireValue{time, value};
   wire.arrived = std::chrono::steady_clock::now();
+  if (wire.is_due) {
+    ++wire.conflated;
+    return;
+  }
+  // Not here: one read may bring hundreds of values, of which the last one counts, and everybody else has to get a turn.
+  wire.is_due = true;
+  asio::post(device_->executor(), [weak = weak_from_this(), key] {
+    if (const auto self = weak.lock()) self->hand_out(key);
+  });
+}
+
+void Upstream::hand_out(const MemberKey& key) {
+  const auto found = wires_.find(key);
+  if (found == wires_.end() || !found->second.newest) return;
+  auto& wire = found->second;
+  wire.is_due = false;
+  const auto conflated = std::exchange(wire.conflated, 0);
   // Clients may leave while they are sent to: the value and the list must stay.
   const auto clients = wire.clients;
   const auto newest = *wire.newest;
@@ -403,6 +421,7 @@ void Upstream::publish_wire(const MemberKey& key, const rr::Value& value, rr::Ti
     const auto still_there = wires_.find(key);
     if (still_there == wires_.end()) return;
     if (still_there->second.clients.size() != clients.size() && !has_joined(*client, key)) continue;
+    if (conflated > 0) client->note_conflated(key.first, member, conflated);
     client->receive_wire(key.first, member, newest, arrived);
   }
 }
@@ -422,9 +441,13 @@ void Upstream::drop_wire(const MemberKey& key, const rr::Error* reason) {
   if (!dropped || !reason) return;
   const auto& member = *dropped.mapped().member;
   for (auto* client : dropped.mapped().clients) {
-    client->answer_wire(key.first, member, *reason);
-    client->close_wire(key.first, member);
+    if (has(*client)) client->answer_wire(key.first, member, *reason);
+    if (has(*client)) client->close_wire(key.first, member);
   }
+}
+
+bool Upstream::has(const UpstreamClient& client) const {
+  return std::find(clients_.begin(), clients_.end(), &client) != clients_.end();
 }
 
 bool Upstream::has_joined(const UpstreamClient& client, const MemberKey& key) const {
@@ -520,7 +543,8 @@ void Upstream::pipe_attached(PipeNumber number, const std::string& path, const s
     for (const auto& endpoint : endpoints) endpoints_.erase(endpoint);
     shared_pipes_.erase({pipe.path, pipe.member->name});
     pipes_.erase(found);
-    for (const auto& endpoint : endpoints) endpoint.first->refuse_pipe(endpoint.second, result.error());
+    for (const auto& endpoint : endpoints)
+      if (has(*endpoint.first)) endpoint.first->refuse_pipe(endpoint.second, result.error());
     return;
   }
   pipe.index = result->to<std::int32_t>().value();
@@ -554,10 +578,9 @@ void Upstream::drop_pipe(PipeNumber number) {
   if (const auto known = shared_pipes_.find({pipe.path, pipe.member->name});
       known != shared_pipes_.end() && known->second == number)
     shared_pipes_.erase(known);
-  for (const auto& endpoint : pipe.endpoints) {
-    endpoints_.erase(endpoint);
-    endpoint.first->close_pipe(endpoint.second);
-  }
+  for (const auto& endpoint : pipe.endpoints) endpoints_.erase(endpoint);
+  for (const auto& endpoint : pipe.endpoints)
+    if (has(*endpoint.first)) endpoint.first->close_pipe(endpoint.second);
 }
 
 void Upstream::send_pipe(UpstreamClient& client, rr::PipeId id, const rr::Value& packet) {

@@ -45,6 +45,8 @@ class UpstreamClient {
   virtual void receive_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::WireValue& value,
                             rr::TimePoint arrived) = 0;
   virtual void answer_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::Result<>& result) = 0;
+  /// So many values were replaced by the one that comes next.
+  virtual void note_conflated(const std::string& path, const rr::MemberDefinition& wire, std::uint64_t count) = 0;
   /// Also where it was not answered yet.
   virtual void close_wire(const std::string& path, const rr::MemberDefinition& wire) = 0;
   virtual void accept_pipe(rr::PipeId id) = 0;
@@ -119,6 +121,8 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
     rr::TimePoint arrived;
     std::optional<rr::Value> out_value;  ///< the newest that could not be sent yet
     bool is_attached = false;
+    bool is_due = false;          ///< the newest is about to be handed out
+    std::uint64_t conflated = 0;  ///< values that were replaced before that
   };
   enum class PipeState : std::uint8_t { detached, attaching, attached };
   struct Pipe {
@@ -142,6 +146,8 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   };
 
   rr::awaitable<rr::Result<std::shared_ptr<rr::ClientConnection>>> open_connection(bool is_stepwise);
+  /// Whether the client is there still: what is told to one may end it.
+  bool has(const UpstreamClient& client) const;
   void lost(const rr::Error& reason);
   void watch_object(const std::string& path, const rr::EntityDefinition& type);
   void look_up_again();
@@ -153,6 +159,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   void attach_wire(const MemberKey& key);
   bool has_joined(const UpstreamClient& client, const MemberKey& key) const;
   void publish_wire(const MemberKey& key, const rr::Value& value, rr::TimeSpec time);
+  void hand_out(const MemberKey& key);
   /// `reason`  why, for clients that still wait to join; null: they are told by other means.
   void drop_wire(const MemberKey& key, const rr::Error* reason);
   void attach_pipe(PipeNumber number);

@@ -318,13 +318,14 @@ class Client {
   }
 
   std::string url_;
+  // What handlers write to outlives the connections, whose ends may still call them.
+  std::map<std::string, json> callbacks_;  ///< calls, by callback
+  std::map<std::string, json> events_;     ///< by event
+  std::map<std::string, json> in_values_;  ///< by wire
   rr::RemoteObject root_;
   std::map<std::string, rr::RemoteObject> others_;    ///< roots of further clients
   std::map<std::string, rr::MonitorGuard> monitors_;  ///< by the name that the scenario gives
-  std::map<std::string, json> callbacks_;             ///< calls, by callback
   std::map<std::string, Pipe> pipes_;                 ///< by the name that the scenario gives
-  std::map<std::string, json> events_;                ///< by event
-  std::map<std::string, json> in_values_;             ///< by wire
   std::map<std::string, rr::RemoteGenerator> generators_;
 };
 
