@@ -37,7 +37,7 @@ struct WireConnection {
   std::uint32_t request_id = 0;  ///< of the connect, while a service answers it later
   std::optional<TimeSpec> last_received = {};
   std::optional<TimeSpec> last_sent = {};
-  std::optional<WireValue> early = {};  ///< came before the connect reply; newest only
+  std::optional<WireValue> early = {};    ///< came before the connect reply; newest only
   std::optional<WireValue> waiting = {};  ///< to be sent when the stream has room; newest only
   TimePoint waiting_since = {};           ///< when that came here
   Ledger ledger = {};

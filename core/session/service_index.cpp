@@ -60,7 +60,8 @@ Value describe(const std::vector<KnownNode>& nodes) {
   MapInt32 out;
   for (const auto& [node, index_urls] : nodes) {
     MapInt32 urls;
-    for (const auto& url : index_urls) urls.items.emplace_back(static_cast<std::int32_t>(urls.items.size()), Value(url));
+    for (const auto& url : index_urls)
+      urls.items.emplace_back(static_cast<std::int32_t>(urls.items.size()), Value(url));
     const std::vector<std::uint8_t> id(node.id.bytes.begin(), node.id.bytes.end());
     out.items.emplace_back(static_cast<std::int32_t>(out.items.size()),
                            Structure{"RobotRaconteurServiceIndex.NodeInfo",

@@ -209,8 +209,7 @@ Result<> ServiceSession::send_wire_packet(const PathMember& key, WireConnection&
   connection_.begin_message(outgoing_);
   outgoing_.header.metadata = unreliable_metadata;
   outgoing_.begin_entry(EntryType::wire_packet, key.path, key.member).metadata = unreliable_metadata;
-  if (auto written =
-          write_wire_value(outgoing_, value.value, wire.stamp(value.time), *wire.member, service_->types());
+  if (auto written = write_wire_value(outgoing_, value.value, wire.stamp(value.time), *wire.member, service_->types());
       !written)
     return written;
   send_outgoing(now);

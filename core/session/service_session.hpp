@@ -50,7 +50,7 @@ struct ServiceSessionOptions {
   std::size_t max_open_callbacks = 1024;                  ///< not answered yet; above: out_of_system_resource
   std::size_t max_pipe_endpoints = 4096;                  ///< of one client; above: out_of_system_resource
   std::size_t max_pipe_queued_bytes = 32u * 1024 * 1024;  ///< waiting for the stream; above, pipes take no packets
-  std::size_t max_parked_requests = 64;  ///< for objects of a remote service that are looked for
+  std::size_t max_parked_requests = 64;                   ///< for objects of a remote service that are looked for
   /// Asked before anything is done with a member; what it refuses with is what the client gets. None: all is allowed.
   std::function<Result<>(const MemberAccess&)> admit = {};
 };
@@ -104,8 +104,8 @@ struct WireConnected {
   std::shared_ptr<ServiceObject> object;
   const MemberDefinition* member = nullptr;
 };
-/// The client has enough of a wire. Wires that are connected when the client goes, or whose object is released, end with
-/// it: there is only ClientGone or nothing.
+/// The client has enough of a wire. Wires that are connected when the client goes, or whose object is released, end
+/// with it: there is only ClientGone or nothing.
 struct WireDisconnected {
   std::string path;
   const MemberDefinition* member = nullptr;
@@ -168,8 +168,8 @@ struct LockWanted {
   std::string path;
   std::chrono::milliseconds timeout{0};  ///< enter_monitor; negative: for ever
 };
-/// Of a remote service: the client disconnects. Once what it holds there is given up: to be answered with answer_leave(),
-/// which ends the session.
+/// Of a remote service: the client disconnects. Once what it holds there is given up: to be answered with
+/// answer_leave(), which ends the session.
 struct LeaveWanted {};
 /// The last event.
 struct ClientGone {

@@ -140,10 +140,12 @@ void read_device(ObjectReader& in, DeviceConfig& device) {
   in.size("max_clients", device.max_clients, {0, 1'000'000});
   read_mode(in, device.mode);
   in.object("login", [&](ObjectReader& part) { read_login(part, device.login); });
-  in.objects("callbacks", false, [&](ObjectReader& item) { read_callback_rule(item, device.callbacks.emplace_back()); });
+  in.objects("callbacks", false,
+             [&](ObjectReader& item) { read_callback_rule(item, device.callbacks.emplace_back()); });
   in.flag("shares_reads", device.shares_reads);
   if (device.mode == DeviceMode::relay && (!device.login.username.empty() || !device.callbacks.empty()))
-    in.finding("mode", "login and callbacks are of shared devices: clients of a relayed one have sessions of their own");
+    in.finding("mode",
+               "login and callbacks are of shared devices: clients of a relayed one have sessions of their own");
   read_way(in, device);
   in.object("tls", [&](ObjectReader& part) { part.texts("ca", false, read_file_name(device.tls.ca)); });
 }

@@ -16,7 +16,8 @@ namespace {
 constexpr std::size_t max_slices = 32;
 
 Error stream_error(const error_code& error) {
-  if (error == asio::error::timed_out) return make_error(ErrorCode::connection_error, "peer too slow: it takes no data");
+  if (error == asio::error::timed_out)
+    return make_error(ErrorCode::connection_error, "peer too slow: it takes no data");
   return make_error(ErrorCode::connection_error, "connection lost: " + error.message());
 }
 

@@ -194,9 +194,14 @@ TEST_CASE("every option arrives") {
   CHECK(*device.login.credentials.find("password") == rr::Value("p"));
   CHECK(device.callbacks == std::vector<CallbackRule>{{"s.ask*", CallbackPolicy::all}, {"*", CallbackPolicy::first}});
   const auto id = rr::parse_node_id("82301bf1-e1ef-4e89-8d8f-0848291587ac").value();
-  CHECK(config.discover ==
-        Discover{true, {"node_local", "ipv4_broadcast"}, {{"lab.*", id, "com.x.Arm"}}, 7, false, false, {{"lab.pem"}},
-                 DeviceMode::shared});
+  CHECK(config.discover == Discover{true,
+                                    {"node_local", "ipv4_broadcast"},
+                                    {{"lab.*", id, "com.x.Arm"}},
+                                    7,
+                                    false,
+                                    false,
+                                    {{"lab.pem"}},
+                                    DeviceMode::shared});
   CHECK(config.node == NodeConfig{"lab.gateway", id});
   CHECK(config.base_path == "/lab");
   CHECK(config.proxy ==

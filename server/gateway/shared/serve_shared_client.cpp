@@ -20,8 +20,8 @@ std::optional<Destination> find_destination(Gateway& gateway, const rr::NodeId& 
   if (auto* shared = gateway.shared().find(node_id, node_name))
     return Destination{shared->device().get(), &shared->node()};
   const bool asks_for_none = node_id.is_any() && node_name.empty();
-  const bool asks_for_us = (node_id.is_any() || node_id == own.identity().id) &&
-                           (node_name.empty() || node_name == own.identity().name);
+  const bool asks_for_us =
+      (node_id.is_any() || node_id == own.identity().id) && (node_name.empty() || node_name == own.identity().name);
   if (asks_for_us && !asks_for_none) return Destination{nullptr, &own};
   auto* device = gateway.devices().route(node_id, node_name);
   if (device && !device->is_shared()) return Destination{device, nullptr};
@@ -37,8 +37,8 @@ rr::awaitable<void> serve_shared_client(Gateway& gateway, Connection& connection
       seat.emplace(std::move(*taken));
     } else {
       gateway.reject(Rejection::device_full);
-      const rr::EndReason reason{1013, "device " + rr::quoted(destination.device->config().name) +
-                                           " has all the clients it may have"};
+      const rr::EndReason reason{
+          1013, "device " + rr::quoted(destination.device->config().name) + " has all the clients it may have"};
       co_await client->end(reason);
       co_return;
     }

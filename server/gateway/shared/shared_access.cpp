@@ -32,8 +32,8 @@ Verb verb_of(rr::EntryType type) {
 
 /// Of these there may be thousands a second: they are held to the rules, but their beginning alone is recorded.
 bool is_part_of_stream(rr::EntryType type) {
-  return type == rr::EntryType::wire_packet || type == rr::EntryType::pipe_packet ||
-         type == rr::EntryType::event_req || type == rr::EntryType::generator_next_req;
+  return type == rr::EntryType::wire_packet || type == rr::EntryType::pipe_packet || type == rr::EntryType::event_req ||
+         type == rr::EntryType::generator_next_req;
 }
 
 }  // namespace

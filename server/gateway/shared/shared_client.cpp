@@ -253,8 +253,8 @@ void SharedClient::answer_login(rr::LoginId id, rr::Result<rr::AuthenticatedUser
 void SharedClient::handle(const rr::LoginRequested& login) {
   const auto service = service_ ? service_ : owner_->find_service(login.attempt.service);
   if (!service)
-    return session_.answer_login(
-        login.id, rr::make_error(rr::ErrorCode::authentication_error, "Authentication Failed"), rr::read_clocks());
+    return session_.answer_login(login.id, rr::make_error(rr::ErrorCode::authentication_error, "Authentication Failed"),
+                                 rr::read_clocks());
   const auto self = std::static_pointer_cast<SharedClient>(shared_from_this());
   if (!service->is_for_device(*login.authenticator)) return owner_->judge_login(login, self);
   asio::co_spawn(executor(), log_in_at_device(self, service, login), asio::detached);
@@ -355,8 +355,7 @@ rr::awaitable<void> SharedClient::take_lock(std::shared_ptr<SharedClient> self, 
 
 void SharedClient::answer_lock(const rr::LockWanted& wanted, const rr::Result<>& result) {
   if (!service_) return;
-  const bool is_release =
-      wanted.command == rr::LockCommand::unlock || wanted.command == rr::LockCommand::exit_monitor;
+  const bool is_release = wanted.command == rr::LockCommand::unlock || wanted.command == rr::LockCommand::exit_monitor;
   if (result && is_release) locked_.erase(wanted.path);
   if (result && !is_release) locked_.insert(wanted.path);
   if (locker_ && locked_.empty()) {

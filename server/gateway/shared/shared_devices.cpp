@@ -105,8 +105,8 @@ void SharedDevices::sync(const DeviceRegistry& devices) {
 }
 
 void SharedDevices::add_own(std::shared_ptr<Device> device, const std::string& service) {
-  own_service_ = std::make_shared<SharedService>(std::move(device), service, config_.retry,
-                                                 std::vector<ServiceBoard*>{&node_});
+  own_service_ =
+      std::make_shared<SharedService>(std::move(device), service, config_.retry, std::vector<ServiceBoard*>{&node_});
   own_service_->start();
 }
 

@@ -26,8 +26,8 @@ std::shared_ptr<SharedClient> SharedNode::add(std::unique_ptr<rr::ByteStream> st
   options.base_url = std::move(arrival.base_url);
   options.admit = std::move(arrival.admit);
   if (const auto verified = stream->verified_peer(); !verified.is_any()) options.verified_node_id = verified;
-  auto client = std::make_shared<SharedClient>(*this, directory_, std::move(options), std::move(stream),
-                                               std::move(arrival.peer));
+  auto client =
+      std::make_shared<SharedClient>(*this, directory_, std::move(options), std::move(stream), std::move(arrival.peer));
   clients_.emplace(client.get(), client);
   ended_.emplace(client.get(), std::move(ended));
   client->start();

@@ -116,13 +116,14 @@ rr::Result<> SharedService::publish() {
   const auto& root_type = session.object_type(name_)->qualified_name;
   const auto attributes = with_mode(session.attributes());
   if (hosted_) {
-    const bool is_same_text = std::all_of(
-        session.types().definitions().begin(), session.types().definitions().end(), [&](const auto& definition) {
-          const auto* known = types_->find_service(definition->name);
-          return !known || known->text == definition->text;
-        });
+    const bool is_same_text = std::all_of(session.types().definitions().begin(), session.types().definitions().end(),
+                                          [&](const auto& definition) {
+                                            const auto* known = types_->find_service(definition->name);
+                                            return !known || known->text == definition->text;
+                                          });
     const bool has_same_policy = hosted_->policy().require_valid_user == upstream_->requires_user();
-    if (is_same_text && has_same_policy && hosted_->root_type_name() == root_type && hosted_->attributes() == rr::Value(attributes))
+    if (is_same_text && has_same_policy && hosted_->root_type_name() == root_type &&
+        hosted_->attributes() == rr::Value(attributes))
       return take_over_definitions(session.types());
     log(LogLevel::warning, "a shared service has changed: its clients have to connect anew",
         {{"device", device_->config().name}, {"service", name_}, {"clients", clients_.size()}});
@@ -161,8 +162,7 @@ void SharedService::find_object(Upstream& by, const std::string& path, std::func
     if (!found) return done(found.error());
     if (const auto& connection = self->upstream_->connection())
       if (auto taken = self->take_over_definitions(connection->session().types()); !taken) return done(taken.error());
-    done(self->hosted_->add_object(
-        path, std::make_shared<SharedObject>(path, std::string(found->to_text().value()))));
+    done(self->hosted_->add_object(path, std::make_shared<SharedObject>(path, std::string(found->to_text().value()))));
   });
 }
 

@@ -66,8 +66,8 @@ rr::awaitable<rr::Result<>> Upstream::open() {
 rr::awaitable<rr::Result<std::shared_ptr<rr::ClientConnection>>> Upstream::open_connection(bool is_stepwise) {
   auto stream = co_await device_->connect();
   if (!stream)
-    co_return rr::make_error(rr::ErrorCode::connection_error, "device " + rr::quoted(device_->config().name) +
-                                                                  " is offline: " + stream.error().message);
+    co_return rr::make_error(rr::ErrorCode::connection_error,
+                             "device " + rr::quoted(device_->config().name) + " is offline: " + stream.error().message);
   const auto& url = device_->config().url;
   const rr::NodeIdentity target{url.node_id.value_or(rr::NodeId{}), url.node_name};
   const std::string username = login_.is_late ? std::string() : login_.username;
@@ -399,7 +399,8 @@ void Upstream::publish_wire(const MemberKey& key, const rr::Value& value, rr::Ti
     ++wire.conflated;
     return;
   }
-  // Not here: one read may bring hundreds of values, of which the last one counts, and everybody else has to get a turn.
+  // Not here: one read may bring hundreds of values, of which the last one counts, and everybody else has to get a
+  // turn.
   wire.is_due = true;
   asio::post(device_->executor(), [weak = weak_from_this(), key] {
     if (const auto self = weak.lock()) self->hand_out(key);
@@ -520,12 +521,12 @@ void Upstream::attach_pipe(PipeNumber number) {
     if (const auto self = weak.lock()) self->drop_pipe(number);
   };
   const bool is_first = pipe.index == 0;
-  connection_->connect_pipe(pipe.path, pipe.member->name, rr::any_pipe_index, std::move(handlers),
-                            [weak, number, is_first, path = pipe.path,
-                             member = pipe.member->name](const rr::Result<rr::Value>& result) {
-                              const auto self = weak.lock();
-                              if (self) self->pipe_attached(number, path, member, result, is_first);
-                            });
+  connection_->connect_pipe(
+      pipe.path, pipe.member->name, rr::any_pipe_index, std::move(handlers),
+      [weak, number, is_first, path = pipe.path, member = pipe.member->name](const rr::Result<rr::Value>& result) {
+        const auto self = weak.lock();
+        if (self) self->pipe_attached(number, path, member, result, is_first);
+      });
 }
 
 void Upstream::pipe_attached(PipeNumber number, const std::string& path, const std::string& member,
@@ -597,7 +598,8 @@ void Upstream::send_pipe(UpstreamClient& client, rr::PipeId id, const rr::Value&
   }
   if (sent) return;
   log(LogLevel::info, "pipe endpoint closed: the device takes no packet",
-      {{"device", device_->config().name}, {"pipe", pipe.path + "." + pipe.member->name},
+      {{"device", device_->config().name},
+       {"pipe", pipe.path + "." + pipe.member->name},
        {"error", sent.error().message}});
   leave_pipe(client, id);
   client.close_pipe(id);
@@ -606,15 +608,15 @@ void Upstream::send_pipe(UpstreamClient& client, rr::PipeId id, const rr::Value&
 // --- callbacks ---
 
 UpstreamClient* Upstream::owner_of_callback(const std::string& path) const {
-  const auto here = std::find_if(calls_.rbegin(), calls_.rend(), [&](const OpenCall& call) { return call.path == path; });
+  const auto here =
+      std::find_if(calls_.rbegin(), calls_.rend(), [&](const OpenCall& call) { return call.path == path; });
   if (here != calls_.rend()) return here->client;
   if (!calls_.empty()) return calls_.back().client;
   return clients_.size() == 1 ? clients_.front() : nullptr;
 }
 
 void Upstream::route_callback(const std::string& path, const rr::MemberDefinition& callback,
-                              std::span<const rr::Value> arguments,
-                              const rr::ClientConnection::CallbackReply& answer) {
+                              std::span<const rr::Value> arguments, const rr::ClientConnection::CallbackReply& answer) {
   const auto name = path + "." + callback.name;
   auto policy = CallbackPolicy::owner;
   for (const auto& rule : device_->config().callbacks)
@@ -640,9 +642,9 @@ void Upstream::route_callback(const std::string& path, const rr::MemberDefinitio
   }
   auto* client = policy == CallbackPolicy::first && !clients_.empty() ? clients_.front() : owner_of_callback(path);
   if (client) return client->call_callback(path, callback, arguments, answer);
-  answer(rr::make_error(rr::ErrorCode::invalid_operation,
-                        "Callback function not set: " + std::to_string(clients_.size()) +
-                            " clients share this session and none of them is meant"));
+  answer(
+      rr::make_error(rr::ErrorCode::invalid_operation, "Callback function not set: " + std::to_string(clients_.size()) +
+                                                           " clients share this session and none of them is meant"));
 }
 
 }  // namespace rrgate

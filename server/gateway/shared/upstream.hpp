@@ -55,8 +55,7 @@ class UpstreamClient {
   virtual void close_pipe(rr::PipeId id) = 0;
   virtual void release_path(const std::string& path) = 0;
   virtual void call_callback(const std::string& path, const rr::MemberDefinition& callback,
-                             std::span<const rr::Value> arguments,
-                             rr::ClientConnection::CallbackReply answer) = 0;
+                             std::span<const rr::Value> arguments, rr::ClientConnection::CallbackReply answer) = 0;
 
  protected:
   ~UpstreamClient() = default;
@@ -186,7 +185,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   std::map<EndpointKey, PipeNumber> endpoints_;
   PipeNumber last_pipe_ = 0;
   std::map<std::pair<UpstreamClient*, rr::GeneratorId>, Generator> generators_;
-  std::vector<OpenCall> calls_;  ///< of functions, oldest first
+  std::vector<OpenCall> calls_;                         ///< of functions, oldest first
   std::map<MemberKey, std::vector<Completion>> reads_;  ///< where reads are shared: who waits for them
   std::uint64_t last_call_ = 0;
 };

@@ -95,8 +95,7 @@ void write_ledgers(Exposition& out, const SharedDevices& shared) {
   out.family("rrgate_subscription_age_us", "gauge", "Age of values when they left the gateway, in microseconds.");
   for (const auto& [key, ledger] : ledgers)
     for (const auto& [name, share] : {std::pair("0.5", 0.5), std::pair("0.99", 0.99)})
-      out.sample(static_cast<std::uint64_t>(ledger.ages.quantile(share).count()),
-                 key + ",quantile=\"" + name + "\"");
+      out.sample(static_cast<std::uint64_t>(ledger.ages.quantile(share).count()), key + ",quantile=\"" + name + "\"");
   out.family("rrgate_shared_session_up", "gauge", "Whether the session with a service of a shared device is open.");
   for (const auto& [key, device] : shared.all())
     for (const auto& [name, service] : device->services())

@@ -74,15 +74,15 @@ TEST_CASE("what a remote object is refused with reaches the client as it is") {
 TEST_CASE("requests that wait for objects are bounded") {
   Remote pair;
   std::vector<RequestId> ids;
-  for (int i = 0; i < 65; ++i) ids.push_back(pair.client->find_object("arm.slots[" + std::to_string(i) + "]", pair.now));
+  for (int i = 0; i < 65; ++i)
+    ids.push_back(pair.client->find_object("arm.slots[" + std::to_string(i) + "]", pair.now));
   CHECK(pair.completion(ids.back()).error().code == ErrorCode::out_of_system_resource);
 }
 
 TEST_CASE("paths of other services are refused at once") {
   Remote pair;
-  const auto error = pair.answer_to([](Message& message) {
-    message.begin_entry(EntryType::property_get_req, "leg.tool", "name", 7);
-  });
+  const auto error =
+      pair.answer_to([](Message& message) { message.begin_entry(EntryType::property_get_req, "leg.tool", "name", 7); });
   CHECK(error.code == ErrorCode::object_not_found);
 }
 
@@ -202,8 +202,8 @@ TEST_CASE("what a client may do is asked before it is done") {
   pair.pump();
   pair.service->reply(pair.next_service<Called>().id, Value(1.5), pair.now);
   CHECK(pair.completion(speed).value() == Value(1.5));
-  CHECK(denied(pair.client->set_property("arm", "pose", Value(Structure{"experimental.loopback.Pose", {}}), pair.now)) ==
-        false);  // does not even fit
+  CHECK(denied(pair.client->set_property("arm", "pose", Value(Structure{"experimental.loopback.Pose", {}}),
+                                         pair.now)) == false);  // does not even fit
   CHECK(denied(pair.client->get_property("arm", "serial", pair.now)));
   CHECK(denied(pair.client->call_function("arm", "stop", {}, pair.now)));
   CHECK(denied(pair.client->connect_wire("arm", "torque", pair.now)));
