@@ -66,6 +66,12 @@ Result<> ServiceSession::park(const Message& message, const MessageEntry& entry)
         std::to_string(parked_.size()) + " requests of this client wait for their objects to be found already");
   EncodedMessage encoded;
   if (auto done = encode(message, {}, encoded); !done) return done;
+  std::size_t bytes = encoded.size();
+  for (const auto& other : parked_) bytes += other.message.size();
+  if (bytes > options_.connection.max_message_size)
+    return make_error(ErrorCode::out_of_system_resource, "requests of this client that wait for their objects hold " +
+                                                             std::to_string(bytes) + " bytes, expected at most " +
+                                                             std::to_string(options_.connection.max_message_size));
   const auto is_same = [&](const ParkedRequest& other) { return other.path == entry.service_path; };
   const bool is_asked = std::any_of(parked_.begin(), parked_.end(), is_same);
   const auto index = static_cast<std::size_t>(&entry - message.entries.data());

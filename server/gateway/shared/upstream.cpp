@@ -15,8 +15,8 @@ namespace asio = boost::asio;
 
 namespace {
 
-/// Packets for a pipe that is not attached yet; more end the endpoint.
-constexpr std::size_t max_waiting_packets = 1024;
+/// Objects that all clients together have found.
+constexpr std::size_t max_objects = 65'536;
 
 const auto ignore = [](const rr::Result<rr::Value>&) {};
 
@@ -125,6 +125,10 @@ void Upstream::remove(UpstreamClient& client) {
 
 void Upstream::find_object(const std::string& path, Completion done) {
   if (!connection_) return done(lost_error());
+  if (objects_.size() >= max_objects && !objects_.contains(path))
+    return done(
+        rr::make_error(rr::ErrorCode::out_of_system_resource,
+                       "clients of this device have found " + std::to_string(max_objects) + " objects already"));
   connection_->find_object(path, [weak = weak_from_this(), path, done = std::move(done)](rr::Result<rr::Value> found) {
     if (const auto self = weak.lock(); self && self->connection_ && found)
       if (const auto* type = self->connection_->session().object_type(path)) self->watch_object(path, *type);
@@ -550,8 +554,6 @@ void Upstream::pipe_attached(PipeNumber number, const std::string& path, const s
   }
   pipe.index = result->to<std::int32_t>().value();
   pipe.state = PipeState::attached;
-  const auto waiting = std::exchange(pipe.waiting, {});
-  for (const auto& packet : waiting) (void)connection_->send_pipe(pipe.path, pipe.member->name, pipe.index, packet);
   const auto endpoints = pipe.endpoints;
   for (const auto& endpoint : endpoints)
     if (endpoints_.contains(endpoint)) endpoint.first->accept_pipe(endpoint.second);
@@ -588,14 +590,9 @@ void Upstream::send_pipe(UpstreamClient& client, rr::PipeId id, const rr::Value&
   const auto known = endpoints_.find({&client, id});
   if (known == endpoints_.end()) return;
   auto& pipe = pipes_.at(known->second);
-  rr::Result<> sent;
-  if (pipe.state == PipeState::attached && connection_) {
-    sent = connection_->send_pipe(pipe.path, pipe.member->name, pipe.index, packet);
-  } else if (pipe.waiting.size() < max_waiting_packets) {
-    pipe.waiting.push_back(packet);
-  } else {
-    sent = lost_error();
-  }
+  const auto sent = pipe.state == PipeState::attached && connection_
+                        ? connection_->send_pipe(pipe.path, pipe.member->name, pipe.index, packet)
+                        : rr::Result<>(lost_error());
   if (sent) return;
   log(LogLevel::info, "pipe endpoint closed: the device takes no packet",
       {{"device", device_->config().name},

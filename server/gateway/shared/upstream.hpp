@@ -3,7 +3,6 @@
 #pragma once
 
 #include <boost/asio/steady_timer.hpp>
-#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -106,7 +105,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   /// refuse_pipe().
   void join_pipe(UpstreamClient& client, rr::PipeId id, const std::string& path, const rr::MemberDefinition& pipe);
   void leave_pipe(UpstreamClient& client, rr::PipeId id);
-  /// What the device does not take in time ends the endpoint.
+  /// What the device does not take, or can't because it is away, ends the endpoint.
   void send_pipe(UpstreamClient& client, rr::PipeId id, const rr::Value& packet);
 
  private:
@@ -130,7 +129,6 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
     std::vector<EndpointKey> endpoints;
     std::int32_t index = 0;
     PipeState state = PipeState::detached;
-    std::deque<rr::Value> waiting;  ///< for the device, until it is attached
   };
   using PipeNumber = std::uint64_t;
   struct Generator {

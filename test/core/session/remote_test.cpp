@@ -79,6 +79,17 @@ TEST_CASE("requests that wait for objects are bounded") {
   CHECK(pair.completion(ids.back()).error().code == ErrorCode::out_of_system_resource);
 }
 
+TEST_CASE("what waits for objects is bounded in bytes, too") {
+  Remote pair;
+  pair.find("arm.tool");
+  CHECK(pair.completion(pair.client->find_object("arm.tool", pair.now)));
+  CHECK(pair.hosted().forget_path("arm.tool"));
+  const Value name(std::string(5'000'000, 'x'));
+  std::vector<RequestId> ids;
+  for (int i = 0; i < 3; ++i) ids.push_back(pair.client->set_property("arm.tool", "name", name, pair.now));
+  CHECK(pair.completion(ids.back()).error().code == ErrorCode::out_of_system_resource);
+}
+
 TEST_CASE("paths of other services are refused at once") {
   Remote pair;
   const auto error =
