@@ -6,7 +6,6 @@
 #include <boost/asio/post.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <boost/asio/thread_pool.hpp>
 #include <iostream>
 #include <map>
 #include <optional>
@@ -16,6 +15,7 @@
 #include "core/session/url.hpp"
 #include "core/support/random.hpp"
 #include "server/node/accept.hpp"
+#include "server/node/login_judge.hpp"
 #include "server/node/service_client.hpp"
 #include "server/platform/node_id_store.hpp"
 #include "server/transport/intra.hpp"
@@ -101,10 +101,6 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
         stop_timer_(io_) {}
 
   ~Implementation() {
-    if (judges_) {
-      judges_->stop();
-      judges_->join();
-    }
     close_listeners();
     stop_timer_.cancel();
     for (const auto& service : services_) service->detach();
@@ -273,18 +269,8 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
       std::cerr << identity().name << ": " << problem << '\n';
   }
   void judge_login(const LoginRequested& login, const std::shared_ptr<ServiceClient>& client) override {
-    // A good password hash takes long: what the node does for its other clients must not wait for it.
-    if (!judges_) judges_ = std::make_unique<asio::thread_pool>(1);
-    asio::post(*judges_, [&io = io_, login, weak = std::weak_ptr(client)] {
-      Result<AuthenticatedUser> result = make_error(ErrorCode::authentication_error, "Authentication Failed");
-      try {
-        result = login.authenticator->authenticate(login.attempt);
-      } catch (const std::exception&) {
-        // Its text may hold anything: the client only hears that it failed.
-      }
-      asio::post(io, [login, weak, result = std::move(result)]() mutable {
-        if (const auto still_there = weak.lock()) still_there->answer_login(login.id, std::move(result));
-      });
+    judge_.judge(login, io_.get_executor(), [id = login.id, weak = std::weak_ptr(client)](const auto& result) {
+      if (const auto still_there = weak.lock()) still_there->answer_login(id, result);
     });
   }
   void locks_changed(const Service& service) override {
@@ -395,7 +381,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   bool is_stopping_ = false;
   asio::steady_timer stop_timer_;
   asio::signal_set* signals_ = nullptr;
-  std::unique_ptr<asio::thread_pool> judges_;  ///< of logins; there once somebody has tried to log in
+  LoginJudge judge_;
 };
 
 Node::Node(std::string name, NodeOptions options)

@@ -1,20 +1,8 @@
 #include "server/gateway/shared/shared_node.hpp"
 
-#include <boost/asio/post.hpp>
-
 #include "server/log/log.hpp"
 
 namespace rrgate {
-
-namespace asio = boost::asio;
-
-SharedNode::~SharedNode() {
-  if (judges_) {
-    judges_->stop();
-    judges_->join();
-  }
-  close();
-}
 
 std::shared_ptr<SharedClient> SharedNode::add(std::unique_ptr<rr::ByteStream> stream, SharedArrival arrival,
                                               std::function<void()> ended) {
@@ -63,20 +51,9 @@ std::string SharedNode::device_of(std::string_view service) const {
   return found ? found->device()->config().name : std::string();
 }
 
-/// A good password hash takes long: what the gateway does for others must not wait for it.
 void SharedNode::judge_login(const rr::LoginRequested& login, const std::shared_ptr<SharedClient>& client) {
-  if (!judges_) judges_ = std::make_unique<asio::thread_pool>(1);
-  asio::post(*judges_, [executor = client->executor(), login, weak = std::weak_ptr(client)] {
-    rr::Result<rr::AuthenticatedUser> result =
-        rr::make_error(rr::ErrorCode::authentication_error, "Authentication Failed");
-    try {
-      result = login.authenticator->authenticate(login.attempt);
-    } catch (const std::exception&) {
-      // Its text may hold anything: the client only hears that it failed.
-    }
-    asio::post(executor, [login, weak, result = std::move(result)]() mutable {
-      if (const auto still_there = weak.lock()) still_there->answer_login(login.id, std::move(result));
-    });
+  judge_.judge(login, client->executor(), [id = login.id, weak = std::weak_ptr(client)](const auto& result) {
+    if (const auto still_there = weak.lock()) still_there->answer_login(id, result);
   });
 }
 

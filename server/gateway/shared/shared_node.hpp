@@ -1,13 +1,13 @@
 // A node that is the gateway: its own, or the one that stands for a shared device. Layer: server/gateway.
 #pragma once
 
-#include <boost/asio/thread_pool.hpp>
 #include <functional>
 #include <map>
 #include <memory>
 #include <string>
 
 #include "server/gateway/shared/shared_client.hpp"
+#include "server/node/login_judge.hpp"
 
 namespace rrgate {
 
@@ -23,7 +23,7 @@ class SharedNode final : public ServiceBoard, public SharedClientOwner {
  public:
   /// `config`  outlives it.
   SharedNode(rr::NodeIdentity identity, const Config& config) : config_(config), directory_(std::move(identity)) {}
-  ~SharedNode();
+  ~SharedNode() { close(); }
   SharedNode(const SharedNode&) = delete;
   SharedNode& operator=(const SharedNode&) = delete;
 
@@ -57,7 +57,7 @@ class SharedNode final : public ServiceBoard, public SharedClientOwner {
   const Config& config_;
   rr::ServiceDirectory directory_;
   FindAuthenticator find_authenticator_;
-  std::unique_ptr<boost::asio::thread_pool> judges_;  ///< of logins; there once somebody has tried to log in
+  rr::LoginJudge judge_;
   std::map<std::string, std::pair<const rr::HostedService*, std::weak_ptr<SharedService>>, std::less<>> services_;
   std::map<SharedClient*, std::shared_ptr<SharedClient>> clients_;
   std::map<SharedClient*, std::function<void()>> ended_;
