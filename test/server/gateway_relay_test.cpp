@@ -80,12 +80,25 @@ TEST_CASE("a native client that no device is meant by gets NodeNotFound") {
     CHECK(greeting.error == rr::ErrorCode::node_not_found);
     CHECK(client.receive_all().empty());
   };
-  refused({}, "");  // which of the two?
   refused({}, "node.other");
   refused(gateway.device(0).node_id(), "node.y");
   rr::NodeId other;
   other.bytes.fill(0xee);
   refused(other, "");
+}
+
+TEST_CASE("who asks for no node in particular, where there are several devices, gets the gateway's own") {
+  TestGateway gateway(2);
+  gateway.wait_for_state("online", 0);
+  gateway.wait_for_state("online", 1);
+  TestClient client(gateway.port());
+  const auto greeting = greet(client);
+  CHECK(greeting.error == rr::ErrorCode::none);
+  CHECK(greeting.node_name == "rrgate");
+  TestClient by_name(gateway.port());
+  CHECK(greet(by_name, {}, "rrgate").node_id == greeting.node_id);
+  TestClient by_id(gateway.port());
+  CHECK(greet(by_id, greeting.node_id).node_name == "rrgate");
 }
 
 TEST_CASE("a device that is down is told, and taken again when it is back") {
