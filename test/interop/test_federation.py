@@ -156,7 +156,8 @@ def test_a_circle(lab, tmp_path, scheme, count):  # noqa: F811
             {"name": "interop", "url": f"rr+tcp://127.0.0.1:{service_port}/?service=interop"}]})
         gateways[0].hang_up()
         for gateway, port in zip(gateways, ports):
-            gateway.wait_for("device online")
+            gateway.process.wait_until(  # now: it may have seemed so before the circle was noticed
+                lambda at=f"http://127.0.0.1:{port}/api/v1/devices": read_json(at)["devices"][0]["state"] == "online")
             check_all(FUNCTIONS.steps, run_steps("reference", lab, port, scheme="rr+tcp", node=""))
     finally:
         for gateway in gateways:
