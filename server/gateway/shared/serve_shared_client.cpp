@@ -29,6 +29,28 @@ std::optional<Destination> find_destination(Gateway& gateway, const rr::NodeId& 
   return std::nullopt;
 }
 
+namespace {
+
+constexpr std::chrono::milliseconds look_period{10};
+
+/// Whoever comes when the gateway has just begun, as clients do that its restart has cut off, waits for what will be
+/// there in a moment. Returns whether there is such a node still.
+rr::awaitable<bool> wait_until_ready(Gateway& gateway, const Destination& destination, asio::any_io_executor executor) {
+  asio::steady_timer look(executor);
+  const auto deadline = std::chrono::steady_clock::now() + gateway.config().timeouts.connect;
+  for (;;) {
+    auto& shared = gateway.shared();
+    const auto* device = destination.device ? shared.find(*destination.device) : nullptr;
+    if (destination.device && !device) co_return false;
+    const bool is_ready = device ? device->is_ready() : shared.is_ready();
+    if (is_ready || gateway.is_stopping() || std::chrono::steady_clock::now() >= deadline) co_return true;
+    look.expires_after(look_period);
+    co_await look.async_wait(asio::as_tuple(asio::use_awaitable));
+  }
+}
+
+}  // namespace
+
 rr::awaitable<void> serve_shared_client(Gateway& gateway, Connection& connection, Destination destination,
                                         std::unique_ptr<rr::ByteStream> client, std::string base_url) {
   std::optional<Device::Seat> seat;
@@ -42,6 +64,11 @@ rr::awaitable<void> serve_shared_client(Gateway& gateway, Connection& connection
       co_await client->end(reason);
       co_return;
     }
+  }
+  const auto executor = client->executor();
+  if (!co_await wait_until_ready(gateway, destination, executor)) {
+    client->close();
+    co_return;
   }
   const auto name = destination.device ? destination.device->config().name : std::string("the gateway");
   log(LogLevel::info, "client connected", {{"device", name}, {"peer", connection.client}, {"mode", "shared"}});

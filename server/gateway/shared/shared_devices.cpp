@@ -77,6 +77,12 @@ void SharedDevice::refresh() {
   }
 }
 
+bool SharedDevice::is_ready() const {
+  if (!device_->identity()) return device_->state() == DeviceState::offline;
+  return std::all_of(services_.begin(), services_.end(),
+                     [](const auto& service) { return service.second->has_tried(); });
+}
+
 rr::Result<std::unique_ptr<rr::ByteStream>> SharedDevice::open_stream() {
   const bool is_ready = std::any_of(services_.begin(), services_.end(),
                                     [](const auto& service) { return service.second->hosted() != nullptr; });
@@ -115,6 +121,10 @@ void SharedDevices::stop() {
   if (own_service_) own_service_->stop();
   own_service_.reset();
   node_.close();
+}
+
+bool SharedDevices::is_ready() const {
+  return std::all_of(devices_.begin(), devices_.end(), [](const auto& device) { return device.second->is_ready(); });
 }
 
 SharedDevice* SharedDevices::find(const Device& device) const {

@@ -21,6 +21,8 @@ class SharedDevice {
   SharedNode& node() { return node_; }
   const std::shared_ptr<Device>& device() const { return device_; }
   const std::map<std::string, std::shared_ptr<SharedService>>& services() const { return services_; }
+  /// Whether clients find what there is: not while the gateway itself is only just connecting.
+  bool is_ready() const;
   /// A client of this process. Errors   connection_error: the device has never answered.
   rr::Result<std::unique_ptr<rr::ByteStream>> open_stream();
 
@@ -48,6 +50,7 @@ class SharedDevices {
   void sync(const DeviceRegistry& devices);
   void stop();
 
+  bool is_ready() const;
   /// Null where the device is not shared.
   SharedDevice* find(const Device& device) const;
   /// By the identity of the node that stands for a device.

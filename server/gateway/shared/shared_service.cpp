@@ -82,6 +82,7 @@ rr::awaitable<void> SharedService::keep_open(std::shared_ptr<SharedService> self
     if (self->is_stopped_) break;
     rr::Result<> done = opened;
     if (opened) done = self->publish();
+    self->has_tried_ = true;
     if (done) {
       log(LogLevel::info, "shared session open", {{"device", self->device_->config().name}, {"service", self->name_}});
       wait = self->retry_.min;

@@ -42,6 +42,8 @@ class SharedService : public std::enable_shared_from_this<SharedService> {
   const std::shared_ptr<Device>& device() const { return device_; }
   /// Null before the device has answered for the first time.
   const std::shared_ptr<rr::HostedService>& hosted() const { return hosted_; }
+  /// Whether the first attempt to connect is over, well or not.
+  bool has_tried() const { return has_tried_; }
   /// The session that all clients share.
   const std::shared_ptr<Upstream>& upstream() const { return upstream_; }
   /// A session for one client alone; not open yet.
@@ -72,6 +74,7 @@ class SharedService : public std::enable_shared_from_this<SharedService> {
   std::shared_ptr<rr::HostedService> hosted_;
   std::set<SharedClient*> clients_;
   boost::asio::steady_timer wake_;
+  bool has_tried_ = false;
   bool is_stopped_ = false;
 };
 
