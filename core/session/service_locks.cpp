@@ -10,8 +10,6 @@ namespace rr {
 
 namespace {
 
-/// A client that waits for a monitor hears of it at least that often.
-constexpr std::chrono::seconds longest_wait{5};
 constexpr std::size_t max_waiting_enters = 64;
 
 bool is_packet(EntryType type) {
@@ -84,14 +82,9 @@ Result<> ServiceSession::answer_monitor(const Message& message, const MessageEnt
     return make_error(ErrorCode::invalid_operation, "Already acquiring or acquired monitor lock");
   Result<MonitorLocks::State> state = MonitorLocks::State::waiting;
   if (command == "MonitorEnter") {
-    const auto* timeout = message.elements_of(entry).find("timeout");
-    if (!timeout) return make_error(ErrorCode::message_element_not_found, "Element timeout not found.");
-    if (timeout->type != DataType::int32_t || timeout->count == 0)
-      return make_error(ErrorCode::data_type_mismatch,
-                        "timeout is " + std::string(data_type_name(timeout->type)) + ", expected int32");
-    std::int32_t milliseconds = 0;
-    std::memcpy(&milliseconds, timeout->data.data(), sizeof(milliseconds));
-    state = monitors.enter(found->object, session_id_, std::chrono::milliseconds(milliseconds), now);
+    const auto timeout = read_monitor_timeout(message, entry);
+    if (!timeout) return timeout.error();
+    state = monitors.enter(found->object, session_id_, *timeout, now);
   } else {
     state = monitors.look(*found->object, session_id_, now);
   }
@@ -99,20 +92,31 @@ Result<> ServiceSession::answer_monitor(const Message& message, const MessageEnt
   OpenEnter enter{entry.request_id, std::string(entry.service_path), std::string(command), std::move(found->object),
                   now.steady + longest_wait};
   if (*state == MonitorLocks::State::owned)
-    answer_enter(enter, "OK", now);
+    answer_lock_request(enter, "OK", now);
   else
     enters_.push_back(std::move(enter));
   return {};
 }
 
-void ServiceSession::answer_enter(const OpenEnter& enter, const Result<std::string_view>& answer, Now now) {
+Result<std::chrono::milliseconds> ServiceSession::read_monitor_timeout(const Message& message,
+                                                                       const MessageEntry& entry) {
+  const auto* timeout = message.elements_of(entry).find("timeout");
+  if (!timeout) return make_error(ErrorCode::message_element_not_found, "Element timeout not found.");
+  if (timeout->type != DataType::int32_t || timeout->count == 0)
+    return make_error(ErrorCode::data_type_mismatch,
+                      "timeout is " + std::string(data_type_name(timeout->type)) + ", expected int32");
+  return std::chrono::milliseconds(load<std::int32_t>(timeout->data.data()));
+}
+
+void ServiceSession::send_session_op_reply(std::string_view path, std::string_view member, std::uint32_t request_id,
+                                           const Result<std::string_view>& answer, Now now) {
   connection_.begin_message(outgoing_);
-  outgoing_.begin_entry(EntryType::client_session_op_ret, enter.path, enter.member, enter.request_id);
+  outgoing_.begin_entry(EntryType::client_session_op_ret, path, member, request_id);
   if (answer)
     outgoing_.add_text("return", *answer);
   else
     write_error(outgoing_, answer.error());
-  send_outgoing(now);
+  send_outgoing(now, service_->is_remote());
 }
 
 void ServiceSession::handle_locks_changed(Now now) {
@@ -126,9 +130,9 @@ void ServiceSession::handle_locks_changed(Now now) {
     const OpenEnter enter = std::move(enters_[i]);
     enters_.erase(enters_.begin() + static_cast<std::ptrdiff_t>(i));
     if (!state)
-      answer_enter(enter, state.error(), now);
+      answer_lock_request(enter, state.error(), now);
     else
-      answer_enter(enter, is_over ? std::string_view("OK") : std::string_view("Continue"), now);
+      answer_lock_request(enter, is_over ? std::string_view("OK") : std::string_view("Continue"), now);
   }
 }
 

@@ -1,7 +1,6 @@
 // Services whose objects are another node's: requests wait until their object is found, locks are that node's. Layer:
 // session. Source: sessions spec sections 2.4, 2.6 and 2.20.
 #include <algorithm>
-#include <cstring>
 #include <utility>
 
 #include "core/member/error_entry.hpp"
@@ -11,24 +10,11 @@ namespace rr {
 
 namespace {
 
-/// A client that waits for a monitor hears of it at least that often.
-constexpr std::chrono::seconds longest_wait{5};
 constexpr std::size_t max_open_locks = 64;
 
 /// Session operations that name no object.
 bool names_no_object(std::string_view command) {
   return command == "AuthenticateUser" || command == "LogoutUser";
-}
-
-Result<std::chrono::milliseconds> read_timeout(const Message& message, const MessageEntry& entry) {
-  const auto* timeout = message.elements_of(entry).find("timeout");
-  if (!timeout) return make_error(ErrorCode::message_element_not_found, "Element timeout not found.");
-  if (timeout->type != DataType::int32_t || timeout->count == 0)
-    return make_error(ErrorCode::data_type_mismatch,
-                      "timeout is " + std::string(data_type_name(timeout->type)) + ", expected int32");
-  std::int32_t milliseconds = 0;
-  std::memcpy(&milliseconds, timeout->data.data(), sizeof(milliseconds));
-  return std::chrono::milliseconds(milliseconds);
 }
 
 }  // namespace
@@ -130,7 +116,7 @@ Result<> ServiceSession::ask_for_lock(const Message& message, const MessageEntry
     wanted.command = LockCommand::unlock;
   } else if (command == "MonitorEnter") {
     wanted.command = LockCommand::enter_monitor;
-    const auto timeout = read_timeout(message, entry);
+    const auto timeout = read_monitor_timeout(message, entry);
     if (!timeout) return timeout.error();
     wanted.timeout = *timeout;
   } else if (command == "MonitorExit") {
@@ -168,16 +154,6 @@ Result<> ServiceSession::continue_entering(const MessageEntry& entry, Now now) {
   return {};
 }
 
-void ServiceSession::finish_lock(const OpenLock& lock, const Result<std::string_view>& answer, Now now) {
-  connection_.begin_message(outgoing_);
-  outgoing_.begin_entry(EntryType::client_session_op_ret, lock.path, lock.member, lock.request_id);
-  if (answer)
-    outgoing_.add_text("return", *answer);
-  else
-    write_error(outgoing_, answer.error());
-  send_outgoing(now, true);
-}
-
 void ServiceSession::answer_lock(LockRequestId id, const Result<>& result, Now now) {
   const auto found = std::find_if(locks_.begin(), locks_.end(), [id](const OpenLock& lock) { return lock.id == id; });
   if (found == locks_.end()) return;
@@ -188,9 +164,9 @@ void ServiceSession::answer_lock(LockRequestId id, const Result<>& result, Now n
   const OpenLock lock = std::move(*found);
   locks_.erase(found);
   if (result)
-    finish_lock(lock, std::string_view("OK"), now);
+    answer_lock_request(lock, std::string_view("OK"), now);
   else
-    finish_lock(lock, result.error(), now);
+    answer_lock_request(lock, result.error(), now);
 }
 
 void ServiceSession::continue_late_locks(Now now) {
@@ -198,7 +174,7 @@ void ServiceSession::continue_late_locks(Now now) {
     if (now.steady < locks_[i].answer_by) continue;
     locks_[i].answer_by = TimePoint::max();
     locks_[i].is_asked = false;
-    finish_lock(OpenLock(locks_[i]), std::string_view("Continue"), now);
+    answer_lock_request(OpenLock(locks_[i]), std::string_view("Continue"), now);
   }
 }
 

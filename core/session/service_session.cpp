@@ -184,24 +184,24 @@ Result<> ServiceSession::send_event(std::string_view path, const MemberDefinitio
 }
 
 Result<> ServiceSession::send_wire(std::string_view path, const MemberDefinition& member, const Value& value, Now now) {
-  return send_wire(path, member, WireValue{now.utc, value}, now.steady, now);
+  return send_wire(path, member, value, now.utc, now.steady, now);
 }
 
-Result<> ServiceSession::send_wire(std::string_view path, const MemberDefinition& member, const WireValue& value,
-                                   TimePoint arrived, Now now) {
+Result<> ServiceSession::send_wire(std::string_view path, const MemberDefinition& member, const Value& value,
+                                   TimeSpec time, TimePoint arrived, Now now) {
   const auto found = wires_.find(PathMemberView{path, member.name});
   if (!may_use_service() || found == wires_.end()) return {};
   auto& wire = found->second;
   const bool has_room = wire.state == WireState::connected && connection_.queued_bytes() < wire_high_mark;
-  if (has_room) return send_wire_packet(found->first, wire, value, arrived, now);
+  if (has_room) return send_wire_packet(found->first, wire, value, time, arrived, now);
   if (wire.waiting) ++wire.ledger.conflated;
-  wire.waiting = value;
+  wire.waiting = WireValue{time, value};
   wire.waiting_since = arrived;
   return {};
 }
 
-Result<> ServiceSession::send_wire_packet(const PathMember& key, WireConnection& wire, const WireValue& value,
-                                          TimePoint arrived, Now now) {
+Result<> ServiceSession::send_wire_packet(const PathMember& key, WireConnection& wire, const Value& value,
+                                          TimeSpec time, TimePoint arrived, Now now) {
   if (wire.waiting) {  // an older one
     ++wire.ledger.conflated;
     wire.waiting.reset();
@@ -209,8 +209,7 @@ Result<> ServiceSession::send_wire_packet(const PathMember& key, WireConnection&
   connection_.begin_message(outgoing_);
   outgoing_.header.metadata = unreliable_metadata;
   outgoing_.begin_entry(EntryType::wire_packet, key.path, key.member).metadata = unreliable_metadata;
-  if (auto written = write_wire_value(outgoing_, value.value, wire.stamp(value.time), *wire.member, service_->types());
-      !written)
+  if (auto written = write_wire_value(outgoing_, value, wire.stamp(time), *wire.member, service_->types()); !written)
     return written;
   send_outgoing(now);
   wire.ledger.note_delivery(now.steady - arrived);
@@ -220,10 +219,10 @@ Result<> ServiceSession::send_wire_packet(const PathMember& key, WireConnection&
 void ServiceSession::flush_wires(Now now) {
   for (auto& [key, wire] : wires_) {
     if (!wire.waiting || wire.state == WireState::connecting || !may_use_service()) continue;
-    const WireValue value = std::move(*wire.waiting);
-    wire.waiting.reset();
+    const auto [time, value] = *std::exchange(wire.waiting, std::nullopt);
     // A value that does not fit its definition was refused or not when it was set; here only the stream counts.
-    if (!send_wire_packet(key, wire, value, wire.waiting_since, now) || connection_.queued_bytes() >= wire_high_mark)
+    if (!send_wire_packet(key, wire, value, time, wire.waiting_since, now) ||
+        connection_.queued_bytes() >= wire_high_mark)
       return;
   }
 }

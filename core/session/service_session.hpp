@@ -209,9 +209,9 @@ class ServiceSession {
   Result<> send_event(std::string_view path, const MemberDefinition& member, std::span<const Value> arguments, Now now);
   /// Sends InValue if the client has connected this wire; a value that waits for a slow stream is replaced.
   Result<> send_wire(std::string_view path, const MemberDefinition& member, const Value& value, Now now);
-  /// The same for a value that is of another time, and came here at `arrived`.
-  Result<> send_wire(std::string_view path, const MemberDefinition& member, const WireValue& value, TimePoint arrived,
-                     Now now);
+  /// The same for a value that is of another `time`, and came here at `arrived`.
+  Result<> send_wire(std::string_view path, const MemberDefinition& member, const Value& value, TimeSpec time,
+                     TimePoint arrived, Now now);
   /// Values of a wire were replaced before they came here: for its ledger.
   void note_conflated(std::string_view path, const MemberDefinition& member, std::uint64_t count);
   /// Answers WireConnected of a remote service, where it is not answered yet.
@@ -284,6 +284,8 @@ class ServiceSession {
     bool wants_dim_count = false;                   ///< memories: of the dimensions, only how many
   };
 
+  /// A client that waits for a monitor hears of it at least that often.
+  static constexpr std::chrono::seconds longest_wait{5};
   /// A MonitorEnter or MonitorContinueEnter that is not answered yet.
   struct OpenEnter {
     std::uint32_t request_id = 0;
@@ -369,7 +371,14 @@ class ServiceSession {
                        Now now);
   Result<> answer_object_lock(const MessageEntry& entry);
   Result<> answer_monitor(const Message& message, const MessageEntry& entry, Now now);
-  void answer_enter(const OpenEnter& enter, const Result<std::string_view>& answer, Now now);
+  static Result<std::chrono::milliseconds> read_monitor_timeout(const Message& message, const MessageEntry& entry);
+  /// Of OpenEnter or OpenLock. `answer`  the text that the client gets.
+  template <class Request>
+  void answer_lock_request(const Request& request, const Result<std::string_view>& answer, Now now) {
+    send_session_op_reply(request.path, request.member, request.request_id, answer, now);
+  }
+  void send_session_op_reply(std::string_view path, std::string_view member, std::uint32_t request_id,
+                             const Result<std::string_view>& answer, Now now);
   TimePoint next_enter_deadline() const;
   void tell_others_of_monitors();
   void leave_monitors();
@@ -393,7 +402,6 @@ class ServiceSession {
   Result<> park(const Message& message, const MessageEntry& entry);
   Result<> ask_for_lock(const Message& message, const MessageEntry& entry, Now now);
   Result<> continue_entering(const MessageEntry& entry, Now now);
-  void finish_lock(const OpenLock& lock, const Result<std::string_view>& answer, Now now);
   void continue_late_locks(Now now);
 
   Result<> admit(EntryType type, std::string_view path, const MemberDefinition* member) const;
@@ -432,8 +440,8 @@ class ServiceSession {
 
   void begin_reply(const MessageEntry& request);
   void send_error(const MessageEntry& request, const Error& error, Now now);
-  Result<> send_wire_packet(const PathMember& key, WireConnection& wire, const WireValue& value, TimePoint arrived,
-                            Now now);
+  Result<> send_wire_packet(const PathMember& key, WireConnection& wire, const Value& value, TimeSpec time,
+                            TimePoint arrived, Now now);
   void flush_wires(Now now);
 
   ServiceDirectory& directory_;

@@ -137,7 +137,8 @@ void SharedClient::handle(const rr::WireReceived& received) {
 
 void SharedClient::receive_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::WireValue& value,
                                 rr::TimePoint arrived) {
-  (void)session_.send_wire(path, wire, value, arrived, rr::read_clocks());  // a lost connection is heard of by itself
+  // A lost connection is heard of by itself.
+  (void)session_.send_wire(path, wire, value.value, value.time, arrived, rr::read_clocks());
   settle();
 }
 

@@ -106,9 +106,8 @@ TEST_CASE("a wire of a remote service is connected when that one says so") {
   const WireValue early{TimeSpec{1'600'000'000, 5}, Value(2.5)};
 
   SECTION("the newest value follows the answer, with its own time") {
-    CHECK(pair.service->send_wire("arm", torque, WireValue{TimeSpec{1'600'000'000, 4}, Value(1.5)}, pair.now.steady,
-                                  pair.now));
-    CHECK(pair.service->send_wire("arm", torque, early, pair.now.steady, pair.now));
+    CHECK(pair.service->send_wire("arm", torque, Value(1.5), TimeSpec{1'600'000'000, 4}, pair.now.steady, pair.now));
+    CHECK(pair.service->send_wire("arm", torque, early.value, early.time, pair.now.steady, pair.now));
     pair.pump();
     CHECK_FALSE(pair.client->poll_event());
     pair.advance(std::chrono::milliseconds(3));
@@ -133,7 +132,7 @@ TEST_CASE("a wire of a remote service is connected when that one says so") {
     pair.service->answer_wire("arm", torque, {}, pair.now);
     CHECK(pair.completion(connecting));
     for (int i = 0; i < 2; ++i) {
-      CHECK(pair.service->send_wire("arm", torque, early, pair.now.steady, pair.now));
+      CHECK(pair.service->send_wire("arm", torque, early.value, early.time, pair.now.steady, pair.now));
       pair.pump();
       CHECK(pair.next_client<WireValueReceived>().time.nanoseconds == 5 + i);
     }
