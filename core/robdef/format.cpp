@@ -6,6 +6,7 @@
 #include "core/robdef/robdef.hpp"
 #include "core/robdef/statement_text.hpp"
 #include "core/robdef/version_levels.hpp"
+#include "core/support/words.hpp"
 
 namespace rr {
 

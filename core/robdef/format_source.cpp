@@ -7,6 +7,7 @@
 #include "core/robdef/names.hpp"
 #include "core/robdef/robdef.hpp"
 #include "core/robdef/statement_text.hpp"
+#include "core/support/words.hpp"
 
 namespace rr {
 

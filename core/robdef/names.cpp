@@ -63,16 +63,6 @@ std::string_view trim_blanks(std::string_view text) {
   return text;
 }
 
-std::vector<std::string_view> split_words(std::string_view text) {
-  std::vector<std::string_view> words;
-  for (text = trim_blanks(text); !text.empty(); text = trim_blanks(text)) {
-    const auto length = std::min(text.find_first_of(" \t"), text.size());
-    words.push_back(text.substr(0, length));
-    text.remove_prefix(length);
-  }
-  return words;
-}
-
 std::string to_lower(std::string_view text) {
   std::string lower(text);
   for (auto& c : lower) {

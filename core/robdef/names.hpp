@@ -3,7 +3,6 @@
 
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "core/wire/message.hpp"
 
@@ -30,7 +29,6 @@ constexpr bool is_text_character(char c) {
 }
 
 std::string_view trim_blanks(std::string_view text);
-std::vector<std::string_view> split_words(std::string_view text);
 std::string to_lower(std::string_view text);
 
 /// A letter, then letters, digits and underscores, the last one not an underscore.

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/robdef/names.hpp"
+#include "core/support/words.hpp"
 
 namespace rr {
 

@@ -5,6 +5,7 @@
 
 #include "core/robdef/names.hpp"
 #include "core/robdef/verify_scope.hpp"
+#include "core/support/words.hpp"
 
 namespace rr {
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/support/words.hpp"
+
 namespace rrgate {
 
 namespace {
@@ -16,23 +18,11 @@ void for_each_line(std::string_view file, Call call) {
 }
 
 bool is_line_of(std::string_view line, std::string_view name) {
-  const auto words = split_words(line);
+  const auto words = rr::split_words(line);
   return !words.empty() && words.front() == name;
 }
 
 }  // namespace
-
-std::vector<std::string_view> split_words(std::string_view text, std::string_view separators) {
-  std::vector<std::string_view> words;
-  for (;;) {
-    const auto begin = text.find_first_not_of(separators);
-    if (begin == std::string_view::npos) return words;
-    text.remove_prefix(begin);
-    const auto end = std::min(text.find_first_of(separators), text.size());
-    words.push_back(text.substr(0, end));
-    text.remove_prefix(end);
-  }
-}
 
 rr::Result<> check_name(std::string_view what, std::string_view name) {
   const auto is_bad = [](char c) { return static_cast<unsigned char>(c) <= ' ' || c == 0x7f || c == ',' || c == ':'; };
@@ -47,7 +37,7 @@ rr::Result<> check_name(std::string_view what, std::string_view name) {
 rr::Result<std::vector<std::string>> parse_roles(std::string_view text) {
   std::vector<std::string> out;
   if (text == "_") return out;
-  for (const auto role : split_words(text, ",")) {
+  for (const auto role : rr::split_words(text, ",")) {
     if (auto checked = check_name("role", role); !checked) return checked.error();
     out.emplace_back(role);
   }

@@ -9,8 +9,6 @@
 
 namespace rrgate {
 
-std::vector<std::string_view> split_words(std::string_view text, std::string_view separators = " \t\r\v\f");
-
 /// A name that a line and HTTP Basic can hold: 1 to 128 characters, no blank, comma, colon or control character, no '#'
 /// or '_' in front. `what` is "user name" or "role". Errors   invalid_argument.
 [[nodiscard]] rr::Result<> check_name(std::string_view what, std::string_view name);

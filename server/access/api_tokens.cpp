@@ -3,6 +3,7 @@
 #include <charconv>
 
 #include "core/support/hex.hpp"
+#include "core/support/words.hpp"
 #include "server/access/access_text.hpp"
 #include "server/access/base64url.hpp"
 #include "server/security/digest.hpp"
@@ -75,7 +76,7 @@ rr::Result<ApiTokens> ApiTokens::from_text(std::string_view text) {
 }
 
 rr::Result<> ApiTokens::add_line(std::string_view line) {
-  const auto fields = split_words(line);
+  const auto fields = rr::split_words(line);
   if (fields.empty() || fields.front().front() == '#') return {};
   if (fields.size() != 4)
     return unusable("has " + std::to_string(fields.size()) + " fields, expected name, SHA-256, roles or _, day or _");

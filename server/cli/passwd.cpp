@@ -5,6 +5,7 @@
 #include <iostream>
 #include <optional>
 
+#include "core/support/words.hpp"
 #include "server/access/access_text.hpp"
 #include "server/cli/command.hpp"
 #include "server/definitions/text_file.hpp"
@@ -71,7 +72,7 @@ rr::Result<std::string> read_password(const std::string& name) {
 rr::Result<std::string> make_line(const std::string& name, std::string_view before,
                                   const std::optional<std::string>& roles) {
   // Roles and nodes stay as they are where nothing is said of them.
-  const auto fields = split_words(before);
+  const auto fields = rr::split_words(before);
   std::string privileges(fields.size() > 2 ? fields[2] : "_");
   if (roles) {
     const auto parsed = parse_roles(*roles);

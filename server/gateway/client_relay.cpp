@@ -14,17 +14,15 @@ rr::Result<> may_relay(Gateway& gateway, const Connection& connection, const Dev
 }
 
 rr::awaitable<rr::Result<std::unique_ptr<Boarding>>> board(Gateway& gateway, Device& device, std::string way) {
-  const auto label = "device " + rr::quoted(device.config().name);
   auto seat = device.take_seat();
   if (!seat) {
     gateway.reject(Rejection::device_full);
-    co_return rr::make_error(rr::ErrorCode::connection_error,
-                             label + " has all the clients it may have (" + std::to_string(device.clients()) + ")");
+    co_return rr::make_error(rr::ErrorCode::connection_error, device.full_text());
   }
   auto stream = co_await device.connect(std::move(way));
   if (!stream) {
     gateway.reject(Rejection::device_offline);
-    co_return rr::make_error(rr::ErrorCode::connection_error, label + " is offline: " + stream.error().message);
+    co_return rr::make_error(rr::ErrorCode::connection_error, device.offline_text(stream.error()));
   }
   auto boarding = std::make_unique<Boarding>(Boarding{device, std::move(*seat), std::move(*stream)});
   co_return boarding;

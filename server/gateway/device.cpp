@@ -168,6 +168,19 @@ std::optional<Device::Seat> Device::take_seat() {
   return Seat(*this);
 }
 
+std::string Device::full_text() const {
+  return "device " + rr::quoted(config_.name) + " has all the clients it may have (" + std::to_string(clients_) + ")";
+}
+
+std::string Device::offline_text(const rr::Error& error) const {
+  return "device " + rr::quoted(config_.name) + " is offline: " + error.message;
+}
+
+void Device::start() {
+  const auto keep_watching = [](std::shared_ptr<Device> self) -> rr::awaitable<void> { co_await self->watch(); };
+  asio::co_spawn(executor(), keep_watching(shared_from_this()), asio::detached);
+}
+
 rr::awaitable<void> Device::watch() {
   auto backoff = retry_.min;
   while (!is_stopping_) {
@@ -264,16 +277,8 @@ void DeviceRegistry::reload_tls(bool is_forced) {
     if (!device->config().is_found) device->reload_tls(is_forced);  // those have theirs together
 }
 
-namespace {
-
-rr::awaitable<void> watch(std::shared_ptr<Device> device) {
-  co_await device->watch();
-}
-
-}  // namespace
-
 void DeviceRegistry::start() {
-  for (const auto& device : devices_) asio::co_spawn(executor_, watch(device), asio::detached);
+  for (const auto& device : devices_) device->start();
 }
 
 rr::Result<std::vector<std::shared_ptr<Device>>> DeviceRegistry::prepare(const Config& next) {
@@ -295,8 +300,7 @@ void DeviceRegistry::replace(std::vector<std::shared_ptr<Device>> configured) {
   const auto before = std::exchange(devices_, std::move(configured));
   for (std::size_t i = 0; i < devices_.size(); ++i) {
     devices_[i]->become(config_.devices[i], config_);
-    if (std::find(before.begin(), before.end(), devices_[i]) == before.end())
-      asio::co_spawn(executor_, watch(devices_[i]), asio::detached);
+    if (std::find(before.begin(), before.end(), devices_[i]) == before.end()) devices_[i]->start();
   }
   for (const auto& device : before) {
     if (has(*device)) continue;
@@ -314,7 +318,7 @@ bool DeviceRegistry::has(const Device& device) const {
 Device& DeviceRegistry::add(DeviceConfig device, std::shared_ptr<TlsFiles> tls) {
   devices_.push_back(std::make_shared<Device>(executor_, std::move(device), config_, std::move(tls)));
   auto& added = *devices_.back();
-  asio::co_spawn(executor_, watch(devices_.back()), asio::detached);
+  added.start();
   if (on_change_) on_change_();
   return added;
 }

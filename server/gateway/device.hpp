@@ -86,6 +86,9 @@ class Device : public std::enable_shared_from_this<Device> {
   };
   /// nullopt when the device has as many clients as it may.
   std::optional<Seat> take_seat();
+  // What those hear who can't get to it.
+  std::string full_text() const;
+  std::string offline_text(const rr::Error& error) const;
 
   /// For devices by TLS: reads the CAs that it is checked against. See TlsFiles.
   [[nodiscard]] rr::Result<> load_tls();
@@ -93,6 +96,8 @@ class Device : public std::enable_shared_from_this<Device> {
 
   /// Probes until stop(), all URLs side by side; stop() ends what is being dialed.
   rr::awaitable<void> watch();
+  /// The same, by itself.
+  void start();
   void stop();
 
  private:

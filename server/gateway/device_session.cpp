@@ -74,14 +74,10 @@ rr::awaitable<rr::Result<rr::AsyncObject>> DeviceSession::root() {
 }
 
 rr::awaitable<rr::Result<>> DeviceSession::connect() {
-  const auto label = "device " + rr::quoted(device_->config().name);
   auto seat = device_->take_seat();
-  if (!seat)
-    co_return rr::make_error(rr::ErrorCode::out_of_system_resource,
-                             label + " has all the clients it may have (" + std::to_string(device_->clients()) + ")");
+  if (!seat) co_return rr::make_error(rr::ErrorCode::out_of_system_resource, device_->full_text());
   auto stream = co_await device_->connect_client();
-  if (!stream)
-    co_return rr::make_error(rr::ErrorCode::connection_error, label + " is offline: " + stream.error().message);
+  if (!stream) co_return rr::make_error(rr::ErrorCode::connection_error, device_->offline_text(stream.error()));
   rr::MapString credentials;
   if (!key_.username.empty()) credentials.items.emplace_back("password", rr::Value(key_.password));
   auto opened =

@@ -140,7 +140,8 @@ void Gateway::tell_of_nodes() {
       const auto& identity = device->identity();
       if (!shared && !identity) continue;
       const auto node = shared ? shared->node().identity() : rr::NodeIdentity{identity->node_id, identity->node_name};
-      out.push_back({node, {index_url(base_url, node)}});
+      out.push_back({node, {}});
+      if (!base_url.empty()) out.back().index_urls.push_back(index_url(base_url, node));
     }
     return out;
   };

@@ -1,8 +1,5 @@
 #include "server/gateway/gateway_service.hpp"
 
-#include <boost/asio/co_spawn.hpp>
-#include <boost/asio/detached.hpp>
-
 #include "server/gateway/gateway.hpp"
 #include "server/gateway/robdef_text.hpp"
 #include "server/log/log.hpp"
@@ -34,10 +31,6 @@ double seconds(std::chrono::microseconds time) {
   return std::chrono::duration<double>(time).count();
 }
 
-rr::awaitable<void> watch(std::shared_ptr<Device> device) {
-  co_await device->watch();
-}
-
 }  // namespace
 
 GatewayService::GatewayService(asio::io_context& io, Gateway& gateway)
@@ -65,7 +58,7 @@ void GatewayService::start() {
   node_.add(service_);
   node_.listen("rr+intra:///");
   node_.every(look_period, [this] { look_at_devices(); });
-  asio::co_spawn(device_->executor(), watch(device_), asio::detached);
+  device_->start();
 }
 
 void GatewayService::stop() {

@@ -4,7 +4,7 @@
 #include <boost/asio/use_awaitable.hpp>
 
 #include "core/session/url.hpp"
-#include "server/access/access_text.hpp"
+#include "core/support/words.hpp"
 #include "server/gateway/gateway.hpp"
 #include "server/http/upgrade.hpp"
 #include "server/json/base64.hpp"
@@ -48,7 +48,7 @@ std::optional<Identity> by_proxy(const Request& request, const Connection& conne
   out.name = request.header(headers.user);
   if (out.name.empty()) return std::nullopt;
   if (!headers.roles.empty())
-    for (const auto role : split_words(request.header(headers.roles), ", |\t")) out.roles.emplace_back(role);
+    for (const auto role : rr::split_words(request.header(headers.roles), ", |\t")) out.roles.emplace_back(role);
   out.proof = Proof::proxy;
   return out;
 }

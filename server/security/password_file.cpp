@@ -4,23 +4,13 @@
 #include <fstream>
 #include <sstream>
 
+#include "core/support/words.hpp"
+
 namespace rr {
 
 namespace {
 
 constexpr std::size_t max_password_size = 1024;
-
-std::vector<std::string_view> split(std::string_view text, std::string_view separators) {
-  std::vector<std::string_view> words;
-  while (true) {
-    const auto begin = text.find_first_not_of(separators);
-    if (begin == std::string_view::npos) return words;
-    text.remove_prefix(begin);
-    const auto end = std::min(text.find_first_of(separators), text.size());
-    words.push_back(text.substr(0, end));
-    text.remove_prefix(end);
-  }
-}
 
 Error refused(std::string why) {
   return {ErrorCode::authentication_error, std::move(why)};
@@ -56,7 +46,7 @@ Result<std::shared_ptr<const PasswordFileAuthenticator>> PasswordFileAuthenticat
 }
 
 Result<> PasswordFileAuthenticator::add_line(std::string_view line) {
-  const auto fields = split(line, " \t\r\v\f");
+  const auto fields = split_words(line);
   if (fields.empty()) return {};
   if (fields.size() < 3 || fields.size() > 4)
     return make_error(ErrorCode::invalid_configuration, "has " + std::to_string(fields.size()) +
@@ -69,9 +59,9 @@ Result<> PasswordFileAuthenticator::add_line(std::string_view line) {
                       "user " + quoted(fields[0]) + " has an MD5 hash, which must be allowed; use scrypt");
   User user{std::move(*hash), {}, {}};
   if (fields[2] != "_")
-    for (const auto privilege : split(fields[2], ",")) user.privileges.emplace_back(privilege);
+    for (const auto privilege : split_words(fields[2], ",")) user.privileges.emplace_back(privilege);
   if (fields.size() == 4)
-    for (const auto text : split(fields[3], ",")) {
+    for (const auto text : split_words(fields[3], ",")) {
       const auto node = parse_node_id(text);
       if (!node) return node.error();
       user.nodes.push_back(*node);

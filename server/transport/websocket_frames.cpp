@@ -91,13 +91,8 @@ Result<> WebSocketDecoder::begin_frame() {
   }
   const bool is_masked = (header_[1] & 0x80) != 0;
   if (!is_masked && role_ == WebSocketRole::server) return fail(1002, "frame of a client without mask");
-  left_ = header_[1] & 0x7f;
-  std::size_t at = 2;
-  if (left_ >= 126) {
-    const std::size_t width = left_ == 126 ? 2 : 8;
-    left_ = 0;
-    for (std::size_t i = 0; i < width; ++i) left_ = left_ << 8 | header_[at++];
-  }
+  std::size_t at = 0;
+  left_ = read_frame_length(header_, at);
   if (left_ > INT64_MAX) return fail(1002, "frame length with its highest bit set");
   if (is_control(opcode_)) {
     if (!is_final || left_ > 125) return fail(1002, "control frame that is fragmented or longer than 125 bytes");
@@ -140,6 +135,15 @@ void unmask(const std::uint8_t* from, std::uint8_t* to, std::size_t count, const
     std::memcpy(to + i, &word, 8);
   }
   for (; i < count; ++i) to[i] = static_cast<std::uint8_t>(from[i] ^ rotated[i % 8]);
+}
+
+std::uint64_t read_frame_length(ByteSpan header, std::size_t& at) {
+  at = 2;
+  const std::uint8_t brief = header[1] & 0x7f;
+  if (brief < 126) return brief;
+  std::uint64_t length = 0;
+  for (const std::size_t end = brief == 126 ? 4 : 10; at < end; ++at) length = length << 8 | header[at];
+  return length;
 }
 
 FrameHeader make_frame_header(WebSocketOpcode opcode, std::size_t payload, const WebSocketMask* mask) {

@@ -78,6 +78,9 @@ class WebSocketDecoder {
 void unmask(const std::uint8_t* from, std::uint8_t* to, std::size_t count, const WebSocketMask& mask,
             std::size_t index);
 
+/// The length of a frame's payload, from a header that is there as far as the length goes; `at` is where it ends.
+std::uint64_t read_frame_length(ByteSpan header, std::size_t& at);
+
 /// The header of a final frame: 2 or 4 bytes, since `payload` is at most max_frame_payload, and the mask of a client's.
 struct FrameHeader {
   std::array<std::uint8_t, 8> bytes;

@@ -75,13 +75,8 @@ Result<std::size_t> WebSocketMessageDecoder::feed(ByteSpan bytes) {
 
 Result<> WebSocketMessageDecoder::begin_frame() {
   first_byte_ = header_[0];
-  left_ = header_[1] & 0x7f;
-  std::size_t at = 2;
-  if (left_ >= 126) {
-    const std::size_t width = left_ == 126 ? 2 : 8;
-    left_ = 0;
-    for (std::size_t i = 0; i < width; ++i) left_ = left_ << 8 | header_[at++];
-  }
+  std::size_t at = 0;
+  left_ = read_frame_length(header_, at);
   std::memcpy(mask_.data(), header_.data() + at, 4);
   mask_index_ = 0;
   header_.clear();

@@ -59,8 +59,7 @@ rr::awaitable<void> serve_shared_client(Gateway& gateway, Connection& connection
       seat.emplace(std::move(*taken));
     } else {
       gateway.reject(Rejection::device_full);
-      const rr::EndReason reason{
-          1013, "device " + rr::quoted(destination.device->config().name) + " has all the clients it may have"};
+      const rr::EndReason reason{1013, destination.device->full_text()};
       co_await client->end(reason);
       co_return;
     }

@@ -1,9 +1,7 @@
 #include "server/gateway/shared/shared_devices.hpp"
 
-#include <openssl/evp.h>
-
 #include <algorithm>
-#include <array>
+#include <boost/uuid/name_generator_sha1.hpp>
 
 #include "core/session/service_index.hpp"
 #include "server/transport/socket_stream.hpp"
@@ -14,15 +12,11 @@ namespace {
 
 /// A UUID of version 5 in the name space of the gateway's own: the same whenever the gateway has the same.
 rr::NodeId derived_id(const rr::NodeId& gateway, std::string_view device) {
-  std::vector<std::uint8_t> text(gateway.bytes.begin(), gateway.bytes.end());
-  text.insert(text.end(), device.begin(), device.end());
-  std::array<std::uint8_t, EVP_MAX_MD_SIZE> digest{};
-  unsigned size = 0;
-  EVP_Digest(text.data(), text.size(), digest.data(), &size, EVP_sha1(), nullptr);
+  boost::uuids::uuid space;
+  std::copy(gateway.bytes.begin(), gateway.bytes.end(), space.begin());
+  const auto derived = boost::uuids::name_generator_sha1(space)(std::string(device));
   rr::NodeId id;
-  std::copy_n(digest.begin(), id.bytes.size(), id.bytes.begin());
-  id.bytes[6] = static_cast<std::uint8_t>((id.bytes[6] & 0x0f) | 0x50);
-  id.bytes[8] = static_cast<std::uint8_t>((id.bytes[8] & 0x3f) | 0x80);
+  std::copy(derived.begin(), derived.end(), id.bytes.begin());
   return id;
 }
 

@@ -1,17 +1,13 @@
 #include "server/gateway/shared/upstream.hpp"
 
 #include <algorithm>
-#include <boost/asio/post.hpp>
 
 #include "core/session/service_path.hpp"
 #include "core/support/glob.hpp"
 #include "server/gateway/open_session.hpp"
-#include "server/log/log.hpp"
 #include "server/node/async_object.hpp"
 
 namespace rrgate {
-
-namespace asio = boost::asio;
 
 namespace {
 
@@ -65,9 +61,7 @@ rr::awaitable<rr::Result<>> Upstream::open() {
 
 rr::awaitable<rr::Result<std::shared_ptr<rr::ClientConnection>>> Upstream::open_connection(bool is_stepwise) {
   auto stream = co_await device_->connect();
-  if (!stream)
-    co_return rr::make_error(rr::ErrorCode::connection_error,
-                             "device " + rr::quoted(device_->config().name) + " is offline: " + stream.error().message);
+  if (!stream) co_return rr::make_error(rr::ErrorCode::connection_error, device_->offline_text(stream.error()));
   const auto& url = device_->config().url;
   const rr::NodeIdentity target{url.node_id.value_or(rr::NodeId{}), url.node_name};
   const std::string username = login_.is_late ? std::string() : login_.username;
@@ -105,6 +99,10 @@ void Upstream::add(UpstreamClient& client) {
   clients_.push_back(&client);
 }
 
+bool Upstream::has(const UpstreamClient& client) const {
+  return std::find(clients_.begin(), clients_.end(), &client) != clients_.end();
+}
+
 void Upstream::remove(UpstreamClient& client) {
   std::erase(clients_, &client);
   std::erase_if(calls_, [&](const OpenCall& call) { return call.client == &client; });
@@ -112,8 +110,7 @@ void Upstream::remove(UpstreamClient& client) {
     leave_pipe(client, (it++)->first.second);
   std::vector<std::pair<std::string, const rr::MemberDefinition*>> wires;
   for (const auto& [key, wire] : wires_)
-    if (std::find(wire.clients.begin(), wire.clients.end(), &client) != wire.clients.end())
-      wires.emplace_back(key.first, wire.member);
+    if (has_joined(client, key)) wires.emplace_back(key.first, wire.member);
   for (const auto& [path, member] : wires) leave_wire(client, path, *member);
   std::vector<rr::GeneratorId> generators;
   for (const auto& [key, generator] : generators_)
@@ -332,274 +329,6 @@ void Upstream::lock(const rr::LockWanted& wanted, Completion done) {
     case rr::LockCommand::exit_monitor:
       return connection_->exit_monitor(wanted.path, std::move(done));
   }
-}
-
-// --- wires ---
-
-void Upstream::join_wire(UpstreamClient& client, const std::string& path, const rr::MemberDefinition& member) {
-  if (!connection_) return client.answer_wire(path, member, lost_error());
-  const MemberKey key(path, member.name);
-  auto& wire = wires_[key];
-  wire.member = &member;
-  wire.clients.push_back(&client);
-  if (wire.is_attached) {
-    const auto newest = wire.newest;  // the client may leave
-    const auto arrived = wire.arrived;
-    const bool is_due = wire.is_due;
-    client.answer_wire(path, member, {});
-    if (newest && !is_due) client.receive_wire(path, member, *newest, arrived);
-  } else if (wire.clients.size() == 1) {
-    attach_wire(key);
-  }
-}
-
-void Upstream::attach_wire(const MemberKey& key) {
-  if (!connection_) return;
-  const auto weak = weak_from_this();
-  if (!connection_->session().object_type(key.first))  // another session of this service has found it
-    return find_object(key.first, [weak, key](const rr::Result<rr::Value>& found) {
-      const auto self = weak.lock();
-      if (!self || !self->connection_) return;
-      if (found) return self->attach_wire(key);
-      const auto reason = found.error();
-      self->drop_wire(key, &reason);
-    });
-  auto received = [weak, key](const rr::Value& value, rr::TimeSpec time) {
-    if (const auto self = weak.lock()) self->publish_wire(key, value, time);
-  };
-  auto connected = [weak, key](const rr::Result<rr::Value>& done) {
-    const auto self = weak.lock();
-    if (!self || !self->connection_) return;
-    const auto found = self->wires_.find(key);
-    if (found == self->wires_.end()) return;
-    if (!done) {
-      const auto reason = done.error();
-      return self->drop_wire(key, &reason);
-    }
-    auto& wire = found->second;
-    wire.is_attached = true;
-    const auto clients = wire.clients;
-    for (auto* client : clients)
-      if (self->has_joined(*client, key)) client->answer_wire(key.first, *wire.member, {});
-    const auto still_there = self->wires_.find(key);
-    if (still_there == self->wires_.end() || !self->connection_) return;
-    if (const auto value = std::exchange(still_there->second.out_value, std::nullopt))
-      (void)self->connection_->send_wire(key.first, key.second, *value);
-  };
-  connection_->on_wire_closed(key.first, key.second, [weak, key] {
-    const auto closed = rr::make_error(rr::ErrorCode::service_error, "the device closed the wire");
-    if (const auto self = weak.lock()) self->drop_wire(key, &closed);
-  });
-  connection_->connect_wire(key.first, key.second, std::move(received), std::move(connected));
-}
-
-void Upstream::publish_wire(const MemberKey& key, const rr::Value& value, rr::TimeSpec time) {
-  const auto found = wires_.find(key);
-  if (found == wires_.end()) return;
-  auto& wire = found->second;
-  wire.newest = rr::WireValue{time, value};
-  wire.arrived = std::chrono::steady_clock::now();
-  if (wire.is_due) {
-    ++wire.conflated;
-    return;
-  }
-  // Not here: one read may bring hundreds of values, of which the last one counts, and everybody else has to get a
-  // turn.
-  wire.is_due = true;
-  asio::post(device_->executor(), [weak = weak_from_this(), key] {
-    if (const auto self = weak.lock()) self->hand_out(key);
-  });
-}
-
-void Upstream::hand_out(const MemberKey& key) {
-  const auto found = wires_.find(key);
-  if (found == wires_.end() || !found->second.newest) return;
-  auto& wire = found->second;
-  wire.is_due = false;
-  const auto conflated = std::exchange(wire.conflated, 0);
-  // Clients may leave while they are sent to: the value and the list must stay.
-  const auto clients = wire.clients;
-  const auto newest = *wire.newest;
-  const auto arrived = wire.arrived;
-  const auto& member = *wire.member;
-  for (auto* client : clients) {
-    const auto still_there = wires_.find(key);
-    if (still_there == wires_.end()) return;
-    if (still_there->second.clients.size() != clients.size() && !has_joined(*client, key)) continue;
-    if (conflated > 0) client->note_conflated(key.first, member, conflated);
-    client->receive_wire(key.first, member, newest, arrived);
-  }
-}
-
-void Upstream::leave_wire(UpstreamClient& client, const std::string& path, const rr::MemberDefinition& member) {
-  const MemberKey key(path, member.name);
-  const auto found = wires_.find(key);
-  if (found == wires_.end()) return;
-  std::erase(found->second.clients, &client);
-  if (!found->second.clients.empty()) return;
-  wires_.erase(found);
-  if (connection_) connection_->disconnect_wire(path, member.name, ignore);
-}
-
-void Upstream::drop_wire(const MemberKey& key, const rr::Error* reason) {
-  const auto dropped = wires_.extract(key);
-  if (!dropped || !reason) return;
-  const auto& member = *dropped.mapped().member;
-  for (auto* client : dropped.mapped().clients) {
-    if (has(*client)) client->answer_wire(key.first, member, *reason);
-    if (has(*client)) client->close_wire(key.first, member);
-  }
-}
-
-bool Upstream::has(const UpstreamClient& client) const {
-  return std::find(clients_.begin(), clients_.end(), &client) != clients_.end();
-}
-
-bool Upstream::has_joined(const UpstreamClient& client, const MemberKey& key) const {
-  const auto found = wires_.find(key);
-  if (found == wires_.end()) return false;
-  const auto& clients = found->second.clients;
-  return std::find(clients.begin(), clients.end(), &client) != clients.end();
-}
-
-void Upstream::send_wire(const std::string& path, const rr::MemberDefinition& member, const rr::Value& value) {
-  const auto found = wires_.find({path, member.name});
-  if (found == wires_.end()) return;
-  if (!connection_ || !found->second.is_attached)
-    found->second.out_value = value;
-  else
-    (void)connection_->send_wire(path, member.name, value);  // the newest wins: one that can't be sent is replaced
-}
-
-// --- pipes ---
-
-void Upstream::join_pipe(UpstreamClient& client, rr::PipeId id, const std::string& path,
-                         const rr::MemberDefinition& member) {
-  if (!connection_) return client.refuse_pipe(id, lost_error());
-  const EndpointKey endpoint(&client, id);
-  const bool is_shared = member.direction() == rr::MemberDirection::readonly;
-  const MemberKey key(path, member.name);
-  if (is_shared) {
-    if (const auto known = shared_pipes_.find(key); known != shared_pipes_.end()) {
-      auto& pipe = pipes_.at(known->second);
-      pipe.endpoints.push_back(endpoint);
-      endpoints_[endpoint] = known->second;
-      if (pipe.state == PipeState::attached) client.accept_pipe(id);
-      return;
-    }
-  }
-  const auto number = ++last_pipe_;
-  auto& pipe = pipes_[number];
-  pipe.path = path;
-  pipe.member = &member;
-  pipe.endpoints.push_back(endpoint);
-  endpoints_[endpoint] = number;
-  if (is_shared) shared_pipes_[key] = number;
-  attach_pipe(number);
-}
-
-void Upstream::attach_pipe(PipeNumber number) {
-  const auto found = pipes_.find(number);
-  if (found == pipes_.end() || !connection_ || found->second.state != PipeState::detached) return;
-  auto& pipe = found->second;
-  const auto weak = weak_from_this();
-  if (!connection_->session().object_type(pipe.path))  // another session of this service has found it
-    return find_object(pipe.path, [weak, number](const rr::Result<rr::Value>& object) {
-      const auto self = weak.lock();
-      if (!self || !self->connection_) return;
-      if (object) return self->attach_pipe(number);
-      self->drop_pipe(number);
-    });
-  pipe.state = PipeState::attaching;
-  rr::ClientConnection::PipeHandlers handlers;
-  handlers.received = [weak, number](const rr::Value& packet) {
-    const auto self = weak.lock();
-    if (!self) return;
-    const auto at = self->pipes_.find(number);
-    if (at == self->pipes_.end()) return;
-    const auto endpoints = at->second.endpoints;  // they may leave
-    for (const auto& endpoint : endpoints)
-      if (self->endpoints_.contains(endpoint)) endpoint.first->receive_packet(endpoint.second, packet);
-  };
-  handlers.closed = [weak, number] {
-    if (const auto self = weak.lock()) self->drop_pipe(number);
-  };
-  const bool is_first = pipe.index == 0;
-  connection_->connect_pipe(
-      pipe.path, pipe.member->name, rr::any_pipe_index, std::move(handlers),
-      [weak, number, is_first, path = pipe.path, member = pipe.member->name](const rr::Result<rr::Value>& result) {
-        const auto self = weak.lock();
-        if (self) self->pipe_attached(number, path, member, result, is_first);
-      });
-}
-
-void Upstream::pipe_attached(PipeNumber number, const std::string& path, const std::string& member,
-                             const rr::Result<rr::Value>& result, bool is_first) {
-  const auto found = pipes_.find(number);
-  if (found == pipes_.end()) {  // everybody has left meanwhile
-    if (result && connection_) connection_->disconnect_pipe(path, member, result->to<std::int32_t>().value(), ignore);
-    return;
-  }
-  auto& pipe = found->second;
-  if (!result) {
-    if (!is_first && !connection_) return;  // lost again: the next attempt will do
-    const auto endpoints = pipe.endpoints;
-    if (!is_first) return drop_pipe(number);
-    for (const auto& endpoint : endpoints) endpoints_.erase(endpoint);
-    shared_pipes_.erase({pipe.path, pipe.member->name});
-    pipes_.erase(found);
-    for (const auto& endpoint : endpoints)
-      if (has(*endpoint.first)) endpoint.first->refuse_pipe(endpoint.second, result.error());
-    return;
-  }
-  pipe.index = result->to<std::int32_t>().value();
-  pipe.state = PipeState::attached;
-  const auto endpoints = pipe.endpoints;
-  for (const auto& endpoint : endpoints)
-    if (endpoints_.contains(endpoint)) endpoint.first->accept_pipe(endpoint.second);
-}
-
-void Upstream::leave_pipe(UpstreamClient& client, rr::PipeId id) {
-  const EndpointKey endpoint(&client, id);
-  const auto known = endpoints_.find(endpoint);
-  if (known == endpoints_.end()) return;
-  const auto found = pipes_.find(known->second);
-  endpoints_.erase(known);
-  auto& pipe = found->second;
-  std::erase(pipe.endpoints, endpoint);
-  if (!pipe.endpoints.empty()) return;
-  if (connection_ && pipe.state == PipeState::attached)
-    connection_->disconnect_pipe(pipe.path, pipe.member->name, pipe.index, ignore);
-  if (pipe.member->direction() == rr::MemberDirection::readonly) shared_pipes_.erase({pipe.path, pipe.member->name});
-  pipes_.erase(found);
-}
-
-void Upstream::drop_pipe(PipeNumber number) {
-  const auto dropped = pipes_.extract(number);
-  if (!dropped) return;
-  const auto& pipe = dropped.mapped();
-  if (const auto known = shared_pipes_.find({pipe.path, pipe.member->name});
-      known != shared_pipes_.end() && known->second == number)
-    shared_pipes_.erase(known);
-  for (const auto& endpoint : pipe.endpoints) endpoints_.erase(endpoint);
-  for (const auto& endpoint : pipe.endpoints)
-    if (has(*endpoint.first)) endpoint.first->close_pipe(endpoint.second);
-}
-
-void Upstream::send_pipe(UpstreamClient& client, rr::PipeId id, const rr::Value& packet) {
-  const auto known = endpoints_.find({&client, id});
-  if (known == endpoints_.end()) return;
-  auto& pipe = pipes_.at(known->second);
-  const auto sent = pipe.state == PipeState::attached && connection_
-                        ? connection_->send_pipe(pipe.path, pipe.member->name, pipe.index, packet)
-                        : rr::Result<>(lost_error());
-  if (sent) return;
-  log(LogLevel::info, "pipe endpoint closed: the device takes no packet",
-      {{"device", device_->config().name},
-       {"pipe", pipe.path + "." + pipe.member->name},
-       {"error", sent.error().message}});
-  leave_pipe(client, id);
-  client.close_pipe(id);
 }
 
 // --- callbacks ---

@@ -1,0 +1,12 @@
+// Words of a text. Layer: support.
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+namespace rr {
+
+/// What stands between `separators`, of which any number may follow one another. Borrows from `text`.
+std::vector<std::string_view> split_words(std::string_view text, std::string_view separators = " \t\r\v\f");
+
+}  // namespace rr
