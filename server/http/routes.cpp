@@ -11,24 +11,33 @@
 
 namespace rrgate {
 
+std::vector<Route> list_routes(Gateway& gateway) {
+  using enum http::verb;
+  return {
+      {get, "/healthz", health_endpoint()},
+      {get, "/readyz", ready_endpoint(gateway)},
+      {get, "/metrics", metrics_endpoint(gateway)},
+      {get, "/api/v1/openapi.json", gateway_document_endpoint(gateway)},
+      {get, "/api/v1/devices", devices_endpoint(gateway)},
+      {get, "/api/v1/devices/*", objects_endpoint(gateway)},
+      {put, "/api/v1/devices/*", objects_endpoint(gateway)},
+      {post, "/api/v1/devices/*", objects_endpoint(gateway)},
+      {options, "/api/v1/devices/*", objects_endpoint(gateway)},
+      {get, "/api/v1/discovery", discovery_endpoint(gateway)},
+      {get, "/api/v1/access", who_endpoint(gateway)},
+      {post, "/api/v1/tickets", tickets_endpoint(gateway)},
+      {post, "/api/v1/access/requests", ask_endpoint(gateway)},
+      {get, "/api/v1/access/requests", requests_endpoint(gateway)},
+      {post, "/api/v1/access/requests/*", request_endpoint(gateway)},
+      {get, "/api/*", no_such_api_endpoint()},
+      {get, "/devices/*", device_endpoint(gateway)},
+      {get, "/*", dashboard_endpoint(gateway)},
+  };
+}
+
 Router make_routes(Gateway& gateway) {
   Router router;
-  router.add(http::verb::get, "/healthz", health_endpoint());
-  router.add(http::verb::get, "/readyz", ready_endpoint(gateway));
-  router.add(http::verb::get, "/metrics", metrics_endpoint(gateway));
-  router.add(http::verb::get, "/api/v1/openapi.json", gateway_document_endpoint(gateway));
-  router.add(http::verb::get, "/api/v1/devices", devices_endpoint(gateway));
-  for (const auto method : {http::verb::get, http::verb::put, http::verb::post, http::verb::options})
-    router.add(method, "/api/v1/devices/*", objects_endpoint(gateway));
-  router.add(http::verb::get, "/api/v1/discovery", discovery_endpoint(gateway));
-  router.add(http::verb::get, "/api/v1/access", who_endpoint(gateway));
-  router.add(http::verb::post, "/api/v1/tickets", tickets_endpoint(gateway));
-  router.add(http::verb::post, "/api/v1/access/requests", ask_endpoint(gateway));
-  router.add(http::verb::get, "/api/v1/access/requests", requests_endpoint(gateway));
-  router.add(http::verb::post, "/api/v1/access/requests/*", request_endpoint(gateway));
-  router.add(http::verb::get, "/api/*", no_such_api_endpoint());
-  router.add(http::verb::get, "/devices/*", device_endpoint(gateway));
-  router.add(http::verb::get, "/*", dashboard_endpoint(gateway));
+  for (auto& route : list_routes(gateway)) router.add(route.method, std::move(route.pattern), std::move(route.handler));
   return router;
 }
 

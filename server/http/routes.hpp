@@ -7,7 +7,15 @@ namespace rrgate {
 
 class Gateway;
 
-/// The handlers refer to the gateway, which outlives them.
+struct Route {
+  http::verb method;
+  std::string pattern;  ///< see Router::add()
+  Handler handler;
+};
+
+/// In the order in which they are tried. The handlers refer to the gateway, which outlives them.
+std::vector<Route> list_routes(Gateway& gateway);
+
 Router make_routes(Gateway& gateway);
 
 }  // namespace rrgate

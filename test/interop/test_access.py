@@ -18,7 +18,7 @@ import websockets.sync.client
 from directions import PEERS
 from processes import Background
 from test_https import make_web_certificates
-from test_http_api import Answer
+from test_http_api import Answer, schemathesis
 from test_operations import RRGATE, Gateway, is_alive
 from test_proxies import open_websocket
 
@@ -264,6 +264,22 @@ def test_a_client_asks_and_an_admin_decides(guarded):
         assert ask(guarded.port, "POST", requests, wrong).status == 400
     statuses = [ask(guarded.port, "POST", requests, {"name": f"n{i}"}).status for i in range(4)]
     assert statuses == [202, 202, 202, 429]
+
+
+def test_the_gateways_document_is_kept_with_users_and_rights(device, tmp_path):
+    """What nobody, one who may look and an admin are answered is what the document says."""
+    make_users(tmp_path)
+    (tmp_path / "tokens").touch(0o600)
+    access = {"users_file": "users", "tokens_file": "tokens", "rules": RULES}
+    with running(tmp_path, device, access) as gateway:
+        for user in ("root", "vera", None):  # who may decide comes first: what others ask for stays open
+            more = ["--auth", f"{user}:{PASSWORDS[user]}"] if user else []
+            assert " selected" in schemathesis(tmp_path, gateway.port, "/api/v1/openapi.json", *more)
+        document = ask(gateway.port, "GET", "/api/v1/openapi.json").json
+        assert document["tags"] == [] and "examples" not in document["components"]["parameters"]["device"]
+        known = ask(gateway.port, "GET", "/api/v1/openapi.json", headers=basic("vera")).json
+        assert [tag["name"] for tag in known["tags"]] == ["interop"]
+        assert (tmp_path / "tokens").read_text()  # the admin's run has approved requests
 
 
 def test_json_web_tokens(device, tmp_path):

@@ -1,5 +1,7 @@
 #include "server/http/endpoints/access.hpp"
 
+#include <algorithm>
+
 #include "server/access/access_text.hpp"
 #include "server/access/api_tokens.hpp"
 #include "server/definitions/text_file.hpp"
@@ -227,9 +229,9 @@ Handler request_endpoint(Gateway& gateway) {
     const auto slash = rest.find('/');
     const std::string id(rest.substr(0, slash));
     const auto what = slash == std::string_view::npos ? std::string_view() : rest.substr(slash + 1);
-    if (what == "claim") return claim(gateway, request, id);
-    if (what != "approve" && what != "deny")
+    if (std::find(request_actions.begin(), request_actions.end(), what) == request_actions.end())
       return problem_response(404, "expected .../requests/ID/approve, deny or claim");
+    if (what == "claim") return claim(gateway, request, id);
     if (auto refusal = refuse_stranger(gateway, request)) return std::move(*refusal);
     return what == "approve" ? approve(gateway, request, id) : deny(gateway, request, id);
   };

@@ -1,6 +1,9 @@
 // Who one is, tickets for upgrades, requests of access. Layer: server/http.
 #pragma once
 
+#include <array>
+#include <string_view>
+
 #include "server/http/router.hpp"
 
 namespace rrgate {
@@ -17,6 +20,8 @@ Handler tickets_endpoint(Gateway& gateway);
 Handler ask_endpoint(Gateway& gateway);
 /// GET /api/v1/access/requests, for admins: {"requests":[{"id","name","reason","client","state","asked"}]}.
 Handler requests_endpoint(Gateway& gateway);
+/// What can be done with one.
+inline constexpr std::array<std::string_view, 3> request_actions = {"approve", "deny", "claim"};
 /// POST /api/v1/access/requests/ID/approve {"roles":[...],"days":N}, .../deny, for admins; .../claim {"secret"}, by who
 /// has asked: {"state"} and, the first time after approval, {"token"}.
 Handler request_endpoint(Gateway& gateway);

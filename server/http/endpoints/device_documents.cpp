@@ -438,10 +438,6 @@ std::string typescript(const std::vector<DescribedService>& services) {
 
 }  // namespace
 
-bool is_device_document(std::string_view name) {
-  return name == "openapi.json" || name == "asyncapi.json" || name == "thing-description.json" || name == "types.d.ts";
-}
-
 Response device_document(std::string_view document, std::string_view device, const std::string& base,
                          const std::vector<DescribedService>& services, const std::vector<std::string>& unavailable) {
   if (document == "types.d.ts")

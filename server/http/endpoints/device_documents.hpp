@@ -17,11 +17,8 @@ struct DescribedService {
   const rr::TypeRegistry* types;
 };
 
-/// Names of the documents: "openapi.json", "asyncapi.json", "thing-description.json", "types.d.ts".
-bool is_device_document(std::string_view name);
-
-/// One of them. `base` is the path of the device, "/api/v1/devices/NAME".
-/// `unavailable` are services that could not be asked.
+/// "openapi.json", "asyncapi.json", "thing-description.json" or "types.d.ts". `base` is the path of the device,
+/// "/api/v1/devices/NAME". `unavailable` are services that could not be asked.
 Response device_document(std::string_view document, std::string_view device, const std::string& base,
                          const std::vector<DescribedService>& services, const std::vector<std::string>& unavailable);
 

@@ -1,5 +1,7 @@
 #include "server/http/endpoints/objects.hpp"
 
+#include <algorithm>
+
 #include "server/gateway/http_access.hpp"
 #include "server/http/endpoints/call_log.hpp"
 #include "server/http/endpoints/device_documents.hpp"
@@ -82,6 +84,10 @@ bool is_definition(std::string_view name) {
   return name.size() > definition_suffix.size() && name.ends_with(definition_suffix);
 }
 
+bool is_device_resource(std::string_view name) {
+  return std::find(device_resources.begin(), device_resources.end(), name) != device_resources.end();
+}
+
 /// A document about the device, or one of its definitions: from sessions with all its services.
 rr::awaitable<void> serve_document(Gateway& gateway, Device& device, const ObjectRequest& request, std::string name) {
   auto& writer = request.writer();
@@ -136,8 +142,7 @@ rr::awaitable<void> serve(Gateway& gateway, ResponseWriter& writer, std::vector<
     co_await writer.send(response);
     co_return;
   }
-  const bool is_about_all = segments.size() == 2 && (segments[1] == "subscriptions" ||
-                                                     is_device_document(segments[1]) || is_definition(segments[1]));
+  const bool is_about_all = segments.size() == 2 && (is_device_resource(segments[1]) || is_definition(segments[1]));
   const bool is_object = segments.size() > 1 && !is_about_all;
   const auto service = is_object ? segments[1] : std::string();
   std::optional<RateGate::Pass> pass;

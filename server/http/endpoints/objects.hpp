@@ -1,10 +1,17 @@
 // The objects of devices over HTTP: GET, PUT, POST and streams. Layer: server/http. See docs/http-api.md.
 #pragma once
 
+#include <array>
+#include <string_view>
+
 #include "server/gateway/gateway.hpp"
 #include "server/http/router.hpp"
 
 namespace rrgate {
+
+/// What is below a device and no service of it, the definitions "NAME.robdef" apart.
+inline constexpr std::array<std::string_view, 5> device_resources = {"subscriptions", "openapi.json", "asyncapi.json",
+                                                                     "thing-description.json", "types.d.ts"};
 
 /// "DEVICE", "DEVICE/SERVICE" and what is below, for all methods.
 Handler objects_endpoint(Gateway& gateway);
