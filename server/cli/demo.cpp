@@ -28,6 +28,7 @@ struct DemoDevice {
   std::string_view name;
   std::string_view program;
   std::string_view service;
+  DeviceMode mode = DeviceMode::relay;
   std::string path = {};
   std::uint16_t port = 0;
   std::vector<std::string> arguments = {};
@@ -133,7 +134,9 @@ Config make_config(const std::vector<DemoDevice>& devices, std::uint16_t port) {
   Config config;
   config.listen.push_back({"127.0.0.1", port});
   for (const auto& device : devices) {
-    config.devices.push_back({std::string(device.name), rr::parse_url(device.url()).value(), 0});
+    DeviceConfig each{std::string(device.name), rr::parse_url(device.url()).value()};
+    each.mode = device.mode;
+    config.devices.push_back(std::move(each));
   }
   config.retry.min = milliseconds(200);
   config.retry.max = milliseconds(2000);
@@ -157,8 +160,9 @@ int run_demo(Arguments arguments) {
     port = *number;
   }
 
+  // The robot stops when the client that drives it is gone: it must see each client. Frames are the same for all.
   std::vector<DemoDevice> devices = {{"create", "rrgate-demo-create", "Create"},
-                                     {"webcams", "rrgate-demo-webcams", "Webcam"}};
+                                     {"webcams", "rrgate-demo-webcams", "Webcam", DeviceMode::shared}};
   for (auto& device : devices) {
     device.path = find_program(device.program);
     if (device.path.empty()) {

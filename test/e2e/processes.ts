@@ -108,7 +108,7 @@ export class Lab {
         web_root,
         devices: [
           { name: "create", url: this.create_url },
-          { name: "webcams", url: webcams_url },
+          { name: "webcams", url: webcams_url, mode: "shared" }, // as `rrgate demo` has them
         ],
       }),
     );

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import urllib.request
 
 RRGATE = sys.argv.pop()
 
@@ -75,6 +76,20 @@ class CommandLine(Files):
             result = run("serve", "--config", self.file({"listen": [f"127.0.0.1:{port}"], "devices": []}))
         self.assertEqual(result.returncode, 1)
         self.assertIn(f"127.0.0.1:{port}", result.stderr)
+
+
+class Demo(unittest.TestCase):
+    def test_the_robot_is_relayed_and_the_cameras_are_shared(self):
+        process = subprocess.Popen([RRGATE, "demo", "--port", "0"], stdout=subprocess.PIPE, text=True)
+        self.addCleanup(process.stdout.close)
+        self.addCleanup(process.wait)
+        self.addCleanup(process.terminate)
+        ready = next(line for line in process.stdout if line.startswith("rrgate demo: "))  # the devices say theirs first
+        url = ready.split()[-1]
+        with urllib.request.urlopen(url + "api/v1/devices", timeout=10) as answer:
+            devices = json.load(answer)["devices"]
+        self.assertEqual([(each["name"], each["mode"], each["state"]) for each in devices],
+                         [("create", "relay", "online"), ("webcams", "shared", "online")])
 
 
 class Serving(Files):

@@ -31,12 +31,25 @@ describe("list of devices", () => {
       state: "online",
       last_error: null,
       services: [{ name: "Create", type: "experimental.create2.Create" }],
+      mode: "shared",
+      clients: 3,
     };
     expect(read_devices({ devices: [device] })).toEqual([device]);
   });
   it("does without fields that an older gateway leaves out", () => {
     expect(read_devices({ devices: [{ name: "arm", state: "sleeping" }, null] })).toEqual([
-      { name: "arm", url: "", found: false, node_id: "", node_name: "", state: "offline", last_error: null, services: [] },
+      {
+        name: "arm",
+        url: "",
+        found: false,
+        node_id: "",
+        node_name: "",
+        state: "offline",
+        last_error: null,
+        services: [],
+        mode: null,
+        clients: null,
+      },
     ]);
   });
   it("refuses an answer that is no list of devices", () => {

@@ -5,6 +5,9 @@ import { Store } from "../app/store";
 
 export type DeviceState = "online" | "offline" | "connecting";
 
+/** Whether each client has a connection of its own to the device, or all share the gateway's. */
+export type DeviceMode = "relay" | "shared";
+
 export interface Service {
   name: string;
   /** Qualified type of the root object; empty until the gateway has read it. */
@@ -21,6 +24,9 @@ export interface Device {
   state: DeviceState;
   last_error: string | null;
   services: Service[];
+  /** null: not the gateway's, or an older gateway does not say. */
+  mode: DeviceMode | null;
+  clients: number | null;
 }
 
 export type GatewayState =
@@ -109,6 +115,8 @@ export function read_devices(answer: unknown): Device[] {
     state: state_of(device["state"]),
     last_error: typeof device["last_error"] === "string" ? device["last_error"] : null,
     services: read_services(device["services"]),
+    mode: device["mode"] === "relay" || device["mode"] === "shared" ? device["mode"] : null,
+    clients: typeof device["clients"] === "number" ? device["clients"] : null,
   }));
 }
 

@@ -68,6 +68,8 @@ async function describe(node: UsbNode): Promise<Device> {
     state: "offline",
     last_error: node.error?.message ?? null,
     services: [],
+    mode: null,
+    clients: null,
   };
   if (node.url === undefined) return device;
   try {

@@ -4,11 +4,12 @@
 import { useNow, useStore } from "../app/store";
 import { format_route } from "../app/router";
 import { devices_of } from "../gateway/devices";
-import type { Device, DeviceList, GatewayState, Service } from "../gateway/devices";
+import type { Device, DeviceList, DeviceMode, GatewayState, Service } from "../gateway/devices";
 import { is_usb } from "../gateway/usb_devices";
 import type { UsbDeviceList } from "../gateway/usb_devices";
 import type { AccessDesk } from "../gateway/access";
 import { AccessPart } from "./access_part";
+import { SubscriptionsPart } from "./subscriptions_part";
 import { StateBadge } from "../ui/state_badge";
 import { clock_time, sentence, span } from "../ui/words";
 
@@ -123,6 +124,18 @@ function DeviceRow({ device, stale }: { device: Device; stale: boolean }) {
             </dd>
           </div>
         )}
+        {device.mode !== null && (
+          <div>
+            <dt>Mode</dt>
+            <dd title={MODE[device.mode]}>{device.mode}</dd>
+          </div>
+        )}
+        {device.clients !== null && (
+          <div>
+            <dt>Clients</dt>
+            <dd>{device.clients}</dd>
+          </div>
+        )}
       </dl>
       {device.state !== "online" && (
         <p class="device-trouble">
@@ -141,9 +154,15 @@ function DeviceRow({ device, stale }: { device: Device; stale: boolean }) {
           </li>
         )}
       </ul>
+      {device.mode === "shared" && <SubscriptionsPart device={device.name} online={device.state === "online"} stale={stale} />}
     </li>
   );
 }
+
+const MODE: Readonly<Record<DeviceMode, string>> = {
+  relay: "Each client has a connection of its own to the device",
+  shared: "All clients share one session of the gateway with the device",
+};
 
 function ServiceLink({ device, service }: { device: Device; service: Service }) {
   return (

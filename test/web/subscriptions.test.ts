@@ -1,0 +1,109 @@
+// What the clients of a shared device listen to: read, kept while the gateway is away, asked for only while shown.
+import { away_after, read_subscriptions, SubscriptionList } from "../../web/src/gateway/subscriptions";
+import type { SubscriptionsState } from "../../web/src/gateway/subscriptions";
+import { age_text } from "../../web/src/ui/words";
+
+const frames = {
+  client: "192.0.2.1:5",
+  path: "Webcam.Webcams[0]",
+  member: "FrameStream",
+  kind: "pipe",
+  delivered: 12,
+  conflated: 0,
+  dropped: 1,
+  age_p50_ms: 0.5,
+  age_p99_ms: 16.4,
+};
+
+describe("subscriptions", () => {
+  it("are read by member, then client", () => {
+    const other = { ...frames, client: "192.0.2.1:4" };
+    const wire = { ...frames, path: "Create", member: "state", kind: "wire", conflated: 7 };
+    expect(read_subscriptions({ subscriptions: [frames, other, null, { ...wire, service: "Create" }] })).toEqual([wire, other, frames]);
+    expect(read_subscriptions({ subscriptions: [{}] })).toMatchObject([{ client: "", member: "", delivered: 0, age_p99_ms: 0 }]);
+    expect(() => read_subscriptions({ devices: [] })).toThrow('no list "subscriptions"');
+  });
+
+  it("stay as they were while the gateway is away, since when it went", () => {
+    const known: SubscriptionsState = { kind: "known", subscriptions: [frames] };
+    const away = away_after(known, new TypeError("fetch failed"), 1000);
+    expect(away).toEqual({ kind: "away", since: 1000, reason: "the gateway cannot be reached", subscriptions: [frames] });
+    expect(away_after(away, new Error("late"), 2000)).toMatchObject({ since: 1000, reason: "late", subscriptions: [frames] });
+    expect(away_after({ kind: "loading" }, new Error("late"), 2000)).toMatchObject({ since: 2000, subscriptions: null });
+    expect(away_after({ kind: "denied", reason: "no" }, new Error("late"), 3)).toMatchObject({ subscriptions: null });
+  });
+});
+
+describe("a list of subscriptions", () => {
+  const answers: (Response | Error)[] = [];
+  const asked: string[] = [];
+  let page: { hidden: boolean; look: () => void };
+
+  beforeEach(() => {
+    vi.useFakeTimers();
+    answers.length = asked.length = 0;
+    page = { hidden: false, look: () => undefined };
+    vi.stubGlobal("document", {
+      baseURI: "https://host/robots/",
+      get hidden() {
+        return page.hidden;
+      },
+      addEventListener: (_: string, listener: () => void) => (page.look = listener),
+      removeEventListener: () => (page.look = () => undefined),
+    });
+    vi.stubGlobal("fetch", async (url: URL) => {
+      asked.push(url.href);
+      const answer = answers.shift() ?? new TypeError("fetch failed");
+      if (answer instanceof Error) throw answer;
+      return answer;
+    });
+  });
+  afterEach(() => {
+    vi.useRealTimers();
+    vi.unstubAllGlobals();
+  });
+
+  it("is asked again every 3 s, and no more once it is closed", async () => {
+    answers.push(Response.json({ subscriptions: [frames] }), Response.json({ subscriptions: [] }));
+    const list = new SubscriptionList("a b");
+    list.start();
+    await vi.advanceTimersByTimeAsync(0);
+    expect(list.state.value).toEqual({ kind: "known", subscriptions: [frames] });
+    await vi.advanceTimersByTimeAsync(3000);
+    expect(list.state.value).toEqual({ kind: "known", subscriptions: [] });
+    expect(asked).toEqual(Array(2).fill("https://host/robots/api/v1/devices/a%20b/subscriptions"));
+    list.stop();
+    await vi.advanceTimersByTimeAsync(60_000);
+    expect(asked.length).toBe(2);
+  });
+
+  it("says who may not see it, and why", async () => {
+    answers.push(Response.json({ detail: "vera may not" }, { status: 403 }), new Response("", { status: 401 }));
+    const list = new SubscriptionList("robot");
+    list.start();
+    await vi.advanceTimersByTimeAsync(0);
+    expect(list.state.value).toEqual({ kind: "denied", reason: "vera may not" });
+    await vi.advanceTimersByTimeAsync(3000);
+    expect(list.state.value).toEqual({ kind: "denied", reason: "the gateway answered 401" });
+    await vi.advanceTimersByTimeAsync(3000);
+    expect(list.state.value).toMatchObject({ kind: "away", reason: "the gateway cannot be reached", subscriptions: null });
+    list.stop();
+  });
+
+  it("is not asked for while the page is hidden, and at once when it is shown", async () => {
+    const list = new SubscriptionList("robot");
+    page.hidden = true;
+    list.start();
+    await vi.advanceTimersByTimeAsync(60_000);
+    expect(asked.length).toBe(1);
+    page.hidden = false;
+    page.look();
+    await vi.advanceTimersByTimeAsync(0);
+    expect(asked.length).toBe(2);
+    list.stop();
+  });
+});
+
+it("an age has the digits that matter", () => {
+  expect([0, 0.44, 12.3, 999, 1512].map(age_text)).toEqual(["0.0 ms", "0.4 ms", "12 ms", "999 ms", "1.5 s"]);
+});

@@ -1,0 +1,117 @@
+// What the clients of a shared device listen to, and what each has lost. Closed at first; asks only while it is open.
+// Layer: web/pages.
+
+import { useEffect, useState } from "preact/hooks";
+import { useStore } from "../app/store";
+import { SubscriptionList, subscriptions_of } from "../gateway/subscriptions";
+import type { Subscription, SubscriptionsState } from "../gateway/subscriptions";
+import { age_text, clock_time, sentence } from "../ui/words";
+
+interface Props {
+  device: string;
+  online: boolean;
+  stale: boolean;
+}
+
+export function SubscriptionsPart({ device, online, stale }: Props) {
+  const [open, set_open] = useState(false);
+  return (
+    <details class="subscriptions" onToggle={(event) => set_open(event.currentTarget.open)}>
+      <summary>
+        Subscriptions<span class="unseen"> of {device}</span>
+      </summary>
+      {open && <Subscriptions device={device} online={online} stale={stale} />}
+    </details>
+  );
+}
+
+function Subscriptions({ device, online, stale }: Props) {
+  const [list] = useState(() => new SubscriptionList(device));
+  useEffect(() => {
+    list.start();
+    return () => list.stop();
+  }, [list]);
+  const state = useStore(list.state);
+  const subscriptions = subscriptions_of(state);
+  return (
+    <div data-subscriptions={state.kind}>
+      <p class="note" role="status">
+        {headline(state, online, stale)}
+      </p>
+      {state.kind === "loading" && <span class="bone" aria-hidden="true" />}
+      {subscriptions && subscriptions.length > 0 && <Table device={device} subscriptions={subscriptions} />}
+    </div>
+  );
+}
+
+/** Changes rarely, so that it can be announced: the numbers are in the table. */
+function headline(state: SubscriptionsState, online: boolean, stale: boolean): string {
+  if (state.kind === "loading") return "Asking the gateway for them.";
+  if (state.kind === "denied") return `You may not see them: ${sentence(state.reason)}`;
+  if (state.kind === "away") {
+    const below = state.subscriptions && state.subscriptions.length > 0 ? " Below is what it said last." : "";
+    return `The gateway has not told them since ${clock_time(state.since)}: ${sentence(state.reason)}${below}`;
+  }
+  if (!online && !stale) return "The device is away: nothing comes until it is back, and then they go on.";
+  if (state.subscriptions.length === 0) return "No client listens to a wire or a pipe of it now.";
+  return "Wires and pipes of each client, since it connected them.";
+}
+
+/** With its roles said outright: on a narrow screen its rows are laid out as blocks, and browsers would forget them. */
+function Table({ device, subscriptions }: { device: string; subscriptions: Subscription[] }) {
+  return (
+    <table class="ledger" role="table" aria-label={`Subscriptions of ${device}`}>
+      <thead role="rowgroup">
+        <tr role="row">
+          {["Member", "Client", "Delivered", "Conflated", "Dropped", "Age p50", "Age p99"].map((name) => (
+            <th key={name} role="columnheader" scope="col" title={HINTS[name]}>
+              {name}
+            </th>
+          ))}
+        </tr>
+      </thead>
+      <tbody role="rowgroup">
+        {subscriptions.map((each, row) => (
+          <Row key={`${each.path}.${each.member} ${each.client} ${row}`} subscription={each} />
+        ))}
+      </tbody>
+    </table>
+  );
+}
+
+const HINTS: Readonly<Record<string, string>> = {
+  Delivered: "Values handed to the client's connection",
+  Conflated: "Values of a wire that a newer one replaced before there was room",
+  Dropped: "Values lost otherwise",
+  "Age p50": "Half of the values were not older than this when they were handed on",
+  "Age p99": "99 of 100 values were not older than this when they were handed on",
+};
+
+function Row({ subscription }: { subscription: Subscription }) {
+  const { path, member, kind, client, delivered, conflated, dropped, age_p50_ms, age_p99_ms } = subscription;
+  const aged = (ms: number): string => (delivered > 0 ? age_text(ms) : "none yet");
+  const cells: [name: string, value: string, mark: string][] = [
+    ["Client", client === "" ? "unknown" : client, "code"],
+    ["Delivered", String(delivered), ""],
+    ["Conflated", String(conflated), conflated > 0 ? "is-conflated" : ""],
+    ["Dropped", String(dropped), dropped > 0 ? "is-dropped" : ""],
+    ["Age p50", aged(age_p50_ms), ""],
+    ["Age p99", aged(age_p99_ms), ""],
+  ];
+  return (
+    <tr role="row" data-member={member}>
+      <th role="rowheader" scope="row">
+        <span class="code">
+          {path}.<wbr />
+          {member}
+        </span>{" "}
+        <span class="note">{kind}</span>
+      </th>
+      {cells.map(([name, value, mark]) => (
+        <td key={name} role="cell" class={mark} data-label={name}>
+          {value}
+        </td>
+      ))}
+    </tr>
+  );
+}
