@@ -10,6 +10,7 @@ from processes import Background, free_port, read_json, start_gateway
 from scenarios import SCENARIOS
 from test_http_api import Stream, ask
 from test_https import make_web_certificates
+from test_access import basic, bearer, rrgate
 from test_operations import Gateway
 from test_tls import FUNCTIONS, SERVICE, check_all, lab, run_steps, start_service  # noqa: F401
 
@@ -89,6 +90,84 @@ def test_two_gateways(lab, maker, tmp_path, monkeypatch, way):  # noqa: F811
         stream.close()
     finally:
         chain.stop()
+
+
+WHOLE = ["read", "write", "call", "subscribe", "lock"]
+PLANT = {"rules": [{"roles": ["plant"], "devices": ["interop"], "may": WHOLE}]}
+
+
+def protected_gateway(folder, device, mode, **access):
+    """A far gateway that lets the near one in, and nobody else."""
+    folder.mkdir()
+    (folder / "tokens").touch(0o600)
+    token = rrgate("token", folder / "tokens", "near", "--roles", "plant")
+    rrgate("passwd", folder / "users", "near", "--roles", "plant", given="secret\n")
+    far = Gateway(folder, {"devices": [{"name": "interop", "url": device, "mode": mode}],
+                           "access": {"tokens_file": "tokens", "users_file": "users", **PLANT}, **access})
+    far.wait_for("device online", device="interop")
+    return far, token
+
+
+@pytest.fixture(scope="module")
+def bare_device(tmp_path_factory):
+    service = Background([sys.executable, PEERS / "service.py"], tmp_path_factory.mktemp("device") / "service.log")
+    yield json.loads(service.next_line())["url"]
+    service.stop()
+
+
+@pytest.mark.parametrize("near_mode", ["relay", "shared"])
+@pytest.mark.parametrize("far_mode", ["relay", "shared"])
+@pytest.mark.parametrize("scheme", ["rr+ws", "rr+wss"])
+def test_the_far_gateway_asks_who_comes(lab, bare_device, tmp_path, monkeypatch, scheme, far_mode, near_mode):  # noqa: F811
+    """A token in the headers of the near one's device is the proof, for its looks and for its clients."""
+    tls = make_web_certificates(tmp_path / "web")
+    monkeypatch.setenv("SSL_CERT_FILE", str(tmp_path / "web" / "web-ca.pem"))
+    far, token = protected_gateway(tmp_path / "far", bare_device, far_mode, tls=tls)
+    device = {"name": "interop", "url": f"{scheme}://localhost:{far.port}/devices/interop?service=interop", "mode": near_mode}
+    proof = [{"name": "Authorization", "value": "Bearer " + token}]
+    (tmp_path / "near").mkdir()
+    near = Gateway(tmp_path / "near", {"devices": [device]})
+    try:
+        if far_mode == "relay":
+            assert "401" in near.wait_for("device offline")["error"]
+        else:  # what there is, is no secret; to use it is for who has the right
+            near.wait_for("device online", device="interop")
+            near.process.wait_until(lambda: ask(near.port, "GET", "/version").status in (401, 403))
+        near.write({**near.config, "devices": [{**device, "headers": proof}]})
+        near.hang_up()
+        near.wait_for("configuration read anew")
+        near.process.wait_until(lambda: ask(near.port, "GET", "/version").status == 200)
+        check_all(STEPS, run_steps("reference", lab, near.port, STEPS, scheme="rr+tcp", node=""))
+        assert ask(near.port, "POST", "/add", {"left": 1, "right": 2}).json == {"result": 3}
+        stream = Stream(near.port, "/changed")
+        ask(near.port, "POST", "/fire", {"count": 1})
+        assert stream.next()[2]["value"] == 0
+        stream.close()
+        assert ask(far.port, "GET", "/version").status == 401
+        assert ask(far.port, "GET", "/version", headers=bearer(token)).json == "1"
+    finally:
+        near.process.stop()
+        far.process.stop()
+
+
+def test_the_near_gateway_logs_in_at_the_far_one(lab, bare_device, tmp_path):  # noqa: F811
+    """As a user of the far one's, where both share the device: without a login it sees the service and may do nothing."""
+    far, _ = protected_gateway(tmp_path / "far", bare_device, "shared")
+    device = {"name": "interop", "url": f"rr+tcp://127.0.0.1:{far.port}/?nodename=interop&service=interop", "mode": "shared"}
+    (tmp_path / "near").mkdir()
+    near = Gateway(tmp_path / "near", {"devices": [device]})
+    try:
+        near.wait_for("device online", device="interop")
+        near.process.wait_until(lambda: ask(near.port, "GET", "/version").status in (401, 403))
+        near.write({**near.config, "devices": [{**device, "login": {"username": "near", "password": "secret"}}]})
+        near.hang_up()
+        near.wait_for("configuration read anew")
+        near.process.wait_until(lambda: ask(near.port, "GET", "/version").status == 200)
+        check_all(STEPS, run_steps("reference", lab, near.port, STEPS, scheme="rr+tcp", node=""))
+        assert ask(far.port, "GET", "/version", headers=basic("near", "secret")).json == "1"
+    finally:
+        near.process.stop()
+        far.process.stop()
 
 
 def test_tls_from_the_client_through_both(lab, maker, tmp_path):  # noqa: F811
