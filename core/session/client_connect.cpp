@@ -62,6 +62,7 @@ void ClientSession::request_combined(Now now) {
   const auto id = begin_request(EntryType::connect_client_combined, options_.service, {});
   outgoing_.add_text("clientversion", protocol_level);
   outgoing_.add_text("returnservicedefs", "true");
+  if (options_.known_definitions) add_known_tag({});
   if (!options_.username.empty()) add_login();
   if (auto sent = send_outgoing(now); !sent) return fail(sent.error());
   add_pending(id, EntryType::connect_client_combined, nullptr, {}, now);
@@ -81,7 +82,8 @@ void ClientSession::handle_connect_reply(const MessageEntry& entry, EntryType re
       read_object_type(entry);
       read_attributes(entry);
       Fetch fetch;
-      for (auto& text : read_texts(message, entry, "servicedefs")) fetch.add(std::move(text));
+      for (auto& text : take_definitions(entry, {}, read_texts(message, entry, "servicedefs")))
+        fetch.add(std::move(text));
       return advance_fetch(std::move(fetch), now);
     }
     case EntryType::get_service_desc: {
@@ -108,6 +110,33 @@ void ClientSession::handle_connect_reply(const MessageEntry& entry, EntryType re
     default:
       return;
   }
+}
+
+KnownDefinitions* ClientSession::find_known(std::string_view name) {
+  auto& known = *options_.known_definitions;
+  const auto found = std::find_if(known.begin(), known.end(), [name](const auto& each) { return each.name == name; });
+  return found == known.end() ? nullptr : &*found;
+}
+
+void ClientSession::add_known_tag(std::string_view name) {
+  const auto* known = find_known(name);
+  outgoing_.add_text(definitions_element, known ? known->tag : std::string_view());
+}
+
+/// What a reply has `sent`, or what it confirms instead; what has a tag is remembered by `name`.
+std::vector<std::string> ClientSession::take_definitions(const MessageEntry& entry, std::string_view name,
+                                                         std::vector<std::string> sent) {
+  if (!options_.known_definitions) return sent;
+  auto tag = read_text(*connection_.message(), entry, definitions_element);
+  if (tag.empty()) return sent;
+  service_has_tags_ = true;
+  auto* known = find_known(name);
+  if (sent.empty()) return known && known->tag == tag ? known->texts : sent;
+  if (known)
+    *known = {std::string(name), std::move(tag), sent};
+  else if (options_.known_definitions->size() < max_known_definitions)
+    options_.known_definitions->push_back({std::string(name), std::move(tag), sent});
+  return sent;
 }
 
 void ClientSession::read_object_type(const MessageEntry& entry) {
@@ -141,6 +170,8 @@ void ClientSession::advance_fetch(Fetch fetch, Now now) {
   const auto id = begin_request(EntryType::get_service_desc, options_.service, {});
   outgoing_.add_text("ServiceType", *missing);
   outgoing_.add_text("clientversion", protocol_level);
+  if (service_has_tags_) add_known_tag(*missing);
+  fetch.last_asked = *missing;
   if (auto sent = send_outgoing(now); !sent) return fail(sent.error());
   add_pending(id, EntryType::get_service_desc, nullptr, {}, now);
   fetches_.emplace(id, std::move(fetch));
@@ -149,7 +180,11 @@ void ClientSession::advance_fetch(Fetch fetch, Now now) {
 void ClientSession::handle_fetch_reply(const MessageEntry& entry, Fetch fetch, Now now) {
   const auto& message = *connection_.message();
   if (entry.error != ErrorCode::none) return fail_fetch(fetch, read_error(message, entry, types_));
-  fetch.add(read_text(message, entry, "servicedef"));
+  std::vector<std::string> sent;
+  if (message.elements_of(entry).find("servicedef")) sent.push_back(read_text(message, entry, "servicedef"));
+  sent = take_definitions(entry, fetch.last_asked, std::move(sent));
+  // Without any, advance_fetch() says that the node answered with another one.
+  fetch.add(sent.empty() ? std::string() : std::move(sent.front()));
   advance_fetch(std::move(fetch), now);
 }
 

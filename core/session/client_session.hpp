@@ -22,6 +22,7 @@
 #include "core/member/pipe.hpp"
 #include "core/member/wire.hpp"
 #include "core/session/connection.hpp"
+#include "core/session/known_definitions.hpp"
 #include "core/session/protocol_level.hpp"
 #include "core/session/service_path.hpp"
 #include "core/types/pack.hpp"
@@ -34,6 +35,9 @@ struct ClientOptions {
   std::string username = {};     ///< with credentials: logs in while connecting (see authenticate() for later)
   Value credentials = {};        ///< MapString, e.g. {"password": ...}; null for none
   std::string object_type = {};  ///< the type to use the root object as; empty: the service's own
+  /// Those of an earlier session (see ClientSession::known_definitions()), or none yet; nullopt: the service is not
+  /// asked for tags, and nothing is remembered.
+  std::optional<std::vector<KnownDefinitions>> known_definitions = {};
   std::chrono::milliseconds request_timeout{15'000};
   std::chrono::milliseconds connect_timeout{30'000};  ///< from construction to the event Connected
   std::uint32_t max_memory_transfer = 1024 * 1024;    ///< bytes; larger reads and writes of memories are split
@@ -214,6 +218,8 @@ class ClientSession {
   const Connection& connection() const { return connection_; }
   const TypeRegistry& types() const { return types_; }
   const MapString& attributes() const { return attributes_; }
+  /// For the options of the next session with the service, or with another one that may have the same definitions.
+  const std::optional<std::vector<KnownDefinitions>>& known_definitions() const { return options_.known_definitions; }
   const std::string& service() const { return options_.service; }
   /// The type of an object that was looked up; nullptr if it was not. The root's path is the service name.
   const EntityDefinition* object_type(std::string_view path) const;
@@ -250,6 +256,7 @@ class ClientSession {
     std::set<std::string> names = {};   ///< of `texts`
     std::set<std::string> wanted = {};  ///< imported or asked for
     std::set<std::string> asked = {};
+    std::string last_asked = {};
     RequestId lookup = 0;  ///< the find_object() that waits; 0: the connect sequence
     std::string path = {};
     std::string object_type = {};
@@ -264,6 +271,10 @@ class ClientSession {
   void request_special(EntryType type, std::string_view path, Now now);
   void request_combined(Now now);
   void add_login();
+  KnownDefinitions* find_known(std::string_view name);
+  void add_known_tag(std::string_view name);
+  std::vector<std::string> take_definitions(const MessageEntry& entry, std::string_view name,
+                                            std::vector<std::string> sent);
   void read_object_type(const MessageEntry& entry);
   void read_attributes(const MessageEntry& entry);
   void advance_fetch(Fetch fetch, Now now);
@@ -351,6 +362,7 @@ class ClientSession {
   TimePoint opened_;
   TimePoint last_sent_;  ///< for the keep-alive
   bool has_started_ = false;
+  bool service_has_tags_ = false;  ///< of definitions
   std::string root_type_;
   std::vector<std::string> root_implements_;
   MapString attributes_;

@@ -307,6 +307,8 @@ class ServiceSession {
     std::uint32_t client_endpoint = 0;
     const EntityDefinition* type_for_client = nullptr;
     bool wants_definitions = true;
+    std::optional<std::string> known_tag =
+        {};  ///< of the definitions that it has, maybe empty; nullopt: it has not said
   };
   /// A request that waits for its object to be found.
   struct ParkedRequest {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/member/error_entry.hpp"
+#include "core/session/known_definitions.hpp"
 #include "core/session/service_session.hpp"
 #include "core/support/random.hpp"
 
@@ -31,6 +32,21 @@ Error has_session_already() {
 const MessageElement* find_text(const Message& message, const MessageEntry& entry, std::string_view name) {
   const auto* element = message.elements_of(entry).find(name);
   return element && element->type == DataType::string_t ? element : nullptr;
+}
+
+std::optional<std::string> read_known_tag(const Message& message, const MessageEntry& entry) {
+  const auto* element = find_text(message, entry, definitions_element);
+  return element ? std::optional<std::string>(element->text()) : std::nullopt;
+}
+
+/// Writes the tag of `texts` where the client has asked for it by saying what it has. Returns whether it has just
+/// those.
+bool write_tag(Message& message, const std::optional<std::string>& known_tag,
+               const std::vector<std::string_view>& texts) {
+  if (!known_tag) return false;
+  const auto tag = make_definitions_tag(texts);
+  message.add_text(definitions_element, message.store(std::string_view(tag)));
+  return tag == *known_tag;
 }
 
 /// The client's level from `clientversion`; unspecified where it is absent.
@@ -144,7 +160,8 @@ Result<> ServiceSession::write_service_desc(const Message& message, const Messag
     const auto* definition = asked ? asked->types().find_service(type->text()) : nullptr;
     if (!definition) definition = directory_.find_definition(type->text());
     if (!definition) return service_not_found();
-    outgoing_.add_text("servicedef", definition->text);
+    if (!write_tag(outgoing_, read_known_tag(message, entry), {definition->text}))
+      outgoing_.add_text("servicedef", definition->text);
     return {};
   }
   const auto service = directory_.find(entry.service_path);
@@ -192,6 +209,8 @@ Result<> ServiceSession::write_combined(const Message& message, const MessageEnt
   request.wants_definitions =
       !flag || (flag->text() != "0" && flag->text() != "false" && flag->text() != "False" && flag->text() != "FALSE");
 
+  request.known_tag = read_known_tag(message, entry);
+
   const auto elements = message.elements_of(entry);
   const bool has_login = elements.find("username") && elements.find("credentials");
   const auto& policy = service->policy();
@@ -206,6 +225,7 @@ Result<> ServiceSession::write_combined(const Message& message, const MessageEnt
   login_->client_endpoint = request.client_endpoint;
   login_->type_for_client = request.type_for_client;
   login_->wants_definitions = request.wants_definitions;
+  login_->known_tag = std::move(request.known_tag);
   return {};
 }
 
@@ -217,7 +237,7 @@ Result<> ServiceSession::accept_combined(const OpenLogin& request, std::optional
   if (request.wants_definitions) {
     std::vector<std::string_view> texts;
     for (const auto* definition : service->definitions_for_client()) texts.push_back(definition->text);
-    add_text_list(outgoing_, "servicedefs", texts);
+    if (!write_tag(outgoing_, request.known_tag, texts)) add_text_list(outgoing_, "servicedefs", texts);
   }
   return pack_varvalue(outgoing_, "attributes", service->attributes(), service->types());
 }

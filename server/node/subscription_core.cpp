@@ -70,6 +70,7 @@ class SubscriptionLink : public std::enable_shared_from_this<SubscriptionLink> {
     const std::string url = attempt_->urls[attempt_->next++];
     ++attempt_->open;
     auto options = core_->options().connect;
+    options.known_definitions = known_;
     if (!service_.username.empty()) {
       options.username = service_.username;
       options.credentials = service_.credentials;
@@ -112,6 +113,7 @@ class SubscriptionLink : public std::enable_shared_from_this<SubscriptionLink> {
   void handle_lost(const Error& reason) {
     const auto connection = std::exchange(connection_, nullptr);
     if (is_closed_) return;
+    if (const auto& known = connection->session().known_definitions()) known_ = *known;
     core_->handle_lost(AsyncObject(connection, connection->root_path()), reason);
     if (!is_closed_) retry();
   }
@@ -137,6 +139,7 @@ class SubscriptionLink : public std::enable_shared_from_this<SubscriptionLink> {
   asio::steady_timer timer_;
   std::shared_ptr<Attempt> attempt_;  ///< null while there is none
   std::shared_ptr<ClientConnection> connection_;
+  std::vector<KnownDefinitions> known_;  ///< of the connections before
   bool is_waiting_ = false;
   bool is_wanted_ = true;
   bool is_closed_ = false;

@@ -94,6 +94,33 @@ it("connects, and again after a loss; what was under way rejects as lost", async
   await subscription.close();
 });
 
+it("is not sent again what it knows of the service, unless that has changed", async () => {
+  const with_force = definition.replace("property double speed", "property double speed\n  property double force");
+  const begin = (text: string) => TestService.start({ definitions: [text], root: "test.subscribe.Root" });
+  const services = [];
+  for (const text of [definition, definition, definition, with_force, with_force]) services.push(await begin(text));
+  const subscription = follow(in_turn(...services));
+  const received: number[] = [];
+  const types: (readonly string[])[] = [];
+  for (const [number, service] of services.entries()) {
+    const client = await subscription.client();
+    received.push(client.$.stats.bytesReceived);
+    types.push(client.$.types);
+    expect("force" in client).toBe(number >= 3);
+    expect(await client["twice"]!(number)).toBe(number);
+    service.drop("gone");
+    await settle();
+    clock.fire();
+  }
+  const [full, known, again, changed, known_too] = received as [number, number, number, number, number];
+  expect(known).toBeLessThan(full - definition.length);
+  expect(again).toBe(known);
+  expect(changed).toBeGreaterThan(full);
+  expect(known_too).toBe(known);
+  expect(types).toEqual([[definition], [definition], [definition], [with_force], [with_force]]);
+  await subscription.close();
+});
+
 it("waits longer after each failure, up to a limit, and starts again after a success", async () => {
   const chances = [0, 0.999];
   let turn = 0;

@@ -187,6 +187,9 @@ RR_EXPORT(attributes) JsHandle rr_attributes() {
 RR_EXPORT(definitions) JsHandle rr_definitions() {
   return session->definitions().release();
 }
+RR_EXPORT(known_definitions) JsHandle rr_known_definitions() {
+  return session->known_definitions().release();
+}
 RR_EXPORT(members) JsHandle rr_members(JsHandle path) {
   return session->members(JsValue(path)).release();
 }

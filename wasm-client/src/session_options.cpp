@@ -74,6 +74,21 @@ class OptionReader {
   std::optional<Error> error_;
 };
 
+/// As WasmSession::known_definitions() gave them.
+std::vector<KnownDefinitions> read_known_definitions(const JsValue& js) {
+  std::vector<KnownDefinitions> known(js.length().value_or(0));
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    const auto each = js.at(i).value_or(JsValue::undefined());
+    const auto text = [&](std::size_t at) {
+      return each.at(at).value_or(JsValue::undefined()).text().value_or(std::string());
+    };
+    known[i].name = text(0);
+    known[i].tag = text(1);
+    for (std::size_t at = 2; at < each.length().value_or(0); ++at) known[i].texts.push_back(text(at));
+  }
+  return known;
+}
+
 }  // namespace
 
 Result<ClientOptions> read_session_options(const JsValue& js) {
@@ -111,6 +126,9 @@ Result<ClientOptions> read_session_options(const JsValue& js) {
     reader.refuse("maxMessageSize", "is not between 65536 and 536870912 bytes");
   if (connection.max_queued_bytes < 2 * connection.max_message_size)
     connection.max_queued_bytes = 2 * connection.max_message_size;
+
+  if (const auto known = js.field("known"); known && known->kind() == JsKind::array)
+    options.known_definitions = read_known_definitions(*known);
 
   if (options.service.empty()) reader.refuse("service", "is missing");
   if (reader.error()) return *reader.error();

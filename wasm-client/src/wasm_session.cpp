@@ -397,6 +397,18 @@ JsValue WasmSession::definitions() const {
   return texts;
 }
 
+JsValue WasmSession::known_definitions() const {
+  const JsValue known = make_js_array();
+  for (const auto& each : session_.known_definitions().value_or(std::vector<KnownDefinitions>())) {
+    const JsValue item = make_js_array();
+    push_js(item, make_js_text(each.name));
+    push_js(item, make_js_text(each.tag));
+    for (const auto& text : each.texts) push_js(item, make_js_text(text));
+    push_js(known, item);
+  }
+  return known;
+}
+
 JsValue WasmSession::members(const JsValue& path) const {
   const auto* type = session_.object_type(text_of(path));
   return type ? make_js_members(*type) : JsValue::undefined();

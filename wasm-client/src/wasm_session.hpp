@@ -92,6 +92,8 @@ class WasmSession {
   JsValue attributes() const;
   /// The texts of all definitions, imports first.
   JsValue definitions() const;
+  /// What the service named by a tag, for the option `known` of a later session: [[name, tag, text...]...].
+  JsValue known_definitions() const;
   /// The members of an object that was found (see make_js_members()); undefined for others.
   JsValue members(const JsValue& path) const;
   /// The path of an object below `parent`; `index` undefined, or its text.

@@ -7,6 +7,7 @@ import type { ObjectInfo, RemoteObject } from "./types.js";
 import { parse_service_url } from "./url.js";
 import { open_usb } from "./usb_devices.js";
 import { Core } from "./wasm_module.js";
+import type { KnownDefinitions } from "./wasm_module.js";
 import { open_websocket } from "./websocket.js";
 import { check_signal } from "./within.js";
 
@@ -38,6 +39,11 @@ export interface ConnectOptions {
 const default_connect_timeout = 30_000;
 const default_request_timeout = 15_000;
 
+/** What stays from one connection of a subscription to the next. */
+export interface Memory {
+  known: KnownDefinitions;
+}
+
 /**
  * Connects to a service.
  * @param url "wss://host/devices/create?service=Create"; schemes ws, wss, http, https, rr+ws, rr+wss, rr+tcp (the port
@@ -47,9 +53,18 @@ const default_request_timeout = 15_000;
  * @throws    RobotRaconteurError InvalidArgument (URL, options), ConnectionError, ServiceNotFound, NodeNotFound,
  *            AuthenticationError, RequestTimeout, ...; the reason of `signal`.
  */
-export async function connect<T = RemoteObject>(
+export function connect<T = RemoteObject>(
   url: string | URL,
   options: ConnectOptions = {},
+): Promise<T & { readonly $: ObjectInfo }> {
+  return connect_with<T>(url, options);
+}
+
+/** As connect(). A service that has the definitions in `memory` does not send them again; in the end others are there. */
+export async function connect_with<T>(
+  url: string | URL,
+  options: ConnectOptions,
+  memory?: Memory,
 ): Promise<T & { readonly $: ObjectInfo }> {
   const { signal } = options;
   check_signal(signal);
@@ -84,9 +99,11 @@ export async function connect<T = RemoteObject>(
         stringTable: options.stringTable,
         connectTimeout: timeout,
         maxMessageSize: options.maxMessageSize,
+        known: memory?.known,
       }),
     );
     const session = attempt.begin(core, request_timeout);
+    if (memory) session.on_close(() => (memory.known = core.known_definitions()));
     const type = await attempt.unless_failed(session.start());
     return new ObjectTree(session).root(service, type) as T & { readonly $: ObjectInfo };
   } catch (error) {

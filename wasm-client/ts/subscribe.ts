@@ -2,8 +2,8 @@
 // Source: sessions spec section 2.17.
 import { Backoff, system_clock } from "./clock.js";
 import type { Clock } from "./clock.js";
-import { connect } from "./connect.js";
-import type { ConnectOptions } from "./connect.js";
+import { connect_with } from "./connect.js";
+import type { ConnectOptions, Memory } from "./connect.js";
 import { call_safely, make_error } from "./errors.js";
 import type { RobotRaconteurError } from "./errors.js";
 import { findServices } from "./find_services.js";
@@ -59,6 +59,8 @@ export class Subscription<T = RemoteObject> {
   readonly #clock: Clock;
   readonly #backoff: Backoff;
   readonly #ending = new AbortController();
+  /** Of whichever service it was: one with other definitions sends its own. */
+  readonly #memory: Memory = { known: [] };
   #client: Client<T> | undefined;
   #stop_waiting: (() => void) | undefined;
   #closed: Promise<void> | undefined;
@@ -175,7 +177,7 @@ export class Subscription<T = RemoteObject> {
     for (const url of await this.#ways()) {
       if (this.isClosed) return;
       try {
-        return this.#take(await connect<T>(url, { ...options, signal }));
+        return this.#take(await connect_with<T>(url, { ...options, signal }, this.#memory));
       } catch (error) {
         this.#tell_failed(error, url);
       }

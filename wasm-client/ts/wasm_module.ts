@@ -20,7 +20,12 @@ export interface CoreOptions {
   connectTimeout?: number | undefined;
   requestTimeout?: number | undefined;
   maxMessageSize?: number | undefined;
+  /** What known_definitions() of an earlier session gave, or []: definitions that the service need not send again. */
+  known?: KnownDefinitions | undefined;
 }
+
+/** For each set of definitions its name, the service's tag for it, and the texts; to be kept, not to be read. */
+export type KnownDefinitions = readonly (readonly string[])[];
 
 export type CoreEvent =
   | { kind: "connected"; type: string }
@@ -96,6 +101,7 @@ interface WasmSession extends CoreExports {
   peer(): Handle;
   attributes(): Handle;
   definitions(): Handle;
+  known_definitions(): Handle;
   members(path: Handle): Handle;
   child_path(parent: Handle, member: Handle, index: Handle): Handle;
 }
@@ -331,6 +337,10 @@ export class Core {
 
   definitions(): string[] {
     return this.#values.take(this.#session.definitions()) as string[];
+  }
+
+  known_definitions(): KnownDefinitions {
+    return this.#values.take(this.#session.known_definitions()) as KnownDefinitions;
   }
 
   /** Of an object that was found. */

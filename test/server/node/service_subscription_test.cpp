@@ -175,6 +175,33 @@ TEST_CASE("a subscription connects again after each loss, and its wires and pipe
   CHECK(lost == 3);
 }
 
+TEST_CASE("a subscription that connects again is not sent what it knows") {
+  LampNode lamp;
+  asio::io_context io;
+  run(io, [&]() -> asio::awaitable<void> {
+    auto lamps = subscribe_service(io, lamp.url(), quick());
+    std::vector<std::uint64_t> received;
+    lamps.on_connected([&](const AsyncObject& client) {
+      received.push_back(client.connection()->session().connection().stats().bytes_received);
+    });
+    for (std::int32_t life = 1; life <= 3; ++life) {
+      const auto client = co_await lamps.client(5s);
+      const auto level = co_await client.get("level");  // it has the definitions
+      CHECK(number(level) == life);
+      lamp.stop();
+      while (lamps.default_client()) {
+        asio::steady_timer pause(io, 1ms);
+        co_await pause.async_wait(asio::use_awaitable);
+      }
+      lamp.start();
+    }
+    co_await lamps.client(5s);
+    REQUIRE(received.size() == 4);
+    const auto size = std::string_view(definition).size();
+    for (std::size_t i = 1; i < received.size(); ++i) CHECK(received[i] + size < received[0]);
+  });
+}
+
 TEST_CASE("calls that are under way when a connection is lost fail, and are not repeated") {
   LampNode lamp;
   asio::io_context io;
