@@ -80,14 +80,14 @@ void ClientSession::handle_connect_reply(const MessageEntry& entry, EntryType re
       connection_.set_endpoints(endpoint_, message.header.sender_endpoint);
       connection_.authorise();
       read_object_type(entry);
-      read_attributes(entry);
+      keep_attributes(entry);
       Fetch fetch;
       for (auto& text : take_definitions(entry, {}, read_texts(message, entry, "servicedefs")))
         fetch.add(std::move(text));
       return advance_fetch(std::move(fetch), now);
     }
     case EntryType::get_service_desc: {
-      read_attributes(entry);
+      keep_attributes(entry);
       Fetch fetch;
       for (auto& name : read_texts(message, entry, "extraimports")) fetch.wanted.insert(std::move(name));
       fetch.add(read_text(message, entry, "servicedef"));
@@ -145,13 +145,27 @@ void ClientSession::read_object_type(const MessageEntry& entry) {
   root_implements_ = read_texts(message, entry, "objectimplements");
 }
 
-void ClientSession::read_attributes(const MessageEntry& entry) {
+Result<Value> ClientSession::read_attributes(const MessageEntry& entry, std::string_view name) const {
   const auto& message = *connection_.message();
-  const auto* element = message.elements_of(entry).find("attributes");
-  if (!element) return;
+  const auto* element = message.elements_of(entry).find(name);
+  if (!element) return Value(MapString{});
+  auto value = unpack_varvalue(message, *element, types_);
+  if (value && !value->get_if<MapString>())
+    return make_error(ErrorCode::data_type_mismatch, "attributes are " + value->type_text() + ", expected map{string}");
+  return value;
+}
+
+void ClientSession::keep_attributes(const MessageEntry& entry) {
   // Attributes only describe; a service whose attributes cannot be read is still a service.
-  if (auto value = unpack_varvalue(message, *element, types_))
-    if (auto* map = value->get_if<MapString>()) attributes_ = std::move(*map);
+  if (auto value = read_attributes(entry, "attributes")) attributes_ = std::move(*value->get_if<MapString>());
+}
+
+RequestId ClientSession::get_attributes(Now now) {
+  if (state_ != ClientState::connected) return fail_request(next_request_id(), not_connected());
+  const auto id = begin_request(EntryType::get_service_attributes, options_.service, {});
+  if (auto sent = send_outgoing(now); !sent) return fail_request(id, sent.error());
+  add_pending(id, EntryType::get_service_attributes, nullptr, {}, now);
+  return id;
 }
 
 /// Asks for the next definition that is missing, one at a time, or goes on when there is none.

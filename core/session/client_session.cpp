@@ -425,6 +425,8 @@ Result<Value> ClientSession::read_reply(const Message& message, const MessageEnt
       if (!read) return read.error();
       return std::move(read->value);
     }
+    case EntryType::get_service_attributes:
+      return read_attributes(entry, "return");
     default:
       return Value{};
   }

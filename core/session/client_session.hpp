@@ -184,6 +184,9 @@ class ClientSession {
   /// not takes only this one.
   RequestId authenticate(std::string_view username, const Value& credentials, Now now);
   RequestId logout(Now now);  ///< completes with null
+  /// Asks for the attributes as they are now; completes with a MapString. A service of this library tells there what
+  /// became of the values of this session's subscriptions (subscription_losses.hpp).
+  RequestId get_attributes(Now now);
   /// Locks the object at `path` and all below it, until unlock() or until the client, or the user's last one, has gone.
   /// Completes with null.
   RequestId lock(std::string_view path, LockKind kind, Now now);
@@ -276,7 +279,8 @@ class ClientSession {
   std::vector<std::string> take_definitions(const MessageEntry& entry, std::string_view name,
                                             std::vector<std::string> sent);
   void read_object_type(const MessageEntry& entry);
-  void read_attributes(const MessageEntry& entry);
+  Result<Value> read_attributes(const MessageEntry& entry, std::string_view name) const;
+  void keep_attributes(const MessageEntry& entry);
   void advance_fetch(Fetch fetch, Now now);
   void handle_fetch_reply(const MessageEntry& entry, Fetch fetch, Now now);
   void finish_fetch(Fetch fetch, Now now);

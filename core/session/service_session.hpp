@@ -358,6 +358,8 @@ class ServiceSession {
   Result<> connect(std::shared_ptr<HostedService> service, std::uint32_t client_endpoint,
                    std::optional<AuthenticatedUser> user, Now now);
   Result<> disconnect(const Message& message, const MessageEntry& entry, Now now);
+  /// A MapString (service_losses.cpp).
+  Value attributes_with_losses() const;
 
   // logins (service_login.cpp)
   bool may_use_service() const;
@@ -457,6 +459,7 @@ class ServiceSession {
   bool is_gone_ = false;
 
   Message outgoing_;
+  Value told_attributes_;     ///< borrowed by outgoing_
   SessionId session_id_ = 0;  ///< while service_ is set
   std::vector<OpenEnter> enters_;
   std::optional<AuthenticatedUser> user_;

@@ -99,6 +99,7 @@ void ServiceSession::handle_special(const Message& message, Now now) {
                          (header.receiver_node_id.is_any() &&
                           (header.receiver_node_name.empty() || header.receiver_node_name == self.name));
   outgoing_.clear();
+  told_attributes_ = {};
   outgoing_.header.receiver_node_id = header.sender_node_id;
   outgoing_.header.receiver_node_name = header.sender_node_name;
   outgoing_.header.sender_endpoint = header.receiver_endpoint;
@@ -143,7 +144,11 @@ Result<> ServiceSession::answer_special(const Message& message, const MessageEnt
     case EntryType::get_service_attributes: {
       const auto service = directory_.find(entry.service_path);
       if (!service) return make_error(ErrorCode::service_error, "Service not found");
-      return pack_varvalue(outgoing_, "return", service->attributes(), service->types());
+      // Once a message: it is a long answer to a short question.
+      const bool tells_losses = service == service_ && may_use_service() && told_attributes_.is_null();
+      if (tells_losses) told_attributes_ = attributes_with_losses();
+      const auto& attributes = tells_losses ? told_attributes_ : service->attributes();
+      return pack_varvalue(outgoing_, "return", attributes, service->types());
     }
     default:
       return protocol_error("Invalid Special Operation");

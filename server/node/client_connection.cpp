@@ -240,6 +240,10 @@ void ClientConnection::logout(Completion done) {
   expect(session_.logout(read_clocks()), std::move(done));
 }
 
+void ClientConnection::get_attributes(Completion done) {
+  expect(session_.get_attributes(read_clocks()), std::move(done));
+}
+
 void ClientConnection::lock(std::string_view path, LockKind kind, Completion done) {
   expect(session_.lock(path, kind, read_clocks()), std::move(done));
 }

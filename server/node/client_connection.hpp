@@ -116,6 +116,8 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   // Session operations; see ClientSession.
   void authenticate(std::string_view username, const Value& credentials, Completion done);
   void logout(Completion done);
+  /// As they are now, and losses of this connection's subscriptions: see read_losses() in subscription_losses.hpp.
+  void get_attributes(Completion done);
   void lock(std::string_view path, LockKind kind, Completion done);
   void unlock(std::string_view path, Completion done);
   void enter_monitor(std::string_view path, std::chrono::milliseconds timeout, Completion done);

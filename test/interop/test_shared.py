@@ -1,7 +1,9 @@
 """Shared devices: many clients, one session with the device. The clients here are those of the real package; what single
 members do is test_interop.py's, whose scenarios all run through a shared device as well."""
 import json
+import os
 import pathlib
+import signal
 import sys
 import threading
 
@@ -9,7 +11,7 @@ import numpy
 import pytest
 import RobotRaconteur as RR
 
-from clients import run_program
+from clients import JS, run_program
 from directions import DIRECTIONS, service_command
 from processes import BUILD, Background, read_json, start_gateway
 from scenarios import POSE
@@ -155,6 +157,60 @@ def test_the_gateway_is_a_service(node, site, tmp_path):
     changes.wait_for(lambda change: change == ("removed", "nobody"))
     for each in (root, client):
         node.DisconnectService(each)
+
+
+def ask_losses(client):
+    client.write_line("tell")
+    return json.loads(client.next_line())
+
+
+def test_a_client_hears_of_its_losses(node, site, tmp_path):
+    """In its own session: one that does not read, while the device publishes, hears what it has missed."""
+    _, port, _ = site
+    url = f"ws://127.0.0.1:{port}/devices/interop?service=interop"
+    client = Background(["node", JS / "losses.mjs", url], tmp_path / "client.log")
+    late = None
+    try:
+        client.next_line()
+        publisher = node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop")
+        os.kill(client.process.pid, signal.SIGSTOP)
+
+        def conflated():
+            publisher.publish_state(numpy.zeros(100_000))
+            subscriptions = read_json(f"http://127.0.0.1:{port}/api/v1/devices/interop/subscriptions")["subscriptions"]
+            return sum(each["conflated"] for each in subscriptions)
+        client.wait_until(lambda: conflated() >= 3)
+        os.kill(client.process.pid, signal.SIGCONT)
+        told = ask_losses(client)
+        assert told["wire"]["conflated"] >= 3 and told["wire"]["delivered"] >= 1 and told["wire"]["dropped"] == 0, told
+        assert told["wire"]["ageP99"] >= told["wire"]["ageP50"] > 0
+        assert told["pipe"]["conflated"] == told["pipe"]["dropped"] == 0
+        late = Background(["node", JS / "losses.mjs", url], tmp_path / "late.log")
+        late.next_line()
+        assert ask_losses(late)["wire"]["conflated"] == 0  # to each its own
+        node.DisconnectService(publisher)
+    finally:
+        client.stop()
+        if late:
+            late.stop()
+
+
+@pytest.mark.parametrize("mode", ["direct", "relayed"])
+def test_a_device_of_the_package_keeps_no_account(tmp_path, mode):
+    service = Background([sys.executable, pathlib.Path(__file__).parent / "peers" / "service.py"], tmp_path / "service.log")
+    url = json.loads(service.next_line())["url"].replace("rr+tcp:", "ws:")
+    gateway = client = None
+    try:
+        if mode == "relayed":
+            gateway, port = start_gateway(tmp_path, url.replace("ws:", "rr+tcp:"))
+            url = f"ws://127.0.0.1:{port}/devices/interop?service=interop"
+        client = Background(["node", JS / "losses.mjs", url], tmp_path / "client.log")
+        client.next_line()
+        assert ask_losses(client) == {"wire": None, "pipe": None}
+    finally:
+        for each in (client, gateway, service):
+            if each:
+                each.stop()
 
 
 def test_clients_stay_when_the_device_goes(node, tmp_path):

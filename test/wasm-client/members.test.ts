@@ -373,6 +373,23 @@ describe("object references", () => {
   });
 });
 
+it("hears what became of the values of a wire and of a pipe", async () => {
+  const wire = robot["both"]!.connect() as WireConnection<number>;
+  await wire.ready;
+  for (let i = 0; i < 3; ++i) await robot["publish_both"]!(i);
+  const losses = await wire.losses();
+  expect(losses).toEqual({ delivered: 3, conflated: 0, dropped: 0, ageP50: expect.any(Number), ageP99: expect.any(Number) });
+  const end = await robot["stream"]!.connect(7);
+  await end.send(1);
+  expect((await end.losses({ timeout: 1000 }))!.delivered).toBe(1);
+  const other = await robot["stream"]!.connect(8);
+  expect((await other.losses())!.delivered).toBe(0);
+  await wire.close();
+  expect(await wire.losses()).toBeUndefined();
+  await robot.$.close();
+  expect((await failure(end.losses())).code).toBe(ErrorCode.ConnectionError);
+});
+
 it("uses the root object as the type that was asked for", async () => {
   const other = await TestService.start({ definitions: [definition], root: "test.members.Root" });
   const base = await other.connect({ objectType: "test.members.Base" });

@@ -215,8 +215,10 @@ it("keeps a wire over connections", async () => {
   await vi.waitUntil(() => wire.isConnected);
   await client["publish_both"]!(1);
   await vi.waitUntil(() => seen.length === 1);
+  expect((await wire.losses())!.delivered).toBe(1);
   first.drop("gone");
   await vi.waitUntil(() => !wire.isConnected);
+  expect(await wire.losses()).toBeUndefined();
   expect(wire.value).toBe(1);
   clock.fire();
   const next = await subscription.client();

@@ -122,6 +122,9 @@ RR_EXPORT(authenticate) RequestId rr_authenticate(JsHandle username, JsHandle cr
 RR_EXPORT(logout) RequestId rr_logout() {
   return session->logout();
 }
+RR_EXPORT(get_attributes) RequestId rr_get_attributes() {
+  return session->get_attributes();
+}
 RR_EXPORT(lock) RequestId rr_lock(JsHandle path, bool is_for_client) {
   return session->lock(JsValue(path), is_for_client ? rr::LockKind::client : rr::LockKind::user);
 }

@@ -220,6 +220,10 @@ RequestId WasmSession::logout() {
   return session_.logout(now_);
 }
 
+RequestId WasmSession::get_attributes() {
+  return session_.get_attributes(now_);
+}
+
 RequestId WasmSession::lock(const JsValue& path, LockKind kind) {
   return session_.lock(text_of(path), kind, now_);
 }

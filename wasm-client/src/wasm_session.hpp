@@ -58,6 +58,7 @@ class WasmSession {
   /// `credentials` an object or Map, as varvalues.
   RequestId authenticate(const JsValue& username, const JsValue& credentials);
   RequestId logout();
+  RequestId get_attributes();
   RequestId lock(const JsValue& path, LockKind kind);
   RequestId unlock(const JsValue& path);
   /// `milliseconds` below 0: no limit.

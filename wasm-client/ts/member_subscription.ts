@@ -3,7 +3,7 @@ import type { Clock } from "./clock.js";
 import { call_safely, make_error } from "./errors.js";
 import { ValueQueue } from "./members/queue.js";
 import type { Subscription } from "./subscribe.js";
-import type { PipeEndpoint, RemoteObject, RrValue, WireConnection, WireTime } from "./types.js";
+import type { CallOptions, Losses, PipeEndpoint, RemoteObject, RrValue, WireConnection, WireTime } from "./types.js";
 
 export interface MemberSubscriptionOptions {
   /** The object that the member belongs to: "*" is the root, "*.arm" one of its object references; "*". */
@@ -20,6 +20,7 @@ const retry_ms = 2_500;
 
 interface Connection {
   send(value: unknown): Promise<void>;
+  losses(options?: CallOptions): Promise<Losses | undefined>;
   close(): Promise<void>;
 }
 
@@ -60,6 +61,11 @@ abstract class MemberSubscription<C extends Connection> implements AsyncIterable
   send(value: unknown): Promise<void> {
     if (this.connection) return this.connection.send(value);
     return Promise.reject(make_error("InvalidOperation", `${this.member}: is not connected at the moment`));
+  }
+
+  /** Of the connection that is up; undefined while there is none, and where the service keeps no account of it. */
+  async losses(options?: CallOptions): Promise<Losses | undefined> {
+    return this.connection?.losses(options);
   }
 
   /** Leaving the loop closes this subscription of the member. */

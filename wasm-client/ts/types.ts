@@ -163,6 +163,18 @@ export interface WireTime {
   nanoseconds: number;
 }
 
+/** What became of the values of one subscription, by the account of the service: how many, and how old. */
+export interface Losses {
+  /** Handed to the connection. */
+  delivered: number;
+  /** Replaced by a newer one before that. */
+  conflated: number;
+  dropped: number;
+  /** Milliseconds that half, and 99 %, of those delivered did not wait longer than; in steps of two. */
+  ageP50: number;
+  ageP99: number;
+}
+
 /**
  * A connected wire. Iterating gives the newest value each time; values that came in between are skipped. Leaving the
  * loop closes the connection.
@@ -175,6 +187,8 @@ export interface WireConnection<T = RrValue, S = T> extends AsyncIterable<T> {
   readonly ready: Promise<void>;
   /** Sends the OutValue; one that waits for a slow network is replaced by a newer one. */
   send(value: S): Promise<void>;
+  /** What this session's values of the wire came to; undefined where the service keeps no account of it. */
+  losses(options?: CallOptions): Promise<Losses | undefined>;
   close(): Promise<void>;
 }
 
@@ -215,6 +229,8 @@ export interface PipeEndpoint<T = RrValue, S = T> extends AsyncIterable<T> {
    *         the network: the packet is not sent), DataTypeMismatch, ConnectionError, ...
    */
   send(packet: S, options?: PipeSendOptions): Promise<void>;
+  /** What its packets came to; undefined where the service keeps no account of it. */
+  losses(options?: CallOptions): Promise<Losses | undefined>;
   /** Calls `closed` once when the endpoint ends, with the reason where it was not closed in order. */
   onClose(closed: (reason?: unknown) => void): () => void;
   /** What waits in send() rejects; what was received can still be taken. Repeated calls do nothing. */

@@ -82,6 +82,7 @@ interface WasmSession extends CoreExports {
   send_pipe_packet(path: Handle, member: Handle, index: number, value: Handle, wants_ack: boolean): number;
   authenticate(username: Handle, credentials: Handle): number;
   logout(): number;
+  get_attributes(): number;
   lock(path: Handle, is_for_client: boolean): number;
   unlock(path: Handle): number;
   enter_monitor(path: Handle, milliseconds: number): number;
@@ -257,6 +258,10 @@ export class Core {
     return this.#ask("logout");
   }
 
+  get_attributes(): number {
+    return this.#ask("get_attributes");
+  }
+
   lock(path: string, kind: "user" | "client"): number {
     return this.#checked(this.#at_now().lock(this.#give(path), kind === "client"));
   }
@@ -387,6 +392,7 @@ type MemberRequest =
   | "write_memory"
   | "authenticate"
   | "logout"
+  | "get_attributes"
   | "unlock"
   | "exit_monitor"
   | "connect_wire"

@@ -3,6 +3,7 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <catch2/catch.hpp>
 
+#include "core/session/subscription_losses.hpp"
 #include "test/server/node/node_fixture.hpp"
 
 using namespace rr;
@@ -17,6 +18,7 @@ stdver 0.10
 object Echo
     function string say(string text)
     event said(string text)
+    wire int32 count
 end
 )";
 
@@ -26,6 +28,7 @@ void add_echo(Node& node) {
     service->fire("said", text);
     return text;
   });
+  service->set_wire("count", 5);
   node.add(service);
 }
 
@@ -65,6 +68,23 @@ TEST_CASE("a lost connection fails what is pending, and everything after it") {
   connection.close(make_error(ErrorCode::connection_error, "cut"));
   CHECK(codes == std::vector{ErrorCode::connection_error});
   CHECK(error_of([&] { echo.call("say", "y"); }).message == "cut");
+}
+
+TEST_CASE("a client hears what became of the values of its wire") {
+  RunningNode node(add_echo);
+  const auto echo = connect(node.url("Echo"));
+  const auto losses = [&] {
+    const Value attributes = echo.connection().wait_for(
+        [](ClientConnection& connection, auto done) { connection.get_attributes(std::move(done)); });
+    return read_losses(attributes, "Echo", "count");
+  };
+  CHECK_FALSE(losses());
+  int values = 0;
+  echo.connect_wire("count", [&](const Value&, TimeSpec) { ++values; });
+  REQUIRE(echo.connection().run_until([&] { return values > 0; }, 5s));
+  REQUIRE(losses());
+  CHECK(losses()->delivered == 1);
+  CHECK(losses()->conflated == 0);
 }
 
 TEST_CASE("handlers may use the connection, but not wait on it") {

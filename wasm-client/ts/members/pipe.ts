@@ -1,7 +1,8 @@
 // Pipes: every packet, in order. Layer: wasm-client/ts/members. Source: sessions spec section 2.11.
 import { call_safely, make_error } from "../errors.js";
-import type { PipeConnectOptions, PipeEndpoint, PipeMember, PipeSendOptions, RrValue } from "../types.js";
+import type { CallOptions, Losses, PipeConnectOptions, PipeEndpoint, PipeMember, PipeSendOptions, RrValue } from "../types.js";
 import { check_signal, within } from "../within.js";
+import { losses_of } from "./losses.js";
 import type { MemberContext } from "./member.js";
 import { ValueQueue } from "./queue.js";
 
@@ -127,6 +128,10 @@ class Endpoint implements PipeEndpoint {
     if (!taken) return;
     const unless_over = within(taken, { signal: this.#ending.signal }, "");
     await within(unless_over, limits, `pipe ${info.name}: the packet was not taken`).finally(() => this.#acks.delete(number));
+  }
+
+  losses(options?: CallOptions): Promise<Losses | undefined> {
+    return losses_of(this.context, options, this.index);
   }
 
   onClose(closed: (reason?: unknown) => void): () => void {

@@ -1,7 +1,8 @@
 // Wires: the newest value wins. Layer: wasm-client/ts/members. Source: sessions spec section 2.12.
 import { make_error } from "../errors.js";
-import type { CallOptions, RrValue, WireConnection, WireMember, WireTime } from "../types.js";
+import type { CallOptions, Losses, RrValue, WireConnection, WireMember, WireTime } from "../types.js";
 import { check_signal } from "../within.js";
+import { losses_of } from "./losses.js";
 import type { MemberContext } from "./member.js";
 import { ValueQueue } from "./queue.js";
 
@@ -146,6 +147,10 @@ class Connection implements WireConnection {
   send(value: unknown): Promise<void> {
     if (this.#end) return Promise.reject(this.#end.reason ?? closed_wire(this.wire.context.info.name));
     return this.wire.send(value);
+  }
+
+  losses(options?: CallOptions): Promise<Losses | undefined> {
+    return losses_of(this.wire.context, options);
   }
 
   close(): Promise<void> {
