@@ -20,9 +20,11 @@ class AgeHistogram {
   void add(std::chrono::nanoseconds age) {
     const auto us = static_cast<std::uint64_t>(std::max<std::int64_t>(age.count(), 0) / 1000);
     ++counts_[std::min<std::size_t>(static_cast<std::size_t>(std::bit_width(us)), bucket_count - 1)];
+    sum_us_ += us;
   }
   void add(const AgeHistogram& other) {
     for (std::size_t i = 0; i < bucket_count; ++i) counts_[i] += other.counts_[i];
+    sum_us_ += other.sum_us_;
   }
   /// Ages of bucket i are below this.
   static constexpr std::chrono::microseconds upper_bound(std::size_t bucket) {
@@ -34,6 +36,7 @@ class AgeHistogram {
     for (const auto count : counts_) sum += count;
     return sum;
   }
+  std::uint64_t sum_us() const { return sum_us_; }
   /// An age that `share` (0 to 1) of all values did not exceed; zero where there are none.
   std::chrono::microseconds quantile(double share) const {
     const auto wanted = static_cast<double>(total()) * share;
@@ -47,6 +50,7 @@ class AgeHistogram {
 
  private:
   std::array<std::uint64_t, bucket_count> counts_{};
+  std::uint64_t sum_us_ = 0;
 };
 
 struct Ledger {
@@ -64,6 +68,17 @@ struct Ledger {
     conflated += other.conflated;
     dropped += other.dropped;
     ages.add(other.ages);
+  }
+};
+
+/// Of many subscriptions together.
+struct Ledgers {
+  Ledger wires = {};
+  Ledger pipes = {};
+
+  void add(const Ledgers& other) {
+    wires.add(other.wires);
+    pipes.add(other.pipes);
   }
 };
 

@@ -27,7 +27,7 @@ Result<CallbackId> ServiceSession::call_callback(std::string_view path, const Me
   connection_.begin_message(outgoing_);
   outgoing_.begin_entry(EntryType::callback_call_req, path, member.name, request_id_of(id));
   if (auto written = write_arguments(outgoing_, arguments, member, service_->types()); !written) return written.error();
-  if (auto sent = connection_.send(outgoing_, now); !sent) {
+  if (auto sent = connection_.send(outgoing_, now, member.has_modifier("urgent") || service_->is_remote()); !sent) {
     if (connection_.state() == ConnectionState::closed) leave(sent.error(), now);
     return sent.error();
   }

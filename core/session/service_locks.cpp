@@ -170,7 +170,7 @@ void ServiceSession::set_user(std::optional<AuthenticatedUser> user) {
   if (may_use_service()) return;
   // Logged out of a service that requires a user: what was connected until now ends, too.
   leave_monitors();
-  wires_.clear();
+  end_all_wires();
   release_pipes(service_->name());
 }
 

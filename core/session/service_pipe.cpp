@@ -35,6 +35,7 @@ void ServiceSession::forget_pipe(PipeId id) {
   const auto indices = pipe_indices_.find(*pipe->second.key);
   indices->second.erase(pipe->second.index);
   if (indices->second.empty()) pipe_indices_.erase(indices);
+  ended_.pipes.add(pipe->second.ledger);
   pipes_.erase(pipe);
 }
 

@@ -114,7 +114,8 @@ void ServiceSession::leave(Error reason, Now now) {
   login_.reset();
   calls_.clear();
   generators_.clear();
-  wires_.clear();
+  end_all_wires();
+  for (const auto& [id, pipe] : pipes_) ended_.pipes.add(pipe.ledger);
   pipes_.clear();
   pipe_indices_.clear();
   parked_.clear();
@@ -183,85 +184,11 @@ Result<> ServiceSession::send_event(std::string_view path, const MemberDefinitio
   return {};
 }
 
-Result<> ServiceSession::send_wire(std::string_view path, const MemberDefinition& member, const Value& value, Now now) {
-  return send_wire(path, member, value, now.utc, now.steady, now);
-}
-
-Result<> ServiceSession::send_wire(std::string_view path, const MemberDefinition& member, const Value& value,
-                                   TimeSpec time, TimePoint arrived, Now now) {
-  const auto found = wires_.find(PathMemberView{path, member.name});
-  if (!may_use_service() || found == wires_.end()) return {};
-  auto& wire = found->second;
-  const bool has_room = wire.state == WireState::connected && connection_.queued_bytes() < wire_high_mark;
-  if (has_room) return send_wire_packet(found->first, wire, value, time, arrived, now);
-  if (wire.waiting) ++wire.ledger.conflated;
-  wire.waiting = WireValue{time, value};
-  wire.waiting_since = arrived;
-  return {};
-}
-
-Result<> ServiceSession::send_wire_packet(const PathMember& key, WireConnection& wire, const Value& value,
-                                          TimeSpec time, TimePoint arrived, Now now) {
-  if (wire.waiting) {  // an older one
-    ++wire.ledger.conflated;
-    wire.waiting.reset();
-  }
-  connection_.begin_message(outgoing_);
-  outgoing_.header.metadata = unreliable_metadata;
-  outgoing_.begin_entry(EntryType::wire_packet, key.path, key.member).metadata = unreliable_metadata;
-  if (auto written = write_wire_value(outgoing_, value, wire.stamp(time), *wire.member, service_->types()); !written)
-    return written;
-  send_outgoing(now);
-  wire.ledger.note_delivery(now.steady - arrived);
-  return {};
-}
-
-void ServiceSession::flush_wires(Now now) {
-  for (auto& [key, wire] : wires_) {
-    if (!wire.waiting || wire.state == WireState::connecting || !may_use_service()) continue;
-    const auto [time, value] = *std::exchange(wire.waiting, std::nullopt);
-    // A value that does not fit its definition was refused or not when it was set; here only the stream counts.
-    if (!send_wire_packet(key, wire, value, time, wire.waiting_since, now) ||
-        connection_.queued_bytes() >= wire_high_mark)
-      return;
-  }
-}
-
-void ServiceSession::note_conflated(std::string_view path, const MemberDefinition& member, std::uint64_t count) {
-  const auto wire = wires_.find(PathMemberView{path, member.name});
-  if (wire != wires_.end()) wire->second.ledger.conflated += count;
-}
-
-void ServiceSession::answer_wire(std::string_view path, const MemberDefinition& member, const Result<>& result,
-                                 Now now) {
-  const auto wire = wires_.find(PathMemberView{path, member.name});
-  if (wire == wires_.end() || wire->second.state == WireState::connected) return;
-  const auto request_id = wire->second.request_id;
-  wire->second.state = WireState::connected;
-  if (!result) wires_.erase(wire);
-  connection_.begin_message(outgoing_);
-  outgoing_.begin_entry(EntryType::wire_connect_ret, path, member.name, request_id);
-  if (!result) write_error(outgoing_, result.error());
-  send_outgoing(now);
-  flush_wires(now);
-}
-
-void ServiceSession::close_wire(std::string_view path, const MemberDefinition& member, Now now) {
-  const auto wire = wires_.find(PathMemberView{path, member.name});
-  if (wire == wires_.end()) return;
-  if (wire->second.state == WireState::connecting)
-    return answer_wire(path, member, make_error(ErrorCode::service_error, "the wire was closed"), now);
-  wires_.erase(wire);
-  connection_.begin_message(outgoing_);
-  outgoing_.header.metadata = unreliable_metadata;
-  outgoing_.begin_entry(EntryType::wire_closed, path, member.name);
-  send_outgoing(now);
-}
-
 void ServiceSession::release_path(std::string_view path, Now now) {
   if (!service_) return;
   const auto is_released = [path](std::string_view other) { return is_within(other, path); };
-  std::erase_if(wires_, [&](const auto& wire) { return is_released(wire.first.path); });
+  for (auto wire = wires_.begin(); wire != wires_.end();)
+    wire = is_released(wire->first.path) ? end_wire(wire) : std::next(wire);
   release_pipes(path);
   end_generators(generators_.remove_released(is_released));
   connection_.begin_message(outgoing_);
@@ -275,10 +202,6 @@ void ServiceSession::close_service(Now now) {
   outgoing_.begin_entry(EntryType::service_closed, {}, {});
   send_outgoing(now);
   leave({ErrorCode::none, "the service was closed"}, now);
-}
-
-bool ServiceSession::has_wire(std::string_view path, std::string_view member) const {
-  return wires_.find(PathMemberView{path, member}) != wires_.end();
 }
 
 void ServiceSession::send_outgoing(Now now, bool is_urgent) {
@@ -455,33 +378,6 @@ Result<> ServiceSession::add_call(const Message& message, const MessageEntry& en
   return {};
 }
 
-Result<> ServiceSession::answer_wire(const MessageEntry& entry, const HostedService::Found& found,
-                                     const MemberDefinition& member, Now now) {
-  PathMember key{std::string(entry.service_path), std::string(entry.member_name)};
-  if (entry.type == EntryType::wire_disconnect_req) {
-    if (wires_.erase(key) == 0) return make_error(ErrorCode::service_error, "Invalid wire connection");
-    events_.push_back(WireDisconnected{key.path, &member});
-    begin_reply(entry);
-    send_outgoing(now);
-    return {};
-  }
-  if (wires_.size() >= options_.max_wires && !wires_.contains(key))
-    return make_error(ErrorCode::out_of_system_resource,
-                      "this client has " + std::to_string(options_.max_wires) + " wires connected already");
-  // A second request of a connected client is accepted: it is the same connection.
-  const bool is_remote = service_->is_remote();
-  const WireConnection fresh{is_remote ? WireState::connecting : WireState::connected, &member, entry.request_id};
-  const bool is_new = wires_.try_emplace(key, fresh).second;
-  if (is_new && is_remote) {
-    events_.push_back(WireConnected{key.path, found.object, &member});
-    return {};
-  }
-  begin_reply(entry);
-  send_outgoing(now);
-  if (is_new) events_.push_back(WireConnected{key.path, found.object, &member});
-  return {};
-}
-
 Result<> ServiceSession::answer_service_index(const MessageEntry& entry, const MemberDefinition& member, Now now) {
   const auto answer = answer_service_index_call(member.name, directory_, options_.base_url);
   if (!answer) return answer.error();
@@ -489,18 +385,6 @@ Result<> ServiceSession::answer_service_index(const MessageEntry& entry, const M
   if (auto written = write_return(outgoing_, *answer, member, service_->types()); !written) return written;
   send_outgoing(now);
   return {};
-}
-
-void ServiceSession::handle_wire_packet(const Message& message, const MessageEntry& entry) {
-  const auto wire = wires_.find(PathMemberView{entry.service_path, entry.member_name});
-  if (wire == wires_.end() || !check_direction(entry.type, *wire->second.member)) return;
-  if (!admit(entry.type, entry.service_path, wire->second.member)) return;
-  auto packet = read_wire_value(message, entry, *wire->second.member, service_->types());
-  if (!packet || !wire->second.accept(packet->time)) return;
-  auto found = service_->find_object(entry.service_path);
-  if (!found) return;
-  events_.push_back(
-      WireReceived{std::move(found->object), wire->second.member, packet->time, std::move(packet->value)});
 }
 
 void ServiceSession::begin_reply(const MessageEntry& request) {
@@ -512,7 +396,7 @@ void ServiceSession::begin_reply(const MessageEntry& request) {
 void ServiceSession::send_error(const MessageEntry& request, const Error& error, Now now) {
   begin_reply(request);
   write_error(outgoing_, error);
-  send_outgoing(now);
+  send_outgoing(now, service_ && service_->is_remote());
 }
 
 }  // namespace rr

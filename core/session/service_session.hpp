@@ -264,6 +264,8 @@ class ServiceSession {
     for (const auto& [key, wire] : wires_) visit(key.path, *wire.member, wire.ledger);
     for (const auto& [id, pipe] : pipes_) visit(pipe.key->path, pipe.state.member(), pipe.ledger);
   }
+  /// Of all wires and pipes that the client ever had connected here.
+  Ledgers total_ledgers() const;
   /// Who has logged in; nullptr while nobody has.
   const AuthenticatedUser* user() const { return user_ ? &*user_ : nullptr; }
   /// This side's number of the session; 0 before the client is connected.
@@ -347,6 +349,10 @@ class ServiceSession {
   void handle_message(const Message& message, Now now);
   void send_outgoing(Now now, bool is_urgent = false);
   void leave(Error reason, Now now);
+  using Wires = std::map<PathMember, WireConnection, PathMemberLess>;
+  /// Returns the one behind it.
+  Wires::iterator end_wire(Wires::iterator wire);
+  void end_all_wires();
 
   // node-level requests (service_special.cpp)
   void handle_special(const Message& message, Now now);
@@ -470,7 +476,8 @@ class ServiceSession {
   CallId last_call_id_ = 0;
   std::vector<OpenCall> calls_;
   GeneratorTable generators_;
-  std::map<PathMember, WireConnection, PathMemberLess> wires_;
+  Wires wires_;
+  Ledgers ended_;  ///< of wires and pipes that are no more
   /// A DisconnectClient that is not answered yet.
   struct OpenLeave {
     NodeIdentity client;

@@ -108,7 +108,7 @@ rr::Value GatewayService::list_devices() const {
 rr::Value GatewayService::list_statistics() const {
   rr::List out;
   for (const auto& device : gateway_.devices().all()) {
-    const auto& traffic = device->traffic();
+    const auto traffic = gateway_.shared().traffic_of(*device);
     out.items.push_back(rr::Structure{"org.rrgate.gateway.DeviceStatistics",
                                       {{"device", device->config().name},
                                        {"sessions", traffic.sessions},

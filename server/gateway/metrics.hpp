@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <string_view>
 
+#include "core/member/ledger.hpp"
+
 namespace rrgate {
 
 /// Why something was turned away.
@@ -37,6 +39,7 @@ struct Metrics {
 };
 
 /// What passed in one direction between a device and all its clients.
+/// Of a shared device: between its clients and the gateway.
 struct Flow {
   std::uint64_t bytes = 0;
   std::uint64_t messages = 0;  ///< without those inside TLS from end to end
@@ -47,6 +50,7 @@ struct Traffic {
   Flow to_device;
   Flow to_clients;
   std::uint64_t sessions = 0;
+  rr::Ledgers ledgers;  ///< of clients of a shared device
 };
 
 }  // namespace rrgate

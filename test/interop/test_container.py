@@ -194,7 +194,7 @@ def test_the_compose_files_are_such(names):
 
 def test_the_dashboard_asks_for_what_there_is(tmp_path):
     from test_operations import running
-    with running(tmp_path, {"devices": [{"name": "x", "url": "rr+tcp://127.0.0.1:1/?service=x"}]}) as gateway:
+    with running(tmp_path, {"devices": [{"name": "x", "url": "rr+tcp://127.0.0.1:1/?service=x", "mode": "shared"}]}) as gateway:
         known = {name.split("{")[0] for name in gateway.metrics()}
     panels = json.loads((DOCKER / "grafana" / "rrgate.json").read_text())["panels"]
     asked = {name for panel in panels for target in panel["targets"]

@@ -12,7 +12,7 @@ import pytest
 
 from directions import PEERS
 from processes import BUILD, Background, free_port
-from test_proxies import fetch, open_websocket
+from test_proxies import SCENARIO, fetch, open_websocket, run_steps
 
 RRGATE = BUILD / "server" / "rrgate"
 
@@ -81,14 +81,16 @@ def read_metrics(text):
             assert current not in families
             families.add(current)
         elif line.startswith("# TYPE "):
-            assert line.split()[2] == current and line.split()[3] in ("counter", "gauge")
-            assert (line.split()[3] == "counter") == current.endswith("_total")
+            kind = line.split()[3]
+            assert line.split()[2] == current and kind in ("counter", "gauge", "histogram")
+            assert (kind == "counter") == current.endswith("_total")
         else:
-            found = re.fullmatch(r'(\w+)(?:\{(?:\w+="[^"]*",?)+\})? (\d+)', line)
-            assert found and found[1] == current, line
+            found = re.fullmatch(r'(\w+)(?:\{(?:\w+="[^"]*",?)+\})? (\d+(?:\.\d+)?)', line)
+            names = [current + end for end in ("_bucket", "_sum", "_count")] if kind == "histogram" else [current]
+            assert found and found[1] in names, line
             name, value = line.rsplit(" ", 1)
             assert name not in values
-            values[name] = int(value)
+            values[name] = float(value) if "." in value else int(value)
     return values
 
 
@@ -145,6 +147,30 @@ def test_metrics(device, tmp_path):
             assert after[f'rrgate_rejected_total{{reason="{reason}"}}'] == 1, reason
         assert after["rrgate_connections_total"] > before["rrgate_connections_total"]
         link.close()
+
+
+def test_metrics_of_a_shared_device(device, tmp_path):
+    """What a client had stays counted when it has gone."""
+    with running(tmp_path, {"devices": [interop(device, mode="shared")]}) as gateway:
+        gateway.wait_for("shared session open")
+        url = f"rr+tcp://127.0.0.1:{gateway.port}/?nodename=interop&service=interop"
+        assert gateway.metrics()['rrgate_subscription_delivered_total{device="interop",kind="wire"}'] == 0
+        run_steps("reference", url, SCENARIO["wires"].steps)
+        first = gateway.metrics()
+        assert first['rrgate_sessions{device="interop"}'] == 0
+        wires = {name: first[f'rrgate_subscription_{name}_total{{device="interop",kind="wire"}}'] for name in ("delivered", "dropped")}
+        assert wires["delivered"] > 0 and wires["dropped"] == 0, wires
+        ages = 'rrgate_subscription_age_seconds_{}{{device="interop",kind="wire"{}}}'
+        buckets = [value for name, value in first.items() if name.startswith("rrgate_subscription_age_seconds_bucket")]
+        assert buckets == sorted(buckets) and buckets[-1] == first[ages.format("count", "")] == wires["delivered"]
+        assert 0 < first[ages.format("sum", "")] < 10
+        for direction in ("to_device", "to_clients"):
+            assert first[f'rrgate_relayed_bytes_total{{device="interop",direction="{direction}"}}'] > 1000
+            assert first[f'rrgate_waiting_bytes{{device="interop",direction="{direction}"}}'] == 0
+        run_steps("reference", url, SCENARIO["wires"].steps)
+        second = gateway.metrics()
+        assert all(second[name] >= value for name, value in first.items() if "_total" in name or "_bucket" in name)
+        assert second[ages.format("count", "")] > first[ages.format("count", "")]
 
 
 @pytest.mark.parametrize("way", ["signal", "watch"])

@@ -136,4 +136,11 @@ SharedDevice* SharedDevices::find(const rr::NodeId& node_id, std::string_view no
   return nullptr;
 }
 
+Traffic SharedDevices::traffic_of(const Device& device) const {
+  auto traffic = device.traffic();
+  if (const auto* shared = find(device))
+    for (const auto& [name, service] : shared->services()) service->add_traffic(traffic);
+  return traffic;
+}
+
 }  // namespace rrgate

@@ -56,6 +56,8 @@ class SharedDevices {
   /// By the identity of the node that stands for a device.
   SharedDevice* find(const rr::NodeId& node_id, std::string_view node_name) const;
   const std::map<const Device*, std::unique_ptr<SharedDevice>>& all() const { return devices_; }
+  /// Of a device, the clients that are there included.
+  Traffic traffic_of(const Device& device) const;
   /// Calls `visit(device, client, path, member, ledger)` for every subscription of every client.
   template <class Visit>
   void visit_ledgers(Visit&& visit) const {

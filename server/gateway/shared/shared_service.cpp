@@ -30,6 +30,15 @@ rr::MapString with_mode(rr::MapString attributes) {
   return attributes;
 }
 
+void add_to(Traffic& traffic, const rr::ServiceSession& session) {
+  const auto& stats = session.connection().stats();
+  traffic.to_device.bytes += stats.bytes_received;
+  traffic.to_device.messages += stats.messages_received;
+  traffic.to_clients.bytes += stats.bytes_sent;
+  traffic.to_clients.messages += stats.messages_sent;
+  traffic.ledgers.add(session.total_ledgers());
+}
+
 /// Definitions that the root's does not import.
 std::vector<std::string> extra_imports(const rr::TypeRegistry& types, const rr::HostedService& without) {
   std::vector<std::string> out;
@@ -154,6 +163,17 @@ void SharedService::withdraw() {
   for (auto* board : boards_) board->withdraw(*hosted);
   const auto clients = clients_;  // each removes itself
   for (auto* client : clients) client->close_service();
+}
+
+void SharedService::remove(SharedClient& client) {
+  if (clients_.erase(&client) > 0) add_to(device_->traffic(), client.session());
+}
+
+void SharedService::add_traffic(Traffic& traffic) const {
+  for (const auto* client : clients_) {
+    add_to(traffic, client->session());
+    traffic.to_clients.waiting += client->session().queued_bytes();
+  }
 }
 
 void SharedService::find_object(Upstream& by, const std::string& path, std::function<void(rr::Result<>)> done) {

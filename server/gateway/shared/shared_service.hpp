@@ -55,8 +55,10 @@ class SharedService : public std::enable_shared_from_this<SharedService> {
   void find_object(Upstream& by, const std::string& path, std::function<void(rr::Result<>)> done);
 
   void add(SharedClient& client) { clients_.insert(&client); }
-  void remove(SharedClient& client) { clients_.erase(&client); }
+  void remove(SharedClient& client);
   const std::set<SharedClient*>& clients() const { return clients_; }
+  /// Adds what the clients that are there have had.
+  void add_traffic(Traffic& traffic) const;
 
  private:
   static rr::awaitable<void> keep_open(std::shared_ptr<SharedService> self);

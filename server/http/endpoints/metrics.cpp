@@ -4,7 +4,6 @@
 
 #include <filesystem>
 #include <fstream>
-#include <map>
 
 #include "server/gateway/gateway.hpp"
 #include "server/gateway/http_access.hpp"
@@ -24,6 +23,11 @@ std::string label(std::string_view text) {
   return out;
 }
 
+std::string seconds(std::uint64_t microseconds) {
+  auto digits = std::to_string(microseconds % 1'000'000);
+  return std::to_string(microseconds / 1'000'000) + "." + std::string(6 - digits.size(), '0') + digits;
+}
+
 class Exposition {
  public:
   void family(std::string_view name, std::string_view type, std::string_view help) {
@@ -31,14 +35,26 @@ class Exposition {
     text_.append("# HELP ").append(name).append(" ").append(help).append("\n# TYPE ");
     text_.append(name).append(" ").append(type).append("\n");
   }
-  void sample(std::uint64_t value, std::string_view labels = {}) {
-    text_ += name_;
+  void sample(std::uint64_t value, std::string_view labels = {}, std::string_view suffix = {}) {
+    text_.append(name_).append(suffix);
     if (!labels.empty()) text_.append("{").append(labels).append("}");
     text_.append(" ").append(std::to_string(value)).append("\n");
   }
   void single(std::string_view name, std::string_view type, std::string_view help, std::uint64_t value) {
     family(name, type, help);
     sample(value);
+  }
+  /// In seconds. Every second of its buckets, from 128 us on: each is a series of its own.
+  void histogram(const rr::AgeHistogram& ages, const std::string& labels) {
+    std::uint64_t count = 0;
+    for (std::size_t i = 0; i < rr::AgeHistogram::bucket_count; ++i) {
+      count += ages.counts()[i];
+      if (i < 7 || i % 2 == 0 || i == rr::AgeHistogram::bucket_count - 1) continue;
+      sample(count, labels + ",le=\"" + seconds(rr::AgeHistogram::upper_bound(i).count()) + "\"", "_bucket");
+    }
+    sample(count, labels + ",le=\"+Inf\"", "_bucket");
+    text_.append(name_).append("_sum{" + labels + "} ").append(seconds(ages.sum_us())).append("\n");
+    sample(count, labels, "_count");
   }
   std::string take() { return std::move(text_); }
 
@@ -47,19 +63,31 @@ class Exposition {
   std::string text_;
 };
 
-using Devices = std::vector<std::shared_ptr<Device>>;
+struct DeviceNow {
+  const Device* device;
+  std::string label;  ///< device="name"
+  Traffic traffic;
+};
+using Devices = std::vector<DeviceNow>;
+
+Devices look_at(Gateway& gateway) {
+  Devices out;
+  for (const auto& device : gateway.devices().all())
+    out.push_back(
+        {device.get(), "device=\"" + label(device->config().name) + "\"", gateway.shared().traffic_of(*device)});
+  return out;
+}
 
 void write_flows(Exposition& out, const Devices& devices, std::uint64_t Flow::*member) {
-  for (const auto& device : devices) {
-    const auto name = "device=\"" + label(device->config().name) + "\",direction=\"";
-    out.sample(device->traffic().to_device.*member, name + "to_device\"");
-    out.sample(device->traffic().to_clients.*member, name + "to_clients\"");
+  for (const auto& each : devices) {
+    out.sample(each.traffic.to_device.*member, each.label + ",direction=\"to_device\"");
+    out.sample(each.traffic.to_clients.*member, each.label + ",direction=\"to_clients\"");
   }
 }
 
 void write_devices(Exposition& out, const Devices& devices) {
   const auto each = [&](const auto& value) {
-    for (const auto& device : devices) out.sample(value(*device), "device=\"" + label(device->config().name) + "\"");
+    for (const auto& one : devices) out.sample(value(*one.device), one.label);
   };
   out.family("rrgate_device_up", "gauge", "Whether the device answers.");
   each([](const Device& device) { return device.state() == DeviceState::online ? 1u : 0u; });
@@ -67,7 +95,8 @@ void write_devices(Exposition& out, const Devices& devices) {
   each([](const Device& device) { return device.clients(); });
   out.family("rrgate_sessions_total", "counter", "Clients that were ever connected to the device.");
   each([](const Device& device) { return device.traffic().sessions; });
-  out.family("rrgate_relayed_bytes_total", "counter", "Bytes that were passed on.");
+  out.family("rrgate_relayed_bytes_total", "counter",
+             "Bytes that were passed on, or, of a shared device, that its clients sent and were sent.");
   write_flows(out, devices, &Flow::bytes);
   out.family("rrgate_relayed_messages_total", "counter",
              "Messages that were begun to be passed on, TLS sessions apart.");
@@ -76,31 +105,32 @@ void write_devices(Exposition& out, const Devices& devices) {
   write_flows(out, devices, &Flow::waiting);
 }
 
-/// Of all clients of a device and kind of member together: labels must not grow with clients.
-void write_ledgers(Exposition& out, const SharedDevices& shared) {
-  std::map<std::string, rr::Ledger> ledgers;
-  shared.visit_ledgers([&](const SharedDevice& device, const SharedClient&, const std::string&,
-                           const rr::MemberDefinition& member, const rr::Ledger& ledger) {
-    const auto key = "device=\"" + label(device.device()->config().name) + "\",kind=\"" +
-                     std::string(member_kind_name(member.kind)) + "\"";
-    ledgers[key].add(ledger);
-  });
-  const auto each = [&](std::string_view name, std::string_view help, std::uint64_t rr::Ledger::*count) {
-    out.family(name, "gauge", help);
-    for (const auto& [key, ledger] : ledgers) out.sample(ledger.*count, key);
+/// Of all clients of a shared device together: labels must not grow with clients.
+void write_ledgers(Exposition& out, const Devices& devices, const SharedDevices& shared) {
+  const auto each = [&](const auto& write) {
+    for (const auto& one : devices)
+      if (shared.find(*one.device)) {
+        write(one.label + ",kind=\"wire\"", one.traffic.ledgers.wires);
+        write(one.label + ",kind=\"pipe\"", one.traffic.ledgers.pipes);
+      }
   };
-  each("rrgate_subscription_delivered", "Values that the subscriptions of now were handed.", &rr::Ledger::delivered);
-  each("rrgate_subscription_conflated", "Values that were replaced by newer ones.", &rr::Ledger::conflated);
-  each("rrgate_subscription_dropped", "Values that were lost.", &rr::Ledger::dropped);
-  out.family("rrgate_subscription_age_us", "gauge", "Age of values when they left the gateway, in microseconds.");
-  for (const auto& [key, ledger] : ledgers)
-    for (const auto& [name, share] : {std::pair("0.5", 0.5), std::pair("0.99", 0.99)})
-      out.sample(static_cast<std::uint64_t>(ledger.ages.quantile(share).count()), key + ",quantile=\"" + name + "\"");
+  const auto count = [&](std::string_view name, std::string_view help, std::uint64_t rr::Ledger::*member) {
+    out.family(name, "counter", help);
+    each([&](const std::string& labels, const rr::Ledger& ledger) { out.sample(ledger.*member, labels); });
+  };
+  count("rrgate_subscription_delivered_total", "Values that were handed to clients' connections.",
+        &rr::Ledger::delivered);
+  count("rrgate_subscription_conflated_total", "Values that were replaced by newer ones.", &rr::Ledger::conflated);
+  count("rrgate_subscription_dropped_total", "Values that were lost.", &rr::Ledger::dropped);
+  out.family("rrgate_subscription_age_seconds", "histogram",
+             "How long values were in the gateway when they were handed to clients' connections.");
+  for (const auto& one : devices)  // packets of pipes are handed on at once
+    if (shared.find(*one.device)) out.histogram(one.traffic.ledgers.wires.ages, one.label + ",kind=\"wire\"");
   out.family("rrgate_shared_session_up", "gauge", "Whether the session with a service of a shared device is open.");
-  for (const auto& [key, device] : shared.all())
-    for (const auto& [name, service] : device->services())
-      out.sample(service->upstream()->is_open() ? 1 : 0,
-                 "device=\"" + label(device->device()->config().name) + "\",service=\"" + label(name) + "\"");
+  for (const auto& one : devices)
+    if (const auto* device = shared.find(*one.device))
+      for (const auto& [name, service] : device->services())
+        out.sample(service->upstream()->is_open() ? 1 : 0, one.label + ",service=\"" + label(name) + "\"");
 }
 
 std::uint64_t resident_bytes() {
@@ -137,8 +167,9 @@ Handler metrics_endpoint(Gateway& gateway) {
     out.family("rrgate_rejected_total", "counter", "Connections and requests that were turned away.");
     for (std::size_t i = 0; i < rejection_names.size(); ++i)
       out.sample(metrics.rejected[i], "reason=\"" + std::string(rejection_names[i]) + "\"");
-    write_devices(out, gateway.devices().all());
-    write_ledgers(out, gateway.shared());
+    const auto devices = look_at(gateway);
+    write_devices(out, devices);
+    write_ledgers(out, devices, gateway.shared());
     out.family("rrgate_config_reloads_total", "counter", "Times that the configuration was read anew.");
     out.sample(metrics.reloads, "result=\"ok\"");
     out.sample(metrics.failed_reloads, "result=\"failed\"");

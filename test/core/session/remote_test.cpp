@@ -151,6 +151,73 @@ TEST_CASE("a wire of a remote service is connected when that one says so") {
   }
 }
 
+TEST_CASE("what subscriptions had stays counted when they are over") {
+  Remote pair;
+  const auto connect = [&] {
+    const auto connecting = pair.client->connect_wire("arm", "torque", pair.now);
+    pair.pump();
+    pair.next_service<WireConnected>();
+    pair.service->answer_wire("arm", pair.member("torque"), {}, pair.now);
+    CHECK(pair.completion(connecting));
+  };
+  const auto open_pipe = [&] {
+    pair.client->connect_pipe("arm", "poses", any_pipe_index, pair.now);
+    pair.pump();
+    return pair.next_service<PipeConnected>().id;
+  };
+  const auto send = [&](int count) {
+    for (int i = 0; i < count; ++i)
+      CHECK(pair.service->send_wire("arm", pair.member("torque"), Value(1.0 * i), pair.now));
+  };
+  const auto delivered = [&] {
+    const auto total = pair.service->total_ledgers();
+    CHECK(total.wires.ages.total() == total.wires.delivered);
+    return std::pair(total.wires.delivered, total.pipes.delivered);
+  };
+  connect();
+  send(3);
+  const auto pipe = open_pipe();
+  CHECK(pair.service->send_pipe_packet(pipe, Value(), pair.now));
+  CHECK(delivered() == std::pair<std::uint64_t, std::uint64_t>{3, 1});
+  pair.client->disconnect_wire("arm", "torque", pair.now);
+  pair.pump();
+  CHECK(delivered() == std::pair<std::uint64_t, std::uint64_t>{3, 1});
+  connect();
+  send(2);
+  pair.service->close_wire("arm", pair.member("torque"), pair.now);
+  pair.service->close_pipe(pipe, pair.now);
+  CHECK(delivered() == std::pair<std::uint64_t, std::uint64_t>{5, 1});
+  pair.pump();
+  connect();
+  send(1);
+  const auto last = open_pipe();
+  CHECK(pair.service->send_pipe_packet(last, Value(), pair.now));
+  pair.service->release_path("arm", pair.now);
+  CHECK(delivered() == std::pair<std::uint64_t, std::uint64_t>{6, 2});
+  connect();
+  send(1);
+  pair.service->handle_closed(make_error(ErrorCode::connection_error, "gone"), pair.now);
+  CHECK(delivered() == std::pair<std::uint64_t, std::uint64_t>{7, 2});
+}
+
+TEST_CASE("callbacks and refusals of a remote service go ahead of its data") {
+  Remote pair;
+  pair.client->connect_pipe("arm", "samples", any_pipe_index, pair.now);
+  pair.pump();
+  const auto pipe = pair.next_service<PipeConnected>().id;
+  pair.service->accept_pipe(pipe, pair.now);
+  pair.pump();
+  pair.next_client<Completed>();
+  for (int i = 0; i < 3; ++i) CHECK(pair.service->send_pipe_packet(pipe, Value(1.0 * i), pair.now));
+  const std::vector<Value> question{Value(7)};
+  CHECK(pair.service->call_callback("arm", pair.member("notice"), question, pair.now));
+  const auto refused = pair.client->find_object("leg", pair.now);
+  pair.pump();
+  CHECK(pair.next_client<CallbackCalled>().member == "notice");
+  CHECK(pair.next_client<Completed>().id == refused);
+  CHECK(pair.next_client<PipePacketReceived>().value == Value(0.0));
+}
+
 TEST_CASE("locks are a remote service's own") {
   Remote pair;
   const auto entering = pair.client->enter_monitor("arm", std::chrono::milliseconds(-1), pair.now);

@@ -1,0 +1,152 @@
+// Wires of a service session. Layer: session. Source: sessions spec section 2.13.
+#include <utility>
+
+#include "core/member/error_entry.hpp"
+#include "core/member/member_table.hpp"
+#include "core/session/service_session.hpp"
+
+namespace rr {
+
+// --- asked ---
+
+Result<> ServiceSession::send_wire(std::string_view path, const MemberDefinition& member, const Value& value, Now now) {
+  return send_wire(path, member, value, now.utc, now.steady, now);
+}
+
+Result<> ServiceSession::send_wire(std::string_view path, const MemberDefinition& member, const Value& value,
+                                   TimeSpec time, TimePoint arrived, Now now) {
+  const auto found = wires_.find(PathMemberView{path, member.name});
+  if (!may_use_service() || found == wires_.end()) return {};
+  auto& wire = found->second;
+  const bool has_room = wire.state == WireState::connected && connection_.queued_bytes() < wire_high_mark;
+  if (has_room) return send_wire_packet(found->first, wire, value, time, arrived, now);
+  if (wire.waiting) ++wire.ledger.conflated;
+  wire.waiting = WireValue{time, value};
+  wire.waiting_since = arrived;
+  return {};
+}
+
+Result<> ServiceSession::send_wire_packet(const PathMember& key, WireConnection& wire, const Value& value,
+                                          TimeSpec time, TimePoint arrived, Now now) {
+  if (wire.waiting) {  // an older one
+    ++wire.ledger.conflated;
+    wire.waiting.reset();
+  }
+  connection_.begin_message(outgoing_);
+  outgoing_.header.metadata = unreliable_metadata;
+  outgoing_.begin_entry(EntryType::wire_packet, key.path, key.member).metadata = unreliable_metadata;
+  if (auto written = write_wire_value(outgoing_, value, wire.stamp(time), *wire.member, service_->types()); !written)
+    return written;
+  send_outgoing(now);
+  wire.ledger.note_delivery(now.steady - arrived);
+  return {};
+}
+
+void ServiceSession::flush_wires(Now now) {
+  for (auto& [key, wire] : wires_) {
+    if (!wire.waiting || wire.state == WireState::connecting || !may_use_service()) continue;
+    const auto [time, value] = *std::exchange(wire.waiting, std::nullopt);
+    // A value that does not fit its definition was refused or not when it was set; here only the stream counts.
+    if (!send_wire_packet(key, wire, value, time, wire.waiting_since, now) ||
+        connection_.queued_bytes() >= wire_high_mark)
+      return;
+  }
+}
+
+void ServiceSession::note_conflated(std::string_view path, const MemberDefinition& member, std::uint64_t count) {
+  const auto wire = wires_.find(PathMemberView{path, member.name});
+  if (wire != wires_.end()) wire->second.ledger.conflated += count;
+}
+
+void ServiceSession::answer_wire(std::string_view path, const MemberDefinition& member, const Result<>& result,
+                                 Now now) {
+  const auto wire = wires_.find(PathMemberView{path, member.name});
+  if (wire == wires_.end() || wire->second.state == WireState::connected) return;
+  const auto request_id = wire->second.request_id;
+  wire->second.state = WireState::connected;
+  if (!result) end_wire(wire);
+  connection_.begin_message(outgoing_);
+  outgoing_.begin_entry(EntryType::wire_connect_ret, path, member.name, request_id);
+  if (!result) write_error(outgoing_, result.error());
+  send_outgoing(now);
+  flush_wires(now);
+}
+
+void ServiceSession::close_wire(std::string_view path, const MemberDefinition& member, Now now) {
+  const auto wire = wires_.find(PathMemberView{path, member.name});
+  if (wire == wires_.end()) return;
+  if (wire->second.state == WireState::connecting)
+    return answer_wire(path, member, make_error(ErrorCode::service_error, "the wire was closed"), now);
+  end_wire(wire);
+  connection_.begin_message(outgoing_);
+  outgoing_.header.metadata = unreliable_metadata;
+  outgoing_.begin_entry(EntryType::wire_closed, path, member.name);
+  send_outgoing(now);
+}
+
+bool ServiceSession::has_wire(std::string_view path, std::string_view member) const {
+  return wires_.find(PathMemberView{path, member}) != wires_.end();
+}
+
+Ledgers ServiceSession::total_ledgers() const {
+  auto total = ended_;
+  for (const auto& [key, wire] : wires_) total.wires.add(wire.ledger);
+  for (const auto& [id, pipe] : pipes_) total.pipes.add(pipe.ledger);
+  return total;
+}
+
+// --- received ---
+
+Result<> ServiceSession::answer_wire(const MessageEntry& entry, const HostedService::Found& found,
+                                     const MemberDefinition& member, Now now) {
+  PathMember key{std::string(entry.service_path), std::string(entry.member_name)};
+  if (entry.type == EntryType::wire_disconnect_req) {
+    const auto wire = wires_.find(key);
+    if (wire == wires_.end()) return make_error(ErrorCode::service_error, "Invalid wire connection");
+    end_wire(wire);
+    events_.push_back(WireDisconnected{key.path, &member});
+    begin_reply(entry);
+    send_outgoing(now);
+    return {};
+  }
+  if (wires_.size() >= options_.max_wires && !wires_.contains(key))
+    return make_error(ErrorCode::out_of_system_resource,
+                      "this client has " + std::to_string(options_.max_wires) + " wires connected already");
+  // A second request of a connected client is accepted: it is the same connection.
+  const bool is_remote = service_->is_remote();
+  const WireConnection fresh{is_remote ? WireState::connecting : WireState::connected, &member, entry.request_id};
+  const bool is_new = wires_.try_emplace(key, fresh).second;
+  if (is_new && is_remote) {
+    events_.push_back(WireConnected{key.path, found.object, &member});
+    return {};
+  }
+  begin_reply(entry);
+  send_outgoing(now);
+  if (is_new) events_.push_back(WireConnected{key.path, found.object, &member});
+  return {};
+}
+
+void ServiceSession::handle_wire_packet(const Message& message, const MessageEntry& entry) {
+  const auto wire = wires_.find(PathMemberView{entry.service_path, entry.member_name});
+  if (wire == wires_.end() || !check_direction(entry.type, *wire->second.member)) return;
+  if (!admit(entry.type, entry.service_path, wire->second.member)) return;
+  auto packet = read_wire_value(message, entry, *wire->second.member, service_->types());
+  if (!packet || !wire->second.accept(packet->time)) return;
+  auto found = service_->find_object(entry.service_path);
+  if (!found) return;
+  events_.push_back(
+      WireReceived{std::move(found->object), wire->second.member, packet->time, std::move(packet->value)});
+}
+
+// --- ended ---
+
+ServiceSession::Wires::iterator ServiceSession::end_wire(Wires::iterator wire) {
+  ended_.wires.add(wire->second.ledger);
+  return wires_.erase(wire);
+}
+
+void ServiceSession::end_all_wires() {
+  while (!wires_.empty()) end_wire(wires_.begin());
+}
+
+}  // namespace rr
