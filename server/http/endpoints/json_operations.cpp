@@ -18,7 +18,6 @@ namespace {
 constexpr std::size_t max_open = 256;
 /// Requests that are not answered yet.
 constexpr std::size_t max_running = 64;
-constexpr std::size_t max_id_bytes = 64;
 /// What the client may take to answer the device.
 constexpr std::chrono::seconds answer_time{10};
 
@@ -52,60 +51,6 @@ bool takes_values(const rr::MemberDefinition& function) {
 }
 
 }  // namespace
-
-/// A message of the client: a JSON object.
-class JsonOperations::Request {
- public:
-  explicit Request(rr::Json message) : message_(std::move(message)) {}
-
-  /// Errors   invalid_argument: no object, or its id is none.
-  rr::Result<> check() {
-    const auto refused = [](std::string why) {
-      return rr::make_error(rr::ErrorCode::invalid_argument, std::move(why));
-    };
-    if (!message_.is_object()) return refused("a message is an object {\"id\": ..., \"op\": ...}");
-    const auto* id = find("id");
-    if (!id || id->is_null()) return {};
-    if (!id->is_number_integer() && !(id->is_string() && id->get_ref<const std::string&>().size() <= max_id_bytes))
-      return refused("\"id\" is a whole number, or a string of at most " + std::to_string(max_id_bytes) + " bytes");
-    id_ = id->dump();
-    return {};
-  }
-
-  /// As JSON; "null" without one.
-  const std::string& id() const { return id_; }
-  /// Null where it is not there.
-  const rr::Json* find(std::string_view name) const {
-    const auto found = message_.find(name);
-    return found == message_.end() ? nullptr : &*found;
-  }
-  // Throw   rr::Exception: it is not there, or something else.
-  const rr::Json& at(std::string_view name) const {
-    const auto* found = find(name);
-    if (!found) refuse(rr::ErrorCode::invalid_argument, "\"" + std::string(name) + "\" is missing");
-    return *found;
-  }
-  std::string text(std::string_view name, std::string otherwise) const {
-    const auto* found = find(name);
-    if (!found) return otherwise;
-    if (!found->is_string()) refuse(rr::ErrorCode::invalid_argument, "\"" + std::string(name) + "\" is not a string");
-    return found->get<std::string>();
-  }
-  /// A number a dimension.
-  std::optional<Shape> numbers(std::string_view name, std::size_t count) const {
-    const auto* found = find(name);
-    if (!found) return std::nullopt;
-    const auto is_number = [](const rr::Json& item) { return item.is_number_unsigned(); };
-    if (!found->is_array() || found->size() != count || !std::all_of(found->begin(), found->end(), is_number))
-      refuse(rr::ErrorCode::invalid_argument,
-             "\"" + std::string(name) + "\" is not an array of " + std::to_string(count) + " whole numbers");
-    return found->get<Shape>();
-  }
-
- private:
-  rr::Json message_;
-  std::string id_ = "null";
-};
 
 struct JsonOperations::Ask {
   Ask(TargetPtr of, rr::ClientConnection::CallbackReply to, const asio::any_io_executor& executor,
@@ -149,10 +94,9 @@ JsonOperations::JsonOperations(Gateway& gateway, JsonSocketPlace place, std::sha
     : gateway_(gateway), place_(std::move(place)), outbox_(std::move(outbox)) {}
 
 rr::awaitable<void> JsonOperations::take(const std::string& message) {
-  auto json = rr::read_json(message);
-  if (!json) co_return tell_error("null", json.error());
-  const auto request = std::make_shared<Request>(std::move(*json));
-  if (const auto checked = request->check(); !checked) co_return tell_error("null", checked.error());
+  auto read = JsonRequest::from_text(message);
+  if (!read) co_return tell_error("null", read.error());
+  const auto request = std::make_shared<const JsonRequest>(std::move(*read));
   if (running_ >= max_running)
     co_return tell_error(request->id(),
                          rr::make_error(rr::ErrorCode::out_of_system_resource,
@@ -178,7 +122,7 @@ rr::awaitable<void> JsonOperations::run(std::shared_ptr<JsonOperations> self, Re
   if (error) {
     self->tell_error(request->id(), *error);
   } else if (request->id() != "null") {
-    self->outbox_->add("{\"id\":" + request->id() + ",\"result\":" + rr::write_json(result) + "}");
+    self->outbox_->add(json_answer(request->id(), result));
   }
 }
 
@@ -214,14 +158,8 @@ std::shared_ptr<DeviceSession> JsonOperations::session() {
   return own_ ? own_ : value_or_throw(gateway_.sessions().open(*place_.device, place_.key));
 }
 
-void JsonOperations::tell(rr::OrderedJson message) {
-  outbox_->add(rr::write_json(message));
-}
-
 void JsonOperations::tell_error(const std::string& id, const rr::Error& error) {
-  static const rr::TypeRegistry no_types;
-  const auto told = rr::write_json(rr::error_to_json(error, no_types));
-  outbox_->add("{\"id\":" + id + "," + told.substr(1));
+  outbox_->add(json_refusal(id, error));
 }
 
 void JsonOperations::stop() {
@@ -331,7 +269,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::login(RequestPtr request, TargetP
 
 // --- what stays open ---
 
-std::string JsonOperations::reserve(const Request& request) {
+std::string JsonOperations::reserve(const JsonRequest& request) {
   const auto& id = request.id();
   if (id == "null") refuse(rr::ErrorCode::invalid_argument, "what stays open is named by its \"id\": it needs one");
   if (open_.contains(id)) refuse(rr::ErrorCode::invalid_argument, "the id " + id + " names something that is open");
@@ -371,7 +309,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::open(RequestPtr request, TargetPt
   co_return nullptr;
 }
 
-JsonOperations::Generator& JsonOperations::generator_of(const Request& request) {
+JsonOperations::Generator& JsonOperations::generator_of(const JsonRequest& request) {
   const auto found = open_.find(request.at("generator").dump());
   auto* generator = found == open_.end() ? nullptr : std::get_if<Generator>(&found->second);
   if (!generator) refuse(rr::ErrorCode::invalid_argument, "\"generator\" is not the id of one that is open");

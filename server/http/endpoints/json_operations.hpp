@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/http/endpoints/json_outbox.hpp"
+#include "server/http/endpoints/json_request.hpp"
 #include "server/http/endpoints/object_request.hpp"
 #include "server/transport/watchdog.hpp"
 
@@ -35,8 +36,7 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
 
  private:
   using TargetPtr = std::shared_ptr<Target>;
-  class Request;
-  using RequestPtr = std::shared_ptr<const Request>;
+  using RequestPtr = std::shared_ptr<const JsonRequest>;
   using Perform = rr::awaitable<rr::OrderedJson> (JsonOperations::*)(RequestPtr request, TargetPtr target);
   struct Operation {
     std::string_view name;
@@ -66,7 +66,6 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
   rr::awaitable<rr::OrderedJson> perform(RequestPtr request);
   rr::awaitable<TargetPtr> find(RequestPtr request, const Operation& operation);
   std::shared_ptr<DeviceSession> session();
-  void tell(rr::OrderedJson message);
   void tell_error(const std::string& id, const rr::Error& error);
 
   rr::awaitable<rr::OrderedJson> describe(RequestPtr request, TargetPtr target);
@@ -90,8 +89,8 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
   rr::awaitable<rr::OrderedJson> login(RequestPtr request, TargetPtr);
 
   /// Takes the request's id for what it opens. Throws   rr::Exception: no id, one that is in use, too many.
-  std::string reserve(const Request& request);
-  Generator& generator_of(const Request& request);
+  std::string reserve(const JsonRequest& request);
+  Generator& generator_of(const JsonRequest& request);
   /// The device asks.
   void ask(const std::string& id, const TargetPtr& target, std::span<const rr::Value> arguments,
            rr::ClientConnection::CallbackReply reply);

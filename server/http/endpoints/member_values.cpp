@@ -41,42 +41,6 @@ rr::OrderedJson describe_object(const Target& target) {
   return out;
 }
 
-rr::Result<std::vector<rr::Value>> arguments_from_json(const rr::Json& json, const rr::MemberDefinition& member,
-                                                       const rr::TypeRegistry& types, const rr::JsonForm& form) {
-  std::vector<rr::Value> out;
-  const auto refused = [&](std::string why) {
-    return rr::make_error(rr::ErrorCode::invalid_argument, member.name + " " + std::move(why));
-  };
-  if (!json.is_object()) return refused("takes its parameters as an object {\"name\": value}");
-  for (const auto& parameter : member.parameters) {
-    if (parameter.type.container == rr::ContainerKind::generator) continue;
-    const auto found = json.find(parameter.name);
-    if (found == json.end())
-      return refused("misses the parameter " + rr::quoted(parameter.name) + " (" + format_type(parameter.type) + ")");
-    auto value = rr::value_from_json(*found, parameter.type, types, form, parameter.name);
-    if (!value) return value.error();
-    out.push_back(std::move(*value));
-  }
-  for (const auto& [key, unused] : json.items()) {
-    const auto is_known = std::any_of(member.parameters.begin(), member.parameters.end(),
-                                      [&key = key](const auto& parameter) { return parameter.name == key; });
-    if (!is_known) return refused("has no parameter " + rr::quoted(key));
-  }
-  return out;
-}
-
-rr::Result<rr::OrderedJson> arguments_to_json(std::span<const rr::Value> arguments, const rr::MemberDefinition& member,
-                                              const rr::TypeRegistry& types, const rr::JsonForm& form) {
-  auto out = rr::OrderedJson::object();
-  for (std::size_t i = 0; i < member.parameters.size() && i < arguments.size(); ++i) {
-    const auto& parameter = member.parameters[i];
-    auto json = rr::value_to_json(arguments[i], parameter.type, types, form, parameter.name);
-    if (!json) return json.error();
-    rr::add_key(out, parameter.name) = std::move(*json);
-  }
-  return {boost::system::in_place_value, std::move(out)};
-}
-
 rr::Result<rr::OrderedJson> sample_to_json(const Sample& sample, const rr::MemberDefinition& member,
                                            const rr::TypeRegistry& types, const rr::JsonForm& form) {
   if (member.kind == rr::MemberKind::event) return arguments_to_json(sample.values, member, types, form);

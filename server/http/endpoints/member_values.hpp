@@ -2,41 +2,23 @@
 #pragma once
 
 #include <optional>
-#include <span>
 #include <string_view>
 #include <vector>
 
 #include "server/http/endpoints/object_request.hpp"
+#include "server/http/endpoints/refusal.hpp"
+#include "server/json/arguments.hpp"
 
 namespace rrgate {
 
 /// What one request may read of a memory.
 inline constexpr std::uint64_t max_memory_bytes = 16u * 1024 * 1024;
 
-/// An exception is how an error gets out of a coroutine here: one place answers them all.
-template <class T>
-T value_or_throw(rr::Result<T> result) {
-  if (!result) throw rr::Exception(result.error());
-  return std::move(*result);
-}
-
-[[noreturn]] inline void refuse(rr::ErrorCode code, std::string why) {
-  throw rr::Exception(rr::make_error(code, std::move(why)));
-}
-
 /// Documentation without the blank that follows "##" in each line of a definition.
 std::string plain_documentation(std::string_view documentation);
 
 /// What an object has: for people who look around, and programs that do.
 rr::OrderedJson describe_object(const Target& target);
-
-/// The arguments of a function from {"name": value, ...}.
-/// Errors   those of value_from_json(); invalid_argument: missing, unknown or superfluous names.
-rr::Result<std::vector<rr::Value>> arguments_from_json(const rr::Json& json, const rr::MemberDefinition& member,
-                                                       const rr::TypeRegistry& types, const rr::JsonForm& form);
-/// The other way, for what events tell and callbacks ask.
-rr::Result<rr::OrderedJson> arguments_to_json(std::span<const rr::Value> arguments, const rr::MemberDefinition& member,
-                                              const rr::TypeRegistry& types, const rr::JsonForm& form);
 
 /// What a sample says: a value, or an event's arguments by name.
 rr::Result<rr::OrderedJson> sample_to_json(const Sample& sample, const rr::MemberDefinition& member,

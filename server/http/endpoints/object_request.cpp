@@ -9,8 +9,6 @@ namespace rrgate {
 
 namespace {
 
-constexpr std::size_t max_segments = 64;
-
 bool accepts(std::string_view header, std::string_view type) {
   return header.find(type) != std::string_view::npos;
 }
@@ -183,19 +181,6 @@ Response ObjectRequest::method_response(std::string_view allowed) const {
   auto response = problem_response(405, "method not supported here; supported: " + std::string(allowed));
   response.set("Allow", std::string(allowed));
   return response;
-}
-
-rr::Result<std::vector<std::string>> split_path(std::string_view path) {
-  std::vector<std::string> out;
-  while (!path.empty()) {
-    const auto slash = path.find('/');
-    auto segment = rr::percent_decode(path.substr(0, slash));
-    if (!segment) return segment.error();
-    out.push_back(std::move(*segment));
-    if (out.size() > max_segments) return rr::make_error(rr::ErrorCode::object_not_found, "the path is too long");
-    path = slash == std::string_view::npos ? std::string_view() : path.substr(slash + 1);
-  }
-  return out;
 }
 
 rr::awaitable<rr::Result<std::shared_ptr<Target>>> find_target(std::shared_ptr<DeviceSession> session,

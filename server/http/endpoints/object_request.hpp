@@ -10,6 +10,7 @@
 
 #include "server/gateway/gateway.hpp"
 #include "server/http/response_writer.hpp"
+#include "server/http/split_path.hpp"
 #include "server/json/value_from_json.hpp"
 
 namespace rrgate {
@@ -80,9 +81,6 @@ unsigned status_of(rr::ErrorCode code);
 
 /// Walks from the root object along `segments`, percent-decoded: objrefs by name, an index behind those that have one,
 /// at last a member or nothing.
-/// Between the slashes, decoded. A slash at the end adds nothing. Errors   a bad escape; object_not_found: too long.
-rr::Result<std::vector<std::string>> split_path(std::string_view path);
-
 /// Errors   object_not_found, member_not_found, those of the device.
 rr::awaitable<rr::Result<std::shared_ptr<Target>>> find_target(std::shared_ptr<DeviceSession> session,
                                                                std::vector<std::string> segments);

@@ -1,0 +1,22 @@
+// How errors leave coroutines that answer requests. Layer: server/http.
+#pragma once
+
+#include <string>
+#include <utility>
+
+#include "server/node/exception.hpp"
+
+namespace rrgate {
+
+/// An exception is how an error gets out of a coroutine here: one place answers them all.
+template <class T>
+T value_or_throw(rr::Result<T> result) {
+  if (!result) throw rr::Exception(result.error());
+  return std::move(*result);
+}
+
+[[noreturn]] inline void refuse(rr::ErrorCode code, std::string why) {
+  throw rr::Exception(rr::make_error(code, std::move(why)));
+}
+
+}  // namespace rrgate
