@@ -148,10 +148,10 @@ Result<> PipeEndpointState::keep(PipePacket packet) {
   return {};
 }
 
-Value PipeEndpointState::take_first() {
+PipePacket PipeEndpointState::take_first() {
   auto first = waiting_.extract(waiting_.begin());
   store_->bytes -= first.mapped().size_bytes;
-  return std::move(first.mapped().value);
+  return std::move(first.mapped());
 }
 
 }  // namespace rr

@@ -80,14 +80,14 @@ class PipeEndpointState {
   /// Takes the number back: the packet could not be sent after all.
   void return_number() { --next_sent_; }
 
-  /// What was agreed on. Calls `deliver(Value&&)` for each packet that waited and is due.
+  /// What was agreed on. Calls `deliver(PipePacket&&)` for each packet that waited and is due.
   template <class Deliver>
   void open(bool is_unreliable, Deliver&& deliver);
   void start_closing() { state_ = PipeState::closing; }
 
-  /// Calls `deliver(Value&&)` for this packet and all that waited for it; keeps it where an earlier one is missing;
-  /// drops it where it came before.
-  /// Errors   out_of_system_resource: too many packets wait. The endpoint has to be closed: it can never go on.
+  /// Calls `deliver(PipePacket&&)` for this packet and all that waited for it; keeps it where an earlier one is
+  /// missing; drops it where it came before. Errors   out_of_system_resource: too many packets wait. The endpoint has
+  /// to be closed: it can never go on.
   template <class Deliver>
   Result<> receive(PipePacket packet, Deliver&& deliver);
 
@@ -95,7 +95,7 @@ class PipeEndpointState {
   Result<> keep(PipePacket packet);
   template <class Deliver>
   void deliver_waiting(Deliver&& deliver);
-  Value take_first();
+  PipePacket take_first();
 
   const MemberDefinition* member_;
   PipeStore* store_;
@@ -117,13 +117,13 @@ template <class Deliver>
 Result<> PipeEndpointState::receive(PipePacket packet, Deliver&& deliver) {
   if (state_ == PipeState::closing) return {};
   if (state_ == PipeState::open && is_unreliable_) {
-    deliver(std::move(packet.value));
+    deliver(std::move(packet));
     return {};
   }
   if (state_ == PipeState::connecting || packet.number != static_cast<std::uint32_t>(received_ + 1))
     return keep(std::move(packet));
   ++received_;
-  deliver(std::move(packet.value));
+  deliver(std::move(packet));
   if (!waiting_.empty()) deliver_waiting(deliver);
   return {};
 }

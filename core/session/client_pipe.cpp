@@ -76,6 +76,21 @@ Result<std::uint32_t> ClientSession::send_pipe_packet(std::string_view path, std
   return sent.error();
 }
 
+void ClientSession::hold_pipe_acks(std::string_view path, std::string_view member, std::int32_t index, bool is_held,
+                                   Now now) {
+  auto* pipe = find_pipe(path, member);
+  if (!pipe || state_ == ClientState::closed) return;
+  const auto found = pipe->endpoints.find(index);
+  if (found == pipe->endpoints.end() || found->second.state() != PipeState::open) return;
+  auto& endpoint = found->second;
+  endpoint.holds_acks = is_held;
+  if (is_held || endpoint.held_acks.empty()) return;
+  pipe_acks_.clear();
+  for (const auto number : endpoint.held_acks) pipe_acks_.emplace_back(index, number);
+  endpoint.held_acks.clear();
+  send_pipe_acks(path, member, endpoint.is_unreliable(), now);
+}
+
 // --- received ---
 
 void ClientSession::handle_pipe_reply(const Message& message, const MessageEntry& entry, RequestId id,
@@ -114,9 +129,9 @@ Result<std::int32_t> ClientSession::open_pipe(const Message& message, const Mess
     return protocol_error("pipe '" + pending.member->name + "': the service gave the index " + std::to_string(*index) +
                           ", which is in use");
   emit(Completed{id, Value(*index)});
-  endpoint.open(reads_unreliable(message, entry), [&](Value&& value) {
+  endpoint.open(reads_unreliable(message, entry), [&](PipePacket&& packet) {
     if (state_ != ClientState::closed)
-      emit(PipePacketReceived{pending.path, pending.member->name, *index, std::move(value)});
+      emit(PipePacketReceived{pending.path, pending.member->name, *index, std::move(packet.value)});
   });
   if (pipe->closed_early.erase(*index) > 0) {
     pipe->endpoints.erase(*index);
@@ -185,7 +200,7 @@ void ClientSession::handle_pipe_packets(const Message& message, const MessageEnt
     if (!handle_pipe_packet(message, element, entry, endpoint->second, *index)) broken.push_back(*index);
     if (state_ == ClientState::closed) return;
   }
-  if (!pipe_acks_.empty()) send_pipe_acks(entry, is_unreliable, now);
+  if (!pipe_acks_.empty()) send_pipe_acks(entry.service_path, entry.member_name, is_unreliable, now);
   // A packet that is lost, or cannot be read, cannot be made up for: the endpoint ends, and both sides know.
   for (const auto index : broken) {
     const auto endpoint = pipe->endpoints.find(index);
@@ -197,23 +212,36 @@ void ClientSession::handle_pipe_packets(const Message& message, const MessageEnt
 }
 
 Result<> ClientSession::handle_pipe_packet(const Message& message, const MessageElement& element,
-                                           const MessageEntry& entry, PipeEndpointState& endpoint, std::int32_t index) {
+                                           const MessageEntry& entry, ClientEndpoint& endpoint, std::int32_t index) {
   auto packet = read_pipe_packet_head(message, element, endpoint.member());
   if (!packet) return packet.error();
-  if (packet->wants_ack) pipe_acks_.emplace_back(index, packet->number);
+  if (packet->wants_ack) acknowledge_packet(endpoint, index, packet->number);
   if (endpoint.member().direction() == MemberDirection::writeonly) return {};
   if (auto read = read_pipe_packet_value(message, element, endpoint.member(), types_, *packet); !read) return read;
-  return endpoint.receive(std::move(*packet), [&](Value&& value) {
+  return endpoint.receive(std::move(*packet), [&](PipePacket&& due) {
     if (state_ != ClientState::closed)
-      emit(
-          PipePacketReceived{std::string(entry.service_path), std::string(entry.member_name), index, std::move(value)});
+      emit(PipePacketReceived{std::string(entry.service_path), std::string(entry.member_name), index,
+                              std::move(due.value)});
   });
 }
 
-void ClientSession::send_pipe_acks(const MessageEntry& entry, bool is_unreliable, Now now) {
+/// A service that does not mind how many are on the way is acknowledged its oldest packet for each that comes.
+void ClientSession::acknowledge_packet(ClientEndpoint& endpoint, std::int32_t index, std::uint32_t number) {
+  if (!endpoint.holds_acks) {
+    pipe_acks_.emplace_back(index, number);
+    return;
+  }
+  auto& held = endpoint.held_acks;
+  held.push_back(number);
+  if (held.size() <= options_.max_held_acks) return;
+  pipe_acks_.emplace_back(index, held.front());
+  held.pop_front();
+}
+
+void ClientSession::send_pipe_acks(std::string_view path, std::string_view member, bool is_unreliable, Now now) {
   connection_.begin_message(outgoing_);
   if (is_unreliable) outgoing_.header.metadata = unreliable_metadata;
-  outgoing_.begin_entry(EntryType::pipe_packet_ret, entry.service_path, entry.member_name);
+  outgoing_.begin_entry(EntryType::pipe_packet_ret, path, member);
   for (const auto& [index, number] : pipe_acks_) write_pipe_ack(outgoing_, index, number);
   if (auto sent = send_outgoing(now); !sent) fail(sent.error());
 }

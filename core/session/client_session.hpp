@@ -44,6 +44,7 @@ struct ClientOptions {
   std::size_t max_events = 65'536;        ///< not polled; more close the session: nothing is dropped silently
   std::size_t max_open_callbacks = 1024;  ///< not answered yet; above: out_of_system_resource
   std::size_t max_pipe_queued_bytes = 32u * 1024 * 1024;  ///< waiting for the stream; above, pipes take no packets
+  std::size_t max_held_acks = 4096;  ///< of one endpoint, see hold_pipe_acks(); above, the oldest is sent
 };
 
 using RequestId = std::uint32_t;
@@ -179,6 +180,11 @@ class ClientSession {
   Result<std::uint32_t> send_pipe_packet(std::string_view path, std::string_view member, std::int32_t index,
                                          const Value& value, Now now, bool wants_ack = false);
 
+  /// Keeps the acknowledgements of an endpoint's packets back, or sends those that were kept, in their order. A service
+  /// that bounds how many of its packets are on the way stops meanwhile; what it sends all the same is received as
+  /// ever. Held acknowledgements end with the endpoint. Unknown endpoints are ignored.
+  void hold_pipe_acks(std::string_view path, std::string_view member, std::int32_t index, bool is_held, Now now);
+
   /// Logs in, or in as another user. `credentials` a MapString, {"password": ...} for most services. Completes with
   /// null. A service that requires a user for everything takes the login of ClientOptions, in connecting; one that does
   /// not takes only this one.
@@ -246,10 +252,15 @@ class ClientSession {
     std::string path;
     const MemberDefinition* member = nullptr;
   };
+  struct ClientEndpoint : PipeEndpointState {
+    using PipeEndpointState::PipeEndpointState;
+    bool holds_acks = false;
+    std::deque<std::uint32_t> held_acks = {};  ///< numbers, in the order in which they came
+  };
   /// The endpoints of one pipe. While a connect is pending, packets of unknown endpoints are kept: they may be its own.
   struct ClientPipe {
     const MemberDefinition* member = nullptr;
-    std::map<std::int32_t, PipeEndpointState> endpoints = {};
+    std::map<std::int32_t, ClientEndpoint> endpoints = {};
     std::size_t connects = 0;                  ///< pending
     std::set<std::int32_t> closed_early = {};  ///< closed by the service before its connect reply came
   };
@@ -344,8 +355,9 @@ class ClientSession {
                                  const Pending& pending, Now now);
   void handle_pipe_packets(const Message& message, const MessageEntry& entry, Now now);
   Result<> handle_pipe_packet(const Message& message, const MessageElement& element, const MessageEntry& entry,
-                              PipeEndpointState& endpoint, std::int32_t index);
-  void send_pipe_acks(const MessageEntry& entry, bool is_unreliable, Now now);
+                              ClientEndpoint& endpoint, std::int32_t index);
+  void acknowledge_packet(ClientEndpoint& endpoint, std::int32_t index, std::uint32_t number);
+  void send_pipe_acks(std::string_view path, std::string_view member, bool is_unreliable, Now now);
   void handle_pipe_acks(const Message& message, const MessageEntry& entry);
   void handle_pipe_closed(const Message& message, const MessageEntry& entry);
   void release_pipes(std::string_view path);

@@ -23,8 +23,8 @@ struct KnownDefinitions {
 /// A client remembers no more than that.
 inline constexpr std::size_t max_known_definitions = 64;
 
-/// Names exactly these texts in this order, a UUID made of them (RFC 4122, version 5). So it is the same after a restart
-/// and on every node that has the service.
+/// Names exactly these texts in this order, a UUID made of them (RFC 4122, version 5). So it is the same after a
+/// restart and on every node that has the service.
 std::string make_definitions_tag(const std::vector<std::string_view>& texts);
 
 }  // namespace rr

@@ -42,7 +42,8 @@ void ServiceSession::forget_pipe(PipeId id) {
 void ServiceSession::accept_pipe(PipeId id, Now now) {
   auto* pipe = find_pipe(id);
   if (!pipe || pipe->state.state() != PipeState::connecting) return;
-  pipe->state.open(pipe->is_unreliable, [](Value&&) {});  // nothing was kept: the client does not know the index yet
+  pipe->state.open(pipe->is_unreliable,
+                   [](PipePacket&&) {});  // nothing was kept: the client does not know the index yet
   connection_.begin_message(outgoing_);
   outgoing_.begin_entry(EntryType::pipe_connect_ret, pipe->key->path, pipe->key->member, pipe->request_id);
   write_pipe_index(outgoing_, pipe->index);
@@ -90,6 +91,14 @@ Result<std::uint32_t> ServiceSession::send_pipe_packet(PipeId id, const Value& v
   return sent.error();
 }
 
+void ServiceSession::acknowledge_pipe(PipeId id, std::span<const std::uint32_t> numbers, Now now) {
+  const auto* pipe = find_pipe(id);
+  if (!pipe || numbers.empty()) return;
+  pipe_acks_.clear();
+  for (const auto number : numbers) pipe_acks_.emplace_back(pipe->index, number);
+  send_pipe_acks(pipe->key->path, pipe->key->member, pipe->is_unreliable, now);
+}
+
 void ServiceSession::close_pipe(PipeId id, Now now) {
   accept_pipe(id, now);
   const auto* pipe = find_pipe(id);
@@ -108,6 +117,7 @@ void ServiceSession::release_pipes(std::string_view path) {
   for (const auto& [id, pipe] : pipes_)
     if (is_within(pipe.key->path, path)) released.push_back(id);
   for (const auto id : released) {
+    if (const auto* pipe = find_pipe(id); pipe->state.state() == PipeState::connecting) release_pass(pipe->request_id);
     forget_pipe(id);
     events_.push_back(PipeClosed{id});
   }
@@ -178,13 +188,7 @@ void ServiceSession::handle_pipe_packets(const Message& message, const MessageEn
     is_unreliable = is_unreliable || pipe->is_unreliable;
     if (!handle_pipe_packet(message, element, *pipe)) broken.push_back(pipe->id);
   }
-  if (!pipe_acks_.empty()) {
-    connection_.begin_message(outgoing_);
-    if (is_unreliable) outgoing_.header.metadata = unreliable_metadata;
-    outgoing_.begin_entry(EntryType::pipe_packet_ret, entry.service_path, entry.member_name);
-    for (const auto& [index, number] : pipe_acks_) write_pipe_ack(outgoing_, index, number);
-    send_outgoing(now);
-  }
+  if (!pipe_acks_.empty()) send_pipe_acks(entry.service_path, entry.member_name, is_unreliable, now);
   // A packet that is lost, or cannot be read, cannot be made up for: the endpoint ends, and both sides know.
   for (const auto id : broken) {
     if (!find_pipe(id)) continue;
@@ -197,12 +201,23 @@ Result<> ServiceSession::handle_pipe_packet(const Message& message, const Messag
   const auto& member = pipe.state.member();
   auto packet = read_pipe_packet_head(message, element, member);
   if (!packet) return packet.error();
-  if (packet->wants_ack) pipe_acks_.emplace_back(pipe.index, packet->number);
+  const bool is_for_remote = service_->is_remote() && member.direction() != MemberDirection::readonly;
+  if (packet->wants_ack && !is_for_remote) pipe_acks_.emplace_back(pipe.index, packet->number);
   if (member.direction() == MemberDirection::readonly) return {};
   if (auto read = read_pipe_packet_value(message, element, member, service_->types(), *packet); !read) return read;
-  return pipe.state.receive(std::move(*packet), [&](Value&& value) {
-    events_.push_back(PipeReceived{pipe.id, std::move(value)});
+  return pipe.state.receive(std::move(*packet), [&](PipePacket&& due) {
+    PipeReceived received{pipe.id, std::move(due.value)};
+    if (due.wants_ack && is_for_remote) received.wants_ack = due.number;
+    events_.push_back(std::move(received));
   });
+}
+
+void ServiceSession::send_pipe_acks(std::string_view path, std::string_view member, bool is_unreliable, Now now) {
+  connection_.begin_message(outgoing_);
+  if (is_unreliable) outgoing_.header.metadata = unreliable_metadata;
+  outgoing_.begin_entry(EntryType::pipe_packet_ret, path, member);
+  for (const auto& [index, number] : pipe_acks_) write_pipe_ack(outgoing_, index, number);
+  send_outgoing(now);
 }
 
 void ServiceSession::handle_pipe_acks(const Message& message, const MessageEntry& entry) {

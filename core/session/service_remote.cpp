@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/member/error_entry.hpp"
+#include "core/session/service_index.hpp"
 #include "core/session/service_session.hpp"
 
 namespace rr {
@@ -22,6 +23,21 @@ bool names_no_object(std::string_view command) {
 Result<> ServiceSession::admit(EntryType type, std::string_view path, const MemberDefinition* member) const {
   if (!options_.admit) return {};
   return options_.admit(MemberAccess{type, path, member, user()});
+}
+
+Result<> ServiceSession::enter(const MessageEntry& entry, const MemberDefinition& member) {
+  const bool ends_something = entry.type == EntryType::wire_disconnect_req ||
+                              entry.type == EntryType::pipe_disconnect_req ||
+                              (entry.type == EntryType::generator_next_req && entry.error != ErrorCode::none);
+  if (!options_.enter || ends_something || service_->name() == service_index_name) return {};
+  auto pass = options_.enter(MemberAccess{entry.type, entry.service_path, &member, user()});
+  if (!pass) return pass.error();
+  if (*pass) passes_.emplace(entry.request_id, std::move(*pass));
+  return {};
+}
+
+void ServiceSession::release_pass(std::uint32_t request_id) {
+  if (const auto found = passes_.find(request_id); found != passes_.end()) passes_.erase(found);
 }
 
 // --- objects ---

@@ -113,6 +113,7 @@ void ServiceSession::leave(Error reason, Now now) {
   service_.reset();
   login_.reset();
   calls_.clear();
+  passes_.clear();
   generators_.clear();
   end_all_wires();
   for (const auto& [id, pipe] : pipes_) ended_.pipes.add(pipe.ledger);
@@ -205,6 +206,9 @@ void ServiceSession::close_service(Now now) {
 }
 
 void ServiceSession::send_outgoing(Now now, bool is_urgent) {
+  if (!passes_.empty())
+    for (const auto& entry : outgoing_.entries)
+      if (!is_request(entry.type)) release_pass(entry.request_id);
   if (auto sent = connection_.send(outgoing_, now, is_urgent); sent)
     return;
   else if (connection_.state() == ConnectionState::closed)
@@ -309,6 +313,7 @@ Result<> ServiceSession::dispatch_member(const Message& message, const MessageEn
                           std::string(member_kind_name(find_member_request(entry.type)->kind)) + " " +
                           quoted(entry.member_name));
   if (auto admitted = admit(entry.type, entry.service_path, member); !admitted) return admitted;
+  if (auto entered = enter(entry, *member); !entered) return entered;
   if (auto allowed = check_locks(entry, *found, *member, now); !allowed) return allowed;
   if (auto allowed = check_direction(entry.type, *member); !allowed) return allowed;
   switch (entry.type) {

@@ -53,6 +53,12 @@ struct ServiceSessionOptions {
   std::size_t max_parked_requests = 64;                   ///< for objects of a remote service that are looked for
   /// Asked before anything is done with a member; what it refuses with is what the client gets. None: all is allowed.
   std::function<Result<>(const MemberAccess&)> admit = {};
+  /// Asked behind `admit` for each request to a member, unless it ends something; packets are none. What it returns is
+  /// kept until the request is answered; what it refuses with is what the client gets, and nothing is lost by it. None:
+  /// as many as may come.
+  std::function<Result<std::shared_ptr<const void>>(const MemberAccess&)> enter = {};
+  /// With it nothing is served here: the first request for a service fails so, and the session ends behind it.
+  std::optional<Error> refusal = {};
 };
 
 using CallId = std::uint64_t;
@@ -129,6 +135,9 @@ struct PipeConnected {
 struct PipeReceived {
   PipeId id = 0;
   Value value;
+  /// Of a remote service: the packet's number, where the client wants to hear that it has arrived there. To be answered
+  /// with acknowledge_pipe(). Packets for other services are acknowledged by the session.
+  std::optional<std::uint32_t> wants_ack = {};
 };
 /// Packets that were sent with wants_ack have arrived.
 struct PipeAcknowledged {
@@ -226,6 +235,8 @@ class ServiceSession {
   /// Errors   invalid_operation: closed; write_only_member; out_of_system_resource: too much waits for the stream (see
   ///          queued_bytes()), nothing was sent; those of pack().
   Result<std::uint32_t> send_pipe_packet(PipeId id, const Value& value, Now now, bool wants_ack = false);
+  /// Answers PipeReceived of a remote service. Unknown ids (the endpoint is closed) are ignored.
+  void acknowledge_pipe(PipeId id, std::span<const std::uint32_t> numbers, Now now);
   /// Closes the endpoint and tells the client; no event follows.
   void close_pipe(PipeId id, Now now);
   /// Calls a callback of the client. Every call that begins ends in exactly one CallbackCompleted; its value is null
@@ -272,6 +283,8 @@ class ServiceSession {
   std::uint32_t endpoint() const { return endpoint_; }
   /// What waits for the stream: a sender of many pipe packets waits until this is small.
   std::size_t queued_bytes() const { return connection_.queued_bytes(); }
+  /// Above these, pipes take no packets.
+  std::size_t max_pipe_queued_bytes() const { return options_.max_pipe_queued_bytes; }
 
  private:
   struct OpenCall {
@@ -415,6 +428,8 @@ class ServiceSession {
   void continue_late_locks(Now now);
 
   Result<> admit(EntryType type, std::string_view path, const MemberDefinition* member) const;
+  Result<> enter(const MessageEntry& entry, const MemberDefinition& member);
+  void release_pass(std::uint32_t request_id);
 
   // callbacks (service_callback.cpp)
   void handle_callback_reply(const Message& message, const MessageEntry& entry);
@@ -429,6 +444,7 @@ class ServiceSession {
   Result<> handle_pipe_packet(const Message& message, const MessageElement& element, ServicePipe& pipe);
   void handle_pipe_acks(const Message& message, const MessageEntry& entry);
   void release_pipes(std::string_view path);
+  void send_pipe_acks(std::string_view path, std::string_view member, bool is_unreliable, Now now);
   ServicePipe* find_pipe(PipeId id);
   ServicePipe* find_pipe(const MessageEntry& entry, std::int32_t index);
   void forget_pipe(PipeId id);
@@ -475,6 +491,8 @@ class ServiceSession {
 
   CallId last_call_id_ = 0;
   std::vector<OpenCall> calls_;
+  std::unordered_multimap<std::uint32_t, std::shared_ptr<const void>>
+      passes_;  ///< of requests, until they are answered
   GeneratorTable generators_;
   Wires wires_;
   Ledgers ended_;  ///< of wires and pipes that are no more

@@ -104,13 +104,18 @@ void ServiceSession::handle_special(const Message& message, Now now) {
   outgoing_.header.receiver_node_name = header.sender_node_name;
   outgoing_.header.sender_endpoint = header.receiver_endpoint;
   outgoing_.header.receiver_endpoint = header.sender_endpoint;
+  bool is_refused = false;
   for (const auto& entry : message.entries) {
     if (static_cast<std::uint16_t>(entry.type) % 2 == 0) continue;  // replies are not for a service
     outgoing_.begin_entry(reply_type(entry.type), entry.service_path, entry.member_name, entry.request_id);
     const bool had_login = login_.has_value();
     const bool was_leaving = leaving_.has_value();
-    const Result<> done = is_for_us ? answer_special(message, entry, now)
-                                    : make_error(ErrorCode::node_not_found, "Could not find route to remote node");
+    const bool is_of_node = entry.type == EntryType::get_node_info || entry.type == EntryType::node_check_capability;
+    const bool is_unwanted = options_.refusal && !is_of_node;
+    const Result<> done = !is_for_us    ? make_error(ErrorCode::node_not_found, "Could not find route to remote node")
+                          : is_unwanted ? Result<>(*options_.refusal)
+                                        : answer_special(message, entry, now);
+    is_refused = is_refused || is_unwanted;
     if (!done) {
       // A failure may leave a half-built entry behind: it starts anew.
       outgoing_.elements.resize(outgoing_.entries.back().first_element);
@@ -122,6 +127,7 @@ void ServiceSession::handle_special(const Message& message, Now now) {
     }
   }
   if (!outgoing_.entries.empty()) send_outgoing(now);
+  if (is_refused) leave(*options_.refusal, now);
 }
 
 Result<> ServiceSession::answer_special(const Message& message, const MessageEntry& entry, Now now) {

@@ -142,6 +142,7 @@ void ServiceSession::handle_wire_packet(const Message& message, const MessageEnt
 
 ServiceSession::Wires::iterator ServiceSession::end_wire(Wires::iterator wire) {
   ended_.wires.add(wire->second.ledger);
+  if (wire->second.state == WireState::connecting) release_pass(wire->second.request_id);
   return wires_.erase(wire);
 }
 

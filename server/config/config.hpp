@@ -88,11 +88,12 @@ struct Limits {
   bool operator==(const Limits&) const = default;
 };
 
-/// Requests over HTTP; 0: no bound.
+/// Requests over HTTP, WebSockets and in shared sessions; 0: no bound.
 struct RateLimit {
   std::size_t per_second = 0;
   std::size_t at_once = 0;
 
+  bool is_bound() const { return per_second > 0 || at_once > 0; }
   bool operator==(const RateLimit&) const = default;
 };
 struct Rates {
@@ -100,6 +101,7 @@ struct Rates {
   RateLimit user;    ///< of one who has proven who he is
   RateLimit device;  ///< to one device, of all together
 
+  bool is_bound() const { return client.is_bound() || user.is_bound() || device.is_bound(); }
   bool operator==(const Rates&) const = default;
 };
 

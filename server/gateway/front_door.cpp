@@ -131,6 +131,7 @@ rr::awaitable<void> serve_connection(Gateway& gateway, std::unique_ptr<rr::ByteS
     protocol = co_await look_at_first_bytes(*stream, connection.client, patience);
   }
 
+  connection.address = connection.peer.endpoint.address().to_string();
   auto& identity = connection.identity;
   identity.client = connection.client;
   identity = identity.is_proven() ? gateway.access().with_grants(std::move(identity))

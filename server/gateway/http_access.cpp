@@ -210,4 +210,38 @@ std::optional<RateGate::Pass> HttpAccess::enter_device(const std::string& device
   return devices_.enter(device, rates.device.per_second, rates.device.at_once, std::chrono::steady_clock::now());
 }
 
+namespace {
+
+std::string to_text(const RateLimit& limit) {
+  std::string out;
+  if (limit.per_second > 0) out = std::to_string(limit.per_second) + " requests a second";
+  if (limit.at_once > 0) out += (out.empty() ? "" : " or ") + std::to_string(limit.at_once) + " at once";
+  return out;
+}
+
+}  // namespace
+
+rr::Result<std::shared_ptr<const HttpAccess::Passes>> HttpAccess::enter(const std::string& address,
+                                                                        const std::string& user,
+                                                                        const std::string& device, const Rates& rates) {
+  if (!rates.is_bound()) return std::shared_ptr<const Passes>();
+  const auto now = std::chrono::steady_clock::now();
+  const auto refused = [](const RateLimit& limit, const std::string& what) {
+    return rr::make_error(rr::ErrorCode::out_of_system_resource,
+                          "asked for more than " + to_text(limit) + " " + what + "; try again in a second");
+  };
+  auto out = std::make_shared<Passes>();
+  out->client = clients_.enter(address, rates.client.per_second, rates.client.at_once, now);
+  if (!out->client) return refused(rates.client, "from " + address);
+  if (!user.empty()) {
+    out->user = users_.enter(user, rates.user.per_second, rates.user.at_once, now);
+    if (!out->user) return refused(rates.user, "of " + rr::quoted(user));
+  }
+  if (!device.empty()) {
+    out->device = enter_device(device, rates);
+    if (!out->device) return refused(rates.device, "to device " + rr::quoted(device));
+  }
+  return std::shared_ptr<const Passes>(std::move(out));
+}
+
 }  // namespace rrgate

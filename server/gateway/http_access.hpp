@@ -47,6 +47,15 @@ class HttpAccess {
   rr::awaitable<Admitted> admit(Request& request, const Connection& connection, const Config& config);
   std::optional<RateGate::Pass> enter_device(const std::string& device, const Rates& rates);
   static Response too_much(std::string_view what);
+  struct Passes {
+    std::optional<RateGate::Pass> client = {};
+    std::optional<RateGate::Pass> user = {};
+    std::optional<RateGate::Pass> device = {};
+  };
+  /// Lets one request pass that is not one of HTTP's, until it is answered. `user`, `device`  empty: none.
+  /// Errors   out_of_system_resource: too much is asked for; again in a second.
+  rr::Result<std::shared_ptr<const Passes>> enter(const std::string& address, const std::string& user,
+                                                  const std::string& device, const Rates& rates);
 
   Tickets& tickets() { return tickets_; }
   AccessRequests& requests() { return requests_; }

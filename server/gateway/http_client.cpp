@@ -2,6 +2,7 @@
 
 #include "server/gateway/client_relay.hpp"
 #include "server/gateway/http_access.hpp"
+#include "server/gateway/refused_client.hpp"
 #include "server/gateway/shared/serve_shared_client.hpp"
 #include "server/http/endpoints/json_socket.hpp"
 #include "server/http/request_reader.hpp"
@@ -91,6 +92,7 @@ rr::awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, st
                                     const Request& request, rr::ByteSpan unread) {
   auto& tcp = *stream;
   connection.client = request.arrival.peer;
+  connection.address = request.arrival.address.to_string();
   connection.identity = request.identity;
   const auto refuse = [&tcp](const Response& refusal) -> rr::awaitable<void> {
     co_await write_refusal(tcp, refusal);
@@ -134,17 +136,27 @@ rr::awaitable<void> serve_websocket(Gateway& gateway, Connection& connection, st
   const bool takes_close = takes_close_frames(request);
   // In a session of ours each request is looked at; see shared_access.hpp.
   const auto allowed = destination->node ? rr::Result<>() : may_relay(gateway, connection, *destination->device);
-  // A page can read why a WebSocket closes; but to show who one is, where that was not done, is for the upgrade.
-  if (!allowed && !(takes_close && request.identity.is_proven())) {
+  // Who speaks Robot Raconteur can be told so in it, and a page can read why a WebSocket closes; but to show who one
+  // is, where a page or another gateway has not done so, is for the upgrade.
+  const bool names_protocol = request.message.count(http::field::sec_websocket_protocol) != 0;
+  const bool has_shown = request.identity.is_proven();
+  const bool can_show = takes_close || !way.empty();
+  const bool hears_in_session = !allowed && names_protocol && (has_shown || !can_show);
+  if (!allowed && !hears_in_session && !(takes_close && has_shown)) {
     const auto response = gateway.http_access().refusal(request.identity, allowed.error());
     co_await refuse(response);
     co_return;
   }
-  if (allowed && destination->node) {
+  if (hears_in_session || destination->node) {
     const auto accepted = format_upgrade_response(request);
     if (co_await write_text(tcp, accepted)) co_return;
     tcp.put_back(unread);
     auto socket = std::make_unique<rr::WebSocketStream>(std::move(stream), rr::WebSocketRole::server, takes_close);
+    if (hears_in_session) {
+      log(LogLevel::info, "client refused", {{"peer", connection.client}, {"error", allowed.error().message}});
+      co_await refuse_in_session(gateway, connection, *destination->device, std::move(socket), allowed.error());
+      co_return;
+    }
     auto base_url = node_url(request);
     co_await serve_shared_client(gateway, connection, *destination, std::move(socket), std::move(base_url));
     co_return;

@@ -5,6 +5,7 @@
 #include "core/wire/codec.hpp"
 #include "core/wire/frame_scanner.hpp"
 #include "server/gateway/client_relay.hpp"
+#include "server/gateway/refused_client.hpp"
 #include "server/gateway/shared/serve_shared_client.hpp"
 #include "server/log/log.hpp"
 #include "server/transport/watchdog.hpp"
@@ -44,6 +45,12 @@ bool note_circle(Gateway& gateway, const rr::NodeId& sender) {
     return true;
   }
   return false;
+}
+
+/// TLS with the device's own certificate can't be had without the device.
+bool asks_for_tls(const rr::Message& request) {
+  return !request.entries.empty() && request.entries.front().type == rr::EntryType::stream_op &&
+         request.entries.front().member_name == "STARTTLS";
 }
 
 std::string describe_wish(const rr::MessageHeader& header) {
@@ -96,12 +103,14 @@ rr::awaitable<void> serve_native_client(Gateway& gateway, Connection& connection
   const auto destination =
       find_destination(gateway, request.header.receiver_node_id, request.header.receiver_node_name);
   rr::Error refusal;
+  bool is_denied = false;
   const bool is_relayed = destination && !destination->node;
   const auto allowed = is_relayed ? may_relay(gateway, connection, *destination->device) : rr::Result<>();
   if (note_circle(gateway, request.header.sender_node_id)) {
     refusal = rr::make_error(rr::ErrorCode::connection_error, "the way leads back to the gateway that it began at");
   } else if (!allowed) {
     refusal = allowed.error();
+    is_denied = true;
   } else if (destination && destination->node) {
     auto base_url = "rr+tcp://" + rr::format_host_port(connection.local.address().to_string(), connection.local.port());
     co_await serve_shared_client(gateway, connection, *destination, std::move(stream), base_url + "/");
@@ -119,6 +128,10 @@ rr::awaitable<void> serve_native_client(Gateway& gateway, Connection& connection
   }
   log(LogLevel::info, "native client refused",
       {{"peer", connection.client}, {"wanted", describe_wish(request.header)}, {"error", refusal.message}});
+  if (is_denied && !asks_for_tls(request)) {
+    co_await refuse_in_session(gateway, connection, *destination->device, std::move(stream), std::move(refusal));
+    co_return;
+  }
   const auto reply = make_refusal(request, gateway.node_id(), refusal);
   const rr::ByteSpan slice(reply);
   const std::span<const rr::ByteSpan> slices(&slice, 1);

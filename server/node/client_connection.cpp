@@ -211,6 +211,18 @@ Result<> ClientConnection::send_pipe(std::string_view path, std::string_view pip
   return {};
 }
 
+Result<std::uint32_t> ClientConnection::send_pipe_for_ack(std::string_view path, std::string_view pipe,
+                                                          std::int32_t index, const Value& packet) {
+  auto sent = session_.send_pipe_packet(path, pipe, index, packet, read_clocks(), true);
+  settle();
+  return sent;
+}
+
+void ClientConnection::hold_pipe_acks(std::string_view path, std::string_view pipe, std::int32_t index, bool is_held) {
+  session_.hold_pipe_acks(path, pipe, index, is_held, read_clocks());
+  settle();
+}
+
 void ClientConnection::on_callback(std::string_view path, std::string_view callback, CallbackHandler handler) {
   on_callback_later(path, callback,
                     [handler = std::move(handler)](std::span<const Value> arguments, const auto& reply) {
@@ -308,6 +320,14 @@ void ClientConnection::handle(PipePacketReceived&& received) {
   if (found == pipe_handlers_.end()) return;
   const auto handlers = found->second;  // it may disconnect
   if (handlers->received) handlers->received(std::move(received.value));
+}
+
+void ClientConnection::handle(PipePacketsAcknowledged&& acknowledged) {
+  const auto found =
+      pipe_handlers_.find({std::move(acknowledged.path), std::move(acknowledged.member), acknowledged.index});
+  if (found == pipe_handlers_.end()) return;
+  const auto handlers = found->second;  // it may disconnect
+  if (handlers->acknowledged) handlers->acknowledged(acknowledged.numbers);
 }
 
 void ClientConnection::handle(PipeClosedByService&& closed) {

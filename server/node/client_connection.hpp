@@ -65,6 +65,8 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   struct PipeHandlers {
     std::function<void(Value packet)> received;
     std::function<void()> closed = {};  ///< by the service; not for disconnect_pipe() and the session's end
+    /// Packets of send_pipe_for_ack() have arrived.
+    std::function<void(std::span<const std::uint32_t> numbers)> acknowledged = {};
   };
 
   /// Resolves, connects (all addresses, side by side) and opens the session, all within options.connect_timeout.
@@ -113,6 +115,11 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   /// Errors   the endpoint is not connected; out_of_system_resource: too much waits for the stream, nothing was sent
   ///          (see ClientSession::queued_bytes()); those of packing.
   Result<> send_pipe(std::string_view path, std::string_view pipe, std::int32_t index, const Value& packet);
+  /// The same, and returns the packet's number, which PipeHandlers::acknowledged names once it has arrived.
+  Result<std::uint32_t> send_pipe_for_ack(std::string_view path, std::string_view pipe, std::int32_t index,
+                                          const Value& packet);
+  /// See ClientSession.
+  void hold_pipe_acks(std::string_view path, std::string_view pipe, std::int32_t index, bool is_held);
   // Session operations; see ClientSession.
   void authenticate(std::string_view username, const Value& credentials, Completion done);
   void logout(Completion done);
@@ -158,7 +165,7 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   void handle(WireValueReceived&& received);
   void handle(WireClosedByService&& closed);
   void handle(PipePacketReceived&& received);
-  void handle(PipePacketsAcknowledged&&) {}  // nothing here asks for acknowledgements
+  void handle(PipePacketsAcknowledged&& acknowledged);
   void handle(PipeClosedByService&& closed);
   void handle(CallbackCalled&& called);
   void handle(PathReleased&& released);

@@ -80,6 +80,7 @@ void StreamDriver::write(Now now) {
       continue;
     }
     handle_transmitted(bytes, now);
+    has_written();
   }
 }
 
@@ -99,6 +100,7 @@ awaitable<void> StreamDriver::write_waiting(std::shared_ptr<StreamDriver> self) 
   const Now now = read_clocks();
   if (error) co_return driver.finish(stream_error(error), now);
   driver.handle_transmitted(bytes, now);
+  driver.has_written();
   driver.settle(now);
 }
 

@@ -52,6 +52,8 @@ class StreamDriver : public std::enable_shared_from_this<StreamDriver> {
   virtual std::span<const ByteSpan> poll_transmit() = 0;
   virtual bool wants_close() const = 0;
   virtual TimePoint poll_timeout() const = 0;
+  /// After handle_transmitted(): fewer bytes wait. Whatever else is due has to be posted.
+  virtual void has_written() {}
   /// Polls one event and handles it. Returns whether there was one.
   virtual bool handle_event(Now now) = 0;
   /// The stream is closed and all events are handled; called once, last.

@@ -173,12 +173,25 @@ def test_connections_that_pass_unread_are_for_those_who_may_everything(guarded):
         assert upgrade_status(guarded.port, path) == 401
         assert upgrade_status(guarded.port, path, basic("alice")) == 403
         assert upgrade_status(guarded.port, path, basic("root")) == 101
-    # Native clients cannot show anything without a certificate. The error comes so early that the package makes another
-    # of it: the log says what it was.
-    done = subprocess.run([sys.executable, "-c", NATIVE_CLIENT, f"rr+tcp://127.0.0.1:{guarded.port}/?service=interop"],
-                          capture_output=True, text=True, timeout=60)
-    assert done.stdout.startswith("ConnectionException"), done
+    # Native clients cannot show anything without a certificate.
+    for scheme, path in (("rr+tcp", ""), ("rr+ws", ""), ("rr+ws", "devices/interop")):
+        url = f"{scheme}://127.0.0.1:{guarded.port}/{path}?service=interop"
+        done = subprocess.run([sys.executable, "-c", NATIVE_CLIENT, url], capture_output=True, text=True, timeout=60)
+        assert done.stdout.startswith("PermissionDeniedException"), (url, done)
+        assert '"mode": "shared"' in done.stdout, (url, done)
     assert '"mode": "shared"' in str(guarded.wait_for("native client refused"))
+    assert '"mode": "shared"' in str(guarded.wait_for("client refused"))
+
+
+def test_who_is_refused_stays_for_a_moment_at_most(device, tmp_path):
+    make_users(tmp_path)
+    named = {**basic("vera"), "Sec-WebSocket-Protocol": "robotraconteur.robotraconteur.com"}
+    with running(tmp_path, device, {"users_file": "users", "rules": RULES}, limits={"header_timeout_ms": 500}) as gateway:
+        link = open_websocket(gateway.port, "/devices/interop", "".join(f"{name}: {value}\r\n" for name, value in named.items()))
+        with contextlib.closing(link):
+            link.settimeout(20)
+            while link.recv(4096):
+                pass
 
 
 NATIVE_CLIENT = """
@@ -371,6 +384,77 @@ def test_rates(device, tmp_path):
         while ask(gateway.port, "GET", BASE + "/p_double", headers=basic("vera")).status == 429:
             assert time.monotonic() < deadline
             time.sleep(0.3)
+
+
+SESSION_CLIENT = """
+import sys
+import RobotRaconteur as RR
+with RR.ClientNodeSetup():
+    root = RR.RobotRaconteurNode.s.ConnectService(sys.argv[1])
+    wire = root.both.Connect()
+    outcomes = []
+    for _ in range(int(sys.argv[2])):
+        wire.OutValue = 1.0
+        try:
+            outcomes.append(type(root.p_double).__name__)
+        except RR.RobotRaconteurException as error:
+            outcomes.append(type(error).__name__ + ": " + str(error))
+    print("\\n".join(outcomes))
+"""
+
+
+def test_rates_of_requests_in_a_shared_session(device, tmp_path):
+    devices = [{"name": "interop", "url": device, "mode": "shared"}]
+    with running(tmp_path, device, {}, devices=devices, rates={"client": {"per_second": 5}}) as gateway:
+        url = f"rr+tcp://127.0.0.1:{gateway.port}/?nodename=interop&service=interop"
+        done = subprocess.run([sys.executable, "-c", SESSION_CLIENT, url, "60"], capture_output=True, text=True, timeout=60)
+        outcomes = done.stdout.splitlines()
+        assert len(outcomes) == 60 and outcomes[0] == "float", done
+        refused = {each for each in outcomes if each != "float"}
+        (why,) = refused
+        assert why.startswith("OutOfSystemResourceException") and "asked for more than 5 requests a second from 127.0.0.1" in why
+        time.sleep(1)  # or the next look would be one too many
+        metrics = ask(gateway.port, "GET", "/metrics").body.decode()
+        count = next(float(line.split()[1]) for line in metrics.splitlines()
+                     if line.startswith("rrgate_rejected_total") and 'reason="rate"' in line)
+        assert count >= len([each for each in outcomes if each != "float"])
+
+
+def test_rates_of_requests_over_json_on_a_websocket(device, tmp_path):
+    make_users(tmp_path)
+    rates = {"user": {"per_second": 5}, "device": {"at_once": 2}}
+    with running(tmp_path, device, {"users_file": "users"}, rates=rates) as gateway:
+        def answers(user, requests):
+            with json_socket(gateway.port, basic(user)) as link:
+                for number, request in enumerate(requests):
+                    link.send(json.dumps({"id": number, **request}))
+                found = {}
+                while len(found) < len(requests):
+                    answer = json.loads(link.recv(20))
+                    if "id" in answer:
+                        found[answer["id"]] = answer
+                return list(found.values())
+
+        def is_refused(answer, of):
+            error = answer.get("error")
+            return error is not None and error["name"] == "RobotRaconteur.OutOfSystemResource" and \
+                error["retry_after"] == 1 and "asked for more than" in error["message"] and of in error["message"]
+
+        # One after the other, so that never two are on their way.
+        with json_socket(gateway.port, basic("alice")) as link:
+            found = []
+            for number in range(40):
+                link.send(json.dumps({"id": number, "op": "get", "path": "p_double"}))
+                found.append(json.loads(link.recv(20)))
+        assert "result" in found[0]
+        refused = [answer for answer in found if "error" in answer]
+        assert refused and all(is_refused(answer, "5 requests a second of") for answer in refused), refused
+        # Many at once: some are too many, and none is left without an answer.
+        found = answers("root", [{"op": "get", "path": "p_double"}] * 4)
+        assert any("result" in answer for answer in found) and any(is_refused(answer, "2 at once to device") for answer in found), found
+        # What is sent on a wire is no request.
+        found = answers("vera", [{"op": "send", "path": "both", "value": 1.0}] * 40)
+        assert all("result" in answer for answer in found), found
 
 
 def test_users_and_rights_are_read_anew_and_sessions_go_on(device, tmp_path):

@@ -49,6 +49,22 @@ rr::awaitable<bool> wait_until_ready(Gateway& gateway, const Destination& destin
   }
 }
 
+/// How much a client may ask for, whoever he logs in as meanwhile.
+auto make_rate_gate(Gateway& gateway, const SharedNode& node, const Connection& connection) {
+  const auto& identity = connection.identity;
+  return [&gateway, &node, address = connection.address, shown = identity.is_proven() ? identity.name : std::string()](
+             const rr::MemberAccess& wanted) -> rr::Result<std::shared_ptr<const void>> {
+    const auto& rates = gateway.config().rates;
+    if (!rates.is_bound()) return std::shared_ptr<const void>();
+    const bool is_ours = wanted.user && gateway.access().authenticator();  // else it is a user of the device's
+    const auto device = node.device_of(wanted.path.substr(0, wanted.path.find('.')));
+    auto passes = gateway.http_access().enter(address, is_ours ? wanted.user->name : shown, device, rates);
+    if (passes) return std::shared_ptr<const void>(std::move(*passes));
+    gateway.reject(Rejection::rate);
+    return passes.error();
+  };
+}
+
 }  // namespace
 
 rr::awaitable<void> serve_shared_client(Gateway& gateway, Connection& connection, Destination destination,
@@ -76,6 +92,7 @@ rr::awaitable<void> serve_shared_client(Gateway& gateway, Connection& connection
   arrival.base_url = std::move(base_url);
   arrival.is_encrypted = connection.peer.is_encrypted;
   arrival.admit = make_admission(gateway.access(), *destination.node, connection.identity);
+  arrival.enter = make_rate_gate(gateway, *destination.node, connection);
   asio::steady_timer over(client->executor(), asio::steady_timer::time_point::max());
   bool has_ended = false;
   const auto ended = [&] {

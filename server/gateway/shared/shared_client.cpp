@@ -168,7 +168,7 @@ void SharedClient::handle(const rr::PipeConnected& connected) {
 }
 
 void SharedClient::handle(const rr::PipeReceived& received) {
-  if (home_) home_->send_pipe(*this, received.id, received.value);
+  if (home_) home_->send_pipe(*this, received.id, received.value, received.wants_ack);
 }
 
 void SharedClient::handle(const rr::PipeClosed& closed) {
@@ -190,6 +190,26 @@ void SharedClient::refuse_pipe(rr::PipeId id, const rr::Error& error) {
 void SharedClient::receive_packet(rr::PipeId id, const rr::Value& packet) {
   const auto sent = session_.send_pipe_packet(id, packet, rr::read_clocks());
   if (!sent && sent.error().code == rr::ErrorCode::out_of_system_resource) return end_too_slow(sent.error());
+  settle();
+  if (is_behind_ || is_closed() || session_.queued_bytes() <= much_waiting()) return;
+  is_behind_ = true;
+  if (std::exchange(was_behind_, true)) return;
+  log(LogLevel::info, "client reads slowly: the device is held back on its pipes, as far as it minds credit",
+      {{"peer", peer_}, {"waiting_bytes", session_.queued_bytes()}});
+}
+
+void SharedClient::has_written() {
+  if (!is_behind_ || session_.queued_bytes() > much_waiting() / 2) return;
+  is_behind_ = false;
+  const std::weak_ptr<StreamDriver> weak = weak_from_this();
+  post([this, weak] {
+    const auto self = weak.lock();
+    if (self && service_ && !is_behind_) home_->caught_up(*this);
+  });
+}
+
+void SharedClient::acknowledge_packets(rr::PipeId id, std::span<const std::uint32_t> numbers) {
+  session_.acknowledge_pipe(id, numbers, rr::read_clocks());
   settle();
 }
 
@@ -305,6 +325,8 @@ rr::awaitable<void> SharedClient::keep_logged_in(std::shared_ptr<SharedClient> s
 }
 
 void SharedClient::move_to(std::shared_ptr<Upstream> upstream) {
+  home_->acknowledge_all(*this);
+  if (!service_) return;  // it has gone
   home_->remove(*this);
   home_ = std::move(upstream);
   home_->add(*this);

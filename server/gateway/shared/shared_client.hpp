@@ -50,6 +50,7 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
 
   bool handle_event(rr::Now now) override;
   void ended() override;
+  void has_written() override;
 
   void handle(const rr::Called& called);
   void handle(const rr::ClientConnected& connected);
@@ -81,6 +82,8 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   void accept_pipe(rr::PipeId id) override;
   void refuse_pipe(rr::PipeId id, const rr::Error& error) override;
   void receive_packet(rr::PipeId id, const rr::Value& packet) override;
+  bool is_behind() const override { return is_behind_; }
+  void acknowledge_packets(rr::PipeId id, std::span<const std::uint32_t> numbers) override;
   void close_pipe(rr::PipeId id) override;
   void release_path(const std::string& path) override;
   void call_callback(const std::string& path, const rr::MemberDefinition& callback,
@@ -97,10 +100,14 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   Upstream& requests() const { return locker_ ? *locker_ : *home_; }
   void leave_login();
   void end_too_slow(const rr::Error& error);
+  /// Bytes that wait for the stream: above, the client is behind; below half of them it has caught up.
+  std::size_t much_waiting() const { return session_.max_pipe_queued_bytes() / 4; }
 
   SharedClientOwner* owner_;
   std::string peer_;
   std::string end_reason_;
+  bool is_behind_ = false;
+  bool was_behind_ = false;  ///< and it is in the log
   std::shared_ptr<SharedService> service_;
   std::shared_ptr<Upstream> home_;    ///< the shared one, or that of the user who has logged in at the device
   std::shared_ptr<Upstream> login_;   ///< the latter; null: there is none

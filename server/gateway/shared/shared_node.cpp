@@ -13,6 +13,7 @@ std::shared_ptr<SharedClient> SharedNode::add(std::unique_ptr<rr::ByteStream> st
   options.connection.is_encrypted = arrival.is_encrypted;
   options.base_url = std::move(arrival.base_url);
   options.admit = std::move(arrival.admit);
+  options.enter = std::move(arrival.enter);
   if (const auto verified = stream->verified_peer(); !verified.is_any()) options.verified_node_id = verified;
   auto client =
       std::make_shared<SharedClient>(*this, directory_, std::move(options), std::move(stream), std::move(arrival.peer));

@@ -16,6 +16,8 @@ struct SharedArrival {
   std::string peer;      ///< for logs
   std::string base_url;  ///< of the node, as this client reaches it: "rr+tcp://10.0.0.5:52222/"
   std::function<rr::Result<>(const rr::MemberAccess&)> admit;  ///< none: everything is allowed
+  /// See ServiceSessionOptions.
+  std::function<rr::Result<std::shared_ptr<const void>>(const rr::MemberAccess&)> enter;
   bool is_encrypted = false;
 };
 

@@ -90,7 +90,13 @@ void Upstream::lost(const rr::Error& reason) {
   loss_ = reason;
   generators_.clear();
   for (auto& [key, wire] : wires_) wire.is_attached = false;
-  for (auto& [number, pipe] : pipes_) pipe.state = PipeState::detached;
+  for (auto& [number, pipe] : pipes_) {
+    pipe.state = PipeState::detached;
+    pipe.is_held = false;
+  }
+  const auto clients = clients_;  // they may leave
+  for (auto* client : clients)
+    if (has(*client)) acknowledge_all(*client);
   device_->note_trouble();
   if (const auto handler = on_lost_) handler();
 }

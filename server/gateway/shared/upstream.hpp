@@ -51,6 +51,11 @@ class UpstreamClient {
   virtual void accept_pipe(rr::PipeId id) = 0;
   virtual void refuse_pipe(rr::PipeId id, const rr::Error& error) = 0;
   virtual void receive_packet(rr::PipeId id, const rr::Value& packet) = 0;
+  /// Whether much waits for its stream: what it has joined should be sent no faster than it reads. It says with
+  /// Upstream::caught_up() that this is over.
+  virtual bool is_behind() const = 0;
+  /// Packets of its own have arrived.
+  virtual void acknowledge_packets(rr::PipeId id, std::span<const std::uint32_t> numbers) = 0;
   virtual void close_pipe(rr::PipeId id) = 0;
   virtual void release_path(const std::string& path) = 0;
   virtual void call_callback(const std::string& path, const rr::MemberDefinition& callback,
@@ -106,7 +111,13 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   void join_pipe(UpstreamClient& client, rr::PipeId id, const std::string& path, const rr::MemberDefinition& pipe);
   void leave_pipe(UpstreamClient& client, rr::PipeId id);
   /// What the device does not take, or can't because it is away, ends the endpoint.
-  void send_pipe(UpstreamClient& client, rr::PipeId id, const rr::Value& packet);
+  /// `wants_ack`  the client's number of the packet, for acknowledge_packets(), where it wants to hear of it.
+  void send_pipe(UpstreamClient& client, rr::PipeId id, const rr::Value& packet,
+                 std::optional<std::uint32_t> wants_ack);
+  /// The client is not behind any more.
+  void caught_up(UpstreamClient& client);
+  /// Nothing will be heard any more of the client's packets that are on their way: it waits for none of them.
+  void acknowledge_all(UpstreamClient& client);
 
  private:
   using MemberKey = std::pair<std::string, std::string>;  // path, member
@@ -129,6 +140,8 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
     std::vector<EndpointKey> endpoints;
     std::int32_t index = 0;
     PipeState state = PipeState::detached;
+    bool is_held = false;                                        ///< a client is behind: the device hears nothing of it
+    std::map<std::uint32_t, std::uint32_t> unacknowledged = {};  ///< number at the device -> that of the one client
   };
   using PipeNumber = std::uint64_t;
   struct Generator {
@@ -163,6 +176,12 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   void pipe_attached(PipeNumber number, const std::string& path, const std::string& member,
                      const rr::Result<rr::Value>& result, bool is_first);
   void drop_pipe(PipeNumber number);
+  std::vector<PipeNumber> pipes_of(const UpstreamClient& client) const;
+  /// Lets the device go on, or not, as the slowest client of the pipe can take it.
+  void pace_pipe(PipeNumber number);
+  rr::Result<> pass_on(Pipe& pipe, const EndpointKey& endpoint, const rr::Value& packet,
+                       std::optional<std::uint32_t> wants_ack);
+  void pass_back_acks(PipeNumber number, std::span<const std::uint32_t> numbers);
   void route_callback(const std::string& path, const rr::MemberDefinition& callback,
                       std::span<const rr::Value> arguments, const rr::ClientConnection::CallbackReply& answer);
   UpstreamClient* owner_of_callback(const std::string& path) const;

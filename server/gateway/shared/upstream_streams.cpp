@@ -12,6 +12,10 @@ namespace asio = boost::asio;
 
 namespace {
 
+/// Packets of a client that the device has not acknowledged. Above, the gateway does: a client without bounds of its
+/// own can't wait for them all.
+constexpr std::size_t max_unacknowledged = 4096;
+
 const auto ignore = [](const rr::Result<rr::Value>&) {};
 
 }  // namespace
@@ -198,6 +202,10 @@ void Upstream::attach_pipe(PipeNumber number) {
     const auto endpoints = at->second.endpoints;  // they may leave
     for (const auto& endpoint : endpoints)
       if (self->endpoints_.contains(endpoint)) endpoint.first->receive_packet(endpoint.second, packet);
+    self->pace_pipe(number);
+  };
+  handlers.acknowledged = [weak, number](std::span<const std::uint32_t> numbers) {
+    if (const auto self = weak.lock()) self->pass_back_acks(number, numbers);
   };
   handlers.closed = [weak, number] {
     if (const auto self = weak.lock()) self->drop_pipe(number);
@@ -235,17 +243,19 @@ void Upstream::pipe_attached(PipeNumber number, const std::string& path, const s
   const auto endpoints = pipe.endpoints;
   for (const auto& endpoint : endpoints)
     if (endpoints_.contains(endpoint)) endpoint.first->accept_pipe(endpoint.second);
+  pace_pipe(number);
 }
 
 void Upstream::leave_pipe(UpstreamClient& client, rr::PipeId id) {
   const EndpointKey endpoint(&client, id);
   const auto known = endpoints_.find(endpoint);
   if (known == endpoints_.end()) return;
-  const auto found = pipes_.find(known->second);
+  const auto number = known->second;
+  const auto found = pipes_.find(number);
   endpoints_.erase(known);
   auto& pipe = found->second;
   std::erase(pipe.endpoints, endpoint);
-  if (!pipe.endpoints.empty()) return;
+  if (!pipe.endpoints.empty()) return pace_pipe(number);
   if (connection_ && pipe.state == PipeState::attached)
     connection_->disconnect_pipe(pipe.path, pipe.member->name, pipe.index, ignore);
   if (pipe.member->direction() == rr::MemberDirection::readonly) shared_pipes_.erase({pipe.path, pipe.member->name});
@@ -264,13 +274,13 @@ void Upstream::drop_pipe(PipeNumber number) {
     if (has(*endpoint.first)) endpoint.first->close_pipe(endpoint.second);
 }
 
-void Upstream::send_pipe(UpstreamClient& client, rr::PipeId id, const rr::Value& packet) {
+void Upstream::send_pipe(UpstreamClient& client, rr::PipeId id, const rr::Value& packet,
+                         std::optional<std::uint32_t> wants_ack) {
   const auto known = endpoints_.find({&client, id});
   if (known == endpoints_.end()) return;
   auto& pipe = pipes_.at(known->second);
-  const auto sent = pipe.state == PipeState::attached && connection_
-                        ? connection_->send_pipe(pipe.path, pipe.member->name, pipe.index, packet)
-                        : rr::Result<>(lost_error());
+  const auto sent = pipe.state == PipeState::attached && connection_ ? pass_on(pipe, known->first, packet, wants_ack)
+                                                                     : rr::Result<>(lost_error());
   if (sent) return;
   log(LogLevel::info, "pipe endpoint closed: the device takes no packet",
       {{"device", device_->config().name},
@@ -278,6 +288,74 @@ void Upstream::send_pipe(UpstreamClient& client, rr::PipeId id, const rr::Value&
        {"error", sent.error().message}});
   leave_pipe(client, id);
   client.close_pipe(id);
+}
+
+rr::Result<> Upstream::pass_on(Pipe& pipe, const EndpointKey& endpoint, const rr::Value& packet,
+                               std::optional<std::uint32_t> wants_ack) {
+  const auto connection = connection_;  // it may be lost
+  if (!wants_ack) return connection->send_pipe(pipe.path, pipe.member->name, pipe.index, packet);
+  const auto known = endpoint;
+  const auto sent = connection->send_pipe_for_ack(pipe.path, pipe.member->name, pipe.index, packet);
+  if (!sent) return sent.error();
+  const auto found = endpoints_.find(known);
+  if (found == endpoints_.end()) return {};
+  auto& waiting = pipes_.at(found->second).unacknowledged;
+  waiting[*sent] = *wants_ack;
+  if (connection_ && waiting.size() <= max_unacknowledged) return {};
+  const std::uint32_t oldest = waiting.extract(waiting.begin()).mapped();
+  known.first->acknowledge_packets(known.second, {&oldest, 1});
+  return {};
+}
+
+/// Acknowledgements pass, so that a client has no more packets on the way than it wants, the device's among them.
+void Upstream::pass_back_acks(PipeNumber number, std::span<const std::uint32_t> numbers) {
+  const auto found = pipes_.find(number);
+  if (found == pipes_.end() || found->second.endpoints.empty()) return;
+  auto& pipe = found->second;
+  std::vector<std::uint32_t> arrived;
+  for (const auto each : numbers)
+    if (const auto known = pipe.unacknowledged.extract(each)) arrived.push_back(known.mapped());
+  const auto endpoint = pipe.endpoints.front();
+  if (!arrived.empty()) endpoint.first->acknowledge_packets(endpoint.second, arrived);
+}
+
+std::vector<Upstream::PipeNumber> Upstream::pipes_of(const UpstreamClient& client) const {
+  std::vector<PipeNumber> numbers;
+  const EndpointKey first(const_cast<UpstreamClient*>(&client), 0);
+  for (auto it = endpoints_.lower_bound(first); it != endpoints_.end() && it->first.first == &client; ++it)
+    numbers.push_back(it->second);
+  return numbers;
+}
+
+void Upstream::acknowledge_all(UpstreamClient& client) {
+  for (const auto number : pipes_of(client)) {
+    const auto found = pipes_.find(number);
+    if (found == pipes_.end() || found->second.unacknowledged.empty()) continue;
+    std::vector<std::uint32_t> numbers;
+    for (const auto& [there, here] : std::exchange(found->second.unacknowledged, {})) numbers.push_back(here);
+    const auto endpoint = found->second.endpoints.front();
+    endpoint.first->acknowledge_packets(endpoint.second, numbers);
+  }
+}
+
+// --- credit ---
+
+void Upstream::caught_up(UpstreamClient& client) {
+  for (const auto number : pipes_of(client)) pace_pipe(number);
+}
+
+/// A device that bounds its packets on the way gives them out by their acknowledgements. Held back, they keep it from
+/// sending what a slow client could only be cut for.
+void Upstream::pace_pipe(PipeNumber number) {
+  const auto found = pipes_.find(number);
+  if (found == pipes_.end() || !connection_ || found->second.state != PipeState::attached) return;
+  auto& pipe = found->second;
+  const bool is_held = std::any_of(pipe.endpoints.begin(), pipe.endpoints.end(),
+                                   [](const EndpointKey& endpoint) { return endpoint.first->is_behind(); });
+  if (is_held == pipe.is_held) return;
+  pipe.is_held = is_held;
+  const auto connection = connection_;  // it may be lost
+  connection->hold_pipe_acks(pipe.path, pipe.member->name, pipe.index, is_held);
 }
 
 }  // namespace rrgate

@@ -69,13 +69,13 @@ const JsonOperations::Operation JsonOperations::operations[] = {
     {"call", Verb::call, &JsonOperations::call},
     {"open", Verb::call, &JsonOperations::open},
     {"next", Verb::call, &JsonOperations::next, false},
-    {"close", Verb::call, &JsonOperations::close, false},
-    {"abort", Verb::call, &JsonOperations::abort, false},
+    {"close", Verb::call, &JsonOperations::close, false, false, false, true},
+    {"abort", Verb::call, &JsonOperations::abort, false, false, false, true},
     {"subscribe", Verb::subscribe, &JsonOperations::subscribe},
-    {"unsubscribe", Verb::subscribe, &JsonOperations::unsubscribe, false},
-    {"send", Verb::write, &JsonOperations::send, true, true, true},
+    {"unsubscribe", Verb::subscribe, &JsonOperations::unsubscribe, false, false, false, true},
+    {"send", Verb::write, &JsonOperations::send, true, true, true, true},
     {"callback", Verb::subscribe, &JsonOperations::callback, true, true},
-    {"answer", Verb::subscribe, &JsonOperations::answer, false},
+    {"answer", Verb::subscribe, &JsonOperations::answer, false, false, false, true},
     {"shape", Verb::read, &JsonOperations::shape},
     {"read", Verb::read, &JsonOperations::read},
     {"write", Verb::write, &JsonOperations::write},
@@ -101,16 +101,28 @@ rr::awaitable<void> JsonOperations::take(const std::string& message) {
     co_return tell_error(request->id(),
                          rr::make_error(rr::ErrorCode::out_of_system_resource,
                                         "more than " + std::to_string(max_running) + " requests are not answered yet"));
-  ++running_;
   const auto* name = request->find("op");
   const auto* operation = name && name->is_string() ? find_operation(name->get_ref<const std::string&>()) : nullptr;
+  Passes passes;
+  if (!operation || !operation->is_free) {
+    const std::string user = place_.who.is_proven() ? place_.who.name : "";
+    auto entered =
+        gateway_.http_access().enter(place_.address, user, place_.device->config().name, gateway_.config().rates);
+    if (!entered) {
+      gateway_.reject(Rejection::rate);
+      co_return tell_too_much(request->id(), entered.error());
+    }
+    passes = std::move(*entered);
+  }
+  ++running_;
   if (operation && operation->keeps_order)
-    co_await run(shared_from_this(), request);
+    co_await run(shared_from_this(), request, std::move(passes));
   else
-    asio::co_spawn(place_.device->executor(), run(shared_from_this(), request), asio::detached);
+    asio::co_spawn(place_.device->executor(), run(shared_from_this(), request, std::move(passes)), asio::detached);
 }
 
-rr::awaitable<void> JsonOperations::run(std::shared_ptr<JsonOperations> self, RequestPtr request) {
+rr::awaitable<void> JsonOperations::run(std::shared_ptr<JsonOperations> self, RequestPtr request,
+                                        [[maybe_unused]] Passes passes) {
   std::optional<rr::Error> error;
   rr::OrderedJson result;
   try {
@@ -160,6 +172,13 @@ std::shared_ptr<DeviceSession> JsonOperations::session() {
 
 void JsonOperations::tell_error(const std::string& id, const rr::Error& error) {
   outbox_->add(json_refusal(id, error));
+}
+
+void JsonOperations::tell_too_much(const std::string& id, const rr::Error& error) {
+  static const rr::TypeRegistry no_types;
+  auto told = rr::error_to_json(error, no_types);
+  rr::add_key(told["error"], "retry_after") = 1;
+  outbox_->add("{\"id\":" + id + "," + rr::write_json(told).substr(1));
 }
 
 void JsonOperations::stop() {

@@ -7,6 +7,7 @@
 #include <variant>
 #include <vector>
 
+#include "server/gateway/http_access.hpp"
 #include "server/http/endpoints/json_outbox.hpp"
 #include "server/http/endpoints/json_request.hpp"
 #include "server/http/endpoints/object_request.hpp"
@@ -18,6 +19,7 @@ namespace rrgate {
 struct JsonSocketPlace {
   std::shared_ptr<Device> device;
   Identity who;  ///< of the gateway's users
+  std::string address;
   SessionKey key;
   std::vector<std::string> segments;  ///< below the service's root
   rr::JsonForm form;
@@ -45,6 +47,7 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
     bool has_target = true;    ///< the request names an object or a member by its path
     bool needs_own = false;    ///< a session that is shared with nobody
     bool keeps_order = false;  ///< the next message waits for it
+    bool is_free = false;      ///< of bounds on requests: packets, and what ends something
   };
   static const Operation operations[];
   static const Operation* find_operation(std::string_view name);
@@ -62,11 +65,14 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
   /// A question of the device that the client has not answered yet.
   struct Ask;
 
-  static rr::awaitable<void> run(std::shared_ptr<JsonOperations> self, RequestPtr request);
+  using Passes = std::shared_ptr<const HttpAccess::Passes>;
+  static rr::awaitable<void> run(std::shared_ptr<JsonOperations> self, RequestPtr request, Passes passes);
   rr::awaitable<rr::OrderedJson> perform(RequestPtr request);
   rr::awaitable<TargetPtr> find(RequestPtr request, const Operation& operation);
   std::shared_ptr<DeviceSession> session();
   void tell_error(const std::string& id, const rr::Error& error);
+  /// The same error for good once a second has passed.
+  void tell_too_much(const std::string& id, const rr::Error& error);
 
   rr::awaitable<rr::OrderedJson> describe(RequestPtr request, TargetPtr target);
   rr::awaitable<rr::OrderedJson> get(RequestPtr request, TargetPtr target);

@@ -22,7 +22,9 @@ struct Endpoint {
 
   PipeEndpointState pipe;
   std::vector<double> delivered;
-  std::function<void(Value&&)> deliver = [this](Value&& value) { delivered.push_back(value.to<double>().value()); };
+  std::function<void(PipePacket&&)> deliver = [this](PipePacket&& packet) {
+    delivered.push_back(packet.value.to<double>().value());
+  };
 };
 
 using Numbers = std::vector<double>;

@@ -240,6 +240,116 @@ TEST_CASE("the service closes an endpoint: the client is told, and its own close
   CHECK_FALSE(pair.service->poll_event());
 }
 
+TEST_CASE("acknowledgements that are held back come in their order when they are let go") {
+  Pipe pair;
+  const auto send = [&](double value) {
+    REQUIRE(pair.service->send_pipe_packet(pair.id, Value(value), pair.now, true));
+    pair.pump();
+    CHECK(pair.next_client<PipePacketReceived>().value == Value(value));
+  };
+  const auto hold = [&](bool is_held) {
+    pair.client->hold_pipe_acks("arm", "samples", pair.index, is_held, pair.now);
+    pair.pump();
+  };
+  const auto expect_acknowledged = [&](std::uint32_t number) {
+    CHECK(pair.next_service<PipeAcknowledged>().numbers == std::vector<std::uint32_t>{number});
+  };
+  send(1.0);
+  expect_acknowledged(1);
+  hold(true);
+  hold(true);
+  for (const double value : {2.0, 3.0, 4.0}) send(value);
+  CHECK_FALSE(pair.service->poll_event());
+
+  SECTION("let go") {
+    hold(false);
+    for (const std::uint32_t number : {2u, 3u, 4u}) expect_acknowledged(number);
+    send(5.0);
+    expect_acknowledged(5);
+    hold(false);
+  }
+  SECTION("another endpoint goes on meanwhile") {
+    const auto request = pair.client->connect_pipe("arm", "samples", any_pipe_index, pair.now);
+    pair.pump();
+    const auto other = pair.next_service<PipeConnected>().id;
+    pair.service->accept_pipe(other, pair.now);
+    REQUIRE(pair.completion(request));
+    REQUIRE(pair.service->send_pipe_packet(other, Value(9.0), pair.now, true));
+    pair.pump();
+    CHECK(pair.next_client<PipePacketReceived>().value == Value(9.0));
+    const auto acknowledged = pair.next_service<PipeAcknowledged>();
+    CHECK(acknowledged.id == other);
+    CHECK(acknowledged.numbers == std::vector<std::uint32_t>{1});
+  }
+  SECTION("they end with the endpoint, and the next one of its index holds nothing") {
+    const auto closed = pair.client->disconnect_pipe("arm", "samples", pair.index, pair.now);
+    REQUIRE(pair.completion(closed));
+    CHECK(pair.next_service<PipeClosed>().id == pair.id);
+    hold(false);
+    const auto request = pair.client->connect_pipe("arm", "samples", pair.index, pair.now);
+    pair.pump();
+    pair.id = pair.next_service<PipeConnected>().id;
+    pair.service->accept_pipe(pair.id, pair.now);
+    REQUIRE(pair.completion(request).value() == Value(pair.index));
+    send(1.0);
+    expect_acknowledged(1);
+  }
+  SECTION("they end with the session") {
+    pair.client->handle_closed(make_error(ErrorCode::connection_error, "gone"), pair.now);
+    pair.client->hold_pipe_acks("arm", "samples", pair.index, false, pair.now);
+    CHECK(pair.client->poll_transmit().empty());
+  }
+  CHECK_FALSE(pair.service->poll_event());
+}
+
+TEST_CASE("a service that does not mind credit is held back no packet more than there is room for") {
+  Loopback pair;
+  pair.connect();
+  ClientOptions options;
+  options.connection.self = {client_id, ""};
+  options.service = "arm";
+  options.max_held_acks = 3;
+  pair.client = std::make_unique<ClientSession>(options, pair.now);
+  pair.service = std::make_unique<ServiceSession>(pair.directory, ServiceSessionOptions{}, pair.now);
+  pair.connect();
+  const auto request = pair.client->connect_pipe("arm", "samples", any_pipe_index, pair.now);
+  pair.pump();
+  const auto id = pair.next_service<PipeConnected>().id;
+  pair.service->accept_pipe(id, pair.now);
+  const auto index = pair.completion(request).value().to<std::int32_t>().value();
+  pair.client->hold_pipe_acks("arm", "samples", index, true, pair.now);
+  for (std::uint32_t number = 1; number <= 10; ++number)
+    REQUIRE(pair.service->send_pipe_packet(id, Value(1.0 * number), pair.now, true));
+  pair.pump();
+  for (std::uint32_t number = 1; number <= 7; ++number)
+    CHECK(pair.next_service<PipeAcknowledged>().numbers == std::vector<std::uint32_t>{number});
+  CHECK_FALSE(pair.service->poll_event());
+  pair.client->hold_pipe_acks("arm", "samples", index, false, pair.now);
+  pair.pump();
+  for (std::uint32_t number = 8; number <= 10; ++number)
+    CHECK(pair.next_service<PipeAcknowledged>().numbers == std::vector<std::uint32_t>{number});
+}
+
+TEST_CASE("packets for a remote service are acknowledged when they have arrived there") {
+  Pipe pair;
+  pair.directory.find("arm")->set_remote();
+  REQUIRE(pair.send(1.0, true));
+  REQUIRE(pair.send(2.0));
+  REQUIRE(pair.send(3.0, true));
+  pair.pump();
+  CHECK(pair.next_service<PipeReceived>().wants_ack == 1u);
+  CHECK_FALSE(pair.next_service<PipeReceived>().wants_ack);
+  CHECK(pair.next_service<PipeReceived>().wants_ack == 3u);
+  CHECK_FALSE(pair.client->poll_event());
+  const std::vector<std::uint32_t> arrived{1, 3};
+  pair.service->acknowledge_pipe(pair.id, arrived, pair.now);
+  pair.service->acknowledge_pipe(pair.id + 1, arrived, pair.now);
+  pair.pump();
+  for (const auto number : arrived)
+    CHECK(pair.next_client<PipePacketsAcknowledged>().numbers == std::vector<std::uint32_t>{number});
+  CHECK_FALSE(pair.client->poll_event());
+}
+
 TEST_CASE("directions: nobody sends against them, and what comes against them is acknowledged and dropped") {
   Pipe poses("poses");
   CHECK(poses.send(1.0).error().code == ErrorCode::read_only_member);

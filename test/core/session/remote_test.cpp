@@ -293,3 +293,69 @@ TEST_CASE("what a client may do is asked before it is done") {
   CHECK_FALSE(pair.client->poll_event());
   CHECK(asked.back() == std::pair(EntryType::event_req, std::string("bumped")));
 }
+
+TEST_CASE("requests are bounded until they are answered; what is too much is refused, and nothing is lost by it") {
+  Remote pair;
+  int open = 0;
+  ServiceSessionOptions options;
+  options.enter = [&open](const MemberAccess&) -> Result<std::shared_ptr<const void>> {
+    if (open == 2) return make_error(ErrorCode::out_of_system_resource, "too much");
+    ++open;
+    return std::shared_ptr<const void>(&open, [&open](const void*) { --open; });
+  };
+  ClientOptions client_options;
+  client_options.connection.self = {client_id, ""};
+  client_options.service = "arm";
+  pair.client = std::make_unique<ClientSession>(client_options, pair.now);
+  pair.service = std::make_unique<ServiceSession>(pair.directory, options, pair.now);
+  pair.connect();
+  const auto expect_refused = [&](RequestId id) {
+    const auto refused = pair.completion(id);
+    REQUIRE_FALSE(refused);
+    CHECK(refused.error().code == ErrorCode::out_of_system_resource);
+    CHECK(refused.error().message == "too much");
+    CHECK_FALSE(pair.service->poll_event());
+  };
+
+  const auto generator = pair.client->open_generator("arm", "count", {}, pair.now);
+  pair.pump();
+  pair.service->reply(pair.next_service<Called>().id, Value{}, pair.now);
+  const auto index = pair.completion(generator).value().to<std::int32_t>().value();
+  const auto joining = pair.client->connect_wire("arm", "torque", pair.now);
+  const auto reading = pair.client->get_property("arm", "speed", pair.now);
+  pair.pump();
+  pair.next_service<WireConnected>();
+  const auto read = pair.next_service<Called>();
+  CHECK(open == 2);
+  expect_refused(pair.client->next_generator("arm", "count", index, {}, pair.now));
+  expect_refused(pair.client->connect_pipe("arm", "samples", any_pipe_index, pair.now));
+
+  SECTION("an answer makes room, and the generator is still there") {
+    pair.service->reply(read.id, Value(1.5), pair.now);
+    CHECK(pair.completion(reading).value() == Value(1.5));
+    CHECK(open == 1);
+    const auto next = pair.client->next_generator("arm", "count", index, {}, pair.now);
+    pair.pump();
+    pair.service->reply(pair.next_service<Called>().id, Value(std::int32_t{7}), pair.now);
+    CHECK(pair.completion(next).value() == Value(std::int32_t{7}));
+    CHECK(open == 1);
+    pair.service->answer_wire("arm", pair.member("torque"), {}, pair.now);
+    REQUIRE(pair.completion(joining));
+    CHECK(open == 0);
+  }
+  SECTION("what ends something is never too much, and packets are not") {
+    const auto closing = pair.client->close_generator("arm", "count", index, pair.now);
+    pair.pump();
+    pair.service->reply(pair.next_service<Called>().id, Value{}, pair.now);
+    CHECK(pair.completion(closing));
+    CHECK(open == 2);
+  }
+  SECTION("what is asked of an object that is replaced is over") {
+    pair.service->release_path("arm", pair.now);
+    CHECK(open == 1);
+  }
+  SECTION("the end of the session is the end of all") {
+    pair.service->handle_closed(make_error(ErrorCode::connection_error, "gone"), pair.now);
+    CHECK(open == 0);
+  }
+}

@@ -502,3 +502,22 @@ TEST_CASE("messages above the limit are refused: before login 512 KiB, then the 
   CHECK(pair.completion(id).error().code == ErrorCode::protocol_error);
   CHECK(pair.client->state() == ClientState::connected);
 }
+
+TEST_CASE("who is not wanted hears why, whichever way he connects, and the session ends behind it") {
+  Features features;
+  const bool is_stepwise = GENERATE(false, true);
+  if (is_stepwise) features.combined_v2 = features.combined_v4 = false;
+  Loopback pair(features);
+  ServiceSessionOptions options;
+  options.refusal = make_error(ErrorCode::permission_denied, "not you");
+  pair.service = std::make_unique<ServiceSession>(pair.directory, options, pair.now);
+  pair.pump();
+  const auto closed = pair.next_client<SessionClosed>();
+  CHECK(closed.reason.code == ErrorCode::permission_denied);
+  CHECK(closed.reason.message == "connect to 'arm': not you");
+  pair.next_service<ClientGone>();
+  CHECK_FALSE(pair.service->wants_close());
+  pair.now.steady = pair.service->poll_timeout();
+  pair.service->handle_timeout(pair.now);
+  CHECK(pair.service->wants_close());
+}

@@ -1,0 +1,72 @@
+#include "server/gateway/refused_client.hpp"
+
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <functional>
+#include <utility>
+
+#include "core/session/service_session.hpp"
+#include "server/node/stream_driver.hpp"
+
+namespace rrgate {
+
+namespace asio = boost::asio;
+
+namespace {
+
+/// A node without services.
+struct EmptyNode {
+  explicit EmptyNode(rr::NodeIdentity identity) : directory(std::move(identity)) {}
+  rr::ServiceDirectory directory;
+};
+
+class RefusedClient final : private EmptyNode, public rr::SessionDriver<rr::ServiceSession> {
+ public:
+  RefusedClient(rr::NodeIdentity identity, rr::ServiceSessionOptions options, std::unique_ptr<rr::ByteStream> stream,
+                std::function<void()> ended)
+      : EmptyNode(std::move(identity)),
+        SessionDriver(std::move(stream), directory, std::move(options), rr::read_clocks()),
+        ended_(std::move(ended)) {}
+
+ private:
+  bool handle_event(rr::Now) override { return session_.poll_event().has_value(); }
+  void ended() override { ended_(); }
+
+  std::function<void()> ended_;
+};
+
+/// Who the client believes to talk to: else it would not listen.
+rr::NodeIdentity identity_of(Gateway& gateway, const Device& device) {
+  if (const auto& known = device.identity()) return {known->node_id, known->node_name};
+  const auto& url = device.config().url;
+  return {url.node_id.value_or(gateway.node_id()), url.node_name};
+}
+
+}  // namespace
+
+rr::awaitable<void> refuse_in_session(Gateway& gateway, Connection& connection, const Device& device,
+                                      std::unique_ptr<rr::ByteStream> client, rr::Error refusal) {
+  rr::ServiceSessionOptions options;
+  options.connection.max_message_size = gateway.config().limits.max_message_size;
+  options.connection.is_encrypted = connection.peer.is_encrypted;
+  options.connection.handshake_timeout = options.connect_timeout = gateway.config().limits.header_timeout;
+  options.refusal = std::move(refusal);
+  auto identity = identity_of(gateway, device);
+  asio::steady_timer over(client->executor(), asio::steady_timer::time_point::max());
+  bool has_ended = false;
+  const auto ended = [&] {
+    has_ended = true;
+    over.cancel();
+  };
+  const auto session =
+      std::make_shared<RefusedClient>(std::move(identity), std::move(options), std::move(client), ended);
+  connection.stop = [session](const rr::EndReason& reason) {
+    session->close(rr::make_error(rr::ErrorCode::connection_error, reason.text));
+  };
+  session->start();
+  while (!has_ended) co_await over.async_wait(asio::as_tuple(asio::use_awaitable));
+  connection.stop = [](const rr::EndReason&) {};
+}
+
+}  // namespace rrgate

@@ -1,0 +1,172 @@
+"""Pipes of a shared device whose sender minds credit: the slowest reader sets its pace. Device and clients are those of the
+real package."""
+import json
+import pathlib
+import signal
+import sys
+
+import numpy
+import pytest
+import RobotRaconteur as RR
+
+from processes import Background, start_gateway
+from test_shared import News, node  # noqa: F401
+
+PEERS = pathlib.Path(__file__).parent / "peers"
+sys.path.insert(0, str(PEERS))
+from credit_service import BACKLOG  # noqa: E402
+
+FRAME = 262_144  # bytes
+QUEUE = 8_000_000  # bytes that may wait for a client; above a quarter of it the device is held back
+SLOW = "client reads slowly"
+
+
+def start_peer(program, folder, *arguments):
+    process = Background([sys.executable, PEERS / program, *arguments], folder / f"{program}.log")
+    return process, json.loads(process.next_line())
+
+
+@pytest.fixture
+def device(tmp_path):
+    process, ready = start_peer("credit_service.py", tmp_path)
+    yield process, ready["url"]
+    process.process.send_signal(signal.SIGCONT)
+    process.stop()
+
+
+class Reader:
+    """A client in a process of its own, which can be stopped: then nobody reads from its connection."""
+
+    def __init__(self, folder, url):
+        self.process, _ = start_peer("frame_reader.py", folder, url)
+
+    def numbers(self):
+        self.process.write_line("numbers")
+        return json.loads(self.process.next_line())
+
+    def signal(self, which):
+        self.process.process.send_signal(which)
+
+    def stop(self):
+        self.signal(signal.SIGCONT)
+        self.process.stop()
+
+
+class Site:
+    """The device behind a gateway, with one client that reads and one that can be stopped."""
+
+    def __init__(self, folder, node, url, send_stall_ms):
+        self._log = folder / "gateway.log"
+        self.gateway, port = start_gateway(folder, url, device={"mode": "shared"}, limits={"client_queue_bytes": QUEUE},
+                                           timeouts={"send_stall_ms": send_stall_ms})
+        self._url = f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=credit"
+        self.slow = Reader(folder, self._url)
+        self.device = node.ConnectService(url)
+        self.root = node.ConnectService(self._url)
+        self.frames = []
+        self.news = News()
+        self._published = 0
+        self.root.frames.Connect(-1).PacketReceivedEvent += self._receive
+
+    def _receive(self, endpoint):
+        while endpoint.Available:
+            frame = endpoint.ReceivePacket()
+            self.frames.append(int.from_bytes(bytes(frame[:4]), "little"))
+            self.news.add(self.frames[-1])
+
+    def publish(self):
+        self._published += 1
+        self.device.publish(self._published, FRAME)
+        return self._published
+
+    def has_logged(self, text):
+        return text in self._log.read_text()
+
+    def publish_until(self, is_so):
+        """One after the other, each when the last one has come, or can't."""
+        while not is_so():
+            number = self.publish()
+            self.gateway.wait_until(lambda: number in self.frames or is_so())
+
+    def publish_until_held(self):
+        """The other one stops reading. Returns how many frames had been published when the device was held back."""
+        self.publish_until(lambda: len(self.frames) == 3)
+        self.gateway.wait_until(lambda: self.slow.numbers() == self.frames)
+        self.slow.signal(signal.SIGSTOP)
+        self.publish_until(lambda: self.has_logged(SLOW))
+        return self._published
+
+    def publish_many(self):
+        """More than may wait for a client. Each is followed by a call, in whose time an acknowledgement would come."""
+        for _ in range(3 * QUEUE // FRAME):
+            self.publish()
+            self.root.number_of_orders()
+
+    def close(self, node):
+        node.DisconnectService(self.root)
+        node.DisconnectService(self.device)
+        self.slow.stop()
+        assert self.gateway.stop() == 0, self.gateway.description()
+
+
+def test_the_slowest_reader_sets_the_pace(tmp_path, node, device):  # noqa: F811
+    site = Site(tmp_path, node, device[1], send_stall_ms=60_000)
+    try:
+        held_at = site.publish_until_held()
+        site.publish_many()
+        # What was read from the device in one go is acknowledged before it is handed on.
+        assert len(site.frames) <= held_at + 3 * BACKLOG, (held_at, site.frames)
+        site.slow.signal(signal.SIGCONT)
+        site.gateway.wait_until(lambda: site.slow.numbers() == site.frames)
+        before = len(site.frames)
+        site.gateway.wait_until(lambda: site.publish() and len(site.frames) >= before + 2 * BACKLOG)
+        site.gateway.wait_until(lambda: site.slow.numbers() == site.frames)
+        assert not site.has_logged("client closed"), site.gateway.description()
+    finally:
+        site.close(node)
+
+
+def test_the_device_goes_on_without_the_slow_one(tmp_path, node, device):  # noqa: F811
+    """Who takes nothing for `send_stall_ms` is cut as ever, and keeps nobody waiting any more."""
+    site = Site(tmp_path, node, device[1], send_stall_ms=1000)
+    try:
+        site.publish_until_held()
+        site.gateway.wait_until(lambda: site.has_logged("peer too slow"))
+        before = len(site.frames)
+        site.gateway.wait_until(lambda: site.publish() and len(site.frames) >= before + 2 * BACKLOG)
+    finally:
+        site.close(node)
+
+
+def test_packets_of_clients_are_acknowledged_by_the_device(tmp_path, node, device):  # noqa: F811
+    process, url = device
+    gateway, port = start_gateway(tmp_path, url, device={"mode": "shared"})
+    try:
+        root = node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=credit")
+        orders = root.orders.Connect(-1)
+        orders.RequestPacketAck = True
+        acknowledged = []
+        news = News()
+
+        def note(endpoint, number):
+            acknowledged.append(number)
+            news.add(number)
+
+        orders.PacketAckReceivedEvent += note
+        sent = News()
+        order = numpy.zeros((8,), numpy.uint8)
+        orders.AsyncSendPacket(order, lambda number, error: sent.add(number))
+        news.wait_for(lambda number: number == 1)
+        process.process.send_signal(signal.SIGSTOP)
+        for _ in range(3):
+            orders.AsyncSendPacket(order, lambda number, error: sent.add(number))
+        sent.wait_for(lambda number: number == 4)
+        node.GetServiceAttributes(root)  # the gateway answers it by itself
+        assert acknowledged == [1]
+        process.process.send_signal(signal.SIGCONT)
+        news.wait_for(lambda number: number == 4)
+        assert sorted(acknowledged) == [1, 2, 3, 4]
+        assert root.number_of_orders() == 4
+        node.DisconnectService(root)
+    finally:
+        gateway.stop()
