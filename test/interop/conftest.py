@@ -3,12 +3,13 @@ import faulthandler
 import json
 import os
 import shutil
+import sys
 import tempfile
 
 import pytest
 
 from clients import Chromium
-from directions import DIRECTIONS, LEVELS, LOCAL_URL, service_command
+from directions import DIRECTIONS, LEVELS, LOCAL_URL, PEERS, service_command
 from matrix import Matrix
 from processes import ROOT, Background, start_gateway
 
@@ -48,6 +49,17 @@ def pytest_runtest_logreport(report):
 def pytest_sessionfinish(session):
     if not hasattr(session.config, "workerinput"):  # of the process that hears from all others
         matrix.write(ROOT / "build" / "test-logs" / "interop-matrix.md")
+
+
+@pytest.fixture(scope="session")
+def node():
+    """The real package in this process: it starts once, and not again."""
+    import RobotRaconteur as RR
+    sys.path.insert(0, str(PEERS))
+    import quiet_node
+    setup = RR.ClientNodeSetup(argv=["test", *(f"--robotraconteur-{name}={value}" for name, value in quiet_node.QUIET.items())])
+    yield RR.RobotRaconteurNode.s
+    setup.close()
 
 
 @pytest.fixture(autouse=True)

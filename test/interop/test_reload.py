@@ -21,7 +21,6 @@ from test_access import PASSWORDS, Answer, basic, make_users, rrgate
 from test_http_api import Stream
 from test_json_websocket import PROTOCOL
 from test_operations import Gateway
-from test_shared import node  # noqa: F401 - a fixture
 from test_tls import SERVICE, lab, start_service  # noqa: F401
 
 READING = [
@@ -60,7 +59,7 @@ def devices(lab, tmp_path_factory):  # noqa: F811
 class Site:
     """A gateway on two addresses, with everything that can be read anew."""
 
-    def __init__(self, folder, devices, device_ca, is_handed_over):  # noqa: F811
+    def __init__(self, folder, devices, device_ca, is_handed_over):
         self.folder = folder
         shared, relayed = devices
         rrgate("cert", "ca", folder / "web")
@@ -176,7 +175,7 @@ def event_client(name, site, headers):
     return Client(name, exchange, close)
 
 
-def rr_client(name, node, *login):  # noqa: F811
+def rr_client(name, node, *login):
     root = node.ConnectService(name, *login)
 
     def exchange(_):
@@ -187,7 +186,7 @@ def rr_client(name, node, *login):  # noqa: F811
 
 
 @contextlib.contextmanager
-def all_at_work(site, node):  # noqa: F811
+def all_at_work(site, node):
     port, vera = site.port, basic("vera")
     wendy = site.people.certificate("wendy")
     clients = [

@@ -18,21 +18,12 @@ from scenarios import POSE
 from test_access import PASSWORDS, RULES, make_users
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent / "peers"))
-import quiet_node  # noqa: E402
 from values import Values  # noqa: E402
 
 OURS = next(each for each in DIRECTIONS if each.name == "reference-to-ours")
 SERVICES = {"interop", "guarded", "open", "proven", "RobotRaconteurServiceIndex"}  # of the test service's node
 PATIENCE = 20.0  # seconds for what has to come by itself
 GATEWAY_ID = "5c0ffee0-1111-4222-8333-944455556666"
-
-
-@pytest.fixture(scope="module")
-def node():
-    argv = [f"--robotraconteur-{name}={value}" for name, value in quiet_node.QUIET.items()]
-    setup = RR.ClientNodeSetup(argv=["test", *argv])
-    yield RR.RobotRaconteurNode.s
-    setup.close()
 
 
 def start_service(folder, *options):

@@ -3,6 +3,7 @@
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/use_awaitable.hpp>
 
+#include "server/gateway/http_access.hpp"
 #include "server/gateway/shared/shared_access.hpp"
 #include "server/log/log.hpp"
 
