@@ -10,7 +10,7 @@ import pytest
 import RobotRaconteur as RR
 
 from processes import Background, start_gateway
-from test_shared import News, node  # noqa: F401
+from test_shared import News
 
 PEERS = pathlib.Path(__file__).parent / "peers"
 sys.path.insert(0, str(PEERS))
@@ -109,7 +109,7 @@ class Site:
         assert self.gateway.stop() == 0, self.gateway.description()
 
 
-def test_the_slowest_reader_sets_the_pace(tmp_path, node, device):  # noqa: F811
+def test_the_slowest_reader_sets_the_pace(tmp_path, node, device):
     site = Site(tmp_path, node, device[1], send_stall_ms=60_000)
     try:
         held_at = site.publish_until_held()
@@ -126,7 +126,7 @@ def test_the_slowest_reader_sets_the_pace(tmp_path, node, device):  # noqa: F811
         site.close(node)
 
 
-def test_the_device_goes_on_without_the_slow_one(tmp_path, node, device):  # noqa: F811
+def test_the_device_goes_on_without_the_slow_one(tmp_path, node, device):
     """Who takes nothing for `send_stall_ms` is cut as ever, and keeps nobody waiting any more."""
     site = Site(tmp_path, node, device[1], send_stall_ms=1000)
     try:
@@ -138,7 +138,7 @@ def test_the_device_goes_on_without_the_slow_one(tmp_path, node, device):  # noq
         site.close(node)
 
 
-def test_packets_of_clients_are_acknowledged_by_the_device(tmp_path, node, device):  # noqa: F811
+def test_packets_of_clients_are_acknowledged_by_the_device(tmp_path, node, device):
     process, url = device
     gateway, port = start_gateway(tmp_path, url, device={"mode": "shared"})
     try:
