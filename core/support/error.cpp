@@ -1,6 +1,7 @@
 #include "core/support/error.hpp"
 
 #include <cstdlib>
+#include <exception>
 #ifdef __cpp_exceptions
 #include <stdexcept>
 #endif
@@ -143,3 +144,15 @@ std::string quoted(std::string_view text, std::size_t limit) {
 }
 
 }  // namespace rr
+
+#ifdef BOOST_NO_EXCEPTIONS
+/// Boost reports what cannot happen (a Result read without looking) by throwing; without exceptions the program ends.
+namespace boost {
+BOOST_NORETURN void throw_exception(const std::exception&) {
+  std::abort();
+}
+BOOST_NORETURN void throw_exception(const std::exception&, const boost::source_location&) {
+  std::abort();
+}
+}  // namespace boost
+#endif
