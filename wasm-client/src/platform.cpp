@@ -1,4 +1,4 @@
-// What the C++ library wants from their surroundings: there is no operating system around, only js_values.ts.
+// What the C++ library wants from its surroundings: there is no operating system around, only js_values.ts.
 // Layer: wasm-client/src.
 #include <cstddef>
 #include <cstdlib>

@@ -356,18 +356,17 @@ TEST_CASE("directions: nobody sends against them, and what comes against them is
   Pipe orders("orders");
   CHECK(orders.service->send_pipe_packet(orders.id, Value(1.0), orders.now).error().code ==
         ErrorCode::write_only_member);
-  const auto packet = [](Loopback& pair, std::string_view pipe, std::int32_t index) {
-    return [&pair, pipe, index](Message& message) {
+  const auto packet = [](std::string_view pipe, std::int32_t index) {
+    return [pipe, index](Message& message) {
       message.begin_entry(EntryType::pipe_packet, "arm", pipe);
       add_packet(message, index, 1, 1.0, true);
     };
   };
-  orders.client->handle_bytes(encode_from(orders.client->connection(), packet(orders, "orders", orders.index)),
-                              orders.now);
+  orders.client->handle_bytes(encode_from(orders.client->connection(), packet("orders", orders.index)), orders.now);
   orders.pump();
   CHECK_FALSE(orders.client->poll_event());
   CHECK(orders.next_service<PipeAcknowledged>().numbers == std::vector<std::uint32_t>{1});
-  poses.service->handle_bytes(encode_from(poses.service->connection(), packet(poses, "poses", poses.index)), poses.now);
+  poses.service->handle_bytes(encode_from(poses.service->connection(), packet("poses", poses.index)), poses.now);
   poses.pump();
   CHECK_FALSE(poses.service->poll_event());
   CHECK(poses.next_client<PipePacketsAcknowledged>().numbers == std::vector<std::uint32_t>{1});
