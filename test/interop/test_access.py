@@ -222,6 +222,7 @@ def test_tickets_for_pages(guarded):
 def test_the_audit_log_tells_who_did_what(guarded):
     ask(guarded.port, "PUT", BASE + "/p_double", 2.5, basic("alice"))
     ask(guarded.port, "PUT", BASE + "/p_int32", 2, basic("vera"))
+    ask(guarded.port, "POST", BASE + "/add", {"left": 1, "right": 2}, basic("alice"))
     lines = audit_of(guarded)
     wrote = next(line for line in reversed(lines) if line["event"] == "write")
     assert (wrote["user"], wrote["proof"], wrote["device"], wrote["path"], wrote["member"]) == \
@@ -474,14 +475,13 @@ def test_users_and_rights_are_read_anew_and_sessions_go_on(device, tmp_path):
         for thread in loads:
             thread.start()
         # A new user.
-        PASSWORDS["carol"] = "new"
         rrgate("passwd", tmp_path / "users", "carol", "--roles", "operator", given="new\n")
         gateway.wait_for("users and rights read anew")
-        assert ask(gateway.port, "PUT", BASE + "/p_double", 1.5, basic("carol")).status == 204
+        assert ask(gateway.port, "PUT", BASE + "/p_double", 1.5, basic("carol", "new")).status == 204
         # Other rights.
         gateway.write({**gateway.config, "access": {**access, "rules": RULES[:1] + RULES[2:]}})
         gateway.wait_for("configuration read anew")
-        assert ask(gateway.port, "PUT", BASE + "/p_double", 1.5, basic("carol")).status == 403
+        assert ask(gateway.port, "PUT", BASE + "/p_double", 1.5, basic("carol", "new")).status == 403
         # A file that can't be used changes nothing.
         (tmp_path / "users").write_text("broken\n")
         gateway.hang_up()
@@ -493,7 +493,7 @@ def test_users_and_rights_are_read_anew_and_sessions_go_on(device, tmp_path):
         rrgate("passwd", make_users_again / "users", "vera", "--roles", "viewer", given=PASSWORDS["vera"] + "\n")
         (make_users_again / "users").replace(tmp_path / "users")
         gateway.wait_for("users and rights read anew", 2)
-        assert ask(gateway.port, "GET", BASE + "/p_double", headers=basic("carol")).status == 401
+        assert ask(gateway.port, "GET", BASE + "/p_double", headers=basic("carol", "new")).status == 401
         ended.set()
         for thread in loads:
             thread.join()
