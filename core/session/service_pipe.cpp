@@ -36,6 +36,7 @@ void ServiceSession::forget_pipe(PipeId id) {
   indices->second.erase(pipe->second.index);
   if (indices->second.empty()) pipe_indices_.erase(indices);
   ended_.pipes.add(pipe->second.ledger);
+  if (pipe->second.state.state() == PipeState::connecting) release_pass(pipe->second.request_id);
   pipes_.erase(pipe);
 }
 
@@ -117,7 +118,6 @@ void ServiceSession::release_pipes(std::string_view path) {
   for (const auto& [id, pipe] : pipes_)
     if (is_within(pipe.key->path, path)) released.push_back(id);
   for (const auto id : released) {
-    if (const auto* pipe = find_pipe(id); pipe->state.state() == PipeState::connecting) release_pass(pipe->request_id);
     forget_pipe(id);
     events_.push_back(PipeClosed{id});
   }

@@ -53,9 +53,9 @@ def ask(port, method, path, body=None, headers={}, base=BASE):
 class Stream:
     """Server-sent events: (id, event, data) as they come."""
 
-    def __init__(self, port, path, headers={}):
-        self.connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
-        self.connection.request("GET", BASE + path, headers={"Accept": "text/event-stream", **headers})
+    def __init__(self, port, path, headers={}, base=BASE, connection=None):
+        self.connection = connection or http.client.HTTPConnection("127.0.0.1", port, timeout=20)
+        self.connection.request("GET", base + path, headers={"Accept": "text/event-stream", **headers})
         self.response = self.connection.getresponse()
         assert self.response.status == 200, self.response.read()
         assert self.response.headers["Content-Type"] == "text/event-stream"

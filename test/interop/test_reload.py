@@ -156,11 +156,7 @@ def json_client(name, url, **options):
 
 
 def event_client(name, site, headers):
-    stream = Stream.__new__(Stream)
-    stream.connection = site.https()
-    stream.connection.request("GET", "/api/v1/devices/shared/interop/changed", headers={"Accept": "text/event-stream", **headers})
-    stream.response = stream.connection.getresponse()
-    assert stream.response.status == 200, stream.response.read()
+    stream = Stream(site.port, "/changed", headers, "/api/v1/devices/shared/interop", site.https())
     caller = site.https()
     caller.connect()
 

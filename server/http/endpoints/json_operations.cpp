@@ -110,7 +110,7 @@ rr::awaitable<void> JsonOperations::take(const std::string& message) {
         gateway_.http_access().enter(place_.address, user, place_.device->config().name, gateway_.config().rates);
     if (!entered) {
       gateway_.reject(Rejection::rate);
-      co_return tell_too_much(request->id(), entered.error());
+      co_return outbox_->add(json_refusal(request->id(), entered.error(), 1));
     }
     passes = std::move(*entered);
   }
@@ -172,13 +172,6 @@ std::shared_ptr<DeviceSession> JsonOperations::session() {
 
 void JsonOperations::tell_error(const std::string& id, const rr::Error& error) {
   outbox_->add(json_refusal(id, error));
-}
-
-void JsonOperations::tell_too_much(const std::string& id, const rr::Error& error) {
-  static const rr::TypeRegistry no_types;
-  auto told = rr::error_to_json(error, no_types);
-  rr::add_key(told["error"], "retry_after") = 1;
-  outbox_->add("{\"id\":" + id + "," + rr::write_json(told).substr(1));
 }
 
 void JsonOperations::stop() {

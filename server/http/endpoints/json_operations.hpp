@@ -71,8 +71,6 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
   rr::awaitable<TargetPtr> find(RequestPtr request, const Operation& operation);
   std::shared_ptr<DeviceSession> session();
   void tell_error(const std::string& id, const rr::Error& error);
-  /// The same error for good once a second has passed.
-  void tell_too_much(const std::string& id, const rr::Error& error);
 
   rr::awaitable<rr::OrderedJson> describe(RequestPtr request, TargetPtr target);
   rr::awaitable<rr::OrderedJson> get(RequestPtr request, TargetPtr target);

@@ -63,10 +63,11 @@ std::string json_answer(const std::string& id, const rr::OrderedJson& result) {
   return "{\"id\":" + id + ",\"result\":" + rr::write_json(result) + "}";
 }
 
-std::string json_refusal(const std::string& id, const rr::Error& error) {
+std::string json_refusal(const std::string& id, const rr::Error& error, std::optional<int> retry_after) {
   static const rr::TypeRegistry no_types;
-  const auto told = rr::write_json(rr::error_to_json(error, no_types));
-  return "{\"id\":" + id + "," + told.substr(1);
+  auto told = rr::error_to_json(error, no_types);
+  if (retry_after) rr::add_key(told["error"], "retry_after") = *retry_after;
+  return "{\"id\":" + id + "," + rr::write_json(told).substr(1);
 }
 
 }  // namespace rrgate

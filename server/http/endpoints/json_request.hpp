@@ -35,8 +35,8 @@ class JsonRequest {
   std::string id_ = "null";
 };
 
-// Texts of messages to the client. `id` is that of a request.
+// Texts of messages to the client. `id` is that of a request; `retry_after` the seconds until it may be asked again.
 std::string json_answer(const std::string& id, const rr::OrderedJson& result);
-std::string json_refusal(const std::string& id, const rr::Error& error);
+std::string json_refusal(const std::string& id, const rr::Error& error, std::optional<int> retry_after = {});
 
 }  // namespace rrgate

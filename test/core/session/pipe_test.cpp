@@ -140,6 +140,15 @@ Features only_version_2() {
   return features;
 }
 
+/// The same two with other bounds.
+void start_again(Loopback& pair, ClientOptions options, ServiceSessionOptions service_options = {}) {
+  options.connection.self = {client_id, ""};
+  options.service = "arm";
+  pair.client = std::make_unique<ClientSession>(std::move(options), pair.now);
+  pair.service = std::make_unique<ServiceSession>(pair.directory, std::move(service_options), pair.now);
+  pair.connect();
+}
+
 }  // namespace
 
 TEST_CASE("packets go both ways, with numbers and acknowledgements, in both versions") {
@@ -306,12 +315,8 @@ TEST_CASE("a service that does not mind credit is held back no packet more than 
   Loopback pair;
   pair.connect();
   ClientOptions options;
-  options.connection.self = {client_id, ""};
-  options.service = "arm";
   options.max_held_acks = 3;
-  pair.client = std::make_unique<ClientSession>(options, pair.now);
-  pair.service = std::make_unique<ServiceSession>(pair.directory, ServiceSessionOptions{}, pair.now);
-  pair.connect();
+  start_again(pair, options);
   const auto request = pair.client->connect_pipe("arm", "samples", any_pipe_index, pair.now);
   pair.pump();
   const auto id = pair.next_service<PipeConnected>().id;
@@ -515,14 +520,10 @@ TEST_CASE("a stalled stream is the sender's error, and nothing is lost") {
   Loopback pair;
   pair.connect();
   ClientOptions options;
-  options.connection.self = {client_id, ""};
-  options.service = "arm";
   options.max_pipe_queued_bytes = 1000;
-  pair.client = std::make_unique<ClientSession>(options, pair.now);
   ServiceSessionOptions service_options;
   service_options.max_pipe_queued_bytes = 1000;
-  pair.service = std::make_unique<ServiceSession>(pair.directory, service_options, pair.now);
-  pair.connect();
+  start_again(pair, options, service_options);
   const auto request = pair.client->connect_pipe("arm", "samples", any_pipe_index, pair.now);
   pair.pump();
   const auto id = pair.next_service<PipeConnected>().id;

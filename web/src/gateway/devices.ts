@@ -2,6 +2,8 @@
 // Layer: web/gateway. Source: GET /api/v1/devices.
 
 import { Store } from "../app/store";
+import { is_record, text } from "./fields";
+import { Poller, reason_of } from "./poller";
 
 export type DeviceState = "online" | "offline" | "connecting";
 
@@ -36,59 +38,36 @@ export type GatewayState =
   | { kind: "away"; since: number; reason: string; devices: Device[] | null };
 
 const POLL_MS = 2_000;
-const DEADLINE_MS = 5_000;
 
 export class DeviceList {
   readonly state = new Store<GatewayState>({ kind: "loading" });
-  #timer: ReturnType<typeof setTimeout> | undefined;
-  #abort: AbortController | null = null;
-
-  start(): void {
-    document.addEventListener("visibilitychange", this.#on_visibility);
-    void this.#poll();
-  }
-
-  stop(): void {
-    document.removeEventListener("visibilitychange", this.#on_visibility);
-    clearTimeout(this.#timer);
-    this.#abort?.abort();
-    this.#abort = null;
-  }
-
-  /** Asks now. */
-  refresh(): void {
-    if (this.#abort) return;
-    clearTimeout(this.#timer);
-    void this.#poll();
-  }
-
-  readonly #on_visibility = (): void => {
-    if (!document.hidden) this.refresh();
-  };
-
-  async #poll(): Promise<void> {
-    const abort = new AbortController();
-    this.#abort = abort;
-    const deadline = setTimeout(() => abort.abort(new Error("the gateway did not answer within 5 s")), DEADLINE_MS);
-    try {
-      const devices = await fetch_devices(abort.signal);
-      if (this.#abort !== abort) return;
-      this.state.value = { kind: "known", devices };
-    } catch (error) {
-      if (this.#abort !== abort) return;
+  readonly #poller = new Poller<Device[]>({
+    ask: fetch_devices,
+    answered: (devices) => (this.state.value = { kind: "known", devices }),
+    failed: (error) => {
       const before = this.state.value;
       this.state.value = {
         kind: "away",
         since: before.kind === "away" ? before.since : Date.now(),
-        reason: error instanceof TypeError ? "the gateway cannot be reached" : (error as Error).message,
-        devices: before.kind === "loading" ? null : before.devices,
+        reason: reason_of(error),
+        devices: devices_of(before),
       };
-    } finally {
-      clearTimeout(deadline);
-    }
-    this.#abort = null;
-    // A hidden tab asks five times less often: enough to be right when it is shown.
-    this.#timer = setTimeout(() => void this.#poll(), document.hidden ? POLL_MS * 5 : POLL_MS);
+    },
+    period: POLL_MS,
+    hidden_period: POLL_MS * 5, // enough to be right when it is shown
+  });
+
+  start(): void {
+    this.#poller.start();
+  }
+
+  stop(): void {
+    this.#poller.stop();
+  }
+
+  /** Asks now. */
+  refresh(): void {
+    this.#poller.refresh();
   }
 }
 
@@ -127,14 +106,6 @@ function read_services(services: unknown): Service[] {
 
 function state_of(state: unknown): DeviceState {
   return state === "online" || state === "connecting" ? state : "offline";
-}
-
-function text(value: unknown): string {
-  return typeof value === "string" ? value : "";
-}
-
-function is_record(value: unknown): value is Record<string, unknown> {
-  return typeof value === "object" && value !== null;
 }
 
 /** Where a service of a device is reached through the gateway that served this page. */

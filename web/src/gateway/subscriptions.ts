@@ -2,6 +2,8 @@
 // Layer: web/gateway. Source: GET /api/v1/devices/NAME/subscriptions.
 
 import { Store } from "../app/store";
+import { is_record, text } from "./fields";
+import { Poller, reason_of } from "./poller";
 
 export interface Subscription {
   client: string;
@@ -27,52 +29,28 @@ export type SubscriptionsState =
   | { kind: "away"; since: number; reason: string; subscriptions: Subscription[] | null };
 
 const POLL_MS = 3_000;
-const DEADLINE_MS = 5_000;
 
 export class SubscriptionList {
   readonly state = new Store<SubscriptionsState>({ kind: "loading" });
   readonly #device: string;
-  #timer: ReturnType<typeof setTimeout> | undefined;
-  #abort: AbortController | null = null;
+  readonly #poller = new Poller<SubscriptionsState>({
+    ask: (signal) => this.#fetch(signal),
+    answered: (next) => (this.state.value = next),
+    failed: (error) => (this.state.value = away_after(this.state.value, error, Date.now())),
+    period: POLL_MS,
+    hidden_period: null, // nobody looks at a hidden tab
+  });
 
   constructor(device: string) {
     this.#device = device;
   }
 
   start(): void {
-    document.addEventListener("visibilitychange", this.#on_visibility);
-    void this.#poll();
+    this.#poller.start();
   }
 
   stop(): void {
-    document.removeEventListener("visibilitychange", this.#on_visibility);
-    clearTimeout(this.#timer);
-    this.#abort?.abort();
-    this.#abort = null;
-  }
-
-  readonly #on_visibility = (): void => {
-    clearTimeout(this.#timer);
-    if (!document.hidden && !this.#abort) void this.#poll();
-  };
-
-  async #poll(): Promise<void> {
-    const abort = new AbortController();
-    this.#abort = abort;
-    const deadline = setTimeout(() => abort.abort(new Error("the gateway did not answer within 5 s")), DEADLINE_MS);
-    let next: SubscriptionsState;
-    try {
-      next = await this.#fetch(abort.signal);
-    } catch (error) {
-      next = away_after(this.state.value, error, Date.now());
-    } finally {
-      clearTimeout(deadline);
-    }
-    if (this.#abort !== abort) return; // stopped meanwhile
-    this.#abort = null;
-    this.state.value = next;
-    // Nobody looks at a hidden tab; it asks again once it is shown.
-    if (!document.hidden) this.#timer = setTimeout(() => void this.#poll(), POLL_MS);
+    this.#poller.stop();
   }
 
   async #fetch(signal: AbortSignal): Promise<SubscriptionsState> {
@@ -91,7 +69,7 @@ export function away_after(before: SubscriptionsState, error: unknown, now: numb
   return {
     kind: "away",
     since: before.kind === "away" ? before.since : now,
-    reason: error instanceof TypeError ? "the gateway cannot be reached" : (error as Error).message,
+    reason: reason_of(error),
     subscriptions: subscriptions_of(before),
   };
 }
@@ -105,7 +83,7 @@ export function read_subscriptions(answer: unknown): Subscription[] {
   const list = (answer as { subscriptions?: unknown } | null)?.subscriptions;
   if (!Array.isArray(list)) throw new Error('the answer of the gateway has no list "subscriptions"');
   return list
-    .filter((each): each is Record<string, unknown> => typeof each === "object" && each !== null)
+    .filter(is_record)
     .map((each) => ({
       client: text(each["client"]),
       path: text(each["path"]),
@@ -122,10 +100,6 @@ export function read_subscriptions(answer: unknown): Subscription[] {
 
 function compare(a: string, b: string): number {
   return a < b ? -1 : a > b ? 1 : 0;
-}
-
-function text(value: unknown): string {
-  return typeof value === "string" ? value : "";
 }
 
 function count(value: unknown): number {
