@@ -4,6 +4,7 @@ import contextlib
 import http.client
 import itertools
 import json
+import signal
 import socket
 import ssl
 import subprocess
@@ -421,17 +422,23 @@ def test_rates_of_requests_in_a_shared_session(device, tmp_path):
         assert count >= len([each for each in outcomes if each != "float"])
 
 
-def test_rates_of_requests_over_json_on_a_websocket(device, tmp_path):
+def test_rates_of_requests_over_json_on_a_websocket(tmp_path):
     make_users(tmp_path)
+    service = Background([sys.executable, PEERS / "service.py"], tmp_path / "service.log")
+    device = json.loads(service.next_line())["url"]
     rates = {"user": {"per_second": 5}, "device": {"at_once": 2}}
     with running(tmp_path, device, {"users_file": "users"}, rates=rates) as gateway:
-        def answers(user, requests):
+        def answers(user, requests, is_stopped=False):
             with json_socket(gateway.port, basic(user)) as link:
+                if is_stopped:  # so that none is answered before the last one is there
+                    service.process.send_signal(signal.SIGSTOP)
                 for number, request in enumerate(requests):
                     link.send(json.dumps({"id": number, **request}))
                 found = {}
                 while len(found) < len(requests):
                     answer = json.loads(link.recv(20))
+                    if is_stopped and "error" in answer:
+                        service.process.send_signal(signal.SIGCONT)
                     if "id" in answer:
                         found[answer["id"]] = answer
                 return list(found.values())
@@ -451,11 +458,12 @@ def test_rates_of_requests_over_json_on_a_websocket(device, tmp_path):
         refused = [answer for answer in found if "error" in answer]
         assert refused and all(is_refused(answer, "5 requests a second of") for answer in refused), refused
         # Many at once: some are too many, and none is left without an answer.
-        found = answers("root", [{"op": "get", "path": "p_double"}] * 4)
+        found = answers("root", [{"op": "get", "path": "p_double"}] * 4, is_stopped=True)
         assert any("result" in answer for answer in found) and any(is_refused(answer, "2 at once to device") for answer in found), found
         # What is sent on a wire is no request.
         found = answers("vera", [{"op": "send", "path": "both", "value": 1.0}] * 40)
         assert all("result" in answer for answer in found), found
+    service.stop()
 
 
 def test_users_and_rights_are_read_anew_and_sessions_go_on(device, tmp_path):
