@@ -73,10 +73,19 @@ class Background:
     def description(self):
         return f"{' '.join(self.command)}\n(exit {self.process.poll()}) {self._log.read_text(errors='replace')[-4000:]}"
 
+    def pause(self):
+        """It stands still until it is resumed or ended. Returns when each of its threads does: a signal takes its time."""
+        self.process.send_signal(signal.SIGSTOP)
+        os.waitid(os.P_PID, self.process.pid, os.WSTOPPED | os.WEXITED | os.WNOWAIT)
+
+    def resume(self):
+        self.process.send_signal(signal.SIGCONT)
+
     def stop(self):
         """Asks, then kills. Returns the exit code, or None where it had to be killed."""
         code = None
         try:
+            self.resume()
             self.process.stdin.close()
             self.process.send_signal(signal.SIGTERM)
             code = self.process.wait(10)

@@ -4,7 +4,6 @@ import contextlib
 import http.client
 import itertools
 import json
-import signal
 import socket
 import ssl
 import subprocess
@@ -431,14 +430,14 @@ def test_rates_of_requests_over_json_on_a_websocket(tmp_path):
         def answers(user, requests, is_stopped=False):
             with json_socket(gateway.port, basic(user)) as link:
                 if is_stopped:  # so that none is answered before the last one is there
-                    service.process.send_signal(signal.SIGSTOP)
+                    service.pause()
                 for number, request in enumerate(requests):
                     link.send(json.dumps({"id": number, **request}))
                 found = {}
                 while len(found) < len(requests):
                     answer = json.loads(link.recv(20))
                     if is_stopped and "error" in answer:
-                        service.process.send_signal(signal.SIGCONT)
+                        service.resume()
                     if "id" in answer:
                         found[answer["id"]] = answer
                 return list(found.values())

@@ -2,7 +2,6 @@
 real package."""
 import json
 import pathlib
-import signal
 import sys
 
 import numpy
@@ -21,35 +20,23 @@ QUEUE = 8_000_000  # bytes that may wait for a client; above a quarter of it the
 SLOW = "client reads slowly"
 
 
-def start_peer(program, folder, *arguments):
-    process = Background([sys.executable, PEERS / program, *arguments], folder / f"{program}.log")
-    return process, json.loads(process.next_line())
-
-
 @pytest.fixture
 def device(tmp_path):
-    process, ready = start_peer("credit_service.py", tmp_path)
-    yield process, ready["url"]
-    process.process.send_signal(signal.SIGCONT)
+    process = Background([sys.executable, PEERS / "credit_service.py"], tmp_path / "credit_service.log")
+    yield process, json.loads(process.next_line())["url"]
     process.stop()
 
 
-class Reader:
-    """A client in a process of its own, which can be stopped: then nobody reads from its connection."""
+class Reader(Background):
+    """A client in a process of its own, which can be paused: then nobody reads from its connection."""
 
     def __init__(self, folder, url):
-        self.process, _ = start_peer("frame_reader.py", folder, url)
+        super().__init__([sys.executable, PEERS / "frame_reader.py", url], folder / "frame_reader.log")
+        self.next_line()
 
     def numbers(self):
-        self.process.write_line("numbers")
-        return json.loads(self.process.next_line())
-
-    def signal(self, which):
-        self.process.process.send_signal(which)
-
-    def stop(self):
-        self.signal(signal.SIGCONT)
-        self.process.stop()
+        self.write_line("numbers")
+        return json.loads(self.next_line())
 
 
 class Site:
@@ -92,7 +79,7 @@ class Site:
         """The other one stops reading. Returns how many frames had been published when the device was held back."""
         self.publish_until(lambda: len(self.frames) == 3)
         self.gateway.wait_until(lambda: self.slow.numbers() == self.frames)
-        self.slow.signal(signal.SIGSTOP)
+        self.slow.pause()
         self.publish_until(lambda: self.has_logged(SLOW))
         return self._published
 
@@ -116,7 +103,7 @@ def test_the_slowest_reader_sets_the_pace(tmp_path, node, device):
         site.publish_many()
         # What was read from the device in one go is acknowledged before it is handed on.
         assert len(site.frames) <= held_at + 3 * BACKLOG, (held_at, site.frames)
-        site.slow.signal(signal.SIGCONT)
+        site.slow.resume()
         site.gateway.wait_until(lambda: site.slow.numbers() == site.frames)
         before = len(site.frames)
         site.gateway.wait_until(lambda: site.publish() and len(site.frames) >= before + 2 * BACKLOG)
@@ -157,13 +144,13 @@ def test_packets_of_clients_are_acknowledged_by_the_device(tmp_path, node, devic
         order = numpy.zeros((8,), numpy.uint8)
         orders.AsyncSendPacket(order, lambda number, error: sent.add(number))
         news.wait_for(lambda number: number == 1)
-        process.process.send_signal(signal.SIGSTOP)
+        process.pause()
         for _ in range(3):
             orders.AsyncSendPacket(order, lambda number, error: sent.add(number))
         sent.wait_for(lambda number: number == 4)
         node.GetServiceAttributes(root)  # the gateway answers it by itself
         assert acknowledged == [1]
-        process.process.send_signal(signal.SIGCONT)
+        process.resume()
         for expected in (2, 3, 4):  # the package takes them side by side, in any order
             news.wait_for(lambda number: number == expected)
         assert sorted(acknowledged) == [1, 2, 3, 4]

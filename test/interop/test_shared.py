@@ -1,9 +1,7 @@
 """Shared devices: many clients, one session with the device. The clients here are those of the real package; what single
 members do is test_interop.py's, whose scenarios all run through a shared device as well."""
 import json
-import os
 import pathlib
-import signal
 import sys
 import threading
 
@@ -164,14 +162,14 @@ def test_a_client_hears_of_its_losses(node, site, tmp_path):
     try:
         client.next_line()
         publisher = node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop")
-        os.kill(client.process.pid, signal.SIGSTOP)
+        client.pause()
 
         def conflated():
             publisher.publish_state(numpy.zeros(100_000))
             subscriptions = read_json(f"http://127.0.0.1:{port}/api/v1/devices/interop/subscriptions")["subscriptions"]
             return sum(each["conflated"] for each in subscriptions)
         client.wait_until(lambda: conflated() >= 3)
-        os.kill(client.process.pid, signal.SIGCONT)
+        client.resume()
         told = ask_losses(client)
         assert told["wire"]["conflated"] >= 3 and told["wire"]["delivered"] >= 1 and told["wire"]["dropped"] == 0, told
         assert told["wire"]["ageP99"] >= told["wire"]["ageP50"] > 0
