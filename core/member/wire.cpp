@@ -11,6 +11,23 @@ Result<> write_wire_value(Message& message, const Value& value, TimeSpec time, c
   return pack(message, "packet", value, member.type, types);
 }
 
+Result<> write_wire_packet(Message& message, std::string_view path, const MemberDefinition& member, const Value& value,
+                           TimeSpec time, const TypeRegistry& types) {
+  message.header.metadata = unreliable_metadata;
+  message.begin_entry(EntryType::wire_packet, path, member.name).metadata = unreliable_metadata;
+  return write_wire_value(message, value, time, member, types);
+}
+
+Result<SharedMessage*> WirePacket::message(const TypeRegistry& types) {
+  auto& message = message_.message;
+  if (!message.entries.empty()) return &message_;
+  if (auto written = write_wire_packet(message, path_, member_, value_, time_, types); !written) {
+    message.clear();
+    return written.error();
+  }
+  return &message_;
+}
+
 Result<WireValue> read_wire_value(const Message& message, const MessageEntry& entry, const MemberDefinition& member,
                                   const TypeRegistry& types) {
   const auto elements = message.elements_of(entry);

@@ -6,6 +6,7 @@
 #include "core/member/ledger.hpp"
 #include "core/support/time.hpp"
 #include "core/types/pack.hpp"
+#include "core/wire/shared_message.hpp"
 
 namespace rr {
 
@@ -18,10 +19,38 @@ inline constexpr std::size_t wire_high_mark = 64 * 1024;
 /// Adds `packettime` and `packet` to the last entry.
 Result<> write_wire_value(Message& message, const Value& value, TimeSpec time, const MemberDefinition& member,
                           const TypeRegistry& types);
+/// Makes an empty message a wire packet. What cannot be packed leaves it half written.
+Result<> write_wire_packet(Message& message, std::string_view path, const MemberDefinition& member, const Value& value,
+                           TimeSpec time, const TypeRegistry& types);
 
 struct WireValue {
   TimeSpec time;
   Value value;
+};
+
+/// A value on its way to all who have connected a wire; packed and encoded once for them.
+class WirePacket {
+ public:
+  /// `path`, `member` and `value` are borrowed. `arrived` is when the value came here.
+  WirePacket(std::string_view path, const MemberDefinition& member, const Value& value, TimeSpec time,
+             TimePoint arrived)
+      : path_(path), member_(member), value_(value), time_(time), arrived_(arrived) {}
+
+  std::string_view path() const { return path_; }
+  const MemberDefinition& member() const { return member_; }
+  const Value& value() const { return value_; }
+  TimeSpec time() const { return time_; }
+  TimePoint arrived() const { return arrived_; }
+  /// Packed by the first call. Errors   those of pack().
+  Result<SharedMessage*> message(const TypeRegistry& types);
+
+ private:
+  std::string_view path_;
+  const MemberDefinition& member_;
+  const Value& value_;
+  TimeSpec time_;
+  TimePoint arrived_;
+  SharedMessage message_;
 };
 
 /// Reads `packettime` and `packet`.

@@ -285,9 +285,7 @@ Result<> ClientSession::send_wire(std::string_view path, std::string_view member
 Result<> ClientSession::send_wire_packet(const PathMember& key, WireConnection& wire, const Value& value, Now now) {
   wire.waiting.reset();
   connection_.begin_message(outgoing_);
-  outgoing_.header.metadata = unreliable_metadata;
-  outgoing_.begin_entry(EntryType::wire_packet, key.path, key.member).metadata = unreliable_metadata;
-  if (auto written = write_wire_value(outgoing_, value, wire.stamp(now.utc), *wire.member, types_); !written)
+  if (auto written = write_wire_packet(outgoing_, key.path, *wire.member, value, wire.stamp(now.utc), types_); !written)
     return written;
   return send_outgoing(now);
 }

@@ -282,15 +282,34 @@ Result<> Connection::answer_heartbeat(const MessageEntry& entry, Now now) {
 
 void Connection::begin_message(Message& message) {
   message.clear();
-  message.header.sender_endpoint = local_endpoint_;
-  message.header.receiver_endpoint = remote_endpoint_;
-  message.header.receiver_node_id = peer_.id;
-  message.header.receiver_node_name = peer_.name;
-  message.header.message_id = next_message_id_++;
+  address(message.header);
+}
+
+void Connection::address(MessageHeader& header) {
+  header.sender_endpoint = local_endpoint_;
+  header.receiver_endpoint = remote_endpoint_;
+  header.receiver_node_id = peer_.id;
+  header.receiver_node_name = peer_.name;
+  header.message_id = next_message_id_++;
 }
 
 Result<> Connection::send(Message& message, Now now, bool is_urgent) {
   if (state_ == ConnectionState::closed) return close_reason_;
+  complete_header(message);
+  if (auto queued = queue_.push(message, encode_options(), is_urgent); !queued) return queued;
+  return note_sent(now);
+}
+
+Result<> Connection::send(SharedMessage& message, Now now) {
+  if (state_ == ConnectionState::closed) return close_reason_;
+  address(message.message.header);
+  complete_header(message.message);
+  if (auto queued = queue_.push(message, encode_options()); !queued) return queued;
+  return note_sent(now);
+}
+
+/// What send() fills in.
+void Connection::complete_header(Message& message) const {
   auto& header = message.header;
   header.sender_node_id = options_.self.id;
   header.version = agreed_.v4 ? 4 : 2;
@@ -305,11 +324,15 @@ Result<> Connection::send(Message& message, Now now, bool is_urgent) {
     header.has_routing = header.has_endpoints = !is_elided;
   }
   if (header.version == 2) header.has_routing = header.has_endpoints = true;
-  const auto limit =
-      is_authorised_ ? options_.max_message_size - send_headroom : options_.max_unauthorised_message_size;
-  if (auto queued = queue_.push(message, {.string_table = agreed_.string_table, .max_message_size = limit}, is_urgent);
-      !queued)
-    return queued;
+}
+
+EncodeOptions Connection::encode_options() const {
+  return {.string_table = agreed_.string_table,
+          .max_message_size =
+              is_authorised_ ? options_.max_message_size - send_headroom : options_.max_unauthorised_message_size};
+}
+
+Result<> Connection::note_sent(Now now) {
   if (queue_.size() > options_.max_queued_bytes)
     return closed_by(make_error(ErrorCode::connection_error,
                                 "the peer reads too slowly: " + std::to_string(queue_.size()) + " bytes are waiting, " +

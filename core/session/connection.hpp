@@ -82,6 +82,8 @@ class Connection {
   /// (begin_message() sets them). Entry types below 500 keep full routing.
   /// Errors   connection_error when closed or the queue is full; protocol_error above the size limit.
   Result<> send(Message& message, Now now, bool is_urgent = false);
+  /// Sends what other peers are sent as well, addressed to this one's session. Errors   those of send().
+  Result<> send(SharedMessage& message, Now now);
   /// Clears `message` and addresses it to the peer's session: endpoints and the next message id.
   void begin_message(Message& message);
   /// The size limit rises from max_unauthorised_message_size to max_message_size.
@@ -120,7 +122,10 @@ class Connection {
   void begin_stream_reply(const MessageEntry& request);
   Result<> send_create_connection(Now now);
   Result<> send_heartbeat(Now now);
-  Result<> encode_and_queue(Message& message, Now now, bool is_urgent);
+  void address(MessageHeader& header);
+  void complete_header(Message& message) const;
+  EncodeOptions encode_options() const;
+  Result<> note_sent(Now now);
   bool is_for_us() const;
   Error closed_by(Error reason);
 

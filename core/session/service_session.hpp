@@ -218,9 +218,8 @@ class ServiceSession {
   Result<> send_event(std::string_view path, const MemberDefinition& member, std::span<const Value> arguments, Now now);
   /// Sends InValue if the client has connected this wire; a value that waits for a slow stream is replaced.
   Result<> send_wire(std::string_view path, const MemberDefinition& member, const Value& value, Now now);
-  /// The same for a value that is of another `time`, and came here at `arrived`.
-  Result<> send_wire(std::string_view path, const MemberDefinition& member, const Value& value, TimeSpec time,
-                     TimePoint arrived, Now now);
+  /// The same for a value that others are sent as well, with its own time.
+  Result<> send_wire(WirePacket& packet, Now now);
   /// Values of a wire were replaced before they came here: for its ledger.
   void note_conflated(std::string_view path, const MemberDefinition& member, std::uint64_t count);
   /// Answers WireConnected of a remote service, where it is not answered yet.
@@ -466,8 +465,10 @@ class ServiceSession {
 
   void begin_reply(const MessageEntry& request);
   void send_error(const MessageEntry& request, const Error& error, Now now);
-  Result<> send_wire_packet(const PathMember& key, WireConnection& wire, const Value& value, TimeSpec time,
-                            TimePoint arrived, Now now);
+  Wires::value_type* ready_wire(std::string_view path, const MemberDefinition& member, const Value& value,
+                                TimeSpec time, TimePoint arrived);
+  Result<> send_wire_value(Wires::value_type& ready, const Value& value, TimeSpec time, TimePoint arrived, Now now);
+  Result<> finish_wire_packet(Result<> sent, WireConnection& wire, TimePoint arrived, Now now);
   void flush_wires(Now now);
 
   ServiceDirectory& directory_;

@@ -10,45 +10,63 @@ namespace rr {
 // --- asked ---
 
 Result<> ServiceSession::send_wire(std::string_view path, const MemberDefinition& member, const Value& value, Now now) {
-  return send_wire(path, member, value, now.utc, now.steady, now);
+  auto* ready = ready_wire(path, member, value, now.utc, now.steady);
+  return ready ? send_wire_value(*ready, value, now.utc, now.steady, now) : Result<>();
 }
 
-Result<> ServiceSession::send_wire(std::string_view path, const MemberDefinition& member, const Value& value,
-                                   TimeSpec time, TimePoint arrived, Now now) {
+Result<> ServiceSession::send_wire(WirePacket& packet, Now now) {
+  auto* ready = ready_wire(packet.path(), packet.member(), packet.value(), packet.time(), packet.arrived());
+  if (!ready) return {};
+  auto& wire = ready->second;
+  if (wire.last_sent && packet.time() <= *wire.last_sent)  // this client needs a stamp of its own
+    return send_wire_value(*ready, packet.value(), packet.time(), packet.arrived(), now);
+  const auto message = packet.message(service_->types());
+  if (!message) return message.error();
+  wire.last_sent = packet.time();
+  return finish_wire_packet(connection_.send(**message, now), wire, packet.arrived(), now);
+}
+
+/// The wire where it takes the value now. Where it does not, the value waits for it, in place of an older one.
+ServiceSession::Wires::value_type* ServiceSession::ready_wire(std::string_view path, const MemberDefinition& member,
+                                                              const Value& value, TimeSpec time, TimePoint arrived) {
   const auto found = wires_.find(PathMemberView{path, member.name});
-  if (!may_use_service() || found == wires_.end()) return {};
+  if (!may_use_service() || found == wires_.end()) return nullptr;
   auto& wire = found->second;
-  const bool has_room = wire.state == WireState::connected && connection_.queued_bytes() < wire_high_mark;
-  if (has_room) return send_wire_packet(found->first, wire, value, time, arrived, now);
-  if (wire.waiting) ++wire.ledger.conflated;
-  wire.waiting = WireValue{time, value};
-  wire.waiting_since = arrived;
-  return {};
-}
-
-Result<> ServiceSession::send_wire_packet(const PathMember& key, WireConnection& wire, const Value& value,
-                                          TimeSpec time, TimePoint arrived, Now now) {
-  if (wire.waiting) {  // an older one
+  if (wire.waiting) {
     ++wire.ledger.conflated;
     wire.waiting.reset();
   }
+  if (wire.state == WireState::connected && connection_.queued_bytes() < wire_high_mark) return &*found;
+  wire.waiting = WireValue{time, value};
+  wire.waiting_since = arrived;
+  return nullptr;
+}
+
+Result<> ServiceSession::send_wire_value(Wires::value_type& ready, const Value& value, TimeSpec time, TimePoint arrived,
+                                         Now now) {
+  auto& [key, wire] = ready;
   connection_.begin_message(outgoing_);
-  outgoing_.header.metadata = unreliable_metadata;
-  outgoing_.begin_entry(EntryType::wire_packet, key.path, key.member).metadata = unreliable_metadata;
-  if (auto written = write_wire_value(outgoing_, value, wire.stamp(time), *wire.member, service_->types()); !written)
+  if (auto written = write_wire_packet(outgoing_, key.path, *wire.member, value, wire.stamp(time), service_->types());
+      !written)
     return written;
-  send_outgoing(now);
-  wire.ledger.note_delivery(now.steady - arrived);
-  return {};
+  return finish_wire_packet(connection_.send(outgoing_, now), wire, arrived, now);
+}
+
+Result<> ServiceSession::finish_wire_packet(Result<> sent, WireConnection& wire, TimePoint arrived, Now now) {
+  if (sent)
+    wire.ledger.note_delivery(now.steady - arrived);
+  else if (connection_.state() == ConnectionState::closed)
+    leave(sent.error(), now);  // with all wires
+  return sent;
 }
 
 void ServiceSession::flush_wires(Now now) {
-  for (auto& [key, wire] : wires_) {
+  for (auto& each : wires_) {
+    auto& wire = each.second;
     if (!wire.waiting || wire.state == WireState::connecting || !may_use_service()) continue;
     const auto [time, value] = *std::exchange(wire.waiting, std::nullopt);
     // A value that does not fit its definition was refused or not when it was set; here only the stream counts.
-    if (!send_wire_packet(key, wire, value, time, wire.waiting_since, now) ||
-        connection_.queued_bytes() >= wire_high_mark)
+    if (!send_wire_value(each, value, time, wire.waiting_since, now) || connection_.queued_bytes() >= wire_high_mark)
       return;
   }
 }

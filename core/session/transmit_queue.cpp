@@ -8,17 +8,20 @@ namespace {
 constexpr std::size_t max_spare_messages = 16;
 }
 
+EncodedMessage TransmitQueue::take_spare() {
+  if (spare_.empty()) return {};
+  auto spare = std::move(spare_.back());
+  spare_.pop_back();
+  return spare;
+}
+
 Result<> TransmitQueue::push(const Message& message, const EncodeOptions& options, bool is_urgent) {
-  EncodedMessage encoded;
-  if (!spare_.empty()) {
-    encoded = std::move(spare_.back());
-    spare_.pop_back();
-  }
+  auto encoded = take_spare();
   if (auto done = encode(message, options, encoded); !done) return done;
   size_ += encoded.size();
   if (is_urgent) {
     const auto place = std::max(in_flight_, urgent_end_);
-    messages_.insert(messages_.begin() + static_cast<std::ptrdiff_t>(place), std::move(encoded));
+    messages_.insert(messages_.begin() + static_cast<std::ptrdiff_t>(first_ + place), std::move(encoded));
     urgent_end_ = place + 1;
   } else {
     messages_.push_back(std::move(encoded));
@@ -26,11 +29,19 @@ Result<> TransmitQueue::push(const Message& message, const EncodeOptions& option
   return {};
 }
 
+Result<> TransmitQueue::push(SharedMessage& message, const EncodeOptions& options) {
+  auto encoded = take_spare();
+  if (auto done = message.encode(options, encoded); !done) return done;
+  size_ += encoded.size();
+  messages_.push_back(std::move(encoded));
+  return {};
+}
+
 std::span<const ByteSpan> TransmitQueue::slices(std::size_t max_slices) {
   slices_.clear();
   in_flight_ = 0;
   std::size_t skip = front_consumed_;
-  for (const auto& message : messages_) {
+  for (const auto& message : waiting()) {
     if (slices_.size() >= max_slices) break;
     ++in_flight_;
     for (const auto& slice : message.slices()) {
@@ -49,24 +60,33 @@ std::span<const ByteSpan> TransmitQueue::slices(std::size_t max_slices) {
 void TransmitQueue::consume(std::size_t bytes) {
   size_ -= bytes;
   front_consumed_ += bytes;
-  while (!messages_.empty() && front_consumed_ >= messages_.front().size()) {
-    front_consumed_ -= messages_.front().size();
-    if (spare_.size() < max_spare_messages) {
-      messages_.front().clear();
-      spare_.push_back(std::move(messages_.front()));
-    }
-    messages_.pop_front();
-    if (in_flight_ > 0) --in_flight_;
-    if (urgent_end_ > 0) --urgent_end_;
+  while (first_ < messages_.size() && front_consumed_ >= messages_[first_].size()) {
+    front_consumed_ -= messages_[first_].size();
+    pop_front();
   }
   // A message that is written in part stays in flight: nothing may be put before its rest.
   in_flight_ = std::max<std::size_t>(in_flight_, front_consumed_ > 0 ? 1 : 0);
 }
 
+void TransmitQueue::pop_front() {
+  auto& front = messages_[first_];
+  front.clear();
+  if (spare_.size() < max_spare_messages)
+    spare_.push_back(std::move(front));
+  else
+    front = {};
+  if (in_flight_ > 0) --in_flight_;
+  if (urgent_end_ > 0) --urgent_end_;
+  // Written ones are taken out when they are half of all: nothing is moved twice as often as it is sent.
+  if (++first_ * 2 < messages_.size()) return;
+  messages_.erase(messages_.begin(), messages_.begin() + static_cast<std::ptrdiff_t>(first_));
+  first_ = 0;
+}
+
 void TransmitQueue::clear() {
   messages_.clear();
   slices_.clear();
-  size_ = front_consumed_ = in_flight_ = urgent_end_ = 0;
+  first_ = size_ = front_consumed_ = in_flight_ = urgent_end_ = 0;
 }
 
 }  // namespace rr

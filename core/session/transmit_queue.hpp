@@ -2,11 +2,11 @@
 #pragma once
 
 #include <cstddef>
-#include <deque>
 #include <span>
 #include <vector>
 
 #include "core/wire/codec.hpp"
+#include "core/wire/shared_message.hpp"
 
 namespace rr {
 
@@ -17,6 +17,7 @@ class TransmitQueue {
  public:
   /// Encodes `message` behind everything (or, if urgent, behind what is being written).
   Result<> push(const Message& message, const EncodeOptions& options, bool is_urgent = false);
+  Result<> push(SharedMessage& message, const EncodeOptions& options);
 
   bool empty() const { return size_ == 0; }
   /// Bytes not yet consumed.
@@ -30,13 +31,19 @@ class TransmitQueue {
   void clear();
 
  private:
-  std::deque<EncodedMessage> messages_;
+  EncodedMessage take_spare();
+
+  std::span<EncodedMessage> waiting() { return std::span(messages_).subspan(first_); }
+  void pop_front();
+
+  std::vector<EncodedMessage> messages_;
+  std::size_t first_ = 0;              ///< of messages_ that is not written yet
   std::vector<EncodedMessage> spare_;  ///< buffers to reuse
   std::vector<ByteSpan> slices_;
   std::size_t size_ = 0;
   std::size_t front_consumed_ = 0;  ///< bytes of the first message that are written already
-  std::size_t in_flight_ = 0;       ///< messages whose slices were handed out
-  std::size_t urgent_end_ = 0;      ///< index behind the last urgent message: they keep their order
+  std::size_t in_flight_ = 0;       ///< messages, from the first one, whose slices were handed out
+  std::size_t urgent_end_ = 0;      ///< messages, from the first one, up to the last urgent one: they keep their order
 };
 
 }  // namespace rr

@@ -1,6 +1,7 @@
 #include "core/wire/codec.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 #include <string>
 
@@ -43,6 +44,21 @@ Bytes EncodedMessage::to_bytes() const {
   bytes.reserve(size_);
   for (const auto slice : slices_) bytes.insert(bytes.end(), slice.begin(), slice.end());
   return bytes;
+}
+
+void EncodedMessage::assign(const EncodedMessage& other, std::uint16_t message_id) {
+  size_ = other.size_;
+  scratch_ = other.scratch_;
+  slices_ = other.slices_;
+  owners_ = other.owners_;
+  message_id_at_ = other.message_id_at_;
+  std::memcpy(scratch_.data() + message_id_at_, &message_id, sizeof(message_id));
+  std::size_t at = 0;
+  for (auto& slice : slices_) {
+    if (slice.data() != other.scratch_.data() + at) continue;  // a payload
+    slice = {scratch_.data() + at, slice.size()};
+    at += slice.size();
+  }
 }
 
 void EncodedMessage::clear() {

@@ -57,6 +57,8 @@ class EncodedMessage {
   const std::vector<ByteSpan>& slices() const { return slices_; }
   /// All bytes in one piece (a copy), for tests and small messages.
   Bytes to_bytes() const;
+  /// Becomes a copy of a version-4 message that has a MessageID, with another one. Referenced payloads are shared.
+  void assign(const EncodedMessage& other, std::uint16_t message_id);
   void clear();
 
  private:
@@ -65,7 +67,8 @@ class EncodedMessage {
   Bytes scratch_;
   std::vector<ByteSpan> slices_;
   std::vector<std::shared_ptr<const void>> owners_;
-  EncodePlan plan_;  ///< kept for its capacity only
+  std::size_t message_id_at_ = 0;  ///< in scratch_; version 4
+  EncodePlan plan_;                ///< kept for its capacity only
 };
 
 struct EncodeOptions {

@@ -360,7 +360,7 @@ void write_header(GatherWriter& out, const Message& message, const StringCoder& 
   if ((flags & header_flag::priority) != 0) out.number(*header.priority);
   if ((flags & header_flag::meta_info) != 0) {
     out.text_x(header.metadata);
-    out.number(header.message_id);
+    out.message_id(header.message_id);
     out.number(header.message_res_id);
   }
   if ((flags & header_flag::string_table) != 0) {

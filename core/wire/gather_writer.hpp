@@ -72,6 +72,10 @@ class GatherWriter {
     uint_x(static_cast<std::uint32_t>(view.size()));
     bytes(view);
   }
+  void message_id(std::uint16_t id) {
+    out_.message_id_at_ = at_;
+    number(id);
+  }
   void node_id(const NodeId& id) { bytes(id.bytes); }
 
   /// Data of an element: copied when small, referenced when large.

@@ -229,8 +229,13 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     for_clients_of(service, [&](ServiceClient& client) { client.send_event(path, event, arguments); });
   }
   void send_wire(const Service& service, const std::string& path, const MemberDefinition& wire,
-                 const Value& value) override {
-    for_clients_of(service, [&](ServiceClient& client) { client.send_wire(path, wire, value); });
+                 const std::shared_ptr<const Value>& newest) override {
+    const auto value = newest;
+    const Now now = read_clocks();
+    WirePacket packet(path, wire, *value, now.utc, now.steady);
+    for_clients_of(service, [&](ServiceClient& client) {
+      if (newest == value) client.send_wire(packet);
+    });
   }
   void release_path(const Service& service, const std::string& path) override {
     for_clients_of(service, [&](ServiceClient& client) { client.release_path(path); });

@@ -159,9 +159,9 @@ void Object::set_wire(std::string_view wire, Value value) {
     refuse(type_name() + "." + member.name + " is writeonly: the service sends nothing on it");
   check_value(type_name() + "." + member.name, value, member.type, *service_.types_);
   auto& in_value = members_[&member].in_value;
-  in_value = std::move(value);
+  in_value = std::make_shared<const Value>(std::move(value));
   if (!service_.host_) return;
-  for (const std::string& path : paths()) service_.host_->send_wire(service_, path, member, *in_value);
+  for (const std::string& path : paths()) service_.host_->send_wire(service_, path, member, in_value);
 }
 
 void Object::objref(std::string_view name, std::shared_ptr<Object> child) {
@@ -258,8 +258,8 @@ Result<Value> Object::answer(const Called& called) {
       return mine && mine->set.call ? mine->set.call(called.arguments) : missing("set of property");
     case CallKind::peek_in:
     case CallKind::peek_out: {
-      const auto* value = !mine ? nullptr : called.kind == CallKind::peek_in ? &mine->in_value : &mine->out_value;
-      if (value && *value) return **value;
+      if (mine && called.kind == CallKind::peek_in && mine->in_value) return *mine->in_value;
+      if (mine && called.kind == CallKind::peek_out && mine->out_value) return *mine->out_value;
       return make_error(ErrorCode::value_not_set, "wire '" + called.member->name + "' has no value yet");
     }
     case CallKind::poke_out: {
@@ -294,7 +294,7 @@ void Object::receive_wire(const WireReceived& received) {
 
 const Value* Object::in_value(const MemberDefinition& wire) const {
   const auto found = members_.find(&wire);
-  return found != members_.end() && found->second.in_value ? &*found->second.in_value : nullptr;
+  return found != members_.end() ? found->second.in_value.get() : nullptr;
 }
 
 // --- Service ---

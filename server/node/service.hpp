@@ -200,7 +200,7 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
     Handler get;
     Handler set;
     Handler wire_received;
-    std::optional<Value> in_value = {};                                  ///< wires: what clients receive
+    std::shared_ptr<const Value> in_value = {};                          ///< wires: what clients receive
     std::optional<Value> out_value = {};                                 ///< wires: the newest that a client sent
     std::function<std::shared_ptr<Object>(std::string_view)> find = {};  ///< objrefs
     std::function<void(PipeEndpoint)> pipe_connected = {};
@@ -246,8 +246,9 @@ class ServiceHost {
  public:
   virtual void send_event(const Service& service, const std::string& path, const MemberDefinition& event,
                           std::span<const Value> arguments) = 0;
+  /// `newest`  where the wire's value is: another one there is sent by a call of its own.
   virtual void send_wire(const Service& service, const std::string& path, const MemberDefinition& wire,
-                         const Value& value) = 0;
+                         const std::shared_ptr<const Value>& newest) = 0;
   virtual void release_path(const Service& service, const std::string& path) = 0;
   virtual void call_callback(const Service& service, ClientId client, const std::string& path,
                              const MemberDefinition& callback, std::span<const Value> arguments, CallbackDone done) = 0;

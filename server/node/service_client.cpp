@@ -40,10 +40,11 @@ void ServiceClient::send_event(const std::string& path, const MemberDefinition& 
   settle();
 }
 
-void ServiceClient::send_wire(const std::string& path, const MemberDefinition& wire, const Value& value) {
-  if (!session_.has_wire(path, wire.name)) return;
-  (void)session_.send_wire(path, wire, value, read_clocks());
-  settle();
+void ServiceClient::send_wire(WirePacket& packet) {
+  if (!session_.has_wire(packet.path(), packet.member().name)) return;
+  const Now now = read_clocks();
+  (void)session_.send_wire(packet, now);
+  settle(now);
 }
 
 void ServiceClient::release_path(const std::string& path) {

@@ -41,7 +41,7 @@ class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSe
   /// Null while the client is in no service of ours.
   Service* service() const { return service_; }
   void send_event(const std::string& path, const MemberDefinition& event, std::span<const Value> arguments);
-  void send_wire(const std::string& path, const MemberDefinition& wire, const Value& value);
+  void send_wire(WirePacket& packet);
   void release_path(const std::string& path);
   void call_callback(const std::string& path, const MemberDefinition& callback, std::span<const Value> arguments,
                      CallbackDone done);

@@ -32,6 +32,7 @@ class StreamDriver : public std::enable_shared_from_this<StreamDriver> {
   /// Handles the session's events, writes what it has to send, sees to timer and end. Due after everything asked of
   /// the session; inside of event handlers it does nothing, because the loop that called them goes on anyway.
   void settle();
+  void settle(Now now);
   /// Closes the stream at once. The session hears `reason` unless it has ended already.
   void close(Error reason);
   bool is_closed() const { return is_closed_; }
@@ -61,7 +62,6 @@ class StreamDriver : public std::enable_shared_from_this<StreamDriver> {
 
   static awaitable<void> read_all(std::shared_ptr<StreamDriver> self);
   static awaitable<void> write_waiting(std::shared_ptr<StreamDriver> self);
-  void settle(Now now);
   void write(Now now);
   void arm_timer();
   void finish(Error reason, Now now);

@@ -4,6 +4,7 @@ import json
 import pathlib
 import sys
 import threading
+import time
 
 import numpy
 import pytest
@@ -11,6 +12,7 @@ import RobotRaconteur as RR
 
 from clients import JS, run_program
 from directions import DIRECTIONS, service_command
+from load import Clients, running
 from processes import BUILD, Background, read_json, start_gateway
 from scenarios import POSE
 from test_access import PASSWORDS, RULES, make_users
@@ -146,6 +148,38 @@ def test_the_gateway_is_a_service(node, site, tmp_path):
     changes.wait_for(lambda change: change == ("removed", "nobody"))
     for each in (root, client):
         node.DisconnectService(each)
+
+
+def test_each_value_of_a_wire_is_delivered_or_counted(node, site, tmp_path):
+    """To more clients than are sent a value in one go, while values come faster than that."""
+    _, port, _ = site
+    count, values = 150, 100
+    publisher = node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop")
+    url = f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop"
+
+    def publish():
+        publisher.publish_state(numpy.zeros(3))
+
+    def accounts():
+        """Values of each client."""
+        all_of_them = read_json(f"http://127.0.0.1:{port}/api/v1/devices/interop/subscriptions")["subscriptions"]
+        return {each["client"]: each["delivered"] + each["conflated"] for each in all_of_them}
+
+    def last_accounts():
+        """Once nothing comes any more."""
+        before = accounts()
+        clients.process.wait_until(lambda: time.sleep(0.5) or before == accounts() or before.update(accounts()))
+        return before
+
+    with running(Clients(tmp_path, url, count)) as clients:
+        clients.process.wait_until(lambda: publish() or len(accounts()) == count)
+        assert clients.wait_until_ready()["ready"] == count
+        before = last_accounts()
+        for _ in range(values):
+            publish()
+        assert last_accounts() == {client: had + values for client, had in before.items()}
+        assert clients.finish()["lost"] == {}
+    node.DisconnectService(publisher)
 
 
 def ask_losses(client):

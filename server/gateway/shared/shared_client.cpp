@@ -135,11 +135,10 @@ void SharedClient::handle(const rr::WireReceived& received) {
   if (home_) home_->send_wire(path_of(*received.object), *received.member, received.value);
 }
 
-void SharedClient::receive_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::WireValue& value,
-                                rr::TimePoint arrived) {
-  // A lost connection is heard of by itself.
-  (void)session_.send_wire(path, wire, value.value, value.time, arrived, rr::read_clocks());
-  settle();
+void SharedClient::receive_wire(rr::WirePacket& packet) {
+  const auto now = rr::read_clocks();
+  (void)session_.send_wire(packet, now);  // a lost connection is heard of by itself
+  settle(now);
 }
 
 void SharedClient::answer_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::Result<>& result) {

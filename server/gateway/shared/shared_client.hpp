@@ -74,8 +74,7 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   std::weak_ptr<const void> life() const override { return weak_from_this(); }
   void receive_event(const std::string& path, const rr::MemberDefinition& event,
                      std::span<const rr::Value> arguments) override;
-  void receive_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::WireValue& value,
-                    rr::TimePoint arrived) override;
+  void receive_wire(rr::WirePacket& packet) override;
   void answer_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::Result<>& result) override;
   void note_conflated(const std::string& path, const rr::MemberDefinition& wire, std::uint64_t count) override;
   void close_wire(const std::string& path, const rr::MemberDefinition& wire) override;

@@ -89,7 +89,7 @@ void Upstream::lost(const rr::Error& reason) {
   connection_.reset();
   loss_ = reason;
   generators_.clear();
-  for (auto& [key, wire] : wires_) wire.is_attached = false;
+  for (const auto& [key, wire] : wires_) wire->is_attached = false;
   for (auto& [number, pipe] : pipes_) {
     pipe.state = PipeState::detached;
     pipe.is_held = false;
@@ -116,7 +116,7 @@ void Upstream::remove(UpstreamClient& client) {
     leave_pipe(client, (it++)->first.second);
   std::vector<std::pair<std::string, const rr::MemberDefinition*>> wires;
   for (const auto& [key, wire] : wires_)
-    if (has_joined(client, key)) wires.emplace_back(key.first, wire.member);
+    if (has_joined(client, key)) wires.emplace_back(key.first, &wire->member);
   for (const auto& [path, member] : wires) leave_wire(client, path, *member);
   std::vector<rr::GeneratorId> generators;
   for (const auto& [key, generator] : generators_)

@@ -41,8 +41,7 @@ class UpstreamClient {
   virtual std::weak_ptr<const void> life() const = 0;
   virtual void receive_event(const std::string& path, const rr::MemberDefinition& event,
                              std::span<const rr::Value> arguments) = 0;
-  virtual void receive_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::WireValue& value,
-                            rr::TimePoint arrived) = 0;
+  virtual void receive_wire(rr::WirePacket& packet) = 0;
   virtual void answer_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::Result<>& result) = 0;
   /// So many values were replaced by the one that comes next.
   virtual void note_conflated(const std::string& path, const rr::MemberDefinition& wire, std::uint64_t count) = 0;
@@ -123,15 +122,24 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   using MemberKey = std::pair<std::string, std::string>;  // path, member
   using EndpointKey = std::pair<UpstreamClient*, rr::PipeId>;
 
+  struct Follower {
+    UpstreamClient* client = nullptr;
+    std::uint64_t count = 0;  ///< Wire::count of the newest that it was sent
+  };
   struct Wire {
-    const rr::MemberDefinition* member = nullptr;
-    std::vector<UpstreamClient*> clients;
+    Wire(std::string its_path, const rr::MemberDefinition& its_member)
+        : path(std::move(its_path)), member(its_member) {}
+
+    const std::string path;
+    const rr::MemberDefinition& member;
+    std::vector<Follower> followers;
+    std::size_t next = 0;  ///< before the follower whose turn it is
     std::optional<rr::WireValue> newest;
-    rr::TimePoint arrived;
+    rr::TimePoint arrived;               ///< of the newest
+    std::uint64_t count = 0;             ///< values that have come
     std::optional<rr::Value> out_value;  ///< the newest that could not be sent yet
     bool is_attached = false;
-    bool is_due = false;          ///< the newest is about to be handed out
-    std::uint64_t conflated = 0;  ///< values that were replaced before that
+    bool is_handed_out = false;  ///< hand_out() is due
   };
   enum class PipeState : std::uint8_t { detached, attaching, attached };
   struct Pipe {
@@ -169,7 +177,8 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   void attach_wire(const MemberKey& key);
   bool has_joined(const UpstreamClient& client, const MemberKey& key) const;
   void publish_wire(const MemberKey& key, const rr::Value& value, rr::TimeSpec time);
-  void hand_out(const MemberKey& key);
+  void hand_out_later(const std::shared_ptr<Wire>& wire);
+  void hand_out(const std::shared_ptr<Wire>& wire);
   /// `reason`  why, for clients that still wait to join; null: they are told by other means.
   void drop_wire(const MemberKey& key, const rr::Error* reason);
   void attach_pipe(PipeNumber number);
@@ -196,7 +205,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   std::function<void(const std::string&)> on_released_;
   std::vector<UpstreamClient*> clients_;  ///< in the order in which they came
   std::set<std::string> objects_;         ///< paths that were found
-  std::map<MemberKey, Wire> wires_;
+  std::map<MemberKey, std::shared_ptr<Wire>> wires_;
   std::map<PipeNumber, Pipe> pipes_;
   std::map<MemberKey, PipeNumber> shared_pipes_;
   std::map<EndpointKey, PipeNumber> endpoints_;

@@ -16,6 +16,9 @@ namespace {
 /// own can't wait for them all.
 constexpr std::size_t max_unacknowledged = 4096;
 
+/// Who are sent a value of a wire before everybody else gets a turn.
+constexpr std::size_t clients_a_turn = 64;
+
 const auto ignore = [](const rr::Result<rr::Value>&) {};
 
 }  // namespace
@@ -25,16 +28,16 @@ const auto ignore = [](const rr::Result<rr::Value>&) {};
 void Upstream::join_wire(UpstreamClient& client, const std::string& path, const rr::MemberDefinition& member) {
   if (!connection_) return client.answer_wire(path, member, lost_error());
   const MemberKey key(path, member.name);
-  auto& wire = wires_[key];
-  wire.member = &member;
-  wire.clients.push_back(&client);
-  if (wire.is_attached) {
-    const auto newest = wire.newest;  // the client may leave
-    const auto arrived = wire.arrived;
-    const bool is_due = wire.is_due;
+  auto& known = wires_[key];
+  if (!known) known = std::make_shared<Wire>(path, member);
+  const auto wire = known;
+  wire->followers.push_back({&client, wire->count});
+  if (wire->is_attached) {
     client.answer_wire(path, member, {});
-    if (newest && !is_due) client.receive_wire(path, member, *newest, arrived);
-  } else if (wire.clients.size() == 1) {
+    if (!wire->newest || !has_joined(client, key)) return;
+    rr::WirePacket packet(path, member, wire->newest->value, wire->newest->time, wire->arrived);
+    client.receive_wire(packet);
+  } else if (wire->followers.size() == 1) {
     attach_wire(key);
   }
 }
@@ -62,14 +65,13 @@ void Upstream::attach_wire(const MemberKey& key) {
       const auto reason = done.error();
       return self->drop_wire(key, &reason);
     }
-    auto& wire = found->second;
-    wire.is_attached = true;
-    const auto clients = wire.clients;
-    for (auto* client : clients)
-      if (self->has_joined(*client, key)) client->answer_wire(key.first, *wire.member, {});
-    const auto still_there = self->wires_.find(key);
-    if (still_there == self->wires_.end() || !self->connection_) return;
-    if (const auto value = std::exchange(still_there->second.out_value, std::nullopt))
+    const auto wire = found->second;
+    wire->is_attached = true;
+    const auto followers = wire->followers;
+    for (const auto& follower : followers)
+      if (self->has_joined(*follower.client, key)) follower.client->answer_wire(key.first, wire->member, {});
+    if (!self->connection_) return;
+    if (const auto value = std::exchange(wire->out_value, std::nullopt))
       (void)self->connection_->send_wire(key.first, key.second, *value);
   };
   connection_->on_wire_closed(key.first, key.second, [weak, key] {
@@ -82,56 +84,59 @@ void Upstream::attach_wire(const MemberKey& key) {
 void Upstream::publish_wire(const MemberKey& key, const rr::Value& value, rr::TimeSpec time) {
   const auto found = wires_.find(key);
   if (found == wires_.end()) return;
-  auto& wire = found->second;
+  auto& wire = *found->second;
   wire.newest = rr::WireValue{time, value};
   wire.arrived = std::chrono::steady_clock::now();
-  if (wire.is_due) {
-    ++wire.conflated;
-    return;
-  }
-  // Not here: one read may bring hundreds of values, of which the last one counts, and everybody else has to get a
-  // turn.
-  wire.is_due = true;
-  asio::post(device_->executor(), [weak = weak_from_this(), key] {
-    if (const auto self = weak.lock()) self->hand_out(key);
+  ++wire.count;
+  if (!std::exchange(wire.is_handed_out, true)) hand_out_later(found->second);
+}
+
+void Upstream::hand_out_later(const std::shared_ptr<Wire>& wire) {
+  asio::post(device_->executor(), [weak = weak_from_this(), wire] {
+    if (const auto self = weak.lock()) self->hand_out(wire);
   });
 }
 
-void Upstream::hand_out(const MemberKey& key) {
-  const auto found = wires_.find(key);
-  if (found == wires_.end() || !found->second.newest) return;
-  auto& wire = found->second;
-  wire.is_due = false;
-  const auto conflated = std::exchange(wire.conflated, 0);
-  // Clients may leave while they are sent to: the value and the list must stay.
-  const auto clients = wire.clients;
-  const auto newest = *wire.newest;
-  const auto arrived = wire.arrived;
-  const auto& member = *wire.member;
-  for (auto* client : clients) {
-    const auto still_there = wires_.find(key);
-    if (still_there == wires_.end()) return;
-    if (still_there->second.clients.size() != clients.size() && !has_joined(*client, key)) continue;
-    if (conflated > 0) client->note_conflated(key.first, member, conflated);
-    client->receive_wire(key.first, member, newest, arrived);
+/// One after the other, each the newest that there is at its turn. Not all at once: one read may bring hundreds of
+/// values, of which the last one counts, and everybody else has to get a turn, too.
+void Upstream::hand_out(const std::shared_ptr<Wire>& wire) {
+  const auto newest = *wire->newest;
+  rr::WirePacket packet(wire->path, wire->member, newest.value, newest.time, wire->arrived);
+  std::size_t looked_at = 0;
+  for (std::size_t sent = 0; sent < clients_a_turn; ++looked_at) {
+    auto& followers = wire->followers;  // they may leave while they are sent to
+    if (looked_at >= followers.size()) {
+      wire->is_handed_out = false;
+      return;
+    }
+    wire->next = (wire->next + 1) % followers.size();
+    auto& [client, count] = followers[wire->next];
+    if (count == wire->count) continue;
+    const auto missed = wire->count - std::exchange(count, wire->count) - 1;
+    ++sent;
+    if (missed > 0) client->note_conflated(wire->path, wire->member, missed);
+    client->receive_wire(packet);
   }
+  hand_out_later(wire);
 }
 
 void Upstream::leave_wire(UpstreamClient& client, const std::string& path, const rr::MemberDefinition& member) {
-  const MemberKey key(path, member.name);
-  const auto found = wires_.find(key);
+  const auto found = wires_.find({path, member.name});
   if (found == wires_.end()) return;
-  std::erase(found->second.clients, &client);
-  if (!found->second.clients.empty()) return;
+  auto& followers = found->second->followers;
+  std::erase_if(followers, [&](const Follower& each) { return each.client == &client; });
+  if (!followers.empty()) return;
   wires_.erase(found);
   if (connection_) connection_->disconnect_wire(path, member.name, ignore);
 }
 
 void Upstream::drop_wire(const MemberKey& key, const rr::Error* reason) {
   const auto dropped = wires_.extract(key);
-  if (!dropped || !reason) return;
-  const auto& member = *dropped.mapped().member;
-  for (auto* client : dropped.mapped().clients) {
+  if (!dropped) return;
+  const auto followers = std::exchange(dropped.mapped()->followers, {});
+  if (!reason) return;
+  const auto& member = dropped.mapped()->member;
+  for (const auto& [client, count] : followers) {
     if (has(*client)) client->answer_wire(key.first, member, *reason);
     if (has(*client)) client->close_wire(key.first, member);
   }
@@ -140,15 +145,15 @@ void Upstream::drop_wire(const MemberKey& key, const rr::Error* reason) {
 bool Upstream::has_joined(const UpstreamClient& client, const MemberKey& key) const {
   const auto found = wires_.find(key);
   if (found == wires_.end()) return false;
-  const auto& clients = found->second.clients;
-  return std::find(clients.begin(), clients.end(), &client) != clients.end();
+  const auto is_it = [&](const Follower& each) { return each.client == &client; };
+  return std::ranges::any_of(found->second->followers, is_it);
 }
 
 void Upstream::send_wire(const std::string& path, const rr::MemberDefinition& member, const rr::Value& value) {
   const auto found = wires_.find({path, member.name});
   if (found == wires_.end()) return;
-  if (!connection_ || !found->second.is_attached)
-    found->second.out_value = value;
+  if (!connection_ || !found->second->is_attached)
+    found->second->out_value = value;
   else
     (void)connection_->send_wire(path, member.name, value);  // the newest wins: one that can't be sent is replaced
 }

@@ -17,6 +17,10 @@ class Remote : public Loopback {
   }
   HostedService& hosted() { return *directory.find("arm"); }
   const MemberDefinition& member(std::string_view name) { return *hosted().root_type().find_member(name); }
+  Result<> send(const MemberDefinition& wire, const WireValue& value) {
+    WirePacket packet("arm", wire, value.value, value.time, now.steady);
+    return service->send_wire(packet, now);
+  }
   void find(const std::string& path) {
     hosted().add_object(path, std::make_shared<PlainObject>("experimental.loopback.Tool")).value();
     service->handle_object_found(path, {}, now);
@@ -106,8 +110,8 @@ TEST_CASE("a wire of a remote service is connected when that one says so") {
   const WireValue early{TimeSpec{1'600'000'000, 5}, Value(2.5)};
 
   SECTION("the newest value follows the answer, with its own time") {
-    CHECK(pair.service->send_wire("arm", torque, Value(1.5), TimeSpec{1'600'000'000, 4}, pair.now.steady, pair.now));
-    CHECK(pair.service->send_wire("arm", torque, early.value, early.time, pair.now.steady, pair.now));
+    CHECK(pair.send(torque, {TimeSpec{1'600'000'000, 4}, Value(1.5)}));
+    CHECK(pair.send(torque, early));
     pair.pump();
     CHECK_FALSE(pair.client->poll_event());
     pair.advance(std::chrono::milliseconds(3));
@@ -132,7 +136,7 @@ TEST_CASE("a wire of a remote service is connected when that one says so") {
     pair.service->answer_wire("arm", torque, {}, pair.now);
     CHECK(pair.completion(connecting));
     for (int i = 0; i < 2; ++i) {
-      CHECK(pair.service->send_wire("arm", torque, early.value, early.time, pair.now.steady, pair.now));
+      CHECK(pair.send(torque, early));
       pair.pump();
       CHECK(pair.next_client<WireValueReceived>().time.nanoseconds == 5 + i);
     }

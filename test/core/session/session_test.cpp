@@ -310,6 +310,56 @@ TEST_CASE("wires carry the newest value both ways") {
   CHECK_FALSE(pair.service->has_wire("arm", "torque"));
 }
 
+TEST_CASE("one packet of a wire serves all its clients, each as it speaks") {
+  std::vector<std::unique_ptr<Loopback>> pairs;
+  for (const auto& features :
+       {Features{}, Features{}, Features{.string_table = {.local = false, .standard = false}}, legacy_features}) {
+    auto& pair = *pairs.emplace_back(std::make_unique<Loopback>(features));
+    pair.connect();
+    pair.completion(pair.client->connect_wire("arm", "state", pair.now)).value();
+    pair.next_service<WireConnected>();
+  }
+  pairs.push_back(std::make_unique<Loopback>());  // has not connected the wire
+  pairs.back()->connect();
+  const auto& state = *pairs.front()->service->service()->root_type().find_member("state");
+  const auto send = [&](const Value& value, TimeSpec time) {
+    WirePacket packet("arm", state, value, time, pairs.front()->now.steady);
+    for (const auto& pair : pairs) REQUIRE(pair->service->send_wire(packet, pair->now));
+    for (const auto& pair : pairs) pair->pump();
+  };
+  send(pose(1), {50, 1});
+  send(pose(2), {50, 2});
+  send(pose(3), {40, 0});  // the clock was set back
+  pairs.pop_back();
+  CHECK(pairs.front()->client->connection().features().v4);
+  CHECK_FALSE(pairs.back()->client->connection().features().v4);
+  for (const auto& pair : pairs) {
+    for (std::int32_t i = 1; i <= 3; ++i) {
+      const auto received = pair->next_client<WireValueReceived>();
+      CHECK(received.value == pose(i));
+      CHECK(received.time == TimeSpec{50, i});
+    }
+    CHECK_FALSE(pair->client->poll_event());
+    CHECK(pair->service->total_ledgers().wires.delivered == 3);
+  }
+}
+
+TEST_CASE("a value that does not fit its wire goes to nobody") {
+  Loopback pair;
+  pair.connect();
+  pair.completion(pair.client->connect_wire("arm", "state", pair.now)).value();
+  const auto& state = *pair.service->service()->root_type().find_member("state");
+  const Value text("no pose");
+  WirePacket packet("arm", state, text, {50, 1}, pair.now.steady);
+  for (int i = 0; i < 2; ++i) {
+    const auto sent = pair.service->send_wire(packet, pair.now);
+    REQUIRE_FALSE(sent);
+    CHECK(sent.error().code == ErrorCode::data_type_mismatch);
+  }
+  CHECK(pair.service->poll_transmit().empty());
+  CHECK(pair.service->total_ledgers().wires.delivered == 0);
+}
+
 TEST_CASE("a slow stream replaces wire values instead of queueing them") {
   Loopback pair;
   pair.connect();

@@ -1,0 +1,22 @@
+#include "core/wire/shared_message.hpp"
+
+#include "core/wire/encode_plan.hpp"
+
+namespace rr {
+
+Result<> SharedMessage::encode(const EncodeOptions& options, EncodedMessage& out) {
+  const auto& header = message.header;
+  if (header.version != 4 || header.has_routing || header.has_endpoints || header.message_id == 0)
+    return rr::encode(message, options, out);
+  const auto mode = options.string_table;
+  auto& encoded = encoded_[(mode.local ? 1u : 0u) + (mode.standard ? 2u : 0u)];
+  if (encoded.size() == 0) {
+    if (auto done = rr::encode(message, options, encoded); !done) return done;
+  } else if (auto checked = check_message_size(encoded.size(), options); !checked) {
+    return checked.error();
+  }
+  out.assign(encoded, header.message_id);
+  return {};
+}
+
+}  // namespace rr

@@ -1,0 +1,25 @@
+// A message that many receivers are sent. Layer: wire.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "core/wire/codec.hpp"
+#include "core/wire/message.hpp"
+
+namespace rr {
+
+/// Encoded once for all receivers to whom it differs in nothing but MessageID: those of version 4 who are sent it
+/// without addresses. Build `message` first, then set its header to each receiver in turn.
+class SharedMessage {
+ public:
+  Message message;
+
+  /// The same as encode() of `message`. Its entries and metadata stay as they are from the first call on.
+  [[nodiscard]] Result<> encode(const EncodeOptions& options, EncodedMessage& out);
+
+ private:
+  std::array<EncodedMessage, 4> encoded_;  ///< by string table mode; empty while nobody needs it
+};
+
+}  // namespace rr
