@@ -1,17 +1,13 @@
 #include "server/gateway/refused_client.hpp"
 
-#include <boost/asio/as_tuple.hpp>
-#include <boost/asio/steady_timer.hpp>
-#include <boost/asio/use_awaitable.hpp>
 #include <functional>
 #include <utility>
 
 #include "core/session/service_session.hpp"
+#include "server/gateway/session_end.hpp"
 #include "server/node/stream_driver.hpp"
 
 namespace rrgate {
-
-namespace asio = boost::asio;
 
 namespace {
 
@@ -53,19 +49,14 @@ rr::awaitable<void> refuse_in_session(Gateway& gateway, Connection& connection, 
   options.connection.handshake_timeout = options.connect_timeout = gateway.config().limits.header_timeout;
   options.refusal = std::move(refusal);
   auto identity = identity_of(gateway, device);
-  asio::steady_timer over(client->executor(), asio::steady_timer::time_point::max());
-  bool has_ended = false;
-  const auto ended = [&] {
-    has_ended = true;
-    over.cancel();
-  };
-  const auto session =
-      std::make_shared<RefusedClient>(std::move(identity), std::move(options), std::move(client), ended);
+  SessionEnd end(client->executor());
+  const auto session = std::make_shared<RefusedClient>(std::move(identity), std::move(options), std::move(client),
+                                                       [&end] { end.reach(); });
   connection.stop = [session](const rr::EndReason& reason) {
     session->close(rr::make_error(rr::ErrorCode::connection_error, reason.text));
   };
   session->start();
-  while (!has_ended) co_await over.async_wait(asio::as_tuple(asio::use_awaitable));
+  co_await end.wait();
   connection.stop = [](const rr::EndReason&) {};
 }
 

@@ -58,7 +58,7 @@ class ServiceException : public Exception {
   explicit ServiceException(std::string message, ErrorCode code = ErrorCode::operation_failed)
       : Exception({code, std::move(message)}) {}
   /// A custom exception of a service definition: its qualified name, "com.x.MyException".
-  ServiceException(std::string qualified_name, std::string message, std::string sub_name = {}, Value param = {})
+  ServiceException(const std::string& qualified_name, std::string message, std::string sub_name = {}, Value param = {})
       : Exception(declared_error(qualified_name, std::move(message), std::move(sub_name), std::move(param))) {}
 };
 

@@ -171,13 +171,16 @@ def test_each_value_of_a_wire_is_delivered_or_counted(node, site, tmp_path):
         clients.process.wait_until(lambda: time.sleep(0.5) or before == accounts() or before.update(accounts()))
         return before
 
-    with running(Clients(tmp_path, url, count)) as clients:
-        clients.process.wait_until(lambda: publish() or len(accounts()) == count)
-        assert clients.wait_until_ready()["ready"] == count
+    with running(Clients(tmp_path, url, count)) as clients, running(Clients(tmp_path, url, count, name="leaving")) as leaving:
+        clients.process.wait_until(lambda: publish() or len(accounts()) == 2 * count)
+        assert clients.wait_until_ready()["ready"] == leaving.wait_until_ready()["ready"] == count
         before = last_accounts()
-        for _ in range(values):
+        for _ in range(values - 1):
             publish()
-        assert last_accounts() == {client: had + values for client, had in before.items()}
+        leaving.process.process.kill()
+        publish()  # to some who have gone, among them
+        clients.process.wait_until(lambda: len(accounts()) == count)
+        assert last_accounts() == {client: before[client] + values for client in accounts()}
         assert clients.finish()["lost"] == {}
     node.DisconnectService(publisher)
 

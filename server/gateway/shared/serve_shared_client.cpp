@@ -4,6 +4,7 @@
 #include <boost/asio/use_awaitable.hpp>
 
 #include "server/gateway/http_access.hpp"
+#include "server/gateway/session_end.hpp"
 #include "server/gateway/shared/shared_access.hpp"
 #include "server/log/log.hpp"
 
@@ -94,19 +95,14 @@ rr::awaitable<void> serve_shared_client(Gateway& gateway, Connection& connection
   arrival.is_encrypted = connection.peer.is_encrypted;
   arrival.admit = make_admission(gateway.access(), *destination.node, connection.identity);
   arrival.enter = make_rate_gate(gateway, *destination.node, connection);
-  asio::steady_timer over(client->executor(), asio::steady_timer::time_point::max());
-  bool has_ended = false;
-  const auto ended = [&] {
-    has_ended = true;
-    over.cancel();
-  };
-  const auto session = destination.node->add(std::move(client), std::move(arrival), ended);
+  SessionEnd end(client->executor());
+  const auto session = destination.node->add(std::move(client), std::move(arrival), [&end] { end.reach(); });
   connection.device = destination.device;
   connection.stop = [session](const rr::EndReason& reason) {
     session->close_service();
     session->close(rr::make_error(rr::ErrorCode::connection_error, reason.text));
   };
-  while (!has_ended) co_await over.async_wait(asio::as_tuple(asio::use_awaitable));
+  co_await end.wait();
   connection.device = nullptr;
   connection.stop = [](const rr::EndReason&) {};
   log(LogLevel::info, "client disconnected",

@@ -139,7 +139,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
     std::uint64_t count = 0;             ///< values that have come
     std::optional<rr::Value> out_value;  ///< the newest that could not be sent yet
     bool is_attached = false;
-    bool is_handed_out = false;  ///< hand_out() is due
+    bool is_due = false;  ///< hand_out() is due
   };
   enum class PipeState : std::uint8_t { detached, attaching, attached };
   struct Pipe {

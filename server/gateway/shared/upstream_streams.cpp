@@ -88,7 +88,7 @@ void Upstream::publish_wire(const MemberKey& key, const rr::Value& value, rr::Ti
   wire.newest = rr::WireValue{time, value};
   wire.arrived = std::chrono::steady_clock::now();
   ++wire.count;
-  if (!std::exchange(wire.is_handed_out, true)) hand_out_later(found->second);
+  if (!std::exchange(wire.is_due, true)) hand_out_later(found->second);
 }
 
 void Upstream::hand_out_later(const std::shared_ptr<Wire>& wire) {
@@ -102,17 +102,21 @@ void Upstream::hand_out_later(const std::shared_ptr<Wire>& wire) {
 void Upstream::hand_out(const std::shared_ptr<Wire>& wire) {
   const auto newest = *wire->newest;
   rr::WirePacket packet(wire->path, wire->member, newest.value, newest.time, wire->arrived);
-  std::size_t looked_at = 0;
-  for (std::size_t sent = 0; sent < clients_a_turn; ++looked_at) {
+  std::size_t up_to_date = 0;  // in a row
+  for (std::size_t sent = 0; sent < clients_a_turn;) {
     auto& followers = wire->followers;  // they may leave while they are sent to
-    if (looked_at >= followers.size()) {
-      wire->is_handed_out = false;
+    if (up_to_date >= followers.size()) {
+      wire->is_due = false;
       return;
     }
     wire->next = (wire->next + 1) % followers.size();
     auto& [client, count] = followers[wire->next];
-    if (count == wire->count) continue;
+    if (count == wire->count) {
+      ++up_to_date;
+      continue;
+    }
     const auto missed = wire->count - std::exchange(count, wire->count) - 1;
+    up_to_date = 0;
     ++sent;
     if (missed > 0) client->note_conflated(wire->path, wire->member, missed);
     client->receive_wire(packet);

@@ -76,7 +76,7 @@ TEST_CASE("the wrong node is refused by the service") {
 TEST_CASE("a client that is known by its certificate speaks for itself alone") {
   Loopback pair;
   ServiceSessionOptions options;
-  options.connection.known_peer = GENERATE(client_id, NodeId{{9}});
+  options.connection.known_peer = GENERATE(as<NodeId>{}, client_id, NodeId{{9}});
   const bool is_itself = options.connection.known_peer == client_id;
   pair.service = std::make_unique<ServiceSession>(pair.directory, options, pair.now);
   pair.pump();

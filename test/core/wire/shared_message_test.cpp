@@ -89,8 +89,9 @@ TEST_CASE("a shared message keeps what it references for the last of its receive
 }
 
 TEST_CASE("each receiver's limit holds for a shared message") {
+  const std::vector<double> values(100, 0.5);
   SharedMessage shared;
-  write(shared.message, std::vector<double>(100, 0.5));
+  write(shared.message, values);
   address(shared.message.header, 1, false);
   EncodedMessage sent;
   REQUIRE(shared.encode({}, sent));
