@@ -465,10 +465,7 @@ class ServiceSession {
 
   void begin_reply(const MessageEntry& request);
   void send_error(const MessageEntry& request, const Error& error, Now now);
-  Wires::value_type* ready_wire(std::string_view path, const MemberDefinition& member, const Value& value,
-                                TimeSpec time, TimePoint arrived);
-  Result<> send_wire_value(Wires::value_type& ready, const Value& value, TimeSpec time, TimePoint arrived, Now now);
-  Result<> finish_wire_packet(Result<> sent, WireConnection& wire, TimePoint arrived, Now now);
+  Result<> send_wire_packet(WireConnection& wire, WirePacket& packet, Now now);
   void flush_wires(Now now);
 
   ServiceDirectory& directory_;

@@ -10,64 +10,44 @@ namespace rr {
 // --- asked ---
 
 Result<> ServiceSession::send_wire(std::string_view path, const MemberDefinition& member, const Value& value, Now now) {
-  auto* ready = ready_wire(path, member, value, now.utc, now.steady);
-  return ready ? send_wire_value(*ready, value, now.utc, now.steady, now) : Result<>();
+  WirePacket packet(path, member, value, now.utc, now.steady);
+  return send_wire(packet, now);
 }
 
 Result<> ServiceSession::send_wire(WirePacket& packet, Now now) {
-  auto* ready = ready_wire(packet.path(), packet.member(), packet.value(), packet.time(), packet.arrived());
-  if (!ready) return {};
-  auto& wire = ready->second;
-  if (wire.last_sent && packet.time() <= *wire.last_sent)  // this client needs a stamp of its own
-    return send_wire_value(*ready, packet.value(), packet.time(), packet.arrived(), now);
-  const auto message = packet.message(service_->types());
-  if (!message) return message.error();
-  wire.last_sent = packet.time();
-  return finish_wire_packet(connection_.send(**message, now), wire, packet.arrived(), now);
-}
-
-/// The wire where it takes the value now. Where it does not, the value waits for it, in place of an older one.
-ServiceSession::Wires::value_type* ServiceSession::ready_wire(std::string_view path, const MemberDefinition& member,
-                                                              const Value& value, TimeSpec time, TimePoint arrived) {
-  const auto found = wires_.find(PathMemberView{path, member.name});
-  if (!may_use_service() || found == wires_.end()) return nullptr;
+  const auto found = wires_.find(PathMemberView{packet.path(), packet.member().name});
+  if (!may_use_service() || found == wires_.end()) return {};
   auto& wire = found->second;
-  if (wire.waiting) {
-    ++wire.ledger.conflated;
-    wire.waiting.reset();
-  }
-  if (wire.state == WireState::connected && connection_.queued_bytes() < wire_high_mark) return &*found;
-  wire.waiting = WireValue{time, value};
-  wire.waiting_since = arrived;
-  return nullptr;
+  if (wire.waiting) ++wire.ledger.conflated;
+  wire.waiting.reset();
+  if (wire.state == WireState::connected && connection_.queued_bytes() < wire_high_mark)
+    return send_wire_packet(wire, packet, now);
+  wire.waiting = WireValue{packet.time(), packet.value()};
+  wire.waiting_since = packet.arrived();
+  return {};
 }
 
-Result<> ServiceSession::send_wire_value(Wires::value_type& ready, const Value& value, TimeSpec time, TimePoint arrived,
-                                         Now now) {
-  auto& [key, wire] = ready;
-  connection_.begin_message(outgoing_);
-  if (auto written = write_wire_packet(outgoing_, key.path, *wire.member, value, wire.stamp(time), service_->types());
-      !written)
-    return written;
-  return finish_wire_packet(connection_.send(outgoing_, now), wire, arrived, now);
-}
-
-Result<> ServiceSession::finish_wire_packet(Result<> sent, WireConnection& wire, TimePoint arrived, Now now) {
+Result<> ServiceSession::send_wire_packet(WireConnection& wire, WirePacket& packet, Now now) {
+  std::optional<WirePacket> own;  // where this client needs another stamp
+  if (const auto time = wire.stamp(packet.time()); time != packet.time())
+    own.emplace(packet.path(), packet.member(), packet.value(), time, packet.arrived());
+  const auto message = (own ? *own : packet).message(service_->types());
+  if (!message) return message.error();
+  auto sent = connection_.send(**message, now);
   if (sent)
-    wire.ledger.note_delivery(now.steady - arrived);
+    wire.ledger.note_delivery(now.steady - packet.arrived());
   else if (connection_.state() == ConnectionState::closed)
     leave(sent.error(), now);  // with all wires
   return sent;
 }
 
 void ServiceSession::flush_wires(Now now) {
-  for (auto& each : wires_) {
-    auto& wire = each.second;
+  for (auto& [key, wire] : wires_) {
     if (!wire.waiting || wire.state == WireState::connecting || !may_use_service()) continue;
     const auto [time, value] = *std::exchange(wire.waiting, std::nullopt);
+    WirePacket packet(key.path, *wire.member, value, time, wire.waiting_since);
     // A value that does not fit its definition was refused or not when it was set; here only the stream counts.
-    if (!send_wire_value(each, value, time, wire.waiting_since, now) || connection_.queued_bytes() >= wire_high_mark)
-      return;
+    if (!send_wire_packet(wire, packet, now) || connection_.queued_bytes() >= wire_high_mark) return;
   }
 }
 
