@@ -32,8 +32,6 @@ class StreamDriver : public std::enable_shared_from_this<StreamDriver> {
   /// Handles the session's events, writes what it has to send, sees to timer and end. Due after everything asked of
   /// the session; inside of event handlers it does nothing, because the loop that called them goes on anyway.
   void settle();
-  /// The same at a time that was read just now.
-  void settle(Now now);
   /// Closes the stream at once. The session hears `reason` unless it has ended already.
   void close(Error reason);
   bool is_closed() const { return is_closed_; }
@@ -42,6 +40,8 @@ class StreamDriver : public std::enable_shared_from_this<StreamDriver> {
   boost::asio::any_io_executor executor() { return timer_.get_executor(); }
 
  protected:
+  /// settle() at a time that was read just now.
+  void settle(Now now);
   /// Runs `work` on the thread of the stream, later.
   void post(std::function<void()> work);
 

@@ -421,10 +421,17 @@ def test_rates_of_requests_in_a_shared_session(device, tmp_path):
         assert count >= len([each for each in outcomes if each != "float"])
 
 
-def test_rates_of_requests_over_json_on_a_websocket(tmp_path):
+@pytest.fixture
+def own_service(tmp_path):
+    """A service that no other test uses, so that it can be paused: (process, URL)"""
+    process = Background([sys.executable, PEERS / "service.py"], tmp_path / "service.log")
+    yield process, json.loads(process.next_line())["url"]
+    process.stop()
+
+
+def test_rates_of_requests_over_json_on_a_websocket(own_service, tmp_path):
     make_users(tmp_path)
-    service = Background([sys.executable, PEERS / "service.py"], tmp_path / "service.log")
-    device = json.loads(service.next_line())["url"]
+    service, device = own_service
     rates = {"user": {"per_second": 5}, "device": {"at_once": 2}}
     with running(tmp_path, device, {"users_file": "users"}, rates=rates) as gateway:
         def answers(user, requests, is_stopped=False):
@@ -462,7 +469,6 @@ def test_rates_of_requests_over_json_on_a_websocket(tmp_path):
         # What is sent on a wire is no request.
         found = answers("vera", [{"op": "send", "path": "both", "value": 1.0}] * 40)
         assert all("result" in answer for answer in found), found
-    service.stop()
 
 
 def test_users_and_rights_are_read_anew_and_sessions_go_on(device, tmp_path):
