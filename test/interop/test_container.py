@@ -11,6 +11,7 @@ import jsonschema_rs
 import pytest
 import yaml
 
+from machine import need
 from processes import BUILD, ROOT, START_DEADLINE, free_port
 from reverse_proxies import UNPACKED
 from test_operations import RRGATE, read_metrics
@@ -70,8 +71,7 @@ class Podman:
 
 @pytest.fixture(scope="module")
 def podman(tmp_path_factory):
-    if os.getuid() != 0 or not shutil.which("podman") or not BASE.exists():
-        pytest.skip("needs root, podman, and the base image that ./dev test makes with mmdebstrap")
+    need("containers")
     folder = tmp_path_factory.mktemp("podman")
     yield Podman(folder)
     shutil.rmtree(folder, ignore_errors=True)
@@ -204,8 +204,7 @@ def test_the_dashboard_asks_for_what_there_is(tmp_path):
 
 def test_the_unit_is_one(tmp_path):
     """As systemd reads it, with a program that is there."""
-    if not shutil.which("systemd-analyze"):
-        pytest.skip("no systemd-analyze here")
+    need("systemd")
     for name in ("rrgate.service", "rrgate.socket"):
         text = (ROOT / "gateway-config" / name).read_text()
         (tmp_path / name).write_text(text.replace("/usr/bin/rrgate", "/bin/true"))

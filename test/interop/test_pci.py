@@ -4,13 +4,13 @@ Where programs look for such devices, /sys/class and /dev, is made in a mount na
 character device, a pseudo-terminal whose other end leads to a service. Needs root and the right to make namespaces.
 """
 import json
-import subprocess
 import sys
 
 import pytest
 
 from clients import run_program
 from directions import LEVELS, PEERS
+from machine import need
 from processes import BUILD, Background, start_gateway
 from test_tls import FUNCTIONS, check_all
 
@@ -48,14 +48,12 @@ class Machine:
 @pytest.fixture(params=["reference", "ours"])
 def machine(request, tmp_path):
     """(who made the service, machine with the device)."""
+    need("mount-namespaces")
     program = {"reference": [sys.executable, PEERS / "service.py"], "ours": [BUILD / "test/interop/cpp/rr-test-service"]}
     service = Background([*program[request.param], *LEVELS["v4"]], tmp_path / "service.log")
     made = None
     try:
         made = Machine(tmp_path, json.loads(service.next_line())["port"])
-        done = subprocess.run([str(word) for word in made.on("true")], capture_output=True, text=True, timeout=30, check=False)
-        if done.returncode != 0:
-            pytest.skip(f"mount namespaces are not available here: {done.stderr.strip()}")
         yield request.param, made
     finally:
         if made:
