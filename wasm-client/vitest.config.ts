@@ -6,6 +6,7 @@ export default defineConfig({
   test: {
     include: ["test/wasm-client/**/*.test.ts"],
     globals: true,
+    expect: { requireAssertions: true },
     testTimeout: 20_000,
   },
 });

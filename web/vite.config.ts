@@ -28,5 +28,6 @@ export default defineConfig({
     dir: "../test/web",
     include: ["**/*.test.ts"],
     globals: true,
+    expect: { requireAssertions: true },
   },
 });
