@@ -13,14 +13,10 @@ JS = ROOT / "test" / "interop" / "js"
 
 
 def run_client(direction, port, scenario, chromium=None):
-    """Hands the steps of a scenario to the client of a direction. Returns its results, one for each step."""
+    """Hands the steps of a scenario to the client of a direction. Returns what it says, as run_program."""
     if direction.client == "chromium":
-        answer = chromium.ask({"url": client_url(direction, port), "steps": without_expectations(scenario.steps)})
-    else:
-        answer = run_program(client_command(direction, port), scenario.steps)
-    if "results" not in answer:
-        raise AssertionError(f"client did not connect: {answer}")
-    return answer["results"]
+        return chromium.ask({"url": client_url(direction, port), "steps": without_expectations(scenario.steps)})
+    return run_program(client_command(direction, port), scenario.steps)
 
 
 def client_url(direction, port):
@@ -71,6 +67,34 @@ def run_program(command, steps, environment={}):
     if client.returncode != 0 or not lines:
         raise AssertionError(f"client ended with {client.returncode}\n{output[-2000:]}\n{errors[-4000:]}")
     return json.loads(lines[-1])
+
+
+def check_step(what, step, result):
+    """`what` names the step where it fails."""
+    if "expect_error" in step:
+        assert "error" in result, f"{what}\nwanted an error, got {result}"
+        assert result["error"]["name"] == step["expect_error"], what
+        assert step.get("message", "") in result["error"]["message"], what
+        return
+    assert "error" not in result, f"{what}\nfailed: {result['error']}"
+    wanted, found = step["expect"], result.get("value")
+    if step.get("any_order"):  # The reference hands events to a pool of threads.
+        wanted, found = ({"list": sorted(value["list"])} for value in (wanted, found))
+    assert found == wanted, what
+
+
+def check_all(steps, answer):
+    """What a client program printed is what the steps expect."""
+    assert "results" in answer, answer
+    for number, (step, result) in enumerate(zip(steps, answer["results"], strict=True), 1):
+        check_step(f"step {number}: {json.dumps(step, ensure_ascii=False)[:400]}", step, result)
+
+
+def run_and_check(kind, url, steps):
+    """Client programs of the reference, or of Node, whose URLs begin with ws:."""
+    command = {"reference": [sys.executable, PEERS / "client.py", url.replace("ws://", "rr+ws://")],
+               "node": ["node", JS / "client.mjs", url]}[kind]
+    check_all(steps, run_program(command, steps))
 
 
 class Chromium:

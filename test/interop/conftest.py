@@ -8,10 +8,15 @@ import tempfile
 
 import pytest
 
+# Checks that helpers make count as the test's own.
+pytest.register_assert_rewrite("clients", "found_nodes", "gateways", "http_api", "load", "network", "news", "processes", "reverse_proxies",
+                               "tap", "users")
+
 from clients import Chromium
 from directions import DIRECTIONS, LEVELS, LOCAL_URL, PEERS, service_command
 from matrix import Matrix
 from processes import ROOT, Background, start_gateway
+from tls_nodes import make_lab
 
 TEST_DEADLINE = 120.0  # seconds; beyond it the run is ended with all stacks printed
 
@@ -31,9 +36,20 @@ def pytest_unconfigure(config):
     shutil.rmtree(config.local_folder, ignore_errors=True)
 
 
+def pytest_runtest_call(item):
+    item.has_asserted = "raises" in item.function.__code__.co_names  # that what it expects has come, pytest itself looks
+
+
+def pytest_assertion_pass(item):
+    item.has_asserted = True
+
+
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_makereport(item, call):
+    """A test that asserted nothing has failed."""
     report = (yield).get_result()
+    if report.when == "call" and report.passed and not item.has_asserted:
+        report.outcome, report.longrepr = "failed", f"{item.nodeid} asserted nothing"
     params = item.callspec.params if hasattr(item, "callspec") else {}
     if "scenario" in params and (report.when == "call" or report.failed):
         direction, level = params["link"]
@@ -55,7 +71,6 @@ def pytest_sessionfinish(session):
 def node():
     """The real package in this process: it starts once, and not again."""
     import RobotRaconteur as RR
-    sys.path.insert(0, str(PEERS))
     import quiet_node
     setup = RR.ClientNodeSetup(argv=["test", *(f"--robotraconteur-{name}={value}" for name, value in quiet_node.QUIET.items())])
     yield RR.RobotRaconteurNode.s
@@ -150,3 +165,30 @@ def link(request, chromium, tmp_path_factory):
         if gateway:
             gateway.stop()
         service.stop()
+
+
+@pytest.fixture(scope="module")
+def device(tmp_path_factory):
+    """The URL of a service of the reference."""
+    service = Background([sys.executable, PEERS / "service.py"], tmp_path_factory.mktemp("device") / "service.log")
+    yield json.loads(service.next_line())["url"]
+    service.stop()
+
+
+@pytest.fixture(scope="module", params=["reference", "ours"])
+def gateway(request, tmp_path_factory):
+    """The port of a gateway to a device of either make."""
+    folder = tmp_path_factory.mktemp("gateway")
+    direction = next(each for each in DIRECTIONS if each.name == f"reference-to-{request.param}")
+    service = Background(service_command(direction, "v4", "http://localhost"), folder / "service.log")
+    url = json.loads(service.next_line())["url"]
+    process, port = start_gateway(folder, url)
+    yield port
+    assert process.stop() == 0, process.description()
+    service.stop()
+
+
+@pytest.fixture(scope="session")
+def lab(tmp_path_factory):
+    """A folder with certificates, as tls_nodes.make_lab has it."""
+    return make_lab(tmp_path_factory.mktemp("lab"))

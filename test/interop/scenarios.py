@@ -519,3 +519,6 @@ SCENARIOS += [
         {"by": "o", "get": "level", "expect": 1.5},
         {"by": "o", "call": "who", "expect": ""}]),
 ]
+
+SCENARIO = {scenario.name: scenario for scenario in SCENARIOS}
+FUNCTIONS = SCENARIO["functions"]

@@ -1,5 +1,4 @@
 """Who may do what: users, tokens, certificates, proxies and rights, over HTTP, WebSockets and Robot Raconteur."""
-import base64
 import contextlib
 import http.client
 import itertools
@@ -8,7 +7,6 @@ import socket
 import ssl
 import subprocess
 import sys
-import threading
 import time
 
 import issuers
@@ -16,39 +14,11 @@ import pytest
 import websockets.sync.client
 
 from directions import PEERS
+from gateways import RRGATE, Gateway, make_web_certificates, rrgate
+from http_api import BASE, JSON_PROTOCOL, ask, is_alive, open_websocket, schemathesis
+from news import under_load
 from processes import Background
-from test_https import make_web_certificates
-from test_http_api import Answer, schemathesis
-from test_operations import RRGATE, Gateway, is_alive
-from test_proxies import open_websocket
-
-
-PASSWORDS = {"alice": "wonderland", "vera": "look only", "root": "of it all"}
-ROLES = {"alice": "operator", "vera": "viewer", "root": "admin"}
-RULES = [
-    {"roles": ["viewer", "operator"], "may": ["read", "subscribe"]},
-    {"roles": ["operator"], "paths": ["interop"], "members": ["p_double", "add"], "may": ["write", "call"]},
-    {"roles": ["admin"], "may": ["read", "write", "call", "subscribe", "lock", "metrics", "admin"]},
-]
-BASE = "/api/v1/devices/interop/interop"
-
-
-def rrgate(*arguments, given=""):
-    done = subprocess.run([RRGATE, *map(str, arguments)], input=given, capture_output=True, text=True, timeout=30)
-    assert done.returncode == 0, done.stderr
-    return done.stdout.strip()
-
-
-def make_users(folder):
-    for name, password in PASSWORDS.items():
-        rrgate("passwd", folder / "users", name, "--roles", ROLES[name], given=password + "\n")
-
-
-@pytest.fixture(scope="module")
-def device(tmp_path_factory):
-    service = Background([sys.executable, PEERS / "service.py"], tmp_path_factory.mktemp("device") / "service.log")
-    yield json.loads(service.next_line())["url"]
-    service.stop()
+from users import PASSWORDS, RULES, basic, bearer, make_users
 
 
 @contextlib.contextmanager
@@ -72,27 +42,6 @@ def guarded(device, tmp_path_factory):
     with running(folder, device, access) as gateway:
         gateway.token = token
         yield gateway
-
-
-def basic(name, password=None):
-    text = f"{name}:{PASSWORDS[name] if password is None else password}"
-    return {"Authorization": "Basic " + base64.b64encode(text.encode()).decode()}
-
-
-def bearer(token):
-    return {"Authorization": "Bearer " + token}
-
-
-def ask(port, method, path, body=None, headers={}, context=None):
-    made = http.client.HTTPSConnection("localhost", port, timeout=20, context=context) if context else \
-        http.client.HTTPConnection("127.0.0.1", port, timeout=20)
-    try:
-        if body is not None:
-            body, headers = json.dumps(body), {"Content-Type": "application/json", **headers}
-        made.request(method, path, body, headers)
-        return Answer(made.getresponse())
-    finally:
-        made.close()
 
 
 def audit_of(gateway):
@@ -476,41 +425,32 @@ def test_users_and_rights_are_read_anew_and_sessions_go_on(device, tmp_path):
     access = {"users_file": "users", "rules": RULES}
     with running(tmp_path, device, access) as gateway:
         link = open_websocket(gateway.port, "/devices/interop", "Authorization: " + basic("root")["Authorization"] + "\r\n")
-        failures, ended = [], threading.Event()
 
-        def load():
-            while not ended.is_set():
-                answer = ask(gateway.port, "GET", BASE + "/p_double", headers=basic("vera"))
-                if answer.status != 200:
-                    failures.append(answer.body)
+        def read():
+            answer = ask(gateway.port, "GET", BASE + "/p_double", headers=basic("vera"))
+            assert answer.status == 200, answer.body
 
-        loads = [threading.Thread(target=load) for _ in range(3)]
-        for thread in loads:
-            thread.start()
-        # A new user.
-        rrgate("passwd", tmp_path / "users", "carol", "--roles", "operator", given="new\n")
-        gateway.wait_for("users and rights read anew")
-        assert ask(gateway.port, "PUT", BASE + "/p_double", 1.5, basic("carol", "new")).status == 204
-        # Other rights.
-        gateway.write({**gateway.config, "access": {**access, "rules": RULES[:1] + RULES[2:]}})
-        gateway.wait_for("configuration read anew")
-        assert ask(gateway.port, "PUT", BASE + "/p_double", 1.5, basic("carol", "new")).status == 403
-        # A file that can't be used changes nothing.
-        (tmp_path / "users").write_text("broken\n")
-        gateway.hang_up()
-        gateway.wait_for("configuration not used; that from before stays")
-        assert ask(gateway.port, "GET", BASE + "/p_double", headers=basic("vera")).status == 200
-        # A user who is gone.
-        make_users_again = tmp_path / "fresh"
-        make_users_again.mkdir()
-        rrgate("passwd", make_users_again / "users", "vera", "--roles", "viewer", given=PASSWORDS["vera"] + "\n")
-        (make_users_again / "users").replace(tmp_path / "users")
-        gateway.wait_for("users and rights read anew", 2)
-        assert ask(gateway.port, "GET", BASE + "/p_double", headers=basic("carol", "new")).status == 401
-        ended.set()
-        for thread in loads:
-            thread.join()
-        assert failures == []
+        with under_load(read):
+            # A new user.
+            rrgate("passwd", tmp_path / "users", "carol", "--roles", "operator", given="new\n")
+            gateway.wait_for("users and rights read anew")
+            assert ask(gateway.port, "PUT", BASE + "/p_double", 1.5, basic("carol", "new")).status == 204
+            # Other rights.
+            gateway.write({**gateway.config, "access": {**access, "rules": RULES[:1] + RULES[2:]}})
+            gateway.wait_for("configuration read anew")
+            assert ask(gateway.port, "PUT", BASE + "/p_double", 1.5, basic("carol", "new")).status == 403
+            # A file that can't be used changes nothing.
+            (tmp_path / "users").write_text("broken\n")
+            gateway.hang_up()
+            gateway.wait_for("configuration not used; that from before stays")
+            assert ask(gateway.port, "GET", BASE + "/p_double", headers=basic("vera")).status == 200
+            # A user who is gone.
+            make_users_again = tmp_path / "fresh"
+            make_users_again.mkdir()
+            rrgate("passwd", make_users_again / "users", "vera", "--roles", "viewer", given=PASSWORDS["vera"] + "\n")
+            (make_users_again / "users").replace(tmp_path / "users")
+            gateway.wait_for("users and rights read anew", 2)
+            assert ask(gateway.port, "GET", BASE + "/p_double", headers=basic("carol", "new")).status == 401
         assert is_alive(link)
         link.close()
 
@@ -562,7 +502,7 @@ def test_passwd_and_token(tmp_path):
 
 def json_socket(port, headers={}, path=BASE):
     return websockets.sync.client.connect(f"ws://127.0.0.1:{port}{path}", additional_headers=headers,
-                                          subprotocols=["rrgate.json.v1"], proxy=None)
+                                          subprotocols=[JSON_PROTOCOL], proxy=None)
 
 
 def test_rights_over_json_on_a_websocket(guarded):

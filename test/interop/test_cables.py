@@ -11,11 +11,12 @@ import time
 
 import pytest
 
-from clients import run_program, without_expectations
+from clients import check_all, run_program, without_expectations
 from directions import PEERS
 from network import Network, run
 from processes import BUILD, Background, start_gateway
-from test_tls import FUNCTIONS, SERVICE, check_all, environment, lab  # noqa: F401
+from scenarios import FUNCTIONS
+from tls_nodes import SERVICE, environment
 
 DEVICE, GATEWAY = 0, 1
 DEVICE_ADDRESS = "10.77.0.1"
@@ -40,7 +41,7 @@ def network():
 class Site:
     """A device on its machine, a gateway on another."""
 
-    def __init__(self, network, lab, folder, maker, scheme, delay=0.0):  # noqa: F811
+    def __init__(self, network, lab, folder, maker, scheme, delay=0.0):
         self.network, self.scheme = network, scheme
         self._processes = []
         program = {"reference": [sys.executable, PEERS / "service.py"], "ours": [BUILD / "test/interop/cpp/rr-test-service"]}
@@ -94,7 +95,7 @@ class Site:
 
 
 @pytest.fixture
-def site(network, lab, tmp_path):  # noqa: F811
+def site(network, lab, tmp_path):
     """site(maker, scheme[, delay]): one for this test."""
     made = []
 

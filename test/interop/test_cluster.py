@@ -6,15 +6,15 @@ import sys
 
 import pytest
 
+from clients import run_and_check
 from directions import PEERS
+from http_api import fetch
 from processes import Background, read_json, start_gateway
 from reverse_proxies import ReverseProxy
-from scenarios import SCENARIOS
-from test_proxies import fetch, run_steps
+from scenarios import FUNCTIONS
 
 DEVICES = [f"robot{number}" for number in range(10)]
 PROXIES = {"nginx": "../cluster/nginx.conf", "haproxy": "../cluster/haproxy.cfg"}
-FUNCTIONS = next(scenario for scenario in SCENARIOS if scenario.name == "functions").steps
 
 
 @pytest.fixture(scope="module")
@@ -98,8 +98,8 @@ def read_property(cluster, name, address="127.0.0.2"):
 def test_each_device_has_one_gateway(cluster):
     """Whoever comes, and by whichever way: the reference by WebSocket, others by HTTP."""
     for name in DEVICES[:4]:
-        run_steps("reference", cluster.url(name), FUNCTIONS)
-        run_steps("reference", cluster.url(name), FUNCTIONS[:1])
+        run_and_check("reference", cluster.url(name), FUNCTIONS.steps)
+        run_and_check("reference", cluster.url(name), FUNCTIONS.steps[:1])
     by_websocket = owners(cluster, cluster.seen_by)
     assert set(by_websocket) == set(DEVICES[:4])
     for name in DEVICES:

@@ -11,11 +11,11 @@ import jsonschema_rs
 import pytest
 import yaml
 
+from gateways import RRGATE, running
+from http_api import fetch
 from machine import need
 from processes import BUILD, ROOT, START_DEADLINE, free_port
 from reverse_proxies import UNPACKED
-from test_operations import RRGATE, read_metrics
-from test_proxies import fetch
 
 DOCKER = ROOT / "docker"
 BASE = ROOT / "build" / "deps" / "container-base.tar"  # ./dev test made it; where it can't, images can't be built
@@ -193,7 +193,6 @@ def test_the_compose_files_are_such(names):
 
 
 def test_the_dashboard_asks_for_what_there_is(tmp_path):
-    from test_operations import running
     with running(tmp_path, {"devices": [{"name": "x", "url": "rr+tcp://127.0.0.1:1/?service=x", "mode": "shared"}]}) as gateway:
         known = {name.split("{")[0] for name in gateway.metrics()}
     panels = json.loads((DOCKER / "grafana" / "rrgate.json").read_text())["panels"]

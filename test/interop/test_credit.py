@@ -6,14 +6,12 @@ import sys
 
 import numpy
 import pytest
-import RobotRaconteur as RR
 
+from credit_service import BACKLOG
+from news import News
 from processes import Background, start_gateway
-from test_shared import News
 
 PEERS = pathlib.Path(__file__).parent / "peers"
-sys.path.insert(0, str(PEERS))
-from credit_service import BACKLOG  # noqa: E402
 
 FRAME = 262_144  # bytes
 QUEUE = 8_000_000  # bytes that may wait for a client; above a quarter of it the device is held back

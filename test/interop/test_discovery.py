@@ -1,19 +1,15 @@
 """Nodes that find one another over IPv6 link-local multicast: ours and the reference's, each on a machine of its own."""
 import json
 import os
-import sys
 import time
 
 import pytest
 
+from found_nodes import FIND_DEADLINE, OURS, THEIRS, TYPE, Watch
 from network import Network, run
-from processes import BUILD, ROOT, Background
+from processes import BUILD, Background
 
-OURS = BUILD / "test" / "interop" / "cpp" / "rr-test-discovery"
-THEIRS = [sys.executable, str(ROOT / "test" / "interop" / "peers" / "found_node.py")]
-TYPE = "experimental.found.Thing"
 IDS = [f"1111111{number}-0000-4000-8000-000000000000" for number in range(8)]
-FIND_DEADLINE = 5.0  # seconds
 
 
 @pytest.fixture(scope="module")
@@ -35,22 +31,6 @@ def start(network, tmp_path):
     yield start_process
     for process in running:
         process.stop()
-
-
-class Watch:
-    """rr-test-discovery watch on a host: its events as they come."""
-
-    def __init__(self, process):
-        self._process = process
-        assert json.loads(process.next_line()) == {"ready": True}
-
-    def wait_for(self, is_wanted, seconds=FIND_DEADLINE):
-        """The first event from here on that is_wanted(event)."""
-        deadline = time.monotonic() + seconds
-        while True:
-            event = json.loads(self._process.next_line(within=deadline - time.monotonic()))
-            if is_wanted(event):
-                return event
 
 
 def search(network, host, *command):

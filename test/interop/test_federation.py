@@ -1,27 +1,31 @@
 """A gateway behind a gateway: device <- far gateway <- near gateway <- client, each of the ways with TLS somewhere."""
+import functools
 import json
 import signal
 import sys
 
 import pytest
 
+from clients import check_all
 from directions import LEVELS, PEERS
+from gateways import Gateway, make_web_certificates, rrgate
+import http_api
+from http_api import BASE
 from processes import Background, free_port, read_json, start_gateway
-from scenarios import SCENARIOS
-from test_http_api import Stream, ask
-from test_https import make_web_certificates
-from test_access import basic, bearer, rrgate
-from test_operations import Gateway
-from test_tls import FUNCTIONS, SERVICE, check_all, lab, run_steps, start_service  # noqa: F401
+from scenarios import FUNCTIONS, SCENARIO
+from tls_nodes import SERVICE, run_steps, start_service
+from users import basic, bearer
 
-STEPS = [step for name in ("functions", "large_arrays", "events", "wires", "pipes") for scenario in SCENARIOS
-         if scenario.name == name for step in scenario.steps]
+ask = functools.partial(http_api.ask, base=BASE)
+Stream = functools.partial(http_api.Stream, base=BASE)
+
+STEPS = [step for name in ("functions", "large_arrays", "events", "wires", "pipes") for step in SCENARIO[name].steps]
 
 
 class Chain:
     """A device of either make with a certificate, and two gateways in a row before it."""
 
-    def __init__(self, lab, maker, folder, far_scheme, near_scheme):  # noqa: F811
+    def __init__(self, lab, maker, folder, far_scheme, near_scheme):
         """`far_scheme`: how the far gateway reaches the device; `near_scheme`: how the near one reaches the far one."""
         self._lab, self._folder, self._maker = lab, folder, maker
         self._tls = make_web_certificates(folder / "web")
@@ -76,7 +80,7 @@ WAYS = {
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_two_gateways(lab, maker, tmp_path, monkeypatch, way):  # noqa: F811
+def test_two_gateways(lab, maker, tmp_path, monkeypatch, way):
     monkeypatch.setenv("SSL_CERT_FILE", str(tmp_path / "web" / "web-ca.pem"))
     chain = Chain(lab, maker, tmp_path, *WAYS[way])
     try:
@@ -118,7 +122,7 @@ def bare_device(tmp_path_factory):
 @pytest.mark.parametrize("near_mode", ["relay", "shared"])
 @pytest.mark.parametrize("far_mode", ["relay", "shared"])
 @pytest.mark.parametrize("scheme", ["rr+ws", "rr+wss"])
-def test_the_far_gateway_asks_who_comes(lab, bare_device, tmp_path, monkeypatch, scheme, far_mode, near_mode):  # noqa: F811
+def test_the_far_gateway_asks_who_comes(lab, bare_device, tmp_path, monkeypatch, scheme, far_mode, near_mode):
     """A token in the headers of the near one's device is the proof, for its looks and for its clients."""
     tls = make_web_certificates(tmp_path / "web")
     monkeypatch.setenv("SSL_CERT_FILE", str(tmp_path / "web" / "web-ca.pem"))
@@ -150,7 +154,7 @@ def test_the_far_gateway_asks_who_comes(lab, bare_device, tmp_path, monkeypatch,
         far.process.stop()
 
 
-def test_the_near_gateway_logs_in_at_the_far_one(lab, bare_device, tmp_path):  # noqa: F811
+def test_the_near_gateway_logs_in_at_the_far_one(lab, bare_device, tmp_path):
     """As a user of the far one's, where both share the device: without a login it sees the service and may do nothing."""
     far, _ = protected_gateway(tmp_path / "far", bare_device, "shared")
     device = {"name": "interop", "url": f"rr+tcp://127.0.0.1:{far.port}/?nodename=interop&service=interop", "mode": "shared"}
@@ -170,7 +174,7 @@ def test_the_near_gateway_logs_in_at_the_far_one(lab, bare_device, tmp_path):  #
         far.process.stop()
 
 
-def test_tls_from_the_client_through_both(lab, maker, tmp_path):  # noqa: F811
+def test_tls_from_the_client_through_both(lab, maker, tmp_path):
     """With a certificate of the client's own too."""
     chain = Chain(lab, maker, tmp_path, "rr+tcp", "rr+tcp")
     try:
@@ -179,7 +183,7 @@ def test_tls_from_the_client_through_both(lab, maker, tmp_path):  # noqa: F811
         chain.stop()
 
 
-def test_the_far_gateway_dies(lab, tmp_path):  # noqa: F811
+def test_the_far_gateway_dies(lab, tmp_path):
     """The near one says so and goes on; subscriptions and streams of its clients are back when the far one is."""
     chain = Chain(lab, "ours", tmp_path, "rr+tcp", "rrs+tcp")
     url = f"rr+ws://127.0.0.1:{chain.near_port}/devices/interop?service=interop"
@@ -207,7 +211,7 @@ def test_the_far_gateway_dies(lab, tmp_path):  # noqa: F811
 
 @pytest.mark.parametrize("count", [1, 2], ids=["itself", "each other"])
 @pytest.mark.parametrize("scheme", ["rr+tcp", "rr+ws"])
-def test_a_circle(lab, tmp_path, scheme, count):  # noqa: F811
+def test_a_circle(lab, tmp_path, scheme, count):
     """Gateways that have each other as a device, or one that has itself, say so; no connection goes round and round."""
     def device(port):
         path = "devices/interop" if scheme == "rr+ws" else ""

@@ -1,80 +1,18 @@
 """The objects of a device over plain HTTP, as curl would use them; the device is the reference and ours in turn."""
 import base64
+import functools
 import http.client
 import json
-import pathlib
-import subprocess
-import sys
 import threading
 import time
 
-import pytest
-
 from directions import DIRECTIONS, service_command
+import http_api
+from http_api import BASE, schemathesis
 from processes import BUILD, Background, start_gateway
 
-SERVICES = {"reference": "reference-to-reference", "ours": "reference-to-ours"}
-BASE = "/api/v1/devices/interop/interop"
-
-
-@pytest.fixture(scope="module", params=SERVICES)
-def gateway(request, tmp_path_factory):
-    """The port of a gateway to a device."""
-    folder = tmp_path_factory.mktemp("http-api")
-    direction = next(each for each in DIRECTIONS if each.name == SERVICES[request.param])
-    service = Background(service_command(direction, "v4", "http://localhost"), folder / "service.log")
-    url = json.loads(service.next_line())["url"]
-    process, port = start_gateway(folder, url)
-    yield port
-    assert process.stop() == 0, process.description()
-    service.stop()
-
-
-class Answer:
-    def __init__(self, response):
-        self.status, self.headers, self.body = response.status, response.headers, response.read()
-
-    @property
-    def json(self):
-        return json.loads(self.body)
-
-
-def ask(port, method, path, body=None, headers={}, base=BASE):
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
-    try:
-        if body is not None and not isinstance(body, bytes):
-            body, headers = json.dumps(body), {"Content-Type": "application/json", **headers}
-        connection.request(method, base + path, body, headers)
-        return Answer(connection.getresponse())
-    finally:
-        connection.close()
-
-
-class Stream:
-    """Server-sent events: (id, event, data) as they come."""
-
-    def __init__(self, port, path, headers={}, base=BASE, connection=None):
-        self.connection = connection or http.client.HTTPConnection("127.0.0.1", port, timeout=20)
-        self.connection.request("GET", base + path, headers={"Accept": "text/event-stream", **headers})
-        self.response = self.connection.getresponse()
-        assert self.response.status == 200, self.response.read()
-        assert self.response.headers["Content-Type"] == "text/event-stream"
-        assert self.response.readline() == b": connected\n"
-
-    def next(self):
-        fields = {}
-        while True:
-            line = self.response.readline().decode().rstrip("\n")
-            if not line and "data" in fields:
-                return fields.get("id"), fields.get("event"), json.loads(fields["data"])
-            name, colon, value = line.partition(": ")
-            if colon and name:
-                fields[name] = value
-
-    def close(self):
-        # The response holds the socket as well: this is what ends the connection.
-        self.response.close()
-        self.connection.close()
+ask = functools.partial(http_api.ask, base=BASE)
+Stream = functools.partial(http_api.Stream, base=BASE)
 
 
 def test_properties(gateway):
@@ -336,18 +274,6 @@ def test_streams_outlive_the_device(tmp_path):
     finally:
         process.stop()
         service.stop()
-
-
-def schemathesis(folder, port, document, *more):
-    """Every operation of a document with what its schema allows and what it doesn't: no fault, nothing undocumented.
-    `more` are further arguments."""
-    program = pathlib.Path(sys.executable).parent / "schemathesis"
-    checks = "not_a_server_error,status_code_conformance,content_type_conformance,response_schema_conformance"
-    run = subprocess.run(
-        [program, "run", f"http://127.0.0.1:{port}{document}", "--url", f"http://127.0.0.1:{port}", "--checks", checks,
-         "--max-examples", "20", "--no-color", *more], cwd=folder, capture_output=True, text=True, timeout=100)
-    assert run.returncode == 0, run.stdout[-4000:] + run.stderr[-2000:]
-    return run.stdout
 
 
 def test_gateway_and_device_keep_what_their_openapi_says(tmp_path):

@@ -5,15 +5,16 @@ import socket
 import pytest
 from sslyze import ScanCommand, Scanner, ServerNetworkLocation, ServerScanRequest
 
+from clients import check_all
 from directions import LEVELS
-from processes import BUILD, Background, free_port, start_gateway
-from test_tls import FUNCTIONS, SERVICE, check_all, lab, run_steps, start_service  # noqa: F401
-
-RRGATE = BUILD / "server" / "rrgate"
+from gateways import RRGATE, make_web_certificates
+from processes import Background, free_port, start_gateway
+from scenarios import FUNCTIONS
+from tls_nodes import SERVICE, run_steps, start_service
 
 
 @pytest.fixture(scope="module", params=["reference", "ours"])
-def secure_device(request, lab, tmp_path_factory):  # noqa: F811
+def secure_device(request, lab, tmp_path_factory):
     """A service with a certificate: (who made it, port)."""
     # Where the HTTPS is not the service's own it cannot know of it, and the reference's client dies of a string table.
     process, port = start_service(request.param, lab, "good", tmp_path_factory.mktemp("device"), *LEVELS["v4"])
@@ -21,16 +22,8 @@ def secure_device(request, lab, tmp_path_factory):  # noqa: F811
     process.stop()
 
 
-def make_web_certificates(folder):
-    for arguments in (["ca", folder], ["web", folder, "localhost", "127.0.0.1"]):
-        process = Background([RRGATE, "cert", *arguments], folder.parent / "cert.log")
-        assert process.process.wait(30) == 0, process.description()
-        process.stop()
-    return {"certificates": [{"cert": str(folder / "localhost.pem"), "key": str(folder / "localhost.key")}]}
-
-
 @pytest.fixture(scope="module")
-def https(lab, secure_device, tmp_path_factory):  # noqa: F811
+def https(lab, secure_device, tmp_path_factory):
     """A gateway with HTTPS before a device by rrs+tcp: (who made the device, port, CA file)."""
     maker, device_port = secure_device
     folder = tmp_path_factory.mktemp("https")
@@ -41,7 +34,7 @@ def https(lab, secure_device, tmp_path_factory):  # noqa: F811
     gateway.stop()
 
 
-def test_a_device_by_tls_for_clients_in_clear(lab, https, carries):  # noqa: F811
+def test_a_device_by_tls_for_clients_in_clear(lab, https, carries):
     maker, port, _ = https
     for client in ("reference", "ours"):
         carries(client, maker, "rr+tcp", "rrs+tcp")
@@ -49,7 +42,7 @@ def test_a_device_by_tls_for_clients_in_clear(lab, https, carries):  # noqa: F81
 
 
 @pytest.mark.parametrize("client", ["reference", "ours"])
-def test_clients_by_wss(lab, https, monkeypatch, client, carries):  # noqa: F811
+def test_clients_by_wss(lab, https, monkeypatch, client, carries):
     maker, port, ca = https
     carries(client, maker, "rr+wss", "rrs+tcp")
     monkeypatch.setenv("SSL_CERT_FILE", str(ca))
@@ -57,7 +50,7 @@ def test_clients_by_wss(lab, https, monkeypatch, client, carries):  # noqa: F811
 
 
 @pytest.mark.parametrize("scheme", ["rrs+tcp", "rrs+ws", "rrs+wss"])
-def test_tls_from_end_to_end_through_the_gateway(lab, secure_device, tmp_path, monkeypatch, scheme, carries):  # noqa: F811
+def test_tls_from_end_to_end_through_the_gateway(lab, secure_device, tmp_path, monkeypatch, scheme, carries):
     maker, device_port = secure_device
     tls = make_web_certificates(tmp_path / "web")
     monkeypatch.setenv("SSL_CERT_FILE", str(tmp_path / "web" / "web-ca.pem"))
@@ -95,7 +88,7 @@ def accepts(port):
 
 @pytest.mark.parametrize("client", ["reference", "ours"])
 @pytest.mark.parametrize("scheme", ["rr+wss", "rrs+wss"])
-def test_wss_to_a_service_behind_a_proxy(lab, tls_front, monkeypatch, scheme, client, carries):  # noqa: F811
+def test_wss_to_a_service_behind_a_proxy(lab, tls_front, monkeypatch, scheme, client, carries):
     maker, port, ca = tls_front
     monkeypatch.setenv("SSL_CERT_FILE", str(ca))
     carries(client, maker, scheme)
@@ -103,7 +96,7 @@ def test_wss_to_a_service_behind_a_proxy(lab, tls_front, monkeypatch, scheme, cl
 
 
 @pytest.mark.parametrize("scheme", ["rr+ws", "rrs+ws", "rr+wss", "rrs+wss"])
-def test_devices_by_websocket(lab, secure_device, tls_front, tmp_path, monkeypatch, scheme, carries):  # noqa: F811
+def test_devices_by_websocket(lab, secure_device, tls_front, tmp_path, monkeypatch, scheme, carries):
     maker, port = secure_device
     if scheme.endswith("wss"):
         _, port, ca = tls_front
@@ -117,7 +110,7 @@ def test_devices_by_websocket(lab, secure_device, tls_front, tmp_path, monkeypat
         gateway.stop()
 
 
-def test_a_device_with_another_ca_stays_offline(lab, secure_device, tmp_path):  # noqa: F811
+def test_a_device_with_another_ca_stays_offline(lab, secure_device, tmp_path):
     _, device_port = secure_device
     tls = make_web_certificates(tmp_path / "web")
     port = free_port()

@@ -12,8 +12,8 @@ import pytest
 from PIL import Image
 
 from directions import PEERS
+from http_api import ask
 from processes import Background, start_gateway
-from test_http_api import ask
 
 BASE = "/api/v1/devices/interop/camera"
 PNG, JPEG = "image/png", "image/jpeg"

@@ -1,12 +1,10 @@
 """Every scenario in every direction, and what the peers agreed on."""
-import json
-
 import pytest
 
-from clients import client_url, run_client
+from clients import check_all, client_url, run_client
 from directions import LOCAL_URL, Direction, service_command
 from processes import Background, start_gateway
-from scenarios import SCENARIOS
+from scenarios import FUNCTIONS, SCENARIOS
 from tap import Tap
 
 
@@ -14,37 +12,19 @@ from tap import Tap
 def test_scenario(link, chromium, scenario, carries):
     direction, _, port = link
     carries(direction.client, direction.service, *direction.schemes)
-    results = run_client(direction, port, scenario, chromium)
-    assert len(results) == len(scenario.steps)
-    for number, (step, result) in enumerate(zip(scenario.steps, results), 1):
-        check(f"step {number}: {json.dumps(step, ensure_ascii=False)[:400]}", step, result)
-
-
-def check(what, step, result):
-    if "expect_error" in step:
-        assert "error" in result, f"{what}\nwanted an error, got {result}"
-        assert result["error"]["name"] == step["expect_error"], what
-        assert step.get("message", "") in result["error"]["message"], what
-        return
-    assert "error" not in result, f"{what}\nfailed: {result['error']}"
-    wanted, found = step["expect"], result.get("value")
-    if step.get("any_order"):  # The reference hands events to a pool of threads.
-        wanted, found = ({"list": sorted(value["list"])} for value in (wanted, found))
-    assert found == wanted, what
+    check_all(scenario.steps, run_client(direction, port, scenario, chromium))
 
 
 def test_our_local_service_through_the_gateway(tmp_path, carries):
     """As direction ours-gateway-local-reference, which has all scenarios; the gateway's part does not depend on the service."""
     carries("ours", "ours", "rr+ws", "rr+local")
     direction = Direction("ours-gateway-local-ours", "ours", "gateway-ws-local", "ours")
-    functions = next(scenario for scenario in SCENARIOS if scenario.name == "functions")
     service = Background(service_command(direction, "v4", "http://127.0.0.1"), tmp_path / "service.log")
     gateway = None
     try:
         service.next_line()
         gateway, port = start_gateway(tmp_path, LOCAL_URL)
-        for step, result in zip(functions.steps, run_client(direction, port, functions), strict=True):
-            check(json.dumps(step), step, result)
+        check_all(FUNCTIONS.steps, run_client(direction, port, FUNCTIONS))
     finally:
         if gateway:
             gateway.stop()
@@ -57,8 +37,7 @@ def test_agreed_level(link):
     direction, level, port = link
     tap = Tap(port)
     try:
-        functions = next(scenario for scenario in SCENARIOS if scenario.name == "functions")
-        run_client(direction, tap.port, functions)
+        check_all(FUNCTIONS.steps, run_client(direction, tap.port, FUNCTIONS))
         assert tap.level() == level
     finally:
         tap.close()

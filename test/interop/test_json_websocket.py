@@ -1,6 +1,7 @@
 """The objects of a device as JSON over a WebSocket, as a page would use them; the device is the reference and ours in
 turn."""
 import base64
+import functools
 import json
 import socket
 import struct
@@ -11,15 +12,16 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from directions import DIRECTIONS, service_command
+from http_api import BASE, JSON_PROTOCOL
+import http_api
 from processes import Background, start_gateway
-from test_http_api import BASE, ask, gateway  # noqa: F401 - a fixture
 
-PROTOCOL = "rrgate.json.v1"
+ask = functools.partial(http_api.ask, base=BASE)
 
 
 class Socket:
     def __init__(self, port, path=BASE, **options):
-        self._connecting = connect(f"ws://127.0.0.1:{port}{path}", subprotocols=[PROTOCOL], max_size=None, **options)
+        self._connecting = connect(f"ws://127.0.0.1:{port}{path}", subprotocols=[JSON_PROTOCOL], max_size=None, **options)
         self._others = []  # read, but not asked for yet
         self._last_id = 0
 
@@ -81,7 +83,7 @@ def wait_until(is_so):
 
 
 def test_values_and_calls(page):
-    assert page.socket.subprotocol == PROTOCOL
+    assert page.socket.subprotocol == JSON_PROTOCOL
     assert page.ask("set", "p_double", value=2.5) is None
     assert page.ask("get", "p_double") == 2.5
     assert page.ask("set", "p_int64", value="9007199254740993") is None
@@ -151,7 +153,7 @@ def test_frames_that_are_wrong_close_the_socket(gateway, frame, code):
 
 
 def test_who_may_not_open_one(gateway):
-    def status(path=BASE, protocol=PROTOCOL, **options):
+    def status(path=BASE, protocol=JSON_PROTOCOL, **options):
         with pytest.raises(InvalidStatus) as refused:
             connect(f"ws://127.0.0.1:{gateway}{path}", subprotocols=[protocol], **options).__enter__()
         return refused.value.response.status_code

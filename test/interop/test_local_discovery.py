@@ -7,9 +7,9 @@ import urllib.request
 
 import pytest
 
+from found_nodes import OURS, THEIRS, TYPE, Watch
 from network import run
 from processes import BUILD, Background, free_port
-from test_discovery import OURS, THEIRS, TYPE, Watch
 
 NAME = "local.theirs"
 

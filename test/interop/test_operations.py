@@ -1,7 +1,5 @@
 """The gateway as a service: metrics, configuration read anew, what a service manager gives and hears, stopping."""
-import contextlib
 import json
-import re
 import signal
 import socket
 import subprocess
@@ -10,109 +8,15 @@ import time
 
 import pytest
 
-from directions import PEERS
-from processes import BUILD, Background, free_port
-from test_proxies import SCENARIO, fetch, open_websocket, run_steps
-
-RRGATE = BUILD / "server" / "rrgate"
-
-
-@pytest.fixture(scope="module")
-def device(tmp_path_factory):
-    service = Background([sys.executable, PEERS / "service.py"], tmp_path_factory.mktemp("device") / "service.log")
-    yield json.loads(service.next_line())["url"]
-    service.stop()
-
-
-class Gateway:
-    """A gateway with its configuration file at hand."""
-
-    def __init__(self, folder, config, environment={}, command=()):
-        self.log = folder / "gateway.log"
-        self.file = folder / "gateway.json"
-        self.port = free_port()
-        self.config = {"listen": [f"127.0.0.1:{self.port}"], "log": {"format": "json"}, **config}
-        self.write(self.config)
-        self.process = Background([*command, RRGATE, "serve", "--config", self.file], self.log, environment)
-        self.wait_for("listening")
-
-    def write(self, config):
-        new = self.file.with_suffix(".new")
-        new.write_text(config if isinstance(config, str) else json.dumps(config))
-        new.rename(self.file)
-
-    def events(self):
-        return [json.loads(line) for line in self.log.read_text().splitlines() if line.endswith("}")]
-
-    def wait_for(self, event, count=1, **fields):
-        """The count-th event of this name with these fields."""
-        found = []
-
-        def is_there():
-            found[:] = [one for one in self.events() if one["event"] == event and fields.items() <= one.items()]
-            return len(found) >= count
-
-        self.process.wait_until(is_there)
-        return found[count - 1]
-
-    def hang_up(self):
-        self.process.process.send_signal(signal.SIGHUP)
-
-    def session(self, name="interop"):
-        """An open session that nobody uses."""
-        self.wait_for("device online", device=name)
-        count = sum(event["event"] == "client connected" for event in self.events())
-        link = open_websocket(self.port, f"/devices/{name}", f"Origin: http://127.0.0.1:{self.port}\r\n")
-        self.wait_for("client connected", count + 1)
-        return link
-
-    def metrics(self, port=None):
-        status, headers, body = fetch(port or self.port, "/metrics")
-        assert (status, headers["Content-Type"]) == (200, "text/plain; version=0.0.4; charset=utf-8")
-        return read_metrics(body.decode())
-
-
-def read_metrics(text):
-    """{"name{labels}": value}; every sample belongs to the family before it, every family is named once."""
-    values, families, current = {}, set(), None
-    for line in text.splitlines():
-        if line.startswith("# HELP "):
-            current = line.split()[2]
-            assert current not in families
-            families.add(current)
-        elif line.startswith("# TYPE "):
-            kind = line.split()[3]
-            assert line.split()[2] == current and kind in ("counter", "gauge", "histogram")
-            assert (kind == "counter") == current.endswith("_total")
-        else:
-            found = re.fullmatch(r'(\w+)(?:\{(?:\w+="[^"]*",?)+\})? (\d+(?:\.\d+)?)', line)
-            names = [current + end for end in ("_bucket", "_sum", "_count")] if kind == "histogram" else [current]
-            assert found and found[1] in names, line
-            name, value = line.rsplit(" ", 1)
-            assert name not in values
-            values[name] = float(value) if "." in value else int(value)
-    return values
-
-
-@contextlib.contextmanager
-def running(folder, config, *more):
-    gateway = Gateway(folder, config, *more)
-    try:
-        yield gateway
-    finally:
-        gateway.process.stop()
+from clients import run_and_check
+from gateways import RRGATE, running
+from http_api import fetch, is_alive, open_websocket
+from processes import free_port
+from scenarios import SCENARIO
 
 
 def interop(device, **more):
     return {"name": "interop", "url": device, **more}
-
-
-def is_alive(link):
-    link.settimeout(0.3)
-    try:
-        return link.recv(1) != b""
-    except TimeoutError:
-        return True
 
 
 def test_metrics(device, tmp_path):
@@ -155,7 +59,7 @@ def test_metrics_of_a_shared_device(device, tmp_path):
         gateway.wait_for("shared session open")
         url = f"rr+tcp://127.0.0.1:{gateway.port}/?nodename=interop&service=interop"
         assert gateway.metrics()['rrgate_subscription_delivered_total{device="interop",kind="wire"}'] == 0
-        run_steps("reference", url, SCENARIO["wires"].steps)
+        run_and_check("reference", url, SCENARIO["wires"].steps)
         first = gateway.metrics()
         assert first['rrgate_sessions{device="interop"}'] == 0
         wires = {name: first[f'rrgate_subscription_{name}_total{{device="interop",kind="wire"}}'] for name in ("delivered", "dropped")}
@@ -167,7 +71,7 @@ def test_metrics_of_a_shared_device(device, tmp_path):
         for direction in ("to_device", "to_clients"):
             assert first[f'rrgate_relayed_bytes_total{{device="interop",direction="{direction}"}}'] > 1000
             assert first[f'rrgate_waiting_bytes{{device="interop",direction="{direction}"}}'] == 0
-        run_steps("reference", url, SCENARIO["wires"].steps)
+        run_and_check("reference", url, SCENARIO["wires"].steps)
         second = gateway.metrics()
         assert all(second[name] >= value for name, value in first.items() if "_total" in name or "_bucket" in name)
         assert second[ages.format("count", "")] > first[ages.format("count", "")]

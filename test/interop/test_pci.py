@@ -8,11 +8,11 @@ import sys
 
 import pytest
 
-from clients import run_program
+from clients import check_all, run_program
 from directions import LEVELS, PEERS
 from machine import need
 from processes import BUILD, Background, start_gateway
-from test_tls import FUNCTIONS, check_all
+from scenarios import FUNCTIONS
 
 URL = "rr+pci:///?nodename=interop.service&service=interop"
 CLIENTS = {"reference": [sys.executable, PEERS / "client.py", URL, "--robotraconteur-hardware-enable=true"],

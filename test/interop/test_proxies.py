@@ -1,35 +1,24 @@
 """The gateway behind reverse proxies, each with the configuration that gateway-config/proxies/ has for it."""
-import http.client
 import json
 import os
 import re
 import socket
 import struct
-import sys
 import time
 
 import pytest
 import yaml
 
+from clients import run_and_check
 from clients import JS, run_program
-from directions import PEERS
+from http_api import CLIENT, fetch, open_websocket
 from processes import Background, start_gateway
 from reverse_proxies import CONFIGS, ReverseProxy
-from scenarios import SCENARIOS
-from test_interop import check
+from scenarios import SCENARIO
 
 IDLE_SECONDS = float(os.environ.get("RRGATE_IDLE_SECONDS", "2"))  # longer than what the proxies' other timeouts allow here
-CLIENT = "127.0.0.2"  # an address that no proxy has
-SCENARIO = {scenario.name: scenario for scenario in SCENARIOS}
 PROXIES = {"nginx": "nginx.conf", "caddy": "Caddyfile", "haproxy": "haproxy.cfg", "httpd": "httpd.conf"}
 STEPS = SCENARIO["functions"].steps + SCENARIO["large_arrays"].steps + SCENARIO["events"].steps
-
-
-@pytest.fixture(scope="module")
-def device(tmp_path_factory):
-    service = Background([sys.executable, PEERS / "service.py"], tmp_path_factory.mktemp("device") / "service.log")
-    yield json.loads(service.next_line())["url"]
-    service.stop()
 
 
 @pytest.fixture(scope="module")
@@ -55,46 +44,10 @@ def site(request, proxy):
     return (proxy.root, "") if request.param == "root" else (proxy.below, "/robots")
 
 
-def fetch(port, path, headers={}, address=CLIENT):
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10, source_address=(address, 0))
-    try:
-        connection.request("GET", path, headers=headers)
-        answer = connection.getresponse()
-        return answer.status, answer.headers, answer.read()
-    finally:
-        connection.close()
-
-
 def device_of(port, prefix, headers={}):
     status, _, body = fetch(port, prefix + "/api/v1/devices", headers)
     assert status == 200, body
     return next(entry for entry in json.loads(body)["devices"] if entry["name"] == "interop")
-
-
-def run_steps(kind, url, steps=STEPS):
-    command = {"reference": [sys.executable, PEERS / "client.py", url.replace("ws://", "rr+ws://")],
-               "node": ["node", JS / "client.mjs", url]}[kind]
-    plain = [{key: value for key, value in step.items() if not key.startswith("expect") and key not in ("message", "any_order")}
-             for step in steps]
-    answer = run_program(command, plain)
-    assert "results" in answer, answer
-    assert len(answer["results"]) == len(steps)
-    for step, result in zip(steps, answer["results"]):
-        check(json.dumps(step)[:200], step, result)
-
-
-def open_websocket(port, path, headers=""):
-    """A connected WebSocket as a socket; what comes first was the 101."""
-    link = socket.create_connection(("127.0.0.1", port), 10, source_address=(CLIENT, 0))
-    link.sendall(f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-                 f"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n{headers}\r\n".encode())
-    head = b""
-    while b"\r\n\r\n" not in head:
-        chunk = link.recv(4096)
-        assert chunk, head
-        head += chunk
-    assert head.startswith(b"HTTP/1.1 101 "), head
-    return link
 
 
 def last_client(log, since):
@@ -151,7 +104,7 @@ def test_sessions(site, client):
     port, prefix = site
     entry = device_of(port, prefix)
     assert entry["websocket_url"] == f"ws://127.0.0.1:{port}{prefix}/devices/interop"
-    run_steps(client, entry["websocket_url"] + "?service=interop")
+    run_and_check(client, entry["websocket_url"] + "?service=interop")
 
 
 def test_who_the_client_is(site, gateway):
@@ -247,7 +200,7 @@ def test_a_base_path(device, tmp_path, client):
         assert (status, headers["Location"]) == (308, "/lab/")
         entry = device_of(port, "/lab")
         assert entry["websocket_url"] == f"ws://127.0.0.1:{port}/lab/devices/interop"
-        run_steps(client, entry["websocket_url"] + "?service=interop", SCENARIO["functions"].steps)
+        run_and_check(client, entry["websocket_url"] + "?service=interop", SCENARIO["functions"].steps)
     finally:
         process.stop()
 
@@ -270,9 +223,9 @@ def test_proxy_protocol(device, tmp_path, monkeypatch, version):
     try:
         assert device_of(proxy.root, "")["websocket_url"] == f"ws://127.0.0.1:{proxy.root}/devices/interop"
         assert connected_as(proxy.root, "/devices/interop", log).startswith(CLIENT + ":")
-        run_steps("node", f"ws://127.0.0.1:{proxy.root}/devices/interop?service=interop")
+        run_and_check("node", f"ws://127.0.0.1:{proxy.root}/devices/interop?service=interop")
         steps, native = SCENARIO["functions"].steps, f"rr+tcp://127.0.0.1:{proxy.root}/?nodename=interop.service&service=interop"
-        run_steps("reference", native, steps)
+        run_and_check("reference", native, steps)
 
         # Whoever is not trusted is what its address says, and nothing that a proxy would say.
         with socket.create_connection(("127.0.0.1", port), 10, source_address=(CLIENT, 0)) as link:

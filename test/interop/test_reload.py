@@ -16,12 +16,12 @@ import RobotRaconteur as RR
 from websockets.sync.client import connect
 
 from directions import LEVELS, PEERS
+from gateways import Gateway, rrgate
+from http_api import JSON_PROTOCOL, Answer, Stream
+from news import PATIENCE
 from processes import Background, free_port
-from test_access import PASSWORDS, Answer, basic, make_users, rrgate
-from test_http_api import Stream
-from test_json_websocket import PROTOCOL
-from test_operations import Gateway
-from test_tls import SERVICE, lab, start_service  # noqa: F401
+from tls_nodes import SERVICE, start_service
+from users import PASSWORDS, basic, make_users
 
 READING = [
     {"roles": ["viewer", "guest"], "may": ["read", "subscribe"]},
@@ -30,7 +30,6 @@ READING = [
 ]
 WRITING = [*READING, {"roles": ["viewer"], "members": ["p_double"], "may": ["write"]}]
 VALUE = "/api/v1/devices/shared/interop/p_double"
-PATIENCE = 20.0  # seconds for what has to come by itself
 
 # As systemd hands sockets over: from number 3 on, for this process.
 HAND_OVER = """
@@ -47,7 +46,7 @@ os.execv(sys.argv[3], sys.argv[3:])
 
 
 @pytest.fixture(scope="module")
-def devices(lab, tmp_path_factory):  # noqa: F811
+def devices(lab, tmp_path_factory):
     folder = tmp_path_factory.mktemp("devices")
     shared = Background([sys.executable, PEERS / "service.py"], folder / "shared.log")
     relayed, port = start_service("ours", lab, "good", folder, *LEVELS["v4"])
@@ -145,7 +144,7 @@ def http_client(name, connection, headers={}):
 
 
 def json_client(name, url, **options):
-    connecting = connect(url + "/api/v1/devices/shared/interop", subprotocols=[PROTOCOL], **options)
+    connecting = connect(url + "/api/v1/devices/shared/interop", subprotocols=[JSON_PROTOCOL], **options)
     socket = connecting.__enter__()
 
     def exchange(number):
@@ -226,7 +225,7 @@ def all_go_on(clients):
 
 
 @pytest.mark.parametrize("is_handed_over", [False, True], ids=["its own sockets", "sockets of systemd"])
-def test_files_that_change_under_load(lab, devices, node, tmp_path, monkeypatch, is_handed_over):  # noqa: F811
+def test_files_that_change_under_load(lab, devices, node, tmp_path, monkeypatch, is_handed_over):
     monkeypatch.setenv("SSL_CERT_FILE", str(tmp_path / "web" / "web-ca.pem"))
     site = Site(tmp_path, devices, lab / "ca.pem", is_handed_over)
     gateway = site.gateway

@@ -3,7 +3,6 @@ members do is test_interop.py's, whose scenarios all run through a shared device
 import json
 import pathlib
 import sys
-import threading
 import time
 
 import numpy
@@ -13,16 +12,15 @@ import RobotRaconteur as RR
 from clients import JS, run_program
 from directions import DIRECTIONS, service_command
 from load import Clients, running
+from news import News
 from processes import BUILD, Background, read_json, start_gateway
 from scenarios import POSE
-from test_access import PASSWORDS, RULES, make_users
+from users import PASSWORDS, RULES, make_users
+from values import Values
 
-sys.path.insert(0, str(pathlib.Path(__file__).parent / "peers"))
-from values import Values  # noqa: E402
 
 OURS = next(each for each in DIRECTIONS if each.name == "reference-to-ours")
 SERVICES = {"interop", "guarded", "open", "proven", "RobotRaconteurServiceIndex"}  # of the test service's node
-PATIENCE = 20.0  # seconds for what has to come by itself
 GATEWAY_ID = "5c0ffee0-1111-4222-8333-944455556666"
 
 
@@ -49,23 +47,6 @@ def connections_to(port):
     """Established connections of this machine to a port, as the kernel lists them."""
     lines = pathlib.Path("/proc/net/tcp").read_text().splitlines()[1:]
     return sum(1 for line in lines if line.split()[2].endswith(f":{port:04X}") and line.split()[3] == "01")
-
-
-class News:
-    """What came by itself, to be waited for."""
-
-    def __init__(self):
-        self._changed = threading.Condition()
-        self._all = []
-
-    def add(self, item):
-        with self._changed:
-            self._all.append(item)
-            self._changed.notify_all()
-
-    def wait_for(self, is_it):
-        with self._changed:
-            assert self._changed.wait_for(lambda: any(is_it(item) for item in self._all), PATIENCE), self._all[-5:]
 
 
 def wire_news(connection):

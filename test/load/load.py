@@ -9,7 +9,8 @@ import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "interop"))
 
-from processes import BUILD, Background, free_port, read_json  # noqa: E402
+import gateways  # noqa: E402
+from processes import BUILD, Background  # noqa: E402
 
 PROGRAMS = BUILD / "test" / "load"
 NEVER_MS = 3_600_000  # looks at the device are connections too
@@ -35,35 +36,20 @@ class Device:
         self.process.stop()
 
 
-class Gateway:
+class Gateway(gateways.Gateway):
     """A gateway to one device, "load", that can be killed and started again on the same port."""
 
     def __init__(self, folder, device_url, device={}, **more):
-        self.port = free_port()
-        self.log = folder / "gateway.log"
-        self._file = folder / "gateway.json"
-        self._file.write_text(json.dumps({
-            "listen": [f"127.0.0.1:{self.port}"],
+        super().__init__(folder, {
             "devices": [{"name": "load", "url": device_url, **device}],
-            "log": {"format": "json"},
             "limits": {"clients": 10000, "clients_per_address": 10000, **more.pop("limits", {})},
             "retry": {"online_ms": NEVER_MS},
             **more,
-        }))
-        self.start()
+        })
 
-    def start(self):
-        self.process = Background([BUILD / "server" / "rrgate", "serve", "--config", self._file], self.log)
-        try:
-            self.process.wait_until(self._device_is_up)
-        except BaseException:
-            self.process.stop()
-            raise
+    def wait_until_ready(self):
+        self.wait_for("device online", device="load")
         self.pid = self.process.process.pid
-
-    def _device_is_up(self):
-        answer = read_json(f"http://127.0.0.1:{self.port}/api/v1/devices")
-        return answer is not None and answer["devices"][0]["state"] == "online"
 
     def kill(self):
         """As the kernel does it: nobody is told."""
@@ -74,21 +60,6 @@ class Gateway:
         if scheme == "rr+tcp":
             return f"rr+tcp://127.0.0.1:{self.port}/?service=Load"
         return f"{scheme}://127.0.0.1:{self.port}/devices/load?service=Load"
-
-    def events(self, name):
-        lines = self.log.read_text().splitlines()
-        return [event for event in (json.loads(line) for line in lines if line.endswith("}")) if event["event"] == name]
-
-    def wait_for(self, name, is_the_one=lambda event: True):
-        """The first event of this name that is the one."""
-        found = []
-
-        def is_there():
-            found[:] = [event for event in self.events(name) if is_the_one(event)]
-            return bool(found)
-
-        self.process.wait_until(is_there)
-        return found[0]
 
     def resident_bytes(self):
         return resident_bytes(self.pid)
