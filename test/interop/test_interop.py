@@ -18,8 +18,8 @@ def test_scenario(link, chromium, scenario, carries):
 def test_our_local_service_through_the_gateway(tmp_path, carries):
     """As direction ours-gateway-local-reference, which has all scenarios; the gateway's part does not depend on the service."""
     carries("ours", "ours", "rr+ws", "rr+local")
-    direction = Direction("ours-gateway-local-ours", "ours", "gateway-ws-local", "ours")
-    service = Background(service_command(direction, "v4", "http://127.0.0.1"), tmp_path / "service.log")
+    direction = Direction("ours-gateway-local-ours", "ours", "gateway-ws-local", "ours", "v4")
+    service = Background(service_command(direction, direction.level, "http://127.0.0.1"), tmp_path / "service.log")
     gateway = None
     try:
         service.next_line()
