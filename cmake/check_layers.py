@@ -7,8 +7,20 @@ import pathlib
 import re
 import sys
 
-# Each layer may include itself and those before it.
-CORE_LAYERS = ["support", "hardware", "wire", "robdef", "types", "member", "session", "discovery"]
+# The floors of the house, from the ground up: a folder may include itself and those before it. A folder that is not
+# listed belongs to the one that it lies in.
+FLOORS = """
+core/support core/hardware core/wire
+core/robdef/model core/robdef/parse core/robdef/verify core/robdef/format core/robdef
+core/types core/member core/session core/session/client core/session/service core/discovery
+node/platform node/tls node/transport node/http node/driver node/values node/client node/service node/discovery
+node/subscribe node/generate
+server/log server/json server/access server/http server/config server/upstream server/rr server/state server/relay
+server/http/endpoints server/socket server/front server/gateway server/cli server
+""".split()
+
+# Folders that stand beside each other, and know nothing of each other.
+APART = [("core/session/client", "core/session/service"), ("node/client", "node/service")]
 
 # What no file of core/ may include: input and output, threads and clocks belong to the drivers.
 CORE_FORBIDDEN = re.compile(
@@ -19,8 +31,10 @@ CORE_FORBIDDEN = re.compile(
 
 # First folder of a project include -> folders whose files may include it.
 MAY_INCLUDE = {
-    "core": {"core", "server", "wasm-client", "test", "demo", "examples"},
-    "server": {"server", "test", "demo", "examples"},
+    "core": {"core", "node", "server", "wasm-client", "test", "examples"},
+    "node": {"node", "server", "test", "examples"},
+    "server": {"server", "test"},
+    "examples": {"examples", "test"},
     "wasm-client": {"wasm-client", "test"},
     "test": {"test"},
 }
@@ -30,17 +44,27 @@ IMPORT = re.compile(r"""(?:\bfrom\s*|\bimport\s*\(?\s*)["']([^"']+)["']""")
 
 
 def check_cpp(path, line_number, system, included):
-    top, *rest = path.parts
-    target_top, *target_rest = pathlib.PurePosixPath(included).parts
+    top = path.parts[0]
+    target_top = pathlib.PurePosixPath(included).parts[0]
     if top == "core" and CORE_FORBIDDEN.match(included):
         yield f"core must not include {included}: it does no input or output and knows no threads"
     if system or target_top not in MAY_INCLUDE:
         return
+    here, there = floor_of(path), floor_of(pathlib.PurePosixPath(included))
     if top not in MAY_INCLUDE[target_top]:
         yield f"{top}/ must not include {included}"
-    if top == "core" and target_top == "core" and target_rest[0] in CORE_LAYERS and rest[0] in CORE_LAYERS:
-        if CORE_LAYERS.index(target_rest[0]) > CORE_LAYERS.index(rest[0]):
-            yield f"layer {rest[0]} must not include {included}: {target_rest[0]} stands above it"
+    elif (here, there) in APART or (there, here) in APART:
+        yield f"{here} must not include {included}: {there} stands beside it"
+    elif here in FLOORS and there in FLOORS and FLOORS.index(there) > FLOORS.index(here):
+        yield f"{here} must not include {included}: {there} stands above it"
+
+
+def floor_of(path):
+    """The listed folder that a file belongs to; its own folder where none is listed."""
+    for folder in path.parents:
+        if str(folder) in FLOORS:
+            return str(folder)
+    return str(path.parent)
 
 
 def check_typescript(path, line_number, imported):
@@ -51,7 +75,7 @@ def check_typescript(path, line_number, imported):
 
 
 def findings(root):
-    folders = [folder for folder in ("core", "server", "wasm-client", "web", "test", "demo", "examples") if (root / folder).is_dir()]
+    folders = [folder for folder in ("core", "node", "server", "wasm-client", "web", "test", "examples") if (root / folder).is_dir()]
     for folder in folders:
         for file in sorted((root / folder).rglob("*")):
             path = file.relative_to(root)

@@ -4,22 +4,22 @@ include(GNUInstallDirs)
 
 set_target_properties(rr_node PROPERTIES EXPORT_NAME node)
 set_target_properties(rr_platform PROPERTIES EXPORT_NAME platform)
-set_target_properties(rr_security PROPERTIES EXPORT_NAME security)
+set_target_properties(rr_tls PROPERTIES EXPORT_NAME tls)
 set_target_properties(rr_transport PROPERTIES EXPORT_NAME transport)
 set_target_properties(rr_discovery PROPERTIES EXPORT_NAME discovery)
-set_target_properties(rrgate_http PROPERTIES EXPORT_NAME http)
+set_target_properties(rr_http PROPERTIES EXPORT_NAME http)
+set_target_properties(rr_subscribe PROPERTIES EXPORT_NAME subscribe)
 install(
   TARGETS rr_options rr_boost rr_support rr_hardware rr_wire rr_robdef rr_types rr_member rr_session rr_discovery_core
-          rr_platform rr_security rrgate_asio rr_transport rrgate_http rr_node rr_discovery rrgate
+          rr_platform rr_tls rrgate_asio rr_transport rr_http rr_node rr_discovery rr_subscribe rrgate
   EXPORT rrgateTargets
   RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}"
   ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")
 install(TARGETS rrgate-demo-create rrgate-demo-webcams RUNTIME DESTINATION "${CMAKE_INSTALL_LIBEXECDIR}/rrgate")
 
 set(include_dir "${CMAKE_INSTALL_INCLUDEDIR}/rrgate")
-install(DIRECTORY core DESTINATION "${include_dir}" FILES_MATCHING PATTERN "*.hpp")
-install(DIRECTORY server/discovery server/node server/platform server/security server/transport DESTINATION "${include_dir}/server"
-        FILES_MATCHING PATTERN "*.hpp" PATTERN openssl.hpp EXCLUDE)
+install(DIRECTORY core node DESTINATION "${include_dir}" FILES_MATCHING PATTERN "*.hpp" PATTERN openssl.hpp EXCLUDE
+        PATTERN generate EXCLUDE)
 
 set(package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/rrgate")
 install(EXPORT rrgateTargets NAMESPACE rrgate:: DESTINATION "${package_dir}")

@@ -18,6 +18,16 @@ if(RR_FUZZ)
   target_compile_options(rr_options INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 
+# Several files in one compiler run: most of a file's time goes into the headers that it shares with its neighbours.
+# So names in anonymous namespaces are unique within a folder.
+option(RR_UNITY_BUILD "Compile several files of a library together" ON)
+set(CMAKE_UNITY_BUILD ${RR_UNITY_BUILD})
+set(CMAKE_UNITY_BUILD_BATCH_SIZE 6)
+if(RR_UNITY_BUILD AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  # GCC takes a file that is included for a header, whose types others could see.
+  target_compile_options(rr_options INTERFACE "$<BUILD_INTERFACE:-Wno-subobject-linkage>")
+endif()
+
 if(EMSCRIPTEN)
   # Boost gets an include directory of its own: /usr/include itself would shadow the sysroot.
   set(RR_BOOST_ROOT "/usr/include" CACHE PATH "Directory that holds boost/ (for the wasm build)")

@@ -9,8 +9,6 @@ namespace rr {
 
 namespace {
 
-constexpr std::uint8_t vendor_interface_in = 0xC1;
-constexpr std::uint8_t vendor_interface_out = 0x41;
 constexpr std::uint8_t connect_stream = 1;
 constexpr std::uint8_t close_stream_request = 2;
 constexpr std::uint8_t reset_all_stream = 3;

@@ -5,7 +5,6 @@ namespace rr {
 namespace {
 
 constexpr std::uint8_t standard_in = 0x80;
-constexpr std::uint8_t vendor_interface_in = 0xC1;
 constexpr std::uint8_t get_descriptor = 0x06;
 constexpr std::uint16_t bos_value = 0x0F00;
 constexpr std::uint16_t string_value = 0x0300;

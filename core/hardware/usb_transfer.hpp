@@ -10,6 +10,10 @@
 
 namespace rr {
 
+/// bmRequestType of vendor requests to an interface, from the device and to it. Source: USB 2.0 section 9.3.
+inline constexpr std::uint8_t vendor_interface_in = 0xC1;
+inline constexpr std::uint8_t vendor_interface_out = 0x41;
+
 /// How a transfer ended.
 enum class UsbStatus : std::uint8_t { ok, stall, no_device, timed_out, cancelled, overflow, busy, denied, failed };
 

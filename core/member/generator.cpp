@@ -14,7 +14,7 @@ constexpr std::chrono::seconds idle_limit{600};
 constexpr std::chrono::seconds ended_limit{30};  ///< after close or abort
 constexpr std::uint32_t index_mask = std::numeric_limits<std::int32_t>::max();
 
-std::string subject(const MemberDefinition& function) {
+std::string generator_subject(const MemberDefinition& function) {
   return "generator '" + function.name + "'";
 }
 
@@ -33,11 +33,11 @@ Result<Value> read_item(const Message& message, const MessageEntry& entry, std::
   const auto* element = message.elements_of(entry).find(name);
   if (!element)
     return make_error(ErrorCode::message_element_not_found,
-                      subject(function) + ": element '" + std::string(name) + "' not found");
+                      generator_subject(function) + ": element '" + std::string(name) + "' not found");
   auto value = unpack(message, *element, type, types);
   if (value) return value;
   auto error = value.error();
-  error.message = subject(function) + ": " + error.message;
+  error.message = generator_subject(function) + ": " + error.message;
   return error;
 }
 
@@ -58,9 +58,10 @@ Result<std::int32_t> read_generator_index(const Message& message, const MessageE
                                           const MemberDefinition& function) {
   const auto* element = message.elements_of(entry).find("index");
   if (!element)
-    return make_error(ErrorCode::message_element_not_found, subject(function) + ": element 'index' not found");
+    return make_error(ErrorCode::message_element_not_found,
+                      generator_subject(function) + ": element 'index' not found");
   if (element->type != DataType::int32_t || element->count != 1)
-    return make_error(ErrorCode::data_type_mismatch, subject(function) + ": 'index' is " +
+    return make_error(ErrorCode::data_type_mismatch, generator_subject(function) + ": 'index' is " +
                                                          std::string(data_type_name(element->type)) + "[" +
                                                          std::to_string(element->count) + "], expected int32[1]");
   return load<std::int32_t>(element->data.data());
@@ -77,8 +78,8 @@ Result<> write_generator_step(Message& message, GeneratorStep step, std::int32_t
   const auto* definition = generator_parameter(function);
   if (parameter.has_value() != (definition != nullptr))
     return make_error(ErrorCode::invalid_argument,
-                      subject(function) + (definition ? " takes a value with each step, none was given"
-                                                      : " takes no value with its steps, one was given"));
+                      generator_subject(function) + (definition ? " takes a value with each step, none was given"
+                                                                : " takes no value with its steps, one was given"));
   if (!definition) return {};
   return pack(message, "parameter", *parameter, definition->type, types);
 }
@@ -140,8 +141,8 @@ Result<GeneratorTable::Step> GeneratorTable::begin(std::string_view path, const 
   const auto found = generators_.find(index);
   if (found == generators_.end() || found->second.state == State::opening || found->second.function != &function ||
       found->second.path != path)
-    return make_error(ErrorCode::invalid_operation,
-                      "Invalid generator: " + subject(function) + " has none of index " + std::to_string(index));
+    return make_error(ErrorCode::invalid_operation, "Invalid generator: " + generator_subject(function) +
+                                                        " has none of index " + std::to_string(index));
   auto& entry = found->second;
   if (entry.state == State::open) {
     if (step != GeneratorStep::next) entry.state = step == GeneratorStep::close ? State::closed : State::aborted;
@@ -156,7 +157,7 @@ Result<GeneratorTable::Step> GeneratorTable::begin(std::string_view path, const 
   const bool was_closed = entry.state == State::closed;
   generators_.erase(found);
   if (was_closed) return make_error(ErrorCode::stop_iteration, {});
-  return make_error(ErrorCode::operation_aborted, subject(function) + " was aborted by the client");
+  return make_error(ErrorCode::operation_aborted, generator_subject(function) + " was aborted by the client");
 }
 
 bool GeneratorTable::finish(GeneratorId id, GeneratorStep step, bool has_failed, Now now) {

@@ -2,7 +2,7 @@
 // Source: sessions spec sections 2.1 and 2.7.
 #pragma once
 
-#include "core/robdef/service_definition.hpp"
+#include "core/robdef/model/service_definition.hpp"
 
 namespace rr {
 

@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::uint64_t largest = std::numeric_limits<std::uint64_t>::max();
 
-std::string subject(const MemberDefinition& memory) {
+std::string memory_subject(const MemberDefinition& memory) {
   return "memory '" + memory.name + "'";
 }
 
@@ -29,7 +29,7 @@ Result<const MessageElement*> find_element(const Message& message, const Message
                                            const MemberDefinition& memory) {
   if (const auto* element = message.elements_of(entry).find(name)) return element;
   return make_error(ErrorCode::message_element_not_found,
-                    subject(memory) + ": element '" + std::string(name) + "' not found");
+                    memory_subject(memory) + ": element '" + std::string(name) + "' not found");
 }
 
 Result<MemoryShape> read_shape(const Message& message, const MessageEntry& entry, std::string_view name,
@@ -37,12 +37,12 @@ Result<MemoryShape> read_shape(const Message& message, const MessageEntry& entry
   const auto element = find_element(message, entry, name, memory);
   if (!element) return element.error();
   if ((*element)->type != DataType::uint64_t)
-    return make_error(ErrorCode::data_type_mismatch, subject(memory) + ": '" + std::string(name) + "' is " +
+    return make_error(ErrorCode::data_type_mismatch, memory_subject(memory) + ": '" + std::string(name) + "' is " +
                                                          std::string(data_type_name((*element)->type)) +
                                                          "[], expected uint64[]");
   const bool is_plain = !is_multidim(memory.type);
   if ((*element)->count == 0 || (is_plain && (*element)->count != 1))
-    return make_error(ErrorCode::invalid_argument, subject(memory) + ": '" + std::string(name) + "' has " +
+    return make_error(ErrorCode::invalid_argument, memory_subject(memory) + ": '" + std::string(name) + "' has " +
                                                        std::to_string((*element)->count) + " numbers, expected " +
                                                        (is_plain ? "1" : "one a dimension"));
   MemoryShape shape((*element)->count);
@@ -62,12 +62,12 @@ Result<> check_count(const Value& data, std::span<const std::uint64_t> count, co
   if (!shape) return shape.error();
   if (std::equal(shape->begin(), shape->end(), count.begin(), count.end())) return {};
   return make_error(ErrorCode::invalid_argument,
-                    subject(memory) + ": the data is " + shape_text(*shape) + ", expected " + shape_text(count));
+                    memory_subject(memory) + ": the data is " + shape_text(*shape) + ", expected " + shape_text(count));
 }
 
 Error mismatch(const Value& value, const MemberDefinition& memory) {
   return make_error(ErrorCode::data_type_mismatch,
-                    subject(memory) + ": found " + value.type_text() + ", expected " + format_type(memory.type));
+                    memory_subject(memory) + ": found " + value.type_text() + ", expected " + format_type(memory.type));
 }
 
 std::uint64_t capped(std::uint64_t left, std::uint64_t right) {
@@ -112,7 +112,7 @@ Result<std::uint32_t> read_memory_limit(const Message& message, const MessageEnt
   const auto element = find_element(message, entry, "return", memory);
   if (!element) return element.error();
   if ((*element)->type != DataType::uint32_t || (*element)->count != 1)
-    return make_error(ErrorCode::data_type_mismatch, subject(memory) + ": MaxTransferSize is no single uint32");
+    return make_error(ErrorCode::data_type_mismatch, memory_subject(memory) + ": MaxTransferSize is no single uint32");
   return load<std::uint32_t>((*element)->data.data());
 }
 
@@ -128,7 +128,7 @@ Result<MemoryRange> read_memory_range(const Message& message, const MessageEntry
   auto count = read_shape(message, entry, "count", memory);
   if (!count) return count.error();
   if (position->size() != count->size())
-    return make_error(ErrorCode::invalid_argument, subject(memory) + ": " + std::to_string(position->size()) +
+    return make_error(ErrorCode::invalid_argument, memory_subject(memory) + ": " + std::to_string(position->size()) +
                                                        " numbers of position and " + std::to_string(count->size()) +
                                                        " of count, expected one each a dimension");
   return MemoryRange{std::move(*position), std::move(*count)};
@@ -156,7 +156,7 @@ Result<> check_memory_range(const MemoryRange& range, std::span<const std::uint6
                             const MemberDefinition& memory) {
   const auto& [position, count] = range;
   if (position.size() != dimensions.size() || count.size() != dimensions.size())
-    return make_error(ErrorCode::invalid_argument, subject(memory) + ": position and count have " +
+    return make_error(ErrorCode::invalid_argument, memory_subject(memory) + ": position and count have " +
                                                        std::to_string(position.size()) + " and " +
                                                        std::to_string(count.size()) + " dimensions, the memory has " +
                                                        std::to_string(dimensions.size()));
@@ -164,7 +164,7 @@ Result<> check_memory_range(const MemoryRange& range, std::span<const std::uint6
   for (std::size_t i = 0; i < dimensions.size(); ++i)
     is_within = is_within && position[i] <= dimensions[i] && count[i] <= dimensions[i] - position[i];
   if (is_within) return {};
-  return make_error(ErrorCode::out_of_range, subject(memory) + ": Index out of range: " + shape_text(count) +
+  return make_error(ErrorCode::out_of_range, memory_subject(memory) + ": Index out of range: " + shape_text(count) +
                                                  " items at " + shape_text(position) + " of " + shape_text(dimensions));
 }
 
@@ -192,8 +192,8 @@ Result<MemoryShape> shape_of(const Value& value, const MemberDefinition& memory,
   }
   if (!wants_dims) return MemoryShape{items};
   if (product_of(std::span<const std::uint32_t>(*dims)) != items)
-    return make_error(ErrorCode::invalid_argument, subject(memory) + ": dims " + dims_text(*dims) + " do not match " +
-                                                       std::to_string(items) + " items");
+    return make_error(ErrorCode::invalid_argument, memory_subject(memory) + ": dims " + dims_text(*dims) +
+                                                       " do not match " + std::to_string(items) + " items");
   return MemoryShape(dims->begin(), dims->end());
 }
 

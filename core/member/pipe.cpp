@@ -9,7 +9,7 @@ namespace {
 /// What a stored packet takes beside its payload: map node, values, names.
 constexpr std::size_t packet_overhead = 128;
 
-std::string subject(const MemberDefinition& member) {
+std::string pipe_subject(const MemberDefinition& member) {
   return "pipe '" + member.name + "'";
 }
 
@@ -38,7 +38,7 @@ Result<> write_pipe_packet(Message& message, std::int32_t index, std::uint32_t n
   message.add_scalar("packetnumber", DataType::uint32_t, number);
   if (auto packed = pack(message, "packet", value, member.type, types); !packed) {
     auto error = packed.error();
-    error.message = subject(member) + ": " + error.message;
+    error.message = pipe_subject(member) + ": " + error.message;
     return error;
   }
   if (wants_ack) message.add_scalar("requestack", DataType::uint32_t, std::uint32_t{1});
@@ -59,14 +59,14 @@ Result<std::int32_t> read_pipe_index(const MessageElement& element) {
 Result<PipePacket> read_pipe_packet_head(const Message& message, const MessageElement& element,
                                          const MemberDefinition& member) {
   if (element.type != DataType::map_string_t)
-    return make_error(
-        ErrorCode::data_type_mismatch,
-        subject(member) + ": a packet is a " + std::string(data_type_name(element.type)) + ", expected dictionary");
+    return make_error(ErrorCode::data_type_mismatch, pipe_subject(member) + ": a packet is a " +
+                                                         std::string(data_type_name(element.type)) +
+                                                         ", expected dictionary");
   const auto parts = message.children_of(element);
   const auto* number = parts.find("packetnumber");
   if (!number || !is_one_number(*number, DataType::uint32_t))
     return make_error(number ? ErrorCode::data_type_mismatch : ErrorCode::message_element_not_found,
-                      subject(member) + ": packetnumber is not a uint32");
+                      pipe_subject(member) + ": packetnumber is not a uint32");
   PipePacket packet;
   packet.number = load<std::uint32_t>(number->data.data());
   packet.wants_ack = parts.find("requestack") != nullptr;
@@ -77,7 +77,8 @@ Result<PipePacket> read_pipe_packet_head(const Message& message, const MessageEl
 Result<> read_pipe_packet_value(const Message& message, const MessageElement& element, const MemberDefinition& member,
                                 const TypeRegistry& types, PipePacket& packet) {
   const auto* value = message.children_of(element).find("packet");
-  if (!value) return make_error(ErrorCode::message_element_not_found, subject(member) + ": element packet not found");
+  if (!value)
+    return make_error(ErrorCode::message_element_not_found, pipe_subject(member) + ": element packet not found");
   auto read = unpack(message, *value, member.type, types);
   if (!read) return read.error();
   packet.value = std::move(*read);
@@ -106,11 +107,12 @@ void write_pipe_index(Message& message, std::int32_t index) {
 Result<std::int32_t> read_pipe_index_element(const Message& message, const MessageEntry& entry,
                                              const MemberDefinition& member) {
   const auto* element = message.elements_of(entry).find("index");
-  if (!element) return make_error(ErrorCode::message_element_not_found, subject(member) + ": element index not found");
+  if (!element)
+    return make_error(ErrorCode::message_element_not_found, pipe_subject(member) + ": element index not found");
   if (!is_one_number(*element, DataType::int32_t))
     return make_error(
         ErrorCode::data_type_mismatch,
-        subject(member) + ": index is " + std::string(data_type_name(element->type)) + ", expected int32");
+        pipe_subject(member) + ": index is " + std::string(data_type_name(element->type)) + ", expected int32");
   return load<std::int32_t>(element->data.data());
 }
 
@@ -135,11 +137,11 @@ Result<> PipeEndpointState::keep(PipePacket packet) {
   if (ahead > UINT32_MAX / 2 || waiting_.contains(order)) return {};  // it came before
   if (ahead >= store_->max_packets_ahead)
     return make_error(ErrorCode::out_of_system_resource,
-                      subject(*member_) + ": packet " + std::to_string(packet.number) + " came while " +
+                      pipe_subject(*member_) + ": packet " + std::to_string(packet.number) + " came while " +
                           std::to_string(static_cast<std::uint32_t>(received_ + 1)) + " is missing; at most " +
                           std::to_string(store_->max_packets_ahead) + " may be kept");
   if (store_->max_bytes - store_->bytes < packet.size_bytes)
-    return make_error(ErrorCode::out_of_system_resource, subject(*member_) + ": packets that wait for number " +
+    return make_error(ErrorCode::out_of_system_resource, pipe_subject(*member_) + ": packets that wait for number " +
                                                              std::to_string(static_cast<std::uint32_t>(received_ + 1)) +
                                                              " take more than " + std::to_string(store_->max_bytes) +
                                                              " bytes");

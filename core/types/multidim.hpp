@@ -7,7 +7,7 @@
 #include <span>
 #include <string>
 
-#include "core/robdef/service_definition.hpp"
+#include "core/robdef/model/service_definition.hpp"
 
 namespace rr {
 

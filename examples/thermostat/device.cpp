@@ -2,7 +2,7 @@
 #include <iostream>
 
 #include "example__thermostat.hpp"
-#include "server/node/node.hpp"
+#include "node/service/node.hpp"
 
 namespace thermostat = example::thermostat;
 

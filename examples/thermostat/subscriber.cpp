@@ -2,7 +2,7 @@
 #include <iostream>
 
 #include "example__thermostat.hpp"
-#include "server/node/service_subscription.hpp"
+#include "node/subscribe/service_subscription.hpp"
 
 int main(int, char** words) {
   using Room = example::thermostat::ThermostatAsyncClient;

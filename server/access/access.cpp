@@ -3,9 +3,9 @@
 #include <algorithm>
 
 #include "core/support/glob.hpp"
-#include "server/definitions/text_file.hpp"
+#include "node/platform/file_look.hpp"
+#include "node/platform/text_file.hpp"
 #include "server/log/log.hpp"
-#include "server/platform/file_look.hpp"
 
 namespace rrgate {
 

@@ -7,12 +7,12 @@
 #include <string>
 #include <string_view>
 
-#include "core/session/authenticator.hpp"
+#include "core/session/service/authenticator.hpp"
+#include "node/service/password_file.hpp"
 #include "server/access/access_config.hpp"
 #include "server/access/access_rules.hpp"
 #include "server/access/api_tokens.hpp"
 #include "server/access/audit_log.hpp"
-#include "server/security/password_file.hpp"
 
 namespace rrgate {
 

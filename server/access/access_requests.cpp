@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
+#include "node/tls/digest.hpp"
 #include "server/access/access_text.hpp"
 #include "server/access/base64url.hpp"
-#include "server/security/digest.hpp"
 
 namespace rrgate {
 

@@ -4,9 +4,9 @@
 
 #include "core/support/hex.hpp"
 #include "core/support/words.hpp"
+#include "node/tls/digest.hpp"
 #include "server/access/access_text.hpp"
 #include "server/access/base64url.hpp"
-#include "server/security/digest.hpp"
 
 namespace rrgate {
 

@@ -20,7 +20,7 @@ rr::Error refused(std::string why) {
   return rr::make_error(rr::ErrorCode::authentication_error, "token refused: " + std::move(why));
 }
 
-rr::Error unusable(std::string why) {
+rr::Error unusable_key_set(std::string why) {
   return rr::make_error(rr::ErrorCode::invalid_configuration, std::move(why));
 }
 
@@ -129,10 +129,10 @@ bool looks_like_jwt(std::string_view text) {
 
 rr::Result<JwtVerifier> JwtVerifier::from_jwks(std::string_view text, JwtClaims claims) {
   const auto json = rr::read_json(text);
-  if (!json) return unusable(json.error().message);
+  if (!json) return unusable_key_set(json.error().message);
   const auto keys = json->is_object() ? json->find("keys") : json->end();
   if (!json->is_object() || keys == json->end() || !keys->is_array() || keys->size() > max_keys)
-    return unusable("expected {\"keys\": [...]} with at most " + std::to_string(max_keys) + " keys");
+    return unusable_key_set("expected {\"keys\": [...]} with at most " + std::to_string(max_keys) + " keys");
   JwtVerifier out(std::move(claims));
   std::string problem = "there is none in it";
   for (const auto& jwk : *keys) {
@@ -143,7 +143,7 @@ rr::Result<JwtVerifier> JwtVerifier::from_jwks(std::string_view text, JwtClaims 
     else if (is_for_signatures(jwk, *key))
       out.keys_.push_back({text_of(jwk, "kid"), std::move(*key)});
   }
-  if (out.keys_.empty()) return unusable("no key can be used: " + problem);
+  if (out.keys_.empty()) return unusable_key_set("no key can be used: " + problem);
   return out;
 }
 
@@ -151,7 +151,7 @@ rr::Result<JwtVerifier> JwtVerifier::from_secret(std::string_view text, JwtClaim
   while (!text.empty() && std::string_view(" \t\r\n").find(text.back()) != std::string_view::npos)
     text.remove_suffix(1);
   auto key = rr::SignatureKey::from_secret(rr::as_bytes(text));
-  if (!key) return unusable(key.error().message);
+  if (!key) return unusable_key_set(key.error().message);
   JwtVerifier out(std::move(claims));
   out.keys_.push_back({{}, std::move(*key)});
   return out;

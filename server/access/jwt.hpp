@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "server/access/identity.hpp"
-#include "server/security/signature_key.hpp"
+#include "server/access/signature_key.hpp"
 
 namespace rrgate {
 

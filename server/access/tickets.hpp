@@ -7,9 +7,9 @@
 #include <optional>
 #include <string>
 
+#include "node/tls/digest.hpp"
 #include "server/access/base64url.hpp"
 #include "server/access/identity.hpp"
-#include "server/security/digest.hpp"
 
 namespace rrgate {
 

@@ -7,13 +7,13 @@
 
 #include "core/session/start_tls.hpp"
 #include "core/support/random.hpp"
+#include "node/platform/folders.hpp"
+#include "node/platform/secret_file.hpp"
+#include "node/platform/text_file.hpp"
+#include "node/tls/certificate_files.hpp"
+#include "node/tls/issue_certificates.hpp"
+#include "node/tls/node_certificate_check.hpp"
 #include "server/cli/command.hpp"
-#include "server/definitions/text_file.hpp"
-#include "server/platform/folders.hpp"
-#include "server/platform/secret_file.hpp"
-#include "server/security/certificate_files.hpp"
-#include "server/security/issue_certificates.hpp"
-#include "server/security/node_certificate_check.hpp"
 
 namespace rrgate {
 
@@ -26,11 +26,6 @@ constexpr std::int64_t clock_slack = 3600;  // of machines in the lab, in second
 
 constexpr std::string_view node_ca = "node-ca";
 constexpr std::string_view web_ca = "web-ca";
-
-int fail(const std::string& what) {
-  std::cerr << "rrgate cert: " << what << "\n";
-  return exit_failed;
-}
 
 rr::Result<> write_pair(const fs::path& stem, const rr::CertificateAndKey& pair, std::string_view chain, bool force) {
   std::error_code error;
@@ -76,9 +71,9 @@ int make_cas(const Wishes& wishes) {
     wish.begins_after_seconds = -clock_slack;
     wish.ends_after_seconds = wishes.days * day;
     const auto made = rr::issue_certificate(wish, nullptr);
-    if (!made) return fail(made.error().message);
+    if (!made) return report_failure("cert", made.error().message);
     if (auto done = write_pair(wishes.folder / kind.file, *made, {}, wishes.force); !done)
-      return fail(done.error().message);
+      return report_failure("cert", done.error().message);
     std::cout << (wishes.folder / kind.file).string() << ".pem\n";
   }
   std::cout << "The .key files make certificates that are believed: keep them here. Programs that shall believe them "
@@ -111,13 +106,13 @@ int make_node(const Wishes& wishes, const std::string& output) {
   if (wishes.operands.size() != 1) return usage_error("cert node", "expected FOLDER and one NODEID or NODENAME");
   const auto& node = wishes.operands.front();
   const auto ca = read_ca(wishes.folder, node_ca);
-  if (!ca) return fail(ca.error().message);
+  if (!ca) return report_failure("cert", ca.error().message);
   const auto parsed = rr::parse_node_id(node);
   const auto id = parsed && !parsed->is_any() ? parsed : id_of_name(node);
-  if (!id) return fail(id.error().message);
+  if (!id) return report_failure("cert", id.error().message);
   auto path = rr::Result<std::string>((fs::path(output) / (rr::format_node_id(*id) + ".p12")).string());
   if (output.empty()) path = rr::node_certificate_path(*id);
-  if (!path) return fail(path.error().message);
+  if (!path) return report_failure("cert", path.error().message);
 
   rr::CertificateWish wish;
   wish.common_name = rr::format_certificate_name(*id);
@@ -125,10 +120,11 @@ int make_node(const Wishes& wishes, const std::string& output) {
   wish.begins_after_seconds = -clock_slack;
   wish.ends_after_seconds = wishes.days * day;
   const auto made = rr::issue_certificate(wish, &*ca);
-  if (!made) return fail(made.error().message);
+  if (!made) return report_failure("cert", made.error().message);
   const auto bundle = rr::make_node_bundle(*made, ca->certificate);
-  if (!bundle) return fail(bundle.error().message);
-  if (auto done = rr::write_secret(*path, rr::as_text(*bundle), wishes.force); !done) return fail(done.error().message);
+  if (!bundle) return report_failure("cert", bundle.error().message);
+  if (auto done = rr::write_secret(*path, rr::as_text(*bundle), wishes.force); !done)
+    return report_failure("cert", done.error().message);
   std::cout << *path << "\n";
   return exit_ok;
 }
@@ -136,19 +132,19 @@ int make_node(const Wishes& wishes, const std::string& output) {
 int make_web(const Wishes& wishes) {
   if (wishes.operands.empty()) return usage_error("cert web", "expected FOLDER and at least one HOST");
   const auto ca = read_ca(wishes.folder, web_ca);
-  if (!ca) return fail(ca.error().message);
+  if (!ca) return report_failure("cert", ca.error().message);
   rr::CertificateWish wish;
   wish.common_name = wishes.operands.front().substr(0, 64);
   wish.hosts = wishes.operands;
   wish.begins_after_seconds = -clock_slack;
   wish.ends_after_seconds = wishes.days * day;
   const auto made = rr::issue_certificate(wish, &*ca);
-  if (!made) return fail(made.error().message);
+  if (!made) return report_failure("cert", made.error().message);
   auto name = wishes.operands.front();
   for (auto& letter : name)
     if (letter == '*' || letter == ':') letter = '_';
   const auto stem = wishes.folder / name;
-  if (auto done = write_pair(stem, *made, {}, wishes.force); !done) return fail(done.error().message);
+  if (auto done = write_pair(stem, *made, {}, wishes.force); !done) return report_failure("cert", done.error().message);
   std::cout << stem.string() << ".pem\n" << stem.string() << ".key\n";
   return exit_ok;
 }

@@ -1,8 +1,8 @@
 // rrgate check-config: whether `rrgate serve` would take a file. Layer: server/cli.
+#include "node/tls/client_certificates.hpp"
 #include "server/access/access.hpp"
 #include "server/cli/command.hpp"
 #include "server/cli/findings.hpp"
-#include "server/security/client_certificates.hpp"
 
 namespace rrgate {
 

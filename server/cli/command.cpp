@@ -91,6 +91,11 @@ ParsedArguments parse_arguments(Arguments arguments, const KnownOptions& known) 
   return out;
 }
 
+int report_failure(std::string_view command, std::string_view what) {
+  std::cerr << "rrgate " << command << ": " << what << "\n";
+  return exit_failed;
+}
+
 int usage_error(std::string_view command, std::string_view what) {
   std::cerr << "rrgate " << command << ": " << what << "; see rrgate --help\n";
   return exit_usage;

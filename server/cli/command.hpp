@@ -44,6 +44,8 @@ ParsedArguments parse_arguments(Arguments arguments, const KnownOptions& known);
 
 /// Prints "rrgate NAME: what" and how to get help to stderr; returns exit_usage.
 int usage_error(std::string_view command, std::string_view what);
+/// Prints "rrgate NAME: what" to stderr; returns exit_failed.
+int report_failure(std::string_view command, std::string_view what);
 
 // The subcommands.
 int run_serve(Arguments arguments);

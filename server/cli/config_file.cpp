@@ -4,11 +4,11 @@
 
 #include <algorithm>
 
+#include "node/platform/file_look.hpp"
 #include "server/cli/run_gateway.hpp"
 #include "server/cli/service_manager.hpp"
 #include "server/config/access_options.hpp"
 #include "server/log/log.hpp"
-#include "server/platform/file_look.hpp"
 
 namespace rrgate {
 

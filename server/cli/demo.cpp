@@ -44,7 +44,7 @@ struct DemoDevice {
 
 /// The program beside rrgate (installed) or below it (in the build tree).
 std::string find_program(std::string_view name) {
-  for (const auto folder : {".", "demo", "../libexec/rrgate"}) {
+  for (const auto folder : {".", "../examples/demo", "../libexec/rrgate"}) {
     const auto path = std::filesystem::path(program_folder()) / folder / name;
     std::error_code error;
     if (std::filesystem::exists(path, error)) return std::filesystem::canonical(path, error).string();

@@ -3,8 +3,8 @@
 
 #include <iostream>
 
+#include "node/generate/definition_set.hpp"
 #include "server/cli/command.hpp"
-#include "server/definitions/definition_set.hpp"
 
 namespace rrgate {
 

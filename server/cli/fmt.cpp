@@ -1,8 +1,8 @@
 // rrgate fmt: service definitions in one layout. Layer: server/cli.
-#include "core/robdef/format_source.hpp"
+#include "core/robdef/format/format_source.hpp"
+#include "node/platform/text_file.hpp"
 #include "server/cli/command.hpp"
 #include "server/cli/diagnostics.hpp"
-#include "server/definitions/text_file.hpp"
 
 namespace rrgate {
 

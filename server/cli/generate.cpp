@@ -1,10 +1,10 @@
 // rrgate generate: source code from service definitions. Layer: server/cli.
+#include "node/client/client.hpp"
+#include "node/generate/generate_cpp.hpp"
+#include "node/generate/generate_typescript.hpp"
+#include "node/platform/text_file.hpp"
 #include "server/cli/command.hpp"
 #include "server/cli/diagnostics.hpp"
-#include "server/definitions/generate_cpp.hpp"
-#include "server/definitions/generate_typescript.hpp"
-#include "server/definitions/text_file.hpp"
-#include "server/node/client.hpp"
 
 namespace rrgate {
 

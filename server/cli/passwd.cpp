@@ -6,22 +6,17 @@
 #include <optional>
 
 #include "core/support/words.hpp"
+#include "node/platform/secret_file.hpp"
+#include "node/platform/text_file.hpp"
+#include "node/service/password_file.hpp"
 #include "server/access/access_text.hpp"
 #include "server/cli/command.hpp"
-#include "server/definitions/text_file.hpp"
-#include "server/platform/secret_file.hpp"
-#include "server/security/password_file.hpp"
 
 namespace rrgate {
 
 namespace {
 
 constexpr std::size_t max_password_size = 1024;  // as logins take it
-
-int fail(const std::string& what) {
-  std::cerr << "rrgate passwd: " << what << "\n";
-  return exit_failed;
-}
 
 /// Nothing is shown of what is typed while this is there.
 class NoEcho {
@@ -106,20 +101,21 @@ int run_passwd(Arguments arguments) {
 
   std::error_code error;
   const auto old = read_text_file(file);
-  if (!old && std::filesystem::exists(file, error)) return fail(file + ": can't be read");
+  if (!old && std::filesystem::exists(file, error)) return report_failure("passwd", file + ": can't be read");
   const auto text = old.value_or("");
   if (const auto users = rr::PasswordFileAuthenticator::from_text(text, {.accepts_md5 = true}); !users)
-    return fail(file + ": " + users.error().message);
+    return report_failure("passwd", file + ": " + users.error().message);
   const auto before = find_line(text, name);
-  if (deletes && before.empty()) return fail(file + " has no user " + rr::quoted(name));
+  if (deletes && before.empty()) return report_failure("passwd", file + " has no user " + rr::quoted(name));
   std::string line;
   if (!deletes) {
     auto made = make_line(name, before,
                           roles == parsed.options.end() ? std::nullopt : std::optional<std::string>(roles->second));
-    if (!made) return fail(made.error().message);
+    if (!made) return report_failure("passwd", made.error().message);
     line = std::move(*made);
   }
-  if (auto done = rr::write_secret(file, with_line(text, name, line), true); !done) return fail(done.error().message);
+  if (auto done = rr::write_secret(file, with_line(text, name, line), true); !done)
+    return report_failure("passwd", done.error().message);
   std::cout << file << ": user " << rr::quoted(name)
             << (deletes          ? " is deleted"
                 : before.empty() ? " is added"

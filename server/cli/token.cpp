@@ -2,20 +2,15 @@
 #include <charconv>
 #include <iostream>
 
+#include "node/platform/secret_file.hpp"
+#include "node/platform/text_file.hpp"
 #include "server/access/access_text.hpp"
 #include "server/access/api_tokens.hpp"
 #include "server/cli/command.hpp"
-#include "server/definitions/text_file.hpp"
-#include "server/platform/secret_file.hpp"
 
 namespace rrgate {
 
 namespace {
-
-int fail(const std::string& what) {
-  std::cerr << "rrgate token: " << what << "\n";
-  return exit_failed;
-}
 
 /// "_" for ever; empty: not understood.
 std::string last_day(const std::string& days) {
@@ -52,16 +47,18 @@ int run_token(Arguments arguments) {
 
   std::error_code error;
   const auto old = read_text_file(file);
-  if (!old && std::filesystem::exists(file, error)) return fail(file + ": can't be read");
+  if (!old && std::filesystem::exists(file, error)) return report_failure("token", file + ": can't be read");
   const auto text = old.value_or("");
-  if (const auto tokens = ApiTokens::from_text(text); !tokens) return fail(file + ": " + tokens.error().message);
+  if (const auto tokens = ApiTokens::from_text(text); !tokens)
+    return report_failure("token", file + ": " + tokens.error().message);
   const bool is_there = !find_line(text, name).empty();
   if (is_there != deletes)
-    return fail(file + (deletes ? " has no token " : " has a token already of the name ") + rr::quoted(name) +
-                (deletes ? "" : "; --delete takes it out"));
+    return report_failure("token", file + (deletes ? " has no token " : " has a token already of the name ") +
+                                       rr::quoted(name) + (deletes ? "" : "; --delete takes it out"));
   const auto token = make_api_token();
   const auto line = deletes ? "" : name + " " + hash_api_token(token) + " " + format_roles(*roles) + " " + until;
-  if (auto done = rr::write_secret(file, with_line(text, name, line), true); !done) return fail(done.error().message);
+  if (auto done = rr::write_secret(file, with_line(text, name, line), true); !done)
+    return report_failure("token", done.error().message);
   if (deletes) {
     std::cout << file << ": token " << rr::quoted(name) << " is deleted\n";
     return exit_ok;

@@ -8,10 +8,10 @@
 #include <set>
 #include <sstream>
 
+#include "node/http/origin.hpp"
+#include "node/transport/schemes.hpp"
 #include "server/config/access_options.hpp"
 #include "server/config/object_reader.hpp"
-#include "server/http/origin.hpp"
-#include "server/transport/schemes.hpp"
 
 namespace rrgate {
 

@@ -10,11 +10,11 @@
 
 #include "core/session/url.hpp"
 #include "core/types/value.hpp"
+#include "node/tls/tls_context.hpp"
+#include "node/transport/http_headers.hpp"
 #include "server/access/access_config.hpp"
 #include "server/config/finding.hpp"
 #include "server/http/forwarded.hpp"
-#include "server/security/tls_context.hpp"
-#include "server/transport/http_headers.hpp"
 
 namespace rrgate {
 

@@ -9,14 +9,12 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <utility>
 
-#include "core/session/service_index.hpp"
-#include "core/support/random.hpp"
+#include "core/session/service/service_index.hpp"
+#include "node/transport/accept_all.hpp"
 #include "server/config/access_options.hpp"
-#include "server/gateway/front_door.hpp"
-#include "server/gateway/http_access.hpp"
-#include "server/http/routes.hpp"
+#include "server/front/front_door.hpp"
+#include "server/http/endpoints/routes.hpp"
 #include "server/log/log.hpp"
-#include "server/transport/accept_all.hpp"
 
 namespace rrgate {
 
@@ -33,21 +31,9 @@ constexpr std::chrono::seconds files_watch_period{2};
 }  // namespace
 
 Gateway::Gateway(asio::io_context& io, Config config)
-    : io_(io),
-      config_(std::move(config)),
-      access_(config_.access),
-      http_access_(std::make_unique<HttpAccess>(io.get_executor(), access_)),
-      web_tls_(config_.tls.certificates.empty()
-                   ? nullptr
-                   : std::make_unique<TlsFiles>(config_.tls.certificates, config_.access.client_ca)),
-      devices_(io.get_executor(), config_),
-      sessions_(io.get_executor()),
-      admission_(config_.limits.clients, config_.limits.clients_per_address),
-      router_(make_routes(*this)),
-      shared_(config_.node.id.is_any() ? rr::random_node_id() : config_.node.id, config_,
-              [this] { return access_.authenticator(); }),
-      files_watch_(io),
-      drained_(io) {}
+    : GatewayState(io, std::move(config)), io_(io), files_watch_(io), drained_(io) {
+  router_ = make_routes(*this);
+}
 
 Gateway::~Gateway() = default;
 

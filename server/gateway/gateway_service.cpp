@@ -1,8 +1,8 @@
 #include "server/gateway/gateway_service.hpp"
 
-#include "server/gateway/gateway.hpp"
 #include "server/gateway/robdef_text.hpp"
 #include "server/log/log.hpp"
+#include "server/state/gateway_state.hpp"
 
 namespace rrgate {
 
@@ -10,7 +10,7 @@ namespace asio = boost::asio;
 
 namespace {
 
-constexpr std::chrono::seconds look_period{1};
+constexpr std::chrono::seconds device_look_period{1};
 
 rr::NodeOptions node_options() {
   rr::NodeOptions options;
@@ -33,7 +33,7 @@ double seconds(std::chrono::microseconds time) {
 
 }  // namespace
 
-GatewayService::GatewayService(asio::io_context& io, Gateway& gateway)
+GatewayService::GatewayService(asio::io_context& io, GatewayState& gateway)
     : gateway_(gateway),
       node_(io, "", node_options()),
       service_(rr::Service::from_text({std::string(robdef_gateway)}, std::string(name), "Gateway")),
@@ -57,7 +57,7 @@ void GatewayService::add_members() {
 void GatewayService::start() {
   node_.add(service_);
   node_.listen("rr+intra:///");
-  node_.every(look_period, [this] { look_at_devices(); });
+  node_.every(device_look_period, [this] { look_at_devices(); });
   device_->start();
 }
 

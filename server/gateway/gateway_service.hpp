@@ -7,13 +7,13 @@
 #include <memory>
 #include <string>
 
-#include "server/gateway/device.hpp"
-#include "server/node/node.hpp"
-#include "server/node/service.hpp"
+#include "node/service/node.hpp"
+#include "node/service/service.hpp"
+#include "server/upstream/device.hpp"
 
 namespace rrgate {
 
-class Gateway;
+class GatewayState;
 
 /// Runs on a node inside the process, which the gateway shares as it shares a device: its clients are clients of the
 /// gateway, with all that holds for those.
@@ -22,7 +22,7 @@ class GatewayService {
   static constexpr std::string_view name = "gateway";
 
   /// Both outlive it.
-  GatewayService(boost::asio::io_context& io, Gateway& gateway);
+  GatewayService(boost::asio::io_context& io, GatewayState& gateway);
 
   /// What stands for it among the shared devices.
   const std::shared_ptr<Device>& device() const { return device_; }
@@ -37,7 +37,7 @@ class GatewayService {
   rr::Value list_statistics() const;
   rr::Value list_subscriptions() const;
 
-  Gateway& gateway_;
+  GatewayState& gateway_;
   rr::Node node_;
   std::shared_ptr<rr::Service> service_;
   std::shared_ptr<Device> device_;

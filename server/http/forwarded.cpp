@@ -48,7 +48,7 @@ std::vector<std::string_view> split(std::string_view text, char separator) {
 
 /// All lines of a header as the one list that they are.
 template <class Name>
-std::string joined(const Request& request, Name name) {
+std::string joined(const HttpRequest& request, Name name) {
   std::string out;
   const auto lines = request.message.equal_range(name);
   for (auto it = lines.first; it != lines.second; ++it) {
@@ -81,7 +81,7 @@ struct Hop {
   std::string host;
 };
 
-std::vector<Hop> hops_of_forwarded(const Request& request) {
+std::vector<Hop> hops_of_forwarded(const HttpRequest& request) {
   std::vector<Hop> out;
   const auto text = joined(request, "Forwarded");
   for (const auto element : split(text, ',')) {
@@ -106,7 +106,7 @@ std::string last_of(const std::string& list) {
       trim(comma == std::string::npos ? std::string_view(list) : std::string_view(list).substr(comma + 1)));
 }
 
-std::vector<Hop> hops_of_x_forwarded(const Request& request) {
+std::vector<Hop> hops_of_x_forwarded(const HttpRequest& request) {
   std::vector<Hop> out;
   const auto text = joined(request, "X-Forwarded-For");
   const auto proto = last_of(joined(request, "X-Forwarded-Proto"));
@@ -165,7 +165,7 @@ bool ProxyTrust::trusts(const address& address) const {
   return std::any_of(proxies.begin(), proxies.end(), [&](const auto& range) { return range.contains(address); });
 }
 
-Arrival see_through_proxies(const Request& request, const Peer& peer, const ProxyTrust& trust) {
+Arrival see_through_proxies(const HttpRequest& request, const Peer& peer, const ProxyTrust& trust) {
   Arrival out;
   out.address = plain_address(peer.endpoint.address());
   out.peer = rr::format_host_port(out.address.to_string(), peer.endpoint.port());
@@ -202,7 +202,7 @@ bool is_path_prefix(std::string_view text) {
   });
 }
 
-void take_base_path(Request& request, std::string_view base_path) {
+void take_base_path(HttpRequest& request, std::string_view base_path) {
   const auto path = request.path();
   if (base_path.empty() || path.substr(0, base_path.size()) != base_path || path.size() == base_path.size() ||
       path[base_path.size()] != '/')

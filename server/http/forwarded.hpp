@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "server/http/message.hpp"
+#include "node/http/message.hpp"
 
 namespace rrgate {
 
@@ -48,13 +48,13 @@ struct Peer {
 
 /// How a request came. Headers count only from a trusted proxy. The client is the last address that no trusted proxy
 /// has; where a proxy in the row does not know the address before it, that proxy.
-Arrival see_through_proxies(const Request& request, const Peer& peer, const ProxyTrust& trust);
+Arrival see_through_proxies(const HttpRequest& request, const Peer& peer, const ProxyTrust& trust);
 
 /// "/robots/api" -> true: begins with '/', no '/' at its end, plain segments. "" is a prefix too, of nothing.
 bool is_path_prefix(std::string_view text);
 
 /// Takes `base_path` ("" or "/robots") from the front of the request's path, if it is there, and notes it in
 /// `arrival.prefix`. Requests without it stay as they are: the proxy has taken it off, or there is none.
-void take_base_path(Request& request, std::string_view base_path);
+void take_base_path(HttpRequest& request, std::string_view base_path);
 
 }  // namespace rrgate

@@ -17,7 +17,7 @@ constexpr std::uint32_t max_side = 16384;
 constexpr std::uint64_t max_pixels = 64u * 1024 * 1024;
 constexpr int jpeg_quality = 85;
 
-rr::Error failed(std::string why) {
+rr::Error not_encoded(std::string why) {
   return rr::make_error(rr::ErrorCode::operation_failed, "the image " + std::move(why));
 }
 
@@ -127,13 +127,13 @@ rr::Result<> check_image(const PixelImage& image) {
   const auto size = std::to_string(image.width) + " x " + std::to_string(image.height);
   if (image.width == 0 || image.height == 0 || image.width > max_side || image.height > max_side ||
       std::uint64_t{image.width} * image.height > max_pixels)
-    return failed("has " + size + " pixels, expected 1 to " + std::to_string(max_side) + " either way");
+    return not_encoded("has " + size + " pixels, expected 1 to " + std::to_string(max_side) + " either way");
   const auto row = image.width * bytes_per_pixel(image.format);
   if (image.step < row)
-    return failed("has " + std::to_string(image.step) + " bytes a row, expected at least " + std::to_string(row));
+    return not_encoded("has " + std::to_string(image.step) + " bytes a row, expected at least " + std::to_string(row));
   // Both factors have been bounded, the step by the data: nothing overflows.
   if (image.step > image.data.size() || image.step * (image.height - 1) + row > image.data.size())
-    return failed("has " + std::to_string(image.data.size()) + " bytes, too few for " + size + " pixels");
+    return not_encoded("has " + std::to_string(image.data.size()) + " bytes, too few for " + size + " pixels");
   return {};
 }
 
@@ -151,7 +151,7 @@ rr::Result<std::string> encode_png(const PixelImage& image) {
   std::string packed(size, '\0');
   if (compress2(reinterpret_cast<Bytef*>(packed.data()), &size, rows.data(), static_cast<uLong>(rows.size()),
                 Z_BEST_SPEED) != Z_OK)
-    return failed("could not be compressed");
+    return not_encoded("could not be compressed");
   packed.resize(size);
 
   constexpr char gray = 0, rgb = 2, rgba = 6;
@@ -186,7 +186,7 @@ rr::Result<std::string> encode_jpeg(const PixelImage& image) {
   const bool is_done = compress_jpeg(first, step, image.width, image.height, color_space(image.format), components,
                                      error, &bytes, &size);
   auto out = is_done ? rr::Result<std::string>(std::string(reinterpret_cast<const char*>(bytes), size))
-                     : rr::Result<std::string>(failed("could not be compressed: " + std::string(error.text)));
+                     : rr::Result<std::string>(not_encoded("could not be compressed: " + std::string(error.text)));
   std::free(bytes);  // libjpeg's, from malloc()
   return out;
 }

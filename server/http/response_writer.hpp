@@ -6,8 +6,8 @@
 #include <memory>
 #include <string_view>
 
-#include "server/http/message.hpp"
-#include "server/transport/byte_stream.hpp"
+#include "node/transport/byte_stream.hpp"
+#include "server/http/request.hpp"
 
 namespace rrgate {
 

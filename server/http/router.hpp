@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "server/http/message.hpp"
+#include "server/http/request.hpp"
 
 namespace rrgate {
 

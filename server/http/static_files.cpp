@@ -37,7 +37,7 @@ bool is_safe_path(std::string_view path) {
 }
 
 /// A token of Accept-Encoding that isn't refused by q=0.
-bool accepts(std::string_view header, std::string_view encoding) {
+bool accepts_encoding(std::string_view header, std::string_view encoding) {
   while (!header.empty()) {
     const auto comma = header.find(',');
     auto item = header.substr(0, comma);
@@ -94,7 +94,7 @@ Response StaticFiles::answer(const Request& request, std::string_view path) {
   const Cached* found = nullptr;
   std::string_view encoding;
   for (const auto& [name, ending] : {std::pair("br", ".br"), std::pair("gzip", ".gz")}) {
-    if (found || !accepts(accepted, name)) continue;
+    if (found || !accepts_encoding(accepted, name)) continue;
     auto packed = file;
     packed += ending;
     found = load(packed);

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "server/http/message.hpp"
+#include "server/http/request.hpp"
 
 namespace rrgate {
 

@@ -1,4 +1,4 @@
-// The arguments of functions, events and callbacks as JSON, by the names of the parameters. Layer: json.
+// The arguments of functions, events and callbacks as JSON, by the names of the parameters. Layer: server/json.
 #pragma once
 
 #include <span>

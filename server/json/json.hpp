@@ -1,4 +1,5 @@
-// JSON and CBOR as text and bytes. Layer: json. Source: RFC 8259, RFC 8949; service definitions spec section 5.12.
+// JSON and CBOR as text and bytes. Layer: server/json. Source: RFC 8259, RFC 8949; service definitions spec
+// section 5.12.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -1,4 +1,4 @@
-// JSON Schema of declared types, as value_to_json() writes them. Layer: json.
+// JSON Schema of declared types, as value_to_json() writes them. Layer: server/json.
 // Source: service definitions spec section 5.12, "JSON Schema / OpenAPI".
 #pragma once
 

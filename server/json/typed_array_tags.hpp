@@ -1,4 +1,4 @@
-// CBOR tags of number arrays. Layer: json. Source: RFC 8746 section 2.1.
+// CBOR tags of number arrays. Layer: server/json. Source: RFC 8746 section 2.1.
 #pragma once
 
 #include <cstdint>

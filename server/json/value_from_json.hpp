@@ -1,4 +1,4 @@
-// JSON -> Value, strictly by the declared type. Layer: json. Source: service definitions spec section 5.12.
+// JSON -> Value, strictly by the declared type. Layer: server/json. Source: service definitions spec section 5.12.
 #pragma once
 
 #include "server/json/value_to_json.hpp"

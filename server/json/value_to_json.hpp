@@ -1,4 +1,4 @@
-// Value -> JSON, in the shape of the declared type. Layer: json. Source: service definitions spec section 5.12.
+// Value -> JSON, in the shape of the declared type. Layer: server/json. Source: service definitions spec section 5.12.
 #pragma once
 
 #include "core/types/type_registry.hpp"

@@ -1,4 +1,4 @@
-// Logging: one line an event, with named fields, as text or JSON. Layer: server. spdlog stays behind this header.
+// Logging: one line an event, with named fields, as text or JSON. Layer: server/log. spdlog stays behind this header.
 #pragma once
 
 #include <cstdint>

@@ -6,7 +6,7 @@
 #include <exception>
 #include <string>
 
-#include "server/node/client.hpp"
+#include "node/client/client.hpp"
 #include "test/bench/comparison.hpp"
 #include "test/bench/raw_echo.hpp"
 #include "test/bench/raw_session.hpp"

@@ -7,8 +7,8 @@
 #include <cstdlib>
 
 #include "core/support/error.hpp"
-#include "server/transport/http_connect.hpp"
-#include "server/transport/websocket_frames.hpp"
+#include "node/transport/http_connect.hpp"
+#include "node/transport/websocket_frames.hpp"
 #include "test/fuzz/scripted_stream.hpp"
 
 namespace {

@@ -5,8 +5,8 @@
 #include <boost/asio/detached.hpp>
 #include <cstdlib>
 
-#include "server/http/request_reader.hpp"
-#include "server/http/upgrade.hpp"
+#include "node/http/request_reader.hpp"
+#include "node/http/upgrade.hpp"
 #include "test/fuzz/scripted_stream.hpp"
 
 namespace {
@@ -22,7 +22,7 @@ void check_head(std::string_view head) {
   require(head.find("\r\n\r\n") == head.size() - 4);
 }
 
-void check_request(const rrgate::Request& request) {
+void check_request(const rrgate::HttpRequest& request) {
   require(request.path().size() + request.query().size() <= request.message.target().size());
   require(request.message.body().size() <= limits.body_bytes);
   if (!rrgate::asks_for_websocket(request)) return;

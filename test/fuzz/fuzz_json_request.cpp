@@ -5,11 +5,11 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "server/http/endpoints/json_request.hpp"
+#include "node/transport/websocket_messages.hpp"
 #include "server/http/endpoints/refusal.hpp"
 #include "server/http/split_path.hpp"
 #include "server/json/arguments.hpp"
-#include "server/transport/websocket_messages.hpp"
+#include "server/socket/json_request.hpp"
 
 namespace {
 

@@ -1,7 +1,7 @@
 // Info files of rr+local, which any program of this machine may have written.
 #include <cstdlib>
 
-#include "server/transport/local_files.hpp"
+#include "node/transport/local_files.hpp"
 
 namespace {
 

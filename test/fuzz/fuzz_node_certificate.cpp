@@ -2,8 +2,8 @@
 #include <cstdlib>
 
 #include "core/session/start_tls.hpp"
-#include "server/security/node_certificate_check.hpp"
-#include "server/security/openssl.hpp"
+#include "node/tls/node_certificate_check.hpp"
+#include "node/tls/openssl.hpp"
 
 namespace {
 

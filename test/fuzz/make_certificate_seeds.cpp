@@ -3,9 +3,9 @@
 #include <fstream>
 
 #include "core/session/start_tls.hpp"
-#include "server/security/issue_certificates.hpp"
-#include "server/security/node_certificate_check.hpp"
-#include "server/security/openssl.hpp"
+#include "node/tls/issue_certificates.hpp"
+#include "node/tls/node_certificate_check.hpp"
+#include "node/tls/openssl.hpp"
 
 namespace {
 

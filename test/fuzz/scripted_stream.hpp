@@ -4,7 +4,7 @@
 #include <boost/asio/error.hpp>
 #include <boost/asio/io_context.hpp>
 
-#include "server/transport/byte_stream.hpp"
+#include "node/transport/byte_stream.hpp"
 
 namespace rr::fuzz {
 

@@ -278,7 +278,7 @@ def test_streams_outlive_the_device(tmp_path):
 
 def test_gateway_and_device_keep_what_their_openapi_says(tmp_path):
     """The demo robot, and the gateway to it."""
-    robot = Background([BUILD / "server/demo/rrgate-demo-create", "--port", "0"], tmp_path / "robot.log")
+    robot = Background([BUILD / "examples/demo/rrgate-demo-create", "--port", "0"], tmp_path / "robot.log")
     gateway, port = start_gateway(tmp_path, robot.next_line().split(" ", 1)[1])
     try:
         assert "15 selected" in schemathesis(tmp_path, port, "/api/v1/devices/interop/openapi.json")

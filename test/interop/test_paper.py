@@ -129,7 +129,7 @@ def test_client_with_the_service_of_the_paper(service):
 
 
 def test_client_with_our_robot(tmp_path):
-    robot = Background([BUILD / "server/demo/rrgate-demo-create", "--port", "0"], tmp_path / "robot.log")
+    robot = Background([BUILD / "examples/demo/rrgate-demo-create", "--port", "0"], tmp_path / "robot.log")
     try:
         url = robot.next_line().removeprefix("create: ")
         with PaperClient(url, "--drive", "1", "--rest", "60") as client:

@@ -5,7 +5,7 @@
 
 #include "core/session/service_path.hpp"
 #include "core/support/random.hpp"
-#include "server/transport/dial.hpp"
+#include "node/transport/dial.hpp"
 
 namespace asio = boost::asio;
 

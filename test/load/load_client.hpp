@@ -6,8 +6,8 @@
 #include <memory>
 #include <string>
 
-#include "server/node/backoff.hpp"
-#include "server/node/client_connection.hpp"
+#include "node/client/client_connection.hpp"
+#include "node/driver/backoff.hpp"
 #include "test/load/stalling_stream.hpp"
 
 /// "arm.state": the member "state" of the object behind "arm" of the root object; "state": of the root object.

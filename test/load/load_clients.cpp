@@ -17,7 +17,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "server/node/clocks.hpp"
+#include "node/driver/clocks.hpp"
 #include "test/load/age_histogram.hpp"
 #include "test/load/load_client.hpp"
 

@@ -6,7 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "server/node/node.hpp"
+#include "node/service/node.hpp"
 
 namespace {
 

@@ -6,7 +6,7 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <memory>
 
-#include "server/transport/byte_stream.hpp"
+#include "node/transport/byte_stream.hpp"
 
 class StallingStream final : public rr::ByteStream {
  public:

@@ -1,4 +1,4 @@
-#include "server/gateway/allow_rules.hpp"
+#include "server/upstream/allow_rules.hpp"
 
 #include <catch2/catch.hpp>
 

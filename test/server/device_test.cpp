@@ -1,5 +1,5 @@
 // A device of the gateway by itself: which of its URLs is taken, and how it stops.
-#include "server/gateway/device.hpp"
+#include "server/upstream/device.hpp"
 
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
@@ -7,7 +7,7 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <catch2/catch.hpp>
 
-#include "test/server/node/node_fixture.hpp"
+#include "test/node/node/node_fixture.hpp"
 
 using namespace rrgate;
 using boost::asio::ip::tcp;

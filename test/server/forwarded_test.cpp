@@ -3,8 +3,8 @@
 
 #include <catch2/catch.hpp>
 
-#include "server/gateway/admission.hpp"
-#include "server/gateway/proxy_protocol.hpp"
+#include "server/front/proxy_protocol.hpp"
+#include "server/state/admission.hpp"
 
 using namespace rrgate;
 
@@ -13,8 +13,8 @@ namespace {
 namespace ip = boost::asio::ip;
 using Headers = std::vector<std::pair<std::string, std::string>>;
 
-Request request_with(const Headers& headers, const std::string& target = "/") {
-  Request request;
+HttpRequest request_with(const Headers& headers, const std::string& target = "/") {
+  HttpRequest request;
   request.message.target(target);
   request.message.set("Host", "gw:8080");
   for (const auto& [name, value] : headers) request.message.insert(name, value);

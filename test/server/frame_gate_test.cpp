@@ -1,4 +1,4 @@
-#include "server/gateway/frame_gate.hpp"
+#include "server/relay/frame_gate.hpp"
 
 #include <catch2/catch.hpp>
 #include <cstring>

@@ -2,9 +2,9 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <catch2/catch.hpp>
 
-#include "test/server/node/node_fixture.hpp"
+#include "test/node/node/node_fixture.hpp"
+#include "test/node/transport/certificate_lab.hpp"
 #include "test/server/support/test_gateway.hpp"
-#include "test/server/transport/certificate_lab.hpp"
 
 using namespace rrgate;
 using namespace rrgate::test;

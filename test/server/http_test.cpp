@@ -3,10 +3,10 @@
 #include <filesystem>
 #include <fstream>
 
-#include "server/gateway/front_door.hpp"
+#include "node/http/upgrade.hpp"
+#include "server/front/front_door.hpp"
 #include "server/http/router.hpp"
 #include "server/http/static_files.hpp"
-#include "server/http/upgrade.hpp"
 
 using namespace rrgate;
 namespace fs = std::filesystem;

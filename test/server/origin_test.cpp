@@ -1,4 +1,4 @@
-#include "server/http/origin.hpp"
+#include "node/http/origin.hpp"
 
 #include <catch2/catch.hpp>
 

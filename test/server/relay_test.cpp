@@ -1,5 +1,5 @@
 // What the relay does that the gateway's own tests can't wait for: streams in memory.
-#include "server/gateway/relay.hpp"
+#include "server/relay/relay.hpp"
 
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
@@ -9,7 +9,7 @@
 #include <catch2/catch.hpp>
 
 #include "core/session/start_tls.hpp"
-#include "test/server/transport/memory_stream.hpp"
+#include "test/node/transport/memory_stream.hpp"
 
 using namespace rrgate;
 using std::chrono::milliseconds;

@@ -14,7 +14,7 @@
 #include <exception>
 
 #include "core/support/time.hpp"
-#include "server/transport/hardware.hpp"
+#include "node/transport/hardware.hpp"
 #include "test/support/print.hpp"
 
 using namespace rr;

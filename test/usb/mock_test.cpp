@@ -8,8 +8,8 @@
 #include <catch2/catch.hpp>
 #include <memory>
 
-#include "server/transport/hardware.hpp"
-#include "server/transport/usb_host.hpp"
+#include "node/transport/hardware.hpp"
+#include "node/transport/usb_host.hpp"
 #include "test/core/hardware/simulated_device.hpp"
 #include "test/support/golden.hpp"
 #include "test/support/print.hpp"

@@ -1,7 +1,7 @@
 // ClientOptions from the options object of the TypeScript side. Layer: wasm-client/src.
 #pragma once
 
-#include "core/session/client_session.hpp"
+#include "core/session/client/client_session.hpp"
 #include "wasm-client/src/js_access.hpp"
 
 namespace rr {

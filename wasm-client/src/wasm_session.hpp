@@ -5,7 +5,7 @@
 #include <optional>
 #include <unordered_set>
 
-#include "core/session/client_session.hpp"
+#include "core/session/client/client_session.hpp"
 #include "wasm-client/src/js_access.hpp"
 
 namespace rr {

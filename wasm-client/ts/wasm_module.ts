@@ -1,5 +1,5 @@
 // The compiled core: the only file that knows its handles and its memory. Layer: wasm-client/ts.
-// Source: src/wasm_session.hpp, and core/session/client_session.hpp behind it.
+// Source: src/wasm_session.hpp, and core/session/client/client_session.hpp behind it.
 import { make_error, RobotRaconteurError, text_of } from "./errors.js";
 import type { ErrorFields } from "./errors.js";
 import { JsValues } from "./js_values.js";

@@ -2,15 +2,15 @@
 
 #include <algorithm>
 
+#include "node/http/origin.hpp"
+#include "node/platform/secret_file.hpp"
+#include "node/platform/text_file.hpp"
 #include "server/access/access_text.hpp"
 #include "server/access/api_tokens.hpp"
-#include "server/definitions/text_file.hpp"
-#include "server/gateway/gateway.hpp"
-#include "server/gateway/http_access.hpp"
-#include "server/http/origin.hpp"
 #include "server/json/json.hpp"
 #include "server/log/log.hpp"
-#include "server/platform/secret_file.hpp"
+#include "server/state/gateway_state.hpp"
+#include "server/state/http_access.hpp"
 
 namespace rrgate {
 
@@ -70,18 +70,18 @@ rr::Result<std::string> text_of(const rr::Json& body, const char* key) {
 }
 
 /// Browsers send what they know of a user to other pages' requests too.
-bool is_own_page(Gateway& gateway, const Request& request) {
+bool is_own_page(GatewayState& gateway, const Request& request) {
   const auto origin = request.header(http::field::origin);
   return origin.empty() ||
          is_origin_allowed(origin, request.header(http::field::host), gateway.config().allowed_origins);
 }
 
-std::optional<Response> refuse_page(Gateway& gateway, const Request& request) {
+std::optional<Response> refuse_page(GatewayState& gateway, const Request& request) {
   if (is_own_page(gateway, request)) return std::nullopt;
   return problem_response(403, "origin " + rr::quoted(request.header(http::field::origin)) + " is not allowed");
 }
 
-std::optional<Response> refuse_stranger(Gateway& gateway, const Request& request) {
+std::optional<Response> refuse_stranger(GatewayState& gateway, const Request& request) {
   const auto allowed = gateway.access().check(request.identity, {.verb = Verb::admin});
   if (allowed) return std::nullopt;
   gateway.reject(Rejection::forbidden);
@@ -89,7 +89,7 @@ std::optional<Response> refuse_stranger(Gateway& gateway, const Request& request
 }
 
 /// Writes a new token into the tokens file, and has it read. Returns it.
-rr::Result<std::string> add_token(Gateway& gateway, const std::string& name, const std::vector<std::string>& roles,
+rr::Result<std::string> add_token(GatewayState& gateway, const std::string& name, const std::vector<std::string>& roles,
                                   std::optional<std::chrono::sys_days> last_day) {
   const auto& file = gateway.access().state().config.tokens_file;
   if (file.empty())
@@ -107,7 +107,7 @@ rr::Result<std::string> add_token(Gateway& gateway, const std::string& name, con
   return token;
 }
 
-Response approve(Gateway& gateway, const Request& request, const std::string& id) {
+Response approve(GatewayState& gateway, const Request& request, const std::string& id) {
   const auto body = body_of(request);
   if (!body) return error_answer(body.error());
   std::vector<std::string> roles;
@@ -134,7 +134,7 @@ Response approve(Gateway& gateway, const Request& request, const std::string& id
   return answer(200, {{"state", "approved"}});
 }
 
-Response deny(Gateway& gateway, const Request& request, const std::string& id) {
+Response deny(GatewayState& gateway, const Request& request, const std::string& id) {
   auto& requests = gateway.http_access().requests();
   const auto pending = requests.find_pending(id, Clock::now());
   if (!pending) return error_answer(pending.error());
@@ -143,7 +143,7 @@ Response deny(Gateway& gateway, const Request& request, const std::string& id) {
   return answer(200, {{"state", "denied"}});
 }
 
-Response claim(Gateway& gateway, const Request& request, const std::string& id) {
+Response claim(GatewayState& gateway, const Request& request, const std::string& id) {
   const auto body = body_of(request);
   if (!body) return error_answer(body.error());
   const auto secret = text_of(*body, "secret");
@@ -157,7 +157,7 @@ Response claim(Gateway& gateway, const Request& request, const std::string& id) 
 
 }  // namespace
 
-Handler who_endpoint(Gateway& gateway) {
+Handler who_endpoint(GatewayState& gateway) {
   return [&gateway](const Request& request, std::string_view) {
     const auto& who = request.identity;
     const auto& access = gateway.access();
@@ -173,7 +173,7 @@ Handler who_endpoint(Gateway& gateway) {
   };
 }
 
-Handler tickets_endpoint(Gateway& gateway) {
+Handler tickets_endpoint(GatewayState& gateway) {
   return [&gateway](const Request& request, std::string_view) {
     auto& http_access = gateway.http_access();
     if (auto refusal = refuse_page(gateway, request)) return std::move(*refusal);
@@ -186,7 +186,7 @@ Handler tickets_endpoint(Gateway& gateway) {
   };
 }
 
-Handler ask_endpoint(Gateway& gateway) {
+Handler ask_endpoint(GatewayState& gateway) {
   return [&gateway](const Request& request, std::string_view) {
     if (auto refusal = refuse_page(gateway, request)) return std::move(*refusal);
     if (gateway.access().state().config.tokens_file.empty())
@@ -206,7 +206,7 @@ Handler ask_endpoint(Gateway& gateway) {
   };
 }
 
-Handler requests_endpoint(Gateway& gateway) {
+Handler requests_endpoint(GatewayState& gateway) {
   return [&gateway](const Request& request, std::string_view) {
     if (auto refusal = refuse_stranger(gateway, request)) return std::move(*refusal);
     auto list = Json::array();
@@ -223,7 +223,7 @@ Handler requests_endpoint(Gateway& gateway) {
   };
 }
 
-Handler request_endpoint(Gateway& gateway) {
+Handler request_endpoint(GatewayState& gateway) {
   return [&gateway](const Request& request, std::string_view rest) {
     if (auto refusal = refuse_page(gateway, request)) return std::move(*refusal);
     const auto slash = rest.find('/');

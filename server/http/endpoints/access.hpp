@@ -1,4 +1,4 @@
-// Who one is, tickets for upgrades, requests of access. Layer: server/http.
+// Who one is, tickets for upgrades, requests of access. Layer: server/http/endpoints.
 #pragma once
 
 #include <array>
@@ -8,22 +8,22 @@
 
 namespace rrgate {
 
-class Gateway;
+class GatewayState;
 
 /// GET /api/v1/access: {"user","roles","proof","login": whether there is anything to prove,"requests": whether one may
 /// ask for access,"admin": whether one decides on that}; user is null for who has shown nothing.
-Handler who_endpoint(Gateway& gateway);
+Handler who_endpoint(GatewayState& gateway);
 /// POST /api/v1/tickets: {"ticket","expires_in"}, for the upgrade .../devices/NAME?ticket=TICKET, once.
-Handler tickets_endpoint(Gateway& gateway);
+Handler tickets_endpoint(GatewayState& gateway);
 
 /// POST /api/v1/access/requests {"name","reason"}, by anybody: 202 {"id","secret","expires_in"}.
-Handler ask_endpoint(Gateway& gateway);
+Handler ask_endpoint(GatewayState& gateway);
 /// GET /api/v1/access/requests, for admins: {"requests":[{"id","name","reason","client","state","asked"}]}.
-Handler requests_endpoint(Gateway& gateway);
+Handler requests_endpoint(GatewayState& gateway);
 /// What can be done with one.
 inline constexpr std::array<std::string_view, 3> request_actions = {"approve", "deny", "claim"};
 /// POST /api/v1/access/requests/ID/approve {"roles":[...],"days":N}, .../deny, for admins; .../claim {"secret"}, by who
 /// has asked: {"state"} and, the first time after approval, {"token"}.
-Handler request_endpoint(Gateway& gateway);
+Handler request_endpoint(GatewayState& gateway);
 
 }  // namespace rrgate

@@ -1,5 +1,5 @@
-// The line that the log has of what was asked of a device, with the W3C trace that it belongs to. Layer: server/http.
-// Source: W3C Trace Context, section 3.2.
+// The line that the log has of what was asked of a device, with the W3C trace that it belongs to. Layer:
+// server/http/endpoints. Source: W3C Trace Context, section 3.2.
 #pragma once
 
 #include <algorithm>

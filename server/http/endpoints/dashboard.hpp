@@ -1,12 +1,12 @@
-// The dashboard: files from web_root. Layer: server/http.
+// The dashboard: files from web_root. Layer: server/http/endpoints.
 #pragma once
 
 #include "server/http/router.hpp"
 
 namespace rrgate {
 
-class Gateway;
+class GatewayState;
 
-Handler dashboard_endpoint(Gateway& gateway);
+Handler dashboard_endpoint(GatewayState& gateway);
 
 }  // namespace rrgate

@@ -4,8 +4,8 @@
 #include <set>
 
 #include "core/session/url.hpp"
-#include "server/definitions/definition_set.hpp"
-#include "server/definitions/generate_typescript.hpp"
+#include "node/generate/definition_set.hpp"
+#include "node/generate/generate_typescript.hpp"
 #include "server/http/endpoints/image_values.hpp"
 #include "server/http/endpoints/member_values.hpp"
 #include "server/http/etag.hpp"

@@ -1,11 +1,11 @@
-// What a device offers over HTTP, told from its service definitions. Layer: server/http.
+// What a device offers over HTTP, told from its service definitions. Layer: server/http/endpoints.
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "core/types/type_registry.hpp"
-#include "server/http/message.hpp"
+#include "server/http/request.hpp"
 #include "server/json/json.hpp"
 
 namespace rrgate {

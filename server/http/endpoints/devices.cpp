@@ -2,9 +2,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "server/gateway/gateway.hpp"
-#include "server/gateway/http_access.hpp"
-#include "server/http/upgrade.hpp"
+#include "node/http/upgrade.hpp"
+#include "server/state/gateway_state.hpp"
+#include "server/state/http_access.hpp"
 
 namespace rrgate {
 
@@ -45,7 +45,7 @@ nlohmann::ordered_json describe(const Device& device, const Request& request, co
 
 }  // namespace
 
-Handler devices_endpoint(Gateway& gateway) {
+Handler devices_endpoint(GatewayState& gateway) {
   return [&gateway](const Request& request, std::string_view) {
     nlohmann::ordered_json out;
     out["devices"] = nlohmann::ordered_json::array();
@@ -65,7 +65,7 @@ Response describe_device(const Device& device, const Request& request, const Acc
       200, describe(device, request, access).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
 }
 
-Response list_subscriptions(Gateway& gateway, const Device& device) {
+Response list_subscriptions(GatewayState& gateway, const Device& device) {
   nlohmann::ordered_json out;
   auto& list = out["subscriptions"] = nlohmann::ordered_json::array();
   gateway.shared().visit_ledgers([&](const SharedDevice& shared, const SharedClient& client, const std::string& path,
@@ -91,7 +91,7 @@ Handler no_such_api_endpoint() {
   };
 }
 
-Handler device_endpoint(Gateway& gateway) {
+Handler device_endpoint(GatewayState& gateway) {
   return [&gateway](const Request&, std::string_view name) {
     if (!gateway.devices().find(name))
       return problem_response(404, "no device " + rr::quoted(name) + "; /api/v1/devices lists them");

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "server/gateway/gateway.hpp"
+#include "server/state/gateway_state.hpp"
 
 namespace rrgate {
 
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Json = rr::OrderedJson;
 
 Json describe_services(const FoundDevices::Entry& entry) {
   Json out = Json::array();
@@ -46,7 +46,7 @@ Json describe(const FoundDevices::Entry& entry, std::chrono::steady_clock::time_
 
 }  // namespace
 
-Handler discovery_endpoint(Gateway& gateway) {
+Handler discovery_endpoint(GatewayState& gateway) {
   return [&gateway](const Request& request, std::string_view) {
     const auto& access = gateway.access();
     const bool sees_all = access.state().rules.check(request.identity, {.verb = Verb::admin}).has_value();

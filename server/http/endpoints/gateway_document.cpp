@@ -1,12 +1,12 @@
 #include "server/http/endpoints/gateway_document.hpp"
 
-#include "server/gateway/gateway.hpp"
 #include "server/http/endpoints/device_documents.hpp"
 #include "server/http/endpoints/gateway_openapi.hpp"
+#include "server/state/gateway_state.hpp"
 
 namespace rrgate {
 
-Handler gateway_document_endpoint(Gateway& gateway) {
+Handler gateway_document_endpoint(GatewayState& gateway) {
   return [&gateway](const Request& request, std::string_view) {
     auto out = rr::OrderedJson::parse(gateway_openapi);
     const auto& prefix = request.arrival.prefix;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "server/gateway/gateway.hpp"
+#include "server/state/gateway_state.hpp"
 
 namespace rrgate {
 
@@ -11,7 +11,7 @@ Handler health_endpoint() {
   return [](const Request&, std::string_view) { return json_response(200, "{\"status\":\"ok\"}\n"); };
 }
 
-Handler ready_endpoint(Gateway& gateway) {
+Handler ready_endpoint(GatewayState& gateway) {
   return [&gateway](const Request&, std::string_view) {
     const auto& devices = gateway.devices().all();
     nlohmann::ordered_json out;

@@ -39,7 +39,7 @@ const rr::EntityDefinition* find_description(const rr::EntityDefinition& image, 
   return entity && has_sizes(*entity) ? entity : nullptr;
 }
 
-rr::Error failed(std::string why) {
+rr::Error no_image(std::string why) {
   return rr::make_error(rr::ErrorCode::operation_failed, "the image " + std::move(why));
 }
 
@@ -104,14 +104,14 @@ rr::Result<std::string> image_bytes(const rr::Value& value, const rr::TypeDefini
                                     const rr::TypeRegistry& types, std::string_view media_type) {
   const auto* image_type = find_structure(type, types);
   const auto* image = value.get_if<rr::Structure>();
-  if (!image || !image_type) return failed("is null");
+  if (!image || !image_type) return no_image("is null");
   const auto* data = image->find("data");
   const auto* array = data ? data->get_if<rr::Array>() : nullptr;
-  if (!array) return failed("has no data");
+  if (!array) return no_image("has no data");
   const auto* info_type = find_description(*image_type, types);
   const auto* inner = info_type == image_type ? nullptr : image->find("image_info");
   const auto* info = inner ? inner->get_if<rr::Structure>() : image;
-  if (!info) return failed("has no image_info");
+  if (!info) return no_image("has no image_info");
   const auto bytes = array->bytes();
   const auto text = rr::as_text(bytes);
 
@@ -122,8 +122,8 @@ rr::Result<std::string> image_bytes(const rr::Value& value, const rr::TypeDefini
                                    : text.starts_with("\x89PNG")    ? png_type
                                                                     : "";
     if (found == media_type) return std::string(text);
-    if (!found.empty()) return failed("is " + std::string(found) + "; ask for that");
-    if (!encoding.empty()) return failed("is encoded as " + rr::quoted(encoding) + ", which is not known here");
+    if (!found.empty()) return no_image("is " + std::string(found) + "; ask for that");
+    if (!encoding.empty()) return no_image("is encoded as " + rr::quoted(encoding) + ", which is not known here");
   }
   const auto number = [&](const char* name) -> std::uint64_t {
     const auto* field = info->find(name);
@@ -140,8 +140,8 @@ rr::Result<std::string> image_bytes(const rr::Value& value, const rr::TypeDefini
                                       : pixels.height == 0 ? 0
                                                            : bytes.size() / pixels.width / pixels.height);
   if (!format && !by_size)
-    return failed("has " + std::to_string(pixels.width) + " x " + std::to_string(pixels.height) + " pixels in " +
-                  std::to_string(bytes.size()) + " bytes and does not say how");
+    return no_image("has " + std::to_string(pixels.width) + " x " + std::to_string(pixels.height) + " pixels in " +
+                    std::to_string(bytes.size()) + " bytes and does not say how");
   pixels.format = format ? *format : *by_size;
   pixels.step = step > 0 ? static_cast<std::size_t>(step) : pixels.width * bytes_per_pixel(pixels.format);
   if (const auto checked = check_image(pixels); !checked) return checked.error();

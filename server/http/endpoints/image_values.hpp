@@ -1,4 +1,4 @@
-// Values that are images, as browsers show them. Layer: server/http. See docs/http-api.md.
+// Values that are images, as browsers show them. Layer: server/http/endpoints. See docs/http-api.md.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// What members take and give, as JSON, whatever carries it. Layer: server/http.
+// What members take and give, as JSON, whatever carries it. Layer: server/http/endpoints.
 #pragma once
 
 #include <optional>

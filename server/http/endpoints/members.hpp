@@ -1,4 +1,4 @@
-// What a request does with a member. Layer: server/http.
+// What a request does with a member. Layer: server/http/endpoints.
 #pragma once
 
 #include "server/http/endpoints/object_request.hpp"

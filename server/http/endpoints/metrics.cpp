@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include "server/gateway/gateway.hpp"
-#include "server/gateway/http_access.hpp"
+#include "server/state/gateway_state.hpp"
+#include "server/state/http_access.hpp"
 
 namespace rrgate {
 
@@ -70,7 +70,7 @@ struct DeviceNow {
 };
 using Devices = std::vector<DeviceNow>;
 
-Devices look_at(Gateway& gateway) {
+Devices look_at(GatewayState& gateway) {
   Devices out;
   for (const auto& device : gateway.devices().all())
     out.push_back(
@@ -152,7 +152,7 @@ std::uint64_t open_files() {
 
 }  // namespace
 
-Handler metrics_endpoint(Gateway& gateway) {
+Handler metrics_endpoint(GatewayState& gateway) {
   return [&gateway](const Request& request, std::string_view) {
     if (const auto allowed = gateway.access().check(request.identity, {.verb = Verb::metrics}); !allowed)
       return gateway.http_access().refusal(request.identity, allowed.error());

@@ -1,14 +1,14 @@
-// /metrics: counters for Prometheus. Layer: server/http. Source: its text exposition format, version 0.0.4.
+// /metrics: counters for Prometheus. Layer: server/http/endpoints. Source: its text exposition format, version 0.0.4.
 #pragma once
 
 #include "server/http/router.hpp"
 
 namespace rrgate {
 
-class Gateway;
+class GatewayState;
 
 /// Labels are the names of devices, of which there are as many as the configuration and discover.max_devices allow,
 /// and words that are listed in metrics.hpp.
-Handler metrics_endpoint(Gateway& gateway);
+Handler metrics_endpoint(GatewayState& gateway);
 
 }  // namespace rrgate

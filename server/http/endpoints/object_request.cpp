@@ -1,15 +1,15 @@
 #include "server/http/endpoints/object_request.hpp"
 
 #include "core/session/service_path.hpp"
-#include "server/gateway/http_access.hpp"
 #include "server/http/endpoints/image_values.hpp"
 #include "server/json/base64.hpp"
+#include "server/state/http_access.hpp"
 
 namespace rrgate {
 
 namespace {
 
-bool accepts(std::string_view header, std::string_view type) {
+bool accepts_type(std::string_view header, std::string_view type) {
   return header.find(type) != std::string_view::npos;
 }
 
@@ -76,7 +76,7 @@ unsigned status_of(rr::ErrorCode code) {
   }
 }
 
-SessionKey session_key(Gateway& gateway, const Request& request, std::string service) {
+SessionKey session_key(GatewayState& gateway, const Request& request, std::string service) {
   SessionKey key{std::move(service)};
   if (gateway.http_access().takes_basic()) return key;
   constexpr std::string_view basic = "Basic ";
@@ -91,7 +91,7 @@ SessionKey session_key(Gateway& gateway, const Request& request, std::string ser
   return key;
 }
 
-rr::Result<> check_access(Gateway& gateway, const Identity& who, std::string_view service, const Target& target,
+rr::Result<> check_access(GatewayState& gateway, const Identity& who, std::string_view service, const Target& target,
                           Verb verb) {
   auto& access = gateway.access();
   const auto& device = target.session->device().config().name;
@@ -110,14 +110,15 @@ rr::JsonForm json_form(const Request& request) {
 
 ObjectRequest::ObjectRequest(ResponseWriter& writer) : writer_(writer) {
   const auto accept = request().header(http::field::accept);
-  wants_events_ = accepts(accept, "text/event-stream");
-  if (accepts(accept, "application/cbor")) wanted_ = BodyForm::cbor;
-  if (accepts(accept, "application/octet-stream")) wanted_ = BodyForm::bytes;
+  wants_events_ = accepts_type(accept, "text/event-stream");
+  if (accepts_type(accept, "application/cbor")) wanted_ = BodyForm::cbor;
+  if (accepts_type(accept, "application/octet-stream")) wanted_ = BodyForm::bytes;
   const auto as = option("as").value_or("");
-  wants_motion_ = as == "mjpeg" || (as.empty() && accepts(accept, "multipart/x-mixed-replace"));
-  const bool takes_jpeg = as == "jpeg" || (as.empty() && accepts(accept, jpeg_type));
-  const bool takes_png = as == "png" || (as.empty() && (accepts(accept, png_type) || accepts(accept, "image/*")));
-  if (takes_png || takes_jpeg) wanted_image_ = takes_jpeg && !accepts(accept, png_type) ? jpeg_type : png_type;
+  wants_motion_ = as == "mjpeg" || (as.empty() && accepts_type(accept, "multipart/x-mixed-replace"));
+  const bool takes_jpeg = as == "jpeg" || (as.empty() && accepts_type(accept, jpeg_type));
+  const bool takes_png =
+      as == "png" || (as.empty() && (accepts_type(accept, png_type) || accepts_type(accept, "image/*")));
+  if (takes_png || takes_jpeg) wanted_image_ = takes_jpeg && !accepts_type(accept, png_type) ? jpeg_type : png_type;
   if (as == "jpeg") wanted_image_ = jpeg_type;
   form_ = json_form(request());
   form_.has_bytes = wanted_ == BodyForm::cbor;

@@ -1,4 +1,4 @@
-// One request to an object of a device: which object, which member, in which form. Layer: server/http.
+// One request to an object of a device: which object, which member, in which form. Layer: server/http/endpoints.
 // Source: service definitions spec section 5.12, "JSON Schema / OpenAPI".
 #pragma once
 
@@ -8,10 +8,10 @@
 #include <string_view>
 #include <vector>
 
-#include "server/gateway/gateway.hpp"
 #include "server/http/response_writer.hpp"
 #include "server/http/split_path.hpp"
 #include "server/json/value_from_json.hpp"
+#include "server/state/gateway_state.hpp"
 
 namespace rrgate {
 
@@ -29,10 +29,10 @@ struct Target {
 };
 
 /// Whose session a request uses: user and password of HTTP Basic authentication, where they are not for the gateway.
-SessionKey session_key(Gateway& gateway, const Request& request, std::string service);
+SessionKey session_key(GatewayState& gateway, const Request& request, std::string service);
 /// Whether somebody may do something to what a path leads to. To look at an object as such is for whoever may do
 /// anything within it. Errors   permission_denied.
-rr::Result<> check_access(Gateway& gateway, const Identity& who, std::string_view service, const Target& target,
+rr::Result<> check_access(GatewayState& gateway, const Identity& who, std::string_view service, const Target& target,
                           Verb verb);
 /// What the query says of the form of values.
 rr::JsonForm json_form(const Request& request);

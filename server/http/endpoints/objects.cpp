@@ -2,15 +2,15 @@
 
 #include <algorithm>
 
-#include "server/gateway/http_access.hpp"
+#include "node/http/origin.hpp"
 #include "server/http/endpoints/call_log.hpp"
 #include "server/http/endpoints/device_documents.hpp"
 #include "server/http/endpoints/devices.hpp"
 #include "server/http/endpoints/image_values.hpp"
 #include "server/http/endpoints/member_values.hpp"
 #include "server/http/endpoints/members.hpp"
-#include "server/http/origin.hpp"
 #include "server/log/log.hpp"
+#include "server/state/http_access.hpp"
 
 namespace rrgate {
 
@@ -60,7 +60,7 @@ rr::awaitable<void> serve_target(const ObjectRequest& request, const Target& tar
 
 /// Why a request for a device, or a service of it, goes no further: there is no right to anything of it, or it is asked
 /// for too much. nullopt: go on, with the pass.
-std::optional<Response> refuse_device(Gateway& gateway, const Request& request, const Device& device,
+std::optional<Response> refuse_device(GatewayState& gateway, const Request& request, const Device& device,
                                       std::optional<std::string_view> service, std::optional<RateGate::Pass>& pass) {
   auto& access = gateway.access();
   const auto& name = device.config().name;
@@ -89,7 +89,8 @@ bool is_device_resource(std::string_view name) {
 }
 
 /// A document about the device, or one of its definitions: from sessions with all its services.
-rr::awaitable<void> serve_document(Gateway& gateway, Device& device, const ObjectRequest& request, std::string name) {
+rr::awaitable<void> serve_document(GatewayState& gateway, Device& device, const ObjectRequest& request,
+                                   std::string name) {
   auto& writer = request.writer();
   std::vector<std::shared_ptr<DeviceSession>> sessions;
   std::vector<rr::AsyncObject> roots;  // their connections keep the definitions
@@ -134,7 +135,7 @@ rr::awaitable<void> serve_document(Gateway& gateway, Device& device, const Objec
   co_await writer.send(response);
 }
 
-rr::awaitable<void> serve(Gateway& gateway, ResponseWriter& writer, std::vector<std::string> segments) {
+rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::vector<std::string> segments) {
   const ObjectRequest request(writer);
   auto* device = gateway.devices().find(segments.front());
   if (!device) {
@@ -211,7 +212,7 @@ rr::awaitable<void> serve(Gateway& gateway, ResponseWriter& writer, std::vector<
 }
 
 /// A page of another origin may read and write only where the configuration lists it.
-bool admit_origin(Gateway& gateway, ResponseWriter& writer) {
+bool admit_origin(GatewayState& gateway, ResponseWriter& writer) {
   const auto& request = writer.request();
   const auto origin = request.header(http::field::origin);
   if (origin.empty()) return true;
@@ -221,7 +222,7 @@ bool admit_origin(Gateway& gateway, ResponseWriter& writer) {
   return true;
 }
 
-rr::awaitable<void> answer(Gateway& gateway, ResponseWriter& writer, std::string rest) {
+rr::awaitable<void> answer(GatewayState& gateway, ResponseWriter& writer, std::string rest) {
   Response response;
   const auto& request = writer.request();
   auto segments = split_path(rest);
@@ -245,7 +246,7 @@ rr::awaitable<void> answer(Gateway& gateway, ResponseWriter& writer, std::string
 
 }  // namespace
 
-Handler objects_endpoint(Gateway& gateway) {
+Handler objects_endpoint(GatewayState& gateway) {
   return [&gateway](const Request&, std::string_view rest) {
     Response response;
     response.answer_later = [&gateway, rest = std::string(rest)](ResponseWriter& writer) {

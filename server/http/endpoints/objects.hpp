@@ -1,11 +1,11 @@
-// The objects of devices over HTTP: GET, PUT, POST and streams. Layer: server/http. See docs/http-api.md.
+// The objects of devices over HTTP: GET, PUT, POST and streams. Layer: server/http/endpoints. See docs/http-api.md.
 #pragma once
 
 #include <array>
 #include <string_view>
 
-#include "server/gateway/gateway.hpp"
 #include "server/http/router.hpp"
+#include "server/state/gateway_state.hpp"
 
 namespace rrgate {
 
@@ -14,6 +14,6 @@ inline constexpr std::array<std::string_view, 5> device_resources = {"subscripti
                                                                      "thing-description.json", "types.d.ts"};
 
 /// "DEVICE", "DEVICE/SERVICE" and what is below, for all methods.
-Handler objects_endpoint(Gateway& gateway);
+Handler objects_endpoint(GatewayState& gateway);
 
 }  // namespace rrgate

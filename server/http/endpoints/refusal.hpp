@@ -1,10 +1,10 @@
-// How errors leave coroutines that answer requests. Layer: server/http.
+// How errors leave coroutines that answer requests. Layer: server/http/endpoints.
 #pragma once
 
 #include <string>
 #include <utility>
 
-#include "server/node/exception.hpp"
+#include "node/values/exception.hpp"
 
 namespace rrgate {
 

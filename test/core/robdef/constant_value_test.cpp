@@ -1,11 +1,11 @@
-#include "core/robdef/constant_value.hpp"
+#include "core/robdef/model/constant_value.hpp"
 
 #include <catch2/catch.hpp>
 #include <clocale>
 #include <cmath>
 #include <limits>
 
-#include "core/robdef/names.hpp"
+#include "core/robdef/model/names.hpp"
 
 namespace rr::test {
 

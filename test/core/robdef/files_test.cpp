@@ -1,7 +1,7 @@
 // The definitions of the project's robdef folder.
 #include <catch2/catch.hpp>
 
-#include "core/robdef/constant_value.hpp"
+#include "core/robdef/model/constant_value.hpp"
 #include "test/core/robdef/checked.hpp"
 #include "test/support/golden.hpp"
 

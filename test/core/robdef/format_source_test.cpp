@@ -1,7 +1,7 @@
 // The layout for authors, which keeps what the canonical text loses.
 #include <catch2/catch.hpp>
 
-#include "core/robdef/format_source.hpp"
+#include "core/robdef/format/format_source.hpp"
 #include "test/core/robdef/checked.hpp"
 #include "test/support/golden.hpp"
 

@@ -1,4 +1,4 @@
-#include "core/robdef/lexer.hpp"
+#include "core/robdef/parse/lexer.hpp"
 
 #include <catch2/catch.hpp>
 

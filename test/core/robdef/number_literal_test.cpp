@@ -1,5 +1,5 @@
 // FLOAT literals against the C library's own conversion, which rounds correctly too.
-#include "core/robdef/number_literal.hpp"
+#include "core/robdef/model/number_literal.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>

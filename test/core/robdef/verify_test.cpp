@@ -1,7 +1,7 @@
 // Rules of verification beyond the shared cases: resolution, sizes of namedarrays, cycles, inheritance.
 #include <catch2/catch.hpp>
 
-#include "core/robdef/cycles.hpp"
+#include "core/robdef/model/cycles.hpp"
 #include "test/core/robdef/checked.hpp"
 
 namespace rr::test {

@@ -1,6 +1,6 @@
 #include <catch2/catch.hpp>
 
-#include "core/robdef/service_definition.hpp"
+#include "core/robdef/model/service_definition.hpp"
 
 namespace rr::test {
 

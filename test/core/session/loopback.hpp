@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/member/error_entry.hpp"
-#include "core/session/client_session.hpp"
-#include "core/session/service_session.hpp"
+#include "core/session/client/client_session.hpp"
+#include "core/session/service/service_session.hpp"
 
 namespace rr::test {
 

@@ -2,7 +2,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "core/session/subscription_losses.hpp"
+#include "core/session/service/subscription_losses.hpp"
 #include "test/core/session/loopback.hpp"
 #include "test/support/print.hpp"
 

@@ -9,8 +9,8 @@
 #include <iostream>
 
 #include "core/session/start_tls.hpp"
-#include "server/security/issue_certificates.hpp"
-#include "server/security/node_certificate_check.hpp"
+#include "node/tls/issue_certificates.hpp"
+#include "node/tls/node_certificate_check.hpp"
 
 namespace {
 

@@ -2,8 +2,8 @@
 #include <iostream>
 #include <map>
 
-#include "server/node/client.hpp"
-#include "server/security/certificate_files.hpp"
+#include "node/client/client.hpp"
+#include "node/tls/certificate_files.hpp"
 #include "test/interop/cpp/plain_value.hpp"
 #include "test/interop/cpp/scenario_value.hpp"
 

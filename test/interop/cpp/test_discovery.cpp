@@ -20,10 +20,10 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
-#include "server/discovery/discovery.hpp"
-#include "server/discovery/subscribe_service_by_type.hpp"
-#include "server/node/client.hpp"
-#include "server/node/node.hpp"
+#include "node/client/client.hpp"
+#include "node/discovery/discovery.hpp"
+#include "node/service/node.hpp"
+#include "node/subscribe/subscribe_service_by_type.hpp"
 
 namespace {
 

@@ -9,9 +9,9 @@
 #include <numeric>
 
 #include "core/types/pack.hpp"
-#include "server/node/node.hpp"
-#include "server/security/certificate_files.hpp"
-#include "server/security/password_file.hpp"
+#include "node/service/node.hpp"
+#include "node/service/password_file.hpp"
+#include "node/tls/certificate_files.hpp"
 
 namespace {
 

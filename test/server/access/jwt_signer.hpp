@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "node/tls/openssl.hpp"
 #include "server/access/base64url.hpp"
-#include "server/security/openssl.hpp"
 
 namespace rrgate::test {
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "node/platform/text_file.hpp"
 #include "server/cli/command.hpp"
-#include "server/definitions/text_file.hpp"
 
 namespace rrgate::test {
 

@@ -4,7 +4,7 @@
 #include <map>
 #include <optional>
 
-#include "core/session/service_session.hpp"
+#include "core/session/service/service_session.hpp"
 #include "core/support/random.hpp"
 #include "core/types/multidim.hpp"
 #include "wasm-client/src/js_access.hpp"

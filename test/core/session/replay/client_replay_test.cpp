@@ -12,7 +12,7 @@
 #include "core/member/memory.hpp"
 #include "core/member/pipe.hpp"
 #include "core/member/wire.hpp"
-#include "core/session/client_session.hpp"
+#include "core/session/client/client_session.hpp"
 #include "test/core/session/replay/recorded_peer.hpp"
 #include "test/support/print.hpp"
 

@@ -10,7 +10,7 @@
 #include "core/member/memory.hpp"
 #include "core/member/pipe.hpp"
 #include "core/member/wire.hpp"
-#include "core/session/service_session.hpp"
+#include "core/session/service/service_session.hpp"
 #include "core/wire/format_message.hpp"
 #include "test/core/session/replay/recorded_peer.hpp"
 #include "test/support/print.hpp"

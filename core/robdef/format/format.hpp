@@ -1,0 +1,16 @@
+// ServiceDefinition -> its canonical text. Layer: robdef. Source: service definitions spec section 5.9.
+#pragma once
+
+#include <string>
+
+#include "core/robdef/model/service_definition.hpp"
+
+namespace rr {
+
+/// The canonical text (spec section 5.9).
+std::string format_service_definition(const ServiceDefinition& definition);
+
+/// Equality of spec section 5.9 (documentation does not count).
+bool is_equal(const ServiceDefinition& left, const ServiceDefinition& right);
+
+}  // namespace rr

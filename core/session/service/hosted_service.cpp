@@ -1,0 +1,205 @@
+#include "core/session/service/hosted_service.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <set>
+#include <utility>
+
+#include "core/session/service/service_index.hpp"
+#include "core/session/service_path.hpp"
+
+namespace rr {
+
+namespace {
+
+bool is_decimal_int32(std::string_view text) {
+  std::int32_t number = 0;
+  const auto* end = text.data() + text.size();
+  const auto parsed = std::from_chars(text.data(), end, number);
+  return parsed.ec == std::errc{} && parsed.ptr == end;
+}
+
+bool is_indexed(const MemberDefinition& objref) {
+  return objref.type.container != ContainerKind::none || objref.type.array != ArrayKind::none;
+}
+
+/// What the objref's type says about the index: required or not, number or text.
+Result<> check_index(const MemberDefinition& objref, const std::optional<std::string>& index) {
+  const auto& type = objref.type;
+  const bool by_text = type.container == ContainerKind::map_string;
+  const bool by_number = type.container == ContainerKind::map_int32 || type.array == ArrayKind::variable;
+  if (!by_text && !by_number) return {};  // an index on a plain objref is ignored
+  if (!index) return make_error(ErrorCode::invalid_argument, "objref '" + objref.name + "' needs an index");
+  if (by_number && !is_decimal_int32(*index))
+    return make_error(ErrorCode::invalid_argument,
+                      "objref '" + objref.name + "': index " + quoted(*index) + " is not an int32");
+  return {};
+}
+
+}  // namespace
+
+std::string_view implements_name(const EntityDefinition& type, const ImplementsDefinition& base) {
+  const auto [definition, name] = split_qualified_name(base.qualified_name);
+  return definition == split_qualified_name(type.qualified_name).first ? name : std::string_view(base.qualified_name);
+}
+
+Result<std::shared_ptr<HostedService>> HostedService::make(std::string name, std::shared_ptr<ServiceObject> root,
+                                                           std::shared_ptr<const TypeRegistry> types,
+                                                           MapString attributes,
+                                                           std::vector<std::string> extra_imports) {
+  if (const auto path = parse_service_path(name); !path || path->size() != 1)
+    return make_error(ErrorCode::invalid_argument,
+                      "service name " + quoted(name) + ": expected letters, digits and inner underscores");
+  const auto* type = types->find_entity(root->type_name());
+  if (!type || type->kind != EntityKind::object)
+    return make_error(ErrorCode::service_definition_error,
+                      "service " + quoted(name) + ": " + quoted(root->type_name()) + " is not an object type");
+  std::shared_ptr<HostedService> service(new HostedService);
+  service->root_ = root;
+  service->types_ = std::move(types);
+  service->root_type_ = type;
+  service->attributes_ = Value(std::move(attributes));
+  service->extra_imports_ = std::move(extra_imports);
+  service->objects_.emplace(name, Found{std::move(root), type});
+  service->name_ = std::move(name);
+  return service;
+}
+
+const ServiceDefinition& HostedService::root_definition() const {
+  return *types_->find_service(split_qualified_name(root_->type_name()).first);
+}
+
+std::vector<const ServiceDefinition*> HostedService::definitions_for_client() const {
+  std::set<std::string, std::less<>> names;
+  std::vector<std::string> open = extra_imports_;
+  open.push_back(root_definition().name);
+  while (!open.empty()) {
+    const auto name = std::move(open.back());
+    open.pop_back();
+    const auto* definition = types_->find_service(name);
+    if (!definition || !names.insert(name).second) continue;
+    for (const auto& import : definition->imports) open.push_back(import.name);
+  }
+  std::vector<const ServiceDefinition*> definitions;
+  for (const auto& name : names) definitions.push_back(types_->find_service(name));
+  return definitions;
+}
+
+Result<HostedService::Found> HostedService::find_object(std::string_view path) {
+  if (const auto known = objects_.find(path); known != objects_.end()) return known->second;
+  const auto segments = parse_service_path(path);
+  if (!segments) return segments.error();
+  if (segments->front().name != name_)
+    return make_error(ErrorCode::object_not_found, "path " + quoted(path) + " does not begin with this service");
+  Found found = objects_.find(name_)->second;
+  std::size_t length = name_.size();
+  for (std::size_t i = 1; i < segments->size(); ++i) {
+    const auto& segment = (*segments)[i];
+    length = std::min(path.find('.', length + 1), path.size());
+    const auto prefix = path.substr(0, length);
+    if (const auto known = objects_.find(prefix); known != objects_.end()) {
+      found = known->second;
+      continue;
+    }
+    const auto* objref = found.type->find_member(segment.name);
+    if (!objref || objref->kind != MemberKind::objref)
+      return make_error(ErrorCode::member_not_found, found.type->name + " has no objref " + quoted(segment.name));
+    if (auto valid = check_index(*objref, segment.index); !valid) return valid.error();
+    auto child = found.object->find_child(*objref, segment.index);
+    if (!child) return child.error();
+    if (!*child) return make_error(ErrorCode::service_error, "Requested object is null: " + quoted(prefix));
+    found.object = std::move(*child);
+    found.type = types_->find_entity(found.object->type_name());
+    if (!found.type || found.type->kind != EntityKind::object)
+      return make_error(ErrorCode::internal_error,
+                        "object " + quoted(prefix) + " has the unknown type " + quoted(found.object->type_name()));
+    if (objects_.size() < max_cached_objects) objects_.emplace(prefix, found);
+  }
+  return found;
+}
+
+Result<> HostedService::add_object(const std::string& path, std::shared_ptr<ServiceObject> object) {
+  const auto* type = types_->find_entity(object->type_name());
+  if (!type || type->kind != EntityKind::object)
+    return make_error(ErrorCode::service_definition_error,
+                      "object " + quoted(path) + " has the unknown type " + quoted(object->type_name()));
+  if (objects_.size() >= max_cached_objects && !objects_.contains(path)) {
+    auto victim = objects_.upper_bound(path);
+    if (victim == objects_.end()) victim = objects_.begin();
+    if (victim->first == name_ && ++victim == objects_.end()) victim = objects_.begin();
+    objects_.erase(victim);
+  }
+  objects_.insert_or_assign(path, Found{std::move(object), type});
+  return {};
+}
+
+Result<std::string> HostedService::canonical_path(std::string_view path) {
+  if (path == name_) return name_;
+  const auto segments = parse_service_path(path);
+  if (!segments) return segments.error();
+  std::string canonical = name_;
+  for (std::size_t i = 1; i < segments->size(); ++i) {
+    const auto& [name, index] = (*segments)[i];
+    const auto parent = find_object(canonical);
+    if (!parent) return parent.error();
+    const auto* objref = parent->type->find_member(name);
+    if (!objref || objref->kind != MemberKind::objref)
+      return make_error(ErrorCode::member_not_found, parent->type->name + " has no objref " + quoted(name));
+    if (auto valid = check_index(*objref, index); !valid) return valid.error();
+    if (!is_indexed(*objref)) {
+      canonical = child_path(canonical, name);
+    } else if (objref->type.container == ContainerKind::map_string) {
+      canonical = child_path(canonical, name, *index);
+    } else {
+      std::int32_t number = 0;
+      std::from_chars(index->data(), index->data() + index->size(), number);
+      canonical = child_path(canonical, name, std::to_string(number));
+    }
+  }
+  if (auto found = find_object(canonical); !found) return found.error();
+  return canonical;
+}
+
+bool HostedService::forget_path(std::string_view path) {
+  if (path == name_) return false;
+  return std::erase_if(objects_, [path](const auto& object) { return is_within(object.first, path); }) > 0;
+}
+
+std::vector<std::string> HostedService::paths_of(const ServiceObject& object) const {
+  std::vector<std::string> paths;
+  for (const auto& [path, found] : objects_)
+    if (found.object.get() == &object) paths.push_back(path);
+  return paths;
+}
+
+ServiceDirectory::ServiceDirectory(NodeIdentity identity) : identity_(std::move(identity)) {
+  auto index = make_service_index();
+  services_.emplace(index->name(), std::move(index));
+}
+
+Result<> ServiceDirectory::add(std::shared_ptr<HostedService> service) {
+  const auto name = service->name();
+  if (!services_.emplace(name, std::move(service)).second)
+    return make_error(ErrorCode::invalid_argument, "the node has a service " + quoted(name) + " already");
+  return {};
+}
+
+bool ServiceDirectory::remove(std::string_view name) {
+  const auto found = services_.find(name);
+  if (found == services_.end() || name == service_index_name) return false;
+  services_.erase(found);
+  return true;
+}
+
+std::shared_ptr<HostedService> ServiceDirectory::find(std::string_view name) const {
+  const auto found = services_.find(name);
+  return found == services_.end() ? nullptr : found->second;
+}
+
+const ServiceDefinition* ServiceDirectory::find_definition(std::string_view name) const {
+  for (const auto& [service_name, service] : services_)
+    if (const auto* definition = service->types().find_service(name)) return definition;
+  return nullptr;
+}
+
+}  // namespace rr

@@ -1,0 +1,152 @@
+// The services of a node, as sessions see them. Layer: session. Source: sessions spec sections 2.3, 2.4, 2.5, 2.16.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/session/connection.hpp"
+#include "core/session/service/authenticator.hpp"
+#include "core/session/service/monitor_locks.hpp"
+#include "core/session/service/object_locks.hpp"
+#include "core/types/type_registry.hpp"
+#include "core/types/value.hpp"
+
+namespace rr {
+
+/// One object of a service: its type and the way to its children. What its members do is the application's business:
+/// a session hands requests out as events that name the object.
+class ServiceObject {
+ public:
+  virtual ~ServiceObject() = default;
+
+  /// The qualified object type, "com.x.Robot"; the same for the object's whole life.
+  virtual const std::string& type_name() const = 0;
+  /// The object behind an objref. Sessions cache it by path until the path is released.
+  /// `index`  the decoded index where the objref is indexed (for int32 checked to be a decimal number).
+  /// Errors   object_not_found; service_error "Requested object is null".
+  virtual Result<std::shared_ptr<ServiceObject>> find_child(const MemberDefinition& objref,
+                                                            const std::optional<std::string>& index) = 0;
+  /// Whether clients may take turns at this object by its monitor lock.
+  virtual bool is_monitor_lockable() const { return false; }
+};
+
+/// A direct base of `type` as peers expect its name: objects of the same definition without it, all others with theirs
+/// (also where the definition names them by an alias).
+std::string_view implements_name(const EntityDefinition& type, const ImplementsDefinition& base);
+
+/// One service of a node.
+class HostedService {
+ public:
+  /// `types` holds the root type's definition and everything that it imports.
+  /// Errors   service_definition_error: the root type is not an object in `types`; invalid_argument: a bad name.
+  static Result<std::shared_ptr<HostedService>> make(std::string name, std::shared_ptr<ServiceObject> root,
+                                                     std::shared_ptr<const TypeRegistry> types,
+                                                     MapString attributes = {},
+                                                     std::vector<std::string> extra_imports = {});
+
+  const std::string& name() const { return name_; }
+  const TypeRegistry& types() const { return *types_; }
+  const EntityDefinition& root_type() const { return *root_type_; }
+  const std::string& root_type_name() const { return root_->type_name(); }
+  /// A MapString of numbers and texts.
+  const Value& attributes() const { return attributes_; }
+  const std::vector<std::string>& extra_imports() const { return extra_imports_; }
+  /// Who may do what; to be set before clients come.
+  const SecurityPolicy& policy() const { return policy_; }
+  void set_policy(SecurityPolicy policy) { policy_ = std::move(policy); }
+  LoginLimit& login_limit() { return login_limit_; }
+  SessionId next_session_id() { return ++last_session_id_; }
+  /// The objects are another node's: what they are takes time to find out, so that sessions ask for them (ObjectWanted)
+  /// and for locks (LockWanted). To be set before clients come.
+  bool is_remote() const { return is_remote_; }
+  void set_remote() { is_remote_ = true; }
+  ObjectLocks& object_locks() { return object_locks_; }
+  MonitorLocks& monitor_locks() { return monitor_locks_; }
+  /// The definition that holds the root type.
+  const ServiceDefinition& root_definition() const;
+  /// What a client needs: the root's definition, the extra imports and all that these import; in order of names.
+  std::vector<const ServiceDefinition*> definitions_for_client() const;
+
+  struct Found {
+    std::shared_ptr<ServiceObject> object;
+    const EntityDefinition* type = nullptr;
+  };
+  /// Walks the path from the root and caches what it finds.
+  /// Errors   those of parse_service_path; object_not_found (not this service, null object); member_not_found;
+  ///          invalid_argument (a missing or malformed index).
+  Result<Found> find_object(std::string_view path);
+  bool has_object(std::string_view path) const { return objects_.contains(path); }
+  /// An object of a remote service that was found. Another one may be forgotten for it.
+  /// Errors   service_definition_error: its type is not known.
+  Result<> add_object(const std::string& path, std::shared_ptr<ServiceObject> object);
+  /// The one spelling of `path` by which locks know its object. Errors as find_object().
+  Result<std::string> canonical_path(std::string_view path);
+  /// Forgets `path` and everything below it. Returns whether anything was there.
+  bool forget_path(std::string_view path);
+  /// All paths under which `object` is known.
+  std::vector<std::string> paths_of(const ServiceObject& object) const;
+
+ private:
+  HostedService() = default;
+
+  std::string name_;
+  std::shared_ptr<ServiceObject> root_;
+  std::shared_ptr<const TypeRegistry> types_;
+  const EntityDefinition* root_type_ = nullptr;
+  Value attributes_;
+  std::vector<std::string> extra_imports_;
+  SecurityPolicy policy_;
+  LoginLimit login_limit_;
+  SessionId last_session_id_ = 0;
+  ObjectLocks object_locks_;
+  MonitorLocks monitor_locks_;
+  bool is_remote_ = false;
+  std::map<std::string, Found, std::less<>> objects_;
+  static constexpr std::size_t max_cached_objects = 4096;  ///< hostile paths may not grow it; the root always stays
+};
+
+/// Another node that a service index tells of.
+struct KnownNode {
+  NodeIdentity node;
+  std::vector<std::string> index_urls;  ///< of its service index
+};
+
+/// Identity and services of one node; outlives its sessions.
+class ServiceDirectory {
+ public:
+  explicit ServiceDirectory(NodeIdentity identity);
+
+  const NodeIdentity& identity() const { return identity_; }
+  /// Errors   invalid_argument: the name is taken.
+  Result<> add(std::shared_ptr<HostedService> service);
+  bool remove(std::string_view name);
+  std::shared_ptr<HostedService> find(std::string_view name) const;  ///< nullptr where there is none
+  /// In order of names; the service index is one of them.
+  const std::map<std::string, std::shared_ptr<HostedService>, std::less<>>& services() const { return services_; }
+  /// Nodes that this one leads to, and those that it has discovered, for the service index; asked with the URL of the
+  /// connection that the question came by.
+  using ListNodes = std::function<std::vector<KnownNode>(std::string_view base_url)>;
+  void set_routed_nodes(ListNodes list) { routed_ = std::move(list); }
+  void set_detected_nodes(ListNodes list) { detected_ = std::move(list); }
+  std::vector<KnownNode> routed_nodes(std::string_view base_url) const {
+    return routed_ ? routed_(base_url) : std::vector<KnownNode>();
+  }
+  std::vector<KnownNode> detected_nodes(std::string_view base_url) const {
+    return detected_ ? detected_(base_url) : std::vector<KnownNode>();
+  }
+  /// A definition by name, from any service.
+  const ServiceDefinition* find_definition(std::string_view name) const;
+
+ private:
+  NodeIdentity identity_;
+  std::map<std::string, std::shared_ptr<HostedService>, std::less<>> services_;
+  ListNodes routed_;
+  ListNodes detected_;
+};
+
+}  // namespace rr

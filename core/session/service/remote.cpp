@@ -1,0 +1,197 @@
+// Services whose objects are another node's: requests wait until their object is found, locks are that node's. Layer:
+// session. Source: sessions spec sections 2.4, 2.6 and 2.20.
+#include <algorithm>
+#include <utility>
+
+#include "core/member/error_entry.hpp"
+#include "core/session/service/service_index.hpp"
+#include "core/session/service/service_session.hpp"
+
+namespace rr {
+
+namespace {
+
+constexpr std::size_t max_open_locks = 64;
+
+/// Session operations that name no object.
+bool names_no_object(std::string_view command) {
+  return command == "AuthenticateUser" || command == "LogoutUser";
+}
+
+}  // namespace
+
+Result<> ServiceSession::admit(EntryType type, std::string_view path, const MemberDefinition* member) const {
+  if (!options_.admit) return {};
+  return options_.admit(MemberAccess{type, path, member, user()});
+}
+
+Result<> ServiceSession::enter(const MessageEntry& entry, const MemberDefinition& member) {
+  const bool ends_something = entry.type == EntryType::wire_disconnect_req ||
+                              entry.type == EntryType::pipe_disconnect_req ||
+                              (entry.type == EntryType::generator_next_req && entry.error != ErrorCode::none);
+  if (!options_.enter || ends_something || service_->name() == service_index_name) return {};
+  auto pass = options_.enter(MemberAccess{entry.type, entry.service_path, &member, user()});
+  if (!pass) return pass.error();
+  if (*pass) passes_.emplace(entry.request_id, std::move(*pass));
+  return {};
+}
+
+void ServiceSession::release_pass(std::uint32_t request_id) {
+  if (const auto found = passes_.find(request_id); found != passes_.end()) passes_.erase(found);
+}
+
+// --- objects ---
+
+bool ServiceSession::must_wait_for_object(const MessageEntry& entry) const {
+  if (!service_->is_remote() || service_->has_object(entry.service_path)) return false;
+  switch (entry.type) {
+    case EntryType::client_session_op_req:
+      return !names_no_object(entry.member_name);
+    case EntryType::client_keep_alive_req:
+    case EntryType::endpoint_check_capability:
+    case EntryType::service_check_capability_req:
+      return false;
+    default:
+      return true;
+  }
+}
+
+Result<> ServiceSession::park(const Message& message, const MessageEntry& entry) {
+  const auto path = parse_service_path(entry.service_path);
+  if (!path) return path.error();
+  if (path->front().name != service_->name())
+    return make_error(ErrorCode::object_not_found,
+                      "path " + quoted(entry.service_path) + " does not begin with this service");
+  if (parked_.size() >= options_.max_parked_requests)
+    return make_error(
+        ErrorCode::out_of_system_resource,
+        std::to_string(parked_.size()) + " requests of this client wait for their objects to be found already");
+  EncodedMessage encoded;
+  if (auto done = encode(message, {}, encoded); !done) return done;
+  std::size_t bytes = encoded.size();
+  for (const auto& other : parked_) bytes += other.message.size();
+  if (bytes > options_.connection.max_message_size)
+    return make_error(ErrorCode::out_of_system_resource, "requests of this client that wait for their objects hold " +
+                                                             std::to_string(bytes) + " bytes, expected at most " +
+                                                             std::to_string(options_.connection.max_message_size));
+  const auto is_same = [&](const ParkedRequest& other) { return other.path == entry.service_path; };
+  const bool is_asked = std::any_of(parked_.begin(), parked_.end(), is_same);
+  const auto index = static_cast<std::size_t>(&entry - message.entries.data());
+  parked_.push_back({std::string(entry.service_path), encoded.to_bytes(), index});
+  if (!is_asked) events_.push_back(ObjectWanted{std::string(entry.service_path)});
+  return {};
+}
+
+void ServiceSession::handle_object_found(std::string_view path, const Result<>& found, Now now) {
+  std::vector<ParkedRequest> ready;
+  for (std::size_t i = 0; i < parked_.size();) {
+    if (parked_[i].path != path) {
+      ++i;
+      continue;
+    }
+    ready.push_back(std::move(parked_[i]));
+    parked_.erase(parked_.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+  Message message;
+  for (const auto& request : ready) {
+    if (!service_ || !decode(request.message, {}, message)) return;  // our own bytes: only the client may be gone
+    const auto& entry = message.entries[request.entry];
+    if (found)
+      handle_entry(message, entry, now);
+    else
+      send_error(entry, found.error(), now);
+  }
+}
+
+void ServiceSession::answer_leave(Now now) {
+  if (!leaving_ || is_gone_) return;
+  outgoing_.clear();
+  outgoing_.header.sender_endpoint = endpoint_;
+  outgoing_.header.receiver_node_id = leaving_->client.id;
+  outgoing_.header.receiver_node_name = leaving_->client.name;
+  outgoing_.header.receiver_endpoint = leaving_->client_endpoint;
+  outgoing_.begin_entry(EntryType::disconnect_client_ret, leaving_->path, leaving_->member, leaving_->request_id);
+  send_outgoing(now);
+  leave({ErrorCode::none, "the client disconnected"}, now);
+}
+
+// --- locks ---
+
+Result<> ServiceSession::ask_for_lock(const Message& message, const MessageEntry& entry, Now now) {
+  const auto command = entry.member_name;
+  if (!may_use_service()) return make_error(ErrorCode::authentication_error, "User is not authenticated");
+  if (command == "ReleaseClientObjectLock") return make_error(ErrorCode::invalid_operation, "Invalid command");
+  if (auto admitted = admit(entry.type, entry.service_path, nullptr); !admitted) return admitted;
+  if (command == "MonitorContinueEnter") return continue_entering(entry, now);
+  LockWanted wanted;
+  if (command == "RequestObjectLock") {
+    wanted.command = LockCommand::lock_for_user;
+  } else if (command == "RequestClientObjectLock") {
+    wanted.command = LockCommand::lock_for_client;
+  } else if (command == "ReleaseObjectLock") {
+    wanted.command = LockCommand::unlock;
+  } else if (command == "MonitorEnter") {
+    wanted.command = LockCommand::enter_monitor;
+    const auto timeout = read_monitor_timeout(message, entry);
+    if (!timeout) return timeout.error();
+    wanted.timeout = *timeout;
+  } else if (command == "MonitorExit") {
+    wanted.command = LockCommand::exit_monitor;
+  } else {
+    return protocol_error("Invalid ClientSessionOp command");
+  }
+  if (locks_.size() >= max_open_locks)
+    return make_error(ErrorCode::out_of_system_resource,
+                      std::to_string(locks_.size()) + " requests for locks of this client wait already");
+  wanted.id = ++last_lock_id_;
+  wanted.path = entry.service_path;
+  OpenLock lock;
+  lock.id = wanted.id;
+  lock.request_id = entry.request_id;
+  lock.path = wanted.path;
+  lock.member = command;
+  lock.is_monitor_enter = wanted.command == LockCommand::enter_monitor;
+  if (lock.is_monitor_enter) lock.answer_by = now.steady + longest_wait;
+  locks_.push_back(std::move(lock));
+  events_.push_back(std::move(wanted));
+  return {};
+}
+
+Result<> ServiceSession::continue_entering(const MessageEntry& entry, Now now) {
+  const auto found = std::find_if(locks_.begin(), locks_.end(), [&](const OpenLock& lock) {
+    return lock.is_monitor_enter && !lock.is_asked && lock.path == entry.service_path;
+  });
+  if (found == locks_.end()) return make_error(ErrorCode::invalid_operation, "Not acquiring monitor lock");
+  found->request_id = entry.request_id;
+  found->member = entry.member_name;
+  found->is_asked = true;
+  found->answer_by = now.steady + longest_wait;
+  if (found->result) answer_lock(found->id, Result<>(*found->result), now);
+  return {};
+}
+
+void ServiceSession::answer_lock(LockRequestId id, const Result<>& result, Now now) {
+  const auto found = std::find_if(locks_.begin(), locks_.end(), [id](const OpenLock& lock) { return lock.id == id; });
+  if (found == locks_.end()) return;
+  if (!found->is_asked) {
+    found->result = result;
+    return;
+  }
+  const OpenLock lock = std::move(*found);
+  locks_.erase(found);
+  if (result)
+    answer_lock_request(lock, std::string_view("OK"), now);
+  else
+    answer_lock_request(lock, result.error(), now);
+}
+
+void ServiceSession::continue_late_locks(Now now) {
+  for (std::size_t i = 0; i < locks_.size(); ++i) {  // an answer that can't be sent ends the session
+    if (now.steady < locks_[i].answer_by) continue;
+    locks_[i].answer_by = TimePoint::max();
+    locks_[i].is_asked = false;
+    answer_lock_request(OpenLock(locks_[i]), std::string_view("Continue"), now);
+  }
+}
+
+}  // namespace rr

@@ -1,0 +1,519 @@
+// The service's half of a session: one client on one connection. Layer: session.
+// Source: sessions spec sections 2.2..2.9, 2.11, 2.12. The sans-IO contract stands in connection.hpp.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <variant>
+#include <vector>
+
+#include "core/member/callback.hpp"
+#include "core/member/generator.hpp"
+#include "core/member/ledger.hpp"
+#include "core/member/memory.hpp"
+#include "core/member/pipe.hpp"
+#include "core/member/wire.hpp"
+#include "core/session/connection.hpp"
+#include "core/session/service/authenticator.hpp"
+#include "core/session/service/hosted_service.hpp"
+#include "core/session/service_path.hpp"
+
+namespace rr {
+
+/// What a client is about to do with a member, or (no member) with the locks of an object.
+struct MemberAccess {
+  EntryType type;  ///< of the request or packet
+  std::string_view path;
+  const MemberDefinition* member;
+  const AuthenticatedUser* user;  ///< null: has not logged in
+};
+
+struct ServiceSessionOptions {
+  ConnectionOptions connection;  ///< `self` is taken from the directory
+  std::string base_url = {};     ///< "rr+tcp://127.0.0.1:52222/": what the service index says of this connection
+  std::chrono::milliseconds connect_timeout{30'000};    ///< a connection that opens no session is closed
+  std::chrono::milliseconds endpoint_timeout{600'000};  ///< without a session message
+  /// The client's NodeID, where the transport vouches for it (a certificate; the local machine).
+  std::optional<NodeId> verified_node_id = {};
+  std::size_t max_open_calls = 1024;               ///< not answered yet; above: out_of_system_resource
+  std::size_t max_generators = 256;                ///< run by one client; above: out_of_system_resource
+  std::uint32_t max_memory_transfer = 100 * 1024;  ///< bytes: how clients are told to split; not enforced
+  std::size_t max_wires = 4096;                    ///< connected by one client; above: out_of_system_resource
+  std::chrono::milliseconds callback_timeout{15'000};
+  std::size_t max_open_callbacks = 1024;                  ///< not answered yet; above: out_of_system_resource
+  std::size_t max_pipe_endpoints = 4096;                  ///< of one client; above: out_of_system_resource
+  std::size_t max_pipe_queued_bytes = 32u * 1024 * 1024;  ///< waiting for the stream; above, pipes take no packets
+  std::size_t max_parked_requests = 64;                   ///< for objects of a remote service that are looked for
+  /// Asked before anything is done with a member; what it refuses with is what the client gets. None: all is allowed.
+  std::function<Result<>(const MemberAccess&)> admit = {};
+  /// Asked behind `admit` for each request to a member, unless it ends something; packets are none. What it returns is
+  /// kept until the request is answered; what it refuses with is what the client gets, and nothing is lost by it. None:
+  /// as many as may come.
+  std::function<Result<std::shared_ptr<const void>>(const MemberAccess&)> enter = {};
+  /// With it nothing is served here: the first request for a service fails so, and the session ends behind it.
+  std::optional<Error> refusal = {};
+};
+
+using CallId = std::uint64_t;
+
+enum class CallKind : std::uint8_t {
+  property_get,
+  property_set,
+  function,
+  peek_in,
+  peek_out,
+  poke_out,
+  generator_open,     ///< a call of a generator function; any value answers it
+  generator_next,     ///< answered with the next value, or with the error stop_iteration after the last one
+  generator_close,    ///< the client has enough: any value answers it
+  generator_abort,    ///< the client wants it to stop at once: any value answers it
+  memory_dimensions,  ///< answered with a uint64 array, one number a dimension
+  memory_read,        ///< answered with exactly that many items; the application checks the range against the memory
+  memory_write,       ///< as memory_read; any value answers it
+};
+
+/// A request for the application, to be answered exactly once with reply().
+struct Called {
+  CallId id = 0;
+  CallKind kind = CallKind::function;
+  std::shared_ptr<ServiceObject> object;
+  const MemberDefinition* member = nullptr;
+  std::vector<Value> arguments;  ///< function, generator_open: parameters; property_set, poke_out: the value;
+                                 ///< generator_next: the parameter, where the generator takes one
+  TimeSpec time = {};            ///< poke_out
+  GeneratorId generator = 0;     ///< generator_...
+  MemoryRange range = {};        ///< memory_read, memory_write; for the latter `arguments` holds the items
+};
+struct ClientConnected {
+  HostedService* service = nullptr;
+};
+using LoginId = std::uint64_t;
+
+/// A login to be judged by `authenticator`, which may be slow, and to be answered exactly once with answer_login().
+struct LoginRequested {
+  LoginId id = 0;
+  std::shared_ptr<const Authenticator> authenticator;
+  LoginAttempt attempt;
+  LoginLimit::Ticket ticket;  ///< to be kept until the answer
+};
+/// A wire was connected: send the current value, if there is one. Of a remote service: a client wants to connect it; to
+/// be answered with answer_wire().
+struct WireConnected {
+  std::string path;
+  std::shared_ptr<ServiceObject> object;
+  const MemberDefinition* member = nullptr;
+};
+/// The client has enough of a wire. Wires that are connected when the client goes, or whose object is released, end
+/// with it: there is only ClientGone or nothing.
+struct WireDisconnected {
+  std::string path;
+  const MemberDefinition* member = nullptr;
+};
+/// A newer OutValue of the client.
+struct WireReceived {
+  std::shared_ptr<ServiceObject> object;
+  const MemberDefinition* member = nullptr;
+  TimeSpec time;
+  Value value;
+};
+/// A pipe endpoint of one client; never used again in its session.
+using PipeId = std::uint64_t;
+/// A client wants a pipe endpoint: to be answered exactly once, with accept_pipe() or refuse_pipe().
+struct PipeConnected {
+  PipeId id = 0;
+  std::shared_ptr<ServiceObject> object;
+  const MemberDefinition* member = nullptr;
+  std::int32_t index = 0;
+};
+struct PipeReceived {
+  PipeId id = 0;
+  Value value;
+  /// Of a remote service: the packet's number, where the client wants to hear that it has arrived there. To be answered
+  /// with acknowledge_pipe(). Packets for other services are acknowledged by the session.
+  std::optional<std::uint32_t> wants_ack = {};
+};
+/// Packets that were sent with wants_ack have arrived.
+struct PipeAcknowledged {
+  PipeId id = 0;
+  std::vector<std::uint32_t> numbers;
+};
+/// The client closed the endpoint, or sent what cannot be read, or its object was released. Endpoints that still live
+/// when the client goes end with it: there is only ClientGone.
+struct PipeClosed {
+  PipeId id = 0;
+};
+/// Nothing more comes for this generator: it ended, was closed or aborted, was left alone for ten minutes, or its
+/// object was released. Generators that still run when the client goes end with it: there is only ClientGone.
+struct GeneratorEnded {
+  GeneratorId id = 0;
+};
+/// This client gave up a monitor that others wait for: all sessions of the service are to be told so, with
+/// handle_locks_changed().
+struct LocksChanged {
+  HostedService* service = nullptr;
+};
+/// A call of the client's callback ended: with its answer, or because it took too long or the client is gone.
+struct CallbackCompleted {
+  CallbackId id = 0;
+  Result<Value> result;
+};
+/// Of a remote service: an object that the client names is not known. To be answered with handle_object_found().
+struct ObjectWanted {
+  std::string path;
+};
+using LockRequestId = std::uint64_t;
+enum class LockCommand : std::uint8_t { lock_for_user, lock_for_client, unlock, enter_monitor, exit_monitor };
+/// Of a remote service: to be answered exactly once, with answer_lock().
+struct LockWanted {
+  LockRequestId id = 0;
+  LockCommand command = LockCommand::unlock;
+  std::string path;
+  std::chrono::milliseconds timeout{0};  ///< enter_monitor; negative: for ever
+};
+/// Of a remote service: the client disconnects. Once what it holds there is given up: to be answered with
+/// answer_leave(), which ends the session.
+struct LeaveWanted {};
+/// The last event.
+struct ClientGone {
+  Error reason;
+};
+using ServiceEvent =
+    std::variant<Called, ClientConnected, LoginRequested, LocksChanged, WireConnected, WireDisconnected, WireReceived,
+                 PipeConnected, PipeReceived, PipeAcknowledged, PipeClosed, GeneratorEnded, CallbackCompleted,
+                 ObjectWanted, LockWanted, LeaveWanted, ClientGone>;
+
+/// One client of a node. Node-level requests (definitions, attributes, the service index) are answered in here.
+class ServiceSession {
+ public:
+  ServiceSession(ServiceDirectory& directory, ServiceSessionOptions options, Now now);
+  ServiceSession(const ServiceSession&) = delete;
+  ServiceSession& operator=(const ServiceSession&) = delete;
+  ~ServiceSession();
+
+  // --- told ---
+
+  void handle_bytes(ByteSpan input, Now now);
+  void handle_transmitted(std::size_t bytes, Now now);
+  void handle_timeout(Now now);
+  void handle_closed(Error reason, Now now);
+  /// Another session of the service had the event LocksChanged.
+  void handle_locks_changed(Now now);
+
+  // --- asked ---
+
+  /// Answers a call. Property set, poke and void functions ignore the value. A value that does not fit the definition
+  /// becomes an error reply that says so. Unknown ids (the client is gone) are ignored.
+  void reply(CallId id, const Result<Value>& result, Now now);
+  /// Ends a login. Unknown ids (the client is gone) are ignored.
+  void answer_login(LoginId id, Result<AuthenticatedUser> result, Now now);
+  /// Clients that still have to log in are sent nothing.
+  /// Errors   those of packing; connection_error.
+  Result<> send_event(std::string_view path, const MemberDefinition& member, std::span<const Value> arguments, Now now);
+  /// Sends InValue if the client has connected this wire; a value that waits for a slow stream is replaced.
+  Result<> send_wire(std::string_view path, const MemberDefinition& member, const Value& value, Now now);
+  /// The same for a value that others are sent as well, with its own time.
+  Result<> send_wire(WirePacket& packet, Now now);
+  /// Values of a wire were replaced before they came here: for its ledger.
+  void note_conflated(std::string_view path, const MemberDefinition& member, std::uint64_t count);
+  /// Answers WireConnected of a remote service, where it is not answered yet.
+  void answer_wire(std::string_view path, const MemberDefinition& member, const Result<>& result, Now now);
+  /// Ends the client's connection to this wire, if it has one, and tells the client.
+  void close_wire(std::string_view path, const MemberDefinition& member, Now now);
+  /// Answers PipeConnected. Unknown ids, answered and closed ones are ignored.
+  void accept_pipe(PipeId id, Now now);
+  void refuse_pipe(PipeId id, const Error& error, Now now);
+  /// Sends a packet; accepts the endpoint first where that was not done yet.
+  /// Returns  the packet's number, which PipeAcknowledged names where `wants_ack`.
+  /// Errors   invalid_operation: closed; write_only_member; out_of_system_resource: too much waits for the stream (see
+  ///          queued_bytes()), nothing was sent; those of pack().
+  Result<std::uint32_t> send_pipe_packet(PipeId id, const Value& value, Now now, bool wants_ack = false);
+  /// Answers PipeReceived of a remote service. Unknown ids (the endpoint is closed) are ignored.
+  void acknowledge_pipe(PipeId id, std::span<const std::uint32_t> numbers, Now now);
+  /// Closes the endpoint and tells the client; no event follows.
+  void close_pipe(PipeId id, Now now);
+  /// Calls a callback of the client. Every call that begins ends in exactly one CallbackCompleted; its value is null
+  /// for void callbacks. Errors   connection_error; out_of_system_resource: too many calls are not answered yet; those
+  /// of packing.
+  Result<CallbackId> call_callback(std::string_view path, const MemberDefinition& member,
+                                   std::span<const Value> arguments, Now now);
+  /// Tells the client to look up `path` again.
+  void release_path(std::string_view path, Now now);
+  /// Answers ObjectWanted: the service has the object now (HostedService::add_object()), or not.
+  void handle_object_found(std::string_view path, const Result<>& found, Now now);
+  /// Answers LockWanted. Unknown ids (the client is gone) are ignored.
+  void answer_lock(LockRequestId id, const Result<>& result, Now now);
+  /// Answers LeaveWanted.
+  void answer_leave(Now now);
+  /// Tells the client that its service is gone (ServiceClosed), then closes.
+  void close_service(Now now);
+
+  // --- answers ---
+
+  std::span<const ByteSpan> poll_transmit() { return connection_.poll_transmit(); }
+  /// Whether the stream should be closed now.
+  bool wants_close() const { return connection_.state() == ConnectionState::closed; }
+  TimePoint poll_timeout() const;
+  std::optional<ServiceEvent> poll_event();
+
+  // --- looked at ---
+
+  const Connection& connection() const { return connection_; }
+  /// The service that the client is connected to; nullptr before and after.
+  HostedService* service() const { return service_.get(); }
+  bool has_wire(std::string_view path, std::string_view member) const;
+  /// Calls `visit(path, member, ledger)` for each wire and pipe endpoint that the client has connected.
+  template <class Visit>
+  void visit_ledgers(Visit&& visit) const {
+    for (const auto& [key, wire] : wires_) visit(key.path, *wire.member, wire.ledger);
+    for (const auto& [id, pipe] : pipes_) visit(pipe.key->path, pipe.state.member(), pipe.ledger);
+  }
+  /// Of all wires and pipes that the client ever had connected here.
+  Ledgers total_ledgers() const;
+  /// Who has logged in; nullptr while nobody has.
+  const AuthenticatedUser* user() const { return user_ ? &*user_ : nullptr; }
+  /// This side's number of the session; 0 before the client is connected.
+  std::uint32_t endpoint() const { return endpoint_; }
+  /// What waits for the stream: a sender of many pipe packets waits until this is small.
+  std::size_t queued_bytes() const { return connection_.queued_bytes(); }
+  /// Above these, pipes take no packets.
+  std::size_t max_pipe_queued_bytes() const { return options_.max_pipe_queued_bytes; }
+
+ private:
+  struct OpenCall {
+    CallId id = 0;
+    EntryType type = EntryType::null;  ///< of the request
+    std::uint32_t request_id = 0;
+    std::string path;
+    const MemberDefinition* member = nullptr;
+    GeneratorId generator = 0;
+    GeneratorStep step = GeneratorStep::next;
+    std::unique_ptr<const MemoryRange> range = {};  ///< reads and writes of memories
+    bool wants_dim_count = false;                   ///< memories: of the dimensions, only how many
+  };
+
+  /// A client that waits for a monitor hears of it at least that often.
+  static constexpr std::chrono::seconds longest_wait{5};
+  /// A MonitorEnter or MonitorContinueEnter that is not answered yet.
+  struct OpenEnter {
+    std::uint32_t request_id = 0;
+    std::string path;
+    std::string member;
+    std::shared_ptr<ServiceObject> object;
+    TimePoint answer_by;
+  };
+  /// A login that is being judged.
+  struct OpenLogin {
+    LoginId id = 0;
+    EntryType type = EntryType::null;  ///< of the request: connect_client_combined or client_session_op_req
+    std::uint32_t request_id = 0;
+    std::string path;
+    std::string member;
+    std::shared_ptr<HostedService> service;
+    // connect_client_combined
+    NodeIdentity client;
+    std::uint32_t client_endpoint = 0;
+    const EntityDefinition* type_for_client = nullptr;
+    bool wants_definitions = true;
+    std::optional<std::string> known_tag =
+        {};  ///< of the definitions that it has, maybe empty; nullopt: it has not said
+  };
+  /// A request that waits for its object to be found.
+  struct ParkedRequest {
+    std::string path;
+    Bytes message;
+    std::size_t entry = 0;
+  };
+  /// A LockWanted. MonitorEnter is answered "Continue" now and then; the client then asks again.
+  struct OpenLock {
+    LockRequestId id = 0;
+    std::uint32_t request_id = 0;  ///< of the request that waits; none between two of them
+    bool is_asked = true;
+    std::string path;
+    std::string member;
+    bool is_monitor_enter = false;
+    TimePoint answer_by = TimePoint::max();
+    std::optional<Result<>> result = {};  ///< came between two requests
+  };
+  struct OpenCallback {
+    const MemberDefinition* member = nullptr;
+    TimePoint deadline;
+  };
+  struct ServicePipe {
+    ServicePipe(const MemberDefinition& member, PipeStore& store) : state(member, store, PipeState::connecting) {}
+
+    PipeEndpointState state;
+    PipeId id = 0;
+    const PathMember* key = nullptr;  ///< in pipe_indices_
+    std::int32_t index = 0;
+    std::uint32_t request_id = 0;  ///< of the connect
+    bool is_unreliable = false;    ///< defined and asked for
+    Ledger ledger;
+  };
+  using PipeIndices = std::map<std::int32_t, ServicePipe*>;
+
+  void handle_message(const Message& message, Now now);
+  void send_outgoing(Now now, bool is_urgent = false);
+  void leave(Error reason, Now now);
+  using Wires = std::map<PathMember, WireConnection, PathMemberLess>;
+  /// Returns the one behind it.
+  Wires::iterator end_wire(Wires::iterator wire);
+  void end_all_wires();
+
+  // node-level requests (service_special.cpp)
+  void handle_special(const Message& message, Now now);
+  Result<> answer_special(const Message& message, const MessageEntry& entry, Now now);
+  Result<> write_service_desc(const Message& message, const MessageEntry& entry);
+  Result<> write_root_type(const Message& message, const MessageEntry& entry);
+  Result<> write_combined(const Message& message, const MessageEntry& entry, Now now);
+  Result<> accept_combined(const OpenLogin& request, std::optional<AuthenticatedUser> user, Now now);
+  Result<> connect(std::shared_ptr<HostedService> service, std::uint32_t client_endpoint,
+                   std::optional<AuthenticatedUser> user, Now now);
+  Result<> disconnect(const Message& message, const MessageEntry& entry, Now now);
+  /// A MapString (service_losses.cpp).
+  Value attributes_with_losses() const;
+
+  // logins (service_login.cpp)
+  bool may_use_service() const;
+  Result<> check_login(EntryType type) const;
+  Result<> begin_login(const Message& message, const MessageEntry& entry, std::shared_ptr<HostedService> service,
+                       Now now);
+  void finish_combined(const OpenLogin& login, Result<AuthenticatedUser> result, Now now);
+  void finish_authenticate(const OpenLogin& login, Result<AuthenticatedUser> result, Now now);
+  Result<> answer_session_op(const Message& message, const MessageEntry& entry, Now now);
+
+  // locks (service_locks.cpp)
+  Result<> check_locks(const MessageEntry& entry, const HostedService::Found& found, const MemberDefinition& member,
+                       Now now);
+  Result<> answer_object_lock(const MessageEntry& entry);
+  Result<> answer_monitor(const Message& message, const MessageEntry& entry, Now now);
+  static Result<std::chrono::milliseconds> read_monitor_timeout(const Message& message, const MessageEntry& entry);
+  /// Of OpenEnter or OpenLock. `answer`  the text that the client gets.
+  template <class Request>
+  void answer_lock_request(const Request& request, const Result<std::string_view>& answer, Now now) {
+    send_session_op_reply(request.path, request.member, request.request_id, answer, now);
+  }
+  void send_session_op_reply(std::string_view path, std::string_view member, std::uint32_t request_id,
+                             const Result<std::string_view>& answer, Now now);
+  TimePoint next_enter_deadline() const;
+  void tell_others_of_monitors();
+  void leave_monitors();
+  void leave_locks();
+  void set_user(std::optional<AuthenticatedUser> user);
+
+  // requests of the session
+  void handle_entry(const Message& message, const MessageEntry& entry, Now now);
+  Result<> answer_session_request(const Message& message, const MessageEntry& entry);
+  Result<> dispatch_member(const Message& message, const MessageEntry& entry, Now now);
+  Result<> add_call(const Message& message, const MessageEntry& entry, CallKind kind, HostedService::Found found,
+                    const MemberDefinition& member);
+  Result<> check_room_for_call() const;
+  Result<> answer_wire(const MessageEntry& entry, const HostedService::Found& found, const MemberDefinition& member,
+                       Now now);
+  Result<> answer_service_index(const MessageEntry& entry, const MemberDefinition& member, Now now);
+  void handle_wire_packet(const Message& message, const MessageEntry& entry);
+
+  // remote services (service_remote.cpp)
+  bool must_wait_for_object(const MessageEntry& entry) const;
+  Result<> park(const Message& message, const MessageEntry& entry);
+  Result<> ask_for_lock(const Message& message, const MessageEntry& entry, Now now);
+  Result<> continue_entering(const MessageEntry& entry, Now now);
+  void continue_late_locks(Now now);
+
+  Result<> admit(EntryType type, std::string_view path, const MemberDefinition* member) const;
+  Result<> enter(const MessageEntry& entry, const MemberDefinition& member);
+  void release_pass(std::uint32_t request_id);
+
+  // callbacks (service_callback.cpp)
+  void handle_callback_reply(const Message& message, const MessageEntry& entry);
+  void expire_callbacks(Now now);
+  void end_callbacks(const Error& reason);
+
+  // pipes (service_pipe.cpp)
+  Result<> connect_pipe(const Message& message, const MessageEntry& entry, const HostedService::Found& found,
+                        const MemberDefinition& member);
+  Result<> disconnect_pipe(const Message& message, const MessageEntry& entry, const MemberDefinition& member, Now now);
+  void handle_pipe_packets(const Message& message, const MessageEntry& entry, Now now);
+  Result<> handle_pipe_packet(const Message& message, const MessageElement& element, ServicePipe& pipe);
+  void handle_pipe_acks(const Message& message, const MessageEntry& entry);
+  void release_pipes(std::string_view path);
+  void send_pipe_acks(std::string_view path, std::string_view member, bool is_unreliable, Now now);
+  ServicePipe* find_pipe(PipeId id);
+  ServicePipe* find_pipe(const MessageEntry& entry, std::int32_t index);
+  void forget_pipe(PipeId id);
+
+  // generators (service_generator.cpp)
+  Result<> open_generator(const Message& message, const MessageEntry& entry, HostedService::Found found,
+                          const MemberDefinition& member);
+  Result<> step_generator(const Message& message, const MessageEntry& entry, HostedService::Found found,
+                          const MemberDefinition& member, Now now);
+  Result<> write_generator_reply(const OpenCall& call, const Value& value, Now now);
+  void finish_generator_call(const OpenCall& call, bool has_failed, Now now);
+  void end_generators(const std::vector<GeneratorId>& ended);
+
+  // memories (service_memory.cpp)
+  Result<> answer_memory(const Message& message, const MessageEntry& entry, HostedService::Found found,
+                         const MemberDefinition& member, Now now);
+  Result<> check_memory_size(const MemoryRange& range, const MemberDefinition& member) const;
+  Result<> write_memory_reply(const OpenCall& call, const Value& value);
+
+  void begin_reply(const MessageEntry& request);
+  void send_error(const MessageEntry& request, const Error& error, Now now);
+  Result<> send_wire_packet(WireConnection& wire, WirePacket& packet, Now now);
+  void flush_wires(Now now);
+
+  ServiceDirectory& directory_;
+  ServiceSessionOptions options_;
+  Connection connection_;
+  std::shared_ptr<HostedService> service_;
+  std::uint32_t endpoint_ = 0;
+  TimePoint opened_;
+  TimePoint last_session_message_;
+  std::optional<TimePoint> closing_deadline_;
+  bool is_gone_ = false;
+
+  Message outgoing_;
+  Value told_attributes_;     ///< borrowed by outgoing_
+  SessionId session_id_ = 0;  ///< while service_ is set
+  std::vector<OpenEnter> enters_;
+  std::optional<AuthenticatedUser> user_;
+  std::optional<OpenLogin> login_;
+  LoginId last_login_id_ = 0;
+  std::size_t failed_logins_ = 0;
+
+  CallId last_call_id_ = 0;
+  std::vector<OpenCall> calls_;
+  std::unordered_multimap<std::uint32_t, std::shared_ptr<const void>>
+      passes_;  ///< of requests, until they are answered
+  GeneratorTable generators_;
+  Wires wires_;
+  Ledgers ended_;  ///< of wires and pipes that are no more
+  /// A DisconnectClient that is not answered yet.
+  struct OpenLeave {
+    NodeIdentity client;
+    std::uint32_t client_endpoint = 0;
+    std::string path;
+    std::string member;
+    std::uint32_t request_id = 0;
+  };
+  std::optional<OpenLeave> leaving_;
+  std::vector<ParkedRequest> parked_;
+  LockRequestId last_lock_id_ = 0;
+  std::vector<OpenLock> locks_;  ///< at most a handful
+  CallbackId last_callback_id_ = 0;
+  std::map<CallbackId, OpenCallback> callbacks_;  ///< in order of their deadlines, which are equally far
+  PipeStore pipe_store_;                          ///< outlives pipes_
+  PipeId last_pipe_id_ = 0;
+  std::unordered_map<PipeId, ServicePipe> pipes_;
+  std::map<PathMember, PipeIndices, PathMemberLess> pipe_indices_;  ///< the same pipes
+  std::vector<std::pair<std::int32_t, std::uint32_t>> pipe_acks_;   ///< index and number, to be sent; reused
+  std::deque<ServiceEvent> events_;
+};
+
+}  // namespace rr

@@ -1,0 +1,151 @@
+// Wires of a service session. Layer: session. Source: sessions spec section 2.13.
+#include <utility>
+
+#include "core/member/error_entry.hpp"
+#include "core/member/member_table.hpp"
+#include "core/session/service/service_session.hpp"
+
+namespace rr {
+
+// --- asked ---
+
+Result<> ServiceSession::send_wire(std::string_view path, const MemberDefinition& member, const Value& value, Now now) {
+  WirePacket packet(path, member, value, now.utc, now.steady);
+  return send_wire(packet, now);
+}
+
+Result<> ServiceSession::send_wire(WirePacket& packet, Now now) {
+  const auto found = wires_.find(PathMemberView{packet.path(), packet.member().name});
+  if (!may_use_service() || found == wires_.end()) return {};
+  auto& wire = found->second;
+  if (wire.waiting) ++wire.ledger.conflated;
+  wire.waiting.reset();
+  if (wire.state == WireState::connected && connection_.queued_bytes() < wire_high_mark)
+    return send_wire_packet(wire, packet, now);
+  wire.waiting = WireValue{packet.time(), packet.value()};
+  wire.waiting_since = packet.arrived();
+  return {};
+}
+
+Result<> ServiceSession::send_wire_packet(WireConnection& wire, WirePacket& packet, Now now) {
+  std::optional<WirePacket> own;  // where this client needs another stamp
+  if (const auto time = wire.stamp(packet.time()); time != packet.time())
+    own.emplace(packet.path(), packet.member(), packet.value(), time, packet.arrived());
+  const auto message = (own ? *own : packet).message(service_->types());
+  if (!message) return message.error();
+  auto sent = connection_.send(**message, now);
+  if (sent)
+    wire.ledger.note_delivery(now.steady - packet.arrived());
+  else if (connection_.state() == ConnectionState::closed)
+    leave(sent.error(), now);  // with all wires
+  return sent;
+}
+
+void ServiceSession::flush_wires(Now now) {
+  for (auto& [key, wire] : wires_) {
+    if (!wire.waiting || wire.state == WireState::connecting || !may_use_service()) continue;
+    const auto [time, value] = *std::exchange(wire.waiting, std::nullopt);
+    WirePacket packet(key.path, *wire.member, value, time, wire.waiting_since);
+    // A value that does not fit its definition was refused or not when it was set; here only the stream counts.
+    if (!send_wire_packet(wire, packet, now) || connection_.queued_bytes() >= wire_high_mark) return;
+  }
+}
+
+void ServiceSession::note_conflated(std::string_view path, const MemberDefinition& member, std::uint64_t count) {
+  const auto wire = wires_.find(PathMemberView{path, member.name});
+  if (wire != wires_.end()) wire->second.ledger.conflated += count;
+}
+
+void ServiceSession::answer_wire(std::string_view path, const MemberDefinition& member, const Result<>& result,
+                                 Now now) {
+  const auto wire = wires_.find(PathMemberView{path, member.name});
+  if (wire == wires_.end() || wire->second.state == WireState::connected) return;
+  const auto request_id = wire->second.request_id;
+  wire->second.state = WireState::connected;
+  if (!result) end_wire(wire);
+  connection_.begin_message(outgoing_);
+  outgoing_.begin_entry(EntryType::wire_connect_ret, path, member.name, request_id);
+  if (!result) write_error(outgoing_, result.error());
+  send_outgoing(now);
+  flush_wires(now);
+}
+
+void ServiceSession::close_wire(std::string_view path, const MemberDefinition& member, Now now) {
+  const auto wire = wires_.find(PathMemberView{path, member.name});
+  if (wire == wires_.end()) return;
+  if (wire->second.state == WireState::connecting)
+    return answer_wire(path, member, make_error(ErrorCode::service_error, "the wire was closed"), now);
+  end_wire(wire);
+  connection_.begin_message(outgoing_);
+  outgoing_.header.metadata = unreliable_metadata;
+  outgoing_.begin_entry(EntryType::wire_closed, path, member.name);
+  send_outgoing(now);
+}
+
+bool ServiceSession::has_wire(std::string_view path, std::string_view member) const {
+  return wires_.find(PathMemberView{path, member}) != wires_.end();
+}
+
+Ledgers ServiceSession::total_ledgers() const {
+  auto total = ended_;
+  for (const auto& [key, wire] : wires_) total.wires.add(wire.ledger);
+  for (const auto& [id, pipe] : pipes_) total.pipes.add(pipe.ledger);
+  return total;
+}
+
+// --- received ---
+
+Result<> ServiceSession::answer_wire(const MessageEntry& entry, const HostedService::Found& found,
+                                     const MemberDefinition& member, Now now) {
+  PathMember key{std::string(entry.service_path), std::string(entry.member_name)};
+  if (entry.type == EntryType::wire_disconnect_req) {
+    const auto wire = wires_.find(key);
+    if (wire == wires_.end()) return make_error(ErrorCode::service_error, "Invalid wire connection");
+    end_wire(wire);
+    events_.push_back(WireDisconnected{key.path, &member});
+    begin_reply(entry);
+    send_outgoing(now);
+    return {};
+  }
+  if (wires_.size() >= options_.max_wires && !wires_.contains(key))
+    return make_error(ErrorCode::out_of_system_resource,
+                      "this client has " + std::to_string(options_.max_wires) + " wires connected already");
+  // A second request of a connected client is accepted: it is the same connection.
+  const bool is_remote = service_->is_remote();
+  const WireConnection fresh{is_remote ? WireState::connecting : WireState::connected, &member, entry.request_id};
+  const bool is_new = wires_.try_emplace(key, fresh).second;
+  if (is_new && is_remote) {
+    events_.push_back(WireConnected{key.path, found.object, &member});
+    return {};
+  }
+  begin_reply(entry);
+  send_outgoing(now);
+  if (is_new) events_.push_back(WireConnected{key.path, found.object, &member});
+  return {};
+}
+
+void ServiceSession::handle_wire_packet(const Message& message, const MessageEntry& entry) {
+  const auto wire = wires_.find(PathMemberView{entry.service_path, entry.member_name});
+  if (wire == wires_.end() || !check_direction(entry.type, *wire->second.member)) return;
+  if (!admit(entry.type, entry.service_path, wire->second.member)) return;
+  auto packet = read_wire_value(message, entry, *wire->second.member, service_->types());
+  if (!packet || !wire->second.accept(packet->time)) return;
+  auto found = service_->find_object(entry.service_path);
+  if (!found) return;
+  events_.push_back(
+      WireReceived{std::move(found->object), wire->second.member, packet->time, std::move(packet->value)});
+}
+
+// --- ended ---
+
+ServiceSession::Wires::iterator ServiceSession::end_wire(Wires::iterator wire) {
+  ended_.wires.add(wire->second.ledger);
+  if (wire->second.state == WireState::connecting) release_pass(wire->second.request_id);
+  return wires_.erase(wire);
+}
+
+void ServiceSession::end_all_wires() {
+  while (!wires_.empty()) end_wire(wires_.begin());
+}
+
+}  // namespace rr

@@ -1,0 +1,171 @@
+// A client that waits: for tests, tools and scripts in C++. Layer: node/client.
+//
+//   auto create = rr::connect("rr+tcp://127.0.0.1:52222/?service=Create");
+//   create.call("Drive", 100, 5000);
+//   std::cout << *create.get("DistanceTraveled").to<std::int32_t>() << " mm\n";
+//   create.on_event("Bump", [](std::span<const rr::Value>) { std::cout << "bump\n"; });
+//   create.connection().run_for(std::chrono::seconds(5));
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+#include "node/client/client_connection.hpp"
+#include "node/client/remote_generator.hpp"
+#include "node/client/remote_memory.hpp"
+#include "node/values/exception.hpp"
+#include "node/values/handler.hpp"
+
+namespace rr {
+
+/// A request that failed, or a connection that could not be opened.
+class ClientException : public Exception {
+ public:
+  using Exception::Exception;
+};
+
+/// A connection and the io_context that it runs on, which runs only while one of the functions here waits: handlers of
+/// events and wires are called then, and may not wait themselves (std::logic_error). For one thread.
+class BlockingConnection {
+ public:
+  /// Throws   ClientException.
+  BlockingConnection(std::string_view url, ConnectOptions options);
+  /// Disconnects, within a second.
+  ~BlockingConnection();
+  BlockingConnection(const BlockingConnection&) = delete;
+  BlockingConnection& operator=(const BlockingConnection&) = delete;
+
+  /// Calls handlers for a time, or until `is_done()`. Returns whether it is done.
+  void run_for(std::chrono::milliseconds duration);
+  bool run_until(const std::function<bool()>& is_done, std::chrono::milliseconds timeout);
+  /// Starts a request and waits for its completion. Throws ClientException.
+  Value wait_for(const std::function<void(ClientConnection&, ClientConnection::Completion)>& start);
+  /// Logs in to a service that does not require it, or in as another user. Throws ClientException.
+  void authenticate(std::string_view username, std::string_view password);
+  void logout();
+  /// What the service says of itself.
+  const MapString& attributes() const { return connection_->session().attributes(); }
+  void close();
+  bool is_closed() const { return close_reason_.has_value(); }
+  /// Whether a handler runs: nothing can wait.
+  bool is_running() const { return is_running_; }
+  ClientConnection& asynchronous() { return *connection_; }
+
+ private:
+  boost::asio::io_context io_{1};
+  std::shared_ptr<ClientConnection> connection_;
+  std::optional<Error> close_reason_;
+  bool is_running_ = false;
+};
+
+/// Holds the monitor lock of an object for as long as it lives.
+class MonitorGuard {
+ public:
+  MonitorGuard(std::shared_ptr<BlockingConnection> connection, std::string path)
+      : connection_(std::move(connection)), path_(std::move(path)) {}
+  MonitorGuard(MonitorGuard&& other) noexcept = default;
+  MonitorGuard& operator=(MonitorGuard&&) = delete;
+  /// Gives the lock back without waiting for the answer.
+  ~MonitorGuard();
+  /// Gives it back now, and waits. Throws ClientException: it was lost meanwhile.
+  void exit();
+
+ private:
+  std::shared_ptr<BlockingConnection> connection_;  ///< null once the lock is given back
+  std::string path_;
+};
+
+/// An endpoint of a pipe: a handle that is cheap to copy. Everything throws ClientException.
+class RemotePipe {
+ public:
+  /// Waits while the stream is full, as long as a request may take; not in handlers: there it throws instead.
+  void send(const Value& packet) const;
+  void close() const;
+  std::int32_t index() const { return state_->index; }
+  bool is_open() const { return state_->is_open && !connection_->is_closed(); }
+
+ private:
+  friend class RemoteObject;
+  struct State {
+    std::int32_t index = 0;
+    bool is_open = true;
+  };
+  RemotePipe(std::shared_ptr<BlockingConnection> connection, std::string path, std::string pipe)
+      : connection_(std::move(connection)), path_(std::move(path)), pipe_(std::move(pipe)) {}
+
+  std::shared_ptr<BlockingConnection> connection_;
+  std::string path_;
+  std::string pipe_;
+  std::shared_ptr<State> state_ = std::make_shared<State>();
+};
+
+/// An object of the service: a handle that is cheap to copy. Everything throws ClientException.
+class RemoteObject {
+ public:
+  RemoteObject(std::shared_ptr<BlockingConnection> connection, std::string path)
+      : connection_(std::move(connection)), path_(std::move(path)) {}
+
+  template <class... Args>
+  Value call(std::string_view function, Args&&... arguments) const {
+    const std::array<Value, sizeof...(Args)> values{to_value(std::forward<Args>(arguments))...};
+    return call_values(function, values);
+  }
+  Value call_values(std::string_view function, std::span<const Value> arguments) const;
+  /// Calls a generator function.
+  template <class... Args>
+  RemoteGenerator generator(std::string_view function, Args&&... arguments) const {
+    const std::array<Value, sizeof...(Args)> values{to_value(std::forward<Args>(arguments))...};
+    return generator_values(function, values);
+  }
+  RemoteGenerator generator_values(std::string_view function, std::span<const Value> arguments) const;
+  RemoteMemory memory(std::string_view name) const { return {connection_, path_, std::string(name)}; }
+  Value get(std::string_view property) const;
+  void set(std::string_view property, const Value& value) const;
+  RemoteObject object(std::string_view objref) const;
+  RemoteObject object(std::string_view objref, std::string_view index) const;
+
+  Value peek_in(std::string_view wire) const;
+  Value peek_out(std::string_view wire) const;
+  void poke_out(std::string_view wire, const Value& value) const;
+  void connect_wire(std::string_view wire, ClientConnection::WireHandler handler) const;
+  void disconnect_wire(std::string_view wire) const;
+  void send_wire(std::string_view wire, const Value& value) const;
+  /// `received` gets every packet, in order, until the endpoint is closed.
+  RemotePipe connect_pipe(std::string_view pipe, std::function<void(Value packet)> received,
+                          std::int32_t index = any_pipe_index) const;
+  /// handler of the callback's C++ types, or Value; returns the answer. What it throws, the service gets as an error.
+  template <class F>
+  void on_callback(std::string_view callback, F&& handler) const {
+    on_callback_values(callback, make_handler(std::forward<F>(handler)).call);
+  }
+  void on_callback_values(std::string_view callback, ClientConnection::CallbackHandler handler) const;
+  void on_event(std::string_view event, ClientConnection::EventHandler handler) const;
+
+  /// Keeps others out of this object and all below it, until unlock() or until this client has gone.
+  void lock(LockKind kind = LockKind::user) const;
+  void unlock() const;
+  /// Waits for the monitor lock. `timeout` negative: for ever.
+  [[nodiscard]] MonitorGuard enter_monitor(std::chrono::milliseconds timeout = std::chrono::milliseconds(-1)) const;
+
+  /// Qualified.
+  const std::string& type_name() const;
+  const std::string& path() const { return path_; }
+  BlockingConnection& connection() const { return *connection_; }
+
+ private:
+  std::shared_ptr<BlockingConnection> connection_;
+  std::string path_;
+};
+
+/// The root object of the service that `url` names. A service that requires a user takes options.username and
+/// options.credentials, or those given here.
+RemoteObject connect(std::string_view url, ConnectOptions options = {});
+RemoteObject connect(std::string_view url, std::string_view username, std::string_view password,
+                     ConnectOptions options = {});
+
+}  // namespace rr

@@ -1,0 +1,380 @@
+#include "node/client/client_connection.hpp"
+
+#include <boost/asio/bind_cancellation_slot.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/post.hpp>
+#include <variant>
+
+#include "core/session/service_path.hpp"
+#include "core/session/url.hpp"
+#include "core/support/random.hpp"
+
+namespace rr {
+
+namespace asio = boost::asio;
+
+namespace {
+
+/// Whichever URL is taken, a peer that is gone is noticed as soon as it should be.
+Heartbeat quickest_heartbeat(const std::vector<ConnectionUrl>& urls) {
+  auto out = heartbeat_of(urls.front().scheme);
+  for (const auto& url : urls)
+    if (const auto other = heartbeat_of(url.scheme); other.period < out.period) out = other;
+  return out;
+}
+
+/// Throws   boost::system::system_error: it was cancelled.
+awaitable<void> dial_and_start(std::vector<ConnectionUrl> urls, ConnectOptions options,
+                               std::shared_ptr<ClientOpening> opening, ClientConnection::Opened done) {
+  const auto deadline = std::chrono::steady_clock::now() + options.connect_timeout;
+  options.dial.timeout = options.connect_timeout;
+  const auto heartbeat = options.heartbeat.value_or(quickest_heartbeat(urls));
+  options.connection.heartbeat_period = heartbeat.period;
+  options.connection.receive_timeout = heartbeat.timeout;
+  auto stream = co_await dial_any(std::move(urls), std::move(options.dial));
+  if (opening->is_over()) co_return;
+  if (!stream) co_return done(stream.error());
+  const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
+  options.connect_timeout = std::max(left, std::chrono::milliseconds(1));
+  options.connection.known_peer = (*stream)->verified_peer();
+  const auto connection = std::make_shared<ClientConnection>(std::move(*stream), std::move(options), std::move(done));
+  opening->begin_session(connection);
+  connection->start();
+}
+
+}  // namespace
+
+void ClientOpening::cancel() {
+  if (std::exchange(is_over_, true)) return;
+  dialing_.emit(asio::cancellation_type::terminal);
+  if (const auto connection = connection_.lock())
+    connection->close(make_error(ErrorCode::operation_cancelled, "connecting was given up"));
+}
+
+ClientConnection::ClientConnection(std::unique_ptr<ByteStream> stream, ClientOptions options, Opened opened)
+    : SessionDriver(std::move(stream), std::move(options), read_clocks()), opened_(std::move(opened)) {}
+
+void ClientConnection::open(std::unique_ptr<ByteStream> stream, ClientOptions options, Opened done) {
+  options.connection.known_peer = stream->verified_peer();
+  if (options.connection.self.id.is_any()) options.connection.self.id = random_node_id();
+  std::make_shared<ClientConnection>(std::move(stream), std::move(options), std::move(done))->start();
+}
+
+std::shared_ptr<ClientOpening> ClientConnection::open(asio::io_context& io, std::string_view url,
+                                                      ConnectOptions options, Opened done) {
+  const auto opening = std::make_shared<ClientOpening>();
+  auto tell = [opening, done = std::move(done)](Result<std::shared_ptr<ClientConnection>> opened) {
+    if (!std::exchange(opening->is_over_, true)) done(std::move(opened));
+  };
+  const auto refuse = [&](ErrorCode code, std::string why) {
+    asio::post(io, [tell, error = make_error(code, std::move(why))] { tell(error); });
+    return opening;
+  };
+  std::vector<std::string> texts{std::string(url)};
+  texts.insert(texts.end(), options.other_urls.begin(), options.other_urls.end());
+  std::vector<ConnectionUrl> urls;
+  for (const auto& text : texts) {
+    const auto parsed = parse_url(text);
+    if (!parsed) return refuse(parsed.error().code, parsed.error().message);
+    if (!can_dial(parsed->scheme))
+      return refuse(ErrorCode::connection_error, "connect to " + quoted(text) + ": scheme '" + parsed->scheme +
+                                                     "' is not available here, expected " + dialable_schemes());
+    urls.push_back(*parsed);
+  }
+  options.service = urls.front().service;
+  options.connection.target = {urls.front().node_id.value_or(NodeId{}), urls.front().node_name};
+  if (options.connection.self.id.is_any()) options.connection.self.id = random_node_id();
+  auto work = dial_and_start(std::move(urls), std::move(options), opening, std::move(tell));
+  // Posted: `done` is not called before this returns.
+  asio::post(io, [&io, opening, work = std::move(work)]() mutable {
+    if (opening->is_over_) return;
+    const auto keep = [opening](std::exception_ptr) {};  // the coroutine uses the slot until this is called
+    asio::co_spawn(io, std::move(work), asio::bind_cancellation_slot(opening->dialing_.slot(), keep));
+  });
+  return opening;
+}
+
+void ClientConnection::expect(RequestId id, Completion done) {
+  completions_.emplace(id, std::move(done));
+  settle();
+}
+
+void ClientConnection::call(std::string_view path, std::string_view function, std::span<const Value> arguments,
+                            Completion done) {
+  expect(session_.call_function(path, function, arguments, read_clocks()), std::move(done));
+}
+
+void ClientConnection::open_generator(std::string_view path, std::string_view function,
+                                      std::span<const Value> arguments, Completion done) {
+  expect(session_.open_generator(path, function, arguments, read_clocks()), std::move(done));
+}
+
+void ClientConnection::next_generator(std::string_view path, std::string_view function, std::int32_t index,
+                                      const std::optional<Value>& parameter, Completion done) {
+  expect(session_.next_generator(path, function, index, parameter, read_clocks()), std::move(done));
+}
+
+void ClientConnection::close_generator(std::string_view path, std::string_view function, std::int32_t index,
+                                       Completion done) {
+  expect(session_.close_generator(path, function, index, read_clocks()), std::move(done));
+}
+
+void ClientConnection::abort_generator(std::string_view path, std::string_view function, std::int32_t index,
+                                       Completion done) {
+  expect(session_.abort_generator(path, function, index, read_clocks()), std::move(done));
+}
+
+void ClientConnection::get_memory_dimensions(std::string_view path, std::string_view memory, Completion done) {
+  expect(session_.get_memory_dimensions(path, memory, read_clocks()), std::move(done));
+}
+
+void ClientConnection::read_memory(std::string_view path, std::string_view memory, const MemoryRange& range,
+                                   Completion done) {
+  expect(session_.read_memory(path, memory, range.position, range.count, read_clocks()), std::move(done));
+}
+
+void ClientConnection::write_memory(std::string_view path, std::string_view memory,
+                                    std::span<const std::uint64_t> position, const Value& value, Completion done) {
+  expect(session_.write_memory(path, memory, position, value, read_clocks()), std::move(done));
+}
+
+void ClientConnection::get(std::string_view path, std::string_view property, Completion done) {
+  expect(session_.get_property(path, property, read_clocks()), std::move(done));
+}
+
+void ClientConnection::set(std::string_view path, std::string_view property, const Value& value, Completion done) {
+  expect(session_.set_property(path, property, value, read_clocks()), std::move(done));
+}
+
+void ClientConnection::find_object(std::string_view path, Completion done) {
+  expect(session_.find_object(path, read_clocks()), std::move(done));
+}
+
+void ClientConnection::peek_in(std::string_view path, std::string_view wire, Completion done) {
+  expect(session_.peek_in_value(path, wire, read_clocks()), std::move(done));
+}
+
+void ClientConnection::peek_out(std::string_view path, std::string_view wire, Completion done) {
+  expect(session_.peek_out_value(path, wire, read_clocks()), std::move(done));
+}
+
+void ClientConnection::poke_out(std::string_view path, std::string_view wire, const Value& value, Completion done) {
+  expect(session_.poke_out_value(path, wire, value, read_clocks()), std::move(done));
+}
+
+void ClientConnection::connect_wire(std::string_view path, std::string_view wire, WireHandler handler,
+                                    Completion done) {
+  wire_handlers_[{std::string(path), std::string(wire)}] = std::make_shared<WireHandler>(std::move(handler));
+  expect(session_.connect_wire(path, wire, read_clocks()), std::move(done));
+}
+
+void ClientConnection::disconnect_wire(std::string_view path, std::string_view wire, Completion done) {
+  const MemberKey key{std::string(path), std::string(wire)};
+  wire_handlers_.erase(key);
+  wire_closed_handlers_.erase(key);
+  expect(session_.disconnect_wire(path, wire, read_clocks()), std::move(done));
+}
+
+void ClientConnection::on_wire_closed(std::string_view path, std::string_view wire, std::function<void()> handler) {
+  wire_closed_handlers_[{std::string(path), std::string(wire)}] = std::move(handler);
+}
+
+Result<> ClientConnection::send_wire(std::string_view path, std::string_view wire, const Value& value) {
+  auto sent = session_.send_wire(path, wire, value, read_clocks());
+  settle();
+  return sent;
+}
+
+void ClientConnection::connect_pipe(std::string_view path, std::string_view pipe, std::int32_t index,
+                                    PipeHandlers handlers, Completion done) {
+  // Packets follow right behind the completion: only there the index is known.
+  auto connected = [this, path = std::string(path), pipe = std::string(pipe),
+                    handlers = std::make_shared<PipeHandlers>(std::move(handlers)),
+                    done = std::move(done)](Result<Value> result) {
+    if (result) pipe_handlers_[{path, pipe, result->to<std::int32_t>().value()}] = handlers;
+    if (done) done(std::move(result));
+  };
+  expect(session_.connect_pipe(path, pipe, index, read_clocks()), std::move(connected));
+}
+
+void ClientConnection::disconnect_pipe(std::string_view path, std::string_view pipe, std::int32_t index,
+                                       Completion done) {
+  pipe_handlers_.erase({std::string(path), std::string(pipe), index});
+  expect(session_.disconnect_pipe(path, pipe, index, read_clocks()), std::move(done));
+}
+
+Result<> ClientConnection::send_pipe(std::string_view path, std::string_view pipe, std::int32_t index,
+                                     const Value& packet) {
+  auto sent = session_.send_pipe_packet(path, pipe, index, packet, read_clocks());
+  settle();
+  if (!sent) return sent.error();
+  return {};
+}
+
+Result<std::uint32_t> ClientConnection::send_pipe_for_ack(std::string_view path, std::string_view pipe,
+                                                          std::int32_t index, const Value& packet) {
+  auto sent = session_.send_pipe_packet(path, pipe, index, packet, read_clocks(), true);
+  settle();
+  return sent;
+}
+
+void ClientConnection::hold_pipe_acks(std::string_view path, std::string_view pipe, std::int32_t index, bool is_held) {
+  session_.hold_pipe_acks(path, pipe, index, is_held, read_clocks());
+  settle();
+}
+
+void ClientConnection::on_callback(std::string_view path, std::string_view callback, CallbackHandler handler) {
+  on_callback_later(path, callback,
+                    [handler = std::move(handler)](std::span<const Value> arguments, const auto& reply) {
+                      reply(handler(arguments));
+                    });
+}
+
+void ClientConnection::on_callback_later(std::string_view path, std::string_view callback,
+                                         LateCallbackHandler handler) {
+  callback_handlers_[{std::string(path), std::string(callback)}] =
+      std::make_shared<LateCallbackHandler>(std::move(handler));
+}
+
+void ClientConnection::forget_callback(std::string_view path, std::string_view callback) {
+  callback_handlers_.erase({std::string(path), std::string(callback)});
+}
+
+void ClientConnection::on_event(std::string_view path, std::string_view event, EventHandler handler) {
+  event_handlers_[{std::string(path), std::string(event)}] = std::make_shared<EventHandler>(std::move(handler));
+}
+
+void ClientConnection::authenticate(std::string_view username, const Value& credentials, Completion done) {
+  expect(session_.authenticate(username, credentials, read_clocks()), std::move(done));
+}
+
+void ClientConnection::logout(Completion done) {
+  expect(session_.logout(read_clocks()), std::move(done));
+}
+
+void ClientConnection::get_attributes(Completion done) {
+  expect(session_.get_attributes(read_clocks()), std::move(done));
+}
+
+void ClientConnection::lock(std::string_view path, LockKind kind, Completion done) {
+  expect(session_.lock(path, kind, read_clocks()), std::move(done));
+}
+
+void ClientConnection::unlock(std::string_view path, Completion done) {
+  expect(session_.unlock(path, read_clocks()), std::move(done));
+}
+
+void ClientConnection::enter_monitor(std::string_view path, std::chrono::milliseconds timeout, Completion done) {
+  expect(session_.enter_monitor(path, timeout, read_clocks()), std::move(done));
+}
+
+void ClientConnection::exit_monitor(std::string_view path, Completion done) {
+  expect(session_.exit_monitor(path, read_clocks()), std::move(done));
+}
+
+void ClientConnection::disconnect() {
+  session_.disconnect(read_clocks());
+  settle();
+}
+
+bool ClientConnection::handle_event(Now) {
+  auto event = session_.poll_event();
+  if (!event) return false;
+  std::visit([this](auto& happened) { handle(std::move(happened)); }, *event);
+  return true;
+}
+
+void ClientConnection::handle(Connected&&) {
+  const Opened opened = std::exchange(opened_, nullptr);
+  opened(std::static_pointer_cast<ClientConnection>(shared_from_this()));
+}
+
+void ClientConnection::handle(Completed&& completed) {
+  auto found = completions_.extract(completed.id);
+  if (!found.empty() && found.mapped()) found.mapped()(std::move(completed.result));
+}
+
+void ClientConnection::handle(EventReceived&& received) {
+  const auto found = event_handlers_.find({std::move(received.path), std::move(received.member)});
+  if (found == event_handlers_.end()) return;
+  const auto handler = found->second;  // it may replace itself
+  (*handler)(received.arguments);
+}
+
+void ClientConnection::handle(WireValueReceived&& received) {
+  const auto found = wire_handlers_.find({std::move(received.path), std::move(received.member)});
+  if (found == wire_handlers_.end()) return;
+  const auto handler = found->second;
+  (*handler)(received.value, received.time);
+}
+
+void ClientConnection::handle(WireClosedByService&& closed) {
+  const MemberKey key{std::move(closed.path), std::move(closed.member)};
+  wire_handlers_.erase(key);
+  const auto found = wire_closed_handlers_.extract(key);
+  if (found && found.mapped()) found.mapped()();
+}
+
+void ClientConnection::handle(PipePacketReceived&& received) {
+  const auto found = pipe_handlers_.find({std::move(received.path), std::move(received.member), received.index});
+  if (found == pipe_handlers_.end()) return;
+  const auto handlers = found->second;  // it may disconnect
+  if (handlers->received) handlers->received(std::move(received.value));
+}
+
+void ClientConnection::handle(PipePacketsAcknowledged&& acknowledged) {
+  const auto found =
+      pipe_handlers_.find({std::move(acknowledged.path), std::move(acknowledged.member), acknowledged.index});
+  if (found == pipe_handlers_.end()) return;
+  const auto handlers = found->second;  // it may disconnect
+  if (handlers->acknowledged) handlers->acknowledged(acknowledged.numbers);
+}
+
+void ClientConnection::handle(PipeClosedByService&& closed) {
+  const auto found = pipe_handlers_.extract({std::move(closed.path), std::move(closed.member), closed.index});
+  if (found && found.mapped()->closed) found.mapped()->closed();
+}
+
+void ClientConnection::handle(CallbackCalled&& called) {
+  const auto found = callback_handlers_.find({std::move(called.path), std::move(called.member)});
+  if (found == callback_handlers_.end())
+    return session_.reply_callback(called.id, make_error(ErrorCode::invalid_operation, "Callback function not set"),
+                                   read_clocks());
+  const auto handler = found->second;  // it may replace itself
+  const std::weak_ptr<StreamDriver> weak = weak_from_this();
+  const CallbackReply reply = [weak, id = called.id](const Result<Value>& answer) {
+    const auto self = std::static_pointer_cast<ClientConnection>(weak.lock());
+    if (!self) return;
+    self->session_.reply_callback(id, answer, read_clocks());
+    self->settle();
+  };
+  try {
+    (*handler)(called.arguments, reply);
+  } catch (const std::exception& exception) {
+    reply(Error{ErrorCode::remote_error, exception.what(), "rrgate.UnhandledException"});
+  }
+}
+
+/// Whoever uses objects below the path hears of it when the next request fails; their handlers have to go now.
+void ClientConnection::handle(PathReleased&& released) {
+  const auto is_released = [&](const auto& item) { return is_within(item.first.first, released.path); };
+  std::erase_if(event_handlers_, is_released);
+  std::erase_if(wire_handlers_, is_released);
+  std::erase_if(callback_handlers_, is_released);
+  const auto handler = path_released_;
+  if (handler) handler(released.path);
+}
+
+void ClientConnection::handle(SessionClosed&& closed) {
+  event_handlers_.clear();
+  wire_handlers_.clear();
+  wire_closed_handlers_.clear();
+  callback_handlers_.clear();
+  pipe_handlers_.clear();
+  path_released_ = nullptr;
+  if (const Opened opened = std::exchange(opened_, nullptr)) return opened(std::move(closed.reason));
+  for (const auto& handler : std::exchange(on_closed_, {}))
+    if (handler) handler(closed.reason);
+}
+
+}  // namespace rr

@@ -1,0 +1,229 @@
+#include "node/discovery/ip_discovery.hpp"
+
+#include <algorithm>
+#include <boost/asio/ip/multicast.hpp>
+#include <boost/asio/ip/v6_only.hpp>
+#include <chrono>
+#include <optional>
+
+#include "node/transport/byte_stream.hpp"
+
+namespace rr {
+
+namespace asio = boost::asio;
+using asio::ip::udp;
+
+namespace {
+
+constexpr std::chrono::seconds rescan_period{5};
+
+/// FF0x::BA86; `scope` is the x: 1 node, 2 link, 5 site.
+asio::ip::address_v6 group(std::uint8_t scope, unsigned zone) {
+  asio::ip::address_v6::bytes_type bytes{};
+  bytes[0] = 0xff;
+  bytes[1] = scope;
+  bytes[14] = 0xba;
+  bytes[15] = 0x86;
+  return asio::ip::address_v6(bytes, zone);
+}
+
+std::vector<std::uint8_t> group_scopes(const IpDiscoveryScopes& scopes) {
+  std::vector<std::uint8_t> out;
+  if (scopes.node_local) out.push_back(1);
+  if (scopes.link_local) out.push_back(2);
+  if (scopes.site_local) out.push_back(5);
+  return out;
+}
+
+}  // namespace
+
+class IpDiscovery::Implementation : public std::enable_shared_from_this<Implementation> {
+ public:
+  Implementation(const asio::any_io_executor& executor, IpDiscoveryScopes scopes, bool listens, Callbacks callbacks)
+      : executor_(executor), scopes_(scopes), listens_(listens), callbacks_(std::move(callbacks)), rescan_(executor) {}
+
+  void start() {
+    addresses_ = local_addresses();
+    listen();
+    rescan_later();
+  }
+
+  void close() {
+    is_closed_ = true;
+    rescan_.cancel();
+    for (auto* receiver : {&v6_, &v4_}) receiver->reset();
+  }
+
+  const std::vector<LocalAddress>& addresses() const { return addresses_; }
+
+  void send(const LocalAddress& from, std::string_view packet, bool stays_here) {
+    if (from.address.is_v4()) {
+      if (!scopes_.ipv4_broadcast || stays_here) return;
+      send_to(from, {from.broadcast.value_or(asio::ip::address_v4::broadcast())}, packet);
+      return;
+    }
+    std::vector<asio::ip::address> groups;
+    for (const auto scope : group_scopes(scopes_))
+      if (!stays_here || scope == 1) groups.emplace_back(group(scope, from.interface_index));
+    if (!groups.empty()) send_to(from, groups, packet);
+  }
+
+  void send_everywhere(std::string_view packet) {
+    std::set<std::pair<unsigned, bool>> done;  // interface, whether IPv4
+    for (const auto& from : addresses_) {
+      const bool is_v4 = from.address.is_v4();
+      if ((is_v4 || from.is_link_local()) && !from.address.is_loopback() &&
+          done.emplace(from.interface_index, is_v4).second)
+        send(from, packet, false);
+    }
+  }
+
+ private:
+  /// One socket that listens, with the buffer of the datagram that it waits for.
+  struct Receiver {
+    explicit Receiver(const asio::any_io_executor& executor) : socket(executor) {}
+    udp::socket socket;
+    udp::endpoint sender;
+    std::array<char, max_discovery_packet_bytes> buffer{};
+    std::set<unsigned> joined;  ///< interfaces whose groups it is a member of
+  };
+
+  /// A socket of its own for each packet: it is bound to the address that the packet speaks of.
+  void send_to(const LocalAddress& from, const std::vector<asio::ip::address>& targets, std::string_view packet) {
+    error_code error;
+    udp::socket socket(executor_);
+    socket.open(from.address.is_v6() ? udp::v6() : udp::v4(), error);
+    if (error) return;
+    socket.non_blocking(true, error);
+    socket.set_option(udp::socket::reuse_address(true), error);
+    if (from.address.is_v6()) {
+      socket.set_option(asio::ip::multicast::outbound_interface(from.interface_index), error);
+      socket.set_option(asio::ip::multicast::enable_loopback(true), error);
+    } else {
+      socket.set_option(asio::socket_base::broadcast(true), error);
+    }
+    socket.bind({from.address, discovery_port}, error);
+    // Somebody may hold the port without sharing it. Nobody looks at where a packet comes from but its address.
+    if (error == asio::error::address_in_use) socket.bind({from.address, 0}, error);
+    if (error) return;  // the address has just gone
+    // A network that is down is no problem of ours: the next announcement may find it up.
+    for (const auto& target : targets)
+      socket.send_to(asio::buffer(packet.data(), packet.size()), {target, discovery_port}, 0, error);
+  }
+
+  void listen() {
+    if (!listens_) return;
+    if (!v6_ && !group_scopes(scopes_).empty()) open(v6_, {asio::ip::address_v6::any(), discovery_port});
+    if (!v4_ && scopes_.ipv4_broadcast) open(v4_, {asio::ip::address_v4::any(), discovery_port});
+    join_groups();
+  }
+
+  void open(std::shared_ptr<Receiver>& receiver, const udp::endpoint& endpoint) {
+    auto opened = std::make_shared<Receiver>(executor_);
+    error_code error;
+    opened->socket.open(endpoint.protocol(), error);
+    if (!error && endpoint.address().is_v6()) opened->socket.set_option(asio::ip::v6_only(true), error);
+    // Every node of the machine listens at this port; multicast and broadcast datagrams reach all of them.
+    if (!error) opened->socket.set_option(udp::socket::reuse_address(true), error);
+    if (!error) opened->socket.bind(endpoint, error);
+    if (error)
+      return report_once("listen for discovery on UDP port " + std::to_string(discovery_port) +
+                         (endpoint.address().is_v6() ? " (IPv6): " : " (IPv4): ") + error.message());
+    receiver = opened;
+    receive(opened);
+  }
+
+  void join_groups() {
+    if (!v6_) return;
+    std::set<unsigned> present;
+    for (const auto& address : addresses_)
+      if (address.address.is_v6()) present.insert(address.interface_index);
+    for (const auto interface : present)
+      if (!v6_->joined.contains(interface))
+        for (const auto scope : group_scopes(scopes_)) {
+          error_code ignored;  // an interface without multicast
+          v6_->socket.set_option(asio::ip::multicast::join_group(group(scope, 0), interface), ignored);
+        }
+    v6_->joined = present;  // an interface that has gone takes its membership along
+  }
+
+  void receive(const std::shared_ptr<Receiver>& receiver) {
+    receiver->socket.async_receive_from(
+        asio::buffer(receiver->buffer), receiver->sender,
+        [self = shared_from_this(), receiver](const error_code& error, std::size_t size) {
+          if (self->is_closed_ || error == asio::error::operation_aborted) return;
+          if (error) return self->drop(receiver, error);
+          self->handle_datagram(receiver->sender, std::string_view(receiver->buffer.data(), size));
+          if (!self->is_closed_) self->receive(receiver);
+        });
+  }
+
+  /// The next rescan opens another.
+  void drop(const std::shared_ptr<Receiver>& receiver, const error_code& error) {
+    report_once("receive discovery packets: " + error.message());
+    for (auto* each : {&v6_, &v4_})
+      if (*each == receiver) each->reset();
+  }
+
+  void handle_datagram(const udp::endpoint& sender, std::string_view packet) {
+    PacketSource source;
+    source.address = to_ip_address(sender.address());
+    if (sender.address().is_v6()) source.zone = zone_of(sender.address().to_v6().scope_id());
+    source.is_this_machine = std::any_of(addresses_.begin(), addresses_.end(),
+                                         [&](const auto& own) { return to_ip_address(own.address) == source.address; });
+    callbacks_.received(packet, source);
+  }
+
+  void rescan_later() {
+    rescan_.expires_after(rescan_period);
+    rescan_.async_wait([self = shared_from_this()](const error_code& error) {
+      if (error || self->is_closed_) return;
+      auto found = local_addresses();
+      const bool is_changed = found != self->addresses_;
+      self->addresses_ = std::move(found);
+      self->listen();
+      self->rescan_later();
+      if (is_changed) self->callbacks_.addresses_changed();
+    });
+  }
+
+  /// What goes wrong at one rescan goes wrong at the next as well.
+  void report_once(const std::string& problem) {
+    if (reported_.insert(problem).second) callbacks_.report(problem);
+  }
+
+  asio::any_io_executor executor_;
+  IpDiscoveryScopes scopes_;
+  bool listens_;
+  Callbacks callbacks_;
+  asio::steady_timer rescan_;
+  std::vector<LocalAddress> addresses_;
+  std::shared_ptr<Receiver> v6_;
+  std::shared_ptr<Receiver> v4_;
+  std::set<std::string> reported_;  ///< one for each kind of failure
+  bool is_closed_ = false;
+};
+
+IpDiscovery::IpDiscovery(const asio::any_io_executor& executor, IpDiscoveryScopes scopes, bool listens,
+                         Callbacks callbacks)
+    : implementation_(std::make_shared<Implementation>(executor, scopes, listens, std::move(callbacks))) {
+  implementation_->start();
+}
+
+IpDiscovery::~IpDiscovery() {
+  implementation_->close();
+}
+
+const std::vector<LocalAddress>& IpDiscovery::addresses() const {
+  return implementation_->addresses();
+}
+
+void IpDiscovery::send(const LocalAddress& from, std::string_view packet, bool stays_here) {
+  implementation_->send(from, packet, stays_here);
+}
+
+void IpDiscovery::send_everywhere(std::string_view packet) {
+  implementation_->send_everywhere(packet);
+}
+
+}  // namespace rr

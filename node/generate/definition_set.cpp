@@ -1,0 +1,112 @@
+#include "node/generate/definition_set.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <functional>
+#include <set>
+
+#include "core/robdef/model/names.hpp"
+#include "node/platform/text_file.hpp"
+
+namespace rrgate {
+
+DefinitionSet DefinitionSet::from_files(std::span<const std::string> files, std::span<const std::string> folders,
+                                        rr::RobdefMode mode) {
+  DefinitionSet set(mode);
+  for (const auto& file : files) {
+    if (set.add_file(file)) set.requested_.push_back(&set.definitions_.back());
+  }
+  set.add_imports(folders);
+  set.verify();
+  return set;
+}
+
+DefinitionSet DefinitionSet::from_texts(std::span<const std::string> texts, rr::RobdefMode mode) {
+  DefinitionSet set(mode);
+  for (const auto& text : texts) set.requested_.push_back(set.add(text, {}));
+  set.verify();
+  return set;
+}
+
+const rr::ServiceDefinition* DefinitionSet::add(std::string_view text, std::string_view file) {
+  auto parsed = rr::parse_service_definition(text, mode_, file);
+  std::move(parsed.diagnostics.begin(), parsed.diagnostics.end(), std::back_inserter(diagnostics_));
+  definitions_.push_back(std::move(parsed.definition));
+  return &definitions_.back();
+}
+
+bool DefinitionSet::add_file(const std::string& file) {
+  const auto text = read_text_file(file);
+  if (text) {
+    add(*text, file);
+    return true;
+  }
+  rr::Diagnostic diagnostic;
+  diagnostic.code = "unreadable";
+  diagnostic.message = "found no file that can be read, expected a service definition";
+  diagnostic.file = file;
+  diagnostics_.push_back(std::move(diagnostic));
+  return false;
+}
+
+void DefinitionSet::add_imports(std::span<const std::string> folders) {
+  // Definitions that come in here are walked as well.
+  for (std::size_t i = 0; i < definitions_.size(); ++i) {
+    const auto& importer = definitions_[i];
+    const auto beside = std::filesystem::path(importer.file).parent_path();
+    for (const auto& import : importer.imports) {
+      const auto add_from = [&](const std::filesystem::path& folder) {
+        const auto file = folder / (import.name + ".robdef");
+        std::error_code error;
+        return std::filesystem::is_regular_file(file, error) && add_file(file.string());
+      };
+      // One that is nowhere is reported by verify(), at the line of its import.
+      if (!find_service(import.name) && !add_from(beside)) std::any_of(folders.begin(), folders.end(), add_from);
+    }
+  }
+}
+
+void DefinitionSet::verify() {
+  std::vector<rr::ServiceDefinition*> set;
+  for (auto& definition : definitions_) set.push_back(&definition);
+  auto found = rr::verify_service_definitions(set, mode_);
+  std::move(found.begin(), found.end(), std::back_inserter(diagnostics_));
+}
+
+bool DefinitionSet::is_good() const {
+  return std::none_of(diagnostics_.begin(), diagnostics_.end(),
+                      [](const auto& diagnostic) { return diagnostic.severity == rr::Severity::error; });
+}
+
+std::vector<const rr::ServiceDefinition*> DefinitionSet::in_order() const {
+  std::vector<const rr::ServiceDefinition*> order;
+  std::set<const rr::ServiceDefinition*> seen;
+  const std::function<void(const rr::ServiceDefinition&)> visit = [&](const rr::ServiceDefinition& definition) {
+    if (!seen.insert(&definition).second) return;
+    for (const auto& import : definition.imports) visit(*find_service(import.name));
+    order.push_back(&definition);
+  };
+  for (const auto& definition : definitions_) visit(definition);
+  return order;
+}
+
+const rr::ServiceDefinition* DefinitionSet::find_service(std::string_view name) const {
+  const auto found = std::find_if(definitions_.begin(), definitions_.end(),
+                                  [&](const auto& definition) { return definition.name == name; });
+  return found == definitions_.end() ? nullptr : &*found;
+}
+
+const rr::EntityDefinition* DefinitionSet::find_entity(std::string_view qualified_name) const {
+  const auto [service, name] = rr::split_qualified(qualified_name);
+  const auto* definition = find_service(service);
+  return definition ? definition->find_entity(name) : nullptr;
+}
+
+bool DefinitionSet::has_service_within(std::string_view name) const {
+  const auto inner = std::string(name) + '.';
+  return std::any_of(definitions_.begin(), definitions_.end(), [&](const auto& definition) {
+    return definition.name == name || definition.name.starts_with(inner);
+  });
+}
+
+}  // namespace rrgate

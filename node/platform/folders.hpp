@@ -1,0 +1,25 @@
+// Where Robot Raconteur keeps its files on this machine. Layer: node/platform. Source: transports spec section 8.1.
+//
+// As with the reference, but for two things: an empty variable counts as unset, and a relative path is refused.
+#pragma once
+
+#include <filesystem>
+
+#include "core/support/error.hpp"
+
+namespace rr {
+
+/// Certificates and NodeIDs of this user; of the whole machine for root.
+/// Errors   invalid_configuration: nothing says where, or what does is a relative path.
+[[nodiscard]] Result<std::filesystem::path> user_config_folder();
+/// Sockets and locks of this user's nodes. Below /tmp where there is no XDG_RUNTIME_DIR; then it must be the user's
+/// own. Errors   as above.
+[[nodiscard]] Result<std::filesystem::path> user_run_folder();
+[[nodiscard]] Result<std::filesystem::path> system_run_folder();
+/// What this machine's own nodes keep.
+[[nodiscard]] Result<std::filesystem::path> system_state_folder();
+
+/// This process's user. Empty where the system knows no name for its number.
+std::string user_name();
+
+}  // namespace rr

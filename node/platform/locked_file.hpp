@@ -1,0 +1,44 @@
+// A file that one process at a time may hold. Layer: node/platform. Source: transports spec section 8.2 (locks).
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "core/support/error.hpp"
+
+namespace rr {
+
+/// Held by a record lock of the open file, which excludes the reference's locks and, unlike those, survives that this
+/// process opens and closes the file elsewhere.
+class LockedFile {
+ public:
+  /// Opens or creates it, mode 0640, and locks it. Its content stays as it is.
+  /// Errors   system_resource_permission_denied: another node holds it; system_resource_error: it can't be opened.
+  [[nodiscard]] static Result<LockedFile> open(const std::filesystem::path& path);
+  /// Whether somebody holds the lock of a file. Not there: no.
+  static bool is_held(const std::filesystem::path& path);
+
+  LockedFile(LockedFile&& other) noexcept
+      : descriptor_(std::exchange(other.descriptor_, -1)), path_(std::move(other.path_)) {}
+  LockedFile& operator=(LockedFile&& other) noexcept;
+  ~LockedFile();
+
+  /// Replaces the content.
+  [[nodiscard]] Result<> write(std::string_view text);
+  /// At most `limit` bytes of the content.
+  [[nodiscard]] Result<std::string> read(std::size_t limit) const;
+  /// Deletes the file; the lock is held until the end of this object.
+  void remove();
+
+ private:
+  LockedFile(int descriptor, std::filesystem::path path) : descriptor_(descriptor), path_(std::move(path)) {}
+  Error failure(const char* what) const;
+
+  int descriptor_;
+  std::filesystem::path path_;
+};
+
+}  // namespace rr

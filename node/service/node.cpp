@@ -1,0 +1,435 @@
+#include "node/service/node.hpp"
+
+#include <algorithm>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <iostream>
+#include <map>
+#include <optional>
+#include <system_error>
+
+#include "core/discovery/announcement.hpp"
+#include "core/session/url.hpp"
+#include "core/support/random.hpp"
+#include "node/driver/accept.hpp"
+#include "node/platform/node_id_store.hpp"
+#include "node/service/login_judge.hpp"
+#include "node/service/service_client.hpp"
+#include "node/transport/intra.hpp"
+#include "node/transport/local.hpp"
+#include "node/transport/tcp.hpp"
+
+namespace rr {
+
+namespace asio = boost::asio;
+using boost::system::error_code;
+
+namespace {
+
+constexpr std::chrono::milliseconds stop_deadline{500};
+constexpr std::chrono::milliseconds send_stall{15000};
+
+NodeIdentity make_identity(std::string name, const NodeId& id) {
+  if (!name.empty() && !is_valid_node_name(name))
+    throw std::invalid_argument("node name " + rr::quoted(name) +
+                                " is not valid: expected letters, digits, '_', '-', '.'");
+  return {id.is_any() ? random_node_id() : id, std::move(name)};
+}
+
+struct ListenUrl {
+  HostPort address;
+  bool requires_tls = false;
+};
+
+ListenUrl parse_listen_url(std::string_view url) {
+  constexpr std::string_view scheme = "rr+tcp://";
+  constexpr std::string_view secure_scheme = "rrs+tcp://";
+  const auto fail = [&](const std::string& why) {
+    throw std::invalid_argument("listen on " + rr::quoted(url) + ": " + why +
+                                ", expected rr+tcp://HOST:PORT, rr+local:/// or rr+intra:///");
+  };
+  const bool is_secure = url.substr(0, secure_scheme.size()) == secure_scheme;
+  if (!is_secure && url.substr(0, scheme.size()) != scheme) fail("unknown scheme");
+  std::string_view rest = url.substr(is_secure ? secure_scheme.size() : scheme.size());
+  if (!rest.empty() && rest.back() == '/') rest.remove_suffix(1);
+  const auto parsed = parse_host_port(rest);
+  if (!parsed) fail(parsed.error().message);
+  return {*parsed, is_secure};
+}
+
+/// The NodeID that this machine keeps for the name, while nobody else uses it.
+std::optional<NodeIdClaim> claim_stored_id(const std::string& name, const NodeOptions& options) {
+  if (!options.keeps_id) return std::nullopt;
+  auto claim = NodeIdClaim::take(name);
+  if (!claim) throw std::runtime_error("node " + rr::quoted(name) + ": " + claim.error().message);
+  return std::move(*claim);
+}
+
+/// Runs work at multiples of a period.
+struct Repeat {
+  Repeat(asio::io_context& io, std::chrono::nanoseconds interval, std::function<void()> what)
+      : timer(io), period(interval), work(std::move(what)) {}
+  asio::steady_timer timer;
+  std::chrono::nanoseconds period;
+  std::function<void()> work;
+  bool is_stopped = false;
+};
+
+void repeat(const std::shared_ptr<Repeat>& job) {
+  job->timer.async_wait([job](const error_code&) {
+    if (!job->is_stopped) job->work();
+    if (job->is_stopped) return;
+    const auto late = std::chrono::steady_clock::now() - job->timer.expiry();
+    job->timer.expires_at(job->timer.expiry() + job->period * std::max<std::int64_t>(1, late / job->period + 1));
+    repeat(job);
+  });
+}
+
+}  // namespace
+
+class Node::Implementation final : public ServiceClientOwner, public ServiceHost {
+ public:
+  Implementation(asio::io_context* io, std::string name, NodeOptions options)
+      : options_(std::move(options)),
+        own_io_(io ? nullptr : std::make_unique<asio::io_context>(1)),
+        io_(io ? *io : *own_io_),
+        claim_(claim_stored_id(name, options_)),
+        directory_(make_identity(std::move(name), claim_ ? claim_->id() : options_.id)),
+        stop_timer_(io_) {}
+
+  ~Implementation() {
+    close_listeners();
+    stop_timer_.cancel();
+    for (const auto& service : services_) service->detach();
+    for (const auto& [id, client] : std::exchange(clients_, {})) client->abandon();
+  }
+
+  void add(const std::shared_ptr<Service>& service) {
+    auto hosted = service->attach(*this);
+    if (auto added = directory_.add(hosted); !added) {
+      service->detach();
+      throw std::invalid_argument(added.error().message);
+    }
+    services_.push_back(service);
+    nonce_ = make_service_state_nonce();
+    if (intra_) intra_->publish(nonce_);
+    if (local_)
+      if (auto published = local_->publish(nonce_); !published) report(published.error().message);
+    if (services_changed_) services_changed_();
+  }
+
+  std::uint16_t listen(std::string_view url) {
+    if (url == "rr+local:///") return listen_locally();
+    if (url == "rr+intra:///") return listen_in_process();
+    const auto parsed = parse_listen_url(url);
+    const bool requires_tls = parsed.requires_tls || options_.require_tls;
+    if (requires_tls && !(options_.tls && options_.tls->has_certificate()))
+      throw std::invalid_argument("listen on " + rr::quoted(url) + ": TLS needs a certificate: NodeOptions::tls");
+    auto listener = std::make_unique<TcpListener>(io_.get_executor());
+    const auto bound = listener->open(parsed.address, true);
+    if (!bound) throw std::runtime_error(bound.error().message);
+    listener->start([this, requires_tls](asio::ip::tcp::socket socket) { accept(std::move(socket), requires_tls); },
+                    [this](const std::string& problem) { report(problem); });
+    listeners_.push_back(std::move(listener));
+    for (const auto& at : *bound) listens_.push_back({at, requires_tls});
+    if (services_changed_) services_changed_();
+    return bound->front().port;
+  }
+
+  std::uint16_t listen_locally() {
+    if (local_) throw std::invalid_argument("listen on rr+local:///: the node does so already");
+    auto listener = std::make_unique<LocalListener>(io_.get_executor());
+    if (auto opened = listener->open(identity(), nonce_, options_.local_is_public); !opened)
+      throw std::runtime_error("listen on rr+local:///: " + opened.error().message);
+    auto welcome = [this](std::unique_ptr<ByteStream> stream) { accept_near(std::move(stream), "rr+local"); };
+    listener->start(
+        std::move(welcome), [this](const std::string& problem) { report(problem); }, send_stall);
+    local_ = std::move(listener);
+    return 0;
+  }
+
+  std::uint16_t listen_in_process() {
+    if (intra_) throw std::invalid_argument("listen on rr+intra:///: the node does so already");
+    auto welcome = [this](std::unique_ptr<ByteStream> stream) { accept_near(std::move(stream), "rr+intra"); };
+    auto listener = std::make_unique<IntraListener>(io_.get_executor(), std::move(welcome), send_stall);
+    if (auto opened = listener->open(identity(), nonce_); !opened)
+      throw std::runtime_error("listen on rr+intra:///: " + opened.error().message);
+    intra_ = std::move(listener);
+    return 0;
+  }
+
+  void run() {
+    asio::signal_set signals(io_, SIGINT, SIGTERM);
+    signals.async_wait([this](const error_code& error, int) {
+      if (!error) stop();
+    });
+    signals_ = &signals;
+    io_.run();
+    signals_ = nullptr;
+  }
+
+  void stop() {
+    if (std::exchange(is_stopping_, true)) return;
+    if (signals_) signals_->cancel();
+    close_listeners();
+    for (const auto& service : services_) {
+      service->on_client_connected(nullptr);
+      service->on_client_gone(nullptr);
+    }
+    const auto clients = clients_;  // each removes itself
+    for (const auto& [id, client] : clients) client->close_service();
+    if (clients_.empty()) return stopped();
+    stop_timer_.expires_after(stop_deadline);
+    stop_timer_.async_wait([this](const error_code& error) {
+      if (error) return;
+      const auto stubborn = clients_;
+      for (const auto& [id, client] : stubborn)
+        client->close(make_error(ErrorCode::connection_error, "the node stops"));
+    });
+  }
+
+  void every(std::chrono::nanoseconds period, std::function<void()> work) {
+    if (period <= std::chrono::nanoseconds::zero())
+      throw std::invalid_argument("Node::every: the period must be longer than nothing");
+    const auto job = std::make_shared<Repeat>(io_, period, std::move(work));
+    job->timer.expires_after(period);
+    repeats_.push_back(job);
+    repeat(job);
+  }
+
+  std::vector<std::string> listen_urls() const {
+    std::vector<std::string> out;
+    for (const auto& [address, requires_tls] : listens_) {
+      const auto at = "://" + format_host_port(address.host, address.port) +
+                      "?nodeid=" + format_node_id(identity().id, NodeIdFormat::dashes);
+      if (!requires_tls) out.push_back("rr+tcp" + at);
+      if (options_.tls && options_.tls->has_certificate()) out.push_back("rrs+tcp" + at);
+    }
+    if (local_) out.push_back("rr+local:///?nodeid=" + format_node_id(identity().id, NodeIdFormat::dashes));
+    if (intra_) out.push_back("rr+intra:///?nodeid=" + format_node_id(identity().id, NodeIdFormat::dashes));
+    return out;
+  }
+  const std::string& nonce() const { return nonce_; }
+  void on_services_changed(std::function<void()> handler) { services_changed_ = std::move(handler); }
+
+  asio::io_context& io() { return io_; }
+  const NodeIdentity& identity() const { return directory_.identity(); }
+  std::size_t client_count() const {
+    return static_cast<std::size_t>(
+        std::count_if(clients_.begin(), clients_.end(), [](const auto& client) { return client.second->service(); }));
+  }
+
+  // ServiceHost: from services to clients
+
+  void send_event(const Service& service, const std::string& path, const MemberDefinition& event,
+                  std::span<const Value> arguments) override {
+    for_clients_of(service, [&](ServiceClient& client) { client.send_event(path, event, arguments); });
+  }
+  void send_wire(const Service& service, const std::string& path, const MemberDefinition& wire,
+                 const std::shared_ptr<const Value>& newest) override {
+    const auto value = newest;
+    const Now now = read_clocks();
+    WirePacket packet(path, wire, *value, now.utc, now.steady);
+    for_clients_of(service, [&](ServiceClient& client) {
+      if (newest == value) client.send_wire(packet);
+    });
+  }
+  void release_path(const Service& service, const std::string& path) override {
+    for_clients_of(service, [&](ServiceClient& client) { client.release_path(path); });
+  }
+  void call_callback(const Service& service, ClientId id, const std::string& path, const MemberDefinition& callback,
+                     std::span<const Value> arguments, CallbackDone done) override {
+    const auto client = clients_.find(id);
+    if (client != clients_.end() && client->second->service() == &service)
+      return client->second->call_callback(path, callback, arguments, std::move(done));
+    asio::post(io_, [done = std::move(done), name = callback.name] {
+      done(make_error(ErrorCode::connection_error, "callback '" + name + "': the client is not connected"));
+    });
+  }
+  ClientId current_client() const override { return current_client_; }
+  Caller find_client(ClientId id) const override {
+    const auto found = clients_.find(id);
+    if (found == clients_.end() || !found->second->service()) return {};
+    const ServiceSession& session = found->second->session();
+    const auto* user = session.user();
+    return {id, user ? user->name : std::string(), session.endpoint(), session.connection().peer(),
+            found->second->verified_peer()};
+  }
+
+  // ServiceClientOwner: from clients
+
+  Service* find_service(const HostedService& hosted) override {
+    for (const auto& service : services_)
+      if (service->name() == hosted.name()) return service.get();
+    return nullptr;  // the service index
+  }
+  void set_current_client(ClientId id) override { current_client_ = id; }
+  void report(const std::string& problem) override {
+    if (options_.report)
+      options_.report(problem);
+    else
+      std::cerr << identity().name << ": " << problem << '\n';
+  }
+  void judge_login(const LoginRequested& login, const std::shared_ptr<ServiceClient>& client) override {
+    judge_.judge(login, io_.get_executor(), [id = login.id, weak = std::weak_ptr(client)](const auto& result) {
+      if (const auto still_there = weak.lock()) still_there->answer_login(id, result);
+    });
+  }
+  void locks_changed(const Service& service) override {
+    for_clients_of(service, [](ServiceClient& client) { client.handle_locks_changed(); });
+  }
+  void client_ended(ServiceClient& client) override {
+    clients_.erase(client.id());
+    if (is_stopping_ && clients_.empty()) stopped();
+  }
+
+ private:
+  /// Clients that are lost while they are sent to, or by what handlers do then, leave clients_ meanwhile.
+  template <class F>
+  void for_clients_of(const Service& service, F&& what) {
+    for (auto next = clients_.begin(); next != clients_.end();) {
+      const auto client = next->second;
+      if (client->service() == &service) what(*client);
+      next = clients_.upper_bound(client->id());
+    }
+  }
+
+  void accept(asio::ip::tcp::socket socket, bool requires_tls) {
+    error_code error;
+    const auto local = socket.local_endpoint(error);
+    if (error) return;  // gone already
+    if (clients_.size() + arriving_ >= options_.max_clients) return;
+    ++arriving_;
+    auto stream = make_tcp_stream(std::move(socket), send_stall);
+    std::string host = local.address().to_string();
+    host.resize(std::min(host.size(), host.find('%')));  // the zone is what this machine calls the link
+    asio::co_spawn(io_, welcome(std::move(stream), format_host_port(host, local.port()), requires_tls), asio::detached);
+  }
+
+  /// From this machine: nothing has to be found out first.
+  void accept_near(std::unique_ptr<ByteStream> stream, std::string scheme) {
+    if (is_stopping_ || clients_.size() + arriving_ >= options_.max_clients) return;
+    Accepted accepted;
+    accepted.stream = std::move(stream);
+    accepted.scheme = std::move(scheme);
+    add_client(std::move(accepted), "");
+  }
+
+  awaitable<void> welcome(std::unique_ptr<ByteStream> stream, std::string local, bool requires_tls) {
+    AcceptOptions how;
+    how.allowed_origins = options_.allowed_origins;
+    how.self = identity();
+    how.tls = options_.tls;
+    how.requires_tls = requires_tls;
+    auto accepted = co_await accept_stream(std::move(stream), std::move(how));
+    --arriving_;
+    if (!accepted && accepted.error().code == ErrorCode::authentication_error) report(accepted.error().message);
+    if (accepted && !is_stopping_) add_client(std::move(*accepted), local);
+  }
+
+  void add_client(Accepted accepted, const std::string& local) {
+    ServiceSessionOptions session;
+    session.connection.features = options_.features;
+    session.connection.max_message_size = options_.max_message_size;
+    const auto heartbeat = options_.heartbeat.value_or(heartbeat_of(accepted.scheme));
+    session.connection.heartbeat_period = heartbeat.period * 12 / 10;
+    session.connection.receive_timeout = heartbeat.timeout;
+    session.connection.known_peer = accepted.known_peer;
+    session.connection.is_encrypted = accepted.is_encrypted;
+    if (const auto verified = accepted.stream->verified_peer(); !verified.is_any()) session.verified_node_id = verified;
+    session.base_url = accepted.scheme + "://" + local + "/";
+    const ClientId id = ++last_client_id_;
+    const auto client =
+        std::make_shared<ServiceClient>(id, *this, directory_, std::move(session), std::move(accepted.stream));
+    clients_.emplace(id, client);
+    client->start();
+  }
+
+  void stopped() {
+    stop_timer_.cancel();
+    if (own_io_) own_io_->stop();  // whatever else runs on it ends with the node
+  }
+
+  void close_listeners() {
+    for (const auto& listener : listeners_) listener->close();
+    listeners_.clear();
+    local_.reset();
+    intra_.reset();
+    listens_.clear();
+    for (const auto& job : repeats_) {
+      job->is_stopped = true;
+      job->timer.cancel();
+    }
+    repeats_.clear();
+  }
+
+  NodeOptions options_;
+  std::unique_ptr<asio::io_context> own_io_;
+  asio::io_context& io_;
+  std::optional<NodeIdClaim> claim_;
+  ServiceDirectory directory_;
+  std::vector<std::shared_ptr<Service>> services_;
+  std::string nonce_ = make_service_state_nonce();
+  std::function<void()> services_changed_;
+  std::vector<std::unique_ptr<TcpListener>> listeners_;
+  std::unique_ptr<LocalListener> local_;
+  std::unique_ptr<IntraListener> intra_;
+  std::vector<ListenUrl> listens_;  ///< of the listeners: addresses with their true ports
+  std::vector<std::shared_ptr<Repeat>> repeats_;
+  std::map<ClientId, std::shared_ptr<ServiceClient>> clients_;
+  std::size_t arriving_ = 0;  ///< connections whose first bytes are awaited
+  ClientId last_client_id_ = 0;
+  ClientId current_client_ = 0;
+  bool is_stopping_ = false;
+  asio::steady_timer stop_timer_;
+  asio::signal_set* signals_ = nullptr;
+  LoginJudge judge_;
+};
+
+Node::Node(std::string name, NodeOptions options)
+    : implementation_(std::make_unique<Implementation>(nullptr, std::move(name), std::move(options))) {}
+Node::Node(asio::io_context& io, std::string name, NodeOptions options)
+    : implementation_(std::make_unique<Implementation>(&io, std::move(name), std::move(options))) {}
+Node::~Node() = default;
+
+void Node::add(const std::shared_ptr<Service>& service) {
+  implementation_->add(service);
+}
+std::uint16_t Node::listen(std::string_view url) {
+  return implementation_->listen(url);
+}
+void Node::run() {
+  implementation_->run();
+}
+void Node::stop() {
+  implementation_->stop();
+}
+void Node::post(std::function<void()> work) {
+  asio::post(implementation_->io(), std::move(work));
+}
+void Node::every(std::chrono::nanoseconds period, std::function<void()> work) {
+  implementation_->every(period, std::move(work));
+}
+const NodeIdentity& Node::identity() const {
+  return implementation_->identity();
+}
+std::vector<std::string> Node::listen_urls() const {
+  return implementation_->listen_urls();
+}
+const std::string& Node::service_state_nonce() const {
+  return implementation_->nonce();
+}
+void Node::on_services_changed(std::function<void()> handler) {
+  implementation_->on_services_changed(std::move(handler));
+}
+asio::io_context& Node::io_context() {
+  return implementation_->io();
+}
+std::size_t Node::client_count() const {
+  return implementation_->client_count();
+}
+
+}  // namespace rr

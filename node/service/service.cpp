@@ -1,0 +1,362 @@
+#include "node/service/service.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <sstream>
+
+#include "core/session/service_path.hpp"
+#include "node/service/refusal.hpp"
+
+namespace rr {
+
+namespace {
+
+/// Kinds whose members need no handler yet: calls of them are answered with NotImplementedError.
+bool may_be_absent(const MemberDefinition& member) {
+  return member.kind != MemberKind::function && member.kind != MemberKind::property &&
+         member.kind != MemberKind::objref;
+}
+
+/// What one step of a generator carries; void for any other type.
+TypeDefinition step_type(TypeDefinition type) {
+  if (type.container != ContainerKind::generator) return {};
+  type.container = ContainerKind::none;
+  return type;
+}
+
+bool is_indexed(const MemberDefinition& objref) {
+  return objref.type.container != ContainerKind::none || objref.type.array != ArrayKind::none;
+}
+
+bool is_kind_of(const TypeRegistry& types, const std::string& type, const std::string& wanted) {
+  if (type == wanted) return true;
+  const EntityDefinition* entity = types.find_entity(type);
+  return entity && std::any_of(entity->implements.begin(), entity->implements.end(),
+                               [&](const ImplementsDefinition& base) { return base.qualified_name == wanted; });
+}
+
+bool may_stand_behind(const TypeRegistry& types, const std::string& type, const MemberDefinition& objref) {
+  return objref.type.type == DataType::varobject_t || is_kind_of(types, type, objref.type.qualified_name);
+}
+
+std::string read_file(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  if (!file || !(text << file.rdbuf())) refuse("service definition " + quoted(path, 200) + " cannot be read");
+  return text.str();
+}
+
+void check_parameters(const std::string& where, const std::vector<HandlerType>& taken,
+                      const std::vector<ParameterDefinition>& parameters) {
+  if (taken.size() != parameters.size())
+    refuse(where + ": the handler takes " + std::to_string(taken.size()) + " parameters, the definition has " +
+           std::to_string(parameters.size()));
+  for (std::size_t i = 0; i < parameters.size(); ++i)
+    if (!accepts(taken[i], parameters[i].type))
+      refuse(where + ": parameter '" + parameters[i].name + "' is " + format_type(parameters[i].type) +
+             ", the handler takes " + handler_type_text(taken[i]));
+}
+
+void check_result(const std::string& where, const HandlerType& result, const TypeDefinition& type) {
+  if (!returns(result, type))
+    refuse(where + ": is " + format_type(type) + ", the handler returns " + handler_type_text(result));
+}
+
+}  // namespace
+
+// --- Object: what the device says ---
+
+const MemberDefinition& Object::require_member(std::string_view name, MemberKind kind) const {
+  const MemberDefinition* member = type_->find_member(name);
+  if (!member) refuse(type_name() + " has no member " + quoted(name));
+  if (member->kind != kind)
+    refuse(type_name() + "." + member->name + " is a " + std::string(member_kind_name(member->kind)) + ", not a " +
+           std::string(member_kind_name(kind)));
+  return *member;
+}
+
+void Object::set_handler(std::string_view name, HandlerSlot slot, Handler handler) {
+  const auto kind = slot == HandlerSlot::call            ? MemberKind::function
+                    : slot == HandlerSlot::wire_received ? MemberKind::wire
+                                                         : MemberKind::property;
+  const MemberDefinition& member = require_member(name, kind);
+  const std::string where = type_name() + "." + member.name;
+  const MemberDirection direction = member.direction();
+  Member& mine = members_[&member];
+  switch (slot) {
+    case HandlerSlot::call:
+      if (member.is_generator()) refuse(where + " is a generator function: it takes a handler of generator()");
+      check_parameters(where, handler.parameters, member.parameters);
+      check_result(where, handler.result, member.type);
+      mine.call = std::move(handler);
+      break;
+    case HandlerSlot::get:
+      if (direction == MemberDirection::writeonly) refuse(where + " is writeonly: it takes no get handler");
+      check_parameters(where + " (get)", handler.parameters, {});
+      check_result(where, handler.result, member.type);
+      mine.get = std::move(handler);
+      break;
+    case HandlerSlot::set:
+      if (direction == MemberDirection::readonly) refuse(where + " is readonly: it takes no set handler");
+      check_parameters(where + " (set)", handler.parameters, {{"value", member.type}});
+      mine.set = std::move(handler);
+      break;
+    case HandlerSlot::wire_received:
+      if (direction == MemberDirection::readonly) refuse(where + " is readonly: clients send nothing on it");
+      check_parameters(where, handler.parameters, {{"value", member.type}});
+      mine.wire_received = std::move(handler);
+      break;
+  }
+}
+
+void Object::set_generator(std::string_view name, GeneratorHandler handler) {
+  const MemberDefinition& member = require_member(name, MemberKind::function);
+  const std::string where = type_name() + "." + member.name;
+  if (!member.is_generator()) refuse(where + " is no generator function: it takes a handler of function()");
+  auto parameters = member.parameters;
+  std::vector<ParameterDefinition> step_parameters;
+  if (!parameters.empty() && parameters.back().type.container == ContainerKind::generator) {
+    step_parameters = {{parameters.back().name, step_type(parameters.back().type)}};
+    parameters.pop_back();
+  }
+  check_parameters(where, handler.parameters, parameters);
+  if (!handler.checks_itself) {
+    check_parameters(where + ", each step", handler.step_parameters, step_parameters);
+    check_result(where + ", each step", handler.value, step_type(member.type));
+  }
+  members_[&member].generator = std::move(handler);
+}
+
+void Object::check_arguments(const MemberDefinition& member, const char* verb, std::span<const Value> arguments) const {
+  if (arguments.size() != member.parameters.size())
+    refuse(type_name() + "." + member.name + ": " + verb + " with " + std::to_string(arguments.size()) +
+           " arguments, the definition has " + std::to_string(member.parameters.size()));
+  for (std::size_t i = 0; i < arguments.size(); ++i)
+    check_value(type_name() + "." + member.name + ", argument '" + member.parameters[i].name + "'", arguments[i],
+                member.parameters[i].type, *service_.types_);
+}
+
+void Object::fire_values(std::string_view event, std::span<const Value> arguments) {
+  const MemberDefinition& member = require_member(event, MemberKind::event);
+  check_arguments(member, "fired", arguments);
+  if (!service_.host_) return;
+  for (const std::string& path : paths()) service_.host_->send_event(service_, path, member, arguments);
+}
+
+void Object::call_callback(ClientId client, std::string_view callback, const std::vector<Value>& arguments,
+                           CallbackDone done) {
+  const MemberDefinition& member = require_member(callback, MemberKind::callback);
+  check_arguments(member, "called", arguments);
+  if (!service_.host_) refuse(type_name() + "." + member.name + ": the service is in no node");
+  const auto known_as = paths();
+  service_.host_->call_callback(service_, client, known_as.empty() ? service_.name_ : known_as.front(), member,
+                                arguments, std::move(done));
+}
+
+void Object::set_wire(std::string_view wire, Value value) {
+  const MemberDefinition& member = require_member(wire, MemberKind::wire);
+  if (member.direction() == MemberDirection::writeonly)
+    refuse(type_name() + "." + member.name + " is writeonly: the service sends nothing on it");
+  check_value(type_name() + "." + member.name, value, member.type, *service_.types_);
+  auto& in_value = members_[&member].in_value;
+  in_value = std::make_shared<const Value>(std::move(value));
+  if (!service_.host_) return;
+  for (const std::string& path : paths()) service_.host_->send_wire(service_, path, member, in_value);
+}
+
+void Object::objref(std::string_view name, std::shared_ptr<Object> child) {
+  const MemberDefinition& member = require_member(name, MemberKind::objref);
+  const std::string where = type_name() + "." + member.name;
+  if (is_indexed(member)) refuse(where + " is indexed: it takes a function that finds the object");
+  if (child && !may_stand_behind(*service_.types_, child->type_name(), member))
+    refuse(where + ": is " + format_type(member.type) + ", the object is " + child->type_name());
+  members_[&member].find = [child = std::move(child)](std::string_view) { return child; };
+  for (const std::string& path : paths()) release_path(child_path(path, member.name));
+}
+
+void Object::objref(std::string_view name, std::function<std::shared_ptr<Object>()> find) {
+  const MemberDefinition& member = require_member(name, MemberKind::objref);
+  if (is_indexed(member)) refuse(type_name() + "." + member.name + " is indexed: it takes a function of the index");
+  members_[&member].find = [find = std::move(find)](std::string_view) { return find(); };
+}
+
+void Object::objref(std::string_view name, std::function<std::shared_ptr<Object>(std::string_view index)> find) {
+  const MemberDefinition& member = require_member(name, MemberKind::objref);
+  if (!is_indexed(member)) refuse(type_name() + "." + member.name + " has no index: it takes an object");
+  members_[&member].find = std::move(find);
+}
+
+void Object::release(std::string_view name, std::string_view index) {
+  const MemberDefinition& member = require_member(name, MemberKind::objref);
+  for (const std::string& path : paths()) release_path(child_path(path, member.name, index));
+}
+
+std::vector<std::string> Object::paths() const {
+  if (!service_.hosted_) return {};
+  if (this == service_.root_.get()) return {service_.name_};
+  return service_.hosted_->paths_of(*this);
+}
+
+void Object::release_path(const std::string& path) {
+  if (service_.hosted_->forget_path(path) && service_.host_) service_.host_->release_path(service_, path);
+}
+
+std::vector<std::string> Object::missing_handlers() const {
+  std::vector<std::string> missing;
+  for (const MemberDefinition& member : type_->members) {
+    if (may_be_absent(member)) continue;
+    const auto found = members_.find(&member);
+    const Member* mine = found == members_.end() ? nullptr : &found->second;
+    const auto report = [&](bool is_there, std::string_view what) {
+      if (!is_there) missing.push_back(std::string(what) + " " + type_->name + "." + member.name);
+    };
+    const MemberDirection direction = member.direction();
+    if (member.kind == MemberKind::function)
+      report(mine && (member.is_generator() ? bool(mine->generator.open) : bool(mine->call.call)), "function");
+    if (member.kind == MemberKind::objref) report(mine && mine->find, "objref");
+    if (member.kind != MemberKind::property) continue;
+    if (direction != MemberDirection::writeonly) report(mine && mine->get.call, "get of property");
+    if (direction != MemberDirection::readonly) report(mine && mine->set.call, "set of property");
+  }
+  return missing;
+}
+
+// --- Object: what clients ask ---
+
+Result<std::shared_ptr<ServiceObject>> Object::find_child(const MemberDefinition& objref,
+                                                          const std::optional<std::string>& index) {
+  const auto found = members_.find(&objref);
+  if (found == members_.end() || !found->second.find)
+    return make_error(ErrorCode::not_implemented_error, "objref '" + objref.name + "' has no handler");
+  std::shared_ptr<Object> child;
+  try {
+    child = found->second.find(index ? std::string_view(*index) : std::string_view{});
+  } catch (const Exception& exception) {
+    return exception.error();
+  } catch (const std::exception& exception) {
+    return make_error(ErrorCode::object_not_found, exception.what());
+  }
+  if (child && !may_stand_behind(*service_.types_, child->type_name(), objref))
+    return make_error(ErrorCode::internal_error, "objref '" + objref.name + "' is " + format_type(objref.type) +
+                                                     ", the service gave a " + child->type_name());
+  return std::shared_ptr<ServiceObject>(std::move(child));
+}
+
+Result<Value> Object::answer(const Called& called) {
+  const auto missing = [&](std::string_view what) {
+    return make_error(ErrorCode::not_implemented_error,
+                      std::string(what) + " '" + called.member->name + "' has no handler");
+  };
+  const auto found = members_.find(called.member);
+  Member* mine = found == members_.end() ? nullptr : &found->second;
+  switch (called.kind) {
+    case CallKind::function:
+      return mine && mine->call.call ? mine->call.call(called.arguments) : missing("function");
+    case CallKind::property_get:
+      return mine && mine->get.call ? mine->get.call({}) : missing("get of property");
+    case CallKind::property_set:
+      return mine && mine->set.call ? mine->set.call(called.arguments) : missing("set of property");
+    case CallKind::peek_in:
+    case CallKind::peek_out: {
+      if (mine && called.kind == CallKind::peek_in && mine->in_value) return *mine->in_value;
+      if (mine && called.kind == CallKind::peek_out && mine->out_value) return *mine->out_value;
+      return make_error(ErrorCode::value_not_set, "wire '" + called.member->name + "' has no value yet");
+    }
+    case CallKind::poke_out: {
+      Member& wire = mine ? *mine : members_[called.member];
+      wire.out_value = called.arguments.front();
+      return wire.wire_received.call ? wire.wire_received.call(called.arguments) : Value{};
+    }
+    case CallKind::memory_dimensions:
+    case CallKind::memory_read:
+    case CallKind::memory_write:
+      return answer_memory(called);
+    case CallKind::generator_open:
+    case CallKind::generator_next:
+    case CallKind::generator_close:
+    case CallKind::generator_abort:
+      break;  // ServiceClient keeps generators and answers for them
+  }
+  return missing("member");
+}
+
+Result<Generator> Object::open_generator(const Called& called) {
+  const auto found = members_.find(called.member);
+  if (found != members_.end() && found->second.generator.open) return found->second.generator.open(called.arguments);
+  return make_error(ErrorCode::not_implemented_error, "generator '" + called.member->name + "' has no handler");
+}
+
+void Object::receive_wire(const WireReceived& received) {
+  Member& wire = members_[received.member];
+  wire.out_value = received.value;
+  if (wire.wire_received.call) (void)wire.wire_received.call({&received.value, 1});
+}
+
+const Value* Object::in_value(const MemberDefinition& wire) const {
+  const auto found = members_.find(&wire);
+  return found != members_.end() ? found->second.in_value.get() : nullptr;
+}
+
+// --- Service ---
+
+std::shared_ptr<Service> Service::from_text(const std::vector<std::string>& definitions, std::string name,
+                                            std::string root_type) {
+  const std::shared_ptr<Service> service(new Service);
+  service->name_ = std::move(name);
+  service->types_ = std::make_shared<TypeRegistry>();
+  if (auto added = service->types_->add(definitions, RobdefMode::strict); !added)
+    refuse("service " + quoted(service->name_) + ": " + added.error().message);
+  if (definitions.empty()) refuse("service " + quoted(service->name_) + " has no definition");
+  service->definition_ = parse_service_definition(definitions.back(), RobdefMode::strict).definition.name;
+  service->root_ = service->make_object(root_type);
+  return service;
+}
+
+std::shared_ptr<Service> Service::from_files(const std::vector<std::string>& paths, std::string name,
+                                             std::string root_type) {
+  std::vector<std::string> texts;
+  for (const std::string& path : paths) texts.push_back(read_file(path));
+  return from_text(texts, std::move(name), std::move(root_type));
+}
+
+std::shared_ptr<Object> Service::make_object(std::string_view type) {
+  std::string qualified(type);
+  if (qualified.find('.') == std::string::npos) qualified = definition_ + "." + qualified;
+  const EntityDefinition* entity = types_->find_entity(qualified);
+  if (!entity || entity->kind != EntityKind::object)
+    refuse("service " + quoted(name_) + ": there is no object type " + quoted(qualified));
+  std::shared_ptr<Object> object(new Object(*this, *entity));
+  std::erase_if(objects_, [](const std::weak_ptr<Object>& other) { return other.expired(); });
+  objects_.push_back(object);
+  return object;
+}
+
+void Service::set_attribute(std::string key, Value value) {
+  if (host_) refuse("service " + quoted(name_) + ": attributes are set before the service is added to a node");
+  std::erase_if(attributes_.items, [&](const auto& item) { return item.first == key; });
+  attributes_.items.emplace_back(std::move(key), std::move(value));
+}
+
+void Service::set_security(SecurityPolicy policy) {
+  if (host_) refuse("service " + quoted(name_) + ": security is set before the service is added to a node");
+  if (policy.require_valid_user && !policy.authenticator)
+    refuse("service " + quoted(name_) + " requires a user, but has no authenticator: nobody could log in");
+  security_ = std::move(policy);
+}
+
+std::shared_ptr<HostedService> Service::attach(ServiceHost& host) {
+  if (hosted_) refuse("service " + quoted(name_) + " was added to a node before");
+  std::string missing;
+  for (const std::weak_ptr<Object>& weak : objects_)
+    if (const auto object = weak.lock())
+      for (const std::string& handler : object->missing_handlers()) missing += (missing.empty() ? "" : ", ") + handler;
+  if (!missing.empty()) refuse("service " + quoted(name_) + ": no handler for " + missing);
+  auto hosted = HostedService::make(name_, root_, types_, attributes_);
+  if (!hosted) refuse("service " + quoted(name_) + ": " + hosted.error().message);
+  hosted_ = std::move(*hosted);
+  hosted_->set_policy(security_);
+  host_ = &host;
+  return hosted_;
+}
+
+}  // namespace rr

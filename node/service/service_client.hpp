@@ -1,0 +1,100 @@
+// One client of a node: its session, driven over its stream, and the way from its requests to handlers. Layer:
+// node/service.
+#pragma once
+
+#include <memory>
+#include <string_view>
+#include <unordered_map>
+
+#include "core/session/service/service_session.hpp"
+#include "node/driver/stream_driver.hpp"
+#include "node/service/service.hpp"
+
+namespace rr {
+
+class ServiceClient;
+
+/// What a client needs of its node.
+class ServiceClientOwner {
+ public:
+  virtual Service* find_service(const HostedService& hosted) = 0;
+  virtual void set_current_client(ClientId id) = 0;  ///< 0: no handler runs
+  /// A handler failed and no client waits for the answer.
+  virtual void report(const std::string& problem) = 0;
+  /// Has the login judged, away from the node's thread, and answers it with client.answer_login() unless that is gone.
+  virtual void judge_login(const LoginRequested& login, const std::shared_ptr<ServiceClient>& client) = 0;
+  virtual void locks_changed(const Service& service) = 0;
+  virtual void client_ended(ServiceClient& client) = 0;
+
+ protected:
+  ~ServiceClientOwner() = default;
+};
+
+class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSender {
+ public:
+  ServiceClient(ClientId id, ServiceClientOwner& owner, ServiceDirectory& directory, ServiceSessionOptions options,
+                std::unique_ptr<ByteStream> stream);
+
+  ClientId id() const { return id_; }
+  const ServiceSession& session() const { return session_; }
+  void handle_locks_changed();
+  void answer_login(LoginId id, Result<AuthenticatedUser> result);
+  /// Null while the client is in no service of ours.
+  Service* service() const { return service_; }
+  void send_event(const std::string& path, const MemberDefinition& event, std::span<const Value> arguments);
+  void send_wire(WirePacket& packet);
+  void release_path(const std::string& path);
+  void call_callback(const std::string& path, const MemberDefinition& callback, std::span<const Value> arguments,
+                     CallbackDone done);
+  /// Tells the client that its service ends, then closes.
+  void close_service();
+  /// The owner goes away: nothing is told to it or to handlers any more.
+  void abandon();
+
+ private:
+  bool handle_event(Now now) override;
+  void ended() override;
+
+  void handle(const Called& called, Now now);
+  Result<Value> answer_generator(const Called& called);
+  /// Tells a generator that nobody will ask it any more.
+  void abandon_generator(const Generator& generator);
+  void handle(const ClientConnected& connected, Now now);
+  void handle(const LoginRequested& login, Now now);
+  void handle(const LocksChanged& changed, Now now);
+  void handle(const WireConnected& connected, Now now);
+  void handle(const WireReceived& received, Now now);
+  void handle(const WireDisconnected&, Now) {}
+  void handle(const ObjectWanted&, Now) {}  // no service of ours is remote
+  void handle(const LockWanted&, Now) {}
+  void handle(const LeaveWanted&, Now) {}
+  void handle(const PipeConnected& connected, Now now);
+  void handle(const PipeReceived& received, Now now);
+  void handle(const PipeAcknowledged& acknowledged, Now now);
+  void handle(const PipeClosed& closed, Now now);
+  void handle(const GeneratorEnded& ended, Now now);
+  void handle(const CallbackCompleted& completed, Now now);
+  void handle(const ClientGone& gone, Now now);
+
+  // PipeSender: from endpoints
+  Result<std::uint32_t> send_pipe_packet(PipeId id, const Value& value, bool wants_ack) override;
+  void close_pipe(PipeId id) override;
+  std::size_t queued_bytes() const override { return session_.queued_bytes(); }
+  void end_pipe(PipeId id, bool tells_handler);
+  /// Runs a handler whose failure no client waits for.
+  template <class F>
+  void run_handler(const char* kind, const std::string& member, F&& handler);
+
+  ClientId id_;
+  ServiceClientOwner* owner_;
+  Service* service_ = nullptr;
+  std::unordered_map<PipeId, PipeEndpoint> pipes_;
+  std::unordered_map<GeneratorId, Generator> generators_;  ///< as many as the session allows
+  struct CalledCallback {
+    const MemberDefinition* member = nullptr;
+    CallbackDone done;
+  };
+  std::unordered_map<CallbackId, CalledCallback> callbacks_;
+};
+
+}  // namespace rr

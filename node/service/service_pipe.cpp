@@ -1,0 +1,61 @@
+// The pipes of a service's objects: handlers, endpoints, broadcasts. Layer: node/service.
+#include <algorithm>
+
+#include "node/service/refusal.hpp"
+#include "node/service/service.hpp"
+
+namespace rr {
+
+void Object::set_pipe_handler(std::string_view name, std::function<void(PipeEndpoint)> Member::*slot,
+                              std::function<void(PipeEndpoint)> handler) {
+  members_[&require_member(name, MemberKind::pipe)].*slot = std::move(handler);
+}
+
+void Object::set_packet_handler(std::string_view name, HandlerType packet, PacketHandler handler) {
+  const MemberDefinition& member = require_member(name, MemberKind::pipe);
+  const std::string where = type_name() + "." + member.name;
+  if (member.direction() == MemberDirection::readonly) refuse(where + " is readonly: clients send nothing on it");
+  if (!accepts(packet, member.type))
+    refuse(where + ": packets are " + format_type(member.type) + ", the handler takes " + handler_type_text(packet));
+  members_[&member].pipe_received = std::move(handler);
+}
+
+std::size_t Object::broadcast(std::string_view pipe, const Value& value, std::int32_t max_backlog) {
+  const MemberDefinition& member = require_member(pipe, MemberKind::pipe);
+  if (member.direction() == MemberDirection::writeonly)
+    refuse(type_name() + "." + member.name + " is writeonly: the service sends nothing on it");
+  check_value(type_name() + "." + member.name, value, member.type, *service_.types_);
+  const auto found = members_.find(&member);
+  if (found == members_.end()) return 0;
+  // Endpoints that are lost while they are sent to leave the list meanwhile.
+  const auto endpoints = found->second.endpoints;
+  return static_cast<std::size_t>(std::count_if(endpoints.begin(), endpoints.end(), [&](const PipeEndpoint& endpoint) {
+    return endpoint.broadcast(value, max_backlog);
+  }));
+}
+
+const std::vector<PipeEndpoint>& Object::endpoints(std::string_view pipe) {
+  return members_[&require_member(pipe, MemberKind::pipe)].endpoints;
+}
+
+// --- what clients do ---
+
+void Object::connect_pipe(const MemberDefinition& pipe, const PipeEndpoint& endpoint) {
+  Member& mine = members_[&pipe];
+  if (mine.pipe_connected) mine.pipe_connected(endpoint);
+  if (endpoint.is_open()) mine.endpoints.push_back(endpoint);
+}
+
+Result<> Object::receive_packet(const MemberDefinition& pipe, const PipeEndpoint& endpoint, const Value& packet) {
+  const auto found = members_.find(&pipe);
+  if (found == members_.end() || !found->second.pipe_received) return {};
+  return found->second.pipe_received(endpoint, packet);
+}
+
+void Object::close_pipe(const MemberDefinition& pipe, const PipeEndpoint& endpoint, bool tells_handler) {
+  Member& mine = members_[&pipe];
+  const bool was_connected = std::erase(mine.endpoints, endpoint) > 0;
+  if (tells_handler && was_connected && mine.pipe_closed) mine.pipe_closed(endpoint);
+}
+
+}  // namespace rr

@@ -1,0 +1,119 @@
+#include "node/subscribe/service_subscription_filter.hpp"
+
+#include <algorithm>
+
+#include "core/support/glob.hpp"
+
+namespace rr {
+
+namespace {
+
+using Operation = ServiceSubscriptionFilterOperation;
+using Group = ServiceSubscriptionFilterAttributeGroup;
+
+/// std::regex recurses: what others wrote must not decide how deep.
+constexpr std::size_t max_matched_size = 1024;
+
+/// Of an attribute: key, empty where there is none, and text.
+using Texts = std::vector<std::pair<std::string, std::string>>;
+
+void add_text(Texts& to, const std::string& key, const Value& value) {
+  if (const auto text = value.to_text()) to.emplace_back(key, *text);
+}
+
+Texts texts_of(const MapString& attributes, std::string_view name) {
+  Texts out;
+  for (const auto& [key, value] : attributes.items) {
+    if (key != name) continue;
+    if (const auto* list = value.get_if<List>())
+      for (const auto& item : list->items) add_text(out, {}, item);
+    else if (const auto* numbered = value.get_if<MapInt32>())
+      for (const auto& [number, item] : numbered->items) add_text(out, {}, item);
+    else if (const auto* named = value.get_if<MapString>())
+      for (const auto& [item_key, item] : named->items) add_text(out, item_key, item);
+    else
+      add_text(out, {}, value);
+  }
+  return out;
+}
+
+Texts split(const Texts& texts, char at) {
+  if (at == 0) return texts;
+  Texts out;
+  for (const auto& [key, text] : texts) {
+    std::size_t begin = 0;
+    for (auto end = text.find(at); end != std::string::npos; begin = end + 1, end = text.find(at, begin))
+      out.emplace_back(key, text.substr(begin, end - begin));
+    out.emplace_back(key, text.substr(begin));
+  }
+  return out;
+}
+
+bool matches(const ServiceSubscriptionFilterAttribute& wanted, const std::string& key, const std::string& text) {
+  if (!wanted.name.empty() && wanted.name != key) return false;
+  if (const auto* exactly = std::get_if<std::string>(&wanted.text)) return text == *exactly;
+  return text.size() <= max_matched_size && std::regex_match(text, std::get<std::regex>(wanted.text));
+}
+
+/// Over any number of conditions; true where there is none.
+class Combined {
+ public:
+  explicit Combined(Operation operation) : operation_(operation) {}
+  void add(bool holds) {
+    is_empty_ = false;
+    any_ = any_ || holds;
+    all_ = all_ && holds;
+  }
+  bool result() const {
+    if (is_empty_) return true;
+    switch (operation_) {
+      case Operation::or_of:
+        return any_;
+      case Operation::and_of:
+        return all_;
+      case Operation::nor_of:
+        return !any_;
+      case Operation::nand_of:
+        return !all_;
+    }
+    return false;
+  }
+
+ private:
+  Operation operation_;
+  bool is_empty_ = true;
+  bool any_ = false;
+  bool all_ = true;
+};
+
+bool holds(const Group& group, const Texts& all_texts) {
+  const auto texts = split(all_texts, group.split_at);
+  Combined combined(group.operation);
+  for (const auto& wanted : group.attributes)
+    combined.add(std::any_of(texts.begin(), texts.end(),
+                             [&](const auto& each) { return matches(wanted, each.first, each.second); }));
+  for (const auto& inner : group.groups) combined.add(holds(inner, all_texts));
+  return combined.result();
+}
+
+}  // namespace
+
+const ServiceSubscriptionFilterNode* ServiceSubscriptionFilter::find_node(const NodeIdentity& node) const {
+  const auto found = std::find_if(nodes.begin(), nodes.end(), [&](const ServiceSubscriptionFilterNode& each) {
+    return (each.node_id.is_any() || each.node_id == node.id) &&
+           (each.node_name.empty() || glob_matches(each.node_name, node.name));
+  });
+  return found == nodes.end() ? nullptr : &*found;
+}
+
+bool ServiceSubscriptionFilter::takes(const ServiceInfo& service) const {
+  if (!takes_node(service.node)) return false;
+  if (!service_names.empty() &&
+      std::find(service_names.begin(), service_names.end(), service.name) == service_names.end())
+    return false;
+  Combined combined(attributes_operation);
+  for (const auto& [name, group] : attributes) combined.add(holds(group, texts_of(service.attributes, name)));
+  return combined.result() && (!predicate || predicate(service));
+}
+
+}  // namespace rr

@@ -1,0 +1,18 @@
+// SHA-256 and random bytes. Layer: node/tls.
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+#include "core/support/bytes.hpp"
+
+namespace rr {
+
+/// 32 bytes.
+Bytes sha256(ByteSpan bytes);
+/// For secrets. Throws   std::runtime_error: the system has none to give.
+Bytes random_bytes(std::size_t count);
+/// Takes the same time whatever differs; texts of different length are no secret.
+bool equal_secrets(ByteSpan left, ByteSpan right);
+
+}  // namespace rr

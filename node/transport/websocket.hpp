@@ -1,0 +1,46 @@
+// A WebSocket as a byte stream. Layer: node/transport. Source: transports spec section 4.5.
+#pragma once
+
+#include <boost/asio/steady_timer.hpp>
+#include <memory>
+
+#include "node/transport/byte_stream.hpp"
+#include "node/transport/watchdog.hpp"
+#include "node/transport/websocket_frames.hpp"
+
+namespace rr {
+
+/// Native Robot Raconteur peers drop a connection at any ping, pong, close or empty frame. So none is sent, except a
+/// pong or close that answers the peer's own, and a close with a reason to a peer that is known to take it.
+class WebSocketStream final : public ByteStream {
+ public:
+  /// `inner` has just carried the 101 response. `role` is ours. `takes_close`: the peer is a browser or another full
+  /// WebSocket client.
+  WebSocketStream(std::unique_ptr<ByteStream> inner, WebSocketRole role, bool takes_close);
+
+  awaitable<ReadResult> read_some(std::span<std::uint8_t> into) override;
+  awaitable<error_code> write(std::span<const ByteSpan> slices) override;
+  /// WebSockets have no half-closed state: does nothing, end() follows.
+  void finish_sending() override {}
+  void cancel() override { inner_->cancel(); }
+  awaitable<void> end(const EndReason& reason) override;
+  void close() override { inner_->close(); }
+  std::string peer() const override { return inner_->peer(); }
+  boost::asio::any_io_executor executor() override { return inner_->executor(); }
+
+ private:
+  awaitable<error_code> write_raw(std::span<const ByteSpan> slices);
+
+  std::unique_ptr<ByteStream> inner_;
+  WebSocketRole role_;
+  WebSocketDecoder decoder_;
+  FrameSplitter splitter_;
+  Deadline close_limit_;
+  bool takes_close_;
+  std::optional<EndReason> violation_;  ///< what the peer did against RFC 6455
+  bool is_writing_ = false;
+  bool is_broken_ = false;             ///< a write ended in the middle of a frame: nothing more can be sent
+  boost::asio::steady_timer written_;  ///< cancelled when a write ends
+};
+
+}  // namespace rr

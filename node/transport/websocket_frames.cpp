@@ -1,0 +1,236 @@
+#include "node/transport/websocket_frames.hpp"
+
+#include <algorithm>
+#include <boost/beast/core/detail/base64.hpp>
+#include <boost/uuid/detail/sha1.hpp>
+#include <cstring>
+
+#include "core/support/random.hpp"
+
+namespace rr {
+
+namespace {
+
+bool is_control(WebSocketOpcode opcode) {
+  return static_cast<std::uint8_t>(opcode) >= 8;
+}
+
+/// Length of a whole header by its first two bytes.
+std::size_t header_length(std::uint8_t second) {
+  const std::uint8_t length = second & 0x7f;
+  return 2u + (length == 126 ? 2u : length == 127 ? 8u : 0u) + ((second & 0x80) != 0 ? 4u : 0u);
+}
+
+/// Unpredictable, so that no page chooses the bytes that a proxy sees (RFC 6455, 10.3).
+WebSocketMask make_mask() {
+  WebSocketMask mask;
+  const auto random = random_u32();
+  std::memcpy(mask.data(), &random, sizeof(random));
+  return mask;
+}
+
+/// Codes that may stand in a close frame (RFC 6455, 7.4).
+bool is_sendable_code(std::uint16_t code) {
+  return (code >= 1000 && code <= 1014 && code != 1004 && code != 1005 && code != 1006) ||
+         (code >= 3000 && code <= 4999);
+}
+
+}  // namespace
+
+Error WebSocketDecoder::fail(std::uint16_t code, std::string what) {
+  close_code_ = code;
+  return protocol_error("WebSocket: " + std::move(what));
+}
+
+Result<std::size_t> WebSocketDecoder::decode(std::span<std::uint8_t> bytes) {
+  std::size_t out = 0;
+  std::size_t in = 0;
+  while (in < bytes.size() && !close_) {
+    if (!in_payload_) {
+      header_[header_size_++] = bytes[in++];
+      if (header_size_ < 2 || header_size_ < header_length(header_[1])) continue;
+      if (auto begun = begin_frame(); !begun) return begun.error();
+      if (left_ == 0 && is_control(opcode_)) end_control();
+      continue;
+    }
+    const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(left_, bytes.size() - in));
+    if (is_control(opcode_)) {
+      const auto before = control_.size();
+      control_.resize(before + count);
+      unmask(bytes.data() + in, control_.data() + before, count, mask_, mask_index_);
+    } else {
+      unmask(bytes.data() + in, bytes.data() + out, count, mask_, mask_index_);
+      out += count;
+    }
+    mask_index_ = (mask_index_ + count) % 4;
+    in += count;
+    left_ -= count;
+    if (left_ != 0) continue;
+    in_payload_ = false;
+    if (is_control(opcode_)) end_control();
+  }
+  return out;
+}
+
+Result<> WebSocketDecoder::begin_frame() {
+  header_size_ = 0;
+  const bool is_final = (header_[0] & 0x80) != 0;
+  if ((header_[0] & 0x70) != 0) return fail(1002, "reserved bits are set, but no extension was agreed on");
+  opcode_ = static_cast<WebSocketOpcode>(header_[0] & 0x0f);
+  switch (opcode_) {
+    case WebSocketOpcode::continuation:
+    case WebSocketOpcode::binary:
+    case WebSocketOpcode::close:
+    case WebSocketOpcode::ping:
+    case WebSocketOpcode::pong:
+      break;
+    case WebSocketOpcode::text:
+      return fail(1003, "text frame; expected binary frames");
+    default:
+      return fail(1002, "opcode " + std::to_string(header_[0] & 0x0f) + " is reserved");
+  }
+  const bool is_masked = (header_[1] & 0x80) != 0;
+  if (!is_masked && role_ == WebSocketRole::server) return fail(1002, "frame of a client without mask");
+  std::size_t at = 0;
+  left_ = read_frame_length(header_, at);
+  if (left_ > INT64_MAX) return fail(1002, "frame length with its highest bit set");
+  if (is_control(opcode_)) {
+    if (!is_final || left_ > 125) return fail(1002, "control frame that is fragmented or longer than 125 bytes");
+    control_.clear();
+  }
+  mask_ = {};
+  if (is_masked) std::memcpy(mask_.data(), header_.data() + at, 4);
+  mask_index_ = 0;
+  in_payload_ = left_ != 0;
+  return {};
+}
+
+void WebSocketDecoder::end_control() {
+  has_seen_control_ = true;
+  if (opcode_ == WebSocketOpcode::ping) ping_ = control_;
+  if (opcode_ != WebSocketOpcode::close) return;
+  close_.emplace();
+  if (control_.size() < 2) return;
+  close_->code = static_cast<std::uint16_t>(control_[0] << 8 | control_[1]);
+  close_->reason = std::string(as_text(ByteSpan(control_).subspan(2)));
+}
+
+std::optional<Bytes> WebSocketDecoder::take_ping() {
+  auto out = std::move(ping_);
+  ping_.reset();
+  return out;
+}
+
+void unmask(const std::uint8_t* from, std::uint8_t* to, std::size_t count, const WebSocketMask& mask,
+            std::size_t index) {
+  std::uint8_t rotated[8];
+  for (std::size_t i = 0; i < 8; ++i) rotated[i] = mask[(index + i) % 4];
+  std::uint64_t word_mask;
+  std::memcpy(&word_mask, rotated, 8);
+  std::size_t i = 0;
+  for (; i + 8 <= count; i += 8) {  // each word is read before its place is written: `to` <= `from` is safe
+    std::uint64_t word;
+    std::memcpy(&word, from + i, 8);
+    word ^= word_mask;
+    std::memcpy(to + i, &word, 8);
+  }
+  for (; i < count; ++i) to[i] = static_cast<std::uint8_t>(from[i] ^ rotated[i % 8]);
+}
+
+std::uint64_t read_frame_length(ByteSpan header, std::size_t& at) {
+  at = 2;
+  const std::uint8_t brief = header[1] & 0x7f;
+  if (brief < 126) return brief;
+  std::uint64_t length = 0;
+  for (const std::size_t end = brief == 126 ? 4 : 10; at < end; ++at) length = length << 8 | header[at];
+  return length;
+}
+
+FrameHeader make_frame_header(WebSocketOpcode opcode, std::size_t payload, const WebSocketMask* mask) {
+  FrameHeader header{};
+  const std::uint8_t mask_bit = mask ? 0x80 : 0;
+  const auto add = [&](std::size_t byte) { header.bytes[header.size++] = static_cast<std::uint8_t>(byte); };
+  add(0x80u | static_cast<std::uint8_t>(opcode));
+  if (payload < 126) {
+    add(mask_bit | payload);
+  } else {
+    add(mask_bit | 126u);
+    add(payload >> 8);
+    add(payload);
+  }
+  if (mask)
+    for (const auto byte : *mask) add(byte);
+  return header;
+}
+
+Bytes make_control_frame(WebSocketRole role, WebSocketOpcode opcode, ByteSpan payload) {
+  const auto kept = payload.first(std::min<std::size_t>(payload.size(), 125));
+  const auto mask = role == WebSocketRole::client ? make_mask() : WebSocketMask{};
+  const auto header = make_frame_header(opcode, kept.size(), role == WebSocketRole::client ? &mask : nullptr);
+  Bytes out(header.size + kept.size());
+  std::copy_n(header.bytes.begin(), header.size, out.begin());
+  unmask(kept.data(), out.data() + header.size, kept.size(), mask, 0);
+  return out;
+}
+
+Bytes make_close_frame(WebSocketRole role, std::uint16_t code, std::string_view reason) {
+  if (!is_sendable_code(code)) return make_control_frame(role, WebSocketOpcode::close, {});
+  if (reason.size() > 123) {
+    std::size_t end = 123;
+    while (end > 0 && (static_cast<unsigned char>(reason[end]) & 0xc0) == 0x80) --end;
+    reason = reason.substr(0, end);
+  }
+  Bytes payload{static_cast<std::uint8_t>(code >> 8), static_cast<std::uint8_t>(code)};
+  payload.insert(payload.end(), reason.begin(), reason.end());
+  return make_control_frame(role, WebSocketOpcode::close, payload);
+}
+
+std::span<const ByteSpan> FrameSplitter::split(std::span<const ByteSpan> payload) {
+  std::size_t left = 0;
+  for (const auto& slice : payload) left += slice.size();
+  headers_.clear();
+  slices_.clear();
+  headers_.reserve(left / max_frame_payload + 1);  // slices_ points into it
+  const bool is_masked = role_ == WebSocketRole::client;
+  masked_.resize(is_masked ? left : 0);  // and into this
+  std::size_t at = 0;                    // of masked_
+  WebSocketMask mask{};
+  std::size_t frame = 0;  // payload of the current frame
+  std::size_t room = 0;   // what is still free of it
+  for (auto slice : payload) {
+    while (!slice.empty()) {
+      if (room == 0) {
+        frame = room = std::min(left, max_frame_payload);
+        if (is_masked) mask = make_mask();
+        headers_.push_back(make_frame_header(WebSocketOpcode::binary, frame, is_masked ? &mask : nullptr));
+        slices_.push_back(headers_.back().span());
+      }
+      auto part = slice.first(std::min(slice.size(), room));
+      slice = slice.subspan(part.size());
+      if (is_masked) {
+        unmask(part.data(), masked_.data() + at, part.size(), mask, (frame - room) % 4);
+        part = ByteSpan(masked_).subspan(at, part.size());
+        at += part.size();
+      }
+      slices_.push_back(part);
+      room -= part.size();
+      left -= part.size();
+    }
+  }
+  return slices_;
+}
+
+std::string websocket_accept(std::string_view key) {
+  const std::string text = std::string(key) + "258EAFA5-E914-47DA-95CA-C5AB0DC85B11";
+  boost::uuids::detail::sha1 hash;
+  hash.process_bytes(text.data(), text.size());
+  unsigned int words[5];
+  hash.get_digest(words);
+  std::uint8_t digest[20];
+  for (std::size_t i = 0; i < 20; ++i) digest[i] = static_cast<std::uint8_t>(words[i / 4] >> (24 - 8 * (i % 4)));
+  std::string out(boost::beast::detail::base64::encoded_size(sizeof(digest)), '\0');
+  out.resize(boost::beast::detail::base64::encode(out.data(), digest, sizeof(digest)));
+  return out;
+}
+
+}  // namespace rr

@@ -1,0 +1,51 @@
+#include "server/config/tls_files.hpp"
+
+#include "node/platform/file_look.hpp"
+#include "node/tls/certificate_files.hpp"
+#include "node/tls/client_certificates.hpp"
+#include "server/log/log.hpp"
+
+namespace rrgate {
+
+rr::TlsTrust TlsFiles::trust() const {
+  if (device_.ca.empty()) return rr::default_trust();
+  rr::TlsTrust trust;
+  trust.files = device_.ca;
+  return trust;
+}
+
+TlsFiles::Looks TlsFiles::look() const {
+  Looks looks;
+  const auto add = [&looks](const std::string& file) { looks[file] = rr::file_look(file); };
+  for (const auto& certificate : certificates_) {
+    add(certificate.certificate_file);
+    add(certificate.key_file);
+  }
+  for (const auto& file : client_ca_) add(file);
+  if (!certificates_.empty()) return looks;
+  const auto trusted = trust();
+  for (const auto* files : {&trusted.files, &trusted.directories, &trusted.published_roots})
+    for (const auto& file : *files) add(file);
+  return looks;
+}
+
+rr::Result<> TlsFiles::load() {
+  seen_ = look();  // before reading: what changes meanwhile is seen at the next look
+  rr::NodeTlsOptions device;
+  device.trust = trust();
+  auto made = certificates_.empty() ? rr::make_node_tls(device) : rr::make_web_tls(certificates_, client_ca_);
+  if (!made) return made.error();
+  context_ = std::move(*made);
+  return {};
+}
+
+bool TlsFiles::reload() {
+  const auto loaded = load();
+  if (loaded)
+    log(LogLevel::info, "TLS files read anew", {{"files", seen_.size()}});
+  else
+    log(LogLevel::error, "TLS files can't be used; those from before stay in use", {{"error", loaded.error().message}});
+  return loaded.has_value();
+}
+
+}  // namespace rrgate

@@ -1,0 +1,46 @@
+// A TLS context that follows its files. Layer: server/config.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "node/tls/tls_context.hpp"
+#include "server/config/config.hpp"
+
+namespace rrgate {
+
+/// Certificates are renewed while the gateway runs: a new context is made when a file changes, and new connections use
+/// it. Files that can't be used change nothing.
+class TlsFiles {
+ public:
+  /// For HTTPS.
+  /// `client_ca`  PEM files of the CAs whose certificates clients may show; empty: they are not asked.
+  explicit TlsFiles(std::vector<rr::WebCertificate> certificates, std::vector<std::string> client_ca = {})
+      : certificates_(std::move(certificates)), client_ca_(std::move(client_ca)) {}
+  /// For connections to a device. Without CAs: default_trust().
+  explicit TlsFiles(DeviceTls device) : device_(std::move(device)) {}
+
+  /// Errors   those of make_web_tls() and make_node_tls(); then context() stays as it was.
+  [[nodiscard]] rr::Result<> load();
+  /// Whether a file is another one than at the last load().
+  bool has_changed() const { return look() != seen_; }
+  /// load(), and a line in the log about how it went. Returns whether it went well.
+  bool reload();
+
+  const rr::TlsContextPtr& context() const { return context_; }
+
+ private:
+  /// Of each file what tells that it was changed or replaced.
+  using Looks = std::map<std::string, std::string>;
+  rr::TlsTrust trust() const;
+  Looks look() const;
+
+  std::vector<rr::WebCertificate> certificates_;
+  std::vector<std::string> client_ca_;
+  DeviceTls device_;
+  Looks seen_;
+  rr::TlsContextPtr context_;
+};
+
+}  // namespace rrgate

@@ -1,0 +1,161 @@
+#include "server/front/front_door.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "node/transport/tls.hpp"
+#include "node/transport/watchdog.hpp"
+#include "server/front/http_client.hpp"
+#include "server/front/native_client.hpp"
+#include "server/front/proxy_protocol.hpp"
+#include "server/log/log.hpp"
+#include "server/state/gateway_state.hpp"
+
+namespace rrgate {
+
+Protocol detect_protocol(rr::ByteSpan first_bytes) {
+  constexpr std::string_view magic = "RRAC";
+  constexpr std::uint8_t tls_handshake = 0x16;
+  const auto text = rr::as_text(first_bytes.first(std::min<std::size_t>(first_bytes.size(), 4)));
+  if (text.empty()) return Protocol::undecided;
+  if (text == magic.substr(0, text.size())) return text.size() == 4 ? Protocol::robot_raconteur : Protocol::undecided;
+  if (first_bytes[0] == tls_handshake) return Protocol::tls;
+  // A method: capital letters, then a space ("GET ") or more letters ("POST", "OPTI").
+  const auto space = text.find(' ');
+  const auto letters = text.substr(0, space);
+  const bool is_method = std::all_of(letters.begin(), letters.end(), [](char c) { return c >= 'A' && c <= 'Z'; });
+  if (!is_method || (space != std::string_view::npos && space < 3)) return Protocol::unknown;
+  return text.size() == 4 ? Protocol::http : Protocol::undecided;
+}
+
+namespace {
+
+/// Reads what a proxy begins a connection with. Returns false where that is nothing that can be used.
+rr::awaitable<bool> take_proxy_header(GatewayState& gateway, rr::ByteStream& stream, Connection& connection) {
+  rr::Deadline limit(stream.executor(), [&stream] { stream.close(); });
+  limit.arm(gateway.config().limits.header_timeout);
+  std::array<std::uint8_t, largest_proxy_header> first{};
+  std::size_t size = 0;
+  for (;;) {
+    const auto read = co_await stream.read_some(std::span(first).subspan(size));
+    if (read.error || read.is_end()) co_return false;
+    size += read.bytes;
+    const auto header = parse_proxy_header({first.data(), size});
+    if (!header) {
+      gateway.reject(Rejection::proxy_header);
+      log(LogLevel::warning, "connection of a trusted proxy closed",
+          {{"peer", connection.client}, {"error", header.error().message}});
+      co_return false;
+    }
+    if (header->size == 0) continue;
+    stream.put_back({first.data() + header->size, size - header->size});
+    if (!header->client) co_return true;
+    connection.peer.endpoint = *header->client;
+    connection.client = Connection::describe(connection.peer);
+    if (connection.ticket.pass_to(header->client->address())) co_return true;
+    gateway.reject(Rejection::too_many);
+    log(LogLevel::warning, "connection refused: too many", {{"peer", connection.client}});
+    co_return false;
+  }
+}
+
+/// Reads until the first bytes tell the protocol, and puts them back. Undecided: the connection ended before.
+rr::awaitable<Protocol> look_at_first_bytes(rr::ByteStream& stream, const std::string& client,
+                                            std::chrono::milliseconds patience) {
+  rr::Deadline limit(stream.executor(), [&stream] { stream.close(); });
+  limit.arm(patience);
+  std::array<std::uint8_t, 4096> first{};
+  std::size_t size = 0;
+  auto protocol = Protocol::undecided;
+  while (protocol == Protocol::undecided) {
+    const auto read = co_await stream.read_some(std::span(first).subspan(size));
+    if (read.error || read.is_end()) {
+      if (size > 0 || !limit.is_armed())
+        log(LogLevel::debug, "connection ended before its first bytes told the protocol", {{"peer", client}});
+      co_return Protocol::undecided;
+    }
+    size += read.bytes;
+    protocol = detect_protocol({first.data(), size});
+  }
+  if (protocol == Protocol::unknown)
+    log(LogLevel::info, "connection closed: neither Robot Raconteur nor HTTP",
+        {{"peer", client}, {"found", rr::as_text({first.data(), std::min<std::size_t>(size, 16)})}});
+  stream.put_back({first.data(), size});
+  co_return protocol;
+}
+
+/// The stream inside TLS; null where there is none.
+rr::awaitable<std::unique_ptr<rr::ByteStream>> accept_https(GatewayState& gateway, Connection& connection,
+                                                            std::unique_ptr<rr::ByteStream> stream) {
+  const auto context = gateway.tls();
+  if (!context) {
+    gateway.reject(Rejection::unknown_protocol);
+    log(LogLevel::info, "connection closed: TLS is not served here", {{"peer", connection.client}});
+    co_return nullptr;
+  }
+  const rr::TlsPeerOptions any_client;
+  auto tls = std::make_unique<rr::TlsStream>(std::move(stream), context, rr::TlsRole::server, any_client);
+  const auto done = co_await tls->handshake(gateway.config().limits.header_timeout);
+  if (!done) {
+    gateway.reject(Rejection::tls);
+    log(LogLevel::info, "connection closed", {{"error", done.error().message}});
+    co_return nullptr;
+  }
+  if (auto name = tls->client_name(); !name.empty()) {
+    connection.identity.name = std::move(name);
+    connection.identity.proof = Proof::certificate;
+  }
+  co_return tls;
+}
+
+}  // namespace
+
+rr::awaitable<void> serve_connection(GatewayState& gateway, std::unique_ptr<rr::ByteStream> stream,
+                                     boost::asio::ip::tcp::endpoint peer, boost::asio::ip::tcp::endpoint local,
+                                     Admission::Ticket ticket) {
+  rr::ByteStream* current = stream.get();
+  Connection connection(Peer{std::move(peer), false}, std::move(local), std::move(ticket));
+  connection.stop = [&current](const rr::EndReason&) { current->close(); };
+  gateway.add(connection);
+  const auto patience = gateway.config().limits.header_timeout;
+  const auto& proxy = gateway.config().proxy;
+  if (proxy.has_proxy_protocol && proxy.trust.trusts(connection.peer.endpoint.address()))
+    if (!co_await take_proxy_header(gateway, *stream, connection)) co_return;
+  auto protocol = co_await look_at_first_bytes(*stream, connection.client, patience);
+  if (protocol == Protocol::tls) {
+    // Closing what is below closes the TLS stream too, whose part it becomes: `current` holds through the handshake.
+    stream = co_await accept_https(gateway, connection, std::move(stream));
+    if (!stream) co_return;
+    current = stream.get();
+    connection.peer.is_encrypted = true;
+    protocol = co_await look_at_first_bytes(*stream, connection.client, patience);
+  }
+
+  connection.address = connection.peer.endpoint.address().to_string();
+  auto& identity = connection.identity;
+  identity.client = connection.client;
+  identity = identity.is_proven() ? gateway.access().with_grants(std::move(identity))
+                                  : gateway.access().anonymous(connection.client);
+  switch (protocol) {
+    case Protocol::robot_raconteur:
+      if (gateway.is_stopping()) break;
+      co_await serve_native_client(gateway, connection, std::move(stream));
+      break;
+    case Protocol::http:
+      co_await serve_http_client(gateway, connection, std::move(stream));
+      break;
+    case Protocol::unknown: {
+      gateway.reject(Rejection::unknown_protocol);
+      // The line that native nodes answer with.
+      const auto line = rr::as_bytes("HTTP/1.1 404 File Not Found\r\n");
+      const std::span<const rr::ByteSpan> slices(&line, 1);
+      co_await current->write(slices);
+      co_await current->end(rr::no_reason);
+      break;
+    }
+    default:
+      break;
+  }
+}
+
+}  // namespace rrgate

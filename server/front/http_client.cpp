@@ -1,0 +1,285 @@
+#include "server/front/http_client.hpp"
+
+#include "node/http/request_reader.hpp"
+#include "node/http/upgrade.hpp"
+#include "node/transport/websocket.hpp"
+#include "server/front/refused_client.hpp"
+#include "server/front/serve_shared_client.hpp"
+#include "server/http/response_writer.hpp"
+#include "server/log/log.hpp"
+#include "server/relay/client_relay.hpp"
+#include "server/socket/json_socket.hpp"
+#include "server/state/http_access.hpp"
+
+namespace rrgate {
+
+namespace {
+
+/// Of way_header: 25 gateways in a row.
+constexpr std::size_t longest_way = 1024;
+
+constexpr std::string_view devices_prefix = "/devices/";
+
+rr::awaitable<rr::error_code> write_text(rr::ByteStream& stream, std::string_view text) {
+  const auto slice = rr::as_bytes(text);
+  const std::span<const rr::ByteSpan> slices(&slice, 1);
+  co_return co_await stream.write(slices);
+}
+
+/// Refuses what is not a request, or not one that goes on.
+rr::awaitable<rr::error_code> write_refusal(rr::ByteStream& stream, const Response& response) {
+  const auto head = format_response_head(response, false, 1);
+  const rr::ByteSpan parts[] = {rr::as_bytes(head), response.body ? rr::as_bytes(*response.body) : rr::ByteSpan()};
+  const std::span<const rr::ByteSpan> slices(parts, 2);
+  co_return co_await stream.write(slices);
+}
+
+/// Where an upgrade leads: by path, or at "/" by the node that native clients put into the query.
+rr::Result<Destination> find_destination(GatewayState& gateway, const Request& request) {
+  const auto path = request.path();
+  const auto not_found = [](std::string text) {
+    return rr::make_error(rr::ErrorCode::node_not_found, std::move(text));
+  };
+  if (path.substr(0, devices_prefix.size()) == devices_prefix) {
+    auto name = path.substr(devices_prefix.size());
+    if (!name.empty() && name.back() == '/') name.remove_suffix(1);
+    auto* device = gateway.devices().find(name);
+    if (!device) return not_found("no device " + rr::quoted(name) + "; /api/v1/devices lists them");
+    return destination_of(gateway, *device);
+  }
+  if (path != "/") return not_found("no WebSocket at " + rr::quoted(path) + "; expected /devices/NAME or /");
+  rr::NodeId node_id;
+  if (const auto text = rr::query_value(request.query(), "nodeid")) {
+    auto parsed = rr::parse_node_id(*text);
+    if (!parsed) return parsed.error();
+    node_id = *parsed;
+  }
+  const auto node_name = rr::query_value(request.query(), "nodename").value_or("");
+  const auto destination = find_destination(gateway, node_id, node_name);
+  if (!destination) return not_found("no device is the node that the query names");
+  return *destination;
+}
+
+/// The URL of the node as the client knows it; empty where it has not told its own.
+std::string node_url(const Request& request) {
+  const auto& arrival = request.arrival;
+  if (arrival.host.empty()) return {};
+  return (arrival.is_encrypted ? "rrs+ws://" : "rr+ws://") + arrival.host + arrival.prefix +
+         std::string(request.path());
+}
+
+/// 101, then JSON messages.
+rr::awaitable<void> accept_json_socket(GatewayState& gateway, Connection& connection,
+                                       std::unique_ptr<rr::ByteStream> stream, const Request& request,
+                                       rr::ByteSpan unread) {
+  const auto place = find_json_socket(gateway, request);
+  if (!place) {
+    const bool is_denied = place.error().code == rr::ErrorCode::permission_denied;
+    gateway.reject(is_denied ? Rejection::forbidden : Rejection::no_such_device);
+    const auto response = is_denied ? gateway.http_access().refusal(request.identity, place.error())
+                                    : problem_response(404, place.error().message);
+    co_await write_refusal(*stream, response);
+    co_await stream->end(rr::no_reason);
+    co_return;
+  }
+  const auto accepted = format_upgrade_response(request, json_subprotocol);
+  if (co_await write_text(*stream, accepted)) co_return;
+  stream->put_back(unread);
+  co_await serve_json_socket(gateway, connection, std::move(stream), *place);
+}
+
+/// Carries an upgrade through. The stream is used up.
+rr::awaitable<void> serve_websocket(GatewayState& gateway, Connection& connection,
+                                    std::unique_ptr<rr::ByteStream> stream, const Request& request,
+                                    rr::ByteSpan unread) {
+  auto& tcp = *stream;
+  connection.client = request.arrival.peer;
+  connection.address = request.arrival.address.to_string();
+  connection.identity = request.identity;
+  const auto refuse = [&tcp](const Response& refusal) -> rr::awaitable<void> {
+    co_await write_refusal(tcp, refusal);
+    co_await tcp.end(rr::no_reason);
+  };
+  const auto subprotocol = is_json_socket(request) ? json_subprotocol : rr::websocket_subprotocol;
+  if (auto refusal = refuse_upgrade(request, gateway.config().allowed_origins, subprotocol)) {
+    gateway.reject(refusal->status == 403 ? Rejection::origin : Rejection::bad_request);
+    log(LogLevel::info, "upgrade refused",
+        {{"peer", connection.client}, {"status", refusal->status}, {"origin", request.header(http::field::origin)}});
+    co_await refuse(*refusal);
+    co_return;
+  }
+  if (!connection.ticket.pass_to(request.arrival.address)) {
+    gateway.reject(Rejection::too_many);
+    log(LogLevel::warning, "connection refused: too many", {{"peer", connection.client}});
+    const auto response = problem_response(503, "too many connections from " + request.arrival.address.to_string());
+    co_await refuse(response);
+    co_return;
+  }
+  if (is_json_socket(request)) {
+    co_await accept_json_socket(gateway, connection, std::move(stream), request, unread);
+    co_return;
+  }
+  const auto destination = find_destination(gateway, request);
+  if (!destination) {
+    gateway.reject(Rejection::no_such_device);
+    const auto& error = destination.error();
+    const auto response = problem_response(error.code == rr::ErrorCode::node_not_found ? 404 : 400, error.message);
+    co_await refuse(response);
+    co_return;
+  }
+  std::string way(request.header(way_header));
+  const bool is_circle = destination->device && destination->device->is_on_way(way);
+  if (is_circle) destination->device->note_circle();
+  if (is_circle || way.size() > longest_way) {
+    const auto response = problem_response(508, "the way leads back to the gateway that it began at");
+    co_await refuse(response);
+    co_return;
+  }
+  const bool takes_close = takes_close_frames(request);
+  // In a session of ours each request is looked at; see shared_access.hpp.
+  const auto allowed = destination->node ? rr::Result<>() : may_relay(gateway, connection, *destination->device);
+  // Who speaks Robot Raconteur can be told so in it, and a page can read why a WebSocket closes; but to show who one
+  // is, where a page or another gateway has not done so, is for the upgrade.
+  const bool names_protocol = request.message.count(http::field::sec_websocket_protocol) != 0;
+  const bool has_shown = request.identity.is_proven();
+  const bool can_show = takes_close || !way.empty();
+  const bool hears_in_session = !allowed && names_protocol && (has_shown || !can_show);
+  if (!allowed && !hears_in_session && !(takes_close && has_shown)) {
+    const auto response = gateway.http_access().refusal(request.identity, allowed.error());
+    co_await refuse(response);
+    co_return;
+  }
+  if (hears_in_session || destination->node) {
+    const auto accepted = format_upgrade_response(request);
+    if (co_await write_text(tcp, accepted)) co_return;
+    tcp.put_back(unread);
+    auto socket = std::make_unique<rr::WebSocketStream>(std::move(stream), rr::WebSocketRole::server, takes_close);
+    if (hears_in_session) {
+      log(LogLevel::info, "client refused", {{"peer", connection.client}, {"error", allowed.error().message}});
+      co_await refuse_in_session(gateway, connection, *destination->device, std::move(socket), allowed.error());
+      co_return;
+    }
+    auto base_url = node_url(request);
+    co_await serve_shared_client(gateway, connection, *destination, std::move(socket), std::move(base_url));
+    co_return;
+  }
+  rr::Result<std::unique_ptr<Boarding>> boarding(nullptr);
+  if (allowed)
+    boarding = co_await board(gateway, *destination->device, std::move(way));
+  else
+    boarding = allowed.error();
+  if (!boarding && !takes_close) {
+    auto response = problem_response(503, boarding.error().message);
+    response.set("Retry-After", "2");
+    co_await refuse(response);
+    co_return;
+  }
+  const auto accepted = format_upgrade_response(request);
+  if (co_await write_text(tcp, accepted)) co_return;
+  tcp.put_back(unread);
+  rr::WebSocketStream socket(std::move(stream), rr::WebSocketRole::server, takes_close);
+  if (!boarding) {  // a page can't read the status of a refused upgrade, but it can read why a WebSocket closes
+    log(LogLevel::info, "client refused", {{"peer", connection.client}, {"error", boarding.error().message}});
+    const auto code = static_cast<std::uint16_t>(allowed ? 1013 : 1008);
+    const rr::EndReason reason{code, boarding.error().message};
+    co_await socket.end(reason);
+    co_return;
+  }
+  co_await relay_client(gateway, connection, socket, **boarding);
+}
+
+/// While the gateway stops, it says so, and nothing else.
+bool is_answered_while_stopping(const Request& request) {
+  const auto path = request.path();
+  return path == "/healthz" || path == "/readyz" || path == "/metrics";
+}
+
+Response stopping_response() {
+  auto response = problem_response(503, "the gateway is stopping");
+  response.set("Retry-After", "5");
+  response.closes = true;
+  return response;
+}
+
+/// Whether it matters who asks. The page itself and how the gateway is are no secrets.
+bool is_guarded(const Request& request) {
+  const auto path = request.path();
+  return asks_for_websocket(request) || path == "/metrics" || path.substr(0, 5) == "/api/";
+}
+
+Rejection rejection_of(unsigned status) {
+  return status == 429 ? Rejection::rate : status == 401 ? Rejection::unauthorized : Rejection::forbidden;
+}
+
+/// The page's own links are relative: they need the '/' at the end.
+bool is_base_path(const Request& request, const Config& config) {
+  return !config.base_path.empty() && request.path() == config.base_path;
+}
+
+Response to_base_path(const Config& config) {
+  auto response = problem_response(308, "the page is at " + config.base_path + "/");
+  response.set("Location", config.base_path + "/");
+  return response;
+}
+
+}  // namespace
+
+rr::awaitable<void> serve_http_client(GatewayState& gateway, Connection& connection,
+                                      std::unique_ptr<rr::ByteStream> stream) {
+  const auto& config = gateway.config();
+  const RequestLimits limits{config.limits.header_bytes, config.limits.header_timeout, config.timeouts.idle,
+                             config.limits.body_bytes};
+  RequestReader reader(*stream, limits);
+  for (;;) {
+    auto read = co_await reader.next();
+    if (!read.request && read.refusal == 0) break;
+    if (!read.request) {
+      gateway.reject(Rejection::bad_request);
+      log(LogLevel::info, "request refused",
+          {{"peer", connection.client}, {"status", read.refusal}, {"detail", read.detail}});
+      const auto response = problem_response(read.refusal, read.detail);
+      co_await write_refusal(*stream, response);
+      co_await stream->end(rr::no_reason);
+      break;
+    }
+    Request request{std::move(*read.request)};
+    ++gateway.metrics().requests;
+    request.arrival = see_through_proxies(request, connection.peer, config.proxy.trust);
+    take_base_path(request, config.base_path);
+    const bool is_refused = gateway.is_stopping() && !is_answered_while_stopping(request);
+    HttpAccess::Admitted admitted;
+    if (!is_refused && is_guarded(request))
+      admitted = co_await gateway.http_access().admit(request, connection, config);
+    if (admitted.refusal) gateway.reject(rejection_of(admitted.refusal->status));
+    if (admitted.refusal && asks_for_websocket(request)) {
+      co_await write_refusal(*stream, *admitted.refusal);
+      co_await stream->end(rr::no_reason);
+      break;
+    }
+    if (!is_refused && asks_for_websocket(request)) {
+      admitted = {};  // connections have bounds of their own
+      const rr::Bytes unread(reader.unread().begin(), reader.unread().end());
+      co_await serve_websocket(gateway, connection, std::move(stream), request, unread);
+      break;
+    }
+    std::vector<std::pair<std::string, std::string>> headers;
+    if (request.arrival.is_encrypted && config.tls.hsts_seconds > 0)
+      headers.emplace_back("Strict-Transport-Security", "max-age=" + std::to_string(config.tls.hsts_seconds));
+    ResponseWriter writer(*stream, request, gateway.is_stopping(), std::move(headers));
+    const auto response = is_refused                      ? stopping_response()
+                          : admitted.refusal              ? *admitted.refusal
+                          : is_base_path(request, config) ? to_base_path(config)
+                                                          : gateway.router().answer(request);
+    if (response.answer_later) {
+      co_await response.answer_later(writer);
+    } else if (co_await writer.send(response)) {
+      break;
+    }
+    if (!writer.goes_on()) {
+      co_await stream->end(rr::no_reason);
+      break;
+    }
+  }
+}
+
+}  // namespace rrgate

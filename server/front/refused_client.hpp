@@ -1,0 +1,19 @@
+// A client that may not have the device that it asks for hears so in a session, as a node would say it. Layer:
+// server/front. Source: sessions spec section 2.3.
+#pragma once
+
+#include <memory>
+
+#include "node/transport/byte_stream.hpp"
+#include "server/state/gateway_state.hpp"
+#include "server/upstream/device.hpp"
+
+namespace rrgate {
+
+/// Answers the handshake in the device's place, and the first request for a service with `refusal`; nobody connects to
+/// the device. Ends then, and in any case after limits.header_timeout. `client` is at the start of its Robot Raconteur
+/// stream.
+rr::awaitable<void> refuse_in_session(GatewayState& gateway, Connection& connection, const Device& device,
+                                      std::unique_ptr<rr::ByteStream> client, rr::Error refusal);
+
+}  // namespace rrgate

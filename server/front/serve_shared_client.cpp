@@ -1,0 +1,117 @@
+#include "server/front/serve_shared_client.hpp"
+
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/use_awaitable.hpp>
+
+#include "server/front/session_end.hpp"
+#include "server/log/log.hpp"
+#include "server/rr/shared_access.hpp"
+#include "server/state/http_access.hpp"
+
+namespace rrgate {
+
+namespace asio = boost::asio;
+
+Destination destination_of(GatewayState& gateway, Device& device) {
+  auto* shared = gateway.shared().find(device);
+  return {&device, shared ? &shared->node() : nullptr};
+}
+
+std::optional<Destination> find_destination(GatewayState& gateway, const rr::NodeId& node_id,
+                                            std::string_view node_name) {
+  auto& own = gateway.shared().node();
+  if (auto* shared = gateway.shared().find(node_id, node_name))
+    return Destination{shared->device().get(), &shared->node()};
+  const bool asks_for_none = node_id.is_any() && node_name.empty();
+  const bool asks_for_us =
+      (node_id.is_any() || node_id == own.identity().id) && (node_name.empty() || node_name == own.identity().name);
+  if (asks_for_us && !asks_for_none) return Destination{nullptr, &own};
+  auto* device = gateway.devices().route(node_id, node_name);
+  if (device && !device->is_shared()) return Destination{device, nullptr};
+  if (asks_for_none) return Destination{nullptr, &own};
+  return std::nullopt;
+}
+
+namespace {
+
+constexpr std::chrono::milliseconds look_period{10};
+
+/// Whoever comes when the gateway has just begun, as clients do that its restart has cut off, waits for what will be
+/// there in a moment. Returns whether there is such a node still.
+rr::awaitable<bool> wait_until_ready(GatewayState& gateway, const Destination& destination,
+                                     asio::any_io_executor executor) {
+  asio::steady_timer look(executor);
+  const auto deadline = std::chrono::steady_clock::now() + gateway.config().timeouts.connect;
+  for (;;) {
+    auto& shared = gateway.shared();
+    const auto* device = destination.device ? shared.find(*destination.device) : nullptr;
+    if (destination.device && !device) co_return false;
+    const bool is_ready = device ? device->is_ready() : shared.is_ready();
+    if (is_ready || gateway.is_stopping() || std::chrono::steady_clock::now() >= deadline) co_return true;
+    look.expires_after(look_period);
+    co_await look.async_wait(asio::as_tuple(asio::use_awaitable));
+  }
+}
+
+/// How much a client may ask for, whoever he logs in as meanwhile.
+auto make_rate_gate(GatewayState& gateway, const SharedNode& node, const Connection& connection) {
+  const auto& identity = connection.identity;
+  return [&gateway, &node, address = connection.address, shown = identity.is_proven() ? identity.name : std::string()](
+             const rr::MemberAccess& wanted) -> rr::Result<std::shared_ptr<const void>> {
+    const auto& rates = gateway.config().rates;
+    if (!rates.is_bound()) return std::shared_ptr<const void>();
+    const bool is_ours = wanted.user && gateway.access().authenticator();  // else it is a user of the device's
+    const auto device = node.device_of(wanted.path.substr(0, wanted.path.find('.')));
+    auto passes = gateway.http_access().enter(address, is_ours ? wanted.user->name : shown, device, rates);
+    if (passes) return std::shared_ptr<const void>(std::move(*passes));
+    gateway.reject(Rejection::rate);
+    return passes.error();
+  };
+}
+
+}  // namespace
+
+rr::awaitable<void> serve_shared_client(GatewayState& gateway, Connection& connection, Destination destination,
+                                        std::unique_ptr<rr::ByteStream> client, std::string base_url) {
+  std::optional<Device::Seat> seat;
+  if (destination.device) {
+    if (auto taken = destination.device->take_seat()) {
+      seat.emplace(std::move(*taken));
+    } else {
+      gateway.reject(Rejection::device_full);
+      const rr::EndReason reason{1013, destination.device->full_text()};
+      co_await client->end(reason);
+      co_return;
+    }
+  }
+  const auto executor = client->executor();
+  if (!co_await wait_until_ready(gateway, destination, executor)) {
+    client->close();
+    co_return;
+  }
+  const auto name = destination.device ? destination.device->config().name : std::string("the gateway");
+  log(LogLevel::info, "client connected", {{"device", name}, {"peer", connection.client}, {"mode", "shared"}});
+  SharedArrival arrival;
+  arrival.peer = connection.client;
+  arrival.base_url = std::move(base_url);
+  arrival.is_encrypted = connection.peer.is_encrypted;
+  arrival.admit = make_admission(gateway.access(), *destination.node, connection.identity);
+  arrival.enter = make_rate_gate(gateway, *destination.node, connection);
+  SessionEnd end(client->executor());
+  const auto session = destination.node->add(std::move(client), std::move(arrival), [&end] { end.reach(); });
+  connection.device = destination.device;
+  connection.stop = [session](const rr::EndReason& reason) {
+    session->close_service();
+    session->close(rr::make_error(rr::ErrorCode::connection_error, reason.text));
+  };
+  co_await end.wait();
+  connection.device = nullptr;
+  connection.stop = [](const rr::EndReason&) {};
+  log(LogLevel::info, "client disconnected",
+      {{"device", name},
+       {"peer", connection.client},
+       {"reason", session->end_reason().empty() ? session->session().connection().close_reason().message
+                                                : session->end_reason()}});
+}
+
+}  // namespace rrgate

@@ -1,0 +1,56 @@
+// What the gateway counts. Layer: server/log. Plain numbers: all of it happens on the gateway's one thread.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+#include "core/member/ledger.hpp"
+
+namespace rrgate {
+
+/// Why something was turned away.
+enum class Rejection {
+  too_many,          ///< limits.clients, clients_per_address
+  unknown_protocol,  ///< neither Robot Raconteur nor HTTP nor, where it is served, TLS
+  tls,               ///< a handshake that failed
+  proxy_header,      ///< of a trusted proxy, missing or broken
+  bad_request,       ///< no HTTP, too long, too late; a broken upgrade
+  origin,            ///< a page that may not connect
+  no_such_device,
+  device_full,
+  device_offline,
+  unauthorized,  ///< a wrong password or token, or none where one is needed
+  forbidden,     ///< no right to it
+  rate,          ///< asked for more than "rates" allow
+};
+inline constexpr std::array<std::string_view, 12> rejection_names = {
+    "too_many",    "unknown_protocol", "tls",          "proxy_header", "bad_request", "origin", "no_such_device",
+    "device_full", "device_offline",   "unauthorized", "forbidden",    "rate"};
+
+struct Metrics {
+  std::uint64_t connections = 0;  ///< accepted
+  std::uint64_t requests = 0;     ///< HTTP requests that were read
+  std::array<std::uint64_t, rejection_names.size()> rejected{};
+  std::uint64_t reloads = 0;
+  std::uint64_t failed_reloads = 0;
+
+  void reject(Rejection why) { ++rejected[static_cast<std::size_t>(why)]; }
+};
+
+/// What passed in one direction between a device and all its clients.
+/// Of a shared device: between its clients and the gateway.
+struct Flow {
+  std::uint64_t bytes = 0;
+  std::uint64_t messages = 0;  ///< without those inside TLS from end to end
+  std::uint64_t waiting = 0;   ///< bytes that a slow reader has not taken yet
+};
+
+struct Traffic {
+  Flow to_device;
+  Flow to_clients;
+  std::uint64_t sessions = 0;
+  rr::Ledgers ledgers;  ///< of clients of a shared device
+};
+
+}  // namespace rrgate

@@ -1,0 +1,56 @@
+#include "server/relay/client_relay.hpp"
+
+#include "server/log/log.hpp"
+#include "server/relay/relay.hpp"
+
+namespace rrgate {
+
+rr::Result<> may_relay(GatewayState& gateway, const Connection& connection, const Device& device) {
+  auto& access = gateway.access();
+  if (access.is_open()) return {};
+  auto allowed = access.check_whole_device(connection.identity, device.config().name);
+  if (!allowed) gateway.reject(Rejection::forbidden);
+  return allowed;
+}
+
+rr::awaitable<rr::Result<std::unique_ptr<Boarding>>> board(GatewayState& gateway, Device& device, std::string way) {
+  auto seat = device.take_seat();
+  if (!seat) {
+    gateway.reject(Rejection::device_full);
+    co_return rr::make_error(rr::ErrorCode::connection_error, device.full_text());
+  }
+  auto stream = co_await device.connect(std::move(way));
+  if (!stream) {
+    gateway.reject(Rejection::device_offline);
+    co_return rr::make_error(rr::ErrorCode::connection_error, device.offline_text(stream.error()));
+  }
+  auto boarding = std::make_unique<Boarding>(Boarding{device, std::move(*seat), std::move(*stream)});
+  co_return boarding;
+}
+
+rr::awaitable<void> relay_client(GatewayState& gateway, Connection& connection, rr::ByteStream& client,
+                                 Boarding& boarding) {
+  const auto& limits = gateway.config().limits;
+  Relay relay(client, *boarding.stream, {limits.max_message_size, limits.outbox_bytes, limits.opaque_rate},
+              boarding.device.traffic());
+  connection.device = &boarding.device;
+  connection.stop = [&relay](rr::EndReason reason) { relay.stop(std::move(reason)); };
+  const auto& name = boarding.device.config().name;
+  log(LogLevel::info, "client connected", {{"device", name}, {"peer", connection.client}});
+
+  const auto reason = co_await relay.run();
+
+  connection.device = nullptr;
+  connection.stop = [&client](const rr::EndReason&) { client.close(); };
+  // A device that ends a connection may be ending altogether: find out now rather than at the next look.
+  if (!gateway.is_stopping() && (reason.code == 1011 || reason.text.rfind("device", 0) == 0))
+    boarding.device.note_trouble();
+  log(LogLevel::info, "client disconnected",
+      {{"device", name},
+       {"peer", connection.client},
+       {"reason", reason.text},
+       {"bytes_to_device", relay.bytes_to_device()},
+       {"bytes_to_client", relay.bytes_to_client()}});
+}
+
+}  // namespace rrgate

@@ -1,0 +1,31 @@
+// A client that has found its device: seat, connection, relay, and the log line at its end. Layer: server/relay.
+#pragma once
+
+#include <memory>
+
+#include "node/transport/byte_stream.hpp"
+#include "server/state/gateway_state.hpp"
+#include "server/upstream/device.hpp"
+
+namespace rrgate {
+
+/// A place at a device and a connection to it.
+struct Boarding {
+  Device& device;
+  Device::Seat seat;
+  std::unique_ptr<rr::ByteStream> stream;
+};
+
+/// Whether a client's bytes may pass to a device unread: only where he could do everything to it.
+/// Errors   permission_denied; the text is for the client.
+rr::Result<> may_relay(GatewayState& gateway, const Connection& connection, const Device& device);
+
+/// `way`    see Device::connect().
+/// Errors   connection_error: the device is full or can't be reached; the text is for the client.
+rr::awaitable<rr::Result<std::unique_ptr<Boarding>>> board(GatewayState& gateway, Device& device, std::string way = {});
+
+/// Relays until one side ends; ends both. `client` is at the start of its Robot Raconteur stream.
+rr::awaitable<void> relay_client(GatewayState& gateway, Connection& connection, rr::ByteStream& client,
+                                 Boarding& boarding);
+
+}  // namespace rrgate

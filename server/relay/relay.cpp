@@ -1,0 +1,151 @@
+#include "server/relay/relay.hpp"
+
+#include <algorithm>
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/error.hpp>
+#include <boost/asio/this_coro.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <chrono>
+#include <cstring>
+#include <memory>
+
+namespace rrgate {
+
+namespace asio = boost::asio;
+
+namespace {
+
+/// After the client has ended its side, the answers on their way may still come for so long.
+constexpr std::chrono::milliseconds half_closed_time{1000};
+
+/// Time that a direction of opaque bytes saves up while it is idle.
+constexpr std::chrono::milliseconds pace_credit{100};
+
+rr::EndReason lost_client(std::uint16_t code, const rr::error_code& error) {
+  if (error == asio::error::timed_out) return {1013, "client too slow"};
+  return {code, "client lost: " + error.message()};
+}
+
+rr::EndReason lost_device(const rr::error_code& error) {
+  return {1011, error == asio::error::timed_out ? "device takes no data" : "device lost: " + error.message()};
+}
+
+}  // namespace
+
+Relay::Relay(rr::ByteStream& client, rr::ByteStream& device, RelayOptions options, Traffic& traffic)
+    : client_(client),
+      device_(device),
+      options_(options),
+      to_device_{client,
+                 device,
+                 FrameGate(options.max_message_size),
+                 false,
+                 traffic.to_device,
+                 asio::steady_timer(client.executor())},
+      to_client_{device,
+                 client,
+                 FrameGate(options.max_message_size),
+                 true,
+                 traffic.to_clients,
+                 asio::steady_timer(client.executor())},
+      half_closed_limit_(client.executor(),
+                         [this] {
+                           stop({1000, "the client has ended"});
+                         }),
+      to_device_done_(client.executor(), asio::steady_timer::time_point::max()) {}
+
+rr::awaitable<rr::EndReason> Relay::run() {
+  const auto executor = co_await asio::this_coro::executor;
+  asio::co_spawn(executor, pump_to_device(), asio::detached);
+  co_await pump(to_client_);
+  while (!is_to_device_done_) co_await to_device_done_.async_wait(asio::as_tuple(asio::use_awaitable));
+  half_closed_limit_.disarm();
+  device_.close();
+  auto reason = *end_reason_;
+  co_await client_.end(reason);
+  co_return reason;
+}
+
+void Relay::stop(rr::EndReason reason) {
+  if (end_reason_) return;
+  end_reason_ = std::move(reason);
+  device_.close();
+  client_.cancel();
+  to_device_.pace.cancel();
+  to_client_.pace.cancel();
+}
+
+rr::awaitable<void> Relay::pump_to_device() {
+  co_await pump(to_device_);
+  is_to_device_done_ = true;
+  to_device_done_.cancel();
+}
+
+rr::awaitable<void> Relay::pump(Direction& direction) {
+  // Not a vector: its pages are touched, and so become memory, only as far as they are used.
+  const auto buffer = std::make_unique_for_overwrite<std::uint8_t[]>(options_.outbox_bytes);
+  std::size_t held = 0;  // bytes of an incomplete message start, at the front
+  while (!end_reason_) {
+    const auto read = co_await direction.from.read_some({buffer.get() + held, options_.outbox_bytes - held});
+    if (read.error || read.is_end()) {
+      end_of(direction, read.error);
+      break;
+    }
+    held += read.bytes;
+    const auto messages = direction.gate.messages();
+    const auto passed = direction.gate.pass({buffer.get(), held});
+    direction.flow.messages += direction.gate.messages() - messages;
+    if (!passed) {
+      stop(broken_rule(direction, passed.error()));
+      break;
+    }
+    if (*passed == 0) continue;
+    if (direction.is_from_device && direction.gate.has_seen_start_tls()) {
+      to_client_.gate.make_opaque();
+      to_device_.gate.make_opaque();
+    }
+    const rr::ByteSpan slice(buffer.get(), *passed);
+    direction.flow.waiting += *passed;
+    const auto error = co_await direction.to.write({&slice, 1});
+    direction.flow.waiting -= *passed;
+    if (error) {
+      stop(direction.is_from_device ? lost_client(1013, error) : lost_device(error));
+      break;
+    }
+    direction.bytes += *passed;
+    direction.flow.bytes += *passed;
+    held -= *passed;
+    if (held > 0) std::memmove(buffer.get(), buffer.get() + *passed, held);
+    if (direction.gate.is_opaque()) co_await keep_pace(direction, *passed);
+  }
+}
+
+rr::awaitable<void> Relay::keep_pace(Direction& direction, std::size_t bytes) {
+  const auto now = std::chrono::steady_clock::now();
+  const std::chrono::nanoseconds cost(
+      static_cast<std::int64_t>(1e9 * static_cast<double>(bytes) / static_cast<double>(options_.opaque_rate)));
+  direction.pace.expires_at(std::max(direction.pace.expiry(), now - pace_credit) + cost);
+  // Bytes come in bursts: only what is ahead of the rate by more than that waits.
+  if (direction.pace.expiry() > now && !end_reason_)
+    co_await direction.pace.async_wait(asio::as_tuple(asio::use_awaitable));
+}
+
+void Relay::end_of(Direction& direction, rr::error_code error) {
+  if (direction.is_from_device) {
+    stop(error ? lost_device(error) : rr::EndReason{1000, "device closed the connection"});
+  } else if (error) {
+    stop(lost_client(1000, error));
+  } else if (!end_reason_) {
+    device_.finish_sending();
+    half_closed_limit_.arm(half_closed_time);
+  }
+}
+
+rr::EndReason Relay::broken_rule(const Direction& direction, const rr::Error& error) const {
+  const std::uint16_t code = direction.gate.is_too_large() ? 1009 : direction.is_from_device ? 1011 : 1002;
+  return {code, (direction.is_from_device ? "from the device: " : "from the client: ") + error.message};
+}
+
+}  // namespace rrgate

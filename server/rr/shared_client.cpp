@@ -1,0 +1,389 @@
+#include "server/rr/shared_client.hpp"
+
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/use_awaitable.hpp>
+
+#include "server/log/log.hpp"
+
+namespace rrgate {
+
+namespace asio = boost::asio;
+
+namespace {
+
+const std::string& path_of(const rr::ServiceObject& object) {
+  return static_cast<const SharedObject&>(object).path();
+}
+
+bool is_generator_step(const rr::Called& called) {
+  return called.generator != 0 && called.kind != rr::CallKind::generator_open;
+}
+
+}  // namespace
+
+SharedClient::SharedClient(SharedClientOwner& owner, rr::ServiceDirectory& directory, rr::ServiceSessionOptions options,
+                           std::unique_ptr<rr::ByteStream> stream, std::string peer)
+    : SessionDriver(std::move(stream), directory, std::move(options), rr::read_clocks()),
+      owner_(&owner),
+      peer_(std::move(peer)) {}
+
+void SharedClient::close_service() {
+  session_.close_service(rr::read_clocks());
+  settle();
+}
+
+bool SharedClient::handle_event(rr::Now) {
+  const auto event = session_.poll_event();
+  if (!event) return false;
+  std::visit([&](const auto& happened) { handle(happened); }, *event);
+  return true;
+}
+
+void SharedClient::ended() {
+  handle(rr::ClientGone{});
+  owner_->client_ended(*this);
+}
+
+void SharedClient::handle(const rr::ClientConnected& connected) {
+  service_ = owner_->find_service(connected.service->name());
+  if (!service_) return;
+  service_->add(*this);
+  home_ = login_ ? login_ : service_->upstream();
+  home_->add(*this);
+}
+
+void SharedClient::handle(const rr::ClientGone&) {
+  if (!service_) return;
+  home_->remove(*this);
+  if (locker_) locker_->remove(*this);
+  service_->remove(*this);
+  if (login_) login_->close();
+  if (locker_) locker_->close();
+  service_.reset();
+  wires_.clear();
+  pipes_.clear();
+  const auto callbacks = std::exchange(callbacks_, {});
+  for (const auto& [id, answer] : callbacks)
+    answer(rr::make_error(rr::ErrorCode::connection_error, "the client is gone"));
+}
+
+// --- requests ---
+
+void SharedClient::handle(const rr::Called& called) {
+  if (!service_) return;
+  if (login_ && !session_.user()) leave_login();
+  const std::weak_ptr<StreamDriver> weak = weak_from_this();
+  auto done = [this, weak, id = called.id](const rr::Result<rr::Value>& result) {
+    const auto self = weak.lock();
+    if (!self) return;
+    session_.reply(id, result, rr::read_clocks());
+    settle();
+  };
+  auto& upstream = is_generator_step(called) && home_->has_generator(*this, called.generator) ? *home_ : requests();
+  upstream.request(*this, called, std::move(done));
+}
+
+void SharedClient::handle(const rr::GeneratorEnded& ended) {
+  if (home_) home_->drop_generator(*this, ended.id);
+  if (locker_) locker_->drop_generator(*this, ended.id);
+}
+
+void SharedClient::handle(const rr::ObjectWanted& wanted) {
+  if (!service_) return;
+  const std::weak_ptr<StreamDriver> weak = weak_from_this();
+  service_->find_object(*home_, wanted.path, [this, weak, path = wanted.path](const rr::Result<>& found) {
+    const auto self = weak.lock();
+    if (!self) return;
+    session_.handle_object_found(path, found, rr::read_clocks());
+    settle();
+  });
+}
+
+/// A client that is told that it has left holds no lock any more.
+void SharedClient::handle(const rr::LeaveWanted&) {
+  const auto own = login_ ? login_ : locker_;
+  const std::weak_ptr<StreamDriver> weak = weak_from_this();
+  auto left = [this, weak] {
+    const auto self = weak.lock();
+    if (!self) return;
+    session_.answer_leave(rr::read_clocks());
+    settle();
+  };
+  if (!own) return left();
+  own->close(std::move(left));
+}
+
+// --- wires ---
+
+void SharedClient::handle(const rr::WireConnected& connected) {
+  if (!service_) return;
+  wires_.emplace(connected.path, connected.member);
+  home_->join_wire(*this, connected.path, *connected.member);
+}
+
+void SharedClient::handle(const rr::WireDisconnected& disconnected) {
+  wires_.erase({disconnected.path, disconnected.member});
+  if (home_) home_->leave_wire(*this, disconnected.path, *disconnected.member);
+}
+
+void SharedClient::handle(const rr::WireReceived& received) {
+  if (home_) home_->send_wire(path_of(*received.object), *received.member, received.value);
+}
+
+void SharedClient::receive_wire(rr::WirePacket& packet) {
+  const auto now = rr::read_clocks();
+  (void)session_.send_wire(packet, now);  // a lost connection is heard of by itself
+  settle(now);
+}
+
+void SharedClient::answer_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::Result<>& result) {
+  if (!result) wires_.erase({path, &wire});
+  session_.answer_wire(path, wire, result, rr::read_clocks());
+  settle();
+}
+
+void SharedClient::note_conflated(const std::string& path, const rr::MemberDefinition& wire, std::uint64_t count) {
+  session_.note_conflated(path, wire, count);
+}
+
+void SharedClient::close_wire(const std::string& path, const rr::MemberDefinition& wire) {
+  wires_.erase({path, &wire});
+  session_.close_wire(path, wire, rr::read_clocks());
+  settle();
+}
+
+// --- pipes ---
+
+void SharedClient::handle(const rr::PipeConnected& connected) {
+  if (!service_) return;
+  const auto path = path_of(*connected.object);
+  pipes_[connected.id] = {path, connected.member};
+  home_->join_pipe(*this, connected.id, path, *connected.member);
+}
+
+void SharedClient::handle(const rr::PipeReceived& received) {
+  if (home_) home_->send_pipe(*this, received.id, received.value, received.wants_ack);
+}
+
+void SharedClient::handle(const rr::PipeClosed& closed) {
+  pipes_.erase(closed.id);
+  if (home_) home_->leave_pipe(*this, closed.id);
+}
+
+void SharedClient::accept_pipe(rr::PipeId id) {
+  session_.accept_pipe(id, rr::read_clocks());
+  settle();
+}
+
+void SharedClient::refuse_pipe(rr::PipeId id, const rr::Error& error) {
+  pipes_.erase(id);
+  session_.refuse_pipe(id, error, rr::read_clocks());
+  settle();
+}
+
+void SharedClient::receive_packet(rr::PipeId id, const rr::Value& packet) {
+  const auto sent = session_.send_pipe_packet(id, packet, rr::read_clocks());
+  if (!sent && sent.error().code == rr::ErrorCode::out_of_system_resource) return end_too_slow(sent.error());
+  settle();
+  if (is_behind_ || is_closed() || session_.queued_bytes() <= much_waiting()) return;
+  is_behind_ = true;
+  if (std::exchange(was_behind_, true)) return;
+  log(LogLevel::info, "client reads slowly: the device is held back on its pipes, as far as it minds credit",
+      {{"peer", peer_}, {"waiting_bytes", session_.queued_bytes()}});
+}
+
+void SharedClient::has_written() {
+  if (!is_behind_ || session_.queued_bytes() > much_waiting() / 2) return;
+  is_behind_ = false;
+  const std::weak_ptr<StreamDriver> weak = weak_from_this();
+  post([this, weak] {
+    const auto self = weak.lock();
+    if (self && service_ && !is_behind_) home_->caught_up(*this);
+  });
+}
+
+void SharedClient::acknowledge_packets(rr::PipeId id, std::span<const std::uint32_t> numbers) {
+  session_.acknowledge_pipe(id, numbers, rr::read_clocks());
+  settle();
+}
+
+void SharedClient::close_pipe(rr::PipeId id) {
+  pipes_.erase(id);
+  session_.close_pipe(id, rr::read_clocks());
+  settle();
+}
+
+/// A packet that does not fit would be lost without anybody knowing: the client goes, and knows.
+void SharedClient::end_too_slow(const rr::Error& error) {
+  if (!end_reason_.empty()) return;
+  end_reason_ = "client too slow: " + error.message;
+  log(LogLevel::warning, "client closed", {{"peer", peer_}, {"reason", end_reason_}});
+  // Not here: whoever sends goes through a list of clients.
+  post([this, self = shared_from_this()] {
+    session_.close_service(rr::read_clocks());
+    close(rr::make_error(rr::ErrorCode::connection_error, end_reason_));
+  });
+}
+
+// --- events, callbacks ---
+
+void SharedClient::receive_event(const std::string& path, const rr::MemberDefinition& event,
+                                 std::span<const rr::Value> arguments) {
+  (void)session_.send_event(path, event, arguments, rr::read_clocks());
+  settle();
+}
+
+void SharedClient::release_path(const std::string& path) {
+  std::erase_if(wires_, [&](const auto& wire) { return rr::is_within(wire.first, path); });
+  std::erase_if(pipes_, [&](const auto& pipe) { return rr::is_within(pipe.second.path, path); });
+  session_.release_path(path, rr::read_clocks());
+  settle();
+}
+
+void SharedClient::call_callback(const std::string& path, const rr::MemberDefinition& callback,
+                                 std::span<const rr::Value> arguments, rr::ClientConnection::CallbackReply answer) {
+  // The session keeps the definition until the answer: it must be that of the service, which outlives the device's.
+  const auto found =
+      session_.service() ? session_.service()->find_object(path) : rr::make_error(rr::ErrorCode::service_error, "");
+  const auto* member = found ? found->type->find_member(callback.name) : nullptr;
+  if (!member) return answer(rr::make_error(rr::ErrorCode::service_error, "Stub not found"));
+  const auto called = session_.call_callback(path, *member, arguments, rr::read_clocks());
+  if (!called) return answer(called.error());
+  callbacks_.emplace(*called, std::move(answer));
+  settle();
+}
+
+void SharedClient::handle(const rr::CallbackCompleted& completed) {
+  const auto found = callbacks_.extract(completed.id);
+  if (found) found.mapped()(completed.result);
+}
+
+void SharedClient::answer_login(rr::LoginId id, rr::Result<rr::AuthenticatedUser> result) {
+  session_.answer_login(id, std::move(result), rr::read_clocks());
+  settle();
+}
+
+// --- logins: where the gateway has no users, the device judges them, by a session of this client's own ---
+
+void SharedClient::handle(const rr::LoginRequested& login) {
+  const auto service = service_ ? service_ : owner_->find_service(login.attempt.service);
+  if (!service)
+    return session_.answer_login(login.id, rr::make_error(rr::ErrorCode::authentication_error, "Authentication Failed"),
+                                 rr::read_clocks());
+  const auto self = std::static_pointer_cast<SharedClient>(shared_from_this());
+  if (!service->is_for_device(*login.authenticator)) return owner_->judge_login(login, self);
+  asio::co_spawn(executor(), log_in_at_device(self, service, login), asio::detached);
+}
+
+rr::awaitable<void> SharedClient::log_in_at_device(std::shared_ptr<SharedClient> self,
+                                                   std::shared_ptr<SharedService> service, rr::LoginRequested login) {
+  const bool is_late = !service->upstream()->requires_user() && self->service_;
+  const auto upstream = service->make_upstream({login.attempt.username, login.attempt.credentials, is_late});
+  const auto opened = co_await upstream->open();
+  auto& client = *self;
+  if (client.is_closed()) {
+    upstream->close();
+    co_return;
+  }
+  if (!opened) {
+    const auto refused = opened.error().code == rr::ErrorCode::authentication_error
+                             ? opened.error()
+                             : rr::make_error(rr::ErrorCode::authentication_error, opened.error().message);
+    client.session_.answer_login(login.id, refused, rr::read_clocks());
+    client.settle();
+    co_return;
+  }
+  if (client.login_) client.leave_login();
+  client.login_ = upstream;
+  if (client.service_) client.move_to(upstream);
+  asio::co_spawn(client.executor(), keep_logged_in(self, upstream), asio::detached);
+  client.session_.answer_login(login.id, rr::AuthenticatedUser{login.attempt.username}, rr::read_clocks());
+  client.settle();
+}
+
+/// Logs in again when the device comes back.
+rr::awaitable<void> SharedClient::keep_logged_in(std::shared_ptr<SharedClient> self, std::shared_ptr<Upstream> login) {
+  const auto nap = asio::as_tuple(asio::use_awaitable);
+  const auto wake = std::make_shared<asio::steady_timer>(self->executor());
+  const std::weak_ptr<SharedClient> weak = self;
+  self.reset();
+  login->on_lost([wake] { wake->cancel(); });
+  for (;;) {
+    wake->expires_after(std::chrono::seconds(login->is_open() ? 10 : 1));
+    co_await wake->async_wait(nap);
+    const auto client = weak.lock();
+    if (!client || client->is_closed() || client->login_ != login) break;
+    if (!login->is_open()) co_await login->open();
+  }
+  if (!weak.lock()) login->close();
+}
+
+void SharedClient::move_to(std::shared_ptr<Upstream> upstream) {
+  home_->acknowledge_all(*this);
+  if (!service_) return;  // it has gone
+  home_->remove(*this);
+  home_ = std::move(upstream);
+  home_->add(*this);
+  for (const auto& [path, member] : std::set(wires_)) home_->join_wire(*this, path, *member);
+  for (const auto& [id, pipe] : std::unordered_map(pipes_)) home_->join_pipe(*this, id, pipe.path, *pipe.member);
+}
+
+void SharedClient::leave_login() {
+  const auto left = std::exchange(login_, nullptr);
+  if (service_) move_to(service_->upstream());
+  left->close();
+}
+
+// --- locks: they are held by a session of this client's own, so that the device keeps all others out ---
+
+void SharedClient::handle(const rr::LockWanted& wanted) {
+  if (!service_) return;
+  if (login_ && !session_.user()) leave_login();
+  if (login_) {  // has a session of its own already
+    const std::weak_ptr<StreamDriver> weak = weak_from_this();
+    return login_->lock(wanted, [this, weak, wanted](const rr::Result<rr::Value>& result) {
+      if (weak.lock()) answer_lock(wanted, result ? rr::Result<>() : rr::Result<>(result.error()));
+    });
+  }
+  const auto self = std::static_pointer_cast<SharedClient>(shared_from_this());
+  asio::co_spawn(executor(), take_lock(self, wanted), asio::detached);
+}
+
+rr::awaitable<void> SharedClient::take_lock(std::shared_ptr<SharedClient> self, rr::LockWanted wanted) {
+  auto& client = *self;
+  if (!client.service_) co_return;
+  if (!client.locker_) {
+    const auto upstream = client.service_->make_upstream(client.service_->device()->config().login);
+    const auto opened = co_await upstream->open();
+    if (!client.service_ || client.locker_) upstream->close();
+    if (!client.service_) co_return;
+    if (!opened) co_return client.answer_lock(wanted, opened.error());
+    if (!client.locker_) client.locker_ = upstream;
+  }
+  const auto locker = client.locker_;
+  const auto lock = [self, locker, wanted](const rr::Result<rr::Value>& found) {
+    if (!found) return self->answer_lock(wanted, found.error());
+    locker->lock(wanted, [self, wanted](const rr::Result<rr::Value>& result) {
+      self->answer_lock(wanted, result ? rr::Result<>() : rr::Result<>(result.error()));
+    });
+  };
+  locker->find_object(wanted.path, lock);
+}
+
+void SharedClient::answer_lock(const rr::LockWanted& wanted, const rr::Result<>& result) {
+  if (!service_) return;
+  const bool is_release = wanted.command == rr::LockCommand::unlock || wanted.command == rr::LockCommand::exit_monitor;
+  if (result && is_release) locked_.erase(wanted.path);
+  if (result && !is_release) locked_.insert(wanted.path);
+  if (locker_ && locked_.empty()) {
+    locker_->remove(*this);
+    std::exchange(locker_, nullptr)->close();
+  }
+  session_.answer_lock(wanted.id, result, rr::read_clocks());
+  settle();
+}
+
+}  // namespace rrgate

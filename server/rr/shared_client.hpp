@@ -1,0 +1,120 @@
+// One client of a shared service: a session of its own with the gateway. Layer: server/rr.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <unordered_map>
+#include <utility>
+
+#include "node/driver/stream_driver.hpp"
+#include "server/rr/shared_service.hpp"
+
+namespace rrgate {
+
+/// The node that a client is connected to.
+class SharedClientOwner {
+ public:
+  /// Null: the service index.
+  virtual std::shared_ptr<SharedService> find_service(std::string_view name) const = 0;
+  /// Has a login judged, and answered with client.answer_login().
+  virtual void judge_login(const rr::LoginRequested& login, const std::shared_ptr<SharedClient>& client) = 0;
+  virtual void client_ended(SharedClient& client) = 0;
+
+ protected:
+  ~SharedClientOwner() = default;
+};
+
+class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private UpstreamClient {
+ public:
+  SharedClient(SharedClientOwner& owner, rr::ServiceDirectory& directory, rr::ServiceSessionOptions options,
+               std::unique_ptr<rr::ByteStream> stream, std::string peer);
+
+  const rr::ServiceSession& session() const { return session_; }
+  const std::string& peer() const { return peer_; }
+  /// Null while it has not connected to a service.
+  const std::shared_ptr<SharedService>& service() const { return service_; }
+  void answer_login(rr::LoginId id, rr::Result<rr::AuthenticatedUser> result);
+  /// Tells the client that its service ends, then closes.
+  void close_service();
+  /// Why the gateway has closed it; empty where it has not.
+  const std::string& end_reason() const { return end_reason_; }
+
+ private:
+  struct Endpoint {
+    std::string path;
+    const rr::MemberDefinition* member = nullptr;
+  };
+
+  bool handle_event(rr::Now now) override;
+  void ended() override;
+  void has_written() override;
+
+  void handle(const rr::Called& called);
+  void handle(const rr::ClientConnected& connected);
+  void handle(const rr::LoginRequested& login);
+  void handle(const rr::LocksChanged&) {}
+  void handle(const rr::WireConnected& connected);
+  void handle(const rr::WireDisconnected& disconnected);
+  void handle(const rr::WireReceived& received);
+  void handle(const rr::PipeConnected& connected);
+  void handle(const rr::PipeReceived& received);
+  void handle(const rr::PipeAcknowledged&) {}
+  void handle(const rr::PipeClosed& closed);
+  void handle(const rr::GeneratorEnded& ended);
+  void handle(const rr::CallbackCompleted& completed);
+  void handle(const rr::ObjectWanted& wanted);
+  void handle(const rr::LockWanted& wanted);
+  void handle(const rr::LeaveWanted& wanted);
+  void handle(const rr::ClientGone& gone);
+
+  // UpstreamClient
+  std::weak_ptr<const void> life() const override { return weak_from_this(); }
+  void receive_event(const std::string& path, const rr::MemberDefinition& event,
+                     std::span<const rr::Value> arguments) override;
+  void receive_wire(rr::WirePacket& packet) override;
+  void answer_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::Result<>& result) override;
+  void note_conflated(const std::string& path, const rr::MemberDefinition& wire, std::uint64_t count) override;
+  void close_wire(const std::string& path, const rr::MemberDefinition& wire) override;
+  void accept_pipe(rr::PipeId id) override;
+  void refuse_pipe(rr::PipeId id, const rr::Error& error) override;
+  void receive_packet(rr::PipeId id, const rr::Value& packet) override;
+  bool is_behind() const override { return is_behind_; }
+  void acknowledge_packets(rr::PipeId id, std::span<const std::uint32_t> numbers) override;
+  void close_pipe(rr::PipeId id) override;
+  void release_path(const std::string& path) override;
+  void call_callback(const std::string& path, const rr::MemberDefinition& callback,
+                     std::span<const rr::Value> arguments, rr::ClientConnection::CallbackReply answer) override;
+
+  static rr::awaitable<void> log_in_at_device(std::shared_ptr<SharedClient> self,
+                                              std::shared_ptr<SharedService> service, rr::LoginRequested login);
+  static rr::awaitable<void> take_lock(std::shared_ptr<SharedClient> self, rr::LockWanted wanted);
+  static rr::awaitable<void> keep_logged_in(std::shared_ptr<SharedClient> self, std::shared_ptr<Upstream> login);
+  void answer_lock(const rr::LockWanted& wanted, const rr::Result<>& result);
+  /// From now on all that the client does goes through `upstream`.
+  void move_to(std::shared_ptr<Upstream> upstream);
+  /// Where a request goes: to the session that holds the client's locks, while there are any.
+  Upstream& requests() const { return locker_ ? *locker_ : *home_; }
+  void leave_login();
+  void end_too_slow(const rr::Error& error);
+  /// Bytes that wait for the stream: above, the client is behind; below half of them it has caught up.
+  std::size_t much_waiting() const { return session_.max_pipe_queued_bytes() / 4; }
+
+  SharedClientOwner* owner_;
+  std::string peer_;
+  std::string end_reason_;
+  bool is_behind_ = false;
+  bool was_behind_ = false;  ///< and it is in the log
+  std::shared_ptr<SharedService> service_;
+  std::shared_ptr<Upstream> home_;    ///< the shared one, or that of the user who has logged in at the device
+  std::shared_ptr<Upstream> login_;   ///< the latter; null: there is none
+  std::shared_ptr<Upstream> locker_;  ///< while locks are held without a login
+  std::set<std::string> locked_;      ///< paths of those locks
+  std::set<std::pair<std::string, const rr::MemberDefinition*>> wires_;
+  std::unordered_map<rr::PipeId, Endpoint> pipes_;
+  std::unordered_map<rr::CallbackId, rr::ClientConnection::CallbackReply> callbacks_;
+};
+
+}  // namespace rrgate

@@ -1,0 +1,146 @@
+#include "server/rr/shared_devices.hpp"
+
+#include <algorithm>
+#include <boost/uuid/name_generator_sha1.hpp>
+
+#include "core/session/service/service_index.hpp"
+#include "node/transport/socket_stream.hpp"
+
+namespace rrgate {
+
+namespace {
+
+/// A UUID of version 5 in the name space of the gateway's own: the same whenever the gateway has the same.
+rr::NodeId derived_id(const rr::NodeId& gateway, std::string_view device) {
+  boost::uuids::uuid space;
+  std::copy(gateway.bytes.begin(), gateway.bytes.end(), space.begin());
+  const auto derived = boost::uuids::name_generator_sha1(space)(std::string(device));
+  rr::NodeId id;
+  std::copy(derived.begin(), derived.end(), id.bytes.begin());
+  return id;
+}
+
+/// Names of devices may have characters that names of nodes may not.
+std::string node_name_of(const std::string& device) {
+  return rr::is_valid_node_name(device) ? device : std::string();
+}
+
+}  // namespace
+
+SharedDevice::SharedDevice(std::shared_ptr<Device> device, SharedNode& gateway_node, const Config& config,
+                           SharedNode::FindAuthenticator find_authenticator)
+    : device_(std::move(device)),
+      gateway_node_(gateway_node),
+      config_(config),
+      node_({derived_id(gateway_node.identity().id, device_->config().name), node_name_of(device_->config().name)},
+            config) {
+  node_.set_authenticator(std::move(find_authenticator));
+  device_->share_by([this] { return open_stream(); });
+  device_->on_change([this] { refresh(); });
+  refresh();
+}
+
+SharedDevice::~SharedDevice() {
+  device_->share_by(nullptr);
+  device_->on_change(nullptr);
+  for (const auto& [name, service] : services_) service->stop();
+  node_.close();
+}
+
+void SharedDevice::refresh() {
+  const auto& identity = device_->identity();
+  if (!identity) return;
+  const auto has = [&](const std::string& name) {
+    return std::any_of(identity->services.begin(), identity->services.end(),
+                       [&](const DeviceService& service) { return service.name == name; });
+  };
+  for (auto it = services_.begin(); it != services_.end();) {
+    if (has(it->first)) {
+      ++it;
+      continue;
+    }
+    it->second->stop();
+    it = services_.erase(it);
+  }
+  for (const auto& service : identity->services) {
+    if (service.name == rr::service_index_name || services_.contains(service.name)) continue;
+    const std::vector<ServiceBoard*> boards{&node_, &gateway_node_};
+    const auto shared = std::make_shared<SharedService>(device_, service.name, config_.retry, boards);
+    services_.emplace(service.name, shared);
+    shared->start();
+  }
+}
+
+bool SharedDevice::is_ready() const {
+  if (!device_->identity()) return device_->state() == DeviceState::offline;
+  return std::all_of(services_.begin(), services_.end(),
+                     [](const auto& service) { return service.second->has_tried(); });
+}
+
+rr::Result<std::unique_ptr<rr::ByteStream>> SharedDevice::open_stream() {
+  const bool is_ready = std::any_of(services_.begin(), services_.end(),
+                                    [](const auto& service) { return service.second->hosted() != nullptr; });
+  if (!is_ready)
+    return rr::make_error(rr::ErrorCode::connection_error,
+                          device_->last_error().empty() ? "no session with it yet" : device_->last_error());
+  auto pair = rr::make_stream_pair(device_->executor(), config_.timeouts.send_stall);
+  if (!pair) return pair.error();
+  SharedArrival arrival;
+  arrival.peer = "the gateway itself";
+  node_.add(std::move(pair->second), std::move(arrival), nullptr);
+  return std::move(pair->first);
+}
+
+SharedDevices::SharedDevices(const rr::NodeId& id, const Config& config,
+                             SharedNode::FindAuthenticator find_authenticator)
+    : config_(config), find_authenticator_(std::move(find_authenticator)), node_({id, config.node.name}, config) {
+  node_.set_authenticator(find_authenticator_);
+}
+
+void SharedDevices::sync(const DeviceRegistry& devices) {
+  std::erase_if(devices_, [&](const auto& each) { return !devices.has(*each.first); });
+  for (const auto& device : devices.all())
+    if (device->is_shared() && !devices_.contains(device.get()))
+      devices_.emplace(device.get(), std::make_unique<SharedDevice>(device, node_, config_, find_authenticator_));
+}
+
+void SharedDevices::add_own(std::shared_ptr<Device> device, const std::string& service) {
+  own_service_ =
+      std::make_shared<SharedService>(std::move(device), service, config_.retry, std::vector<ServiceBoard*>{&node_});
+  own_service_->start();
+}
+
+void SharedDevices::stop() {
+  devices_.clear();
+  if (own_service_) own_service_->stop();
+  own_service_.reset();
+  node_.close();
+}
+
+bool SharedDevices::is_ready() const {
+  return std::all_of(devices_.begin(), devices_.end(), [](const auto& device) { return device.second->is_ready(); });
+}
+
+SharedDevice* SharedDevices::find(const Device& device) const {
+  const auto found = devices_.find(&device);
+  return found == devices_.end() ? nullptr : found->second.get();
+}
+
+SharedDevice* SharedDevices::find(const rr::NodeId& node_id, std::string_view node_name) const {
+  if (node_id.is_any() && node_name.empty()) return nullptr;
+  for (const auto& [key, device] : devices_) {
+    const auto& identity = device->node().identity();
+    if ((node_id.is_any() || node_id == identity.id) && (node_name.empty() || node_name == identity.name))
+      return device.get();
+  }
+  return nullptr;
+}
+
+Traffic SharedDevices::traffic_of(const Device& device) const {
+  auto traffic = device.traffic();
+  if (const auto* shared = find(device))
+    for (const auto& [name, service] : shared->services()) service->add_traffic(traffic);
+  return traffic;
+}
+
+}  // namespace rrgate

@@ -1,0 +1,68 @@
+// A node that is the gateway: its own, or the one that stands for a shared device. Layer: server/rr.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "node/service/login_judge.hpp"
+#include "server/rr/shared_client.hpp"
+
+namespace rrgate {
+
+/// What a connection brings with it.
+struct SharedArrival {
+  std::string peer;      ///< for logs
+  std::string base_url;  ///< of the node, as this client reaches it: "rr+tcp://10.0.0.5:52222/"
+  std::function<rr::Result<>(const rr::MemberAccess&)> admit;  ///< none: everything is allowed
+  /// See ServiceSessionOptions.
+  std::function<rr::Result<std::shared_ptr<const void>>(const rr::MemberAccess&)> enter;
+  bool is_encrypted = false;
+};
+
+class SharedNode final : public ServiceBoard, public SharedClientOwner {
+ public:
+  /// `config`  outlives it.
+  SharedNode(rr::NodeIdentity identity, const Config& config) : config_(config), directory_(std::move(identity)) {}
+  ~SharedNode() { close(); }
+  SharedNode(const SharedNode&) = delete;
+  SharedNode& operator=(const SharedNode&) = delete;
+
+  rr::ServiceDirectory& directory() { return directory_; }
+  const rr::NodeIdentity& identity() const { return directory_.identity(); }
+
+  /// A client on a stream, from now until one of the two ends; `ended` is called then.
+  std::shared_ptr<SharedClient> add(std::unique_ptr<rr::ByteStream> stream, SharedArrival arrival,
+                                    std::function<void()> ended);
+  const std::map<SharedClient*, std::shared_ptr<SharedClient>>& clients() const { return clients_; }
+  /// Tells all clients that their services end.
+  void close();
+
+  /// Who judges logins; asked when a service is published. None: each device its own.
+  using FindAuthenticator = std::function<std::shared_ptr<const rr::Authenticator>()>;
+  void set_authenticator(FindAuthenticator find) { find_authenticator_ = std::move(find); }
+  /// The name of the device that a service is of; empty where there is no such service, or the index.
+  std::string device_of(std::string_view service) const;
+
+  std::shared_ptr<const rr::Authenticator> authenticator() const override {
+    return find_authenticator_ ? find_authenticator_() : nullptr;
+  }
+  void publish(const std::shared_ptr<rr::HostedService>& hosted, SharedService& service) override;
+  void withdraw(const rr::HostedService& hosted) override;
+
+ private:
+  std::shared_ptr<SharedService> find_service(std::string_view name) const override;
+  void judge_login(const rr::LoginRequested& login, const std::shared_ptr<SharedClient>& client) override;
+  void client_ended(SharedClient& client) override;
+
+  const Config& config_;
+  rr::ServiceDirectory directory_;
+  FindAuthenticator find_authenticator_;
+  rr::LoginJudge judge_;
+  std::map<std::string, std::pair<const rr::HostedService*, std::weak_ptr<SharedService>>, std::less<>> services_;
+  std::map<SharedClient*, std::shared_ptr<SharedClient>> clients_;
+  std::map<SharedClient*, std::function<void()>> ended_;
+};
+
+}  // namespace rrgate

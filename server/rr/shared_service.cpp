@@ -1,0 +1,190 @@
+#include "server/rr/shared_service.hpp"
+
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/use_awaitable.hpp>
+
+#include "server/log/log.hpp"
+#include "server/rr/shared_client.hpp"
+
+namespace rrgate {
+
+namespace asio = boost::asio;
+
+namespace {
+
+/// Stands for the device, which judges logins itself: see SharedClient.
+class JudgedByDevice final : public rr::Authenticator {
+ public:
+  rr::Result<rr::AuthenticatedUser> authenticate(const rr::LoginAttempt&) const override {
+    return rr::make_error(rr::ErrorCode::authentication_error, "Authentication Failed");
+  }
+};
+
+/// What clients may want to know, because some things differ from a session of their own.
+rr::MapString with_mode(rr::MapString attributes) {
+  constexpr std::string_view mode = "rrgate.mode";
+  std::erase_if(attributes.items, [mode](const auto& item) { return item.first == mode; });
+  attributes.items.emplace_back(std::string(mode), rr::Value("shared"));
+  return attributes;
+}
+
+void add_to(Traffic& traffic, const rr::ServiceSession& session) {
+  const auto& stats = session.connection().stats();
+  traffic.to_device.bytes += stats.bytes_received;
+  traffic.to_device.messages += stats.messages_received;
+  traffic.to_clients.bytes += stats.bytes_sent;
+  traffic.to_clients.messages += stats.messages_sent;
+  traffic.ledgers.add(session.total_ledgers());
+}
+
+/// Definitions that the root's does not import.
+std::vector<std::string> extra_imports(const rr::TypeRegistry& types, const rr::HostedService& without) {
+  std::vector<std::string> out;
+  const auto known = without.definitions_for_client();
+  for (const auto& definition : types.definitions()) {
+    const auto is_it = [&](const auto* other) { return other->name == definition->name; };
+    if (std::none_of(known.begin(), known.end(), is_it)) out.push_back(definition->name);
+  }
+  return out;
+}
+
+}  // namespace
+
+SharedService::SharedService(std::shared_ptr<Device> device, std::string name, Retry retry,
+                             std::vector<ServiceBoard*> boards)
+    : device_(std::move(device)),
+      name_(std::move(name)),
+      retry_(retry),
+      boards_(std::move(boards)),
+      upstream_(std::make_shared<Upstream>(device_, name_, device_->config().login)),
+      for_device_(std::make_shared<JudgedByDevice>()),
+      wake_(device_->executor()) {}
+
+std::shared_ptr<Upstream> SharedService::make_upstream(UpstreamLogin login) const {
+  return std::make_shared<Upstream>(device_, name_, std::move(login));
+}
+
+void SharedService::start() {
+  upstream_->on_lost([weak = weak_from_this()] {
+    if (const auto self = weak.lock()) self->wake_.cancel();
+  });
+  upstream_->on_released([weak = weak_from_this()](const std::string& path) {
+    if (const auto self = weak.lock(); self && self->hosted_) self->hosted_->forget_path(path);
+  });
+  asio::co_spawn(device_->executor(), keep_open(shared_from_this()), asio::detached);
+}
+
+void SharedService::stop() {
+  is_stopped_ = true;
+  wake_.cancel();
+  withdraw();
+  upstream_->close();
+}
+
+rr::awaitable<void> SharedService::keep_open(std::shared_ptr<SharedService> self) {
+  const auto nap = asio::as_tuple(asio::use_awaitable);
+  auto wait = self->retry_.min;
+  while (!self->is_stopped_) {
+    const auto opened = co_await self->upstream_->open();
+    if (self->is_stopped_) break;
+    rr::Result<> done = opened;
+    if (opened) done = self->publish();
+    self->has_tried_ = true;
+    if (done) {
+      log(LogLevel::info, "shared session open", {{"device", self->device_->config().name}, {"service", self->name_}});
+      wait = self->retry_.min;
+      self->wake_.expires_at(asio::steady_timer::time_point::max());
+      while (self->upstream_->is_open() && !self->is_stopped_) co_await self->wake_.async_wait(nap);
+      log(LogLevel::info, "shared session lost",
+          {{"device", self->device_->config().name}, {"service", self->name_}, {"clients", self->clients_.size()}});
+      if (self->is_stopped_) break;
+    } else {
+      log(LogLevel::warning, "shared session can't be opened",
+          {{"device", self->device_->config().name}, {"service", self->name_}, {"error", done.error().message}});
+    }
+    self->wake_.expires_after(with_jitter(wait));
+    co_await self->wake_.async_wait(nap);
+    wait = std::min(wait * 2, self->retry_.max);
+  }
+  self->upstream_->close();
+}
+
+rr::Result<> SharedService::take_over_definitions(const rr::TypeRegistry& from) {
+  std::vector<std::string> texts;
+  for (const auto& definition : from.definitions())
+    if (!types_->find_service(definition->name)) texts.push_back(definition->text);
+  if (texts.empty()) return {};
+  return types_->add(texts, rr::RobdefMode::compat);
+}
+
+/// Offers the service as it is now. Where it is as it was, clients notice nothing.
+rr::Result<> SharedService::publish() {
+  if (!upstream_->is_open()) return upstream_->lost_error();  // again, at once
+  const auto& session = upstream_->connection()->session();
+  const auto& root_type = session.object_type(name_)->qualified_name;
+  const auto attributes = with_mode(session.attributes());
+  if (hosted_) {
+    const bool is_same_text = std::all_of(session.types().definitions().begin(), session.types().definitions().end(),
+                                          [&](const auto& definition) {
+                                            const auto* known = types_->find_service(definition->name);
+                                            return !known || known->text == definition->text;
+                                          });
+    const bool has_same_policy = hosted_->policy().require_valid_user == upstream_->requires_user();
+    if (is_same_text && has_same_policy && hosted_->root_type_name() == root_type &&
+        hosted_->attributes() == rr::Value(attributes))
+      return take_over_definitions(session.types());
+    log(LogLevel::warning, "a shared service has changed: its clients have to connect anew",
+        {{"device", device_->config().name}, {"service", name_}, {"clients", clients_.size()}});
+    withdraw();
+  }
+  types_ = std::make_shared<rr::TypeRegistry>();
+  if (auto taken = take_over_definitions(session.types()); !taken) return taken;
+  const auto root = std::make_shared<SharedObject>(name_, root_type);
+  auto hosted = rr::HostedService::make(name_, root, types_, attributes);
+  if (!hosted) return hosted.error();
+  if (auto more = extra_imports(*types_, **hosted); !more.empty())
+    hosted = rr::HostedService::make(name_, root, types_, attributes, std::move(more));
+  hosted_ = std::move(*hosted);
+  hosted_->set_remote();
+  rr::SecurityPolicy policy;
+  policy.authenticator = boards_.front()->authenticator();
+  if (!policy.authenticator) policy.authenticator = for_device_;
+  policy.require_valid_user = upstream_->requires_user();
+  hosted_->set_policy(policy);
+  for (auto* board : boards_) board->publish(hosted_, *this);
+  return {};
+}
+
+void SharedService::withdraw() {
+  const auto hosted = std::exchange(hosted_, nullptr);
+  if (!hosted) return;
+  for (auto* board : boards_) board->withdraw(*hosted);
+  const auto clients = clients_;  // each removes itself
+  for (auto* client : clients) client->close_service();
+}
+
+void SharedService::remove(SharedClient& client) {
+  if (clients_.erase(&client) > 0) add_to(device_->traffic(), client.session());
+}
+
+void SharedService::add_traffic(Traffic& traffic) const {
+  for (const auto* client : clients_) {
+    add_to(traffic, client->session());
+    traffic.to_clients.waiting += client->session().queued_bytes();
+  }
+}
+
+void SharedService::find_object(Upstream& by, const std::string& path, std::function<void(rr::Result<>)> done) {
+  by.find_object(path, [weak = weak_from_this(), path, done = std::move(done)](const rr::Result<rr::Value>& found) {
+    const auto self = weak.lock();
+    if (!self || !self->hosted_) return;  // whoever asked has been told that the service is gone
+    if (!found) return done(found.error());
+    if (const auto& connection = self->upstream_->connection())
+      if (auto taken = self->take_over_definitions(connection->session().types()); !taken) return done(taken.error());
+    done(self->hosted_->add_object(path, std::make_shared<SharedObject>(path, std::string(found->to_text().value()))));
+  });
+}
+
+}  // namespace rrgate

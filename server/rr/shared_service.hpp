@@ -1,0 +1,83 @@
+// A service of a device that many clients share: kept connected, and offered again as the gateway's. Layer:
+// server/rr. Source: sessions spec section 2.20.
+#pragma once
+
+#include <boost/asio/steady_timer.hpp>
+#include <functional>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "server/upstream/upstream.hpp"
+
+namespace rrgate {
+
+class SharedClient;
+class SharedService;
+
+/// Where a service is offered: on the node of its device, and on the gateway's.
+class ServiceBoard {
+ public:
+  /// Who judges logins; null: the device does.
+  virtual std::shared_ptr<const rr::Authenticator> authenticator() const = 0;
+  /// Where the name is taken already, the service is not offered there.
+  virtual void publish(const std::shared_ptr<rr::HostedService>& hosted, SharedService& service) = 0;
+  virtual void withdraw(const rr::HostedService& hosted) = 0;
+
+ protected:
+  ~ServiceBoard() = default;
+};
+
+class SharedService : public std::enable_shared_from_this<SharedService> {
+ public:
+  /// `boards`  outlive it.
+  SharedService(std::shared_ptr<Device> device, std::string name, Retry retry, std::vector<ServiceBoard*> boards);
+
+  /// Connects, again and again, until stop().
+  void start();
+  void stop();
+
+  const std::string& name() const { return name_; }
+  const std::shared_ptr<Device>& device() const { return device_; }
+  /// Null before the device has answered for the first time.
+  const std::shared_ptr<rr::HostedService>& hosted() const { return hosted_; }
+  /// Whether the first attempt to connect is over, well or not.
+  bool has_tried() const { return has_tried_; }
+  /// The session that all clients share.
+  const std::shared_ptr<Upstream>& upstream() const { return upstream_; }
+  /// A session for one client alone; not open yet.
+  std::shared_ptr<Upstream> make_upstream(UpstreamLogin login) const;
+  /// Whether a login is for the device to judge.
+  bool is_for_device(const rr::Authenticator& authenticator) const { return &authenticator == for_device_.get(); }
+
+  /// Looks for an object and adds it to what is hosted.
+  void find_object(Upstream& by, const std::string& path, std::function<void(rr::Result<>)> done);
+
+  void add(SharedClient& client) { clients_.insert(&client); }
+  void remove(SharedClient& client);
+  const std::set<SharedClient*>& clients() const { return clients_; }
+  /// Adds what the clients that are there have had.
+  void add_traffic(Traffic& traffic) const;
+
+ private:
+  static rr::awaitable<void> keep_open(std::shared_ptr<SharedService> self);
+  rr::Result<> publish();
+  void withdraw();
+  rr::Result<> take_over_definitions(const rr::TypeRegistry& from);
+
+  std::shared_ptr<Device> device_;
+  std::string name_;
+  Retry retry_;
+  std::vector<ServiceBoard*> boards_;
+  std::shared_ptr<Upstream> upstream_;
+  std::shared_ptr<const rr::Authenticator> for_device_;
+  std::shared_ptr<rr::TypeRegistry> types_;
+  std::shared_ptr<rr::HostedService> hosted_;
+  std::set<SharedClient*> clients_;
+  boost::asio::steady_timer wake_;
+  bool has_tried_ = false;
+  bool is_stopped_ = false;
+};
+
+}  // namespace rrgate

@@ -1,0 +1,535 @@
+#include "server/socket/json_operations.hpp"
+
+#include <algorithm>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/post.hpp>
+
+#include "server/http/endpoints/call_log.hpp"
+#include "server/http/endpoints/member_values.hpp"
+
+namespace rrgate {
+
+namespace asio = boost::asio;
+
+namespace {
+
+/// Subscriptions, generators and callbacks at a time, and as many wires and pipes that are sent on.
+constexpr std::size_t max_open = 256;
+/// Requests that are not answered yet.
+constexpr std::size_t max_running = 64;
+/// What the client may take to answer the device.
+constexpr std::chrono::seconds answer_time{10};
+
+rr::OrderedJson to_json(const Target& target, const rr::Value& value, const rr::JsonForm& form) {
+  return value_or_throw(rr::value_to_json(value, target.member->type, target.types(), form, target.member->name));
+}
+
+std::string path_of(const Target& target) {
+  return target.member ? target.object.path() + "." + target.member->name : target.object.path();
+}
+
+/// Throws   rr::Exception: the path leads to something else.
+const rr::MemberDefinition& expect_member(const Target& target, std::string_view operation,
+                                          std::initializer_list<rr::MemberKind> kinds) {
+  const auto* member = target.member;
+  if (member && std::find(kinds.begin(), kinds.end(), member->kind) != kinds.end()) return *member;
+  refuse(rr::ErrorCode::invalid_operation, rr::quoted(path_of(target)) + " is a " +
+                                               (member ? std::string(member_kind_name(member->kind)) : "object") +
+                                               "; \"" + std::string(operation) + "\" is not for that");
+}
+
+void expect_direction(const rr::MemberDefinition& member, rr::MemberDirection never) {
+  if (member.direction() != never) return;
+  const bool is_read_only = never == rr::MemberDirection::readonly;
+  refuse(is_read_only ? rr::ErrorCode::read_only_member : rr::ErrorCode::write_only_member,
+         rr::quoted(member.name) + (is_read_only ? " can only be read" : " can only be written"));
+}
+
+bool takes_values(const rr::MemberDefinition& function) {
+  return !function.parameters.empty() && function.parameters.back().type.container == rr::ContainerKind::generator;
+}
+
+}  // namespace
+
+struct JsonOperations::Ask {
+  Ask(TargetPtr of, rr::ClientConnection::CallbackReply to, const asio::any_io_executor& executor,
+      std::function<void()> expired)
+      : target(std::move(of)), reply(std::move(to)), limit(executor, std::move(expired)) {}
+
+  TargetPtr target;
+  rr::ClientConnection::CallbackReply reply;
+  rr::Deadline limit;
+};
+
+const JsonOperations::Operation JsonOperations::operations[] = {
+    {"describe", Verb::read, &JsonOperations::describe},
+    {"get", Verb::read, &JsonOperations::get},
+    {"set", Verb::write, &JsonOperations::set},
+    {"call", Verb::call, &JsonOperations::call},
+    {"open", Verb::call, &JsonOperations::open},
+    {"next", Verb::call, &JsonOperations::next, false},
+    {"close", Verb::call, &JsonOperations::close, false, false, false, true},
+    {"abort", Verb::call, &JsonOperations::abort, false, false, false, true},
+    {"subscribe", Verb::subscribe, &JsonOperations::subscribe},
+    {"unsubscribe", Verb::subscribe, &JsonOperations::unsubscribe, false, false, false, true},
+    {"send", Verb::write, &JsonOperations::send, true, true, true, true},
+    {"callback", Verb::subscribe, &JsonOperations::callback, true, true},
+    {"answer", Verb::subscribe, &JsonOperations::answer, false, false, false, true},
+    {"shape", Verb::read, &JsonOperations::shape},
+    {"read", Verb::read, &JsonOperations::read},
+    {"write", Verb::write, &JsonOperations::write},
+    {"lock", Verb::lock, &JsonOperations::lock, true, true},
+    {"unlock", Verb::lock, &JsonOperations::unlock, true, true},
+    {"login", Verb::read, &JsonOperations::login, false, false, true},
+};
+
+const JsonOperations::Operation* JsonOperations::find_operation(std::string_view name) {
+  const auto* found = std::find_if(std::begin(operations), std::end(operations),
+                                   [&](const Operation& each) { return each.name == name; });
+  return found == std::end(operations) ? nullptr : found;
+}
+
+JsonOperations::JsonOperations(GatewayState& gateway, JsonSocketPlace place, std::shared_ptr<JsonOutbox> outbox)
+    : gateway_(gateway), place_(std::move(place)), outbox_(std::move(outbox)) {}
+
+rr::awaitable<void> JsonOperations::take(const std::string& message) {
+  auto read = JsonRequest::from_text(message);
+  if (!read) co_return tell_error("null", read.error());
+  const auto request = std::make_shared<const JsonRequest>(std::move(*read));
+  if (running_ >= max_running)
+    co_return tell_error(request->id(),
+                         rr::make_error(rr::ErrorCode::out_of_system_resource,
+                                        "more than " + std::to_string(max_running) + " requests are not answered yet"));
+  const auto* name = request->find("op");
+  const auto* operation = name && name->is_string() ? find_operation(name->get_ref<const std::string&>()) : nullptr;
+  Passes passes;
+  if (!operation || !operation->is_free) {
+    const std::string user = place_.who.is_proven() ? place_.who.name : "";
+    auto entered =
+        gateway_.http_access().enter(place_.address, user, place_.device->config().name, gateway_.config().rates);
+    if (!entered) {
+      gateway_.reject(Rejection::rate);
+      co_return outbox_->add(json_refusal(request->id(), entered.error(), 1));
+    }
+    passes = std::move(*entered);
+  }
+  ++running_;
+  if (operation && operation->keeps_order)
+    co_await run(shared_from_this(), request, std::move(passes));
+  else
+    asio::co_spawn(place_.device->executor(), run(shared_from_this(), request, std::move(passes)), asio::detached);
+}
+
+rr::awaitable<void> JsonOperations::run(std::shared_ptr<JsonOperations> self, RequestPtr request,
+                                        [[maybe_unused]] Passes passes) {
+  std::optional<rr::Error> error;
+  rr::OrderedJson result;
+  try {
+    result = co_await self->perform(request);
+  } catch (const rr::Exception& exception) {
+    error = exception.error();
+  }
+  --self->running_;
+  if (error) {
+    self->tell_error(request->id(), *error);
+  } else if (request->id() != "null") {
+    self->outbox_->add(json_answer(request->id(), result));
+  }
+}
+
+rr::awaitable<rr::OrderedJson> JsonOperations::perform(RequestPtr request) {
+  const auto name = request->text("op", "");
+  const auto* operation = find_operation(name);
+  if (!operation) refuse(rr::ErrorCode::invalid_argument, "no operation \"op\": " + rr::quoted(name));
+  TargetPtr target;
+  if (!operation->has_target) co_return co_await (this->*operation->perform)(request, target);
+  target = co_await find(request, *operation);
+  const CallLog logged(place_.trace, place_.device->config().name, operation->name, path_of(*target));
+  co_return co_await (this->*operation->perform)(request, target);
+}
+
+rr::awaitable<JsonOperations::TargetPtr> JsonOperations::find(RequestPtr request, const Operation& operation) {
+  auto segments = place_.segments;
+  for (auto& segment : value_or_throw(split_path(request->text("path", "")))) segments.push_back(std::move(segment));
+  auto target = value_or_throw(co_await find_target(session(), segments));
+  // Packets to a client come on the endpoint on which it has sent: nobody else's.
+  const bool is_two_way = target->member && target->member->kind == rr::MemberKind::pipe &&
+                          target->member->direction() == rr::MemberDirection::both;
+  if ((operation.needs_own || (is_two_way && operation.verb == Verb::subscribe)) && target->session != own_) {
+    if (!own_) own_ = std::make_shared<DeviceSession>(place_.device, place_.key);
+    target = value_or_throw(co_await find_target(own_, segments));
+  }
+  if (is_stopped_) refuse(rr::ErrorCode::operation_cancelled, "the WebSocket has ended");
+  if (const auto allowed = check_access(gateway_, place_.who, place_.key.service, *target, operation.verb); !allowed)
+    throw rr::Exception(allowed.error());
+  co_return target;
+}
+
+std::shared_ptr<DeviceSession> JsonOperations::session() {
+  return own_ ? own_ : value_or_throw(gateway_.sessions().open(*place_.device, place_.key));
+}
+
+void JsonOperations::tell_error(const std::string& id, const rr::Error& error) {
+  outbox_->add(json_refusal(id, error));
+}
+
+void JsonOperations::stop() {
+  is_stopped_ = true;
+  for (auto& [id, open] : std::exchange(open_, {}))
+    if (const auto* generator = std::get_if<Generator>(&open))
+      generator->target->object.connection()->close_generator(generator->target->object.path(),
+                                                              generator->target->member->name, generator->index,
+                                                              [](const rr::Result<rr::Value>&) {});
+  senders_.clear();
+  const auto gone = rr::make_error(rr::ErrorCode::operation_aborted, "the client has gone");
+  for (const auto& [number, asked] : std::exchange(asks_, {})) asked->reply(gone);
+  if (own_) own_->stop();
+}
+
+// --- what is over with its answer ---
+
+rr::awaitable<rr::OrderedJson> JsonOperations::describe(RequestPtr, TargetPtr target) {
+  if (target->member) refuse(rr::ErrorCode::invalid_operation, rr::quoted(path_of(*target)) + " is no object");
+  co_return describe_object(*target);
+}
+
+rr::awaitable<rr::OrderedJson> JsonOperations::get(RequestPtr, TargetPtr target) {
+  const auto& member = expect_member(*target, "get", {rr::MemberKind::property, rr::MemberKind::wire});
+  expect_direction(member, rr::MemberDirection::writeonly);
+  rr::Value value;
+  if (member.kind == rr::MemberKind::property)
+    value = co_await target->object.get(member.name);
+  else
+    value = co_await target->object.peek_in(member.name);
+  co_return to_json(*target, value, place_.form);
+}
+
+rr::awaitable<rr::OrderedJson> JsonOperations::set(RequestPtr request, TargetPtr target) {
+  const auto& member = expect_member(*target, "set", {rr::MemberKind::property, rr::MemberKind::wire});
+  expect_direction(member, rr::MemberDirection::readonly);
+  auto value =
+      value_or_throw(rr::value_from_json(request->at("value"), member.type, target->types(), place_.form, member.name));
+  if (member.kind == rr::MemberKind::property)
+    co_await target->object.set(member.name, std::move(value));
+  else
+    co_await target->object.poke_out(member.name, std::move(value));
+  co_return nullptr;
+}
+
+rr::awaitable<rr::OrderedJson> JsonOperations::call(RequestPtr request, TargetPtr target) {
+  const auto& member = expect_member(*target, "call", {rr::MemberKind::function});
+  if (member.is_generator())
+    refuse(rr::ErrorCode::invalid_operation, rr::quoted(member.name) + " is a generator; use \"open\"");
+  static const auto none = rr::Json::object();
+  const auto* given = request->find("args");
+  auto arguments = value_or_throw(arguments_from_json(given ? *given : none, member, target->types(), place_.form));
+  const auto value = co_await target->object.call_values(member.name, std::move(arguments));
+  co_return to_json(*target, value, place_.form);
+}
+
+rr::awaitable<rr::OrderedJson> JsonOperations::shape(RequestPtr, TargetPtr target) {
+  expect_member(*target, "shape", {rr::MemberKind::memory});
+  const auto sizes = co_await memory_shape(*target);
+  co_return rr::OrderedJson(sizes);
+}
+
+rr::awaitable<rr::OrderedJson> JsonOperations::read(RequestPtr request, TargetPtr target) {
+  const auto& member = expect_member(*target, "read", {rr::MemberKind::memory});
+  expect_direction(member, rr::MemberDirection::writeonly);
+  const auto sizes = co_await memory_shape(*target);
+  const auto offset = request->numbers("offset", sizes.size());
+  const auto count = request->numbers("count", sizes.size());
+  const auto items = co_await read_items(*target, sizes, offset, count);
+  co_return to_json(*target, items, place_.form);
+}
+
+rr::awaitable<rr::OrderedJson> JsonOperations::write(RequestPtr request, TargetPtr target) {
+  const auto& member = expect_member(*target, "write", {rr::MemberKind::memory});
+  expect_direction(member, rr::MemberDirection::readonly);
+  const auto sizes = co_await memory_shape(*target);
+  rr::MemoryShape at = request->numbers("offset", sizes.size()).value_or(Shape(sizes.size(), 0));
+  auto items =
+      value_or_throw(rr::value_from_json(request->at("value"), member.type, target->types(), place_.form, member.name));
+  co_await target->object.write_memory(member.name, std::move(at), std::move(items));
+  co_return nullptr;
+}
+
+rr::awaitable<rr::OrderedJson> JsonOperations::lock(RequestPtr request, TargetPtr target) {
+  if (target->member) refuse(rr::ErrorCode::invalid_operation, "objects are locked, not their members");
+  const auto kind = request->text("kind", "client");
+  if (kind != "client" && kind != "user")
+    refuse(rr::ErrorCode::invalid_argument, "\"kind\" is " + rr::quoted(kind) + ", expected \"client\" or \"user\"");
+  co_await target->object.lock(kind == "user" ? rr::LockKind::user : rr::LockKind::client);
+  co_return nullptr;
+}
+
+rr::awaitable<rr::OrderedJson> JsonOperations::unlock(RequestPtr, TargetPtr target) {
+  co_await target->object.unlock();
+  co_return nullptr;
+}
+
+rr::awaitable<rr::OrderedJson> JsonOperations::login(RequestPtr request, TargetPtr) {
+  if (own_ || !open_.empty() || running_ > 1)
+    refuse(rr::ErrorCode::invalid_operation, "\"login\" comes first: others are under way, or something is open");
+  place_.key.username = request->text("username", "");
+  place_.key.password = request->text("password", "");
+  const auto session_of_user = session();
+  value_or_throw(co_await session_of_user->root());
+  co_return nullptr;
+}
+
+// --- what stays open ---
+
+std::string JsonOperations::reserve(const JsonRequest& request) {
+  const auto& id = request.id();
+  if (id == "null") refuse(rr::ErrorCode::invalid_argument, "what stays open is named by its \"id\": it needs one");
+  if (open_.contains(id)) refuse(rr::ErrorCode::invalid_argument, "the id " + id + " names something that is open");
+  if (open_.size() >= max_open)
+    refuse(rr::ErrorCode::out_of_system_resource,
+           "this WebSocket has " + std::to_string(max_open) + " subscriptions, generators and callbacks already");
+  open_[id] = Opening{};
+  return id;
+}
+
+rr::awaitable<rr::OrderedJson> JsonOperations::open(RequestPtr request, TargetPtr target) {
+  const auto& member = expect_member(*target, "open", {rr::MemberKind::function});
+  if (!member.is_generator())
+    refuse(rr::ErrorCode::invalid_operation, rr::quoted(member.name) + " is no generator; use \"call\"");
+  static const auto none = rr::Json::object();
+  const auto* given = request->find("args");
+  auto arguments = value_or_throw(arguments_from_json(given ? *given : none, member, target->types(), place_.form));
+  const auto id = reserve(*request);
+  Generator generator{target};
+  std::optional<rr::Error> error;
+  try {
+    const auto opened = co_await target->object.open_generator(member.name, std::move(arguments));
+    generator.index = opened.to<std::int32_t>().value();
+  } catch (const rr::Exception& exception) {
+    error = exception.error();
+  }
+  if (error) {
+    open_.erase(id);
+    throw rr::Exception(*error);
+  }
+  if (is_stopped_) {  // nobody will close it
+    target->object.connection()->close_generator(target->object.path(), member.name, generator.index,
+                                                 [](const rr::Result<rr::Value>&) {});
+    co_return nullptr;
+  }
+  open_[id] = std::move(generator);
+  co_return nullptr;
+}
+
+JsonOperations::Generator& JsonOperations::generator_of(const JsonRequest& request) {
+  const auto found = open_.find(request.at("generator").dump());
+  auto* generator = found == open_.end() ? nullptr : std::get_if<Generator>(&found->second);
+  if (!generator) refuse(rr::ErrorCode::invalid_argument, "\"generator\" is not the id of one that is open");
+  return *generator;
+}
+
+rr::awaitable<rr::OrderedJson> JsonOperations::next(RequestPtr request, TargetPtr) {
+  const auto [target, index] = generator_of(*request);
+  const auto& member = *target->member;
+  std::optional<rr::Value> parameter;
+  if (takes_values(member))
+    parameter = value_or_throw(rr::value_from_json(request->at("value"), member.parameters.back().type, target->types(),
+                                                   place_.form, member.parameters.back().name));
+  rr::Value value;
+  std::optional<rr::Error> error;
+  try {
+    value = co_await target->object.next_generator(member.name, index, std::move(parameter));
+  } catch (const rr::Exception& exception) {
+    error = exception.error();
+  }
+  auto out = rr::OrderedJson::object();
+  if (error) {
+    const bool has_ended = error->code == rr::ErrorCode::stop_iteration;
+    if (has_ended || error->code == rr::ErrorCode::operation_aborted) open_.erase(request->at("generator").dump());
+    if (!has_ended) throw rr::Exception(*error);
+    rr::add_key(out, "done") = true;
+    co_return out;
+  }
+  rr::add_key(out, "value") = to_json(*target, value, place_.form);
+  rr::add_key(out, "done") = false;
+  co_return out;
+}
+
+rr::awaitable<rr::OrderedJson> JsonOperations::close(RequestPtr request, TargetPtr) {
+  const auto [target, index] = generator_of(*request);
+  open_.erase(request->at("generator").dump());
+  co_await target->object.close_generator(target->member->name, index);
+  co_return nullptr;
+}
+
+rr::awaitable<rr::OrderedJson> JsonOperations::abort(RequestPtr request, TargetPtr) {
+  const auto [target, index] = generator_of(*request);
+  open_.erase(request->at("generator").dump());
+  co_await target->object.abort_generator(target->member->name, index);
+  co_return nullptr;
+}
+
+namespace {
+
+/// {"subscription": id, ...}
+std::string news_of(const std::string& id, rr::OrderedJson news) {
+  return "{\"subscription\":" + id + "," + rr::write_json(news).substr(1);
+}
+
+/// A sample as the client gets it; also why it can't get it.
+std::string sample_text(const std::string& id, const Sample& sample, const Target& target, const rr::JsonForm& form) {
+  auto out = rr::OrderedJson::object();
+  auto value = sample_to_json(sample, *target.member, target.types(), form);
+  if (!value) return news_of(id, rr::error_to_json(value.error(), target.types()));
+  rr::add_key(out, "value") = std::move(*value);
+  if (target.member->kind == rr::MemberKind::event) rr::add_key(out, "number") = sample.number;
+  if (target.member->kind == rr::MemberKind::wire)
+    rr::add_key(out, "time") = {{"seconds", std::to_string(sample.time.seconds)},
+                                {"nanoseconds", sample.time.nanoseconds}};
+  return news_of(id, std::move(out));
+}
+
+}  // namespace
+
+rr::awaitable<rr::OrderedJson> JsonOperations::subscribe(RequestPtr request, TargetPtr target) {
+  const auto& member =
+      expect_member(*target, "subscribe", {rr::MemberKind::event, rr::MemberKind::wire, rr::MemberKind::pipe});
+  expect_direction(member, rr::MemberDirection::writeonly);
+  const auto* after = request->find("after");
+  if (after && !after->is_number_unsigned())
+    refuse(rr::ErrorCode::invalid_argument, "\"after\" is the number of an event");
+  const auto id = reserve(*request);
+  // The target's connection keeps the definitions, which the member is of; its session would keep itself.
+  const auto told = std::make_shared<Target>(*target);
+  told->session.reset();
+  SampleHandler handler = [outbox = outbox_, id, told, form = place_.form](const SamplePtr& sample,
+                                                                           const rr::Error* error) {
+    if (!sample) {
+      auto out = rr::OrderedJson::object();
+      rr::add_key(out, "state") = state_name(error);
+      if (error) rr::add_key(out, "detail") = rr::error_to_json(*error, told->types())["error"]["message"];
+      outbox->add(news_of(id, std::move(out)));
+    } else if (told->member->kind == rr::MemberKind::wire) {
+      outbox->add_newest(id, [id, told, form, sample] { return sample_text(id, *sample, *told, form); });
+    } else {
+      outbox->add(sample_text(id, *sample, *told, form));
+    }
+  };
+  TopicKey key(member.kind, target->object.path(), member.name);
+  auto listening =
+      co_await target->session->listen(std::move(key), after ? after->get<std::uint64_t>() : 0, std::move(handler));
+  if (!listening || is_stopped_ || !open_.contains(id)) {
+    open_.erase(id);
+    value_or_throw(std::move(listening));
+    co_return nullptr;
+  }
+  open_[id] = Subscription{std::move(*listening)};
+  co_return nullptr;
+}
+
+rr::awaitable<rr::OrderedJson> JsonOperations::unsubscribe(RequestPtr request, TargetPtr) {
+  const auto found = open_.find(request->at("subscription").dump());
+  if (found == open_.end() || std::holds_alternative<Generator>(found->second))
+    refuse(rr::ErrorCode::invalid_argument, "\"subscription\" is not the id of one that is open");
+  const auto gone = std::move(found->second);
+  open_.erase(found);
+  co_return nullptr;
+}
+
+rr::awaitable<rr::OrderedJson> JsonOperations::send(RequestPtr request, TargetPtr target) {
+  const auto& member = expect_member(*target, "send", {rr::MemberKind::wire, rr::MemberKind::pipe});
+  expect_direction(member, rr::MemberDirection::readonly);
+  auto value =
+      value_or_throw(rr::value_from_json(request->at("value"), member.type, target->types(), place_.form, member.name));
+  const TopicKey key(member.kind, target->object.path(), member.name);
+  if (!senders_.contains(key)) {
+    if (senders_.size() >= max_open)
+      refuse(rr::ErrorCode::out_of_system_resource,
+             "this WebSocket sends on " + std::to_string(max_open) + " wires and pipes already");
+    SampleHandler nothing = [](const SamplePtr&, const rr::Error*) {};
+    auto listening = value_or_throw(co_await target->session->listen(key, 0, std::move(nothing)));
+    if (is_stopped_) co_return nullptr;
+    senders_[key] = std::move(listening);
+  }
+  const auto sent = co_await target->session->send(key, std::move(value));
+  if (!sent) throw rr::Exception(sent.error());
+  co_return nullptr;
+}
+
+// --- the device asks ---
+
+rr::awaitable<rr::OrderedJson> JsonOperations::callback(RequestPtr request, TargetPtr target) {
+  const auto& member = expect_member(*target, "callback", {rr::MemberKind::callback});
+  const auto id = reserve(*request);
+  const auto asked = std::make_shared<Target>(*target);
+  asked->session.reset();
+  rr::ClientConnection::LateCallbackHandler handler = [weak = weak_from_this(), id, asked](
+                                                          std::span<const rr::Value> arguments, const auto& reply) {
+    if (const auto self = weak.lock())
+      self->ask(id, asked, arguments, reply);
+    else
+      reply(rr::make_error(rr::ErrorCode::operation_aborted, "the client has gone"));
+  };
+  TopicKey key(member.kind, target->object.path(), member.name);
+  auto answering = co_await target->session->answer_callback(std::move(key), std::move(handler));
+  if (!answering || is_stopped_ || !open_.contains(id)) {
+    open_.erase(id);
+    value_or_throw(std::move(answering));
+    co_return nullptr;
+  }
+  open_[id] = Subscription{std::move(*answering)};
+  co_return nullptr;
+}
+
+void JsonOperations::ask(const std::string& id, const TargetPtr& target, std::span<const rr::Value> arguments,
+                         rr::ClientConnection::CallbackReply reply) {
+  auto args = arguments_to_json(arguments, *target->member, target->types(), place_.form);
+  if (!args) return reply(args.error());
+  if (asks_.size() >= max_running)
+    return reply(rr::make_error(rr::ErrorCode::out_of_system_resource,
+                                "the client has " + std::to_string(max_running) + " questions to answer already"));
+  const auto number = ++last_ask_;
+  const auto executor = place_.device->executor();
+  const auto expired = [this, number, executor] {
+    const auto late = asks_.extract(number);
+    if (!late) return;
+    late.mapped()->reply(rr::make_error(rr::ErrorCode::operation_timeout, "the client has not answered in time"));
+    asio::post(executor, [kept = late.mapped()] {});  // this function is part of it
+  };
+  const auto asked = std::make_shared<Ask>(target, std::move(reply), executor, expired);
+  asked->limit.arm(answer_time);
+  asks_[number] = asked;
+  auto question = rr::OrderedJson::object();
+  rr::add_key(question, "call") = number;
+  rr::add_key(question, "args") = std::move(*args);
+  outbox_->add("{\"callback\":" + id + "," + rr::write_json(question).substr(1));
+}
+
+rr::awaitable<rr::OrderedJson> JsonOperations::answer(RequestPtr request, TargetPtr) {
+  const auto& number = request->at("call");
+  const auto found = asks_.find(number.is_number_integer() ? number.get<std::int64_t>() : 0);
+  if (found == asks_.end())
+    refuse(rr::ErrorCode::invalid_argument, "\"call\" is no question that waits; perhaps its time is over");
+  const auto asked = found->second;
+  asks_.erase(found);
+  const auto& member = *asked->target->member;
+  if (const auto* error = request->find("error")) {
+    const auto text = [&](const char* name) {
+      const auto item = error->is_object() ? error->find(name) : error->end();
+      return error->is_object() && item != error->end() && item->is_string() ? item->get<std::string>() : "";
+    };
+    const auto name = text("name");
+    asked->reply(name.empty() ? rr::make_error(rr::ErrorCode::operation_failed, text("message"))
+                              : rr::declared_error(name, text("message")));
+    co_return nullptr;
+  }
+  static const rr::Json none;
+  const auto* result = request->find("result");
+  const auto value =
+      rr::value_from_json(result ? *result : none, member.type, asked->target->types(), place_.form, member.name);
+  asked->reply(value);
+  value_or_throw(value);
+  co_return nullptr;
+}
+
+}  // namespace rrgate

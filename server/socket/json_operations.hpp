@@ -1,0 +1,114 @@
+// What a client of a JSON WebSocket asks for, and what is open for it. Layer: server/socket. See docs/http-api.md.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "node/transport/watchdog.hpp"
+#include "server/http/endpoints/object_request.hpp"
+#include "server/socket/json_outbox.hpp"
+#include "server/socket/json_request.hpp"
+#include "server/state/http_access.hpp"
+
+namespace rrgate {
+
+/// Which object a socket is about, in which form.
+struct JsonSocketPlace {
+  std::shared_ptr<Device> device;
+  Identity who;  ///< of the gateway's users
+  std::string address;
+  SessionKey key;
+  std::vector<std::string> segments;  ///< below the service's root
+  rr::JsonForm form;
+  std::string trace;  ///< W3C trace id of the upgrade; empty: none
+};
+
+/// Lives in a shared_ptr, which the requests under way keep. For the gateway's thread.
+class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
+ public:
+  JsonOperations(GatewayState& gateway, JsonSocketPlace place, std::shared_ptr<JsonOutbox> outbox);
+
+  /// Does what one message asks for. Waits for what has to keep its order; the rest goes on beside it.
+  rr::awaitable<void> take(const std::string& message);
+  /// Ends what is open. What is under way ends by itself, and answers nobody.
+  void stop();
+
+ private:
+  using TargetPtr = std::shared_ptr<Target>;
+  using RequestPtr = std::shared_ptr<const JsonRequest>;
+  using Perform = rr::awaitable<rr::OrderedJson> (JsonOperations::*)(RequestPtr request, TargetPtr target);
+  struct Operation {
+    std::string_view name;
+    Verb verb;
+    Perform perform;
+    bool has_target = true;    ///< the request names an object or a member by its path
+    bool needs_own = false;    ///< a session that is shared with nobody
+    bool keeps_order = false;  ///< the next message waits for it
+    bool is_free = false;      ///< of bounds on requests: packets, and what ends something
+  };
+  static const Operation operations[];
+  static const Operation* find_operation(std::string_view name);
+
+  /// What a request has opened; named by its id.
+  struct Subscription {
+    std::unique_ptr<DeviceSession::Listener> listener;
+  };
+  struct Generator {
+    TargetPtr target;
+    std::int32_t index = 0;
+  };
+  struct Opening {};
+  using Open = std::variant<Opening, Subscription, Generator>;
+  /// A question of the device that the client has not answered yet.
+  struct Ask;
+
+  using Passes = std::shared_ptr<const HttpAccess::Passes>;
+  static rr::awaitable<void> run(std::shared_ptr<JsonOperations> self, RequestPtr request, Passes passes);
+  rr::awaitable<rr::OrderedJson> perform(RequestPtr request);
+  rr::awaitable<TargetPtr> find(RequestPtr request, const Operation& operation);
+  std::shared_ptr<DeviceSession> session();
+  void tell_error(const std::string& id, const rr::Error& error);
+
+  rr::awaitable<rr::OrderedJson> describe(RequestPtr request, TargetPtr target);
+  rr::awaitable<rr::OrderedJson> get(RequestPtr request, TargetPtr target);
+  rr::awaitable<rr::OrderedJson> set(RequestPtr request, TargetPtr target);
+  rr::awaitable<rr::OrderedJson> call(RequestPtr request, TargetPtr target);
+  rr::awaitable<rr::OrderedJson> open(RequestPtr request, TargetPtr target);
+  rr::awaitable<rr::OrderedJson> next(RequestPtr request, TargetPtr);
+  rr::awaitable<rr::OrderedJson> close(RequestPtr request, TargetPtr);
+  rr::awaitable<rr::OrderedJson> abort(RequestPtr request, TargetPtr);
+  rr::awaitable<rr::OrderedJson> subscribe(RequestPtr request, TargetPtr target);
+  rr::awaitable<rr::OrderedJson> unsubscribe(RequestPtr request, TargetPtr);
+  rr::awaitable<rr::OrderedJson> send(RequestPtr request, TargetPtr target);
+  rr::awaitable<rr::OrderedJson> callback(RequestPtr request, TargetPtr target);
+  rr::awaitable<rr::OrderedJson> answer(RequestPtr request, TargetPtr);
+  rr::awaitable<rr::OrderedJson> shape(RequestPtr request, TargetPtr target);
+  rr::awaitable<rr::OrderedJson> read(RequestPtr request, TargetPtr target);
+  rr::awaitable<rr::OrderedJson> write(RequestPtr request, TargetPtr target);
+  rr::awaitable<rr::OrderedJson> lock(RequestPtr request, TargetPtr target);
+  rr::awaitable<rr::OrderedJson> unlock(RequestPtr request, TargetPtr target);
+  rr::awaitable<rr::OrderedJson> login(RequestPtr request, TargetPtr);
+
+  /// Takes the request's id for what it opens. Throws   rr::Exception: no id, one that is in use, too many.
+  std::string reserve(const JsonRequest& request);
+  Generator& generator_of(const JsonRequest& request);
+  /// The device asks.
+  void ask(const std::string& id, const TargetPtr& target, std::span<const rr::Value> arguments,
+           rr::ClientConnection::CallbackReply reply);
+
+  GatewayState& gateway_;
+  JsonSocketPlace place_;
+  std::shared_ptr<JsonOutbox> outbox_;
+  std::shared_ptr<DeviceSession> own_;  ///< once something needs it; then everything uses it
+  std::map<std::string, Open> open_;
+  std::map<TopicKey, std::unique_ptr<DeviceSession::Listener>> senders_;  ///< hold what is sent on
+  std::map<std::int64_t, std::shared_ptr<Ask>> asks_;
+  std::int64_t last_ask_ = 0;
+  std::size_t running_ = 0;
+  bool is_stopped_ = false;
+};
+
+}  // namespace rrgate

@@ -1,0 +1,24 @@
+#include "server/state/gateway_state.hpp"
+
+#include <utility>
+
+#include "core/support/random.hpp"
+
+namespace rrgate {
+
+GatewayState::GatewayState(boost::asio::io_context& io, Config config)
+    : config_(std::move(config)),
+      access_(config_.access),
+      http_access_(std::make_unique<HttpAccess>(io.get_executor(), access_)),
+      web_tls_(config_.tls.certificates.empty()
+                   ? nullptr
+                   : std::make_unique<TlsFiles>(config_.tls.certificates, config_.access.client_ca)),
+      devices_(io.get_executor(), config_),
+      sessions_(io.get_executor()),
+      admission_(config_.limits.clients, config_.limits.clients_per_address),
+      shared_(config_.node.id.is_any() ? rr::random_node_id() : config_.node.id, config_,
+              [this] { return access_.authenticator(); }) {}
+
+GatewayState::~GatewayState() = default;
+
+}  // namespace rrgate

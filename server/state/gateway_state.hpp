@@ -1,0 +1,70 @@
+// What connections need of the gateway: who may do what, the devices, the counters. Layer: server/state.
+#pragma once
+
+#include <boost/asio/io_context.hpp>
+#include <boost/intrusive/list.hpp>
+#include <memory>
+
+#include "node/tls/tls_context.hpp"
+#include "server/access/access.hpp"
+#include "server/config/config.hpp"
+#include "server/config/tls_files.hpp"
+#include "server/http/router.hpp"
+#include "server/log/metrics.hpp"
+#include "server/rr/shared_devices.hpp"
+#include "server/state/admission.hpp"
+#include "server/state/connection.hpp"
+#include "server/state/http_access.hpp"
+#include "server/upstream/device.hpp"
+#include "server/upstream/device_session.hpp"
+#include "server/upstream/found_devices.hpp"
+
+namespace rrgate {
+
+/// The parts of a gateway. Uses one thread: that of the io_context. Gateway alone starts, changes and stops them.
+class GatewayState {
+ public:
+  GatewayState(const GatewayState&) = delete;
+  GatewayState& operator=(const GatewayState&) = delete;
+
+  const Config& config() const { return config_; }
+  DeviceRegistry& devices() { return devices_; }
+  DeviceSessions& sessions() { return sessions_; }
+  SharedDevices& shared() { return shared_; }
+  /// Null where the configuration has no "discover", and before start().
+  FoundDevices* found() { return config_.discover.is_enabled ? found_.get() : nullptr; }
+  Metrics& metrics() { return metrics_; }
+  void reject(Rejection why) { metrics_.reject(why); }
+  Admission& admission() { return admission_; }
+  /// Who may do what.
+  Access& access() { return access_; }
+  /// How clients of HTTP show who they are, and how much they may ask for.
+  HttpAccess& http_access() { return *http_access_; }
+  const Router& router() const { return router_; }
+  /// What new connections are encrypted with; null: TLS is not served.
+  rr::TlsContextPtr tls() const { return web_tls_ ? web_tls_->context() : nullptr; }
+  /// Our own node id, for answers to native clients that no device takes.
+  const rr::NodeId& node_id() { return shared_.node().identity().id; }
+  void add(Connection& connection) { connections_.push_back(connection); }
+  bool is_stopping() const { return is_stopping_; }
+
+ protected:
+  GatewayState(boost::asio::io_context& io, Config config);
+  ~GatewayState();
+
+  Config config_;
+  Access access_;
+  std::unique_ptr<HttpAccess> http_access_;
+  std::unique_ptr<TlsFiles> web_tls_;
+  DeviceRegistry devices_;
+  DeviceSessions sessions_;
+  std::unique_ptr<FoundDevices> found_;
+  Admission admission_;
+  SharedDevices shared_;
+  Router router_;
+  Metrics metrics_;
+  boost::intrusive::list<Connection, boost::intrusive::constant_time_size<false>> connections_;
+  bool is_stopping_ = false;
+};
+
+}  // namespace rrgate

@@ -1,0 +1,247 @@
+#include "server/state/http_access.hpp"
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/use_awaitable.hpp>
+
+#include "core/session/url.hpp"
+#include "core/support/words.hpp"
+#include "node/http/upgrade.hpp"
+#include "server/json/base64.hpp"
+#include "server/json/json.hpp"
+#include "server/state/connection.hpp"
+
+namespace rrgate {
+
+namespace asio = boost::asio;
+
+namespace {
+
+constexpr std::chrono::minutes password_memory{5};
+constexpr std::size_t max_known = 1000;
+constexpr std::size_t max_tries = 10'000;
+constexpr std::size_t max_judged = 64;
+
+using Judged = rr::Result<rr::AuthenticatedUser>;
+
+rr::awaitable<Judged> judge(std::shared_ptr<const rr::PasswordFileAuthenticator> users,
+                            std::shared_ptr<const rr::LoginAttempt> attempt) {
+  co_return users->authenticate(*attempt);
+}
+
+rr::Error refused(std::string why) {
+  return rr::make_error(rr::ErrorCode::authentication_error, std::move(why));
+}
+
+/// What follows "Basic " or "Bearer "; nullopt: another scheme.
+std::optional<std::string_view> credentials_of(std::string_view header, std::string_view scheme) {
+  if (header.size() <= scheme.size() || header[scheme.size()] != ' ' ||
+      !equals_ignoring_case(header.substr(0, scheme.size()), scheme))
+    return std::nullopt;
+  header.remove_prefix(scheme.size());
+  return header.substr(std::min(header.find_first_not_of(' '), header.size()));
+}
+
+std::optional<Identity> by_proxy(const Request& request, const Connection& connection, const Config& config) {
+  const auto& headers = config.access.identity_headers;
+  if (headers.user.empty() || !config.proxy.trust.trusts(connection.peer.endpoint.address())) return std::nullopt;
+  Identity out;
+  out.name = request.header(headers.user);
+  if (out.name.empty()) return std::nullopt;
+  if (!headers.roles.empty())
+    for (const auto role : rr::split_words(request.header(headers.roles), ", |\t")) out.roles.emplace_back(role);
+  out.proof = Proof::proxy;
+  return out;
+}
+
+}  // namespace
+
+HttpAccess::HttpAccess(asio::any_io_executor executor, Access& access)
+    : executor_(std::move(executor)), access_(access), salt_(rr::random_bytes(32)), judges_(1) {}
+
+HttpAccess::~HttpAccess() {
+  judges_.stop();
+  judges_.join();
+}
+
+rr::awaitable<rr::Result<Identity>> HttpAccess::identify(const Request& request, const Connection& connection,
+                                                         const Config& config) {
+  const auto& client = request.arrival.peer;
+  const auto proven = [this, &client](Identity identity) {
+    identity.client = client;
+    return access_.with_grants(std::move(identity));
+  };
+  if (access_.is_open()) co_return access_.anonymous(client);
+  if (auto identity = by_proxy(request, connection, config)) co_return proven(std::move(*identity));
+  const auto header = request.header(http::field::authorization);
+  const auto& state = access_.state();
+  const auto bearer = credentials_of(header, "Bearer");
+  if (bearer && (state.tokens || state.jwt)) {
+    auto identity = by_token(*bearer);
+    if (!identity) {
+      const auto nobody = access_.anonymous(client);
+      access_.record({"login_failed", &nobody, nullptr, identity.error().message});
+      co_return identity.error();
+    }
+    co_return proven(std::move(*identity));
+  }
+  const auto basic = credentials_of(header, "Basic");
+  if (basic && state.users)
+    co_return co_await by_password(std::string(*basic), client, request.arrival.address.to_string());
+  if (asks_for_websocket(request))
+    if (const auto ticket = rr::query_value(request.query(), "ticket")) {
+      auto identity = tickets_.redeem(*ticket, std::chrono::steady_clock::now());
+      if (!identity) co_return refused("the ticket is unknown, was used, or is older than 30 seconds");
+      identity->client = client;
+      co_return std::move(*identity);
+    }
+  if (connection.identity.proof == Proof::certificate) co_return proven(connection.identity);
+  co_return access_.anonymous(client);
+}
+
+rr::Result<Identity> HttpAccess::by_token(std::string_view token) const {
+  const auto now = std::chrono::system_clock::now();
+  const auto& state = access_.state();
+  if (state.jwt && (looks_like_jwt(token) || !state.tokens)) return state.jwt->verify(token, now);
+  return state.tokens->verify(token, now);
+}
+
+rr::Bytes HttpAccess::remembered_as(std::string_view username, std::string_view password) const {
+  rr::Bytes text = salt_;
+  for (const auto part : {username, std::string_view("\0", 1), password})
+    text.insert(text.end(), part.begin(), part.end());
+  return rr::sha256(text);
+}
+
+rr::awaitable<rr::Result<Identity>> HttpAccess::by_password(std::string credentials, std::string client,
+                                                            std::string address) {
+  const auto decoded = rr::decode_base64(credentials);
+  const std::string text = decoded ? std::string(decoded->begin(), decoded->end()) : "";
+  const auto colon = text.find(':');
+  if (colon == std::string::npos) co_return refused("Basic credentials can't be read");
+  const auto username = text.substr(0, colon);
+  const auto password = text.substr(colon + 1);
+  const auto users = access_.state().users;
+  const rr::Now now{std::chrono::steady_clock::now(), {}};
+  if (known_in_ != users || known_.size() >= max_known) known_.clear();
+  known_in_ = users;
+  const auto key = remembered_as(username, password);
+  if (const auto found = known_.find(key); found != known_.end() && now.steady < found->second.ends)
+    co_return access_.logged_in(found->second.user, client);
+
+  if (tries_.size() >= max_tries) tries_.clear();
+  const auto ticket = tries_[address].begin(now);
+  if (!ticket) co_return ticket.error();
+  if (judged_ >= max_judged)
+    co_return rr::make_error(rr::ErrorCode::out_of_system_resource, "too many logins at once; try again later");
+  auto attempt = std::make_shared<rr::LoginAttempt>();
+  attempt->username = username;
+  attempt->credentials.items.emplace_back("password", rr::Value(std::string_view(password)));
+  ++judged_;
+  auto judging = judge(users, attempt);
+  const auto user = co_await asio::co_spawn(judges_.get_executor(), std::move(judging), asio::use_awaitable);
+  --judged_;
+  Identity who;
+  who.name = username;
+  who.client = client;
+  if (!user) {
+    tries_[address].handle_failure(now);
+    access_.record({"login_failed", &who, nullptr, user.error().message});
+    co_return user.error();
+  }
+  if (known_in_ == users) known_[key] = {*user, now.steady + password_memory};
+  who = access_.logged_in(*user, client);
+  access_.record({"login", &who, nullptr, {}});
+  co_return who;
+}
+
+Response HttpAccess::refusal(const Identity& who, const rr::Error& error) const {
+  const auto& state = access_.state();
+  const bool has_challenge = state.users || state.tokens || state.jwt;
+  const bool helps = error.code == rr::ErrorCode::authentication_error || !who.is_proven();
+  unsigned status = has_challenge && helps ? 401 : 403;
+  if (error.code == rr::ErrorCode::out_of_system_resource) status = 503;
+  auto problem = rr::OrderedJson::object();
+  const auto name = std::string(error_code_name(error.code));
+  rr::add_key(problem, "type") = "about:blank";
+  rr::add_key(problem, "title") = name;
+  rr::add_key(problem, "status") = status;
+  rr::add_key(problem, "detail") = error.message;
+  rr::add_key(problem, "error") = {{"name", error.qualified_name()}, {"message", error.message}};
+  auto response = text_response(status, "application/problem+json",
+                                problem.dump(-1, ' ', false, rr::OrderedJson::error_handler_t::replace) + "\n");
+  response.set("Cache-Control", "no-store");
+  if (status == 401 && state.users) response.set("WWW-Authenticate", "Basic realm=\"rrgate\", charset=\"UTF-8\"");
+  if (status == 401 && (state.tokens || state.jwt)) response.set("WWW-Authenticate", "Bearer realm=\"rrgate\"");
+  if (status == 503) response.set("Retry-After", "2");
+  return response;
+}
+
+Response HttpAccess::too_much(std::string_view what) {
+  auto response = problem_response(429, "too many requests " + std::string(what) + "; try again in a second");
+  response.set("Retry-After", "1");
+  return response;
+}
+
+rr::awaitable<HttpAccess::Admitted> HttpAccess::admit(Request& request, const Connection& connection,
+                                                      const Config& config) {
+  Admitted out;
+  const auto address = request.arrival.address.to_string();
+  const auto& of_client = config.rates.client;
+  out.client = clients_.enter(address, of_client.per_second, of_client.at_once, std::chrono::steady_clock::now());
+  if (!out.client) {
+    out.refusal = too_much("from " + address);
+    co_return out;
+  }
+  const auto& of_user = config.rates.user;
+  auto identity = co_await identify(request, connection, config);
+  if (!identity) {
+    out.refusal = refusal(access_.anonymous(request.arrival.peer), identity.error());
+    co_return out;
+  }
+  request.identity = std::move(*identity);
+  if (!request.identity.is_proven()) co_return out;
+  const auto& name = request.identity.name;
+  out.user = users_.enter(name, of_user.per_second, of_user.at_once, std::chrono::steady_clock::now());
+  if (!out.user) out.refusal = too_much("of " + rr::quoted(name));
+  co_return out;
+}
+
+std::optional<RateGate::Pass> HttpAccess::enter_device(const std::string& device, const Rates& rates) {
+  return devices_.enter(device, rates.device.per_second, rates.device.at_once, std::chrono::steady_clock::now());
+}
+
+namespace {
+
+std::string to_text(const RateLimit& limit) {
+  std::string out;
+  if (limit.per_second > 0) out = std::to_string(limit.per_second) + " requests a second";
+  if (limit.at_once > 0) out += (out.empty() ? "" : " or ") + std::to_string(limit.at_once) + " at once";
+  return out;
+}
+
+}  // namespace
+
+rr::Result<std::shared_ptr<const HttpAccess::Passes>> HttpAccess::enter(const std::string& address,
+                                                                        const std::string& user,
+                                                                        const std::string& device, const Rates& rates) {
+  if (!rates.is_bound()) return std::shared_ptr<const Passes>();
+  const auto now = std::chrono::steady_clock::now();
+  const auto refused = [](const RateLimit& limit, const std::string& what) {
+    return rr::make_error(rr::ErrorCode::out_of_system_resource,
+                          "asked for more than " + to_text(limit) + " " + what + "; try again in a second");
+  };
+  auto out = std::make_shared<Passes>();
+  out->client = clients_.enter(address, rates.client.per_second, rates.client.at_once, now);
+  if (!out->client) return refused(rates.client, "from " + address);
+  if (!user.empty()) {
+    out->user = users_.enter(user, rates.user.per_second, rates.user.at_once, now);
+    if (!out->user) return refused(rates.user, "of " + rr::quoted(user));
+  }
+  if (!device.empty()) {
+    out->device = enter_device(device, rates);
+    if (!out->device) return refused(rates.device, "to device " + rr::quoted(device));
+  }
+  return std::shared_ptr<const Passes>(std::move(out));
+}
+
+}  // namespace rrgate

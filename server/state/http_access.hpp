@@ -1,0 +1,89 @@
+// Who sends a request, and how much he may ask for. Layer: server/state.
+#pragma once
+
+#include <boost/asio/any_io_executor.hpp>
+#include <boost/asio/thread_pool.hpp>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "server/access/access.hpp"
+#include "server/access/access_requests.hpp"
+#include "server/access/rate_gate.hpp"
+#include "server/access/tickets.hpp"
+#include "server/config/config.hpp"
+#include "server/http/request.hpp"
+
+namespace rrgate {
+
+struct Connection;
+
+class HttpAccess {
+ public:
+  HttpAccess(boost::asio::any_io_executor executor, Access& access);
+  HttpAccess(const HttpAccess&) = delete;
+  HttpAccess& operator=(const HttpAccess&) = delete;
+  ~HttpAccess();
+
+  /// What the request shows, in this order: the headers of a trusted proxy, Authorization, a ticket where it becomes a
+  /// WebSocket, the certificate of the connection. All are borrowed until the answer.
+  /// Errors   authentication_error: what it shows is wrong; out_of_system_resource: too many tries.
+  rr::awaitable<rr::Result<Identity>> identify(const Request& request, const Connection& connection,
+                                               const Config& config);
+  /// Whether Basic credentials are for the gateway; else they are for the device.
+  bool takes_basic() const { return access_.state().users != nullptr; }
+
+  /// 401 where showing who one is may help, 403, or 503. As application/problem+json.
+  Response refusal(const Identity& who, const rr::Error& error) const;
+
+  /// What lets one request pass, as long as it is answered; or what it is refused with.
+  struct Admitted {
+    std::optional<RateGate::Pass> client = {};
+    std::optional<RateGate::Pass> user = {};
+    std::optional<Response> refusal = {};
+  };
+  /// Finds out who sends a request, which is noted in it, and whether he asks for too much.
+  rr::awaitable<Admitted> admit(Request& request, const Connection& connection, const Config& config);
+  std::optional<RateGate::Pass> enter_device(const std::string& device, const Rates& rates);
+  static Response too_much(std::string_view what);
+  struct Passes {
+    std::optional<RateGate::Pass> client = {};
+    std::optional<RateGate::Pass> user = {};
+    std::optional<RateGate::Pass> device = {};
+  };
+  /// Lets one request pass that is not one of HTTP's, until it is answered. `user`, `device`  empty: none.
+  /// Errors   out_of_system_resource: too much is asked for; again in a second.
+  rr::Result<std::shared_ptr<const Passes>> enter(const std::string& address, const std::string& user,
+                                                  const std::string& device, const Rates& rates);
+
+  Tickets& tickets() { return tickets_; }
+  AccessRequests& requests() { return requests_; }
+
+ private:
+  /// A password that was right: asked again, it need not be hashed again.
+  struct Known {
+    rr::AuthenticatedUser user;
+    std::chrono::steady_clock::time_point ends;
+  };
+
+  rr::Result<Identity> by_token(std::string_view token) const;
+  rr::awaitable<rr::Result<Identity>> by_password(std::string credentials, std::string client, std::string address);
+  rr::Bytes remembered_as(std::string_view username, std::string_view password) const;
+
+  boost::asio::any_io_executor executor_;
+  Access& access_;
+  Tickets tickets_;
+  AccessRequests requests_;
+  RateGate clients_;
+  RateGate users_;
+  RateGate devices_;
+  rr::Bytes salt_;
+  std::map<rr::Bytes, Known> known_;
+  std::shared_ptr<const rr::PasswordFileAuthenticator> known_in_;  ///< the users file that they are of
+  std::map<std::string, rr::LoginLimit> tries_;                    ///< by address
+  std::size_t judged_ = 0;                                         ///< passwords at this moment
+  boost::asio::thread_pool judges_;  ///< hashing a password takes as long as a hundred requests
+};
+
+}  // namespace rrgate

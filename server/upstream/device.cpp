@@ -1,0 +1,376 @@
+#include "server/upstream/device.hpp"
+
+#include <algorithm>
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/bind_cancellation_slot.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/this_coro.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <random>
+
+#include "core/session/connection.hpp"
+#include "core/support/random.hpp"
+#include "node/transport/race.hpp"
+#include "server/log/log.hpp"
+
+namespace rrgate {
+
+namespace asio = boost::asio;
+
+namespace {
+
+constexpr const char* circle = "its URL leads back to this gateway";
+
+struct Reached {
+  rr::ConnectionUrl url;
+  ProbeResult answer;
+};
+
+rr::awaitable<rr::Result<Reached>> probe_at(rr::ConnectionUrl url, rr::DialOptions options, rr::NodeId self_id) {
+  auto answer = co_await probe(url, std::move(options), self_id);
+  if (!answer) co_return answer.error();
+  Reached reached{std::move(url), std::move(*answer)};
+  co_return reached;
+}
+
+rr::awaitable<rr::Result<Reached>> probe_any(std::vector<rr::ConnectionUrl> urls, rr::DialOptions options,
+                                             rr::NodeId self_id) {
+  std::vector<rr::Runner<Reached>> runners;
+  for (auto& url : urls) {
+    rr::Runner<Reached> runner;
+    runner.name = rr::format_url(url);
+    runner.run = [url = std::move(url), options, self_id] { return probe_at(url, options, self_id); };
+    runners.push_back(std::move(runner));
+  }
+  const auto nothing = rr::make_error(rr::ErrorCode::connection_error, "no URL");
+  co_return co_await rr::race(std::move(runners), rr::candidate_stagger, nothing);
+}
+
+bool is_secure(const rr::ConnectionUrl& url) {
+  const auto* scheme = rr::find_url_scheme(url.scheme);
+  return scheme && scheme->is_secure;
+}
+
+}  // namespace
+
+milliseconds with_jitter(milliseconds wait) {
+  static thread_local std::minstd_rand random(std::random_device{}());
+  return wait * std::uniform_int_distribution<int>(75, 125)(random) / 100;
+}
+
+std::string_view to_string(DeviceState state) {
+  switch (state) {
+    case DeviceState::connecting:
+      return "connecting";
+    case DeviceState::online:
+      return "online";
+    case DeviceState::offline:
+      return "offline";
+  }
+  return "unknown";
+}
+
+Device::Device(const asio::any_io_executor& executor, DeviceConfig config, const Config& whole,
+               std::shared_ptr<TlsFiles> tls)
+    : config_(std::move(config)),
+      dial_options_{whole.timeouts.connect, whole.timeouts.send_stall, config_.proxy, config_.headers},
+      tls_(tls                      ? std::move(tls)
+           : is_secure(config_.url) ? std::make_shared<TlsFiles>(config_.tls)
+                                    : nullptr),
+      retry_(whole.retry),
+      look_id_(rr::random_node_id()),
+      wake_(executor) {}
+
+rr::DialOptions Device::dial_options(std::string_view way) const {
+  auto options = dial_options_;
+  const auto own = rr::format_node_id(look_id_, rr::NodeIdFormat::dashes);
+  options.headers.emplace_back(way_header, way.empty() ? own : std::string(way) + ", " + own);
+  if (tls_) options.tls = tls_->context();
+  return options;
+}
+
+rr::Result<> Device::load_tls() {
+  if (!tls_) return {};
+  auto loaded = tls_->load();
+  if (!loaded) loaded.error().message = "device " + rr::quoted(config_.name) + ": " + loaded.error().message;
+  return loaded;
+}
+
+void Device::reload_tls(bool is_forced) {
+  if (tls_ && (is_forced || tls_->has_changed()) && tls_->reload()) look_again();
+}
+
+template <class T>
+rr::awaitable<rr::Result<T>> Device::until_stopped(rr::awaitable<rr::Result<T>> work) {
+  const auto keep = shared_from_this();
+  const auto given_up = rr::make_error(rr::ErrorCode::operation_aborted, "given up: the device is not wanted any more");
+  if (is_stopping_) co_return given_up;
+  const auto executor = co_await asio::this_coro::executor;
+  const auto signal = dialing_.emplace(dialing_.end());
+  auto token = asio::bind_cancellation_slot(signal->slot(), asio::as_tuple(asio::use_awaitable));
+  auto [failure, result] = co_await asio::co_spawn(executor, std::move(work), std::move(token));
+  dialing_.erase(signal);
+  if (is_stopping_) co_return given_up;
+  if (failure) std::rethrow_exception(failure);
+  co_return std::move(result);
+}
+
+bool Device::is_on_way(std::string_view way) const {
+  return way.find(rr::format_node_id(look_id_, rr::NodeIdFormat::dashes)) != std::string_view::npos;
+}
+
+void Device::note_circle() {
+  has_come_back_ = true;
+  is_circle_ = state_ != DeviceState::online;  // one of several URLs may lead elsewhere
+}
+
+rr::awaitable<rr::Result<std::unique_ptr<rr::ByteStream>>> Device::connect(std::string way) {
+  if (is_circle_) co_return rr::make_error(rr::ErrorCode::connection_error, circle);
+  auto dialed = rr::dial_any(urls_to_try(), dial_options(way));
+  auto stream = co_await until_stopped(std::move(dialed));
+  // News either way: it was thought online and can't be reached, or it is back before the next look was due.
+  if (stream.has_value() != (state_ == DeviceState::online)) look_again();
+  co_return stream;
+}
+
+rr::awaitable<rr::Result<std::unique_ptr<rr::ByteStream>>> Device::connect_client() {
+  if (!is_shared()) co_return co_await connect();
+  if (!open_shared_) co_return rr::make_error(rr::ErrorCode::connection_error, "the gateway stops");
+  co_return open_shared_();
+}
+
+rr::NodeIdentity Device::client_target() const {
+  if (is_shared()) return {};
+  return {config_.url.node_id.value_or(rr::NodeId{}), config_.url.node_name};
+}
+
+bool Device::can_become(const DeviceConfig& config) const {
+  auto same = config;
+  same.max_clients = config_.max_clients;
+  same.callbacks = config_.callbacks;
+  same.shares_reads = config_.shares_reads;
+  return same == config_;
+}
+
+void Device::become(const DeviceConfig& config, const Config& whole) {
+  config_.max_clients = config.max_clients;
+  config_.callbacks = config.callbacks;
+  config_.shares_reads = config.shares_reads;
+  dial_options_.timeout = whole.timeouts.connect;
+  dial_options_.send_stall = whole.timeouts.send_stall;
+  retry_ = whole.retry;
+}
+
+std::optional<Device::Seat> Device::take_seat() {
+  if (config_.max_clients != 0 && clients_ >= config_.max_clients) return std::nullopt;
+  ++traffic_.sessions;
+  return Seat(*this);
+}
+
+std::string Device::full_text() const {
+  return "device " + rr::quoted(config_.name) + " has all the clients it may have (" + std::to_string(clients_) + ")";
+}
+
+std::string Device::offline_text(const rr::Error& error) const {
+  return "device " + rr::quoted(config_.name) + " is offline: " + error.message;
+}
+
+void Device::start() {
+  const auto keep_watching = [](std::shared_ptr<Device> self) -> rr::awaitable<void> { co_await self->watch(); };
+  asio::co_spawn(executor(), keep_watching(shared_from_this()), asio::detached);
+}
+
+rr::awaitable<void> Device::watch() {
+  auto backoff = retry_.min;
+  while (!is_stopping_) {
+    looks_again_ = false;
+    has_come_back_ = false;
+    auto probed = probe_any(urls_to_try(), dial_options(), look_id_);
+    auto reached = co_await until_stopped(std::move(probed));
+    if (is_stopping_) break;
+    rr::Result<ProbeResult> result = rr::Error{};
+    if (reached) {
+      config_.url = std::move(reached->url);
+      result = std::move(reached->answer);
+    } else {
+      result = std::move(reached.error());
+    }
+    is_circle_ = has_come_back_ && !result;
+    if (is_circle_) result = rr::make_error(rr::ErrorCode::connection_error, circle);
+    note(result);
+    const auto looked = std::chrono::steady_clock::now();
+    wake_.expires_at(looked + with_jitter(result ? retry_.online : backoff));
+    backoff = result ? retry_.min : std::min(backoff * 2, retry_.max);
+    while (!is_stopping_) {
+      // Looking again on demand keeps the shortest wait too, or a crowd of clients would make this loop spin.
+      if (looks_again_) wake_.expires_at(std::min(wake_.expiry(), looked + retry_.min));
+      if (std::chrono::steady_clock::now() >= wake_.expiry()) break;
+      co_await wake_.async_wait(asio::as_tuple(asio::use_awaitable));
+    }
+  }
+}
+
+std::vector<rr::ConnectionUrl> Device::urls_to_try() const {
+  std::vector<rr::ConnectionUrl> out{config_.url};
+  std::copy_if(urls_.begin(), urls_.end(), std::back_inserter(out),
+               [&](const auto& url) { return url != config_.url; });
+  return out;
+}
+
+void Device::set_urls(std::vector<rr::ConnectionUrl> urls) {
+  if (urls == urls_ || urls.empty()) return;
+  urls_ = std::move(urls);
+  if (std::find(urls_.begin(), urls_.end(), config_.url) == urls_.end()) config_.url = urls_.front();
+  look_again();
+}
+
+void Device::look_again() {
+  looks_again_ = true;
+  wake_.cancel();
+}
+
+void Device::stop() {
+  is_stopping_ = true;
+  for (auto& each : dialing_) each.emit(asio::cancellation_type::terminal);
+  wake_.cancel();
+}
+
+void Device::note(const rr::Result<ProbeResult>& result) {
+  const auto before = state_;
+  const auto known = identity_;
+  note_answer(result, before);
+  if (on_change_ && (state_ != before || identity_ != known)) on_change_();
+}
+
+void Device::note_answer(const rr::Result<ProbeResult>& result, DeviceState before) {
+  if (result) {
+    if (state_ != DeviceState::online || identity_ != *result)
+      log(LogLevel::info, "device online",
+          {{"device", config_.name},
+           {"node_id", rr::format_node_id(result->node_id, rr::NodeIdFormat::dashes)},
+           {"node_name", result->node_name}});
+    state_ = DeviceState::online;
+    identity_ = *result;
+    last_error_.clear();
+    return;
+  }
+  state_ = DeviceState::offline;
+  if (before != state_ || last_error_ != result.error().message)
+    log(LogLevel::warning, "device offline", {{"device", config_.name}, {"error", result.error().message}});
+  last_error_ = result.error().message;
+}
+
+DeviceRegistry::DeviceRegistry(const asio::any_io_executor& executor, const Config& config)
+    : executor_(executor), config_(config) {
+  for (const auto& device : config.devices) devices_.push_back(std::make_shared<Device>(executor, device, config));
+}
+
+rr::Result<> DeviceRegistry::load_tls() {
+  for (const auto& device : devices_)
+    if (auto loaded = device->load_tls(); !loaded) return loaded;
+  return {};
+}
+
+void DeviceRegistry::reload_tls(bool is_forced) {
+  for (const auto& device : devices_)
+    if (!device->config().is_found) device->reload_tls(is_forced);  // those have theirs together
+}
+
+void DeviceRegistry::start() {
+  for (const auto& device : devices_) device->start();
+}
+
+rr::Result<std::vector<std::shared_ptr<Device>>> DeviceRegistry::prepare(const Config& next) {
+  std::vector<std::shared_ptr<Device>> out;
+  for (const auto& config : next.devices) {
+    const auto stays =
+        std::find_if(devices_.begin(), devices_.end(), [&](const auto& device) { return device->can_become(config); });
+    if (stays != devices_.end()) {
+      out.push_back(*stays);
+      continue;
+    }
+    out.push_back(std::make_shared<Device>(executor_, config, next));
+    if (auto loaded = out.back()->load_tls(); !loaded) return loaded.error();
+  }
+  return out;
+}
+
+void DeviceRegistry::replace(std::vector<std::shared_ptr<Device>> configured) {
+  const auto before = std::exchange(devices_, std::move(configured));
+  for (std::size_t i = 0; i < devices_.size(); ++i) {
+    devices_[i]->become(config_.devices[i], config_);
+    if (std::find(before.begin(), before.end(), devices_[i]) == before.end()) devices_[i]->start();
+  }
+  for (const auto& device : before) {
+    if (has(*device)) continue;
+    if (device->config().is_found)
+      devices_.push_back(device);
+    else
+      device->stop();
+  }
+}
+
+bool DeviceRegistry::has(const Device& device) const {
+  return std::any_of(devices_.begin(), devices_.end(), [&](const auto& each) { return each.get() == &device; });
+}
+
+Device& DeviceRegistry::add(DeviceConfig device, std::shared_ptr<TlsFiles> tls) {
+  devices_.push_back(std::make_shared<Device>(executor_, std::move(device), config_, std::move(tls)));
+  auto& added = *devices_.back();
+  added.start();
+  if (on_change_) on_change_();
+  return added;
+}
+
+void DeviceRegistry::remove(const Device& device) {
+  const auto found =
+      std::find_if(devices_.begin(), devices_.end(), [&](const auto& each) { return each.get() == &device; });
+  if (found == devices_.end()) return;
+  (*found)->stop();
+  devices_.erase(found);
+  if (on_change_) on_change_();
+}
+
+void DeviceRegistry::stop() {
+  for (const auto& device : devices_) device->stop();
+}
+
+Device* DeviceRegistry::find(std::string_view name) const {
+  const auto found = std::find_if(devices_.begin(), devices_.end(),
+                                  [name](const auto& device) { return device->config().name == name; });
+  return found == devices_.end() ? nullptr : found->get();
+}
+
+namespace {
+
+/// Before the first answer, and for a device that is down, what the URL says must do.
+rr::NodeIdentity identity_of(const Device& device) {
+  if (const auto& known = device.identity()) return {known->node_id, known->node_name};
+  const auto& url = device.config().url;
+  return {url.node_id.value_or(rr::NodeId{}), url.node_name};
+}
+
+}  // namespace
+
+Device* DeviceRegistry::find_configured(const rr::NodeId& node_id) const {
+  for (const auto& device : devices_)
+    if (!device->config().is_found && identity_of(*device).id == node_id) return device.get();
+  return nullptr;
+}
+
+Device* DeviceRegistry::route(const rr::NodeId& node_id, std::string_view node_name) const {
+  if (node_id.is_any() && node_name.empty()) {
+    const auto choices =
+        config_.devices.empty() ? devices_.size() : config_.devices.size();  // configured ones are first
+    return choices == 1 ? devices_.front().get() : nullptr;
+  }
+  for (const auto& device : devices_) {
+    const auto identity = identity_of(*device);
+    if ((node_id.is_any() || node_id == identity.id) && (node_name.empty() || node_name == identity.name))
+      return device.get();
+  }
+  return nullptr;
+}
+
+}  // namespace rrgate

@@ -1,0 +1,180 @@
+// The devices behind the gateway: who they are and how they are. Layer: server/upstream.
+#pragma once
+
+#include <boost/asio/steady_timer.hpp>
+#include <functional>
+#include <list>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/session/connection.hpp"
+#include "node/transport/dial.hpp"
+#include "server/config/config.hpp"
+#include "server/config/tls_files.hpp"
+#include "server/log/metrics.hpp"
+#include "server/upstream/probe.hpp"
+
+namespace rrgate {
+
+enum class DeviceState { connecting, online, offline };
+std::string_view to_string(DeviceState state);
+
+/// Many gateways, or many devices of one, must not knock in step: 75 to 125 percent.
+milliseconds with_jitter(milliseconds wait);
+
+/// One device. Looks at it from time to time; connects clients to it. Those who use it over a wait hold a Seat.
+class Device : public std::enable_shared_from_this<Device> {
+ public:
+  /// `tls`  of all found devices; null: files of its own, where its URL wants them.
+  Device(const boost::asio::any_io_executor& executor, DeviceConfig config, const Config& whole,
+         std::shared_ptr<TlsFiles> tls = nullptr);
+
+  const DeviceConfig& config() const { return config_; }
+  boost::asio::any_io_executor executor() { return wake_.get_executor(); }
+  DeviceState state() const { return state_; }
+  /// Empty while the device is online.
+  const std::string& last_error() const { return last_error_; }
+  /// What the last answer said; kept while the device is offline, so that clients can still be told which one it is.
+  const std::optional<ProbeResult>& identity() const { return identity_; }
+  std::size_t clients() const { return clients_; }
+  Traffic& traffic() { return traffic_; }
+  const Traffic& traffic() const { return traffic_; }
+
+  /// Whether it goes on when this is what the configuration says of it; the bound on clients may differ.
+  bool can_become(const DeviceConfig& config) const;
+  void become(const DeviceConfig& config, const Config& whole);
+
+  /// The ways to a found device, best first; the first that works becomes config().url.
+  void set_urls(std::vector<rr::ConnectionUrl> urls);
+
+  /// A connection to the device, by whichever URL is the quickest. A failure makes the device be looked at again soon.
+  /// `way`    looks of the gateways that the client has come through (see way_header); empty: none that says so.
+  /// Errors   also: the device's URL leads back to this gateway.
+  rr::awaitable<rr::Result<std::unique_ptr<rr::ByteStream>>> connect(std::string way = {});
+  /// Whether it is this device's own look that comes from this node, or by this way: then its URL leads back here.
+  bool is_own_look(const rr::NodeId& sender) const { return sender == look_id_; }
+  bool is_on_way(std::string_view way) const;
+  /// Such a look has come. Until one is answered no client is connected, or each would go round in circles.
+  void note_circle();
+  /// The same for one client of it: where the device is shared, a connection to the gateway's session with it.
+  rr::awaitable<rr::Result<std::unique_ptr<rr::ByteStream>>> connect_client();
+  /// Which node answers there: empty where any will do.
+  rr::NodeIdentity client_target() const;
+  using OpenShared = std::function<rr::Result<std::unique_ptr<rr::ByteStream>>()>;
+  void share_by(OpenShared open) { open_shared_ = std::move(open); }
+  bool is_shared() const { return config_.mode == DeviceMode::shared; }
+  /// Called when state() or identity() has changed.
+  void on_change(std::function<void()> handler) { on_change_ = std::move(handler); }
+  /// A client's connection to the device broke: look at it again soon.
+  void note_trouble() { look_again(); }
+
+  /// Counts one client while it lives; see max_clients.
+  class Seat {
+   public:
+    explicit Seat(Device& device) : device_(device.shared_from_this()) { ++device_->clients_; }
+    Seat(Seat&& other) noexcept = default;
+    Seat& operator=(Seat&&) = delete;
+    ~Seat() {
+      if (device_) --device_->clients_;
+    }
+
+   private:
+    std::shared_ptr<Device> device_;  ///< a found device may be lost meanwhile
+  };
+  /// nullopt when the device has as many clients as it may.
+  std::optional<Seat> take_seat();
+  // What those hear who can't get to it.
+  std::string full_text() const;
+  std::string offline_text(const rr::Error& error) const;
+
+  /// For devices by TLS: reads the CAs that it is checked against. See TlsFiles.
+  [[nodiscard]] rr::Result<> load_tls();
+  void reload_tls(bool is_forced);
+
+  /// Probes until stop(), all URLs side by side; stop() ends what is being dialed.
+  rr::awaitable<void> watch();
+  /// The same, by itself.
+  void start();
+  void stop();
+
+ private:
+  rr::DialOptions dial_options(std::string_view way = {}) const;
+  /// Errors   those of `work`; operation_aborted: stop() was called.
+  template <class T>
+  rr::awaitable<rr::Result<T>> until_stopped(rr::awaitable<rr::Result<T>> work);
+  void look_again();
+  /// The one that worked last, then the others.
+  std::vector<rr::ConnectionUrl> urls_to_try() const;
+  void note(const rr::Result<ProbeResult>& result);
+  void note_answer(const rr::Result<ProbeResult>& result, DeviceState before);
+
+  DeviceConfig config_;
+  std::vector<rr::ConnectionUrl> urls_;  ///< of a found device
+  OpenShared open_shared_;
+  std::function<void()> on_change_;
+  rr::DialOptions dial_options_;
+  std::shared_ptr<TlsFiles> tls_;                        ///< null: the URL wants none
+  std::list<boost::asio::cancellation_signal> dialing_;  ///< what stop() ends
+  Retry retry_;
+  const rr::NodeId look_id_;    ///< the node that looks come from: none but they have it
+  bool has_come_back_ = false;  ///< the look that is on its way
+  bool is_circle_ = false;      ///< the last look came back, and was not answered
+  DeviceState state_ = DeviceState::connecting;
+  std::string last_error_;
+  std::optional<ProbeResult> identity_;
+  std::size_t clients_ = 0;
+  Traffic traffic_;
+  bool is_stopping_ = false;
+  bool looks_again_ = false;
+  boost::asio::steady_timer wake_;
+};
+
+/// HTTP header of WebSockets from gateway to gateway: the look ids of the devices that the connection is for, one
+/// behind the other.
+inline constexpr const char* way_header = "X-Rrgate-Way";
+
+class DeviceRegistry {
+ public:
+  /// `config`  must outlive it.
+  DeviceRegistry(const boost::asio::any_io_executor& executor, const Config& config);
+
+  /// Errors   those of make_node_tls(), with the device's name.
+  [[nodiscard]] rr::Result<> load_tls();
+  void reload_tls(bool is_forced);
+  void start();
+  void stop();
+
+  /// The devices of another configuration, which must outlive this call alone: those that stay as they are, and new
+  /// ones. Errors   as load_tls(); nothing has changed.
+  [[nodiscard]] rr::Result<std::vector<std::shared_ptr<Device>>> prepare(const Config& next);
+  /// Takes what prepare() made, once the configuration has been replaced. Found devices stay.
+  void replace(std::vector<std::shared_ptr<Device>> configured);
+  bool has(const Device& device) const;
+
+  /// Called when devices have joined or gone.
+  void on_change(std::function<void()> handler) { on_change_ = std::move(handler); }
+  /// A found device joins; its name is nobody's yet.
+  Device& add(DeviceConfig device, std::shared_ptr<TlsFiles> tls);
+  /// A found device goes; clients that are connected to it stay so.
+  void remove(const Device& device);
+
+  const std::vector<std::shared_ptr<Device>>& all() const { return devices_; }
+  /// Null when no device has this name.
+  Device* find(std::string_view name) const;
+  /// The configured device that is this node, as far as is known. Null when there is none.
+  Device* find_configured(const rr::NodeId& node_id) const;
+  /// The device that a client asks for by node id and name (any id and "" ask for none in particular: it gets the only
+  /// configured device, or where none is configured the only one). Null when there is none.
+  Device* route(const rr::NodeId& node_id, std::string_view node_name) const;
+
+ private:
+  boost::asio::any_io_executor executor_;
+  const Config& config_;
+  std::vector<std::shared_ptr<Device>> devices_;
+  std::function<void()> on_change_;
+};
+
+}  // namespace rrgate

@@ -1,0 +1,20 @@
+#include "server/upstream/probe.hpp"
+
+#include "node/discovery/service_query.hpp"
+
+namespace rrgate {
+
+rr::awaitable<rr::Result<ProbeResult>> probe(rr::ConnectionUrl url, rr::DialOptions options, rr::NodeId self_id) {
+  rr::ServiceQueryOptions query;
+  query.self_name = "rrgate";
+  query.self_id = self_id;
+  query.dial = std::move(options);
+  query.max_answer_bytes = 12u * 1024 * 1024;  // somebody has named this device: it may have much to say
+  auto answer = co_await rr::query_services(std::move(url), std::move(query));
+  if (!answer) co_return answer.error();
+  ProbeResult result{answer->node.id, answer->node.name, {}};
+  for (const auto& service : answer->services) result.services.push_back({service.name, service.root_object_type});
+  co_return result;
+}
+
+}  // namespace rrgate

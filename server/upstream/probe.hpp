@@ -1,0 +1,32 @@
+// Asks a device who it is. Layer: server/upstream. Source: transports spec section 3.1.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/support/node_id.hpp"
+#include "node/transport/dial.hpp"
+
+namespace rrgate {
+
+struct DeviceService {
+  std::string name;
+  std::string type;
+
+  bool operator==(const DeviceService&) const = default;
+};
+
+struct ProbeResult {
+  rr::NodeId node_id;
+  std::string node_name;
+  std::vector<DeviceService> services;
+
+  bool operator==(const ProbeResult&) const = default;
+};
+
+/// Connects to the service index as the node `self_id`, asks for the services, disconnects; all of it within
+/// options.timeout.
+/// Errors   connection_error: not reached, no or a wrong answer. node_not_found: another node than the URL names.
+rr::awaitable<rr::Result<ProbeResult>> probe(rr::ConnectionUrl url, rr::DialOptions options, rr::NodeId self_id);
+
+}  // namespace rrgate

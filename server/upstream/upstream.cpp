@@ -1,0 +1,380 @@
+#include "server/upstream/upstream.hpp"
+
+#include <algorithm>
+
+#include "core/session/service_path.hpp"
+#include "core/support/glob.hpp"
+#include "node/client/async_object.hpp"
+#include "server/upstream/open_session.hpp"
+
+namespace rrgate {
+
+namespace {
+
+/// Objects that all clients together have found.
+constexpr std::size_t max_objects = 65'536;
+
+/// The object of a call: hosted services of shared devices have no others.
+const std::string& path_of(const rr::Called& called) {
+  return static_cast<const SharedObject&>(*called.object).path();
+}
+
+}  // namespace
+
+Upstream::Upstream(std::shared_ptr<Device> device, std::string service, UpstreamLogin login)
+    : device_(std::move(device)), service_(std::move(service)), login_(std::move(login)) {}
+
+// --- the session ---
+
+rr::awaitable<rr::Result<>> Upstream::open() {
+  const auto self = shared_from_this();
+  auto opened = co_await open_connection(false);
+  // Whoever has no login may look at the service, and so may his clients; what they do is for the device to refuse.
+  requires_user_ = !opened && login_.username.empty() && opened.error().code == rr::ErrorCode::authentication_error;
+  if (requires_user_) opened = co_await open_connection(true);
+  if (!opened) co_return opened.error();
+  if (login_.is_late) {
+    const rr::AsyncObject root(*opened, service_);
+    const rr::Value credentials(login_.credentials);
+    try {
+      co_await root.authenticate(login_.username, credentials);
+    } catch (const rr::Exception& exception) {
+      (*opened)->disconnect();
+      co_return exception.error();
+    }
+  }
+  connection_ = std::move(*opened);
+  connection_->on_closed([weak = weak_from_this(), which = connection_.get()](const rr::Error& reason) {
+    const auto still_there = weak.lock();
+    if (still_there && still_there->connection_.get() == which) still_there->lost(reason);
+  });
+  connection_->on_path_released([weak = weak_from_this()](const std::string& path) {
+    if (const auto still_there = weak.lock()) still_there->handle_released(path);
+  });
+  loss_.reset();
+  if (const auto* root = connection_->session().object_type(service_)) watch_object(service_, *root);
+  look_up_again();
+  co_return rr::Result<>();
+}
+
+rr::awaitable<rr::Result<std::shared_ptr<rr::ClientConnection>>> Upstream::open_connection(bool is_stepwise) {
+  auto stream = co_await device_->connect();
+  if (!stream) co_return rr::make_error(rr::ErrorCode::connection_error, device_->offline_text(stream.error()));
+  const auto& url = device_->config().url;
+  const rr::NodeIdentity target{url.node_id.value_or(rr::NodeId{}), url.node_name};
+  const std::string username = login_.is_late ? std::string() : login_.username;
+  co_return co_await open_session(std::move(*stream), service_, target, username, login_.credentials, is_stepwise);
+}
+
+void Upstream::close(std::function<void()> closed) {
+  on_lost_ = nullptr;
+  const auto connection = std::exchange(connection_, nullptr);
+  if (!connection) {
+    if (closed) closed();
+    return;
+  }
+  if (closed) connection->on_closed([closed = std::move(closed)](const rr::Error&) { closed(); });
+  connection->disconnect();
+}
+
+rr::Error Upstream::lost_error() const {
+  return rr::make_error(rr::ErrorCode::connection_error,
+                        "connection_lost: device " + rr::quoted(device_->config().name) +
+                            (loss_ ? ": " + loss_->message : std::string(" is not connected")));
+}
+
+void Upstream::lost(const rr::Error& reason) {
+  connection_.reset();
+  loss_ = reason;
+  generators_.clear();
+  for (const auto& [key, wire] : wires_) wire->is_attached = false;
+  for (auto& [number, pipe] : pipes_) {
+    pipe.state = PipeState::detached;
+    pipe.is_held = false;
+  }
+  const auto clients = clients_;  // they may leave
+  for (auto* client : clients)
+    if (has(*client)) acknowledge_all(*client);
+  device_->note_trouble();
+  if (const auto handler = on_lost_) handler();
+}
+
+void Upstream::add(UpstreamClient& client) {
+  clients_.push_back(&client);
+}
+
+bool Upstream::has(const UpstreamClient& client) const {
+  return std::find(clients_.begin(), clients_.end(), &client) != clients_.end();
+}
+
+void Upstream::remove(UpstreamClient& client) {
+  std::erase(clients_, &client);
+  std::erase_if(calls_, [&](const OpenCall& call) { return call.client == &client; });
+  for (auto it = endpoints_.lower_bound({&client, 0}); it != endpoints_.end() && it->first.first == &client;)
+    leave_pipe(client, (it++)->first.second);
+  std::vector<std::pair<std::string, const rr::MemberDefinition*>> wires;
+  for (const auto& [key, wire] : wires_)
+    if (has_joined(client, key)) wires.emplace_back(key.first, &wire->member);
+  for (const auto& [path, member] : wires) leave_wire(client, path, *member);
+  std::vector<rr::GeneratorId> generators;
+  for (const auto& [key, generator] : generators_)
+    if (key.first == &client) generators.push_back(key.second);
+  for (const auto id : generators) drop_generator(client, id);
+}
+
+// --- objects ---
+
+void Upstream::find_object(const std::string& path, Completion done) {
+  if (!connection_) return done(lost_error());
+  if (objects_.size() >= max_objects && !objects_.contains(path))
+    return done(
+        rr::make_error(rr::ErrorCode::out_of_system_resource,
+                       "clients of this device have found " + std::to_string(max_objects) + " objects already"));
+  connection_->find_object(path, [weak = weak_from_this(), path, done = std::move(done)](rr::Result<rr::Value> found) {
+    if (const auto self = weak.lock(); self && self->connection_ && found)
+      if (const auto* type = self->connection_->session().object_type(path)) self->watch_object(path, *type);
+    done(std::move(found));
+  });
+}
+
+/// Events and callbacks of an object reach all clients, whether or not they ever looked at it.
+void Upstream::watch_object(const std::string& path, const rr::EntityDefinition& type) {
+  objects_.insert(path);
+  for (const auto& member : type.members) {
+    if (member.kind == rr::MemberKind::event) {
+      connection_->on_event(path, member.name,
+                            [weak = weak_from_this(), path, &member](std::span<const rr::Value> arguments) {
+                              const auto self = weak.lock();
+                              if (!self) return;
+                              const auto clients = self->clients_;  // they may leave
+                              for (auto* client : clients)
+                                if (self->has(*client)) client->receive_event(path, member, arguments);
+                            });
+    } else if (member.kind == rr::MemberKind::callback) {
+      connection_->on_callback_later(
+          path, member.name,
+          [weak = weak_from_this(), path, &member](std::span<const rr::Value> arguments,
+                                                   const rr::ClientConnection::CallbackReply& answer) {
+            if (const auto self = weak.lock()) self->route_callback(path, member, arguments, answer);
+          });
+    }
+  }
+}
+
+/// After the device has come back: what clients had found there, they have found again, or it is gone.
+void Upstream::look_up_again() {
+  const auto known = objects_;
+  for (const auto& path : known) {
+    find_object(path, [weak = weak_from_this(), path](const rr::Result<rr::Value>& found) {
+      const auto self = weak.lock();
+      if (!self || !self->connection_) return;
+      if (!found) return self->handle_released(path);
+      std::vector<MemberKey> wires;
+      for (const auto& [key, wire] : self->wires_)
+        if (key.first == path) wires.push_back(key);
+      for (const auto& key : wires) self->attach_wire(key);
+      std::vector<PipeNumber> pipes;
+      for (const auto& [number, pipe] : self->pipes_)
+        if (pipe.path == path) pipes.push_back(number);
+      for (const auto number : pipes) self->attach_pipe(number);
+    });
+  }
+}
+
+void Upstream::handle_released(const std::string& path) {
+  std::erase_if(objects_, [&](const auto& each) { return rr::is_within(each, path); });
+  std::vector<MemberKey> wires;
+  for (const auto& [key, wire] : wires_)
+    if (rr::is_within(key.first, path)) wires.push_back(key);
+  for (const auto& key : wires) drop_wire(key, nullptr);
+  std::vector<PipeNumber> pipes;
+  for (const auto& [number, pipe] : pipes_)
+    if (rr::is_within(pipe.path, path)) pipes.push_back(number);
+  for (const auto number : pipes) drop_pipe(number);
+  std::erase_if(generators_, [&](const auto& each) { return rr::is_within(each.second.path, path); });
+  if (on_released_) on_released_(path);
+  const auto clients = clients_;
+  for (auto* client : clients)
+    if (has(*client)) client->release_path(path);
+}
+
+// --- requests ---
+
+void Upstream::request(UpstreamClient& client, const rr::Called& called, Completion done) {
+  if (!connection_) return done(lost_error());
+  // What the device lost while it was asked is said in our words: clients know by them that it may come back.
+  done = [weak = weak_from_this(), done = std::move(done)](rr::Result<rr::Value> result) {
+    const auto self = weak.lock();
+    if (!result && self && !self->connection_) return done(self->lost_error());
+    done(std::move(result));
+  };
+  const auto& path = path_of(called);
+  if (!connection_->session().object_type(path)) {  // another session of this service has found it
+    return find_object(path, [weak = weak_from_this(), &client, life = client.life(), called,
+                              done](const rr::Result<rr::Value>& found) {
+      const auto self = weak.lock();
+      if (!self || !found || life.expired()) return done(found);
+      self->request(client, called, done);
+    });
+  }
+  if (called.generator != 0) return answer_generator(client, called, path, std::move(done));
+  if (called.kind == rr::CallKind::function) {
+    const auto number = ++last_call_;
+    calls_.push_back({&client, path, number});
+    done = [weak = weak_from_this(), number, done = std::move(done)](rr::Result<rr::Value> result) {
+      if (const auto self = weak.lock())
+        std::erase_if(self->calls_, [number](const OpenCall& call) { return call.number == number; });
+      done(std::move(result));
+    };
+  }
+  begin_request(called, path, std::move(done));
+}
+
+void Upstream::share_read(const std::string& path, const std::string& property, Completion done) {
+  const MemberKey key(path, property);
+  auto& waiting = reads_[key];
+  waiting.push_back(std::move(done));
+  if (waiting.size() > 1) return;
+  connection_->get(path, property, [weak = weak_from_this(), key](const rr::Result<rr::Value>& value) {
+    const auto self = weak.lock();
+    if (!self) return;
+    const auto readers = self->reads_.extract(key);
+    if (!readers) return;
+    for (const auto& reader : readers.mapped()) reader(value);
+  });
+}
+
+void Upstream::begin_request(const rr::Called& called, const std::string& path, Completion done) {
+  const auto& name = called.member->name;
+  switch (called.kind) {
+    case rr::CallKind::property_get:
+      if (device_->config().shares_reads) return share_read(path, name, std::move(done));
+      return connection_->get(path, name, std::move(done));
+    case rr::CallKind::property_set:
+      return connection_->set(path, name, called.arguments.front(), std::move(done));
+    case rr::CallKind::function:
+      return connection_->call(path, name, called.arguments, std::move(done));
+    case rr::CallKind::peek_in:
+      return connection_->peek_in(path, name, std::move(done));
+    case rr::CallKind::peek_out:
+      return connection_->peek_out(path, name, std::move(done));
+    case rr::CallKind::poke_out:
+      return connection_->poke_out(path, name, called.arguments.front(), std::move(done));
+    case rr::CallKind::memory_dimensions:
+      return connection_->get_memory_dimensions(path, name, std::move(done));
+    case rr::CallKind::memory_read:
+      return connection_->read_memory(path, name, called.range, std::move(done));
+    case rr::CallKind::memory_write:
+      return connection_->write_memory(path, name, called.range.position, called.arguments.front(), std::move(done));
+    default:
+      return done(rr::make_error(rr::ErrorCode::not_implemented_error, "no such request"));
+  }
+}
+
+void Upstream::answer_generator(UpstreamClient& client, const rr::Called& called, const std::string& path,
+                                Completion done) {
+  const std::pair key(&client, called.generator);
+  const auto& name = called.member->name;
+  if (called.kind == rr::CallKind::generator_open) {
+    auto opened = [weak = weak_from_this(), key, path, name,
+                   done = std::move(done)](rr::Result<rr::Value> index) mutable {
+      const auto self = weak.lock();
+      if (index && self && self->connection_) {
+        const auto number = index->to<std::int32_t>().value();
+        if (self->has(*key.first))
+          self->generators_[key] = {path, name, number};
+        else
+          self->connection_->close_generator(path, name, number, ignore_result);
+      }
+      done(std::move(index));
+    };
+    return connection_->open_generator(path, name, called.arguments, std::move(opened));
+  }
+  const auto found = generators_.find(key);
+  if (found == generators_.end()) {
+    if (called.kind != rr::CallKind::generator_next) return done(rr::Value());
+    return done(rr::make_error(rr::ErrorCode::invalid_operation, "Invalid generator"));
+  }
+  const auto index = found->second.index;
+  if (called.kind == rr::CallKind::generator_next) {
+    auto stepped = [weak = weak_from_this(), key, done = std::move(done)](rr::Result<rr::Value> value) {
+      if (const auto self = weak.lock(); self && !value) self->generators_.erase(key);
+      done(std::move(value));
+    };
+    std::optional<rr::Value> parameter;
+    if (!called.arguments.empty()) parameter = called.arguments.front();
+    return connection_->next_generator(path, name, index, parameter, std::move(stepped));
+  }
+  generators_.erase(found);
+  if (called.kind == rr::CallKind::generator_close)
+    connection_->close_generator(path, name, index, std::move(done));
+  else
+    connection_->abort_generator(path, name, index, std::move(done));
+}
+
+void Upstream::drop_generator(UpstreamClient& client, rr::GeneratorId id) {
+  const auto found = generators_.extract({&client, id});
+  if (!found || !connection_) return;
+  const auto& generator = found.mapped();
+  connection_->close_generator(generator.path, generator.function, generator.index, ignore_result);
+}
+
+void Upstream::lock(const rr::LockWanted& wanted, Completion done) {
+  if (!connection_) return done(lost_error());
+  switch (wanted.command) {
+    case rr::LockCommand::lock_for_user:
+      return connection_->lock(wanted.path, rr::LockKind::user, std::move(done));
+    case rr::LockCommand::lock_for_client:
+      return connection_->lock(wanted.path, rr::LockKind::client, std::move(done));
+    case rr::LockCommand::unlock:
+      return connection_->unlock(wanted.path, std::move(done));
+    case rr::LockCommand::enter_monitor:
+      return connection_->enter_monitor(wanted.path, wanted.timeout, std::move(done));
+    case rr::LockCommand::exit_monitor:
+      return connection_->exit_monitor(wanted.path, std::move(done));
+  }
+}
+
+// --- callbacks ---
+
+UpstreamClient* Upstream::owner_of_callback(const std::string& path) const {
+  const auto here =
+      std::find_if(calls_.rbegin(), calls_.rend(), [&](const OpenCall& call) { return call.path == path; });
+  if (here != calls_.rend()) return here->client;
+  if (!calls_.empty()) return calls_.back().client;
+  return clients_.size() == 1 ? clients_.front() : nullptr;
+}
+
+void Upstream::route_callback(const std::string& path, const rr::MemberDefinition& callback,
+                              std::span<const rr::Value> arguments, const rr::ClientConnection::CallbackReply& answer) {
+  const auto name = path + "." + callback.name;
+  auto policy = CallbackPolicy::owner;
+  for (const auto& rule : device_->config().callbacks)
+    if (rr::glob_matches(rule.member, name)) {
+      policy = rule.policy;
+      break;
+    }
+  if (policy == CallbackPolicy::all && !clients_.empty()) {
+    struct Votes {
+      std::size_t left;
+      bool is_answered = false;
+    };
+    const auto votes = std::make_shared<Votes>(Votes{clients_.size()});
+    const auto clients = clients_;
+    for (auto* client : clients)
+      client->call_callback(path, callback, arguments, [votes, answer](const rr::Result<rr::Value>& vote) {
+        --votes->left;
+        if (votes->is_answered || (!vote && votes->left > 0)) return;
+        votes->is_answered = true;
+        answer(vote);
+      });
+    return;
+  }
+  auto* client = policy == CallbackPolicy::first && !clients_.empty() ? clients_.front() : owner_of_callback(path);
+  if (client) return client->call_callback(path, callback, arguments, answer);
+  answer(
+      rr::make_error(rr::ErrorCode::invalid_operation, "Callback function not set: " + std::to_string(clients_.size()) +
+                                                           " clients share this session and none of them is meant"));
+}
+
+}  // namespace rrgate

@@ -1,0 +1,222 @@
+// One session with a service of a device, used for several clients. Layer: server/upstream.
+// Source: sessions spec section 2.20, "one shared upstream session".
+#pragma once
+
+#include <boost/asio/steady_timer.hpp>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/session/service/service_session.hpp"
+#include "node/client/client_connection.hpp"
+#include "server/upstream/device.hpp"
+
+namespace rrgate {
+
+/// For requests whose answer nobody waits for.
+inline constexpr auto ignore_result = [](const rr::Result<rr::Value>&) {};
+
+/// An object of the device. What its members do is asked of the device.
+class SharedObject final : public rr::ServiceObject {
+ public:
+  SharedObject(std::string path, std::string type) : path_(std::move(path)), type_(std::move(type)) {}
+  const std::string& path() const { return path_; }
+  const std::string& type_name() const override { return type_; }
+  rr::Result<std::shared_ptr<rr::ServiceObject>> find_child(const rr::MemberDefinition&,
+                                                            const std::optional<std::string>&) override {
+    return rr::make_error(rr::ErrorCode::object_not_found, "not looked up yet");
+  }
+
+ private:
+  std::string path_;
+  std::string type_;
+};
+
+/// What an upstream tells a client of it.
+class UpstreamClient {
+ public:
+  /// Ends when the client does.
+  virtual std::weak_ptr<const void> life() const = 0;
+  virtual void receive_event(const std::string& path, const rr::MemberDefinition& event,
+                             std::span<const rr::Value> arguments) = 0;
+  virtual void receive_wire(rr::WirePacket& packet) = 0;
+  virtual void answer_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::Result<>& result) = 0;
+  /// So many values were replaced by the one that comes next.
+  virtual void note_conflated(const std::string& path, const rr::MemberDefinition& wire, std::uint64_t count) = 0;
+  /// Also where it was not answered yet.
+  virtual void close_wire(const std::string& path, const rr::MemberDefinition& wire) = 0;
+  virtual void accept_pipe(rr::PipeId id) = 0;
+  virtual void refuse_pipe(rr::PipeId id, const rr::Error& error) = 0;
+  virtual void receive_packet(rr::PipeId id, const rr::Value& packet) = 0;
+  /// Whether much waits for its stream: what it has joined should be sent no faster than it reads. It says with
+  /// Upstream::caught_up() that this is over.
+  virtual bool is_behind() const = 0;
+  /// Packets of its own have arrived.
+  virtual void acknowledge_packets(rr::PipeId id, std::span<const std::uint32_t> numbers) = 0;
+  virtual void close_pipe(rr::PipeId id) = 0;
+  virtual void release_path(const std::string& path) = 0;
+  virtual void call_callback(const std::string& path, const rr::MemberDefinition& callback,
+                             std::span<const rr::Value> arguments, rr::ClientConnection::CallbackReply answer) = 0;
+
+ protected:
+  ~UpstreamClient() = default;
+};
+
+/// All of it runs on the gateway's thread. Paths are the device's and the clients' alike: the service has one name.
+class Upstream : public std::enable_shared_from_this<Upstream> {
+ public:
+  using Completion = rr::ClientConnection::Completion;
+
+  Upstream(std::shared_ptr<Device> device, std::string service, UpstreamLogin login);
+
+  /// Connects, and attaches again what clients had joined. Errors   those of reaching the device and of the login.
+  rr::awaitable<rr::Result<>> open();
+  /// `closed`  is called once the device knows, or after half a second.
+  void close(std::function<void()> closed = nullptr);
+  bool is_open() const { return connection_ != nullptr; }
+  /// Whether the service is for users who have logged in, and this session is nobody's.
+  bool requires_user() const { return requires_user_; }
+  /// Null while it is not open.
+  const std::shared_ptr<rr::ClientConnection>& connection() const { return connection_; }
+  /// What requests fail with while the device is away.
+  rr::Error lost_error() const;
+  /// Called when the session ends otherwise than by close().
+  void on_lost(std::function<void()> handler) { on_lost_ = std::move(handler); }
+  /// The objects at and below a path were replaced.
+  void on_released(std::function<void(const std::string& path)> handler) { on_released_ = std::move(handler); }
+
+  void add(UpstreamClient& client);
+  /// Ends all that the client has here.
+  void remove(UpstreamClient& client);
+
+  /// Completes with the object's type.
+  void find_object(const std::string& path, Completion done);
+  /// Asks the device; the object of the call is a SharedObject that find_object() has found here.
+  void request(UpstreamClient& client, const rr::Called& called, Completion done);
+  bool has_generator(UpstreamClient& client, rr::GeneratorId id) const { return generators_.contains({&client, id}); }
+  /// A generator of this client that is over without having been closed.
+  void drop_generator(UpstreamClient& client, rr::GeneratorId id);
+  void lock(const rr::LockWanted& wanted, Completion done);
+
+  /// Answered with answer_wire(). A client that joins a wire gets the newest value at once.
+  void join_wire(UpstreamClient& client, const std::string& path, const rr::MemberDefinition& wire);
+  void leave_wire(UpstreamClient& client, const std::string& path, const rr::MemberDefinition& wire);
+  void send_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::Value& value);
+
+  /// Clients of a readonly pipe share one endpoint at the device; others have one each. Answered with accept_pipe() or
+  /// refuse_pipe().
+  void join_pipe(UpstreamClient& client, rr::PipeId id, const std::string& path, const rr::MemberDefinition& pipe);
+  void leave_pipe(UpstreamClient& client, rr::PipeId id);
+  /// What the device does not take, or can't because it is away, ends the endpoint.
+  /// `wants_ack`  the client's number of the packet, for acknowledge_packets(), where it wants to hear of it.
+  void send_pipe(UpstreamClient& client, rr::PipeId id, const rr::Value& packet,
+                 std::optional<std::uint32_t> wants_ack);
+  /// The client is not behind any more.
+  void caught_up(UpstreamClient& client);
+  /// Nothing will be heard any more of the client's packets that are on their way: it waits for none of them.
+  void acknowledge_all(UpstreamClient& client);
+
+ private:
+  using MemberKey = std::pair<std::string, std::string>;  // path, member
+  using EndpointKey = std::pair<UpstreamClient*, rr::PipeId>;
+
+  struct Follower {
+    UpstreamClient* client = nullptr;
+    std::uint64_t count = 0;  ///< Wire::count of the newest that it was sent
+  };
+  struct Wire {
+    Wire(std::string its_path, const rr::MemberDefinition& its_member)
+        : path(std::move(its_path)), member(its_member) {}
+
+    const std::string path;
+    const rr::MemberDefinition& member;
+    std::vector<Follower> followers;
+    std::size_t next = 0;  ///< before the follower whose turn it is
+    std::optional<rr::WireValue> newest;
+    rr::TimePoint arrived;               ///< of the newest
+    std::uint64_t count = 0;             ///< values that have come
+    std::optional<rr::Value> out_value;  ///< the newest that could not be sent yet
+    bool is_attached = false;
+    bool is_due = false;  ///< hand_out() is due
+  };
+  enum class PipeState : std::uint8_t { detached, attaching, attached };
+  struct Pipe {
+    std::string path;
+    const rr::MemberDefinition* member = nullptr;
+    std::vector<EndpointKey> endpoints;
+    std::int32_t index = 0;
+    PipeState state = PipeState::detached;
+    bool is_held = false;                                        ///< a client is behind: the device hears nothing of it
+    std::map<std::uint32_t, std::uint32_t> unacknowledged = {};  ///< number at the device -> that of the one client
+  };
+  using PipeNumber = std::uint64_t;
+  struct Generator {
+    std::string path;
+    std::string function;
+    std::int32_t index = 0;
+  };
+  struct OpenCall {
+    UpstreamClient* client = nullptr;
+    std::string path;
+    std::uint64_t number = 0;
+  };
+
+  rr::awaitable<rr::Result<std::shared_ptr<rr::ClientConnection>>> open_connection(bool is_stepwise);
+  /// Whether the client is there still: what is told to one may end it.
+  bool has(const UpstreamClient& client) const;
+  void lost(const rr::Error& reason);
+  void watch_object(const std::string& path, const rr::EntityDefinition& type);
+  void look_up_again();
+  void handle_released(const std::string& path);
+  void forget_below(const std::string& path);
+  void share_read(const std::string& path, const std::string& property, Completion done);
+  void begin_request(const rr::Called& called, const std::string& path, Completion done);
+  void answer_generator(UpstreamClient& client, const rr::Called& called, const std::string& path, Completion done);
+  void attach_wire(const MemberKey& key);
+  bool has_joined(const UpstreamClient& client, const MemberKey& key) const;
+  void publish_wire(const MemberKey& key, const rr::Value& value, rr::TimeSpec time);
+  void hand_out_later(const std::shared_ptr<Wire>& wire);
+  void hand_out(const std::shared_ptr<Wire>& wire);
+  /// `reason`  why, for clients that still wait to join; null: they are told by other means.
+  void drop_wire(const MemberKey& key, const rr::Error* reason);
+  void attach_pipe(PipeNumber number);
+  void pipe_attached(PipeNumber number, const std::string& path, const std::string& member,
+                     const rr::Result<rr::Value>& result, bool is_first);
+  void drop_pipe(PipeNumber number);
+  std::vector<PipeNumber> pipes_of(const UpstreamClient& client) const;
+  /// Lets the device go on, or not, as the slowest client of the pipe can take it.
+  void pace_pipe(PipeNumber number);
+  rr::Result<> pass_on(Pipe& pipe, const EndpointKey& endpoint, const rr::Value& packet,
+                       std::optional<std::uint32_t> wants_ack);
+  void pass_back_acks(PipeNumber number, std::span<const std::uint32_t> numbers);
+  void route_callback(const std::string& path, const rr::MemberDefinition& callback,
+                      std::span<const rr::Value> arguments, const rr::ClientConnection::CallbackReply& answer);
+  UpstreamClient* owner_of_callback(const std::string& path) const;
+
+  std::shared_ptr<Device> device_;
+  std::string service_;
+  UpstreamLogin login_;
+  std::shared_ptr<rr::ClientConnection> connection_;
+  std::optional<rr::Error> loss_;
+  bool requires_user_ = false;
+  std::function<void()> on_lost_;
+  std::function<void(const std::string&)> on_released_;
+  std::vector<UpstreamClient*> clients_;  ///< in the order in which they came
+  std::set<std::string> objects_;         ///< paths that were found
+  std::map<MemberKey, std::shared_ptr<Wire>> wires_;
+  std::map<PipeNumber, Pipe> pipes_;
+  std::map<MemberKey, PipeNumber> shared_pipes_;
+  std::map<EndpointKey, PipeNumber> endpoints_;
+  PipeNumber last_pipe_ = 0;
+  std::map<std::pair<UpstreamClient*, rr::GeneratorId>, Generator> generators_;
+  std::vector<OpenCall> calls_;                         ///< of functions, oldest first
+  std::map<MemberKey, std::vector<Completion>> reads_;  ///< where reads are shared: who waits for them
+  std::uint64_t last_call_ = 0;
+};
+
+}  // namespace rrgate

@@ -1,0 +1,369 @@
+// Wires and pipes of an upstream: attached to the device once, handed out to all who have joined. Layer:
+// server/upstream.
+#include <algorithm>
+#include <boost/asio/post.hpp>
+
+#include "server/log/log.hpp"
+#include "server/upstream/upstream.hpp"
+
+namespace rrgate {
+
+namespace asio = boost::asio;
+
+namespace {
+
+/// Packets of a client that the device has not acknowledged. Above, the gateway does: a client without bounds of its
+/// own can't wait for them all.
+constexpr std::size_t max_unacknowledged = 4096;
+
+/// Who are sent a value of a wire before everybody else gets a turn.
+constexpr std::size_t clients_a_turn = 64;
+
+}  // namespace
+
+// --- wires ---
+
+void Upstream::join_wire(UpstreamClient& client, const std::string& path, const rr::MemberDefinition& member) {
+  if (!connection_) return client.answer_wire(path, member, lost_error());
+  const MemberKey key(path, member.name);
+  auto& known = wires_[key];
+  if (!known) known = std::make_shared<Wire>(path, member);
+  const auto wire = known;
+  wire->followers.push_back({&client, wire->count});
+  if (wire->is_attached) {
+    client.answer_wire(path, member, {});
+    if (!wire->newest || !has_joined(client, key)) return;
+    rr::WirePacket packet(path, member, wire->newest->value, wire->newest->time, wire->arrived);
+    client.receive_wire(packet);
+  } else if (wire->followers.size() == 1) {
+    attach_wire(key);
+  }
+}
+
+void Upstream::attach_wire(const MemberKey& key) {
+  if (!connection_) return;
+  const auto weak = weak_from_this();
+  if (!connection_->session().object_type(key.first))  // another session of this service has found it
+    return find_object(key.first, [weak, key](const rr::Result<rr::Value>& found) {
+      const auto self = weak.lock();
+      if (!self || !self->connection_) return;
+      if (found) return self->attach_wire(key);
+      const auto reason = found.error();
+      self->drop_wire(key, &reason);
+    });
+  auto received = [weak, key](const rr::Value& value, rr::TimeSpec time) {
+    if (const auto self = weak.lock()) self->publish_wire(key, value, time);
+  };
+  auto connected = [weak, key](const rr::Result<rr::Value>& done) {
+    const auto self = weak.lock();
+    if (!self || !self->connection_) return;
+    const auto found = self->wires_.find(key);
+    if (found == self->wires_.end()) return;
+    if (!done) {
+      const auto reason = done.error();
+      return self->drop_wire(key, &reason);
+    }
+    const auto wire = found->second;
+    wire->is_attached = true;
+    const auto followers = wire->followers;
+    for (const auto& follower : followers)
+      if (self->has_joined(*follower.client, key)) follower.client->answer_wire(key.first, wire->member, {});
+    if (!self->connection_) return;
+    if (const auto value = std::exchange(wire->out_value, std::nullopt))
+      (void)self->connection_->send_wire(key.first, key.second, *value);
+  };
+  connection_->on_wire_closed(key.first, key.second, [weak, key] {
+    const auto closed = rr::make_error(rr::ErrorCode::service_error, "the device closed the wire");
+    if (const auto self = weak.lock()) self->drop_wire(key, &closed);
+  });
+  connection_->connect_wire(key.first, key.second, std::move(received), std::move(connected));
+}
+
+void Upstream::publish_wire(const MemberKey& key, const rr::Value& value, rr::TimeSpec time) {
+  const auto found = wires_.find(key);
+  if (found == wires_.end()) return;
+  auto& wire = *found->second;
+  wire.newest = rr::WireValue{time, value};
+  wire.arrived = std::chrono::steady_clock::now();
+  ++wire.count;
+  if (!std::exchange(wire.is_due, true)) hand_out_later(found->second);
+}
+
+void Upstream::hand_out_later(const std::shared_ptr<Wire>& wire) {
+  asio::post(device_->executor(), [weak = weak_from_this(), wire] {
+    if (const auto self = weak.lock()) self->hand_out(wire);
+  });
+}
+
+/// One after the other, each the newest that there is at its turn. Not all at once: one read may bring hundreds of
+/// values, of which the last one counts, and everybody else has to get a turn, too.
+void Upstream::hand_out(const std::shared_ptr<Wire>& wire) {
+  const auto newest = *wire->newest;
+  rr::WirePacket packet(wire->path, wire->member, newest.value, newest.time, wire->arrived);
+  std::size_t up_to_date = 0;  // in a row
+  for (std::size_t sent = 0; sent < clients_a_turn;) {
+    auto& followers = wire->followers;  // they may leave while they are sent to
+    if (up_to_date >= followers.size()) {
+      wire->is_due = false;
+      return;
+    }
+    wire->next = (wire->next + 1) % followers.size();
+    auto& [client, count] = followers[wire->next];
+    if (count == wire->count) {
+      ++up_to_date;
+      continue;
+    }
+    const auto missed = wire->count - std::exchange(count, wire->count) - 1;
+    up_to_date = 0;
+    ++sent;
+    if (missed > 0) client->note_conflated(wire->path, wire->member, missed);
+    client->receive_wire(packet);
+  }
+  hand_out_later(wire);
+}
+
+void Upstream::leave_wire(UpstreamClient& client, const std::string& path, const rr::MemberDefinition& member) {
+  const auto found = wires_.find({path, member.name});
+  if (found == wires_.end()) return;
+  auto& followers = found->second->followers;
+  std::erase_if(followers, [&](const Follower& each) { return each.client == &client; });
+  if (!followers.empty()) return;
+  wires_.erase(found);
+  if (connection_) connection_->disconnect_wire(path, member.name, ignore_result);
+}
+
+void Upstream::drop_wire(const MemberKey& key, const rr::Error* reason) {
+  const auto dropped = wires_.extract(key);
+  if (!dropped) return;
+  const auto followers = std::exchange(dropped.mapped()->followers, {});
+  if (!reason) return;
+  const auto& member = dropped.mapped()->member;
+  for (const auto& [client, count] : followers) {
+    if (has(*client)) client->answer_wire(key.first, member, *reason);
+    if (has(*client)) client->close_wire(key.first, member);
+  }
+}
+
+bool Upstream::has_joined(const UpstreamClient& client, const MemberKey& key) const {
+  const auto found = wires_.find(key);
+  if (found == wires_.end()) return false;
+  const auto is_it = [&](const Follower& each) { return each.client == &client; };
+  return std::ranges::any_of(found->second->followers, is_it);
+}
+
+void Upstream::send_wire(const std::string& path, const rr::MemberDefinition& member, const rr::Value& value) {
+  const auto found = wires_.find({path, member.name});
+  if (found == wires_.end()) return;
+  if (!connection_ || !found->second->is_attached)
+    found->second->out_value = value;
+  else
+    (void)connection_->send_wire(path, member.name, value);  // the newest wins: one that can't be sent is replaced
+}
+
+// --- pipes ---
+
+void Upstream::join_pipe(UpstreamClient& client, rr::PipeId id, const std::string& path,
+                         const rr::MemberDefinition& member) {
+  if (!connection_) return client.refuse_pipe(id, lost_error());
+  const EndpointKey endpoint(&client, id);
+  const bool is_shared = member.direction() == rr::MemberDirection::readonly;
+  const MemberKey key(path, member.name);
+  if (is_shared) {
+    if (const auto known = shared_pipes_.find(key); known != shared_pipes_.end()) {
+      auto& pipe = pipes_.at(known->second);
+      pipe.endpoints.push_back(endpoint);
+      endpoints_[endpoint] = known->second;
+      if (pipe.state == PipeState::attached) client.accept_pipe(id);
+      return;
+    }
+  }
+  const auto number = ++last_pipe_;
+  auto& pipe = pipes_[number];
+  pipe.path = path;
+  pipe.member = &member;
+  pipe.endpoints.push_back(endpoint);
+  endpoints_[endpoint] = number;
+  if (is_shared) shared_pipes_[key] = number;
+  attach_pipe(number);
+}
+
+void Upstream::attach_pipe(PipeNumber number) {
+  const auto found = pipes_.find(number);
+  if (found == pipes_.end() || !connection_ || found->second.state != PipeState::detached) return;
+  auto& pipe = found->second;
+  const auto weak = weak_from_this();
+  if (!connection_->session().object_type(pipe.path))  // another session of this service has found it
+    return find_object(pipe.path, [weak, number](const rr::Result<rr::Value>& object) {
+      const auto self = weak.lock();
+      if (!self || !self->connection_) return;
+      if (object) return self->attach_pipe(number);
+      self->drop_pipe(number);
+    });
+  pipe.state = PipeState::attaching;
+  rr::ClientConnection::PipeHandlers handlers;
+  handlers.received = [weak, number](const rr::Value& packet) {
+    const auto self = weak.lock();
+    if (!self) return;
+    const auto at = self->pipes_.find(number);
+    if (at == self->pipes_.end()) return;
+    const auto endpoints = at->second.endpoints;  // they may leave
+    for (const auto& endpoint : endpoints)
+      if (self->endpoints_.contains(endpoint)) endpoint.first->receive_packet(endpoint.second, packet);
+    self->pace_pipe(number);
+  };
+  handlers.acknowledged = [weak, number](std::span<const std::uint32_t> numbers) {
+    if (const auto self = weak.lock()) self->pass_back_acks(number, numbers);
+  };
+  handlers.closed = [weak, number] {
+    if (const auto self = weak.lock()) self->drop_pipe(number);
+  };
+  const bool is_first = pipe.index == 0;
+  connection_->connect_pipe(
+      pipe.path, pipe.member->name, rr::any_pipe_index, std::move(handlers),
+      [weak, number, is_first, path = pipe.path, member = pipe.member->name](const rr::Result<rr::Value>& result) {
+        const auto self = weak.lock();
+        if (self) self->pipe_attached(number, path, member, result, is_first);
+      });
+}
+
+void Upstream::pipe_attached(PipeNumber number, const std::string& path, const std::string& member,
+                             const rr::Result<rr::Value>& result, bool is_first) {
+  const auto found = pipes_.find(number);
+  if (found == pipes_.end()) {  // everybody has left meanwhile
+    if (result && connection_)
+      connection_->disconnect_pipe(path, member, result->to<std::int32_t>().value(), ignore_result);
+    return;
+  }
+  auto& pipe = found->second;
+  if (!result) {
+    if (!is_first && !connection_) return;  // lost again: the next attempt will do
+    const auto endpoints = pipe.endpoints;
+    if (!is_first) return drop_pipe(number);
+    for (const auto& endpoint : endpoints) endpoints_.erase(endpoint);
+    shared_pipes_.erase({pipe.path, pipe.member->name});
+    pipes_.erase(found);
+    for (const auto& endpoint : endpoints)
+      if (has(*endpoint.first)) endpoint.first->refuse_pipe(endpoint.second, result.error());
+    return;
+  }
+  pipe.index = result->to<std::int32_t>().value();
+  pipe.state = PipeState::attached;
+  const auto endpoints = pipe.endpoints;
+  for (const auto& endpoint : endpoints)
+    if (endpoints_.contains(endpoint)) endpoint.first->accept_pipe(endpoint.second);
+  pace_pipe(number);
+}
+
+void Upstream::leave_pipe(UpstreamClient& client, rr::PipeId id) {
+  const EndpointKey endpoint(&client, id);
+  const auto known = endpoints_.find(endpoint);
+  if (known == endpoints_.end()) return;
+  const auto number = known->second;
+  const auto found = pipes_.find(number);
+  endpoints_.erase(known);
+  auto& pipe = found->second;
+  std::erase(pipe.endpoints, endpoint);
+  if (!pipe.endpoints.empty()) return pace_pipe(number);
+  if (connection_ && pipe.state == PipeState::attached)
+    connection_->disconnect_pipe(pipe.path, pipe.member->name, pipe.index, ignore_result);
+  if (pipe.member->direction() == rr::MemberDirection::readonly) shared_pipes_.erase({pipe.path, pipe.member->name});
+  pipes_.erase(found);
+}
+
+void Upstream::drop_pipe(PipeNumber number) {
+  const auto dropped = pipes_.extract(number);
+  if (!dropped) return;
+  const auto& pipe = dropped.mapped();
+  if (const auto known = shared_pipes_.find({pipe.path, pipe.member->name});
+      known != shared_pipes_.end() && known->second == number)
+    shared_pipes_.erase(known);
+  for (const auto& endpoint : pipe.endpoints) endpoints_.erase(endpoint);
+  for (const auto& endpoint : pipe.endpoints)
+    if (has(*endpoint.first)) endpoint.first->close_pipe(endpoint.second);
+}
+
+void Upstream::send_pipe(UpstreamClient& client, rr::PipeId id, const rr::Value& packet,
+                         std::optional<std::uint32_t> wants_ack) {
+  const auto known = endpoints_.find({&client, id});
+  if (known == endpoints_.end()) return;
+  auto& pipe = pipes_.at(known->second);
+  const auto sent = pipe.state == PipeState::attached && connection_ ? pass_on(pipe, known->first, packet, wants_ack)
+                                                                     : rr::Result<>(lost_error());
+  if (sent) return;
+  log(LogLevel::info, "pipe endpoint closed: the device takes no packet",
+      {{"device", device_->config().name},
+       {"pipe", pipe.path + "." + pipe.member->name},
+       {"error", sent.error().message}});
+  leave_pipe(client, id);
+  client.close_pipe(id);
+}
+
+rr::Result<> Upstream::pass_on(Pipe& pipe, const EndpointKey& endpoint, const rr::Value& packet,
+                               std::optional<std::uint32_t> wants_ack) {
+  const auto connection = connection_;  // it may be lost
+  if (!wants_ack) return connection->send_pipe(pipe.path, pipe.member->name, pipe.index, packet);
+  const auto known = endpoint;
+  const auto sent = connection->send_pipe_for_ack(pipe.path, pipe.member->name, pipe.index, packet);
+  if (!sent) return sent.error();
+  const auto found = endpoints_.find(known);
+  if (found == endpoints_.end()) return {};
+  auto& waiting = pipes_.at(found->second).unacknowledged;
+  waiting[*sent] = *wants_ack;
+  if (connection_ && waiting.size() <= max_unacknowledged) return {};
+  const std::uint32_t oldest = waiting.extract(waiting.begin()).mapped();
+  known.first->acknowledge_packets(known.second, {&oldest, 1});
+  return {};
+}
+
+/// Acknowledgements pass, so that a client has no more packets on the way than it wants, the device's among them.
+void Upstream::pass_back_acks(PipeNumber number, std::span<const std::uint32_t> numbers) {
+  const auto found = pipes_.find(number);
+  if (found == pipes_.end() || found->second.endpoints.empty()) return;
+  auto& pipe = found->second;
+  std::vector<std::uint32_t> arrived;
+  for (const auto each : numbers)
+    if (const auto known = pipe.unacknowledged.extract(each)) arrived.push_back(known.mapped());
+  const auto endpoint = pipe.endpoints.front();
+  if (!arrived.empty()) endpoint.first->acknowledge_packets(endpoint.second, arrived);
+}
+
+std::vector<Upstream::PipeNumber> Upstream::pipes_of(const UpstreamClient& client) const {
+  std::vector<PipeNumber> numbers;
+  const EndpointKey first(const_cast<UpstreamClient*>(&client), 0);
+  for (auto it = endpoints_.lower_bound(first); it != endpoints_.end() && it->first.first == &client; ++it)
+    numbers.push_back(it->second);
+  return numbers;
+}
+
+void Upstream::acknowledge_all(UpstreamClient& client) {
+  for (const auto number : pipes_of(client)) {
+    const auto found = pipes_.find(number);
+    if (found == pipes_.end() || found->second.unacknowledged.empty()) continue;
+    std::vector<std::uint32_t> numbers;
+    for (const auto& [there, here] : std::exchange(found->second.unacknowledged, {})) numbers.push_back(here);
+    const auto endpoint = found->second.endpoints.front();
+    endpoint.first->acknowledge_packets(endpoint.second, numbers);
+  }
+}
+
+// --- credit ---
+
+void Upstream::caught_up(UpstreamClient& client) {
+  for (const auto number : pipes_of(client)) pace_pipe(number);
+}
+
+/// A device that bounds its packets on the way gives them out by their acknowledgements. Held back, they keep it from
+/// sending what a slow client could only be cut for.
+void Upstream::pace_pipe(PipeNumber number) {
+  const auto found = pipes_.find(number);
+  if (found == pipes_.end() || !connection_ || found->second.state != PipeState::attached) return;
+  auto& pipe = found->second;
+  const bool is_held = std::any_of(pipe.endpoints.begin(), pipe.endpoints.end(),
+                                   [](const EndpointKey& endpoint) { return endpoint.first->is_behind(); });
+  if (is_held == pipe.is_held) return;
+  pipe.is_held = is_held;
+  const auto connection = connection_;  // it may be lost
+  connection->hold_pipe_acks(pipe.path, pipe.member->name, pipe.index, is_held);
+}
+
+}  // namespace rrgate

@@ -1,0 +1,179 @@
+// Nodes of one machine: files, locks, look-up, and calls over rr+local.
+#include "node/transport/local.hpp"
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <cstdlib>
+#include <fstream>
+
+#include "core/support/random.hpp"
+#include "node/platform/folders.hpp"
+#include "node/platform/node_id_store.hpp"
+#include "test/node/node/node_fixture.hpp"
+#include "test/node/transport/sandbox.hpp"
+
+using namespace rr;
+using namespace std::string_view_literals;
+namespace fs = std::filesystem;
+using Catch::Matchers::Contains;
+
+namespace {
+
+void add_adder(Node& node) {
+  auto service = Service::from_text({"service test.sum\nobject Sum\nfunction double add(double a, double b)\nend\n"},
+                                    "Sum", "Sum");
+  service->function("add", [](double a, double b) { return a + b; });
+  node.add(service);
+  node.listen("rr+local:///");
+}
+
+double add_at(const std::string& url) {
+  return connect(url).call("add", 1.5, 2.25).to<double>().value();
+}
+
+void write_file(const fs::path& path, std::string_view text) {
+  fs::create_directories(path.parent_path());
+  std::ofstream(path, std::ios::binary) << text;
+}
+
+}  // namespace
+
+TEST_CASE("a node is reached by name, by ID and by both, and leaves nothing behind") {
+  const Sandbox sandbox;
+  const NodeId id = random_node_id();
+  NodeOptions options;
+  options.id = id;
+  const std::string by_id = "nodeid=" + format_node_id(id, NodeIdFormat::dashes);
+  const auto base = *user_run_folder() / "transport" / "local";
+  {
+    RunningNode node(add_adder, options);
+    CHECK(add_at("rr+local:///?nodename=test.node&service=Sum") == 3.75);
+    CHECK(add_at("rr+local:///?" + by_id + "&service=Sum") == 3.75);
+    CHECK(add_at("rr+local:///?" + by_id + "&nodename=test.node&service=Sum") == 3.75);
+    CHECK(add_at("rr+local://" + user_name() + "@localhost/?nodename=test.node&service=Sum") == 3.75);
+
+    const auto nodes = list_local_nodes(base);
+    REQUIRE(nodes.size() == 1);
+    CHECK(nodes[0].node.id == id);
+    CHECK(nodes[0].node.name == "test.node");
+    struct stat status {};
+    REQUIRE(::stat(nodes[0].socket.c_str(), &status) == 0);
+    CHECK((status.st_mode & 0777) == 0770);
+
+    const auto other = error_of([&] { connect("rr+local:///?" + by_id + "&nodename=other&service=Sum"); });
+    CHECK(other.code == ErrorCode::node_not_found);
+    Node second("test.node");
+    CHECK_THROWS_WITH(second.listen("rr+local:///"), Contains("in use by another node"));
+  }
+  CHECK(fs::is_empty(base / "by-nodeid"));
+  CHECK(fs::is_empty(base / "by-nodename"));
+  CHECK(fs::is_empty(*user_run_folder() / "socket"));
+  CHECK(error_of([&] { connect("rr+local:///?nodename=test.node&service=Sum"); }).code == ErrorCode::node_not_found);
+}
+
+TEST_CASE("what a crashed node left is cleaned up, and a running one is left alone") {
+  const Sandbox sandbox;
+  const auto folders = make_local_folders().value();
+  const LocalNodeInfo dead{{random_node_id(), "dead.node"}, (folders.sockets / "abc.sock").string(), "nobody", "0123"};
+  const auto stem = format_node_id(dead.node.id, NodeIdFormat::dashes);
+  write_file(folders.base / "by-nodeid" / (stem + ".info"), format_local_info(dead));
+  write_file(folders.base / "by-nodeid" / (stem + ".pid"), "3039530421");
+  write_file(dead.socket, "");
+  CHECK(list_local_nodes(folders.base).empty());
+  const auto error = error_of([&] { connect("rr+local:///?nodeid=" + stem + "&service=Sum"); });
+  CHECK(error.code == ErrorCode::connection_error);
+  CHECK_THAT(error.message, Contains(dead.socket));
+
+  RunningNode node(add_adder);
+  RunningNode other([](Node& into) { into.listen("rr+local:///"); }, {}, "other.node");
+  CHECK_FALSE(fs::exists(dead.socket));
+  CHECK_FALSE(fs::exists(folders.base / "by-nodeid" / (stem + ".info")));
+  CHECK(add_at("rr+local:///?nodename=test.node&service=Sum") == 3.75);
+}
+
+TEST_CASE("a socket that answers for another node is found out") {
+  const Sandbox sandbox;
+  RunningNode node(add_adder);
+  const auto folders = make_local_folders().value();
+  auto info = list_local_nodes(folders.base).at(0);
+  info.node = {random_node_id(), "wanted.node"};
+  write_file(folders.base / "by-nodename" / "wanted.node.info", format_local_info(info));
+  CHECK(error_of([&] { connect("rr+local:///?nodename=wanted.node&service=Sum"); }).code == ErrorCode::node_not_found);
+}
+
+TEST_CASE("info files are read as the reference writes them") {
+  const std::string text =
+      "ServiceStateNonce: HMWmpo4JgxqgfzQS\nnodeid: {0dfc24e5-8305-4b9f-a4f7-431ef45913a7}\nnodename: probe.srv\n"
+      "pid: 19391\nsocket: /run/a.sock\nusername: alice\nsocket: /stale.sock\nno key\n";
+  const auto info = parse_local_info(text).value();
+  CHECK(format_node_id(info.node.id) == "{0dfc24e5-8305-4b9f-a4f7-431ef45913a7}");
+  CHECK(info.node.name == "probe.srv");
+  CHECK(info.socket == "/run/a.sock");
+  CHECK(info.username == "alice");
+  CHECK(info.nonce == "HMWmpo4JgxqgfzQS");
+  CHECK_FALSE(parse_local_info("").has_value());
+  CHECK_FALSE(parse_local_info("nodeid: {0dfc24e5-8305-4b9f-a4f7-431ef45913a7}\nsocket: relative.sock\n").has_value());
+  CHECK_FALSE(parse_local_info("nodeid: nonsense\nsocket: /a.sock\n").has_value());
+  CHECK_FALSE(parse_local_info("nodeid: {0dfc24e5-8305-4b9f-a4f7-431ef45913a7}\nsocket: /a\0b.sock\n"sv).has_value());
+}
+
+TEST_CASE("a name keeps its NodeID, for one node at a time") {
+  const Sandbox sandbox;
+  NodeId id;
+  {
+    auto claim = NodeIdClaim::take("my.robot").value();
+    id = claim.id();
+    CHECK_FALSE(id.is_any());
+    const auto second = NodeIdClaim::take("my.robot");
+    REQUIRE_FALSE(second.has_value());
+    CHECK_THAT(second.error().message, Contains("in use by another node"));
+  }
+  CHECK(NodeIdClaim::take("my.robot").value().id() == id);
+  CHECK(NodeIdClaim::take("other.robot").value().id() != id);
+  CHECK_FALSE(NodeIdClaim::take("../robot").has_value());
+
+  NodeOptions options;
+  options.keeps_id = true;
+  CHECK(Node("my.robot", options).identity().id == id);
+
+  const auto stored = ::geteuid() == 0 ? *system_state_folder() : *user_config_folder();
+  write_file(stored / "nodeids" / "broken.robot", "not an id");
+  CHECK_THAT(NodeIdClaim::take("broken.robot").error().message, Contains("'not an id'"));
+  write_file(stored / "nodeids" / "old.robot", " 0DFC24E583054B9FA4F7431EF45913A7\n");
+  CHECK(format_node_id(NodeIdClaim::take("old.robot").value().id()) == "{0dfc24e5-8305-4b9f-a4f7-431ef45913a7}");
+}
+
+TEST_CASE("public nodes are for those whom the administrator lets in") {
+  const Sandbox sandbox;
+  NodeOptions options;
+  options.local_is_public = true;
+  Node early("early.node", options);
+  CHECK_THROWS_WITH(early.listen("rr+local:///"), Contains("not set up for public nodes of " + user_name()));
+
+  const auto base = public_bases_folder().value() / user_name();
+  fs::create_directories(base);
+  const auto umask_before = ::umask(077);
+  RunningNode node(add_adder, options);
+  ::umask(umask_before);
+  const auto mode_of = [](const fs::path& path) {
+    struct stat status {};
+    REQUIRE(::stat(path.c_str(), &status) == 0);
+    return status.st_mode & 07777;
+  };
+  for (const auto* folder : {"by-nodeid", "by-nodename", "socket"}) CHECK(mode_of(base / folder) == 02750);
+  CHECK(mode_of(base / "by-nodename" / "test.node.info") == 0640);
+  CHECK(mode_of(base / "by-nodename" / "test.node.pid") == 0640);
+  CHECK(mode_of(list_local_nodes(base).at(0).socket) == 0770);
+  CHECK(list_local_nodes(*user_run_folder() / "transport" / "local").empty());
+  CHECK(add_at("rr+local://" + user_name() + "@localhost/?nodename=test.node&service=Sum") == 3.75);
+  CHECK(add_at("rr+local:///?nodename=test.node&service=Sum") == 3.75);
+}
+
+TEST_CASE("folders follow the reference's variables, but never a relative one") {
+  Sandbox sandbox;
+  CHECK_THAT(user_run_folder().value().string(), Contains(sandbox.folder()));
+  sandbox.set(::geteuid() == 0 ? "ROBOTRACONTEUR_SYSTEM_CONFIG_DIR" : "ROBOTRACONTEUR_USER_CONFIG_DIR", "somewhere");
+  CHECK_THAT(user_config_folder().error().message, Contains("'somewhere', expected an absolute path"));
+}

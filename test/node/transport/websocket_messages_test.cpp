@@ -1,0 +1,89 @@
+#include "node/transport/websocket_messages.hpp"
+
+#include <catch2/catch.hpp>
+#include <string>
+#include <vector>
+
+using namespace rr;
+
+namespace {
+
+/// A client's frame, with the length in as many bytes as it needs.
+Bytes frame(std::uint8_t first, std::string_view payload) {
+  Bytes out{first};
+  const auto size = payload.size();
+  if (size < 126) {
+    out.push_back(static_cast<std::uint8_t>(0x80 | size));
+  } else {
+    out.push_back(0x80 | 126);
+    out.push_back(static_cast<std::uint8_t>(size >> 8));
+    out.push_back(static_cast<std::uint8_t>(size));
+  }
+  const std::uint8_t mask[] = {0x12, 0xa4, 0x00, 0xff};
+  out.insert(out.end(), mask, mask + 4);
+  for (std::size_t i = 0; i < size; ++i)
+    out.push_back(static_cast<std::uint8_t>(static_cast<std::uint8_t>(payload[i]) ^ mask[i % 4]));
+  return out;
+}
+
+Bytes operator+(Bytes left, const Bytes& right) {
+  left.insert(left.end(), right.begin(), right.end());
+  return left;
+}
+
+/// What a client said, as one line each.
+std::vector<std::string> heard(WebSocketMessageDecoder& decoder, ByteSpan bytes) {
+  std::vector<std::string> out;
+  while (!bytes.empty() && !decoder.received_close()) {
+    const auto taken = decoder.feed(bytes);
+    REQUIRE(taken.has_value());
+    bytes = bytes.subspan(*taken);
+    if (const auto message = decoder.take_message()) out.push_back("message " + *message);
+    if (const auto ping = decoder.take_ping()) out.push_back("ping " + std::string(as_text(*ping)));
+    if (decoder.received_close()) out.push_back("close " + std::to_string(decoder.received_close()->code));
+  }
+  return out;
+}
+
+std::uint16_t refusal(const Bytes& bytes, std::size_t max_message = 1000) {
+  WebSocketMessageDecoder decoder(max_message);
+  for (ByteSpan left(bytes); !left.empty();) {
+    const auto taken = decoder.feed(left);
+    if (!taken) return decoder.close_code();
+    left = left.subspan(*taken);
+    decoder.take_message();
+    decoder.take_ping();
+  }
+  return 0;
+}
+
+}  // namespace
+
+TEST_CASE("messages are the same however their bytes are split") {
+  const std::string long_text(300, 'x');
+  const auto bytes = frame(0x81, "hello") + frame(0x01, "two ") + frame(0x89, "still there?") + frame(0x80, "parts") +
+                     frame(0x81, "") + frame(0x8a, "") + frame(0x81, long_text) + frame(0x88, "\x03\xe8");
+  const std::vector<std::string> expected{"message hello", "ping still there?",    "message two parts",
+                                          "message ",      "message " + long_text, "close 1000"};
+  for (std::size_t cut = 0; cut <= bytes.size(); ++cut) {
+    WebSocketMessageDecoder decoder(1000);
+    auto out = heard(decoder, ByteSpan(bytes).first(cut));
+    for (auto& each : heard(decoder, ByteSpan(bytes).subspan(cut))) out.push_back(each);
+    CHECK(out == expected);
+  }
+}
+
+TEST_CASE("what no client may send has a code to close with") {
+  CHECK(refusal(frame(0x82, "x")) == 1003);
+  CHECK(refusal(frame(0x81, "\xc3\x28")) == 1007);
+  CHECK(refusal({0x81, 0x01}) == 1002);
+  CHECK(refusal(frame(0xc1, "x")) == 1002);
+  CHECK(refusal(frame(0x80, "x")) == 1002);
+  CHECK(refusal(frame(0x01, "x") + frame(0x81, "x")) == 1002);
+  CHECK(refusal(frame(0x09, "x")) == 1002);
+  CHECK(refusal(frame(0x89, std::string(126, 'x'))) == 1002);
+  CHECK(refusal(frame(0x83, "x")) == 1002);
+  CHECK(refusal(frame(0x81, std::string(11, 'x')), 10) == 1009);
+  CHECK(refusal(frame(0x01, "123456") + frame(0x80, "78901"), 10) == 1009);
+  CHECK(refusal(frame(0x01, "12345") + frame(0x80, "67890"), 10) == 0);
+}
