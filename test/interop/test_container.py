@@ -83,11 +83,11 @@ def image(podman, tmp_path_factory):
     context = tmp_path_factory.mktemp("context")
     shutil.copytree(DOCKER, context / "docker", ignore=shutil.ignore_patterns("prebuilt"))
     prebuilt = context / "docker" / "prebuilt"
-    for program, folder in [("rrgate", "bin"), ("demo/rrgate-demo-create", "libexec/rrgate"),
-                            ("demo/rrgate-demo-webcams", "libexec/rrgate")]:
+    for program, folder in [("server/rrgate", "bin"), ("examples/demo/rrgate-demo-create", "libexec/rrgate"),
+                            ("examples/demo/rrgate-demo-webcams", "libexec/rrgate")]:
         (prebuilt / folder).mkdir(parents=True, exist_ok=True)
         target = prebuilt / folder / program.split("/")[-1]
-        subprocess.run(["strip", "-o", target, BUILD / "server" / program], check=True)
+        subprocess.run(["strip", "-o", target, BUILD / program], check=True)
     shutil.copytree(ROOT / "web" / "dist", prebuilt / "share" / "rrgate" / "web")
     # The format of Docker: the other one has no health check.
     podman("build", "--format=docker", "--pull=never", "--isolation=chroot", "--network=host", "-t", "rrgate",
