@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/robdef/model/names.hpp"
+#include "core/robdef/parse/statement.hpp"
 
 namespace rr::test {
 

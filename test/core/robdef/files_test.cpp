@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "core/robdef/model/constant_value.hpp"
+#include "core/robdef/parse/statement.hpp"
 #include "test/core/robdef/checked.hpp"
 #include "test/support/golden.hpp"
 
