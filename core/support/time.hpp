@@ -12,6 +12,7 @@ struct TimeSpec {
   std::int64_t seconds = 0;
   std::int32_t nanoseconds = 0;
 
+  /// The first or last time that can be told where the sum lies outside.
   TimeSpec normalized() const;
   TimeSpec plus_one_nanosecond() const;
   auto operator<=>(const TimeSpec&) const = default;
