@@ -13,10 +13,14 @@ namespace {
 /// One object lacks hardly more than this without lacking everything; the rest would be noise.
 constexpr std::size_t max_missing_members = 20;
 
+/// An object, its bases and members each once: a text may repeat them without end, and every object that implements
+/// this one looks through them.
 struct ObjectNode {
   VerifyScope* scope;
   EntityDefinition* object;
   bool is_cyclic = false;
+  std::vector<const ImplementsDefinition*> bases = {};  ///< those that are objects
+  std::vector<const MemberDefinition*> members = {};
 };
 
 class ImplementsCheck {
@@ -44,7 +48,10 @@ ImplementsCheck::ImplementsCheck(VerifySet& set) {
     for (auto& entity : scope.definition->entities) {
       if (entity.kind != EntityKind::object) continue;
       index_.emplace(names_.emplace_back(scope.definition->name + '.' + entity.name), nodes_.size());
-      nodes_.push_back({&scope, &entity});
+      auto& node = nodes_.emplace_back(ObjectNode{&scope, &entity});
+      std::unordered_set<std::string_view> seen;
+      for (const auto& member : entity.members)
+        if (seen.insert(member.name).second) node.members.push_back(&member);
     }
   }
   graph_.resize(nodes_.size());
@@ -54,7 +61,7 @@ void ImplementsCheck::run() {
   for (auto& node : nodes_) resolve(node);
   report_cycles();
   for (const auto& node : nodes_) {
-    if (!node.object->implements.empty()) check_object(node);
+    if (!node.bases.empty()) check_object(node);
   }
 }
 
@@ -74,6 +81,7 @@ void ImplementsCheck::resolve(ObjectNode& node) {
       continue;
     }
     graph_[static_cast<std::size_t>(&node - nodes_.data())].push_back(index_.at(item.qualified_name));
+    node.bases.push_back(&item);
   }
 }
 
@@ -117,15 +125,13 @@ std::string_view difference(const MemberDefinition& own, const MemberDefinition&
 void ImplementsCheck::check_object(const ObjectNode& node) {
   std::unordered_set<std::string_view> own_bases;
   std::unordered_map<std::string_view, const MemberDefinition*> own_members;
-  for (const auto& item : node.object->implements) own_bases.insert(item.qualified_name);
-  for (const auto& member : node.object->members) own_members.emplace(member.name, &member);
-  std::unordered_set<std::string_view> seen;
-  for (const auto& item : node.object->implements) {
-    if (item.qualified_name.empty() || !seen.insert(item.qualified_name).second) continue;
-    const auto& base = nodes_[index_.at(item.qualified_name)];
+  for (const auto* item : node.bases) own_bases.insert(item->qualified_name);
+  for (const auto* member : node.members) own_members.emplace(member->name, member);
+  for (const auto* item : node.bases) {
+    const auto& base = nodes_[index_.at(item->qualified_name)];
     if (base.object == node.object) continue;
-    if (!node.is_cyclic) check_bases(node, base, item, own_bases);
-    check_members(node, base, item, own_members);
+    if (!node.is_cyclic) check_bases(node, base, *item, own_bases);
+    check_members(node, base, *item, own_members);
   }
 }
 
@@ -133,12 +139,12 @@ void ImplementsCheck::check_bases(const ObjectNode& node, const ObjectNode& base
                                   const ImplementsDefinition& implements,
                                   const std::unordered_set<std::string_view>& own_bases) {
   std::size_t missing = 0;
-  for (const auto& item : base.object->implements) {
-    if (item.qualified_name.empty() || own_bases.contains(item.qualified_name)) continue;
+  for (const auto* item : base.bases) {
+    if (own_bases.contains(item->qualified_name)) continue;
     if (++missing > max_missing_members) return;
     node.scope->error("implements-missing", node.object->line, node.object->name,
                       quoted(node.object->name) + " implements " + quoted(implements.name) + ", which implements " +
-                          quoted(item.qualified_name) + ": expected 'implements' for it here too");
+                          quoted(item->qualified_name) + ": expected 'implements' for it here too");
     node.scope->reporter.note(implements.line, quoted(implements.name) + " is implemented here");
   }
 }
@@ -147,24 +153,24 @@ void ImplementsCheck::check_members(const ObjectNode& node, const ObjectNode& ba
                                     const ImplementsDefinition& implements,
                                     const std::unordered_map<std::string_view, const MemberDefinition*>& own_members) {
   std::size_t missing = 0;
-  for (const auto& member : base.object->members) {
-    const auto own = own_members.find(member.name);
+  for (const auto* member : base.members) {
+    const auto own = own_members.find(member->name);
     if (own != own_members.end()) {
-      const auto what = difference(*own->second, member);
+      const auto what = difference(*own->second, *member);
       if (what.empty()) continue;
-      node.scope->error("implements-mismatch", own->second->line, member.name,
-                        std::string(member_kind_name(own->second->kind)) + ' ' + quoted(member.name) +
+      node.scope->error("implements-mismatch", own->second->line, member->name,
+                        std::string(member_kind_name(own->second->kind)) + ' ' + quoted(member->name) +
                             " differs from that of " + quoted(implements.name) + " in " + std::string(what) +
                             ", expected them equal");
       node.scope->reporter.note(
-          base.scope == node.scope ? member.line : 0,
-          "the member of " + quoted(implements.qualified_name) + ", line " + std::to_string(member.line));
+          base.scope == node.scope ? member->line : 0,
+          "the member of " + quoted(implements.qualified_name) + ", line " + std::to_string(member->line));
       continue;
     }
     if (++missing > max_missing_members) return;
     node.scope->error("implements-missing", node.object->line, node.object->name,
                       quoted(node.object->name) + " implements " + quoted(implements.name) + " but lacks its " +
-                          std::string(member_kind_name(member.kind)) + ' ' + quoted(member.name));
+                          std::string(member_kind_name(member->kind)) + ' ' + quoted(member->name));
     node.scope->reporter.note(implements.line, quoted(implements.name) + " is implemented here");
   }
 }

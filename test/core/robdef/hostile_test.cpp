@@ -121,6 +121,14 @@ TEST_CASE("one large base and many objects that lack its members", "[robdef][hos
                 "end\n" + numbered(10000, [](const auto& i) { return "object O" + i + "\n implements B\nend\n"; }));
 }
 
+TEST_CASE("a base whose members and bases are repeated, and many objects of it", "[robdef][hostile]") {
+  const std::size_t count = 100000;
+  const auto body = " implements A\n wire double w\n";
+  check_quickly(head + "object A\nend\nobject B\n" + repeated(" implements A\n", count) +
+                repeated(" wire double w\n", count) + "end\n" +
+                numbered(count, [&](const auto& i) { return "object O" + i + "\n implements B\n" + body + "end\n"; }));
+}
+
 TEST_CASE("imports in a circle of thousands", "[robdef][hostile]") {
   std::vector<std::string> imports;
   for (int i = 0; i < 3000; ++i) {
