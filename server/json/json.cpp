@@ -3,58 +3,12 @@
 #include <boost/json/basic_parser_impl.hpp>
 #include <boost/json/src.hpp>
 #include <charconv>
-#include <cmath>
-#include <optional>
-#include <vector>
+
+#include "server/json/json_builder.hpp"
 
 namespace rr {
 
 namespace {
-
-constexpr std::size_t max_depth = 64;
-
-/// Puts a document together from what a parser meets; refuses keys that are there already.
-class Builder {
- public:
-  bool begin(Json container) {
-    if (open_.size() >= max_depth) return fail("is nested deeper than " + std::to_string(max_depth) + " levels");
-    auto* added = add(std::move(container));
-    if (added) open_.push_back(added);
-    return added;
-  }
-  bool end() {
-    open_.pop_back();
-    return true;
-  }
-  bool set_key(std::string key) {
-    if (open_.back()->contains(key)) return fail("has the key " + rr::quoted(key) + " twice");
-    key_ = std::move(key);
-    return true;
-  }
-  bool add_value(Json value) { return add(std::move(value)); }
-  bool add_number(double number) { return std::isfinite(number) ? add_value(number) : fail("has a number too large"); }
-  bool fail(std::string why) {
-    why_ = std::move(why);
-    return false;
-  }
-
-  const std::string& why() const { return why_; }
-  Json take() { return std::move(root_); }
-
- private:
-  Json* add(Json value) {
-    if (open_.empty()) return &(root_ = std::move(value));
-    auto& parent = *open_.back();
-    if (!parent.is_array()) return &(parent[key_] = std::move(value));
-    parent.push_back(std::move(value));
-    return &parent.back();
-  }
-
-  Json root_;
-  std::vector<Json*> open_;  ///< a container stays where it is while it is open: nothing is added beside it
-  std::string key_;
-  std::string why_;
-};
 
 /// What boost::json::basic_parser calls. Numbers come with their digits: its own doubles are off by a bit at times.
 struct TextHandler {
@@ -65,7 +19,7 @@ struct TextHandler {
   static constexpr std::size_t max_key_size = std::size_t(-1);
   static constexpr std::size_t max_string_size = std::size_t(-1);
 
-  Builder builder;
+  JsonBuilder builder;
   std::string part;
 
   bool done(bool ok, error_code& ec) {
@@ -116,57 +70,20 @@ struct TextHandler {
   bool on_comment(string_view, error_code&) { return true; }
 };
 
-/// What nlohmann's CBOR reader calls.
-struct CborHandler final : nlohmann::json_sax<Json> {
-  Builder builder;
-
-  bool null() override { return builder.add_value(nullptr); }
-  bool boolean(bool value) override { return builder.add_value(value); }
-  bool number_integer(number_integer_t value) override { return builder.add_value(value); }
-  bool number_unsigned(number_unsigned_t value) override { return builder.add_value(value); }
-  bool number_float(number_float_t value, const string_t&) override { return builder.add_value(value); }
-  bool string(string_t& text) override { return builder.add_value(std::move(text)); }
-  bool binary(binary_t& bytes) override {
-    const auto tag = bytes.has_subtype() ? std::optional(bytes.subtype()) : std::nullopt;
-    return builder.add_value(tag ? Json::binary(std::move(bytes), *tag) : Json::binary(std::move(bytes)));
-  }
-  bool start_object(std::size_t) override { return builder.begin(Json::object()); }
-  bool key(string_t& text) override { return builder.set_key(std::move(text)); }
-  bool end_object() override { return builder.end(); }
-  bool start_array(std::size_t) override { return builder.begin(Json::array()); }
-  bool end_array() override { return builder.end(); }
-  bool parse_error(std::size_t position, const std::string&, const nlohmann::detail::exception&) override {
-    return builder.fail("is no CBOR at byte " + std::to_string(position));
-  }
-};
-
-Error unreadable(std::string_view kind, std::string why) {
-  return make_error(ErrorCode::data_serialization_error, std::string(kind) + " " + std::move(why));
-}
-
 }  // namespace
 
 Result<Json> read_json(std::string_view text) {
   boost::json::parse_options options;
-  options.max_depth = max_depth;
+  options.max_depth = JsonBuilder::max_depth;
   boost::json::basic_parser<TextHandler> parser(options);
   boost::json::error_code ec;
   const auto used = parser.write_some(false, text.data(), text.size(), ec);
   auto& builder = parser.handler().builder;
   if (!ec && used < text.size()) ec = boost::json::error::extra_data;
   if (!ec) return {boost::system::in_place_value, builder.take()};
-  if (!builder.why().empty()) return unreadable("JSON", builder.why() + " (byte " + std::to_string(used) + ")");
-  return unreadable("JSON", "is malformed at byte " + std::to_string(used) + ": " + ec.message());
-}
-
-Result<Json> read_cbor(ByteSpan bytes) {
-  CborHandler handler;
-  nlohmann::detail::binary_reader<Json, decltype(nlohmann::detail::input_adapter(bytes.begin(), bytes.end())),
-                                  CborHandler>
-      reader(nlohmann::detail::input_adapter(bytes.begin(), bytes.end()), Json::input_format_t::cbor);
-  if (reader.sax_parse(Json::input_format_t::cbor, &handler, true, Json::cbor_tag_handler_t::store))
-    return {boost::system::in_place_value, handler.builder.take()};
-  return unreadable("CBOR", handler.builder.why());
+  if (!builder.why().empty())
+    return unreadable_document("JSON", builder.why() + " (byte " + std::to_string(used) + ")");
+  return unreadable_document("JSON", "is malformed at byte " + std::to_string(used) + ": " + ec.message());
 }
 
 std::string write_json(const OrderedJson& json) {

@@ -1,5 +1,6 @@
 // Any JSON or CBOR gives a value that packs, or an error that names its place; what was read is written and read again
 // to the same text.
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 
@@ -25,7 +26,8 @@ std::string written(const Value& value, const TypeDefinition& type, const JsonFo
 
 }  // namespace
 
-/// The first byte chooses a type, the second the forms; then comes JSON, or CBOR.
+/// The first byte chooses a type, the second the forms; then comes JSON, or CBOR, whose first bytes may be repeated:
+/// what nests without end is too long for an input.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size < 3) return 0;
   const auto& types = test::test_types();
@@ -35,7 +37,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   form.packs_arrays = data[1] & 1;
   form.numbers_enums = data[1] & 2;
   form.ignores_unknown = data[1] & 4;
-  const ByteSpan body(data + 2, size - 2);
+  ByteSpan body(data + 2, size - 2);
+  Bytes repeated;
+  if (const auto part = body.first(std::min<std::size_t>(body.size(), 1 + (data[1] >> 5))); data[1] & 16) {
+    for (std::size_t i = 0; i < 100'000; ++i) repeated.insert(repeated.end(), part.begin(), part.end());
+    repeated.insert(repeated.end(), body.begin(), body.end());
+    body = repeated;
+  }
   const auto json = data[1] & 8 ? read_cbor(body) : read_json(as_text(body));
   if (!json) {
     require(!json.error().message.empty(), "an error says what", "");
