@@ -52,7 +52,7 @@ Result<std::vector<std::uint32_t>> read_capabilities(const MessageElement& eleme
 Connection::Connection(ConnectionRole role, ConnectionOptions options, Now now)
     : role_(role),
       options_(std::move(options)),
-      scanner_(options_.max_unauthorised_message_size),
+      scanner_(message_limit()),
       opened_(now.steady),
       last_sent_(now.steady),
       last_received_(now.steady) {
@@ -76,7 +76,7 @@ void Connection::close(Error reason) {
 
 void Connection::authorise() {
   is_authorised_ = true;
-  scanner_.set_max_message_size(options_.max_message_size);
+  scanner_.set_max_message_size(message_limit());
 }
 
 void Connection::set_endpoints(std::uint32_t local, std::uint32_t remote) {
@@ -102,7 +102,8 @@ Result<std::size_t> Connection::receive(ByteSpan input, Now now) {
 }
 
 Result<> Connection::handle_message(ByteSpan bytes, Now now) {
-  if (auto done = decode(bytes, {.string_table = agreed_.string_table}, incoming_); !done) return done;
+  const DecodeOptions options{.string_table = agreed_.string_table, .message_limit = message_limit()};
+  if (auto done = decode(bytes, options, incoming_); !done) return done;
   ++stats_.messages_received;
   last_received_ = now.steady;
   heartbeat_sent_.reset();
@@ -328,8 +329,7 @@ void Connection::complete_header(Message& message) const {
 
 EncodeOptions Connection::encode_options() const {
   return {.string_table = agreed_.string_table,
-          .max_message_size =
-              is_authorised_ ? options_.max_message_size - send_headroom : options_.max_unauthorised_message_size};
+          .max_message_size = is_authorised_ ? message_limit() - send_headroom : message_limit()};
 }
 
 Result<> Connection::note_sent(Now now) {

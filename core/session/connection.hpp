@@ -124,6 +124,9 @@ class Connection {
   Result<> send_heartbeat(Now now);
   void address(MessageHeader& header);
   void complete_header(Message& message) const;
+  std::size_t message_limit() const {
+    return is_authorised_ ? options_.max_message_size : options_.max_unauthorised_message_size;
+  }
   EncodeOptions encode_options() const;
   Result<> note_sent(Now now);
   bool is_for_us() const;

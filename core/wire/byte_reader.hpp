@@ -24,6 +24,7 @@ class ByteReader {
 
   std::size_t at() const { return at_; }
   std::size_t limit() const { return limit_; }
+  std::size_t size() const { return bytes_.size(); }
   std::size_t left() const { return limit_ - at_; }
   /// `end` must lie between at() and the size of the input. After a failure there is nothing left to read.
   void set_limit(std::size_t end) {

@@ -1,6 +1,7 @@
 // Bytes of one message <-> Message, for versions 2 and 4. Layer: wire. Source: messages spec sections 1..8, 11, 14.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -23,11 +24,20 @@ struct StringTableMode {
 struct DecodeOptions {
   StringTableMode string_table = {};
   std::uint32_t max_depth = 128;  ///< nested elements; a top-level element has depth 1
+  /// Bytes: the receiver's limit for messages. Whoever cut the message out of the stream has kept to it; here it bounds
+  /// what a message may become, so that few bytes do not ask for much memory or time.
+  std::size_t message_limit = 12u * 1024 * 1024;
+
+  /// Bytes of the texts that string codes stand for, counted each time one is named.
+  std::size_t max_coded_text() const { return 4 * message_limit; }
+  /// Elements of one message.
+  std::size_t max_elements() const { return std::max<std::size_t>(65536, message_limit / 12); }
 };
 
 /// Decodes exactly one message. `bytes` must hold the whole message and outlive `message`, which borrows from it.
 /// Clears `message` first. Allocates no more than the bytes in hand can justify.
-/// Errors   the classes of the messages spec, section 14; the text names field and byte offset.
+/// Errors   the classes of the messages spec, section 14, and protocol_error beyond a limit of the options; the text
+///          names field and byte offset.
 [[nodiscard]] Result<> decode(ByteSpan bytes, const DecodeOptions& options, Message& message);
 
 /// Sizes and string codes, found before the first byte is written. Items lie as in Message::entries and ::elements.

@@ -63,7 +63,7 @@ std::uint16_t read_header(ByteReader& in, MessageHeader& header) {
   return entry_count;
 }
 
-void read_entry(ByteReader& in, std::uint32_t max_depth, Message& message) {
+void read_entry(ByteReader& in, const DecodeOptions& options, Message& message) {
   const auto start = in.at();
   enter_structure(in, start, in.number<std::uint32_t>("EntrySize"), "EntrySize");
   MessageEntry entry;
@@ -80,7 +80,7 @@ void read_entry(ByteReader& in, std::uint32_t max_depth, Message& message) {
   if (!in.ok()) return;
   entry.first_element = static_cast<std::uint32_t>(message.elements.size());
   Reading reading;
-  decode_elements(in, reading, entry.element_count, max_depth, message);
+  decode_elements(in, reading, entry.element_count, options, message);
   entry.end_element = static_cast<std::uint32_t>(message.elements.size());
   message.entries.push_back(entry);
 }
@@ -186,7 +186,7 @@ Result<> decode_v2(ByteSpan bytes, const DecodeOptions& options, Message& messag
   in.set_limit(bytes.size());
   check_count(in, in.at(), entry_count, entry_fixed_size, "EntryCount");
   for (std::uint32_t index = 0; in.ok() && index < entry_count; ++index) {
-    read_entry(in, options.max_depth, message);
+    read_entry(in, options, message);
     in.set_limit(bytes.size());
   }
   if (in.ok() && in.left() != 0)

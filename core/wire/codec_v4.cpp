@@ -77,6 +77,7 @@ class Reading {
   ByteReader& in_;
   const DecodeOptions& options_;
   LocalTexts local_;
+  std::size_t coded_text_ = 0;  ///< bytes that codes stood for so far
 };
 
 std::uint32_t Reading::read_header(MessageHeader& header) {
@@ -160,6 +161,11 @@ std::string_view Reading::read_code(const char* field) {
     in_.fail(ErrorCode::protocol_error, field, code_at,
              "string code " + std::to_string(code) +
                  (options_.string_table.is_active() ? " is in no table" : ", but no string table was agreed on"));
+  // Few bytes may name one long text again and again; whoever reads the message copies and compares it each time.
+  coded_text_ += text ? text->size() : 0;
+  if (coded_text_ > options_.max_coded_text())
+    in_.fail(ErrorCode::protocol_error, field, code_at,
+             "the texts behind string codes are more than " + std::to_string(options_.max_coded_text()) + " bytes");
   return text.value_or(std::string_view{});
 }
 
@@ -184,7 +190,7 @@ void Reading::read_entry(Message& message) {
   check_count(in_, count_at, entry.element_count, min_element_size, "element count");
   if (!in_.ok()) return;
   entry.first_element = static_cast<std::uint32_t>(message.elements.size());
-  decode_elements(in_, *this, entry.element_count, options_.max_depth, message);
+  decode_elements(in_, *this, entry.element_count, options_, message);
   entry.end_element = static_cast<std::uint32_t>(message.elements.size());
   message.entries.push_back(entry);
 }

@@ -2,13 +2,14 @@
 // Source: messages spec sections 6, 7 and 14.
 #pragma once
 
+#include <algorithm>
 #include <boost/container/small_vector.hpp>
 #include <cstddef>
 #include <cstdint>
 #include <string>
 
 #include "core/wire/byte_reader.hpp"
-#include "core/wire/message.hpp"
+#include "core/wire/codec.hpp"
 
 namespace rr {
 
@@ -53,11 +54,18 @@ inline void read_leaf_data(ByteReader& in, std::size_t count_at, MessageElement&
   }
 }
 
+/// Room for one element, and for twice as many where `more` can still come.
+inline void make_room(std::vector<MessageElement>& elements, std::size_t more) {
+  if (elements.size() < elements.capacity()) return;
+  elements.reserve(std::min(2 * elements.size(), elements.size() + more) + 1);
+}
+
 /// Decodes `count` elements and all their descendants, which must fill the reader up to its limit.
 /// `Format::read_element(in, element)` reads one element up to and without its DataCount and narrows the reader to it;
 /// `Format::read_count(in)` reads a DataCount; `Format::min_element_size` is the smallest element of the version.
 template <class Format>
-void decode_elements(ByteReader& in, Format& format, std::uint32_t count, std::uint32_t max_depth, Message& message) {
+void decode_elements(ByteReader& in, Format& format, std::uint32_t count, const DecodeOptions& options,
+                     Message& message) {
   struct Level {
     std::uint32_t parent;     // index in message.elements; not used for the outermost level, which is the entry
     std::uint32_t remaining;  // children still to come
@@ -82,9 +90,12 @@ void decode_elements(ByteReader& in, Format& format, std::uint32_t count, std::u
     --level.remaining;
 
     const std::size_t start = in.at();
-    if (levels.size() > max_depth)
+    if (levels.size() > options.max_depth)
       return in.fail(ErrorCode::protocol_error, "ElementSize", start,
-                     "nested deeper than " + std::to_string(max_depth) + " elements");
+                     "nested deeper than " + std::to_string(options.max_depth) + " elements");
+    if (message.elements.size() >= options.max_elements())
+      return in.fail(ErrorCode::protocol_error, "ElementSize", start,
+                     "more than " + std::to_string(options.max_elements()) + " elements in one message");
     MessageElement element;
     format.read_element(in, element);
     const std::size_t count_at = in.at();
@@ -100,6 +111,7 @@ void decode_elements(ByteReader& in, Format& format, std::uint32_t count, std::u
       read_leaf_data(in, count_at, element);
     }
     if (!in.ok()) return;
+    make_room(message.elements, (in.size() - in.at()) / Format::min_element_size);
     message.elements.push_back(element);
   }
 }

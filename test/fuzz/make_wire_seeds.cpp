@@ -3,6 +3,7 @@
 #include <fstream>
 #include <iostream>
 
+#include "test/core/wire/coded_message.hpp"
 #include "test/core/wire/vectors.hpp"
 
 namespace {
@@ -22,7 +23,7 @@ int main(int argc, char** argv) {
     return 2;
   }
   const std::filesystem::path root = argv[1];
-  for (const auto* name : {"fuzz_codec_v2", "fuzz_codec_v4", "fuzz_frame_scanner"})
+  for (const auto* name : {"fuzz_codec_v2", "fuzz_codec_v4", "fuzz_frame_scanner", "fuzz_unpack"})
     std::filesystem::create_directories(root / name);
   const auto add = [&root](const std::string& name, const rr::Bytes& bytes) {
     if (bytes.size() < 10 || bytes.size() > max_seed_size) return;
@@ -33,5 +34,11 @@ int main(int argc, char** argv) {
   };
   for (const auto& vector : rr::test::message_vectors()) add(vector.name, vector.bytes);
   for (const auto& vector : rr::test::malformed_vectors()) add(vector.name, vector.bytes);
+  add("coded_texts",
+      rr::test::coded_message(std::string(1000, 'a'), rr::test::coded_map(rr::test::coded_element(), 9), 20));
+  const auto map = rr::test::coded_map(rr::test::coded_element(), 1);
+  rr::Bytes maps{'*'};
+  maps.insert(maps.end(), map.begin(), map.end());
+  write_seed(root / "fuzz_unpack" / "coded_texts", maps);
   return 0;
 }

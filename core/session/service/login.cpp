@@ -39,8 +39,9 @@ Result<> ServiceSession::begin_login(const Message& message, const MessageEntry&
   LoginRequested requested;
   if (username->type == DataType::string_t) requested.attempt.username = username->text();
   // What cannot be read is no credential. The reason is not told on: it might quote a secret.
-  if (auto value = unpack_varvalue(message, *credentials, service->types()))
-    if (auto* map = value->get_if<MapString>()) requested.attempt.credentials = std::move(*map);
+  if (credentials->type == DataType::map_string_t)
+    if (auto value = unpack_varvalue(message, *credentials, service->types()))
+      requested.attempt.credentials = std::move(*value->get_if<MapString>());
   auto ticket = service->login_limit().begin(now);
   if (!ticket) return ticket.error();
   requested.ticket = std::move(*ticket);

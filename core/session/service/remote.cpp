@@ -67,13 +67,14 @@ Result<> ServiceSession::park(const Message& message, const MessageEntry& entry)
         ErrorCode::out_of_system_resource,
         std::to_string(parked_.size()) + " requests of this client wait for their objects to be found already");
   EncodedMessage encoded;
-  if (auto done = encode(message, {}, encoded); !done) return done;
+  const auto limit = options_.connection.max_message_size;
+  if (auto done = encode(message, {.max_message_size = limit}, encoded); !done) return done;
   std::size_t bytes = encoded.size();
   for (const auto& other : parked_) bytes += other.message.size();
-  if (bytes > options_.connection.max_message_size)
+  if (bytes > limit)
     return make_error(ErrorCode::out_of_system_resource, "requests of this client that wait for their objects hold " +
                                                              std::to_string(bytes) + " bytes, expected at most " +
-                                                             std::to_string(options_.connection.max_message_size));
+                                                             std::to_string(limit));
   const auto is_same = [&](const ParkedRequest& other) { return other.path == entry.service_path; };
   const bool is_asked = std::any_of(parked_.begin(), parked_.end(), is_same);
   const auto index = static_cast<std::size_t>(&entry - message.entries.data());
@@ -94,7 +95,9 @@ void ServiceSession::handle_object_found(std::string_view path, const Result<>& 
   }
   Message message;
   for (const auto& request : ready) {
-    if (!service_ || !decode(request.message, {}, message)) return;  // our own bytes: only the client may be gone
+    // Our own bytes: only the client may be gone.
+    const DecodeOptions options{.message_limit = options_.connection.max_message_size};
+    if (!service_ || !decode(request.message, options, message)) return;
     const auto& entry = message.entries[request.entry];
     if (found)
       handle_entry(message, entry, now);

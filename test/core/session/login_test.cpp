@@ -3,6 +3,7 @@
 
 #include "core/member/error_entry.hpp"
 #include "test/core/session/loopback.hpp"
+#include "test/core/wire/coded_message.hpp"
 #include "test/support/print.hpp"
 
 using namespace rr;
@@ -201,6 +202,21 @@ TEST_CASE("a client that still has to log in can do that, and nothing else") {
   pair.next_client<Connected>();
   REQUIRE(pair.service->send_event("arm", bumped, arguments, pair.now));
   CHECK_FALSE(pair.service->poll_transmit().empty());
+}
+
+TEST_CASE("before the login the small limit for messages also bounds what string codes stand for") {
+  for (const std::size_t maps : {4, 5}) {
+    Guarded pair(true);
+    pair.start(login("alice", password("secret"), no_combined()));
+    pair.next_service<ClientConnected>();
+    pair.next_service<LoginRequested>();
+    // Each map names 250 kB twice; 4 * 512 KiB are allowed.
+    pair.service->handle_bytes(coded_message(std::string(250'000, 'a'), coded_map(coded_element(), 1), maps), pair.now);
+    CHECK(pair.service->wants_close() == (maps > 4));
+    if (maps > 4)
+      CHECK(pair.next_service<ClientGone>().reason.message.find(
+                "the texts behind string codes are more than 2097152") != std::string::npos);
+  }
 }
 
 TEST_CASE("whoever logs out of a service that requires a user has nothing connected any more") {
