@@ -1,6 +1,7 @@
 #include "core/types/type_registry.hpp"
 
 #include <algorithm>
+#include <unordered_set>
 
 namespace rr {
 
@@ -74,7 +75,7 @@ class ImportOrder {
 }  // namespace
 
 Result<> TypeRegistry::add(const std::vector<std::string>& texts, RobdefMode mode) {
-  std::vector<std::unique_ptr<ServiceDefinition>> added;
+  Definitions added;
   std::vector<Diagnostic> warnings;
   for (const auto& text : texts) {
     auto parsed = parse_service_definition(text, mode);
@@ -90,9 +91,7 @@ Result<> TypeRegistry::add(const std::vector<std::string>& texts, RobdefMode mod
   if (added.empty()) return {};
 
   // The verifier fills in resolved types, so it gets copies of what is in use already.
-  std::vector<ServiceDefinition> known;
-  known.reserve(definitions_.size());
-  for (const auto& definition : definitions_) known.push_back(*definition);
+  auto known = copy_imports(added);
   std::vector<ServiceDefinition*> set;
   for (auto& definition : known) set.push_back(&definition);
   for (const auto& definition : added) set.push_back(definition.get());
@@ -118,6 +117,19 @@ std::vector<std::string> TypeRegistry::imports_of(std::string_view text) {
   for (const auto& import : parse_service_definition(text, RobdefMode::compat).definition.imports)
     if (std::find(names.begin(), names.end(), import.name) == names.end()) names.push_back(import.name);
   return names;
+}
+
+std::deque<ServiceDefinition> TypeRegistry::copy_imports(const Definitions& importers) const {
+  std::deque<ServiceDefinition> copies;
+  std::unordered_set<std::string_view> seen;
+  const auto copy_from = [&](const ServiceDefinition& importer) {
+    for (const auto& import : importer.imports)
+      if (const auto* found = find_service(import.name); found && seen.insert(found->name).second)
+        copies.push_back(*found);
+  };
+  for (const auto& importer : importers) copy_from(*importer);
+  for (std::size_t i = 0; i < copies.size(); ++i) copy_from(copies[i]);
+  return copies;
 }
 
 const ServiceDefinition* TypeRegistry::find_service(std::string_view name) const {

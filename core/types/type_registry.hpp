@@ -1,6 +1,7 @@
 // The verified definitions that values and objects are checked against. Layer: types.
 #pragma once
 
+#include <deque>
 #include <functional>
 #include <memory>
 #include <string>
@@ -17,7 +18,9 @@ namespace rr {
 /// Definitions that were added never move or change, so pointers to them hold as long as the registry.
 class TypeRegistry {
  public:
-  /// Parses, verifies together with what is there, and adds all or none. Texts may come in any order but must bring
+  using Definitions = std::vector<std::unique_ptr<ServiceDefinition>>;
+
+  /// Parses, verifies together with what they import, and adds all or none. Texts may come in any order but must bring
   /// every import that is not there yet. A definition that is already there (same name) is skipped.
   /// Errors   service_definition_error, with the first diagnostic; the registry is then unchanged.
   Result<> add(const std::vector<std::string>& texts, RobdefMode mode);
@@ -31,7 +34,7 @@ class TypeRegistry {
   const EnumDefinition* find_enum(std::string_view qualified_name) const;
   bool has_exception(std::string_view qualified_name) const;
   /// All definitions, imports before importers.
-  const std::vector<std::unique_ptr<ServiceDefinition>>& definitions() const { return definitions_; }
+  const Definitions& definitions() const { return definitions_; }
   /// Warnings collected by add().
   const std::vector<Diagnostic>& warnings() const { return warnings_; }
 
@@ -41,10 +44,14 @@ class TypeRegistry {
     using is_transparent = void;
     std::size_t operator()(std::string_view text) const { return std::hash<std::string_view>{}(text); }
   };
+
+  /// Copies of what is there already and `importers` import, imports of imports included.
+  std::deque<ServiceDefinition> copy_imports(const Definitions& importers) const;
+
   template <class Definition>
   using Index = std::unordered_map<std::string, const Definition*, TextHash, std::equal_to<>>;
 
-  std::vector<std::unique_ptr<ServiceDefinition>> definitions_;
+  Definitions definitions_;
   Index<ServiceDefinition> services_;
   Index<EntityDefinition> entities_;
   Index<EnumDefinition> enums_;

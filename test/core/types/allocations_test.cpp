@@ -57,6 +57,18 @@ TEST_CASE("the counter counts") {
   CHECK(allocations - before == 1);
 }
 
+TEST_CASE("a definition takes the same work however many are there") {
+  TypeRegistry types;
+  std::vector<std::size_t> counts;
+  for (int i = 0; i < 200; ++i) {
+    const auto text = "service demo.s" + std::to_string(100 + i) + "\nstruct A\n    field double x\nend\n";
+    const auto before = allocations;
+    REQUIRE(types.add({text}, RobdefMode::strict).has_value());
+    counts.push_back(allocations - before);
+  }
+  CHECK(counts.back() <= counts.front() + 10);  // tables grow now and then
+}
+
 TEST_CASE("steady packing allocates nothing") {
   CHECK(count_field(1.5, "d") == 0);
   CHECK(count_field(std::int32_t{5}, "i16") == 0);
