@@ -3,6 +3,7 @@
 #include <array>
 
 #include "core/wire/frame_start.hpp"
+#include "node/http/foreign_page.hpp"
 #include "node/http/request_reader.hpp"
 #include "node/http/upgrade.hpp"
 #include "node/transport/start_tls.hpp"
@@ -33,7 +34,8 @@ awaitable<Result<Accepted>> upgrade(std::unique_ptr<ByteStream> stream, AcceptOp
   std::string why = read.detail;
   rrgate::Response refusal;
   if (read.request && rrgate::asks_for_websocket(*read.request)) {
-    auto refused = rrgate::refuse_upgrade(*read.request, options.allowed_origins);
+    auto refused = rrgate::refuse_foreign_page(*read.request, {.allowed_origins = options.allowed_origins});
+    if (!refused) refused = rrgate::refuse_upgrade(*read.request);
     if (!refused) {
       std::string accepted = rrgate::format_upgrade_response(*read.request);
       if (const auto error = co_await write_text(*stream, std::move(accepted)); error)

@@ -13,8 +13,8 @@
 namespace rr {
 
 struct AcceptOptions {
-  /// Pages that may open WebSockets: scheme://host[:port], scheme://*.domain[:port]; a page from the same host and port
-  /// always may, and so may whoever sends no Origin.
+  /// Pages that may open WebSockets: scheme://host[:port], scheme://*.domain[:port]. A page from the same host and port
+  /// may where the host is an IP address or localhost, and so may whoever sends no Origin.
   std::vector<std::string> allowed_origins = {};
   NodeIdentity self = {};     ///< for TLS: who is meant
   TlsContextPtr tls = {};     ///< null: clients that ask for TLS are told that there is no certificate

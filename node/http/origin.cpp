@@ -1,9 +1,8 @@
 #include "node/http/origin.hpp"
 
 #include <algorithm>
+#include <boost/asio/ip/address.hpp>
 #include <optional>
-
-#include "core/session/url.hpp"
 
 namespace rrgate {
 
@@ -60,34 +59,68 @@ std::optional<Origin> parse_origin(std::string_view text) {
   return parse_authority(scheme, text.substr(separator + 3));
 }
 
-bool matches(const Origin& pattern, const Origin& origin) {
-  if (pattern.scheme != origin.scheme || pattern.port != origin.port) return false;
-  if (pattern.host.rfind("*.", 0) != 0) return pattern.host == origin.host;
-  const auto suffix = std::string_view(pattern.host).substr(1);  // ".domain"
-  return origin.host.size() > suffix.size() &&
-         std::string_view(origin.host).substr(origin.host.size() - suffix.size()) == suffix;
+/// Both in lower case.
+bool fits_host(std::string_view pattern, std::string_view host) {
+  if (!pattern.starts_with("*.")) return pattern == host;
+  const auto suffix = pattern.substr(1);  // ".domain"
+  return host.size() > suffix.size() && host.ends_with(suffix);
+}
+
+/// A star stands for whole names below a domain, or is not there.
+bool is_star_in_place(std::string_view host) {
+  const auto star = host.rfind('*');
+  return star == std::string_view::npos || (star == 0 && host.size() > 2 && host[1] == '.');
+}
+
+bool is_ip_address(std::string_view host) {
+  boost::system::error_code error;
+  if (!host.starts_with('[')) {
+    boost::asio::ip::make_address_v4(std::string(host), error);
+  } else {
+    boost::asio::ip::make_address_v6(std::string(host.substr(1, host.size() - 2)), error);
+  }
+  return !error;
 }
 
 }  // namespace
 
 bool is_origin_pattern(std::string_view text) {
   const auto pattern = parse_origin(text);
-  if (!pattern) return false;
-  const auto star = pattern->host.rfind('*');
-  return star == std::string::npos || (star == 0 && pattern->host.size() > 2 && pattern->host[1] == '.');
+  return pattern && is_star_in_place(pattern->host);
 }
 
-bool is_origin_allowed(std::string_view origin, std::string_view host, const std::vector<std::string>& allowed) {
+bool is_origin_listed(std::string_view origin, std::span<const std::string> patterns) {
   const auto page = parse_origin(origin);
   if (!page || page->host.find('*') != std::string::npos) return false;
-  if (page->scheme == "http" || page->scheme == "https") {
-    const auto own = parse_authority(page->scheme, host);
-    if (own && *own == *page) return true;
-  }
-  return std::any_of(allowed.begin(), allowed.end(), [&](const std::string& text) {
+  return std::any_of(patterns.begin(), patterns.end(), [&](const std::string& text) {
     const auto pattern = parse_origin(text);
-    return pattern && matches(*pattern, *page);
+    return pattern && pattern->scheme == page->scheme && pattern->port == page->port &&
+           fits_host(pattern->host, page->host);
   });
+}
+
+bool is_same_origin(std::string_view origin, std::string_view authority) {
+  const auto page = parse_origin(origin);
+  if (!page || (page->scheme != "http" && page->scheme != "https")) return false;
+  return parse_authority(page->scheme, authority) == page;
+}
+
+bool is_host_pattern(std::string_view text) {
+  const auto pattern = parse_authority({}, text);
+  return pattern && pattern->port.empty() && !text.ends_with(':') && is_star_in_place(pattern->host);
+}
+
+bool is_host_listed(std::string_view authority, std::span<const std::string> patterns) {
+  const auto own = parse_authority({}, authority);
+  if (!own || own->host.find('*') != std::string::npos) return false;
+  if (own->host == "localhost" || is_ip_address(own->host)) return true;
+  return std::any_of(patterns.begin(), patterns.end(),
+                     [&](const std::string& pattern) { return fits_host(lower(pattern), own->host); });
+}
+
+std::string host_name_of(std::string_view authority) {
+  const auto own = parse_authority({}, authority);
+  return own ? own->host : std::string();
 }
 
 }  // namespace rrgate

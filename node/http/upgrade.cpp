@@ -1,7 +1,6 @@
 #include "node/http/upgrade.hpp"
 
 #include "core/support/error.hpp"
-#include "node/http/origin.hpp"
 
 namespace rrgate {
 
@@ -18,8 +17,7 @@ Response upgrade_required(std::string_view detail, std::string_view subprotocol)
   return response;
 }
 
-std::optional<Response> refuse_upgrade(const HttpRequest& request, const std::vector<std::string>& allowed_origins,
-                                       std::string_view subprotocol) {
+std::optional<Response> refuse_upgrade(const HttpRequest& request, std::string_view subprotocol) {
   const auto& message = request.message;
   if (message.method() != http::verb::get) {
     auto response = problem_response(405, "a WebSocket begins with GET");
@@ -45,17 +43,6 @@ std::optional<Response> refuse_upgrade(const HttpRequest& request, const std::ve
     return upgrade_required("subprotocol " + rr::quoted(request.header(http::field::sec_websocket_protocol)) +
                                 ": expected " + std::string(subprotocol),
                             subprotocol);
-  const auto origins = message.count(http::field::origin);
-  const auto origin = request.header(http::field::origin);
-  const std::string_view host =
-      request.arrival.host.empty() ? request.header(http::field::host) : std::string_view(request.arrival.host);
-  if (origins > 1 || (origins == 1 && !is_origin_allowed(origin, host, allowed_origins))) {
-    auto response =
-        problem_response(403, "pages of origin " + rr::quoted(origin) +
-                                  " may not connect; allowed_origins in the configuration lists those that may");
-    response.closes = true;
-    return response;
-  }
   return std::nullopt;
 }
 

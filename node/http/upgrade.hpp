@@ -3,7 +3,6 @@
 
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "node/http/message.hpp"
 #include "node/transport/websocket_frames.hpp"
@@ -13,9 +12,9 @@ namespace rrgate {
 /// Whether the request asks to become a WebSocket at all.
 bool asks_for_websocket(const HttpRequest& request);
 
-/// Checks an upgrade, by the host that the client named (HttpRequest::arrival): method and version, Upgrade, key and
-/// version (426), subprotocol if named (426), Origin if sent (403). nullopt: all is well.
-std::optional<Response> refuse_upgrade(const HttpRequest& request, const std::vector<std::string>& allowed_origins,
+/// Checks an upgrade: method, version, key and version of WebSockets, subprotocol if named (405, 426). nullopt: all is
+/// well. Whose page it is for is checked before, see foreign_page.hpp.
+std::optional<Response> refuse_upgrade(const HttpRequest& request,
                                        std::string_view subprotocol = rr::websocket_subprotocol);
 
 /// The 101 response, with `Connection: Upgrade` alone: native clients compare it as a single token.

@@ -141,12 +141,16 @@ int choose_protocol(SSL*, const unsigned char** out, unsigned char* out_size, co
   return SSL_TLSEXT_ERR_OK;
 }
 
+bool is_for_host(SSL_CTX* context, const char* name) {
+  return X509_check_host(SSL_CTX_get0_certificate(context), name, 0, 0, nullptr) == 1;
+}
+
 int choose_certificate(SSL* ssl, int*, void* argument) {
   const auto& context = *static_cast<const TlsContext*>(argument);
   const char* const name = SSL_get_servername(ssl, TLSEXT_NAMETYPE_host_name);
   if (!name) return SSL_TLSEXT_ERR_OK;
   for (SSL_CTX* candidate : context.all())
-    if (X509_check_host(SSL_CTX_get0_certificate(candidate), name, 0, 0, nullptr) == 1) {
+    if (is_for_host(candidate, name)) {
       SSL_set_SSL_CTX(ssl, candidate);
       break;
     }
@@ -192,6 +196,11 @@ int no_password(char*, int, int, void*) {
 
 TlsContext::TlsContext(std::vector<ssl_ctx_st*> native, bool has_certificate, bool checks_nodes)
     : native_(std::move(native)), has_certificate_(has_certificate), checks_nodes_(checks_nodes) {}
+
+bool TlsContext::has_name(const std::string& host) const {
+  return std::any_of(native_.begin(), native_.end(),
+                     [&](SSL_CTX* context) { return is_for_host(context, host.c_str()); });
+}
 
 TlsContext::~TlsContext() {
   for (SSL_CTX* context : native_) SSL_CTX_free(context);

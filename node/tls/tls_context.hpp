@@ -36,6 +36,8 @@ class TlsContext {
   bool has_certificate() const { return has_certificate_; }
   /// Certificates of peers are those of nodes, and PeerCheck says of which.
   bool checks_nodes() const { return checks_nodes_; }
+  /// Whether one of the certificates is for a host of this name.
+  bool has_name(const std::string& host) const;
 
  private:
   std::vector<ssl_ctx_st*> native_;

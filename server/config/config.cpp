@@ -284,6 +284,13 @@ void read_config(ObjectReader& in, Config& config) {
     config.allowed_origins.push_back(text);
     return {};
   });
+  in.texts("allowed_hosts", false, [&](const std::string& text) -> std::string {
+    if (!is_host_pattern(text))
+      return "found " + rr::quoted(text) +
+             ", expected a name as \"mybox.local\" or \"*.domain\", without scheme and port";
+    config.allowed_hosts.push_back(text);
+    return {};
+  });
   in.object("tls", [&](ObjectReader& part) { read_tls(part, config.tls); });
   in.object("access", [&](ObjectReader& part) { read_access(part, config.access); });
   in.flag("insecure", config.insecure);

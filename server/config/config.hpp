@@ -185,6 +185,7 @@ struct Config {
   std::string base_path;  ///< "" or "/robots": before all paths, where a proxy passes it on
   ProxyConfig proxy;
   std::vector<std::string> allowed_origins;
+  std::vector<std::string> allowed_hosts;  ///< names by which browsers reach the gateway, beside those of certificates
   TlsConfig tls;
   AccessConfig access;
   bool insecure = false;  ///< other machines may come without TLS, or without saying who they are

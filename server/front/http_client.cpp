@@ -1,5 +1,6 @@
 #include "server/front/http_client.hpp"
 
+#include "node/http/foreign_page.hpp"
 #include "node/http/request_reader.hpp"
 #include "node/http/upgrade.hpp"
 #include "node/transport/websocket.hpp"
@@ -101,10 +102,9 @@ rr::awaitable<void> serve_websocket(GatewayState& gateway, Connection& connectio
     co_await tcp.end(rr::no_reason);
   };
   const auto subprotocol = is_json_socket(request) ? json_subprotocol : rr::websocket_subprotocol;
-  if (auto refusal = refuse_upgrade(request, gateway.config().allowed_origins, subprotocol)) {
-    gateway.reject(refusal->status == 403 ? Rejection::origin : Rejection::bad_request);
-    log(LogLevel::info, "upgrade refused",
-        {{"peer", connection.client}, {"status", refusal->status}, {"origin", request.header(http::field::origin)}});
+  if (auto refusal = refuse_upgrade(request, subprotocol)) {
+    gateway.reject(Rejection::bad_request);
+    log(LogLevel::info, "upgrade refused", {{"peer", connection.client}, {"status", refusal->status}});
     co_await refuse(*refusal);
     co_return;
   }
@@ -188,6 +188,23 @@ rr::awaitable<void> serve_websocket(GatewayState& gateway, Connection& connectio
   co_await relay_client(gateway, connection, socket, **boarding);
 }
 
+/// Refuses what somebody else's page has a browser send.
+std::optional<Response> refuse_page(GatewayState& gateway, const Request& request) {
+  const auto& config = gateway.config();
+  const auto tls = gateway.tls();
+  const PageRules rules{config.allowed_origins, config.allowed_hosts, tls.get()};
+  auto refusal = refuse_unknown_host(request, rules);
+  if (!refusal) refusal = refuse_foreign_page(request, rules);
+  if (!refusal) return std::nullopt;
+  gateway.reject(refusal->status == 421 ? Rejection::host : Rejection::origin);
+  log(LogLevel::info, "page refused",
+      {{"peer", request.arrival.peer},
+       {"status", refusal->status},
+       {"host", request.arrival.host},
+       {"origin", request.header(http::field::origin)}});
+  return refusal;
+}
+
 /// While the gateway stops, it says so, and nothing else.
 bool is_answered_while_stopping(const Request& request) {
   const auto path = request.path();
@@ -248,9 +265,11 @@ rr::awaitable<void> serve_http_client(GatewayState& gateway, Connection& connect
     take_base_path(request, config.base_path);
     const bool is_refused = gateway.is_stopping() && !is_answered_while_stopping(request);
     HttpAccess::Admitted admitted;
-    if (!is_refused && is_guarded(request))
+    admitted.refusal = refuse_page(gateway, request);
+    if (!admitted.refusal && !is_refused && is_guarded(request)) {
       admitted = co_await gateway.http_access().admit(request, connection, config);
-    if (admitted.refusal) gateway.reject(rejection_of(admitted.refusal->status));
+      if (admitted.refusal) gateway.reject(rejection_of(admitted.refusal->status));
+    }
     if (admitted.refusal && asks_for_websocket(request)) {
       co_await write_refusal(*stream, *admitted.refusal);
       co_await stream->end(rr::no_reason);
@@ -266,8 +285,8 @@ rr::awaitable<void> serve_http_client(GatewayState& gateway, Connection& connect
     if (request.arrival.is_encrypted && config.tls.hsts_seconds > 0)
       headers.emplace_back("Strict-Transport-Security", "max-age=" + std::to_string(config.tls.hsts_seconds));
     ResponseWriter writer(*stream, request, gateway.is_stopping(), std::move(headers));
-    const auto response = is_refused                      ? stopping_response()
-                          : admitted.refusal              ? *admitted.refusal
+    const auto response = admitted.refusal                ? *admitted.refusal
+                          : is_refused                    ? stopping_response()
                           : is_base_path(request, config) ? to_base_path(config)
                                                           : gateway.router().answer(request);
     if (response.answer_later) {

@@ -16,6 +16,7 @@ enum class Rejection {
   tls,               ///< a handshake that failed
   proxy_header,      ///< of a trusted proxy, missing or broken
   bad_request,       ///< no HTTP, too long, too late; a broken upgrade
+  host,              ///< reached by a name that is not known to be the gateway's
   origin,            ///< a page that may not connect
   no_such_device,
   device_full,
@@ -24,9 +25,10 @@ enum class Rejection {
   forbidden,     ///< no right to it
   rate,          ///< asked for more than "rates" allow
 };
-inline constexpr std::array<std::string_view, 12> rejection_names = {
-    "too_many",    "unknown_protocol", "tls",          "proxy_header", "bad_request", "origin", "no_such_device",
-    "device_full", "device_offline",   "unauthorized", "forbidden",    "rate"};
+inline constexpr std::array<std::string_view, 13> rejection_names = {
+    "too_many", "unknown_protocol", "tls",         "proxy_header",   "bad_request",  "host",
+    "origin",   "no_such_device",   "device_full", "device_offline", "unauthorized", "forbidden",
+    "rate"};
 
 struct Metrics {
   std::uint64_t connections = 0;  ///< accepted

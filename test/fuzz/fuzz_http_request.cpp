@@ -5,6 +5,7 @@
 #include <boost/asio/detached.hpp>
 #include <cstdlib>
 
+#include "node/http/foreign_page.hpp"
 #include "node/http/request_reader.hpp"
 #include "node/http/upgrade.hpp"
 #include "test/fuzz/scripted_stream.hpp"
@@ -25,11 +26,16 @@ void check_head(std::string_view head) {
 void check_request(const rrgate::HttpRequest& request) {
   require(request.path().size() + request.query().size() <= request.message.target().size());
   require(request.message.body().size() <= limits.body_bytes);
-  if (!rrgate::asks_for_websocket(request)) return;
-  if (const auto refusal = rrgate::refuse_upgrade(request, {"https://*.lab.example"})) {
+  const std::vector<std::string> origins = {"https://*.lab.example"};
+  const std::vector<std::string> hosts = {"*.lab.example"};
+  const rrgate::PageRules rules{origins, hosts};
+  auto refusal = rrgate::refuse_unknown_host(request, rules);
+  if (!refusal) refusal = rrgate::refuse_foreign_page(request, rules);
+  if (!refusal && rrgate::asks_for_websocket(request)) refusal = rrgate::refuse_upgrade(request);
+  if (refusal) {
     require(refusal->status >= 400 && refusal->body && refusal->body->size() < 2000);
     check_head(rrgate::format_response_head(*refusal, false, 1));
-  } else {
+  } else if (rrgate::asks_for_websocket(request)) {
     check_head(rrgate::format_upgrade_response(request));
   }
   static_cast<void>(rrgate::takes_close_frames(request));

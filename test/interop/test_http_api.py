@@ -13,6 +13,28 @@ from processes import BUILD, Background, start_gateway
 
 ask = functools.partial(http_api.ask, base=BASE)
 Stream = functools.partial(http_api.Stream, base=BASE)
+UPGRADE = {"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13",
+           "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ=="}
+
+
+def test_a_page_that_was_loaded_by_a_strangers_name_moves_nothing(gateway):
+    """DNS rebinding: the stranger's name now leads here, and his page is to its browser one of the gateway's own."""
+    page = {"Host": f"evil.example:{gateway}", "Origin": f"http://evil.example:{gateway}"}
+    for method, path, body, headers in [
+            ("GET", "/p_double", None, {"Host": page["Host"]}), ("PUT", "/p_double", 6.5, page),
+            ("POST", "/add", {"left": 1, "right": 2}, page), ("GET", "/changed", None, {**page, "Accept": "text/event-stream"}),
+            ("GET", "", None, {**page, **UPGRADE}), ("GET", "", None, {**page, **UPGRADE, "Sec-WebSocket-Protocol": "rrgate.json.v1"})]:
+        refused = ask(gateway, method, path, body, headers)
+        assert refused.status == 421, (method, path, refused.body)
+        assert "allowed_hosts" in refused.json["detail"]
+    for protocol in ({}, {"Sec-WebSocket-Protocol": "robotraconteur.robotraconteur.com"}):
+        assert http_api.ask(gateway, "GET", "/devices/interop", headers={**page, **UPGRADE, **protocol}).status == 421
+    assert ask(gateway, "GET", "/p_double").json != 6.5
+
+
+def test_what_another_sites_page_embeds_reads_nothing(gateway):
+    assert ask(gateway, "GET", "/p_double", headers={"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "no-cors"}).status == 403
+    assert ask(gateway, "GET", "/p_double", headers={"Sec-Fetch-Site": "same-origin", "Sec-Fetch-Mode": "cors"}).status == 200
 
 
 def test_properties(gateway):

@@ -181,7 +181,8 @@ def test_headers_of_others_are_ignored(gateway):
 
 
 def test_forwarded(device, tmp_path):
-    process, port = start_gateway(tmp_path, device, trusted_proxies=["127.0.0.2"], proxy_headers="forwarded")
+    process, port = start_gateway(tmp_path, device, trusted_proxies=["127.0.0.2"], proxy_headers="forwarded",
+                                  allowed_hosts=["lab.example"])
     try:
         header = {"Forwarded": 'for="[2001:db8::7]:99";proto=https;host=lab.example', "X-Forwarded-Host": "evil.example"}
         assert device_of(port, "", header)["websocket_url"] == "wss://lab.example/devices/interop"
@@ -229,11 +230,11 @@ def test_proxy_protocol(device, tmp_path, monkeypatch, version):
 
         # Whoever is not trusted is what its address says, and nothing that a proxy would say.
         with socket.create_connection(("127.0.0.1", port), 10, source_address=(CLIENT, 0)) as link:
-            link.sendall(b"PROXY TCP4 6.6.6.6 127.0.0.1 1 1\r\nGET /healthz HTTP/1.1\r\nHost: x\r\n\r\n")
+            link.sendall(b"PROXY TCP4 6.6.6.6 127.0.0.1 1 1\r\nGET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n")
             assert link.recv(4096).startswith(b"HTTP/1.1 400 ")
         # The proxy itself must say it.
         with socket.create_connection(("127.0.0.1", port), 10) as link:
-            link.sendall(b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n")
+            link.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n")
             assert link.recv(4096) == b""
         block = b"\r\n\r\n\0\r\nQUIT\n\x21\x11" + struct.pack(">H4s4sHH", 12, bytes([192, 0, 2, 7]), bytes(4), 4711, 80)
         with socket.create_connection(("127.0.0.1", port), 10) as link:

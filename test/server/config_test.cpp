@@ -177,6 +177,7 @@ TEST_CASE("every option arrives") {
     "base_path": "/lab", "trusted_proxies": ["10.0.0.0/8", "::1"], "proxy_headers": "forwarded",
     "proxy_protocol": "required",
     "web_root": "web", "allowed_origins": ["https://a.example", "http://*.b.example:81"],
+    "allowed_hosts": ["mybox.local", "*.lab.example"],
     "limits": {"max_message_size": 20000, "header_bytes": 2000, "body_bytes": 3000, "header_timeout_ms": 300, "outbox_bytes": 40000,
                "clients": 5, "clients_per_address": 6, "client_queue_bytes": 70000, "opaque_rate": 7000},
     "timeouts": {"connect_ms": 101, "drain_ms": 102, "send_stall_ms": 103, "idle_ms": 104},
@@ -208,6 +209,7 @@ TEST_CASE("every option arrives") {
         ProxyConfig{{{*parse_address_range("10.0.0.0/8"), *parse_address_range("::1")}, ForwardedBy::forwarded}, true});
   CHECK(config.web_root == "web");
   CHECK(config.allowed_origins.size() == 2);
+  CHECK(config.allowed_hosts == std::vector<std::string>{"mybox.local", "*.lab.example"});
   CHECK(config.limits == Limits{20000, 2000, 3000, milliseconds(300), 40000, 5, 6, 70000, 7000});
   CHECK(config.timeouts == Timeouts{milliseconds(101), milliseconds(102), milliseconds(103), milliseconds(104)});
   CHECK(config.retry == Retry{milliseconds(51), milliseconds(52), milliseconds(53)});
@@ -258,6 +260,8 @@ TEST_CASE("mistakes are named by path, with what was found and expected") {
   finds(with(R"("retry": {"min_ms": 9000, "max_ms": 8000})"), "gateway.json: /retry/min_ms: found 9000");
   finds(with(R"("allowed_origins": ["lab.example"])"), "gateway.json: /allowed_origins/0: found 'lab.example'");
   finds(with(R"("allowed_origins": [7])"), "gateway.json: /allowed_origins/0: found integer 7, expected a string");
+  finds(with(R"("allowed_hosts": ["http://mybox.local:8080"])"),
+        "gateway.json: /allowed_hosts/0: found 'http://mybox.local:8080', expected a name as \"mybox.local\"");
   finds(with(R"("web_root": "a", "web_root": "b")"), "gateway.json: key 'web_root' appears twice");
   finds(R"({"listen": ["8080"], "devices": []})", "gateway.json: /listen/0: address '8080'", "host:port");
 }

@@ -17,7 +17,7 @@ TestClient::HttpResponse fetch(TestGateway& gateway, const std::string& request,
 
 /// A GET whose header block has exactly this many bytes.
 std::string request_of_size(std::size_t size) {
-  const std::string begin = "GET /healthz HTTP/1.1\r\nHost: gw\r\nX-Fill: ";
+  const std::string begin = "GET /healthz HTTP/1.1\r\nHost: localhost\r\nX-Fill: ";
   return begin + std::string(size - begin.size() - 4, 'x') + "\r\n\r\n";
 }
 
@@ -41,11 +41,11 @@ TEST_CASE("health, readiness and devices are answered") {
   CHECK(device["services"].is_array());
   CHECK(device["clients"] == 0);
 
-  const auto health = fetch(gateway, "GET /healthz HTTP/1.1\r\nHost: gw\r\n\r\n");
+  const auto health = fetch(gateway, "GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n");
   CHECK(health.status == 200);
   CHECK_THAT(health.head, Catch::Contains("Content-Type: application/json\r\n"));
   CHECK_THAT(health.head, Catch::Contains("X-Content-Type-Options: nosniff\r\n"));
-  const auto ready = fetch(gateway, "GET /readyz HTTP/1.1\r\nHost: gw\r\n\r\n");
+  const auto ready = fetch(gateway, "GET /readyz HTTP/1.1\r\nHost: localhost\r\n\r\n");
   CHECK(ready.status == 200);
   CHECK(nlohmann::json::parse(ready.body)["devices_online"] == 2);
 }
@@ -55,17 +55,17 @@ TEST_CASE("requests follow each other on one connection, also unasked") {
   TestClient client(gateway.port());
   std::string many;
   for (int i = 0; i < 20; ++i)
-    many += "GET /healthz HTTP/1.1\r\nHost: gw\r\n\r\nGET /nope HTTP/1.1\r\nHost: gw\r\n\r\n";
+    many += "GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\nGET /nope HTTP/1.1\r\nHost: localhost\r\n\r\n";
   client.send(many);
   for (int i = 0; i < 20; ++i) {
     CHECK(client.receive_response().status == 200);
     CHECK(client.receive_response().status == 404);
   }
-  client.send("HEAD /healthz HTTP/1.1\r\nHost: gw\r\n\r\n");
+  client.send("HEAD /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n");
   const auto head = client.receive_response(false);
   CHECK(head.status == 200);
   CHECK_THAT(head.head, Catch::Contains("Content-Length: 16\r\n"));
-  client.send("GET /healthz HTTP/1.1\r\nHost: gw\r\nConnection: close\r\n\r\n");
+  client.send("GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
   CHECK_THAT(client.receive_response().head, Catch::Contains("Connection: close\r\n"));
   CHECK(client.receive_all().empty());
 }
@@ -79,16 +79,16 @@ TEST_CASE("HTTP/1.0 is answered and closed") {
 
 TEST_CASE("errors are problem documents") {
   TestGateway gateway;
-  const auto missing = fetch(gateway, "GET /api/v2/x HTTP/1.1\r\nHost: gw\r\n\r\n");
+  const auto missing = fetch(gateway, "GET /api/v2/x HTTP/1.1\r\nHost: localhost\r\n\r\n");
   CHECK(missing.status == 404);
   CHECK_THAT(missing.head, Catch::Contains("Content-Type: application/problem+json\r\n"));
   CHECK(nlohmann::json::parse(missing.body)["status"] == 404);
-  const auto refused = fetch(gateway, "POST /healthz HTTP/1.1\r\nHost: gw\r\nContent-Length: 2\r\n\r\nhi");
+  const auto refused = fetch(gateway, "POST /healthz HTTP/1.1\r\nHost: localhost\r\nContent-Length: 2\r\n\r\nhi");
   CHECK(refused.status == 405);
   CHECK_THAT(refused.head, Catch::Contains("Allow: GET, HEAD\r\n"));
-  CHECK(fetch(gateway, "GET /devices/x HTTP/1.1\r\nHost: gw\r\n\r\n").status == 426);
-  CHECK(fetch(gateway, "GET /devices/other HTTP/1.1\r\nHost: gw\r\n\r\n").status == 404);
-  CHECK(fetch(gateway, "POST /healthz HTTP/1.1\r\nHost: gw\r\nContent-Length: 99999999\r\n\r\n").status == 413);
+  CHECK(fetch(gateway, "GET /devices/x HTTP/1.1\r\nHost: localhost\r\n\r\n").status == 426);
+  CHECK(fetch(gateway, "GET /devices/other HTTP/1.1\r\nHost: localhost\r\n\r\n").status == 404);
+  CHECK(fetch(gateway, "POST /healthz HTTP/1.1\r\nHost: localhost\r\nContent-Length: 99999999\r\n\r\n").status == 413);
   CHECK(fetch(gateway, "GET /\x01 HTTP/1.1\r\n\r\n").status == 400);
   CHECK(fetch(gateway, "GET / HTTP/9.9\r\n\r\n").status == 400);
   CHECK(fetch(gateway, "GET / HTTP/1.1\r\nno colon\r\n\r\n").status == 400);
@@ -137,7 +137,7 @@ TEST_CASE("silent, half-open and idle connections are closed") {
   TestClient half_message(gateway.port());
   half_message.send(rr::ByteSpan(make_greeting()).first(40));
   TestClient idle(gateway.port());
-  idle.send("GET /healthz HTTP/1.1\r\nHost: gw\r\n\r\n");
+  idle.send("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n");
   CHECK(idle.receive_response().status == 200);
   CHECK(silent.receive_all().empty());
   CHECK(undecided.receive_all().empty());
@@ -159,7 +159,8 @@ TEST_CASE("a flood of requests is answered") {
   TestGateway gateway;
   std::vector<TestClient> clients;
   for (int i = 0; i < 100; ++i) clients.emplace_back(gateway.port());
-  for (auto& client : clients) client.send("GET /healthz HTTP/1.1\r\nHost: gw\r\n\r\nGET /nope HTTP/1.1\r\n\r\n");
+  for (auto& client : clients)
+    client.send("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\nGET /nope HTTP/1.1\r\n\r\n");
   for (auto& client : clients) {
     CHECK(client.receive_response().status == 200);
     CHECK(client.receive_response().status == 404);
@@ -169,7 +170,7 @@ TEST_CASE("a flood of requests is answered") {
 TEST_CASE("IPv6 is listened on, and by name") {
   TestGateway gateway(1, [](Config& config) { config.listen[0] = {"::1", 0}; });
   TestClient client(gateway.port(), "::1");
-  client.send("GET /healthz HTTP/1.1\r\nHost: gw\r\n\r\n");
+  client.send("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n");
   CHECK(client.receive_response().status == 200);
 }
 

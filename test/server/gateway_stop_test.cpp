@@ -16,7 +16,8 @@ bool is_ready(const std::future<void>& future) {
   return future.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
 }
 
-const std::string page = "Sec-WebSocket-Protocol: robotraconteur.robotraconteur.com\r\nOrigin: http://gw:8080\r\n";
+const std::string page =
+    "Sec-WebSocket-Protocol: robotraconteur.robotraconteur.com\r\nOrigin: http://localhost:8080\r\n";
 
 }  // namespace
 
@@ -31,14 +32,14 @@ TEST_CASE("relays go on while the gateway stops, new connections are refused") {
   client.send(make_greeting());
   client.receive_message();
   TestClient idle(gateway.port());
-  idle.send("GET /healthz HTTP/1.1\r\nHost: gw\r\n\r\n");
+  idle.send("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n");
   CHECK(idle.receive_response().status == 200);
 
   const auto stopped = gateway.stop();
   CHECK(idle.receive_all().empty());
   const auto status_of = [&](const std::string& path) {
     TestClient late(gateway.port());
-    late.send("GET " + path + " HTTP/1.1\r\nHost: gw\r\n\r\n");
+    late.send("GET " + path + " HTTP/1.1\r\nHost: localhost\r\n\r\n");
     return late.receive_response().status;
   };
   CHECK(status_of("/readyz") == 503);

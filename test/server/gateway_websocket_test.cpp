@@ -9,7 +9,7 @@ using namespace rrgate::test;
 namespace {
 
 const std::string native = "Sec-WebSocket-Protocol: robotraconteur.robotraconteur.com\r\n";
-const std::string page = native + "Origin: http://gw:8080\r\n";
+const std::string page = native + "Origin: http://localhost:8080\r\n";
 
 std::string close_reason(const TestClient::Frame& frame, std::uint16_t code) {
   REQUIRE(frame.first == 0x88);
@@ -85,8 +85,28 @@ TEST_CASE("wrong subprotocols and origins are refused") {
   CHECK(status("Sec-WebSocket-Protocol: chat\r\n") == 426);
   CHECK(status("Origin: http://evil.example\r\n") == 403);
   CHECK(status("Origin: null\r\n") == 403);
-  CHECK(status("Origin: http://gw:8080\r\n") == 101);
+  CHECK(status("Origin: http://localhost:8080\r\n") == 101);
   CHECK(status("") == 101);
+}
+
+TEST_CASE("a page that was loaded by a stranger's name reaches nothing, by WebSocket or HTTP") {
+  TestGateway gateway(1, [](Config& config) { config.allowed_hosts = {"mybox.local"}; });
+  const auto status = [&](const std::string& request) {
+    TestClient client(gateway.port());
+    client.send(request);
+    return client.receive_response().status;
+  };
+  const auto upgrade = [&](const std::string& headers) {
+    return status("GET /devices/x HTTP/1.1\r\n" + headers +
+                  "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+                  "Sec-WebSocket-Version: 13\r\n\r\n");
+  };
+  CHECK(upgrade("Host: evil.example\r\nOrigin: http://evil.example\r\n") == 421);
+  CHECK(upgrade("Host: evil.example\r\n") == 101);
+  CHECK(upgrade("Host: mybox.local\r\nOrigin: http://mybox.local\r\n") == 101);
+  CHECK(status("GET /api/v1/devices HTTP/1.1\r\nHost: evil.example\r\n\r\n") == 421);
+  CHECK(status("GET /api/v1/devices HTTP/1.1\r\nHost: mybox.local\r\n\r\n") == 200);
+  CHECK(status("GET /healthz HTTP/1.1\r\nHost: evil.example\r\n\r\n") == 421);
 }
 
 TEST_CASE("pings are answered and closes are returned") {

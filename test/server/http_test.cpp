@@ -41,7 +41,7 @@ Headers upgrade_headers() {
 unsigned upgrade_status(const Headers& more, http::verb method = http::verb::get) {
   auto headers = upgrade_headers();
   headers.insert(headers.end(), more.begin(), more.end());
-  const auto refusal = refuse_upgrade(request(method, "/devices/x", headers), {"https://lab.example"});
+  const auto refusal = refuse_upgrade(request(method, "/devices/x", headers));
   return refusal ? refusal->status : 101;
 }
 
@@ -90,34 +90,28 @@ TEST_CASE("the router finds the first fitting route") {
   CHECK(header(refused, "Allow") == "GET, HEAD, POST");
 }
 
-TEST_CASE("an upgrade is accepted from native clients and own pages") {
+TEST_CASE("an upgrade is accepted from native clients and pages") {
   CHECK(upgrade_status({}) == 101);
   CHECK(upgrade_status({{"Sec-WebSocket-Protocol", "robotraconteur.robotraconteur.com"}}) == 101);
   CHECK(upgrade_status({{"Sec-WebSocket-Protocol", "chat, RobotRaconteur.robotraconteur.com"}}) == 101);
   CHECK(upgrade_status({{"Sec-WebSocket-Protocol", "chat"},
                         {"Sec-WebSocket-Protocol", "robotraconteur.robotraconteur.com"}}) == 101);
-  CHECK(upgrade_status({{"Origin", "http://gw:8080"}}) == 101);
-  CHECK(upgrade_status({{"Origin", "https://lab.example"}}) == 101);
 }
 
 TEST_CASE("an upgrade that isn't right is refused with its status") {
   CHECK(upgrade_status({{"Sec-WebSocket-Protocol", "chat"}}) == 426);
   CHECK(upgrade_status({{"Sec-WebSocket-Protocol", ""}}) == 426);
-  CHECK(upgrade_status({{"Origin", "null"}}) == 403);
-  CHECK(upgrade_status({{"Origin", ""}}) == 403);
-  CHECK(upgrade_status({{"Origin", "http://evil.example"}}) == 403);
-  CHECK(upgrade_status({{"Origin", "http://gw:8080"}, {"Origin", "http://evil.example"}}) == 403);
   CHECK(upgrade_status({}, http::verb::post) == 405);
   const auto without = [](const std::string& name) {
     auto headers = upgrade_headers();
     std::erase_if(headers, [&](const auto& entry) { return entry.first == name; });
-    return refuse_upgrade(request(http::verb::get, "/", headers), {})->status;
+    return refuse_upgrade(request(http::verb::get, "/", headers))->status;
   };
   CHECK(without("Sec-WebSocket-Key") == 426);
   CHECK(without("Sec-WebSocket-Version") == 426);
   auto old = request(http::verb::get, "/", upgrade_headers());
   old.message.version(10);
-  CHECK(refuse_upgrade(old, {})->status == 426);
+  CHECK(refuse_upgrade(old)->status == 426);
 }
 
 TEST_CASE("the 101 response is the one that native clients take") {

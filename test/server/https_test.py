@@ -125,8 +125,8 @@ class Serving(Lab):
         self.addCleanup(secure.close)
         return secure
 
-    def get(self, connection, path="/healthz"):
-        connection.sendall(f"GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
+    def get(self, connection, path="/healthz", host="localhost"):
+        connection.sendall(f"GET {path} HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())
         answer = b""
         while b"\r\n\r\n" not in answer:
             answer += connection.recv(4096)
@@ -160,6 +160,12 @@ class Serving(Lab):
         self.assertEqual(self.serial("127.0.0.1"), self.serial("localhost"))
         with self.assertRaises(ssl.SSLCertVerificationError):
             self.connect("third.example")
+
+    def test_names_of_the_certificates_are_names_of_the_gateway(self):
+        self.start()
+        connection = self.connect("other.example")
+        self.assertTrue(self.get(connection, host=f"other.example:{self.port}").startswith("HTTP/1.1 200 "))
+        self.assertTrue(self.get(connection, host=f"third.example:{self.port}").startswith("HTTP/1.1 421 "))
 
     def test_http_1_1_is_chosen_and_http_2_alone_refused(self):
         self.start()

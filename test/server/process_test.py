@@ -114,7 +114,7 @@ class Serving(Files):
         for number in (signal.SIGTERM, signal.SIGINT):
             process, port = self.start()
             with socket.create_connection(("127.0.0.1", port)) as client:
-                client.sendall(b"GET /healthz HTTP/1.1\r\nHost: gw\r\n\r\n")
+                client.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n")
                 self.assertTrue(client.recv(4096).startswith(b"HTTP/1.1 200 OK\r\n"))
                 process.send_signal(number)
                 self.assertEqual(process.wait(timeout=10), 0)
@@ -127,7 +127,7 @@ class Serving(Files):
             page.write("<p>here")
         _, port = self.start(web_root=".")
         with socket.create_connection(("127.0.0.1", port)) as client:
-            client.sendall(b"GET / HTTP/1.1\r\nHost: gw\r\nConnection: close\r\n\r\n")
+            client.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
             answer = b"".join(iter(lambda: client.recv(4096), b""))
         self.assertTrue(answer.endswith(b"<p>here"), answer)
 

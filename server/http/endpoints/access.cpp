@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "node/http/origin.hpp"
 #include "node/platform/secret_file.hpp"
 #include "node/platform/text_file.hpp"
 #include "server/access/access_text.hpp"
@@ -67,18 +66,6 @@ rr::Result<std::string> text_of(const rr::Json& body, const char* key) {
   if (found == body.end()) return std::string();
   if (!found->is_string()) return bad(std::string(key) + " is no string");
   return found->get<std::string>();
-}
-
-/// Browsers send what they know of a user to other pages' requests too.
-bool is_own_page(GatewayState& gateway, const Request& request) {
-  const auto origin = request.header(http::field::origin);
-  return origin.empty() ||
-         is_origin_allowed(origin, request.header(http::field::host), gateway.config().allowed_origins);
-}
-
-std::optional<Response> refuse_page(GatewayState& gateway, const Request& request) {
-  if (is_own_page(gateway, request)) return std::nullopt;
-  return problem_response(403, "origin " + rr::quoted(request.header(http::field::origin)) + " is not allowed");
 }
 
 std::optional<Response> refuse_stranger(GatewayState& gateway, const Request& request) {
@@ -176,7 +163,6 @@ Handler who_endpoint(GatewayState& gateway) {
 Handler tickets_endpoint(GatewayState& gateway) {
   return [&gateway](const Request& request, std::string_view) {
     auto& http_access = gateway.http_access();
-    if (auto refusal = refuse_page(gateway, request)) return std::move(*refusal);
     if (!request.identity.is_proven() && !gateway.access().is_open())
       return http_access.refusal(request.identity, rr::make_error(rr::ErrorCode::authentication_error,
                                                                   "a ticket is for who has shown who he is"));
@@ -188,7 +174,6 @@ Handler tickets_endpoint(GatewayState& gateway) {
 
 Handler ask_endpoint(GatewayState& gateway) {
   return [&gateway](const Request& request, std::string_view) {
-    if (auto refusal = refuse_page(gateway, request)) return std::move(*refusal);
     if (gateway.access().state().config.tokens_file.empty())
       return problem_response(409, "nobody can be given access here: the gateway has no tokens_file");
     const auto body = body_of(request);
@@ -225,7 +210,6 @@ Handler requests_endpoint(GatewayState& gateway) {
 
 Handler request_endpoint(GatewayState& gateway) {
   return [&gateway](const Request& request, std::string_view rest) {
-    if (auto refusal = refuse_page(gateway, request)) return std::move(*refusal);
     const auto slash = rest.find('/');
     const std::string id(rest.substr(0, slash));
     const auto what = slash == std::string_view::npos ? std::string_view() : rest.substr(slash + 1);

@@ -44,8 +44,9 @@ std::string answer_to(const RunningNode& node, const std::string& request) {
   return text.substr(0, text.find("\r\n"));
 }
 
-std::string upgrade_request(const std::string& more) {
-  return "GET /?service=Blocks HTTP/1.1\r\nHost: device.example\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+std::string upgrade_request(const std::string& more, const std::string& host = "127.0.0.1:48653") {
+  return "GET /?service=Blocks HTTP/1.1\r\nHost: " + host +
+         "\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
          "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n" +
          more + "\r\n";
 }
@@ -109,11 +110,20 @@ TEST_CASE("a node takes WebSockets on its port, with messages of any size") {
 TEST_CASE("a node refuses pages of strange origins, and what is no WebSocket") {
   RunningNode node(add_blocks);
   CHECK_THAT(answer_to(node, upgrade_request("")), StartsWith("HTTP/1.1 101"));
-  CHECK_THAT(answer_to(node, upgrade_request("Origin: http://device.example\r\n")), StartsWith("HTTP/1.1 101"));
+  CHECK_THAT(answer_to(node, upgrade_request("Origin: http://127.0.0.1:48653\r\n")), StartsWith("HTTP/1.1 101"));
   CHECK_THAT(answer_to(node, upgrade_request("Origin: http://elsewhere.example\r\n")), StartsWith("HTTP/1.1 403"));
   CHECK_THAT(answer_to(node, upgrade_request("Sec-WebSocket-Protocol: chat\r\n")), StartsWith("HTTP/1.1 426"));
   CHECK_THAT(answer_to(node, "GET / HTTP/1.1\r\nHost: x\r\n\r\n"), StartsWith("HTTP/1.1 404"));
   CHECK_THAT(answer_to(node, "nonsense\r\n\r\n"), StartsWith("HTTP/1.1 400"));
+}
+
+TEST_CASE("a page that was loaded by a stranger's name is no page of the node's; a program may use any name") {
+  RunningNode node(add_blocks);
+  const auto rebound = upgrade_request("Origin: http://evil.example\r\n", "evil.example");
+  CHECK_THAT(answer_to(node, rebound), StartsWith("HTTP/1.1 403"));
+  CHECK_THAT(answer_to(node, upgrade_request("", "device.example")), StartsWith("HTTP/1.1 101"));
+  CHECK_THAT(answer_to(node, upgrade_request("Origin: http://localhost:1\r\n", "localhost:1")),
+             StartsWith("HTTP/1.1 101"));
 }
 
 TEST_CASE("origins that a node allows may open WebSockets") {

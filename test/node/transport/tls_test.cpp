@@ -317,6 +317,9 @@ TEST_CASE("HTTPS: a client takes the certificate of the host that it asked for, 
   };
   for (const auto* host : {"one.example", "127.0.0.1", "::1", "two.example", "TWO.example", "a.two.example"})
     CHECK(result_for(host) == "good");
+  for (const auto* host : {"one.example", "two.example", "TWO.example", "a.two.example"})
+    CHECK(at_server->has_name(host));
+  for (const auto* host : {"three.example", "a.b.two.example", "example", ""}) CHECK_FALSE(at_server->has_name(host));
   CHECK_THAT(result_for("three.example"), Catch::Contains("hostname mismatch"));
   CHECK_THAT(result_for("a.b.two.example"), Catch::Contains("hostname mismatch"));
   CHECK_THAT(result_for("127.0.0.2"), Catch::Contains("IP address mismatch"));

@@ -110,7 +110,7 @@ TestClient::HttpResponse TestClient::receive_response(bool has_body) {
 
 TestClient::HttpResponse TestClient::upgrade(const std::string& target, const std::string& headers) {
   send("GET " + target +
-       " HTTP/1.1\r\nHost: gw:8080\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+       " HTTP/1.1\r\nHost: localhost:8080\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
        "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n" +
        headers + "\r\n");
   return receive_response();

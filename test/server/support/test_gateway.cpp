@@ -62,7 +62,7 @@ nlohmann::json TestGateway::wait_for(const std::string& path,
   TestClient client(port_);
   nlohmann::json answer;
   while (std::chrono::steady_clock::now() < give_up) {
-    client.send("GET " + path + " HTTP/1.1\r\nHost: gw\r\n\r\n");
+    client.send("GET " + path + " HTTP/1.1\r\nHost: localhost\r\n\r\n");
     answer = nlohmann::json::parse(client.receive_response().body);
     if (is_wanted(answer)) return answer;
   }
