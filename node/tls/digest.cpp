@@ -8,13 +8,25 @@
 
 namespace rr {
 
-Bytes sha256(ByteSpan bytes) {
+namespace {
+
+Bytes digest(const char* name, ByteSpan bytes) {
   Bytes out(EVP_MAX_MD_SIZE);
   std::size_t size = 0;
-  if (EVP_Q_digest(nullptr, "SHA256", nullptr, bytes.data(), bytes.size(), out.data(), &size) != 1)
-    throw std::runtime_error("OpenSSL refused SHA-256");
+  if (EVP_Q_digest(nullptr, name, nullptr, bytes.data(), bytes.size(), out.data(), &size) != 1)
+    throw std::runtime_error(std::string("OpenSSL refused ") + name);
   out.resize(size);
   return out;
+}
+
+}  // namespace
+
+Bytes sha1(ByteSpan bytes) {
+  return digest("SHA1", bytes);
+}
+
+Bytes sha256(ByteSpan bytes) {
+  return digest("SHA256", bytes);
 }
 
 Bytes random_bytes(std::size_t count) {

@@ -1,4 +1,4 @@
-// SHA-256 and random bytes. Layer: node/tls.
+// Digests and random bytes. Layer: node/tls.
 #pragma once
 
 #include <cstddef>
@@ -8,6 +8,8 @@
 
 namespace rr {
 
+/// 20 bytes. For protocols that ask for it, not for secrets.
+Bytes sha1(ByteSpan bytes);
 /// 32 bytes.
 Bytes sha256(ByteSpan bytes);
 /// For secrets. Throws   std::runtime_error: the system has none to give.

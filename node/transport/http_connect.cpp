@@ -1,12 +1,12 @@
 #include "node/transport/http_connect.hpp"
 
 #include <algorithm>
-#include <boost/beast/core/detail/base64.hpp>
 #include <boost/beast/http/empty_body.hpp>
 #include <boost/beast/http/parser.hpp>
 #include <boost/beast/http/rfc7230.hpp>
 
 #include "core/support/random.hpp"
+#include "node/tls/base64.hpp"
 #include "node/transport/websocket.hpp"
 #include "node/transport/websocket_frames.hpp"
 
@@ -35,9 +35,7 @@ bool has_token(std::string_view list, std::string_view wanted) {
 
 std::string make_key() {
   const NodeId random = random_node_id();  // as many bytes as a key has
-  std::string key(boost::beast::detail::base64::encoded_size(random.bytes.size()), '\0');
-  key.resize(boost::beast::detail::base64::encode(key.data(), random.bytes.data(), random.bytes.size()));
-  return key;
+  return encode_base64(random.bytes);
 }
 
 awaitable<error_code> write_text(ByteStream& stream, std::string text) {

@@ -1,11 +1,11 @@
 #include "node/transport/websocket_frames.hpp"
 
 #include <algorithm>
-#include <boost/beast/core/detail/base64.hpp>
-#include <boost/uuid/detail/sha1.hpp>
 #include <cstring>
 
 #include "core/support/random.hpp"
+#include "node/tls/base64.hpp"
+#include "node/tls/digest.hpp"
 
 namespace rr {
 
@@ -222,15 +222,7 @@ std::span<const ByteSpan> FrameSplitter::split(std::span<const ByteSpan> payload
 
 std::string websocket_accept(std::string_view key) {
   const std::string text = std::string(key) + "258EAFA5-E914-47DA-95CA-C5AB0DC85B11";
-  boost::uuids::detail::sha1 hash;
-  hash.process_bytes(text.data(), text.size());
-  unsigned int words[5];
-  hash.get_digest(words);
-  std::uint8_t digest[20];
-  for (std::size_t i = 0; i < 20; ++i) digest[i] = static_cast<std::uint8_t>(words[i / 4] >> (24 - 8 * (i % 4)));
-  std::string out(boost::beast::detail::base64::encoded_size(sizeof(digest)), '\0');
-  out.resize(boost::beast::detail::base64::encode(out.data(), digest, sizeof(digest)));
-  return out;
+  return encode_base64(sha1(as_bytes(text)));
 }
 
 }  // namespace rr

@@ -3,8 +3,9 @@
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/error.hpp>
 #include <boost/asio/use_awaitable.hpp>
-#include <boost/beast/websocket/detail/utf8_checker.hpp>
 #include <cstring>
+
+#include "core/support/utf8.hpp"
 
 namespace rr {
 
@@ -23,10 +24,6 @@ Bytes text_header(std::size_t payload) {
   out.push_back(static_cast<std::uint8_t>(width == 0 ? payload : width == 2 ? 126 : 127));
   for (int i = width - 1; i >= 0; --i) out.push_back(static_cast<std::uint8_t>(std::uint64_t{payload} >> (8 * i)));
   return out;
-}
-
-bool is_utf8(std::string_view text) {
-  return boost::beast::websocket::detail::check_utf8(text.data(), text.size());
 }
 
 }  // namespace

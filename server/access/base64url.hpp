@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "server/json/base64.hpp"
+#include "node/tls/base64.hpp"
 
 namespace rrgate {
 

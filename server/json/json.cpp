@@ -12,7 +12,7 @@ namespace {
 
 /// What boost::json::basic_parser calls. Numbers come with their digits: its own doubles are off by a bit at times.
 struct TextHandler {
-  using error_code = boost::json::error_code;
+  using error_code = boost::system::error_code;
   using string_view = boost::json::string_view;
   static constexpr std::size_t max_object_size = std::size_t(-1);
   static constexpr std::size_t max_array_size = std::size_t(-1);
@@ -76,7 +76,7 @@ Result<Json> read_json(std::string_view text) {
   boost::json::parse_options options;
   options.max_depth = JsonBuilder::max_depth;
   boost::json::basic_parser<TextHandler> parser(options);
-  boost::json::error_code ec;
+  boost::system::error_code ec;
   const auto used = parser.write_some(false, text.data(), text.size(), ec);
   auto& builder = parser.handler().builder;
   if (!ec && used < text.size()) ec = boost::json::error::extra_data;

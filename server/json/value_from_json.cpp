@@ -7,7 +7,7 @@
 #include "core/types/multidim.hpp"
 #include "core/types/number.hpp"
 #include "core/types/type_text.hpp"
-#include "server/json/base64.hpp"
+#include "node/tls/base64.hpp"
 #include "server/json/typed_array_tags.hpp"
 
 namespace rr {

@@ -1,11 +1,11 @@
 #include "server/json/value_to_json.hpp"
 
-#include <boost/beast/websocket/detail/utf8_checker.hpp>
 #include <charconv>
 #include <cmath>
 
+#include "core/support/utf8.hpp"
 #include "core/types/field_path.hpp"
-#include "server/json/base64.hpp"
+#include "node/tls/base64.hpp"
 #include "server/json/typed_array_tags.hpp"
 
 namespace rr {
@@ -275,7 +275,7 @@ class ToJson {
   }
 
   bool check_text(const FieldPath& path, std::string_view text) {
-    if (boost::beast::websocket::detail::check_utf8(text.data(), text.size())) return true;
+    if (is_utf8(text)) return true;
     error_ = value_error(ErrorCode::data_serialization_error, "write", path, "is not UTF-8");
     return false;
   }

@@ -6,7 +6,7 @@
 #include "core/session/url.hpp"
 #include "core/support/words.hpp"
 #include "node/http/upgrade.hpp"
-#include "server/json/base64.hpp"
+#include "node/tls/base64.hpp"
 #include "server/json/json.hpp"
 #include "server/state/connection.hpp"
 

@@ -1,8 +1,8 @@
 #include "server/http/endpoints/object_request.hpp"
 
 #include "core/session/service_path.hpp"
+#include "node/tls/base64.hpp"
 #include "server/http/endpoints/image_values.hpp"
-#include "server/json/base64.hpp"
 #include "server/state/http_access.hpp"
 
 namespace rrgate {

@@ -1,4 +1,4 @@
-// Base64 with padding. Layer: server/json. Source: RFC 4648 section 4.
+// Base64 with padding. Layer: node/tls. Source: RFC 4648 section 4.
 #pragma once
 
 #include <optional>
