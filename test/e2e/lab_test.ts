@@ -1,6 +1,6 @@
 // `test` with a running lab, a page that may not complain, and the readings of the robot page.
 import { test as base, expect } from "@playwright/test";
-import type { Page } from "@playwright/test";
+import type { Locator, Page } from "@playwright/test";
 import { Lab } from "./processes";
 
 export { expect };
@@ -45,8 +45,8 @@ export function distance(a: Pose, b: Pose): number {
   return Math.hypot(a.x - b.x, a.y - b.y);
 }
 
-export async function open_robot(page: Page, lab: Lab): Promise<void> {
-  await page.goto(`${lab.url}#/devices/create/Create`);
+export async function open_robot(page: Page, gateway: { url: string }): Promise<void> {
+  await page.goto(`${gateway.url}#/devices/create/Create`);
   await expect(page.locator('[data-link="online"]')).toBeVisible();
   await expect(page.getByRole("button", { name: "Forward" })).toBeEnabled();
 }
@@ -71,6 +71,22 @@ export async function wait_until_moved(page: Page, from: Pose, metres: number): 
     expect(distance(from, now)).toBeGreaterThan(metres);
   }).toPass({ intervals: [100] });
   return now;
+}
+
+/**
+ * Until the robot tells of wheels that turn, or of none that does. A wall keeps the robot in its place, not its wheels: who
+ * wants to see that it was told to stop looks at them.
+ */
+export async function wait_until_driving(page: Page): Promise<void> {
+  await expect(wheel(page, "left")).not.toHaveText(/^[0–]$/);
+}
+
+export async function wait_until_stopped(page: Page, within_ms?: number): Promise<void> {
+  for (const side of ["left", "right"] as const) await expect(wheel(page, side)).toHaveText("0", { timeout: within_ms });
+}
+
+function wheel(page: Page, side: "left" | "right"): Locator {
+  return page.locator(`[data-reading="${side}-wheel"]`);
 }
 
 export async function put_at_start(page: Page): Promise<Pose> {

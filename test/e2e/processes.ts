@@ -11,7 +11,7 @@ import { fileURLToPath } from "node:url";
 const repository = path.resolve(path.dirname(fileURLToPath(import.meta.url)), "../..");
 export const rrgate = process.env["RRGATE"] ?? path.join(repository, "build/release/server/rrgate");
 export const repository_root = repository;
-const web_root = process.env["RRGATE_WEB_ROOT"] ?? path.join(repository, "web/dist");
+export const web_root = process.env["RRGATE_WEB_ROOT"] ?? path.join(repository, "web/dist");
 
 /** A device's program: beside the gateway (installed) or in the build tree. */
 function device_program(name: string): string {

@@ -3,7 +3,7 @@ import { read_requests, read_who } from "../../web/src/gateway/access";
 import { read_devices, relay_url } from "../../web/src/gateway/devices";
 import { read_frame } from "../../web/src/camera/frame";
 import { fit, grid_step, include, START, to_canvas } from "../../web/src/chart/view";
-import { sentence, span } from "../../web/src/ui/words";
+import { sentence, span, stale_age } from "../../web/src/ui/words";
 
 describe("access", () => {
   it("reads who the gateway takes the page for", () => {
@@ -123,6 +123,10 @@ describe("view of the chart", () => {
 });
 
 describe("words", () => {
+  it("say within a second that no newer value came, and how old the last one is", () => {
+    expect([0, 799].map(stale_age)).toEqual([null, null]);
+    expect([800, 1400, 3000, 61_000].map(stale_age)).toEqual(["1 s old", "1 s old", "3 s old", "1 min old"]);
+  });
   it("say spans as people do", () => {
     expect(span(4_999)).toBe("4 s");
     expect(span(61_000)).toBe("1 min");

@@ -98,6 +98,7 @@ describe("steering", () => {
 
 describe("driver", () => {
   const GO: DriveCommand = { velocity: 200, radius: STRAIGHT };
+  const BACK: DriveCommand = { velocity: -200, radius: STRAIGHT };
   const TURN: DriveCommand = { velocity: 200, radius: TURN_RADIUS };
 
   interface Call {
@@ -123,18 +124,74 @@ describe("driver", () => {
   beforeEach(() => void vi.useFakeTimers());
   afterEach(() => void vi.useRealTimers());
 
-  it("has one command in flight, and the newest wish replaces those that wait", async () => {
+  it("has one moving command in flight, and the newest wish replaces those that wait", async () => {
+    const { calls, send } = connection();
+    const driver = new Driver(() => undefined);
+    driver.set_connection(send);
+    driver.want(GO);
+    driver.want(BACK);
+    driver.want(TURN);
+    expect(calls.map((c) => c.command)).toEqual([GO]);
+    await calls[0]?.answer();
+    expect(calls.map((c) => c.command)).toEqual([GO, TURN]);
+  });
+  it("sends a stop at once, past a command that is never answered", () => {
     const { calls, send } = connection();
     const driver = new Driver(() => undefined);
     driver.set_connection(send);
     driver.want(GO);
     driver.want(TURN);
-    driver.want(STOP);
+    vi.advanceTimersByTime(1000);
     expect(calls.map((c) => c.command)).toEqual([GO]);
+    driver.want(STOP);
+    expect(calls.map((c) => c.command)).toEqual([GO, STOP]);
+  });
+  it("sends nothing more to a robot at rest", async () => {
+    const { calls, send } = connection();
+    const driver = new Driver(() => undefined);
+    driver.set_connection(send);
+    driver.want(GO);
+    driver.want(STOP);
+    await calls[0]?.answer();
+    await calls[1]?.answer();
+    expect(driver.is_moving).toBe(false);
+    vi.advanceTimersByTime(5000);
+    expect(calls).toHaveLength(2);
+  });
+  it("drives on only when the stop before is answered", async () => {
+    const { calls, send } = connection();
+    const driver = new Driver(() => undefined);
+    driver.set_connection(send);
+    driver.want(GO);
+    driver.want(STOP);
+    driver.want(TURN);
     await calls[0]?.answer();
     expect(calls.map((c) => c.command)).toEqual([GO, STOP]);
     await calls[1]?.answer();
-    expect(driver.is_moving).toBe(false);
+    expect(calls.map((c) => c.command)).toEqual([GO, STOP, TURN]);
+  });
+  it("stops once more where a moving command is answered after the stop that followed it", async () => {
+    const { calls, send } = connection();
+    const driver = new Driver(() => undefined);
+    driver.set_connection(send);
+    driver.want(GO);
+    driver.want(STOP);
+    await calls[1]?.answer();
+    expect(driver.is_moving).toBe(true);
+    await calls[0]?.answer();
+    vi.advanceTimersByTime(450);
+    expect(calls.map((c) => c.command)).toEqual([GO, STOP, STOP]);
+  });
+  it("stops a robot that others move when somebody asks for it, until the robot answers", async () => {
+    const { calls, send } = connection();
+    const driver = new Driver(() => undefined);
+    driver.set_connection(send);
+    driver.stop();
+    expect(calls.map((c) => c.command)).toEqual([STOP]);
+    await calls[0]?.fail(new Error("timeout"));
+    vi.advanceTimersByTime(450);
+    expect(calls.map((c) => c.command)).toEqual([STOP, STOP]);
+    await calls[1]?.answer();
     vi.advanceTimersByTime(5000);
     expect(calls).toHaveLength(2);
   });

@@ -1,6 +1,19 @@
 // The demo robot: drive, see it move; kill the device, see the page say so; start it, see the page recover.
 import { readFileSync } from "node:fs";
-import { distance, expect, open_robot, pose_of, put_at_start, test, wait_until_moved, wait_until_still } from "../lab_test";
+import {
+  distance,
+  expect,
+  open_robot,
+  pose_of,
+  put_at_start,
+  test,
+  wait_until_driving,
+  wait_until_moved,
+  wait_until_still,
+  wait_until_stopped,
+} from "../lab_test";
+import { Line } from "../line";
+import { start_gateway, web_root } from "../processes";
 
 test.beforeEach(async ({ page, lab }) => {
   await open_robot(page, lab);
@@ -44,6 +57,45 @@ test("it stops when the window loses the keyboard", async ({ page }) => {
   await page.evaluate(() => window.dispatchEvent(new Event("blur")));
   await wait_until_still(page);
   await page.keyboard.up("ArrowUp");
+});
+
+test("Stop stops a robot that somebody else drives", async ({ page, lab }) => {
+  const drive = `${lab.url}api/v1/devices/create/Create/Drive`;
+  expect((await page.request.post(drive, { data: { velocity: 100, radius: 32767 } })).ok()).toBe(true);
+  await wait_until_driving(page);
+  await page.getByRole("button", { name: "Stop" }).click();
+  await wait_until_stopped(page);
+});
+
+test("letting go stops a robot whose answers do not arrive, while the page says how old its values are", async ({ page, context, lab }) => {
+  const line = await Line.to(lab.create_url);
+  const { program, url } = await start_gateway("create", line.url, web_root);
+  try {
+    const watcher = await context.newPage();
+    await open_robot(watcher, lab);
+    await page.bringToFront();
+    await open_robot(page, { url });
+    await page.keyboard.down("ArrowUp");
+    await wait_until_driving(page);
+
+    line.mute();
+    const distance_reading = page.locator('[data-told="distance"]');
+    await expect(distance_reading).toContainText(/\d s old/, { timeout: 2_000 });
+    await expect(page.getByRole("region", { name: "Chart" })).toContainText(/last known, \d s old/);
+    await page.keyboard.up("ArrowUp");
+    await wait_until_stopped(watcher, 1_000);
+    await expect(page.getByRole("region", { name: "Drive" })).toContainText("RequestTimeout");
+
+    line.unmute();
+    await expect(distance_reading).not.toContainText("old");
+    await page.keyboard.down("ArrowUp");
+    await wait_until_driving(page);
+    await page.keyboard.up("ArrowUp");
+    await wait_until_stopped(page);
+  } finally {
+    line.close();
+    await program.kill();
+  }
 });
 
 test("it stops when the page is closed while driving", async ({ page, context, lab }) => {

@@ -11,6 +11,7 @@ import { explain, open_remote } from "../robot/remote";
 import type { Remote } from "../robot/remote";
 import { draw_frame } from "./draw_frame";
 import { Snapshot } from "./snapshot";
+import { useAge } from "../ui/use_age";
 import { clock_time } from "../ui/words";
 
 const PAUSE_MS = 80; // between frames, so that the camera never takes the line from the robot
@@ -78,11 +79,11 @@ function Picture({ link, place, shown }: { link: Link; place: Place; shown: bool
   const [chosen, set_chosen] = useState<number | null>(null);
   const index = chosen !== null && cameras.some((c) => c.index === chosen) ? chosen : (cameras[0]?.index ?? null);
   const canvas = useRef<HTMLCanvasElement>(null);
-  const { failure, has_frame, size } = useFrames(canvas, remote, index, shown);
+  const { failure, has_frame, size, age } = useFrames(canvas, remote, index, shown);
   const note =
     state.kind === "lost"
       ? `No connection to ${place.device} since ${clock_time(state.since)}. Retrying by itself.`
-      : (failure ?? (has_frame ? null : "Waiting for the first picture …"));
+      : (failure ?? (has_frame ? age && `This picture is ${age}.` : "Waiting for the first picture …"));
   return (
     <>
       <div class={`camera-frame ${note !== null && has_frame ? "is-stale" : ""}`}>
@@ -143,6 +144,8 @@ interface Frames {
   failure: string | null;
   has_frame: boolean;
   size: string;
+  /** Of the picture; null while they come. */
+  age: string | null;
 }
 
 function useFrames(
@@ -151,7 +154,9 @@ function useFrames(
   index: number | null,
   shown: boolean,
 ): Frames {
-  const [frames, set_frames] = useState<Frames>({ failure: null, has_frame: false, size: "" });
+  const [frames, set_frames] = useState<Omit<Frames, "age">>({ failure: null, has_frame: false, size: "" });
+  const drawn_at = useRef<number | null>(null);
+  const age = useAge(() => drawn_at.current);
   useEffect(() => {
     if (!remote || index === null || !shown) return;
     const stop = new AbortController();
@@ -161,6 +166,7 @@ function useFrames(
         if (document.hidden) continue;
         const size = await draw_frame(canvas.current, frame);
         if (stop.signal.aborted) return;
+        drawn_at.current = performance.now();
         set_frames((old) => (old.failure === null && old.size === size ? old : { failure: null, has_frame: true, size }));
       }
     };
@@ -175,7 +181,7 @@ function useFrames(
     void keep_following();
     return () => stop.abort();
   }, [remote, index, shown]);
-  return frames;
+  return { ...frames, age };
 }
 
 async function* frames_of(camera: Remote, signal: AbortSignal): AsyncGenerator<unknown, void> {

@@ -6,6 +6,7 @@ import { Plot } from "../chart/plot";
 import { explain } from "../robot/remote";
 import { rate_of, Series } from "../robot/series";
 import { Failure } from "../ui/failure";
+import { useAge } from "../ui/use_age";
 import { format_value } from "../values/format";
 import { readings_of } from "../values/numeric";
 import { parse_input } from "../values/parse";
@@ -34,6 +35,7 @@ function WireReader({ object, name, live }: { object: MemberRowProps["object"]; 
   const [text, set_text] = useState<string | null>(null);
   const [rate, set_rate] = useState(0);
   const [failure, set_failure] = useState<string | null>(null);
+  const age = useAge(() => arrivals.newest?.t ?? null);
 
   useEffect(() => {
     if (!live) return;
@@ -75,7 +77,7 @@ function WireReader({ object, name, live }: { object: MemberRowProps["object"]; 
   const lines = useMemo(() => labels.map((label) => by_label.get(label)).filter((s) => s !== undefined), [labels, by_label]);
   return (
     <>
-      <div class="wire">
+      <div class={`wire ${age === null ? "" : "is-stale"}`}>
         <output class="value wire-value">{text ?? (live ? "no value yet" : "not connected")}</output>
         {lines.length > 0 && (
           <div class="wire-plot">
@@ -90,7 +92,10 @@ function WireReader({ object, name, live }: { object: MemberRowProps["object"]; 
           </div>
         )}
       </div>
-      <p class="note">{rate > 0 ? `${rate.toFixed(1)} values a second` : "no values in the last 2 s"}</p>
+      <p class="note">
+        {rate > 0 ? `${rate.toFixed(1)} values a second` : "no values in the last 2 s"}
+        {age !== null && `; this one is ${age}`}
+      </p>
       <Failure text={failure} />
     </>
   );

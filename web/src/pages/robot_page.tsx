@@ -6,7 +6,7 @@ import { useStore } from "../app/store";
 import { CameraView } from "../camera/camera_view";
 import { RobotChart } from "../chart/robot_chart";
 import type { DeviceList } from "../gateway/devices";
-import { Driver } from "../robot/driver";
+import { Driver, DRIVE_TIMEOUT_MS } from "../robot/driver";
 import type { Link } from "../robot/link";
 import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
@@ -16,6 +16,7 @@ import { DrivePanel } from "../robot_view/drive_panel";
 import { PoseLine } from "../robot_view/pose_line";
 import { SongBox } from "../robot_view/song_box";
 import { ValuesPanel } from "../robot_view/values_panel";
+import { useAge } from "../ui/use_age";
 
 export interface RobotPageProps {
   link: Link;
@@ -38,29 +39,30 @@ export function RobotPage({ link, list, device, shown }: RobotPageProps) {
     model.attach(remote, stop.signal);
     set_drive_failure(null);
     driver.set_connection(async ({ velocity, radius }) => {
-      await remote.call("Drive", [velocity, radius]);
+      await remote.call("Drive", [velocity, radius], { timeout: DRIVE_TIMEOUT_MS });
       set_drive_failure(null);
     });
     return () => {
       driver.dispose();
-      driver.set_connection(null);
       stop.abort();
     };
   }, [remote, model, driver]);
 
   const live = remote !== null;
+  const pose_age = useAge(() => model.heard_at("pose"));
+  const pose_comes = live && pose_age === null;
   const put_back = (robot: Remote): void => {
     robot.call("reset", []).catch((error: unknown) => set_drive_failure(`reset: ${explain(error)}`));
   };
   return (
     <div class="robot">
-      <section class={`panel chart-panel ${live ? "" : "is-stale"}`} aria-labelledby="chart-title">
+      <section class={`panel chart-panel ${pose_comes ? "" : "is-stale"}`} aria-labelledby="chart-title">
         <h2 id="chart-title" class="unseen">
           Chart
         </h2>
-        <RobotChart model={model} live={live} />
+        <RobotChart model={model} live={pose_comes} />
         <div class="chart-foot">
-          <PoseLine model={model} live={live} />
+          <PoseLine model={model} live={live} age={pose_age} />
           {remote?.has("reset", "function") && (
             <button class="button button-quiet" type="button" onClick={() => put_back(remote)}>
               To start

@@ -1,18 +1,23 @@
-// Sends drive commands so that the newest intent wins and a stop is never lost.
-// Layer: web/robot. One call is in flight at a time; what was wanted meanwhile replaces what was waiting.
+// Sends drive commands so that the newest intent wins and a stop is never late.
+// Layer: web/robot. A stop goes out at once, past whatever is unanswered. A moving command waits for the answers to all
+// others, and a newer one replaces it meanwhile: a robot that answers late is never sent old wishes.
 
-import { is_stop, STOP } from "./steering";
+import { is_stop, same_command, STOP } from "./steering";
 import type { DriveCommand } from "./steering";
 
+/** Settles when the robot has answered, or after DRIVE_TIMEOUT_MS. */
 export type SendDrive = (command: DriveCommand) => Promise<void>;
 
-const REPEAT_MS = 400; // a held key is repeated, for a device that stops by itself when commands cease
+export const DRIVE_TIMEOUT_MS = 2_000;
+const REPEAT_MS = 400; // what is held is repeated, for a device that stops by itself when commands cease
 
 export class Driver {
   #send: SendDrive | null = null;
   #wanted: DriveCommand = STOP;
-  #delivered: DriveCommand = STOP; // the last command that may have reached the robot
-  #in_flight = false;
+  #sent: DriveCommand = STOP;
+  /** From a moving command on, until a stop is answered while no moving command is under way. */
+  #may_move = false;
+  #unanswered = { moves: 0, stops: 0 };
   #repeat: ReturnType<typeof setInterval> | undefined;
   readonly #on_error: (error: unknown) => void;
 
@@ -21,46 +26,57 @@ export class Driver {
     this.#on_error = on_error;
   }
 
-  /** A connection came (a function) or went (null). A robot last told to move is told to stop first. */
+  /** A connection came (a function) or went (null). A robot that may still move is told to stop first. */
   set_connection(send: SendDrive | null): void {
     this.#send = send;
-    this.#in_flight = false;
     this.#wanted = STOP;
-    this.#hold(false);
-    if (send && !is_stop(this.#delivered)) this.#pump();
+    this.#unanswered = { moves: 0, stops: 0 };
+    this.#rest();
+    if (this.#may_move) this.#transmit(STOP);
   }
 
-  /** Sets what the robot should do now. Without a connection only the stop is remembered. */
+  /** Sets what the robot should do now. A robot that this page has not moved is not told to stop: others may drive it. */
   want(command: DriveCommand): void {
-    if (!this.#send) return;
-    const same = command.velocity === this.#wanted.velocity && command.radius === this.#wanted.radius;
+    if (!this.#send || same_command(command, this.#wanted)) return;
     this.#wanted = command;
-    this.#hold(!is_stop(command));
-    if (!same) this.#pump();
+    if (is_stop(command) || this.#is_answered) this.#transmit(command);
   }
 
-  /** Whether the robot was last told to move, or is wanted to. */
+  /** Somebody asked for a stop: sent whoever moves the robot, and again until it is answered. */
+  stop(): void {
+    if (!this.#send) return;
+    this.#wanted = STOP;
+    this.#may_move = true;
+    this.#transmit(STOP);
+  }
+
+  /** Whether the robot may move by a command of this page's. */
   get is_moving(): boolean {
-    return !is_stop(this.#wanted) || !is_stop(this.#delivered);
+    return this.#may_move;
   }
 
   /** Stops the robot and forgets the connection. */
   dispose(): void {
     this.want(STOP);
-    this.#hold(false);
+    this.set_connection(null);
   }
 
-  #hold(moving: boolean): void {
+  get #is_answered(): boolean {
+    return this.#unanswered.moves + this.#unanswered.stops === 0;
+  }
+
+  #rest(): void {
     clearInterval(this.#repeat);
-    this.#repeat = moving ? setInterval(() => this.#pump(), REPEAT_MS) : undefined;
+    this.#repeat = undefined;
   }
 
-  #pump(): void {
+  #transmit(command: DriveCommand): void {
     const send = this.#send;
-    if (!send || this.#in_flight) return;
-    const command = this.#wanted;
-    if (!is_stop(command)) this.#delivered = command; // it may move even if the answer never comes
-    this.#in_flight = true;
+    if (!send) return;
+    this.#sent = command;
+    this.#unanswered[is_stop(command) ? "stops" : "moves"] += 1;
+    if (!is_stop(command)) this.#may_move = true; // it may, even if the answer never comes
+    this.#repeat ??= setInterval(() => this.#is_answered && this.#transmit(this.#wanted), REPEAT_MS);
     send(command).then(
       () => this.#settle(send, command, null),
       (error: unknown) => this.#settle(send, command, error),
@@ -69,18 +85,15 @@ export class Driver {
 
   #settle(send: SendDrive, command: DriveCommand, error: unknown): void {
     if (send !== this.#send) return; // an answer of a connection that is gone
-    this.#in_flight = false;
+    this.#unanswered[is_stop(command) ? "stops" : "moves"] -= 1;
     if (error !== null) {
-      this.#on_error(error);
       this.#wanted = STOP;
-      this.#hold(false);
-      if (!is_stop(command)) this.#pump();
-      else if (!is_stop(this.#delivered)) this.#repeat = setInterval(() => this.#pump(), REPEAT_MS);
-      return;
+      this.#on_error(error);
+    } else if (is_stop(command) && this.#unanswered.moves === 0) {
+      this.#may_move = false;
     }
-    this.#delivered = command;
-    if (is_stop(command) && is_stop(this.#wanted)) this.#hold(false);
-    const changed = command.velocity !== this.#wanted.velocity || command.radius !== this.#wanted.radius;
-    if (changed) this.#pump();
+    if (!this.#is_answered) return;
+    if (is_stop(this.#wanted) && !this.#may_move) this.#rest();
+    else if (!same_command(this.#sent, this.#wanted)) this.#transmit(this.#wanted);
   }
 }

@@ -3,7 +3,7 @@
 // Layer: web/robot. Beside gateway/usb_devices.ts the only file that imports `rrgate-client`.
 
 import { connect, RobotRaconteurError } from "rrgate-client";
-import type { DynamicMember, MemberInfo, MemberKind, RemoteObject } from "rrgate-client";
+import type { CallOptions, DynamicMember, MemberInfo, MemberKind, RemoteObject } from "rrgate-client";
 
 export type Member = MemberInfo;
 export type { MemberKind };
@@ -14,7 +14,7 @@ export interface Remote {
   readonly type: string;
   readonly members: readonly Member[];
   has(name: string, kind: MemberKind): boolean;
-  call(name: string, args: readonly unknown[]): Promise<unknown>;
+  call(name: string, args: readonly unknown[], options?: CallOptions): Promise<unknown>;
   get(name: string): Promise<unknown>;
   set(name: string, value: unknown): Promise<void>;
   /** Values of a wire from now on, the newest only; ends with the connection or with `signal`. */
@@ -59,7 +59,7 @@ function wrap(object: RemoteObject): Remote {
     type: info.type,
     members: info.members,
     has: (name, kind) => info.members.some((m) => m.name === name && m.kind === kind),
-    call: async (name, args) => member(name)(...args),
+    call: async (name, args, options) => member(name)(...args, ...(options ? [options] : [])),
     get: async (name) => member(name).get(),
     set: async (name, value) => member(name).set(value),
     wire: (name, signal) => values_of(() => member(name).connect({ signal }), signal),

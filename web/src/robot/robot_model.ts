@@ -28,6 +28,9 @@ export interface Readings {
   packet: { id: number; bytes: Uint8Array } | null;
 }
 
+/** What the robot tells, piece by piece: each may stop coming while others go on. */
+export type Told = keyof Readings | "pose";
+
 const POLL_MS = 100;
 const RETRY_MS = 1_000;
 const SHOW_MS = 100; // numbers faster than this cannot be read
@@ -62,6 +65,7 @@ export class RobotModel {
 
   readonly #reckoner = new Reckoner();
   readonly #moved = new Set<() => void>();
+  readonly #heard = new Map<Told, number>();
   #latest: Readings = NO_READINGS;
   #show_timer: ReturnType<typeof setTimeout> | undefined;
   #bump_count = 0;
@@ -70,6 +74,11 @@ export class RobotModel {
   on_moved(moved: () => void): () => void {
     this.#moved.add(moved);
     return () => void this.#moved.delete(moved);
+  }
+
+  /** When the robot last told of it, by performance.now(); null when it never did. */
+  heard_at(what: Told): number | null {
+    return this.#heard.get(what) ?? null;
   }
 
   /** Follows a connected robot until `signal` aborts. */
@@ -189,12 +198,14 @@ export class RobotModel {
   }
 
   #move_to(pose: Pose): void {
+    this.#heard.set("pose", performance.now());
     this.pose = pose;
     this.trail.add({ x: pose.x, y: pose.y });
     this.#redraw();
   }
 
   #show(change: Partial<Readings>): void {
+    for (const name of Object.keys(change)) this.#heard.set(name as keyof Readings, performance.now());
     this.#latest = { ...this.#latest, ...change };
     this.#show_timer ??= setTimeout(() => {
       this.#show_timer = undefined;

@@ -30,6 +30,10 @@ export function is_stop(command: DriveCommand): boolean {
   return command.velocity === 0;
 }
 
+export function same_command(a: DriveCommand, b: DriveCommand): boolean {
+  return a.velocity === b.velocity && a.radius === b.radius;
+}
+
 const KEYS: Readonly<Record<string, Direction>> = {
   ArrowUp: "forward",
   ArrowDown: "back",

@@ -11,6 +11,7 @@ export interface Driving {
   held: ReadonlySet<Direction>;
   press: (source: string, direction: Direction) => void;
   release: (source: string) => void;
+  /** Lets go of everything and stops the robot, whoever moves it. */
   stop: () => void;
 }
 
@@ -38,16 +39,21 @@ export function useDriving(driver: Driver, speed: number, enabled: boolean): Dri
     [apply, holds],
   );
   const release = useCallback((source: string) => (holds.release(source), apply()), [apply, holds]);
-  const stop = useCallback(() => (holds.clear(), apply()), [apply, holds]);
+  const let_go = useCallback(() => (holds.clear(), apply()), [apply, holds]);
+  const stop = useCallback(() => {
+    holds.clear();
+    set_held(NOTHING);
+    driver.stop();
+  }, [driver, holds]);
 
   useEffect(() => {
-    if (!enabled) stop();
+    if (!enabled) let_go();
     else apply();
-  }, [enabled, speed, apply, stop]);
+  }, [enabled, speed, apply, let_go]);
 
   useEffect(() => {
     const key_down = (event: KeyboardEvent): void => {
-      if (event.ctrlKey || event.metaKey || event.altKey) return stop(); // a shortcut; its key-up may never come
+      if (event.ctrlKey || event.metaKey || event.altKey) return let_go(); // a shortcut; its key-up may never come
       if (takes_keys(event.target)) return;
       const direction = direction_of_key(event.code);
       if (direction) {
@@ -59,26 +65,26 @@ export function useDriving(driver: Driver, speed: number, enabled: boolean): Dri
       }
     };
     const key_up = (event: KeyboardEvent): void => {
-      if (event.key === "Meta") stop(); // macOS tells no key-up of keys that were held with it
+      if (event.key === "Meta") let_go(); // macOS tells no key-up of keys that were held with it
       else if (direction_of_key(event.code)) release(event.code);
     };
     const hidden = (): void => {
-      if (document.hidden) stop();
+      if (document.hidden) let_go();
     };
     const listeners = [
       [window, "keydown", key_down],
       [window, "keyup", key_up],
-      [window, "blur", stop],
-      [window, "pagehide", stop],
+      [window, "blur", let_go],
+      [window, "pagehide", let_go],
       [document, "visibilitychange", hidden],
-      [document, "focusin", (event: FocusEvent) => takes_keys(event.target) && stop()],
+      [document, "focusin", (event: FocusEvent) => takes_keys(event.target) && let_go()],
     ] as const;
     for (const [target, name, heard] of listeners) target.addEventListener(name, heard as EventListener);
     return () => {
       for (const [target, name, heard] of listeners) target.removeEventListener(name, heard as EventListener);
-      stop();
+      let_go();
     };
-  }, [press, release, stop]);
+  }, [press, release, let_go, stop]);
 
   return { held, press, release, stop };
 }

@@ -29,6 +29,7 @@ export function DrivePanel({ driver, enabled, lost, failure, device }: DrivePane
       <div class="pad" role="group" aria-label="Hold to drive">
         <HoldButton direction="forward" label="Forward" driving={driving} enabled={enabled} />
         <HoldButton direction="left" label="Left" driving={driving} enabled={enabled} />
+        {/* At the press already; a click alone is the keyboard's, or a screen reader's. */}
         <button class="pad-stop" type="button" disabled={!enabled} onPointerDown={driving.stop} onClick={driving.stop}>
           Stop
         </button>

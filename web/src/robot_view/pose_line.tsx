@@ -8,7 +8,14 @@ import type { RobotModel } from "../robot/robot_model";
 
 const SHOW_MS = 100;
 
-export function PoseLine({ model, live }: { model: RobotModel; live: boolean }) {
+export interface PoseLineProps {
+  model: RobotModel;
+  live: boolean;
+  /** Of the pose; null while it comes. */
+  age: string | null;
+}
+
+export function PoseLine({ model, live, age }: PoseLineProps) {
   const source = useStore(model.pose_source);
   const [pose, set_pose] = useState<Pose>(model.pose);
   useEffect(() => {
@@ -30,7 +37,7 @@ export function PoseLine({ model, live }: { model: RobotModel; live: boolean }) 
         <Coordinate name="heading" sign="θ" text={`${fixed(degrees, 1)}°`} />
       </dl>
       <p class="note" title={source === "device" ? undefined : "From DistanceTraveled and AngleTraveled, since this page was opened"}>
-        {!live ? "last known" : source === "device" ? "" : "reckoned"}
+        {age !== null ? `last known, ${age}` : !live ? "last known" : source === "device" ? "" : "reckoned"}
       </p>
     </>
   );

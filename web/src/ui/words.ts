@@ -20,6 +20,13 @@ export function span(ms: number): string {
   return `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
 }
 
+const STALE_MS = 800; // a value says that it is old within a second, wherever it is looked at ten times a second
+
+/** `3 s old` for a value that ought to be newer; null for one that is young. */
+export function stale_age(age_ms: number): string | null {
+  return age_ms < STALE_MS ? null : `${span(age_ms + 500)} old`;
+}
+
 /** The same text with an end. */
 export function sentence(text: string): string {
   const trimmed = text.trim();
