@@ -1,5 +1,5 @@
 // The robot page under a finger, on a small screen.
-import { expect, open_robot, pose_of, put_at_start, test, wait_until_moved, wait_until_still } from "../lab_test";
+import { expect, open_robot, pose_of, put_at_start, test, wait_until_moved, wait_until_still, wait_until_stopped } from "../lab_test";
 
 test("a finger that holds drives, and nothing is wider than the screen", async ({ page, lab }) => {
   await open_robot(page, lab);
@@ -15,6 +15,7 @@ test("a finger that holds drives, and nothing is wider than the screen", async (
   await fingers.send("Input.dispatchTouchEvent", { type: "touchStart", touchPoints: [point] });
   await wait_until_moved(page, start, 0.1);
   await fingers.send("Input.dispatchTouchEvent", { type: "touchEnd", touchPoints: [] });
+  await wait_until_stopped(page);
   const end = await wait_until_still(page);
   expect(end.x).toBeGreaterThan(start.x);
   expect((await pose_of(page)).x).toBe(end.x);

@@ -1,5 +1,6 @@
 // The demo robot: drive, see it move; kill the device, see the page say so; start it, see the page recover.
 import { readFileSync } from "node:fs";
+import type { Page } from "@playwright/test";
 import {
   distance,
   expect,
@@ -26,7 +27,7 @@ test("an arrow key drives while it is held", async ({ page }) => {
   await expect(page.getByRole("button", { name: "Forward" })).toHaveAttribute("aria-pressed", "true");
   const there = await wait_until_moved(page, start, 0.2);
   await page.keyboard.up("ArrowUp");
-  await wait_until_still(page);
+  await wait_until_stopped(page);
   expect(there.x).toBeGreaterThan(start.x + 0.19); // it looks east at the start
   await expect(page.locator('[data-reading="distance"]')).not.toHaveText(/^0 /);
 });
@@ -36,6 +37,7 @@ test("A turns left on the spot", async ({ page }) => {
   await page.keyboard.down("KeyA");
   await expect(async () => expect((await pose_of(page)).heading).toBeGreaterThan(start.heading + 20)).toPass();
   await page.keyboard.up("KeyA");
+  await wait_until_stopped(page);
   const end = await wait_until_still(page);
   expect(distance(start, end)).toBeLessThan(0.01);
 });
@@ -47,17 +49,47 @@ test("a held button drives, letting go anywhere stops", async ({ page }) => {
   await wait_until_moved(page, start, 0.1);
   await page.mouse.move(5, 5);
   await page.mouse.up();
-  await wait_until_still(page);
+  await wait_until_stopped(page);
 });
 
-test("it stops when the window loses the keyboard", async ({ page }) => {
-  const start = await pose_of(page);
-  await page.keyboard.down("ArrowUp");
-  await wait_until_moved(page, start, 0.05);
-  await page.evaluate(() => window.dispatchEvent(new Event("blur")));
-  await wait_until_still(page);
-  await page.keyboard.up("ArrowUp");
-});
+const ends_of_a_held_key: Readonly<Record<string, (page: Page) => Promise<unknown>>> = {
+  "the window loses the keyboard": (page) => page.evaluate(() => window.dispatchEvent(new Event("blur"))),
+  "the page is hidden": (page) =>
+    page.evaluate(() => {
+      Object.defineProperty(document, "hidden", { value: true });
+      document.dispatchEvent(new Event("visibilitychange"));
+    }),
+  "the page is left": (page) => page.evaluate(() => window.dispatchEvent(new Event("pagehide"))),
+  "a field takes the keyboard": (page) => page.getByRole("slider", { name: "Speed" }).focus(),
+  "a shortcut begins": (page) => page.keyboard.down("Control"),
+  "Escape is pressed": (page) => page.keyboard.press("Escape"),
+  "Space is pressed": (page) => page.keyboard.press("Space"),
+  "Stop is pressed": (page) => page.getByRole("button", { name: "Stop" }).click(),
+};
+
+for (const [what, end] of Object.entries(ends_of_a_held_key)) {
+  test(`a held key stops to drive when ${what}`, async ({ page }) => {
+    await page.keyboard.down("ArrowUp");
+    await wait_until_driving(page);
+    await end(page);
+    await wait_until_stopped(page);
+  });
+}
+
+const ends_of_a_held_button: Readonly<Record<string, (page: Page) => Promise<unknown>>> = {
+  "the key is let go": (page) => page.keyboard.up("Enter"),
+  "another button takes the keyboard": (page) => page.getByRole("button", { name: "Clear trail" }).focus(),
+};
+
+for (const [what, end] of Object.entries(ends_of_a_held_button)) {
+  test(`a button held with Enter stops to drive when ${what}`, async ({ page }) => {
+    await page.getByRole("button", { name: "Forward" }).focus();
+    await page.keyboard.down("Enter");
+    await wait_until_driving(page);
+    await end(page);
+    await wait_until_stopped(page);
+  });
+}
 
 test("Stop stops a robot that somebody else drives", async ({ page, lab }) => {
   const drive = `${lab.url}api/v1/devices/create/Create/Drive`;
@@ -106,7 +138,7 @@ test("it stops when the page is closed while driving", async ({ page, context, l
   await page.keyboard.down("ArrowUp");
   await wait_until_moved(watcher, start, 0.05);
   await page.close();
-  await wait_until_still(watcher);
+  await wait_until_stopped(watcher);
 });
 
 test("bumps are logged with their time and the bumpers shown", async ({ page }) => {

@@ -74,7 +74,6 @@ function HoldButton({ direction, label, driving, enabled }: HoldButtonProps) {
   const held = driving.held.has(direction);
   const source = (event: PointerEvent): string => `pointer ${event.pointerId}`;
   const key_source = `button ${direction}`;
-  const let_go = (event: PointerEvent): void => driving.release(source(event));
   return (
     <button
       class={`pad-button pad-${direction} ${held ? "is-held" : ""}`}
@@ -86,9 +85,7 @@ function HoldButton({ direction, label, driving, enabled }: HoldButtonProps) {
         event.currentTarget.setPointerCapture(event.pointerId); // the finger may slide off; letting go is still heard
         driving.press(source(event), direction);
       }}
-      onPointerUp={let_go}
-      onPointerCancel={let_go}
-      onLostPointerCapture={let_go}
+      onLostPointerCapture={(event) => driving.release(source(event))} // after pointerup and pointercancel alike
       onContextMenu={(event) => event.preventDefault()} // a long touch is driving, not a menu
       onKeyDown={(event) => {
         if (event.code !== "Space" && event.code !== "Enter") return;
