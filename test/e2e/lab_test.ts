@@ -35,7 +35,7 @@ export interface Pose {
   heading: number;
 }
 
-export async function pose_of(page: Page): Promise<Pose> {
+export async function poseOf(page: Page): Promise<Pose> {
   const read = async (name: string): Promise<number> =>
     Number.parseFloat(await page.locator(`[data-pose="${name}"]`).innerText());
   return { x: await read("x"), y: await read("y"), heading: await read("heading") };
@@ -45,17 +45,17 @@ export function distance(a: Pose, b: Pose): number {
   return Math.hypot(a.x - b.x, a.y - b.y);
 }
 
-export async function open_robot(page: Page, gateway: { url: string }): Promise<void> {
+export async function openRobot(page: Page, gateway: { url: string }): Promise<void> {
   await page.goto(`${gateway.url}#/devices/create/Create`);
   await expect(page.locator('[data-link="online"]')).toBeVisible();
   await expect(page.getByRole("button", { name: "Forward" })).toBeEnabled();
 }
 
 /** Until two looks 400 ms apart show the same place. */
-export async function wait_until_still(page: Page): Promise<Pose> {
+export async function waitUntilStill(page: Page): Promise<Pose> {
   let before: Pose | null = null; // the first look has nothing to compare with: two are an interval apart
   await expect(async () => {
-    const now = await pose_of(page);
+    const now = await poseOf(page);
     const moved = before ? distance(before, now) : Infinity;
     before = now;
     expect(moved).toBeLessThan(0.0005);
@@ -64,10 +64,10 @@ export async function wait_until_still(page: Page): Promise<Pose> {
 }
 
 /** Until the robot is further than `metres` from where it was. */
-export async function wait_until_moved(page: Page, from: Pose, metres: number): Promise<Pose> {
+export async function waitUntilMoved(page: Page, from: Pose, metres: number): Promise<Pose> {
   let now = from;
   await expect(async () => {
-    now = await pose_of(page);
+    now = await poseOf(page);
     expect(distance(from, now)).toBeGreaterThan(metres);
   }).toPass({ intervals: [100] });
   return now;
@@ -77,20 +77,20 @@ export async function wait_until_moved(page: Page, from: Pose, metres: number): 
  * Until the robot tells of wheels that turn, or of none that does. A wall keeps the robot in its place, not its wheels: who
  * wants to see that it was told to stop looks at them.
  */
-export async function wait_until_driving(page: Page): Promise<void> {
+export async function waitUntilDriving(page: Page): Promise<void> {
   await expect(wheel(page, "left")).not.toHaveText(/^[0–]$/);
 }
 
-export async function wait_until_stopped(page: Page, within_ms?: number): Promise<void> {
-  for (const side of ["left", "right"] as const) await expect(wheel(page, side)).toHaveText("0", { timeout: within_ms });
+export async function waitUntilStopped(page: Page, withinMs?: number): Promise<void> {
+  for (const side of ["left", "right"] as const) await expect(wheel(page, side)).toHaveText("0", { timeout: withinMs });
 }
 
 function wheel(page: Page, side: "left" | "right"): Locator {
   return page.locator(`[data-reading="${side}-wheel"]`);
 }
 
-export async function put_at_start(page: Page): Promise<Pose> {
+export async function putAtStart(page: Page): Promise<Pose> {
   await page.getByRole("button", { name: "To start" }).click();
   await expect(page.locator('[data-pose="x"]')).toHaveText("0.000 m");
-  return wait_until_still(page);
+  return waitUntilStill(page);
 }

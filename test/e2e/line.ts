@@ -6,17 +6,17 @@ export class Line {
   readonly url: string;
   readonly #server: Server;
   readonly #ends: { client: Socket; device: Socket }[] = [];
-  #is_muted = false;
+  #isMuted = false;
 
-  private constructor(server: Server, device_url: URL) {
+  private constructor(server: Server, deviceUrl: URL) {
     this.#server = server;
     const { port } = server.address() as AddressInfo;
-    this.url = device_url.href.replace(device_url.host, `127.0.0.1:${port}`);
+    this.url = deviceUrl.href.replace(deviceUrl.host, `127.0.0.1:${port}`);
     server.on("connection", (client) => {
-      const device = connect(Number(device_url.port), device_url.hostname);
+      const device = connect(Number(deviceUrl.port), deviceUrl.hostname);
       this.#ends.push({ client, device });
       client.pipe(device);
-      if (!this.#is_muted) device.pipe(client);
+      if (!this.#isMuted) device.pipe(client);
       for (const [end, other] of [[client, device], [device, client]] as const) {
         end.on("error", () => other.destroy());
         end.on("close", () => other.destroy());
@@ -24,19 +24,19 @@ export class Line {
     });
   }
 
-  static async to(device_url: string): Promise<Line> {
+  static async to(deviceUrl: string): Promise<Line> {
     const server = createServer();
     await new Promise<void>((resolve) => server.listen(0, "127.0.0.1", resolve));
-    return new Line(server, new URL(device_url));
+    return new Line(server, new URL(deviceUrl));
   }
 
   mute(): void {
-    this.#is_muted = true;
+    this.#isMuted = true;
     for (const { client, device } of this.#ends) device.unpipe(client);
   }
 
   unmute(): void {
-    this.#is_muted = false;
+    this.#isMuted = false;
     for (const { client, device } of this.#ends) device.pipe(client);
   }
 

@@ -10,11 +10,11 @@ import { fileURLToPath } from "node:url";
 
 const repository = path.resolve(path.dirname(fileURLToPath(import.meta.url)), "../..");
 export const rrgate = process.env["RRGATE"] ?? path.join(repository, "build/release/server/rrgate");
-export const repository_root = repository;
-export const web_root = process.env["RRGATE_WEB_ROOT"] ?? path.join(repository, "web/dist");
+export const repositoryRoot = repository;
+export const webRoot = process.env["RRGATE_WEB_ROOT"] ?? path.join(repository, "web/dist");
 
 /** A device's program: beside the gateway (installed) or in the build tree. */
-function device_program(name: string): string {
+function deviceProgram(name: string): string {
   const folder = path.dirname(rrgate);
   const found = [".", "../demo", "demo", "../libexec/rrgate"].map((at) => path.join(folder, at, name)).find(existsSync);
   if (!found) throw new Error(`${name} is not beside ${rrgate} or in ../demo; build the target ${name} first`);
@@ -54,15 +54,15 @@ export class Program {
   }
 
   /** Waits for the process to write what `pattern` finds. */
-  async wait_for_output(pattern: RegExp, within_ms = 30_000): Promise<RegExpExecArray> {
-    const give_up = Date.now() + within_ms;
-    while (Date.now() < give_up) {
+  async waitForOutput(pattern: RegExp, withinMs = 30_000): Promise<RegExpExecArray> {
+    const giveUp = Date.now() + withinMs;
+    while (Date.now() < giveUp) {
       const found = pattern.exec(this.#output);
       if (found) return found;
       if (this.#child?.exitCode !== null) break;
       await pause(50);
     }
-    throw new Error(`${this.#file} did not write ${pattern} within ${within_ms} ms; it wrote:\n${this.#output}`);
+    throw new Error(`${this.#file} did not write ${pattern} within ${withinMs} ms; it wrote:\n${this.#output}`);
   }
 
   get output(): string {
@@ -71,16 +71,16 @@ export class Program {
 }
 
 /** A gateway of its own to one device. */
-export async function start_gateway(device: string, device_url: string, site: string): Promise<{ program: Program; url: string }> {
-  const port = await free_port();
+export async function startGateway(device: string, deviceUrl: string, site: string): Promise<{ program: Program; url: string }> {
+  const port = await freePort();
   const config = path.join(mkdtempSync(path.join(tmpdir(), "rrgate-e2e-")), "gateway.json");
-  writeFileSync(config, JSON.stringify({ listen: [`127.0.0.1:${port}`], web_root: site, devices: [{ name: device, url: device_url }] }));
+  writeFileSync(config, JSON.stringify({ listen: [`127.0.0.1:${port}`], web_root: site, devices: [{ name: device, url: deviceUrl }] }));
   const program = new Program(rrgate, ["serve", "--config", config]);
   program.start();
   const url = `http://127.0.0.1:${port}/`;
-  const give_up = Date.now() + 30_000;
+  const giveUp = Date.now() + 30_000;
   while (!(await (await fetch(`${url}api/v1/devices`).catch(() => null))?.text())?.includes('"online"')) {
-    if (Date.now() > give_up) throw new Error(`${device} is not online:\n${program.output}`);
+    if (Date.now() > giveUp) throw new Error(`${device} is not online:\n${program.output}`);
     await pause(100);
   }
   return { program, url };
@@ -92,60 +92,60 @@ export class Lab {
   readonly webcams: Program;
   readonly gateway: Program;
   readonly url: string;
-  readonly create_url: string;
+  readonly createUrl: string;
   readonly #folder: string;
 
-  private constructor(create_port: number, webcams_port: number, gateway_port: number) {
+  private constructor(createPort: number, webcamsPort: number, gatewayPort: number) {
     this.#folder = mkdtempSync(path.join(tmpdir(), "rrgate-e2e-"));
     const config = path.join(this.#folder, "gateway.json");
-    this.url = `http://127.0.0.1:${gateway_port}/`;
-    this.create_url = `rr+tcp://127.0.0.1:${create_port}/?service=Create`;
-    const webcams_url = `rr+tcp://127.0.0.1:${webcams_port}/?service=Webcam`;
+    this.url = `http://127.0.0.1:${gatewayPort}/`;
+    this.createUrl = `rr+tcp://127.0.0.1:${createPort}/?service=Create`;
+    const webcamsUrl = `rr+tcp://127.0.0.1:${webcamsPort}/?service=Webcam`;
     writeFileSync(
       config,
       JSON.stringify({
-        listen: [`127.0.0.1:${gateway_port}`],
-        web_root,
+        listen: [`127.0.0.1:${gatewayPort}`],
+        web_root: webRoot,
         devices: [
-          { name: "create", url: this.create_url },
-          { name: "webcams", url: webcams_url, mode: "shared" }, // as `rrgate demo` has them
+          { name: "create", url: this.createUrl },
+          { name: "webcams", url: webcamsUrl, mode: "shared" }, // as `rrgate demo` has them
         ],
       }),
     );
-    this.create = new Program(device_program("rrgate-demo-create"), ["--port", String(create_port)]);
-    this.webcams = new Program(device_program("rrgate-demo-webcams"), [
+    this.create = new Program(deviceProgram("rrgate-demo-create"), ["--port", String(createPort)]);
+    this.webcams = new Program(deviceProgram("rrgate-demo-webcams"), [
       "--port",
-      String(webcams_port),
+      String(webcamsPort),
       "--robot",
-      this.create_url,
+      this.createUrl,
     ]);
     this.gateway = new Program(rrgate, ["serve", "--config", config]);
   }
 
   static async start(): Promise<Lab> {
     if (!existsSync(rrgate)) throw new Error(`${rrgate} is missing: build it, or name it in RRGATE`);
-    if (!existsSync(path.join(web_root, "index.html"))) throw new Error(`${web_root} is missing: run npm run build in web/`);
-    const lab = new Lab(await free_port(), await free_port(), await free_port());
+    if (!existsSync(path.join(webRoot, "index.html"))) throw new Error(`${webRoot} is missing: run npm run build in web/`);
+    const lab = new Lab(await freePort(), await freePort(), await freePort());
     for (const program of [lab.create, lab.webcams, lab.gateway]) program.start();
-    await lab.wait_until_online();
+    await lab.waitUntilOnline();
     return lab;
   }
 
   /** Until the gateway has reached all devices. */
-  async wait_until_online(within_ms = 30_000): Promise<void> {
-    const give_up = Date.now() + within_ms;
+  async waitUntilOnline(withinMs = 30_000): Promise<void> {
+    const giveUp = Date.now() + withinMs;
     for (;;) {
-      const states = await this.device_states().catch(() => null);
+      const states = await this.deviceStates().catch(() => null);
       if (states && Object.values(states).every((state) => state === "online")) return;
-      if (Date.now() > give_up) {
+      if (Date.now() > giveUp) {
         const wrote = [this.create, this.webcams, this.gateway].map((program) => program.output).join("\n");
-        throw new Error(`devices are not online after ${within_ms} ms: ${JSON.stringify(states)}\n${wrote}`);
+        throw new Error(`devices are not online after ${withinMs} ms: ${JSON.stringify(states)}\n${wrote}`);
       }
       await pause(100);
     }
   }
 
-  async device_states(): Promise<Record<string, string>> {
+  async deviceStates(): Promise<Record<string, string>> {
     const answer = (await (await fetch(`${this.url}api/v1/devices`)).json()) as {
       devices: { name: string; state: string }[];
     };
@@ -159,7 +159,7 @@ export class Lab {
 }
 
 /** Free at this moment: whoever asked binds it a moment later. */
-export async function free_port(): Promise<number> {
+export async function freePort(): Promise<number> {
   const server = createServer();
   await new Promise<void>((resolve) => server.listen(0, "127.0.0.1", resolve));
   const { port } = server.address() as AddressInfo;

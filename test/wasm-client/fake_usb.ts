@@ -12,6 +12,7 @@ import type {
 } from "../../wasm-client/dist/usb/webusb.js";
 import type { OpenTransport, Transport } from "../../wasm-client/dist/index.js";
 
+/* eslint-disable @typescript-eslint/naming-convention -- names of C++ */
 interface WasmDevice extends CoreExports {
   _initialize(): void;
   buffer(size: number): number;
@@ -39,6 +40,7 @@ interface WasmDevice extends CoreExports {
   answer_connect(): void;
   answer_reset(): void;
 }
+/* eslint-enable @typescript-eslint/naming-convention */
 
 const nak = -100;
 const stalled = -2;
@@ -78,20 +80,20 @@ export class FakeUsbDevice implements WebUsbDevice {
   opened = false;
 
   /** Whether another program has the interface; whether the system keeps this one from the device. */
-  is_busy = false;
-  is_denied = false;
+  isBusy = false;
+  isDenied = false;
   /** A request that is never answered. */
-  mute_request: number | undefined;
-  stalled_vendor_request: number | undefined;
+  muteRequest: number | undefined;
+  stalledVendorRequest: number | undefined;
   /** The application does not take what it is sent. */
-  is_deaf = false;
+  isDeaf = false;
   /** A browser that hands out more than was asked for. */
-  is_unbounded = false;
+  isUnbounded = false;
   /** What the host did, in its order: "open", "claim 0", "c1 03 0000 0000 4", "out 64", ... */
   readonly log: string[] = [];
 
   #claimed = new Set<number>();
-  #is_gone = false;
+  #isGone = false;
   #running = false;
   readonly #reads: (Waiting<WebUsbInResult> & { length: number })[] = [];
   readonly #writes: (Waiting<WebUsbOutResult> & { bytes: Uint8Array })[] = [];
@@ -115,15 +117,15 @@ export class FakeUsbDevice implements WebUsbDevice {
     options: FakeDeviceOptions,
   ) {
     this.productName = options.productName ?? "Test robot";
-    this.configurations = [parse_configuration(this.#bytes(device.configuration()))];
+    this.configurations = [parseConfiguration(this.#bytes(device.configuration()))];
     this.configuration = options.isConfigured === false ? null : this.configurations[0]!;
   }
 
   // --- WebUSB ---
 
   async open(): Promise<void> {
-    this.#check_plugged();
-    if (this.is_denied) throw new DOMException("Access denied.", "SecurityError");
+    this.#checkPlugged();
+    if (this.isDenied) throw new DOMException("Access denied.", "SecurityError");
     this.log.push("open");
     this.opened = true;
   }
@@ -137,24 +139,24 @@ export class FakeUsbDevice implements WebUsbDevice {
   }
 
   async selectConfiguration(value: number): Promise<void> {
-    this.#check_open();
+    this.#checkOpen();
     this.log.push(`select ${value}`);
     this.configuration = this.configurations.find(({ configurationValue }) => configurationValue === value) ?? null;
   }
 
   async claimInterface(number: number): Promise<void> {
-    this.#check_open();
+    this.#checkOpen();
     if (!this.configuration) throw new DOMException("The device must have a configuration selected.", "InvalidStateError");
     if (!this.configuration.interfaces.some(({ interfaceNumber }) => interfaceNumber === number)) {
       throw new DOMException("The interface number provided is not supported by the device.", "NotFoundError");
     }
-    if (this.is_busy) throw new DOMException("Unable to claim interface.", "NetworkError");
+    if (this.isBusy) throw new DOMException("Unable to claim interface.", "NetworkError");
     this.log.push(`claim ${number}`);
     this.#claimed.add(number);
   }
 
   async releaseInterface(number: number): Promise<void> {
-    this.#check_open();
+    this.#checkOpen();
     if (!this.#claimed.delete(number)) throw new DOMException("The interface is not claimed.", "InvalidStateError");
     this.log.push(`release ${number}`);
     this.#abort("AbortError", "The transfer was cancelled.");
@@ -173,7 +175,7 @@ export class FakeUsbDevice implements WebUsbDevice {
 
   transferIn(endpoint: number, length: number): Promise<WebUsbInResult> {
     return new Promise((resolve, reject) => {
-      this.#check_endpoint(endpoint, "in");
+      this.#checkEndpoint(endpoint, "in");
       this.#reads.push({ resolve, reject, length });
       this.#run();
     });
@@ -181,7 +183,7 @@ export class FakeUsbDevice implements WebUsbDevice {
 
   transferOut(endpoint: number, data: BufferSource): Promise<WebUsbOutResult> {
     return new Promise((resolve, reject) => {
-      this.#check_endpoint(endpoint, "out");
+      this.#checkEndpoint(endpoint, "out");
       this.#writes.push({ resolve, reject, bytes: (data as Uint8Array).slice() });
       this.#run();
     });
@@ -189,7 +191,7 @@ export class FakeUsbDevice implements WebUsbDevice {
 
   /** @returns what came in; undefined for a stall. */
   async #control(direction: number, setup: WebUsbSetup, length: number, data?: Uint8Array): Promise<Uint8Array<ArrayBuffer> | undefined> {
-    this.#check_open();
+    this.#checkOpen();
     if (!this.configuration) throw new DOMException("The device must have a configuration selected.", "InvalidStateError");
     if (setup.recipient === "interface" && !this.#claimed.has(setup.index & 0xff)) {
       throw new DOMException("The specified interface has not been claimed.", "InvalidStateError");
@@ -197,7 +199,7 @@ export class FakeUsbDevice implements WebUsbDevice {
     await new Promise<unknown>((resolve, reject) => {
       const waiting = { resolve, reject };
       this.#controls.add(waiting);
-      if (setup.request !== this.mute_request) queueMicrotask(() => this.#controls.delete(waiting) && resolve(undefined));
+      if (setup.request !== this.muteRequest) queueMicrotask(() => this.#controls.delete(waiting) && resolve(undefined));
     });
     const type = direction | (types[setup.requestType] << 5) | recipients[setup.recipient];
     const hex = (value: number, digits: number) => value.toString(16).padStart(digits, "0");
@@ -205,7 +207,7 @@ export class FakeUsbDevice implements WebUsbDevice {
     this.log.push(
       `${hex(type, 2)} ${hex(setup.request, 2)} ${hex(setup.value, 4)} ${hex(setup.index, 4)} ${length}${payload}`,
     );
-    if (setup.requestType === "vendor" && setup.request === this.stalled_vendor_request) return undefined;
+    if (setup.requestType === "vendor" && setup.request === this.stalledVendorRequest) return undefined;
     if (data) this.#put(data);
     const size = this.device.control(type, setup.request, setup.value, setup.index, length);
     if (size < 0 && size !== stalled) throw new DOMException("The device was disconnected.", "NotFoundError");
@@ -213,23 +215,23 @@ export class FakeUsbDevice implements WebUsbDevice {
     return size < 0 ? undefined : this.#bytes(size);
   }
 
-  #check_plugged(): void {
-    if (this.#is_gone) throw new DOMException("The device was disconnected.", "NotFoundError");
+  #checkPlugged(): void {
+    if (this.#isGone) throw new DOMException("The device was disconnected.", "NotFoundError");
   }
 
-  #check_open(): void {
-    this.#check_plugged();
+  #checkOpen(): void {
+    this.#checkPlugged();
     if (!this.opened) throw new DOMException("The device must be opened first.", "InvalidStateError");
   }
 
-  #check_endpoint(number: number, direction: "in" | "out"): void {
-    this.#check_open();
-    const is_there = this.configuration?.interfaces.some(
+  #checkEndpoint(number: number, direction: "in" | "out"): void {
+    this.#checkOpen();
+    const isThere = this.configuration?.interfaces.some(
       ({ interfaceNumber, alternates }) =>
         this.#claimed.has(interfaceNumber) &&
         alternates[0]?.endpoints.some((one) => one.endpointNumber === number && one.direction === direction),
     );
-    if (!is_there) {
+    if (!isThere) {
       throw new DOMException("The specified endpoint is not part of a claimed and selected alternate interface.", "NotFoundError");
     }
   }
@@ -245,7 +247,7 @@ export class FakeUsbDevice implements WebUsbDevice {
   /** Each stream becomes a connection of its own; without it, streams are silent. */
   accept: (() => OpenTransport) | undefined;
 
-  get stream_count(): number {
+  get streamCount(): number {
     return this.device.stream_count();
   }
 
@@ -255,7 +257,7 @@ export class FakeUsbDevice implements WebUsbDevice {
     this.#run();
   }
 
-  close_stream(stream: number): void {
+  closeStream(stream: number): void {
     this.device.close(stream);
     this.#run();
   }
@@ -267,44 +269,44 @@ export class FakeUsbDevice implements WebUsbDevice {
 
   /** After the application was deaf. */
   hear(): void {
-    this.is_deaf = false;
+    this.isDeaf = false;
     this.#run();
   }
 
   // --- faults ---
 
-  stall_next_in(): void {
+  stallNextIn(): void {
     this.device.stall_next_in();
     this.#run();
   }
-  stall_next_out(): void {
+  stallNextOut(): void {
     this.device.stall_next_out();
   }
-  stall_control(request: number): void {
+  stallControl(request: number): void {
     this.device.stall_control(request);
   }
-  send_raw(transfer: number[]): void {
+  sendRaw(transfer: number[]): void {
     this.#put(Uint8Array.from(transfer));
     this.device.send_raw();
     this.#run();
   }
-  replace_bos(bytes: number[]): void {
+  replaceBos(bytes: number[]): void {
     this.#put(Uint8Array.from(bytes));
     this.device.replace_bos();
   }
-  replace_block(bytes: number[]): void {
+  replaceBlock(bytes: number[]): void {
     this.#put(Uint8Array.from(bytes));
     this.device.replace_block();
   }
-  replace_string(index: number, bytes: number[]): void {
+  replaceString(index: number, bytes: number[]): void {
     this.#put(Uint8Array.from(bytes));
     this.device.replace_string(index);
   }
-  answer_connect(bytes: number[]): void {
+  answerConnect(bytes: number[]): void {
     this.#put(Uint8Array.from(bytes));
     this.device.answer_connect();
   }
-  answer_reset(bytes: number[]): void {
+  answerReset(bytes: number[]): void {
     this.#put(Uint8Array.from(bytes));
     this.device.answer_reset();
   }
@@ -312,7 +314,7 @@ export class FakeUsbDevice implements WebUsbDevice {
   /** `name`: how pending transfers fail. */
   unplug(name: "NotFoundError" | "NetworkError"): void {
     this.device.unplug();
-    this.#is_gone = true;
+    this.#isGone = true;
     this.opened = false;
     this.#abort(name, name === "NetworkError" ? "A transfer error has occurred." : "The device was disconnected.");
   }
@@ -339,12 +341,12 @@ export class FakeUsbDevice implements WebUsbDevice {
     this.#running = true;
     queueMicrotask(() => {
       this.#running = false;
-      while (!this.#is_gone && this.#step());
+      while (!this.#isGone && this.#step());
     });
   }
 
   #step(): boolean {
-    let has_moved = false;
+    let hasMoved = false;
     for (let write = this.#writes[0]; write; write = this.#writes[0]) {
       this.#put(write.bytes);
       const size = this.device.bulk_out();
@@ -352,17 +354,17 @@ export class FakeUsbDevice implements WebUsbDevice {
       this.log.push(`out ${write.bytes.length}`);
       this.#writes.shift();
       write.resolve(size < 0 ? { status: "stall", bytesWritten: 0 } : { status: "ok", bytesWritten: size });
-      has_moved = true;
+      hasMoved = true;
     }
     for (const id of this.#numbers(this.device.take_closed())) this.#drop(id);
     for (const id of this.#numbers(this.device.take_opened())) this.#serve(id);
     for (const [id, to] of this.#streams) {
-      if (this.is_deaf) break;
+      if (this.isDeaf) break;
       const bytes = this.#bytes(this.device.take_input(id));
       if (bytes.length === 0) continue;
       if (Array.isArray(to)) to.push(bytes);
       else to.send(bytes);
-      has_moved = true;
+      hasMoved = true;
     }
     for (let read = this.#reads[0]; read; read = this.#reads[0]) {
       const size = this.device.bulk_in();
@@ -370,11 +372,11 @@ export class FakeUsbDevice implements WebUsbDevice {
       this.#reads.shift();
       const data = new DataView(this.#bytes(Math.max(size, 0)).buffer);
       if (size < 0) read.resolve({ status: "stall" });
-      else if (size > read.length && !this.is_unbounded) read.resolve({ status: "babble" });
+      else if (size > read.length && !this.isUnbounded) read.resolve({ status: "babble" });
       else read.resolve({ status: "ok", data });
-      has_moved = true;
+      hasMoved = true;
     }
-    return has_moved;
+    return hasMoved;
   }
 
   #serve(id: number): void {
@@ -385,7 +387,7 @@ export class FakeUsbDevice implements WebUsbDevice {
     const listener = {
       opened: () => undefined,
       received: (bytes: Uint8Array) => this.#streams.has(id) && this.send(id, bytes),
-      closed: () => this.close_stream(id),
+      closed: () => this.closeStream(id),
     };
     void Promise.resolve(open(new URL("ws://device.example/"), listener)).then((transport) => {
       if (!this.#streams.has(id)) return transport.close();
@@ -407,10 +409,10 @@ export class FakeUsb extends EventTarget implements WebUsb {
   /** What the user chooses. */
   choice: FakeUsbDevice | DOMException = new DOMException("No device selected.", "NotFoundError");
   readonly asked: unknown[] = [];
-  is_forbidden = false;
+  isForbidden = false;
 
   async getDevices(): Promise<FakeUsbDevice[]> {
-    if (this.is_forbidden) throw new DOMException('Access to the feature "usb" is disallowed by permissions policy.', "SecurityError");
+    if (this.isForbidden) throw new DOMException('Access to the feature "usb" is disallowed by permissions policy.', "SecurityError");
     return [...this.devices];
   }
 
@@ -427,17 +429,17 @@ export class FakeUsb extends EventTarget implements WebUsb {
 
   unplug(device: FakeUsbDevice): void {
     device.unplug("NotFoundError");
-    this.tell_gone(device);
+    this.tellGone(device);
   }
 
-  tell_gone(device: FakeUsbDevice): void {
+  tellGone(device: FakeUsbDevice): void {
     this.devices.splice(this.devices.indexOf(device), 1);
     this.dispatchEvent(Object.assign(new Event("disconnect"), { device }));
   }
 }
 
 /** A configuration descriptor (USB 2.0, section 9.6.3) as browsers show it. */
-function parse_configuration(bytes: Uint8Array): WebUsbConfiguration {
+function parseConfiguration(bytes: Uint8Array): WebUsbConfiguration {
   const interfaces: { interfaceNumber: number; alternates: any[] }[] = [];
   for (let at = 0; at < bytes.length; at += bytes[at]!) {
     const field = (offset: number) => bytes[at + offset]!;

@@ -57,7 +57,7 @@ it("runs several at once, each step after the one before", async () => {
   const second = robot["count"]!(5);
   const steps = await Promise.all([first.next(), second.next(), first.next(), second.next(), first.next()]);
   expect(steps.map(({ value }) => value)).toEqual([0, 0, 1, 1, undefined]);
-  expect(steps[4]!.done).toBe(true);
+  expect(steps[4].done).toBe(true);
   await second.return();
 });
 
@@ -106,10 +106,10 @@ it("is aborted where a value does not fit", async () => {
 
 it("is aborted when a step is given up", async () => {
   const abort = new AbortController();
-  const given_up = failure(robot["hang_on"]!({ signal: abort.signal }).next());
+  const givenUp = failure(robot["hang_on"]!({ signal: abort.signal }).next());
   await settle();
   abort.abort(new Error("enough"));
-  expect((await given_up).message).toBe("enough");
+  expect((await givenUp).message).toBe("enough");
   await settle();
   expect(await ended()).toBe("aborted");
 

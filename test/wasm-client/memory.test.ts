@@ -58,10 +58,10 @@ it("refuses what is not within it", async () => {
 
 it("is given up by its signal", async () => {
   const abort = new AbortController();
-  service.is_mute = true;
+  service.isMute = true;
   const reading = failure(robot["line"]!.read(0, 1, { signal: abort.signal }));
   await settle();
   abort.abort(new Error("enough"));
   expect((await reading).message).toBe("enough");
-  service.is_mute = false;
+  service.isMute = false;
 });

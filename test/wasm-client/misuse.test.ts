@@ -80,15 +80,15 @@ it("says what a URL looks like", async () => {
 
 it("says why the core could not be loaded, in a class of its own, and tries again", async () => {
   vi.resetModules(); // so that nothing is loaded yet
-  const fresh = (await import("../../wasm-client/dist/node.js")) as typeof import("../../wasm-client/dist/node.js");
+  const fresh = await import("../../wasm-client/dist/node.js");
   const own = (await import("../../wasm-client/dist/platform.js")) as { platform: typeof platform };
-  const { load_wasm } = own.platform;
-  own.platform.load_wasm = () => Promise.reject(new Error("404 Not Found"));
+  const { loadWasm } = own.platform;
+  own.platform.loadWasm = () => Promise.reject(new Error("404 Not Found"));
   const attempt = () => fresh.connect("ws://test.example/?service=test", { transport: service.transport });
   const error = await failure(attempt());
   expect(error).toBeInstanceOf(fresh.RobotRaconteurError);
   expect(error.message).toBe("the protocol core could not be loaded: 404 Not Found");
-  own.platform.load_wasm = load_wasm;
+  own.platform.loadWasm = loadWasm;
   await robot.$.close();
   const again = await TestService.start({ definitions: [definition], root: "test.misuse.Root" });
   const root = await fresh.connect("ws://test.example/?service=test", { transport: again.transport });
@@ -96,8 +96,8 @@ it("says why the core could not be loaded, in a class of its own, and tries agai
 });
 
 it("rejects in the same class where the engine refuses the WebSocket", async () => {
-  const { find_websocket } = platform;
-  platform.find_websocket = () =>
+  const { findWebsocket } = platform;
+  platform.findWebsocket = () =>
     Promise.resolve(
       class {
         constructor() {
@@ -110,6 +110,6 @@ it("rejects in the same class where the engine refuses the WebSocket", async () 
     expect(error.code).toBe(ErrorCode.ConnectionError);
     expect(error.message).toContain("could not connect to ws://test.example/: An insecure WebSocket");
   } finally {
-    platform.find_websocket = find_websocket;
+    platform.findWebsocket = findWebsocket;
   }
 });

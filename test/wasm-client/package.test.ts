@@ -2,9 +2,9 @@
 import { readdirSync, readFileSync } from "node:fs";
 import { version } from "../../wasm-client/dist/node.js";
 
-const package_file = new URL("../../wasm-client/package.json", import.meta.url);
+const packageFile = new URL("../../wasm-client/package.json", import.meta.url);
 const dist = new URL("../../wasm-client/dist/", import.meta.url);
-const manifest = JSON.parse(readFileSync(package_file, "utf8")) as {
+const manifest = JSON.parse(readFileSync(packageFile, "utf8")) as {
   version: string;
   dependencies?: object;
   exports: Record<string, string | Record<string, string>>;
@@ -45,7 +45,7 @@ it("loads what speaks to USB devices when there is one to speak to, and not befo
 it("has the files that it exports", () => {
   for (const targets of Object.values(manifest.exports)) {
     for (const target of [targets].flatMap((one) => (typeof one === "string" ? one : Object.values(one)))) {
-      expect(readFileSync(new URL(target, package_file), "utf8"), target).not.toBe("");
+      expect(readFileSync(new URL(target, packageFile), "utf8"), target).not.toBe("");
     }
   }
 });

@@ -46,7 +46,7 @@ beforeEach(async () => {
 afterEach(() => robot.$.close());
 
 it("carries packets both ways, in order", async () => {
-  const endpoint = (await robot["echo"]!.connect()) as PipeEndpoint;
+  const endpoint = (await robot["echo"]!.connect());
   expect(endpoint.index).toBe(1);
   for (let i = 0; i < 100; ++i) await endpoint.send(i);
   expect(await take(endpoint, 100)).toEqual(Array.from({ length: 100 }, (_, i) => i));
@@ -82,13 +82,13 @@ it("brings varvalues with their types", async () => {
 
 it("waits for the network where much is on its way", async () => {
   const endpoint = await open("blocks");
-  service.is_mute = true;
+  service.isMute = true;
   service.buffered = 1e9;
   const block = new Float64Array(1000);
-  let is_taken = false;
-  const sending = endpoint.send(block).then(() => (is_taken = true));
+  let isTaken = false;
+  const sending = endpoint.send(block).then(() => (isTaken = true));
   await settle();
-  expect(is_taken).toBe(false);
+  expect(isTaken).toBe(false);
   service.buffered = 0;
   await sending;
   // Who does not wait is stopped before the memory is full.
@@ -107,7 +107,7 @@ it("waits for acknowledgements where they are wanted", async () => {
   const endpoint = await open("echo");
   await endpoint.send(1, { ack: true });
   await Promise.all([endpoint.send(2, { ack: true }), endpoint.send(3, { ack: true })]);
-  service.is_mute = true;
+  service.isMute = true;
   const abort = new AbortController();
   const aborted = failure(endpoint.send(4, { ack: true, signal: abort.signal }));
   await settle();
@@ -118,10 +118,10 @@ it("waits for acknowledgements where they are wanted", async () => {
   await vi.advanceTimersByTimeAsync(100);
   expect((await late).code).toBe(ErrorCode.RequestTimeout);
   vi.useRealTimers();
-  const open_ones = failure(endpoint.send(6, { ack: true }));
-  service.is_mute = false;
+  const openOnes = failure(endpoint.send(6, { ack: true }));
+  service.isMute = false;
   void endpoint.close();
-  expect((await open_ones).code).toBe(ErrorCode.InvalidOperation);
+  expect((await openOnes).code).toBe(ErrorCode.InvalidOperation);
 });
 
 it("refuses what is not a packet of the pipe", async () => {

@@ -5,13 +5,14 @@ import type { OpenTransport, TransportListener } from "../../wasm-client/dist/no
 interface Step {
   dir: "c>s" | "s>c";
   hex?: string;
+  // eslint-disable-next-line @typescript-eslint/naming-convention -- of the record
   payload_hex?: string;
   http?: string;
   decoded?: string;
 }
 
 /** Of the client that was recorded. */
-const recorded_node_id = Buffer.from("aaaaaaaabbbbccccddddeeeeeeeeeeee", "hex");
+const recordedNodeId = Buffer.from("aaaaaaaabbbbccccddddeeeeeeeeeeee", "hex");
 
 /**
  * Plays the service's part: whenever the client has sent as many messages as the record says, the answers follow.
@@ -25,9 +26,9 @@ export class Replay {
   #steps: { dir: string; bytes: Buffer; text: string }[];
   #listener: TransportListener | undefined;
   #received = Buffer.alloc(0);
-  #node_id: Buffer | undefined;
+  #nodeId: Buffer | undefined;
   #endpoint: Buffer | undefined;
-  readonly #recorded_endpoint: Buffer;
+  readonly #recordedEndpoint: Buffer;
 
   constructor(name: string) {
     const file = new URL(`../golden/transcripts/${name}.json`, import.meta.url);
@@ -40,7 +41,7 @@ export class Replay {
         text: step.decoded ?? "",
       }));
     const connecting = this.#steps.find(({ text }) => /ep \d+>0 \| (ConnectClientCombined|GetServiceDesc)/.test(text))!;
-    this.#recorded_endpoint = u32(Number(/ep (\d+)>0/.exec(connecting.text)![1]));
+    this.#recordedEndpoint = u32(Number(/ep (\d+)>0/.exec(connecting.text)![1]));
     this.open = (_url, listener) => {
       this.#listener = listener;
       queueMicrotask(() => listener.opened());
@@ -49,7 +50,7 @@ export class Replay {
   }
 
   /** Whether everything that was recorded has been played. */
-  get is_over(): boolean {
+  get isOver(): boolean {
     return this.#steps.length === 0;
   }
 
@@ -67,17 +68,17 @@ export class Replay {
 
   #take(message: Buffer): void {
     // Version 2: the sender's node id follows sizes and version; later messages name the endpoint.
-    this.#node_id ??= Buffer.from(message.subarray(12, 28));
+    this.#nodeId ??= Buffer.from(message.subarray(12, 28));
     const step = this.#steps.shift();
     if (step?.dir !== "c>s") throw new Error(`the client sent a message where ${step ? step.text : "nothing"} follows`);
-    const is_before_session = / ep \d+>0 /.test(step.text);
+    const isBeforeSession = / ep \d+>0 /.test(step.text);
     if (!this.#endpoint && / ep \d+>0 \| (ConnectClientCombined|GetServiceDesc)/.test(step.text)) {
-      this.#endpoint = sender_endpoint(message);
+      this.#endpoint = senderEndpoint(message);
     }
     const found = this.#exchange(message, false);
     // Before there is a session the reference leaves out which node it speaks to; this client has learnt it.
-    this.expected.push(is_before_session ? without_header(step.bytes) : step.bytes);
-    this.found.push(is_before_session ? without_header(found) : found);
+    this.expected.push(isBeforeSession ? withoutHeader(step.bytes) : step.bytes);
+    this.found.push(isBeforeSession ? withoutHeader(found) : found);
     queueMicrotask(() => this.#play());
   }
 
@@ -87,22 +88,22 @@ export class Replay {
     }
   }
 
-  #exchange(bytes: Buffer, to_ours: boolean): Buffer {
+  #exchange(bytes: Buffer, toOurs: boolean): Buffer {
     const copy = Buffer.from(bytes);
-    replace(copy, to_ours ? recorded_node_id : this.#node_id, to_ours ? this.#node_id : recorded_node_id);
-    replace(copy, to_ours ? this.#recorded_endpoint : this.#endpoint, to_ours ? this.#endpoint : this.#recorded_endpoint);
+    replace(copy, toOurs ? recordedNodeId : this.#nodeId, toOurs ? this.#nodeId : recordedNodeId);
+    replace(copy, toOurs ? this.#recordedEndpoint : this.#endpoint, toOurs ? this.#endpoint : this.#recordedEndpoint);
     return copy;
   }
 }
 
 /** The message behind its header. */
-function without_header(bytes: Buffer): Buffer {
-  const is_version_2 = bytes.readUInt16LE(8) === 2;
-  return bytes.subarray(is_version_2 ? bytes.readUInt16LE(10) : bytes.readUInt8(10));
+function withoutHeader(bytes: Buffer): Buffer {
+  const isVersion2 = bytes.readUInt16LE(8) === 2;
+  return bytes.subarray(isVersion2 ? bytes.readUInt16LE(10) : bytes.readUInt8(10));
 }
 
 /** Of a message with all routing fields (messages spec sections 3 and 4). */
-function sender_endpoint(bytes: Buffer): Buffer {
+function senderEndpoint(bytes: Buffer): Buffer {
   if (bytes.readUInt16LE(8) === 2) return Buffer.from(bytes.subarray(44, 48));
   let at = 12 + 32; // sizes, version, flags; both node ids
   for (let name = 0; name < 2; ++name) at += 1 + bytes.readUInt8(at);

@@ -25,6 +25,7 @@ import { JsValues } from "../../wasm-client/dist/js_values.js";
 import type { CoreExports, Handle } from "../../wasm-client/dist/js_values.js";
 import type { ConnectOptions, OpenTransport, RemoteObject, TransportListener } from "../../wasm-client/dist/node.js";
 
+/* eslint-disable @typescript-eslint/naming-convention -- names of C++ */
 interface WasmService extends CoreExports {
   _initialize(): void;
   open(options: Handle, steady: number): Handle;
@@ -42,6 +43,7 @@ interface WasmService extends CoreExports {
   transmit_address(): number;
   handle_transmitted(size: number): void;
 }
+/* eslint-enable @typescript-eslint/naming-convention */
 
 const built = new URL("../../build/wasm/test/wasm-client/service/", import.meta.url);
 let compiled: Promise<WebAssembly.Module> | undefined;
@@ -63,12 +65,12 @@ export class TestService {
   /** Bytes that the transport says it holds back. */
   buffered = 0;
   /** What the client sends gets lost. */
-  is_mute = false;
+  isMute = false;
   /** Whether the client has closed the transport. */
-  is_closed = false;
+  isClosed = false;
   #listener: TransportListener | undefined;
   #deliveries: Uint8Array[] = [];
-  #is_delivering = false;
+  #isDelivering = false;
   #timer: ReturnType<typeof setTimeout> | undefined;
   readonly #number: number;
 
@@ -115,7 +117,7 @@ export class TestService {
         return self.buffered;
       },
       close: () => {
-        this.is_closed = true;
+        this.isClosed = true;
       },
     };
   };
@@ -142,7 +144,7 @@ export class TestService {
 
   #receive(bytes: Uint8Array): void {
     this.sent.push(bytes);
-    if (this.is_mute) return;
+    if (this.isMute) return;
     const service = this.#select();
     const address = service.receive_buffer(bytes.length);
     this.values.bytes.set(bytes, address);
@@ -161,7 +163,7 @@ export class TestService {
   #poll(): void {
     for (const client of this.clients) {
       client.#transmit();
-      client.#arm_timer();
+      client.#armTimer();
     }
   }
 
@@ -174,19 +176,19 @@ export class TestService {
       for (let from = 0; from < bytes.length; from += size) this.#deliveries.push(bytes.slice(from, from + size));
       service.handle_transmitted(bytes.length);
     }
-    if (this.#is_delivering || this.#deliveries.length === 0) return;
-    this.#is_delivering = true;
+    if (this.#isDelivering || this.#deliveries.length === 0) return;
+    this.#isDelivering = true;
     queueMicrotask(() => {
-      this.#is_delivering = false;
-      for (const bytes of this.#deliveries.splice(0)) if (!this.is_closed) this.#listener?.received(bytes);
-      if (this.#select().wants_close() && !this.is_closed) this.drop("closed by the service");
+      this.#isDelivering = false;
+      for (const bytes of this.#deliveries.splice(0)) if (!this.isClosed) this.#listener?.received(bytes);
+      if (this.#select().wants_close() && !this.isClosed) this.drop("closed by the service");
     });
   }
 
   /** Of what a service does by itself, only what clients wait for from one another is tested. */
-  #arm_timer(): void {
+  #armTimer(): void {
     clearTimeout(this.#timer);
-    if (this.clients.length < 2 || this.is_closed) return;
+    if (this.clients.length < 2 || this.isClosed) return;
     const delay = this.#select().poll_timeout() - performance.now();
     this.#timer = setTimeout(
       () => {

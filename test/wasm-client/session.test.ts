@@ -1,6 +1,6 @@
 // The life of a session: how it begins, what ends it, and what becomes of what waits. Time is simulated.
 import { connect, ErrorCode, RobotRaconteurError } from "../../wasm-client/dist/node.js";
-import type { OpenTransport, RemoteObject, TransportListener } from "../../wasm-client/dist/node.js";
+import type { OpenTransport, TransportListener } from "../../wasm-client/dist/node.js";
 import { failure, settle, TestService } from "./service.js";
 
 const definition = `service test.session
@@ -19,7 +19,7 @@ end`;
 let service: TestService;
 const start = async () => {
   service = await TestService.start({ definitions: [definition], root: "test.session.Root" });
-  return (await service.connect()) as RemoteObject;
+  return service.connect();
 };
 
 afterEach(() => {
@@ -29,18 +29,17 @@ afterEach(() => {
 /** A transport in the hands of the test. */
 function manual(): { open: OpenTransport; listener: TransportListener; sent: Uint8Array[]; closed: number; buffered: number } {
   const state = { listener: undefined as unknown as TransportListener, sent: [] as Uint8Array[], closed: 0, buffered: 0 };
-  return Object.assign(state, {
-    open: ((_url, listener) => {
-      state.listener = listener;
-      return {
-        send: (bytes: Uint8Array) => void state.sent.push(bytes.slice()),
-        get buffered() {
-          return state.buffered;
-        },
-        close: () => void ++state.closed,
-      };
-    }) as OpenTransport,
-  });
+  const open: OpenTransport = (_url, listener) => {
+    state.listener = listener;
+    return {
+      send: (bytes: Uint8Array) => void state.sent.push(bytes.slice()),
+      get buffered() {
+        return state.buffered;
+      },
+      close: () => void ++state.closed,
+    };
+  };
+  return Object.assign(state, { open });
 }
 
 describe("connecting", () => {
@@ -83,7 +82,7 @@ describe("connecting", () => {
     const error = await failure(connect("ws://test/?service=nope", { transport: other.transport }));
     expect(error.code).toBe(ErrorCode.ServiceNotFound);
     expect(error.message).toContain("nope");
-    expect(other.is_closed).toBe(true);
+    expect(other.isClosed).toBe(true);
   });
 
   it("ends after its timeout, whatever it waits for", async () => {
@@ -142,10 +141,12 @@ describe("connecting", () => {
       expect(error.message).toContain(message);
       expect(error).toBeInstanceOf(RobotRaconteurError);
     }
-    expect((await failure(connect("ws://test/?service=test&nodeid=xyz", { transport: ((_url, listener) => {
+    const open: OpenTransport = (_url, listener) => {
       queueMicrotask(() => listener.opened());
       return { send: () => undefined, buffered: 0, close: () => undefined };
-    }) as OpenTransport }))).message).toContain("'nodeId'");
+    };
+    const error = await failure(connect("ws://test/?service=test&nodeid=xyz", { transport: open }));
+    expect(error.message).toContain("'nodeId'");
   });
 });
 
@@ -170,11 +171,11 @@ describe("requests", () => {
   it("may take longer than usual", async () => {
     const robot = await start();
     vi.useFakeTimers();
-    let is_over = false;
-    const long = failure(robot["hang"]!({ timeout: 60_000 })).then((error) => ((is_over = true), error));
+    let isOver = false;
+    const long = failure(robot["hang"]!({ timeout: 60_000 })).then((error) => ((isOver = true), error));
     // Heartbeats keep the session alive meanwhile.
     for (let second = 0; second < 59; ++second) await vi.advanceTimersByTimeAsync(1_000);
-    expect(is_over).toBe(false);
+    expect(isOver).toBe(false);
     await vi.advanceTimersByTimeAsync(1_500);
     expect((await long).code).toBe(ErrorCode.RequestTimeout);
     vi.useRealTimers();
@@ -217,7 +218,7 @@ describe("the end of a session", () => {
     expect((await hanging).message).toBe("the session was closed by this side");
     await closing;
     expect(service.sent.length).toBe(before + 1); // DisconnectClient
-    expect(service.is_closed).toBe(true);
+    expect(service.isClosed).toBe(true);
     expect(told).toEqual([[]]);
     expect(robot.$.state).toBe("closed");
     const late = await failure(robot["twice"]!(1));
@@ -232,10 +233,10 @@ describe("the end of a session", () => {
     const robot = await start();
     service.buffered = 10_000_000; // nothing gets out any more
     vi.useFakeTimers();
-    let is_closed = false;
-    const closing = robot.$.close().then(() => (is_closed = true));
+    let isClosed = false;
+    const closing = robot.$.close().then(() => (isClosed = true));
     await vi.advanceTimersByTimeAsync(400);
-    expect(is_closed).toBe(false);
+    expect(isClosed).toBe(false);
     await vi.advanceTimersByTimeAsync(200);
     await closing;
   });
@@ -271,7 +272,7 @@ describe("the end of a session", () => {
     const error = await failure(robot["stop"]!());
     expect(error.code).toBe(ErrorCode.ConnectionError);
     expect(robot.$.state).toBe("closed");
-    expect(service.is_closed).toBe(true);
+    expect(service.isClosed).toBe(true);
   });
 
   it("by garbage in the stream closes the transport", async () => {
@@ -280,7 +281,7 @@ describe("the end of a session", () => {
     robot.$.onClose((why) => (reason = why));
     service.garbage(new TextEncoder().encode("garbage that is long enough to be looked at"));
     expect(reason?.code).toBe(ErrorCode.ProtocolError);
-    expect(service.is_closed).toBe(true);
+    expect(service.isClosed).toBe(true);
   });
 
   it("by silence comes after the heartbeat has stayed unanswered", async () => {
@@ -288,7 +289,7 @@ describe("the end of a session", () => {
     const robot = await start();
     let reason: RobotRaconteurError | undefined;
     robot.$.onClose((why) => (reason = why));
-    service.is_mute = true;
+    service.isMute = true;
     for (let second = 0; second < 9; ++second) await vi.advanceTimersByTimeAsync(1_000);
     expect(reason).toBeUndefined();
     for (let second = 0; second < 20; ++second) await vi.advanceTimersByTimeAsync(1_000);

@@ -45,7 +45,7 @@ class ManualClock implements Clock {
 }
 
 /** One service for each connection, in turn; an Error refuses the connection. */
-function in_turn(...services: (TestService | Error)[]): OpenTransport {
+function inTurn(...services: (TestService | Error)[]): OpenTransport {
   return (to, listener) => {
     const service = services.shift() ?? new Error("nobody is there");
     if (service instanceof Error) throw service;
@@ -63,7 +63,7 @@ beforeEach(() => {
 
 it("connects, and again after a loss; what was under way rejects as lost", async () => {
   const first = await start();
-  const subscription = follow(in_turn(first, await start()));
+  const subscription = follow(inTurn(first, await start()));
   const lost: RobotRaconteurError[] = [];
   const connected: unknown[] = [];
   subscription.onLost((reason) => lost.push(reason));
@@ -73,10 +73,10 @@ it("connects, and again after a loss; what was under way rejects as lost", async
   expect(subscription.defaultClient).toBe(client);
   expect(await client["twice"]!(4)).toBe(4);
 
-  const under_way = failure(client["hang"]!());
+  const underWay = failure(client["hang"]!());
   await settle();
   first.drop("the cable is out");
-  const error = await under_way;
+  const error = await underWay;
   expect(error).toBeInstanceOf(RobotRaconteurError);
   expect(error.code).toBe(ErrorCode.ConnectionError);
   expect(error.subName).toBe("connection_lost");
@@ -95,11 +95,11 @@ it("connects, and again after a loss; what was under way rejects as lost", async
 });
 
 it("is not sent again what it knows of the service, unless that has changed", async () => {
-  const with_force = definition.replace("property double speed", "property double speed\n  property double force");
+  const withForce = definition.replace("property double speed", "property double speed\n  property double force");
   const begin = (text: string) => TestService.start({ definitions: [text], root: "test.subscribe.Root" });
   const services = [];
-  for (const text of [definition, definition, definition, with_force, with_force]) services.push(await begin(text));
-  const subscription = follow(in_turn(...services));
+  for (const text of [definition, definition, definition, withForce, withForce]) services.push(await begin(text));
+  const subscription = follow(inTurn(...services));
   const received: number[] = [];
   const types: (readonly string[])[] = [];
   for (const [number, service] of services.entries()) {
@@ -112,12 +112,12 @@ it("is not sent again what it knows of the service, unless that has changed", as
     await settle();
     clock.fire();
   }
-  const [full, known, again, changed, known_too] = received as [number, number, number, number, number];
+  const [full, known, again, changed, knownToo] = received as [number, number, number, number, number];
   expect(known).toBeLessThan(full - definition.length);
   expect(again).toBe(known);
   expect(changed).toBeGreaterThan(full);
-  expect(known_too).toBe(known);
-  expect(types).toEqual([[definition], [definition], [definition], [with_force], [with_force]]);
+  expect(knownToo).toBe(known);
+  expect(types).toEqual([[definition], [definition], [definition], [withForce], [withForce]]);
   await subscription.close();
 });
 
@@ -126,7 +126,7 @@ it("waits longer after each failure, up to a limit, and starts again after a suc
   let turn = 0;
   const service = await start();
   const refused = Array.from({ length: 9 }, (_, index) => new Error(`refused ${index}`));
-  const subscription = follow(in_turn(...refused, service, new Error("gone")), { random: () => chances[turn++ % 2]! });
+  const subscription = follow(inTurn(...refused, service, new Error("gone")), { random: () => chances[turn++ % 2]! });
   const failed: string[] = [];
   subscription.onFailed((error, to) => failed.push(`${to} ${(error as Error).message}`));
   const waits: number[] = [];
@@ -163,7 +163,7 @@ it("tries the ways to a service in order", async () => {
 
 it("ends with close(), whatever it is doing", async () => {
   const service = await start();
-  const subscription = follow(in_turn(service));
+  const subscription = follow(inTurn(service));
   const client = await subscription.client();
   const closing = subscription.close();
   expect(subscription.close()).toBe(closing);
@@ -173,7 +173,7 @@ it("ends with close(), whatever it is doing", async () => {
   expect((await failure(subscription.client())).code).toBe(ErrorCode.InvalidOperation);
   expect(clock.waits).toHaveLength(0);
 
-  const waiting = follow(in_turn());
+  const waiting = follow(inTurn());
   const wanted = failure(waiting.client());
   await vi.waitUntil(() => clock.waits.length > 0);
   await waiting.close();
@@ -186,7 +186,7 @@ it("ends with close(), whatever it is doing", async () => {
   expect(connecting.isClosed).toBe(true);
   await settle();
   expect(clock.waits).toHaveLength(0);
-  expect(follow(in_turn(), { signal: AbortSignal.abort() }).isClosed).toBe(true);
+  expect(follow(inTurn(), { signal: AbortSignal.abort() }).isClosed).toBe(true);
 });
 
 it("gives the client within limits", async () => {
@@ -204,7 +204,7 @@ it("gives the client within limits", async () => {
 it("keeps a wire over connections", async () => {
   const first = await start();
   const second = await start();
-  const subscription = follow(in_turn(first, second));
+  const subscription = follow(inTurn(first, second));
   const wire = subscription.wire("both");
   expect((await failure(wire.send(1))).code).toBe(ErrorCode.InvalidOperation);
   const seen: unknown[] = [];
@@ -235,7 +235,7 @@ it("keeps a wire over connections", async () => {
 
 it("finds the object of a member, and tries again where that fails", async () => {
   const service = await start();
-  const subscription = follow(in_turn(service));
+  const subscription = follow(inTurn(service));
   const level = subscription.wire("level", { path: "*.part" });
   const wrong = subscription.wire("level", { path: "*" });
   const failures: unknown[] = [];
@@ -255,7 +255,7 @@ it("finds the object of a member, and tries again where that fails", async () =>
 
 it("ends a wire with the loop over it", async () => {
   const service = await start();
-  const subscription = follow(in_turn(service));
+  const subscription = follow(inTurn(service));
   const wire = subscription.wire("both");
   const client = await subscription.client();
   await vi.waitUntil(() => wire.isConnected);
@@ -271,7 +271,7 @@ it("ends a wire with the loop over it", async () => {
 
 it("keeps a pipe over connections, without losing what came", async () => {
   const first = await start();
-  const subscription = follow(in_turn(first, await start()));
+  const subscription = follow(inTurn(first, await start()));
   const pipe = subscription.pipe("echo", { limit: 100 });
   const seen: unknown[] = [];
   const loop = (async () => {
@@ -304,7 +304,7 @@ it("keeps a pipe over connections, without losing what came", async () => {
 });
 
 it("ends a loop over a pipe that is too far behind", async () => {
-  const subscription = follow(in_turn(await start()));
+  const subscription = follow(inTurn(await start()));
   const pipe = subscription.pipe("echo", { limit: 10 });
   const packets = pipe[Symbol.asyncIterator]();
   const client = await subscription.client();
@@ -317,7 +317,7 @@ it("ends a loop over a pipe that is too far behind", async () => {
 });
 
 /** A gateway's answer: name, state and type of the one service "test" of each device. */
-function answer_devices(...devices: [name: string, state: string, type: string][]): string[] {
+function answerDevices(...devices: [name: string, state: string, type: string][]): string[] {
   const asked: string[] = [];
   const list = devices.map(([name, state, type]) => ({ name, state, node_id: "id", node_name: null, services: [{ name: "test", type }] }));
   vi.stubGlobal("fetch", async (url: URL) => {
@@ -331,7 +331,7 @@ afterEach(() => vi.unstubAllGlobals());
 const type = "test.subscribe.Root";
 
 it("finds services of a type among the devices of a gateway", async () => {
-  const asked = answer_devices(["a b", "online", type], ["other", "online", "test.Other"], ["off", "offline", type], ["c", "online", type]);
+  const asked = answerDevices(["a b", "online", type], ["other", "online", "test.Other"], ["off", "offline", type], ["c", "online", type]);
   const gateway = "http://gateway:8080/lab";
   const found = await findServices({ gateway, type });
   expect(asked).toEqual(["http://gateway:8080/lab/api/v1/devices"]);
@@ -354,18 +354,18 @@ it("follows a type: the first device that works, asked for anew after each loss"
     if (to.pathname.endsWith("broken")) throw new Error("refused");
     return (to.pathname.endsWith("a") ? first : second).transport(to, listener);
   };
-  answer_devices(["b", "offline", type]);
+  answerDevices(["b", "offline", type]);
   const failed: string[] = [];
   const subscription = subscribe({ gateway: "http://gateway", type }, { transport, clock, random: () => 0.5 });
   subscription.onFailed((error, at) => failed.push(`${at} ${(error as RobotRaconteurError).code}`));
   const wire = subscription.wire("both");
   await vi.waitUntil(() => clock.waits.length > 0);
   expect(failed).toEqual([`http://gateway ${ErrorCode.ServiceNotFound}`]);
-  answer_devices(["broken", "online", type], ["a", "online", type]);
+  answerDevices(["broken", "online", type], ["a", "online", type]);
   clock.fire();
   await subscription.client();
   expect(tried).toEqual(["/devices/broken", "/devices/a"]);
-  answer_devices(["b", "online", type]);
+  answerDevices(["b", "online", type]);
   first.drop("gone");
   await vi.waitUntil(() => clock.waits.length > 0);
   clock.fire();

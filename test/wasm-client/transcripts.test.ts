@@ -5,8 +5,8 @@ import type { ConnectOptions, RemoteObject } from "../../wasm-client/dist/node.j
 import { Replay } from "./replay.js";
 import { failure, settle } from "./service.js";
 
-const without_table: ConnectOptions = { stringTable: false };
-const version_2: ConnectOptions = { version: 2 };
+const withoutTable: ConnectOptions = { stringTable: false };
+const version2: ConnectOptions = { version: 2 };
 
 async function replay(name: string, options: ConnectOptions): Promise<{ robot: RemoteObject; transcript: Replay }> {
   const transcript = new Replay(name);
@@ -19,17 +19,17 @@ async function replay(name: string, options: ConnectOptions): Promise<{ robot: R
 }
 
 /** Everything was played, and the client's messages are those of the reference. */
-function expect_same_bytes(transcript: Replay): void {
-  expect(transcript.is_over).toBe(true);
+function expectSameBytes(transcript: Replay): void {
+  expect(transcript.isOver).toBe(true);
   expect(transcript.found.map((bytes) => bytes.toString("hex"))).toEqual(
     transcript.expected.map((bytes) => bytes.toString("hex")),
   );
 }
 
 it.each([
-  ["rr+ws-v4-property", without_table],
-  ["rr+tcp-v4-property", without_table],
-  ["rr+tcp-v2-property", version_2],
+  ["rr+ws-v4-property", withoutTable],
+  ["rr+tcp-v4-property", withoutTable],
+  ["rr+tcp-v2-property", version2],
 ])("%s: properties", async (name, options) => {
   const { robot, transcript } = await replay(name, options);
   const m = (member: string) => robot[member]!;
@@ -41,19 +41,19 @@ it.each([
   expect(await m("counts").get()).toStrictEqual(Int32Array.of(1, 2, 3));
   await m("counts").set([]);
   await m("counts").set([2147483647, -2147483648]);
-  const reading = (await m("reading").get()) as { label: string };
+  const reading = await m("reading").get<{ label: string }>();
   expect(reading).toStrictEqual({ x: 2.5, label: "first", data: Int32Array.of(4, 5) });
   await m("reading").set({ ...reading, label: "changed" });
   expect(await m("title").get()).toBe("Transcript station – ü");
   await m("secret").set(5);
   expect(await m("status").get()).toBe(7);
   await robot.$.close();
-  expect_same_bytes(transcript);
+  expectSameBytes(transcript);
 });
 
 it.each([
   ["rr+tcp-v4-stringtable-function", {}],
-  ["rr+tcp-v2-function", version_2],
+  ["rr+tcp-v2-function", version2],
 ])("%s: functions, an event, errors", async (name, options: ConnectOptions) => {
   const { robot, transcript } = await replay(name, options);
   const m = (member: string) => robot[member]!;
@@ -75,14 +75,14 @@ it.each([
   expect([foreign.code, foreign.name, foreign.message]).toEqual([ErrorCode.UnknownError, "ValueError", "plain failure"]);
   await robot.$.close();
   // The order of a message's own string table is free: there only the sizes are determined.
-  expect(transcript.is_over).toBe(true);
+  expect(transcript.isOver).toBe(true);
   expect(transcript.found.map(({ length }) => length)).toEqual(transcript.expected.map(({ length }) => length));
-  if (options.version === 2) expect_same_bytes(transcript);
+  if (options.version === 2) expectSameBytes(transcript);
 });
 
 it.each([
-  ["rr+tcp-v4-objref", without_table],
-  ["rr+tcp-v2-objref", version_2],
+  ["rr+tcp-v4-objref", withoutTable],
+  ["rr+tcp-v2-objref", version2],
 ])("%s: object references", async (name, options) => {
   const { robot, transcript } = await replay(name, options);
   const m = (member: string) => robot[member]!;
@@ -96,11 +96,11 @@ it.each([
   expect((await failure(m("named").get("none"))).code).toBe(ErrorCode.InvalidArgument);
   expect(await (await m("anything").get<RemoteObject>())["identify"]!()).toBe("part any");
   await robot.$.close();
-  expect_same_bytes(transcript);
+  expectSameBytes(transcript);
 });
 
 it("rr+ws-v4-wire: connect, peek, poke, close by the service", async () => {
-  const { robot, transcript } = await replay("rr+ws-v4-wire", without_table);
+  const { robot, transcript } = await replay("rr+ws-v4-wire", withoutTable);
   const m = (member: string) => robot[member]!;
   const target = m("target").connect();
   await target.ready;
@@ -130,7 +130,7 @@ it("rr+ws-v4-wire: connect, peek, poke, close by the service", async () => {
   for await (const value of again) rest.push(value); // ends: the service closes it
   expect(rest).toEqual([]);
   await robot.$.close();
-  expect(transcript.is_over).toBe(true);
+  expect(transcript.isOver).toBe(true);
   // Packets carry the time; everything else is determined.
   transcript.found.forEach((bytes, index) => {
     const expected = transcript.expected[index]!;
@@ -140,20 +140,20 @@ it("rr+ws-v4-wire: connect, peek, poke, close by the service", async () => {
 });
 
 it("rr+ws-v4-event: events before the answer of the function that caused them", async () => {
-  const { robot, transcript } = await replay("rr+ws-v4-event", without_table);
+  const { robot, transcript } = await replay("rr+ws-v4-event", withoutTable);
   const events: unknown[] = [];
   robot["changed"]!.on((...args) => events.push(args));
   await robot["reset"]!();
   await robot["reset"]!();
   expect(events).toEqual([[0, "reset"], [0, "reset"]]);
   await robot.$.close();
-  expect_same_bytes(transcript);
+  expectSameBytes(transcript);
 });
 
 it("rr+tcp-v4-stepwise: a service without the combined connect request", async () => {
-  const { robot, transcript } = await replay("rr+tcp-v4-stepwise", without_table);
+  const { robot, transcript } = await replay("rr+tcp-v4-stepwise", withoutTable);
   expect(robot.$.attributes.get("place")).toBe("bench");
   expect(await robot["level"]!.get()).toBe(3);
   await robot.$.close();
-  expect_same_bytes(transcript);
+  expectSameBytes(transcript);
 });

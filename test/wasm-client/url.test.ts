@@ -1,8 +1,8 @@
 // URLs of services.
-import { parse_service_url } from "../../wasm-client/dist/url.js";
+import { parseServiceUrl } from "../../wasm-client/dist/url.js";
 
 const parse = (text: string, base?: string) => {
-  const { address, service, nodeId, nodeName } = parse_service_url(text, base);
+  const { address, service, nodeId, nodeName } = parseServiceUrl(text, base);
   return { address: address.href, service, nodeId, nodeName };
 };
 

@@ -26,7 +26,7 @@ type Client = Robot & { readonly $: ObjectInfo };
 const file = new URL("../../build/wasm/test/wasm-client/usb_device/test_usb_device.wasm", import.meta.url);
 const code = WebAssembly.compile(readFileSync(file));
 const url = "rr+usb:///?nodename=test.service&service=test";
-const device_id = "10203040-5060-7080-90a0-b0c0d0e0f001";
+const deviceId = "10203040-5060-7080-90a0-b0c0d0e0f001";
 const le32 = (value: number) => [value & 255, (value >> 8) & 255, (value >> 16) & 255, value >> 24];
 
 let usb: FakeUsb;
@@ -52,10 +52,10 @@ async function plug(options: FakeDeviceOptions = {}): Promise<FakeUsbDevice> {
 /** A service, and a client of it for each stream. */
 async function serve(): Promise<() => OpenTransport> {
   const first = await TestService.start({ definitions: [definition], root: "test.usb.Root" });
-  let is_taken = false;
+  let isTaken = false;
   return () => {
-    if (is_taken) return first.join().transport;
-    is_taken = true;
+    if (isTaken) return first.join().transport;
+    isTaken = true;
     return first.transport;
   };
 }
@@ -64,10 +64,10 @@ async function serve(): Promise<() => OpenTransport> {
 const lost = (robot: Client) => new Promise<any>((resolve) => robot.$.onClose(resolve));
 
 /** Lets time pass until `promise` is settled. */
-async function let_pass<T>(promise: Promise<T>): Promise<T> {
-  let is_settled = false;
-  void promise.finally(() => (is_settled = true));
-  while (!is_settled) {
+async function letPass<T>(promise: Promise<T>): Promise<T> {
+  let isSettled = false;
+  void promise.finally(() => (isSettled = true));
+  while (!isSettled) {
     await vi.advanceTimersByTimeAsync(100);
     await new Promise(setImmediate); // compiling the core is no timer
   }
@@ -75,7 +75,7 @@ async function let_pass<T>(promise: Promise<T>): Promise<T> {
 }
 
 /** Until the client has given the device back. */
-const given_back = (one = device) => vi.waitFor(() => expect(one.opened).toBe(false), { interval: 1 });
+const givenBack = (one = device) => vi.waitFor(() => expect(one.opened).toBe(false), { interval: 1 });
 
 describe("a session", () => {
   it("has properties, functions, events, wires and pipes", async () => {
@@ -98,15 +98,15 @@ describe("a session", () => {
     const packets = pipe[Symbol.asyncIterator]();
     expect([(await packets.next()).value, (await packets.next()).value]).toEqual([1, 2]);
     await robot.$.close();
-    await given_back();
+    await givenBack();
   });
 
   it("asks the device what the reference asks, and gives it back behind the last stream", async () => {
     const robot = await connect<Robot>(url);
     await robot.$.close();
-    await given_back();
-    const without_data = device.log.filter((entry) => !/^out [1-9]/.test(entry));
-    expect(without_data).toEqual([
+    await givenBack();
+    const withoutData = device.log.filter((entry) => !/^out [1-9]/.test(entry));
+    expect(withoutData).toEqual([
       "open",
       "80 06 0f00 0000 5",
       "80 06 0f00 0000 36",
@@ -145,7 +145,7 @@ describe("a session", () => {
     const robot = await connect<Robot>(url);
     expect(await robot.same(2)).toBe(2);
     await robot.$.close();
-    await given_back();
+    await givenBack();
     expect(device.log.slice(0, 6)).toEqual([
       "open",
       "select 1",
@@ -160,7 +160,7 @@ describe("a session", () => {
     const [one, two] = await Promise.all([connect<Robot>(url), connect<Robot>(url)]);
     await Promise.all([one.speed.set(3), two.same(1)]);
     expect(await two.speed.get()).toBe(3);
-    expect(device.stream_count).toBe(2);
+    expect(device.streamCount).toBe(2);
     await one.$.close();
     expect(await two.same(9)).toBe(9);
     expect(device.opened).toBe(true);
@@ -169,8 +169,8 @@ describe("a session", () => {
     await closing;
     expect(await (await three).same(13)).toBe(13);
     await (await three).$.close();
-    await given_back();
-    expect(device.stream_count).toBe(0);
+    await givenBack();
+    expect(device.streamCount).toBe(0);
   });
 
   it("leaves a device open that the page had opened", async () => {
@@ -185,9 +185,9 @@ describe("a session", () => {
 
 describe("the device is found", () => {
   it.each([
-    `nodeid=${device_id}`,
-    `nodeid={${device_id.toUpperCase()}}`,
-    `nodeid=${device_id.replaceAll("-", "")}&nodename=test.service`,
+    `nodeid=${deviceId}`,
+    `nodeid={${deviceId.toUpperCase()}}`,
+    `nodeid=${deviceId.replaceAll("-", "")}&nodename=test.service`,
   ])("by %s", async (who) => {
     const other = await plug({ name: "other", lastIdByte: 2 });
     const opened = new Promise<void>((resolve) => (device.accept = () => (resolve(), silent)));
@@ -196,7 +196,7 @@ describe("the device is found", () => {
     await opened;
     ended.abort(new Error("enough"));
     expect((await connecting).message).toBe("enough");
-    await Promise.all([given_back(), given_back(other)]);
+    await Promise.all([givenBack(), givenBack(other)]);
   });
 
   it("or told what there is instead", async () => {
@@ -206,9 +206,9 @@ describe("the device is found", () => {
       expect(error.code).toBe(ErrorCode.ConnectionError);
       expect(error.message).toBe(
         'rr+usb:///?nodename=robot&service=test: found on none of this page\'s USB devices: USB device "Test robot" (1209:5252): ' +
-          `is node ${device_id} "test.service"; USB device "Test robot" (1209:5252): is node 10203040-5060-7080-90a0-b0c0d0e0f002 "other"`,
+          `is node ${deviceId} "test.service"; USB device "Test robot" (1209:5252): is node 10203040-5060-7080-90a0-b0c0d0e0f002 "other"`,
       );
-      await given_back();
+      await givenBack();
     }
     expect(device.log.filter((entry) => entry === "open")).toHaveLength(1); // who it is, is known
   });
@@ -227,10 +227,10 @@ describe("the device is found", () => {
 
 describe("a device that cannot be had", () => {
   it("is waited for while another page lets go of it", async () => {
-    device.is_busy = true;
+    device.isBusy = true;
     const connecting = connect<Robot>(url);
     await new Promise((resolve) => setTimeout(resolve, 50));
-    device.is_busy = false;
+    device.isBusy = false;
     const robot = await connecting;
     expect(await robot.same(3)).toBe(3);
     await robot.$.close();
@@ -238,46 +238,46 @@ describe("a device that cannot be had", () => {
 
   it("is told where another program keeps it", async () => {
     vi.useFakeTimers({ toFake: ["setTimeout", "clearTimeout", "performance"] });
-    device.is_busy = true;
-    expect((await let_pass(failure(connect(url)))).message).toMatch(
+    device.isBusy = true;
+    expect((await letPass(failure(connect(url)))).message).toMatch(
       /USB device "Test robot" \(1209:5252\): Robot Raconteur descriptor block: another program or driver uses the interface; close the other program/,
     );
     expect(device.opened).toBe(false);
   });
 
   it("is told where the system keeps this user from it", async () => {
-    device.is_denied = true;
+    device.isDenied = true;
     expect((await failure(connect(url))).message).toMatch(/could not be opened: Access denied\.; on Linux .* on Windows/);
   });
 
   it.each<[string, (device: FakeUsbDevice) => void, RegExp]>([
-    ["has no BOS", (one) => one.replace_bos([]), /BOS descriptor: refused by the device \(stall\)/],
-    ["has another BOS", (one) => one.replace_bos([5, 15, 12, 0, 1, 7, 16, 2, 0, 0, 0, 0]), /no Robot Raconteur capability/],
-    ["has no block", (one) => one.stall_control(0xba), /descriptor block: refused/],
-    ["has a block of another version", (one) => one.replace_block([8, 0, 0, 0, 0, 2, 22, 0]), /version: found 0x0200, expected 0x0100/],
-    ["has a NodeID that is none", (one) => one.replace_string(4, [6, 3, 120, 0, 121, 0]), /NodeID string: /],
-    ["has half a string", (one) => one.replace_string(5, [6, 3, 120, 0]), /string descriptor bLength: found 6, expected the 4 bytes received/],
+    ["has no BOS", (one) => one.replaceBos([]), /BOS descriptor: refused by the device \(stall\)/],
+    ["has another BOS", (one) => one.replaceBos([5, 15, 12, 0, 1, 7, 16, 2, 0, 0, 0, 0]), /no Robot Raconteur capability/],
+    ["has no block", (one) => one.stallControl(0xba), /descriptor block: refused/],
+    ["has a block of another version", (one) => one.replaceBlock([8, 0, 0, 0, 0, 2, 22, 0]), /version: found 0x0200, expected 0x0100/],
+    ["has a NodeID that is none", (one) => one.replaceString(4, [6, 3, 120, 0, 121, 0]), /NodeID string: /],
+    ["has half a string", (one) => one.replaceString(5, [6, 3, 120, 0]), /string descriptor bLength: found 6, expected the 4 bytes received/],
   ])("%s", async (_, spoil, message) => {
     spoil(device);
     const error = await failure(connect(url));
     expect(error.code).toBe(ErrorCode.ConnectionError);
     expect(error.message).toMatch(message);
-    await given_back();
+    await givenBack();
   });
 
   it.each<[string, (device: FakeUsbDevice) => void, RegExp]>([
-    ["no more streams", (one) => one.answer_connect(le32(-1)), /could not connect: USB device .*: stream refused: the device answered -1/],
-    ["half an answer", (one) => one.answer_connect([1, 0]), /stream refused: 2 bytes in the answer, expected 4/],
-    ["a stall", (one) => one.stall_control(1), /stream refused: refused by the device \(stall\)/],
-    ["no reset", (one) => one.stall_control(3), /reset: refused by the device \(stall\)/],
-    ["a reset of another size", (one) => one.answer_reset([0, 0]), /reset: 2 bytes in the answer, expected 4/],
-    ["another protocol", (one) => (one.stalled_vendor_request = 6), /protocol 0x0101: refused/],
+    ["no more streams", (one) => one.answerConnect(le32(-1)), /could not connect: USB device .*: stream refused: the device answered -1/],
+    ["half an answer", (one) => one.answerConnect([1, 0]), /stream refused: 2 bytes in the answer, expected 4/],
+    ["a stall", (one) => one.stallControl(1), /stream refused: refused by the device \(stall\)/],
+    ["no reset", (one) => one.stallControl(3), /reset: refused by the device \(stall\)/],
+    ["a reset of another size", (one) => one.answerReset([0, 0]), /reset: 2 bytes in the answer, expected 4/],
+    ["another protocol", (one) => (one.stalledVendorRequest = 6), /protocol 0x0101: refused/],
   ])("has %s", async (_, spoil, message) => {
     spoil(device);
     const error = await failure(connect(url));
     expect(error.code).toBe(ErrorCode.ConnectionError);
     expect(error.message).toMatch(message);
-    await given_back();
+    await givenBack();
   });
 
   it.each([
@@ -287,8 +287,8 @@ describe("a device that cannot be had", () => {
     [3, "reset: no answer in time"],
   ])("does not answer request %i", async (request, message) => {
     vi.useFakeTimers({ toFake: ["setTimeout", "clearTimeout", "performance"] });
-    device.mute_request = request;
-    expect((await let_pass(failure(connect(url)))).message).toContain(message);
+    device.muteRequest = request;
+    expect((await letPass(failure(connect(url)))).message).toContain(message);
     await vi.advanceTimersByTimeAsync(5000); // the reset at the end
     expect(device.opened).toBe(false);
   });
@@ -304,12 +304,12 @@ describe("a session that is up", () => {
 
   it.each<[string, (device: FakeUsbDevice) => void]>([
     ["the browser says so at once", (one) => usb.unplug(one)],
-    ["the browser says so first", (one) => (usb.tell_gone(one), one.unplug("NotFoundError"))],
-    ["transfers fail first", (one) => (one.unplug("NetworkError"), setTimeout(() => usb.tell_gone(one), 50))],
+    ["the browser says so first", (one) => (usb.tellGone(one), one.unplug("NotFoundError"))],
+    ["transfers fail first", (one) => (one.unplug("NetworkError"), setTimeout(() => usb.tellGone(one), 50))],
   ])("is lost when the device is unplugged: %s", async (_, unplug) => {
     const calls = [failure(robot.hang()), failure(other.hang())];
     const ends = [lost(robot), lost(other)];
-    device.is_deaf = true;
+    device.isDeaf = true;
     const writing = failure(robot.numbers.set(new Float64Array(10_000))); // transfers are pending
     await settle();
     unplug(device);
@@ -323,19 +323,19 @@ describe("a session that is up", () => {
   });
 
   it.each<[string, (device: FakeUsbDevice) => void, RegExp]>([
-    ["stalls a read", (one) => one.stall_next_in(), /read: refused by the device \(stall\)/],
-    ["stalls a write", (one) => (one.stall_next_out(), void failure(robot.hang())), /write: refused by the device \(stall\)/],
-    ["tells a wrong length", (one) => one.send_raw([9, 0, 0, 0, 7, 0, 0, 0]), /len is 9, the transfer has 8 bytes/],
-    ["sends half a header", (one) => one.send_raw([5, 0, 0, 0, 7]), /found 5 bytes, expected 8 or more/],
-    ["sends more than a packet", (one) => one.send_raw(Array<number>(65).fill(0)), /sent more than was asked for/],
+    ["stalls a read", (one) => one.stallNextIn(), /read: refused by the device \(stall\)/],
+    ["stalls a write", (one) => (one.stallNextOut(), void failure(robot.hang())), /write: refused by the device \(stall\)/],
+    ["tells a wrong length", (one) => one.sendRaw([9, 0, 0, 0, 7, 0, 0, 0]), /len is 9, the transfer has 8 bytes/],
+    ["sends half a header", (one) => one.sendRaw([5, 0, 0, 0, 7]), /found 5 bytes, expected 8 or more/],
+    ["sends more than a packet", (one) => one.sendRaw(Array<number>(65).fill(0)), /sent more than was asked for/],
     [
       "sends more than a packet and the browser lets it through",
-      (one) => ((one.is_unbounded = true), one.send_raw([73, ...Array<number>(72).fill(0)])),
+      (one) => ((one.isUnbounded = true), one.sendRaw([73, ...Array<number>(72).fill(0)])),
       /sent more than was asked for/,
     ],
-    ["sends a command", (one) => one.send_raw([8, 0, 1, 0, 7, 0, 0, 0]), /a command/],
-    ["sends unknown flags", (one) => one.send_raw([8, 0, 7, 0, 7, 0, 0, 0]), /flags 0x0007/],
-    ["sends half a notification", (one) => one.send_raw([9, 0, 2, 0, 7, 0, 0, 0, 1]), /found 1 bytes, expected 2/],
+    ["sends a command", (one) => one.sendRaw([8, 0, 1, 0, 7, 0, 0, 0]), /a command/],
+    ["sends unknown flags", (one) => one.sendRaw([8, 0, 7, 0, 7, 0, 0, 0]), /flags 0x0007/],
+    ["sends half a notification", (one) => one.sendRaw([9, 0, 2, 0, 7, 0, 0, 0, 1]), /found 1 bytes, expected 2/],
   ])("is lost when the device %s, and so are the others; they may connect again", async (_, spoil, message) => {
     const ends = [lost(robot), lost(other)];
     spoil(device);
@@ -343,7 +343,7 @@ describe("a session that is up", () => {
       expect(reason.subName).toBe("connection_lost");
       expect(reason.message).toMatch(message);
     }
-    await given_back();
+    await givenBack();
     robot = await connect<Robot>(url);
     expect(await robot.same(3)).toBe(3);
     await robot.$.close();
@@ -356,7 +356,7 @@ describe("a session that is up", () => {
     ["notifications that mean nothing", [10, 0, 2, 0, 7, 0, 0, 0, 0, 0]],
     ["notifications that nobody knows", [10, 0, 2, 0, 7, 0, 0, 0, 77, 0]],
   ])("outlives %s", async (_, transfer) => {
-    for (let round = 0; round < 6; ++round) device.send_raw(transfer);
+    for (let round = 0; round < 6; ++round) device.sendRaw(transfer);
     expect(await robot.same(3)).toBe(3);
     expect(await other.same(7)).toBe(7);
     await Promise.all([robot.$.close(), other.$.close()]);
@@ -364,12 +364,12 @@ describe("a session that is up", () => {
 
   it("is lost alone when the device closes its stream", async () => {
     const end = lost(robot);
-    device.close_stream(7);
+    device.closeStream(7);
     expect((await end).message).toMatch(/the connection was lost: USB device .*: closed by the device/);
     expect(await other.same(7)).toBe(7);
     expect(device.log).not.toContain("41 02 0000 0000 4: 07 00 00 00");
     await other.$.close();
-    await given_back();
+    await givenBack();
   });
 
   it("sends nothing on a stream that is paused, until it is resumed", async () => {
@@ -388,10 +388,10 @@ describe("a session that is up", () => {
 
   it("closes though the device takes nothing any more", async () => {
     vi.useFakeTimers({ toFake: ["setTimeout", "clearTimeout", "performance"] });
-    device.is_deaf = true;
+    device.isDeaf = true;
     for (let count = 0; count < 100; ++count) void failure(robot.numbers.set(new Float64Array(1000)));
     await settle();
-    await let_pass(Promise.all([robot.$.close(), other.$.close()]));
+    await letPass(Promise.all([robot.$.close(), other.$.close()]));
     await vi.advanceTimersByTimeAsync(1000);
     expect(device.opened).toBe(false);
   });
@@ -400,12 +400,12 @@ describe("a session that is up", () => {
 describe("the stream below", () => {
   /** The transport that connect() uses, without a session on it. */
   async function open(listener: Partial<TransportListener> = {}): Promise<Transport> {
-    const { open_usb } = await import("../../wasm-client/dist/usb_devices.js");
+    const { openUsb } = await import("../../wasm-client/dist/usb_devices.js");
     let opened!: () => void;
-    const is_open = new Promise<void>((resolve) => (opened = resolve));
+    const isOpen = new Promise<void>((resolve) => (opened = resolve));
     const silent = { opened, received: () => undefined, closed: () => undefined };
-    const transport = await open_usb(new URL("rr+usb:///?nodename=test.service"), { ...silent, ...listener });
-    await is_open;
+    const transport = await openUsb(new URL("rr+usb:///?nodename=test.service"), { ...silent, ...listener });
+    await isOpen;
     return transport;
   }
 
@@ -414,7 +414,7 @@ describe("the stream below", () => {
     device.accept = () => () => ({ send: (bytes) => void (received += bytes.length), buffered: 0, close: () => undefined });
     const transport = await open();
     const sent = 300_000;
-    device.is_deaf = true;
+    device.isDeaf = true;
     transport.send(new Uint8Array(sent));
     // 56 bytes fit into a packet. The device takes 74 before it holds 4096 bytes; four more are under way.
     await vi.waitFor(() => expect(transport.buffered).toBe(sent - (74 + 4) * 56), { interval: 1 });
@@ -424,7 +424,7 @@ describe("the stream below", () => {
     await vi.waitFor(() => expect(received).toBe(sent));
     expect(transport.buffered).toBe(0);
     transport.close();
-    await given_back();
+    await givenBack();
   });
 
   it("delivers what was sent before it is closed, and says nothing afterwards", async () => {
@@ -432,7 +432,7 @@ describe("the stream below", () => {
     device.accept = () => () => ({ send: (bytes) => void (received += bytes.length), buffered: 0, close: () => undefined });
     const heard: string[] = [];
     const transport = await open({ received: () => void heard.push("bytes"), closed: (reason) => void heard.push(reason) });
-    device.is_deaf = true;
+    device.isDeaf = true;
     transport.send(new Uint8Array(10_000));
     transport.close();
     transport.close();
@@ -440,7 +440,7 @@ describe("the stream below", () => {
     device.send(7, Uint8Array.of(1, 2, 3));
     await new Promise((resolve) => setTimeout(resolve, 50));
     device.hear();
-    await given_back();
+    await givenBack();
     expect(received).toBe(10_000);
     expect(heard).toEqual([]);
   });
@@ -448,8 +448,8 @@ describe("the stream below", () => {
   it("outlives a listener that closes it while it is told something", async () => {
     const transport = await open({ received: () => transport.close() });
     device.send(7, new Uint8Array(1000));
-    await given_back();
-    expect(device.stream_count).toBe(0);
+    await givenBack();
+    expect(device.streamCount).toBe(0);
   });
 
   it("cannot be had behind the device's limit, the others live on", async () => {
@@ -471,7 +471,7 @@ it("subscriptions go on when the device is plugged in again", async () => {
   device = await plug();
   expect(await (await subscription.client()).same(7)).toBe(7);
   await subscription.close();
-  await given_back();
+  await givenBack();
 });
 
 describe("requestUsbDevice()", () => {
@@ -481,9 +481,9 @@ describe("requestUsbDevice()", () => {
     usb.choice = await FakeUsbDevice.make(await code, { name: "arm" });
     expect(await requestUsbDevice()).toEqual({
       device: 'USB device "Test robot" (1209:5252)',
-      nodeId: device_id,
+      nodeId: deviceId,
       nodeName: "arm",
-      url: `rr+usb:///?nodeid=${device_id}`,
+      url: `rr+usb:///?nodeid=${deviceId}`,
     });
     expect(usb.asked).toEqual([{ filters: [{ classCode: 0xff }] }]);
     expect(usb.choice.opened).toBe(false);
@@ -520,11 +520,11 @@ describe("requestUsbDevice()", () => {
 describe("listUsbDevices()", () => {
   it("asks each device who it is, once", async () => {
     const other = await plug({ name: "other", lastIdByte: 0, classCode: 255 });
-    other.replace_string(4, [8, 3, 123, 0, 48, 0, 125, 0]); // {0}: any
+    other.replaceString(4, [8, 3, 123, 0, 48, 0, 125, 0]); // {0}: any
     const robot = await connect<Robot>(url);
     for (let round = 0; round < 2; ++round) {
       expect(await listUsbDevices()).toMatchObject([
-        { nodeId: device_id, nodeName: "test.service", url: `rr+usb:///?nodeid=${device_id}` },
+        { nodeId: deviceId, nodeName: "test.service", url: `rr+usb:///?nodeid=${deviceId}` },
         { nodeId: "00000000-0000-0000-0000-000000000000", nodeName: "other", url: "rr+usb:///?nodename=other" },
       ]);
     }
@@ -534,7 +534,7 @@ describe("listUsbDevices()", () => {
   });
 
   it("says why a device does not tell, and leaves out those that cannot be nodes", async () => {
-    device.stall_control(0xba);
+    device.stallControl(0xba);
     await plug({ classCode: 3 });
     const [one, ...more] = await listUsbDevices();
     expect(more).toEqual([]);
@@ -543,7 +543,7 @@ describe("listUsbDevices()", () => {
   });
 
   it("says that a frame may not", async () => {
-    usb.is_forbidden = true;
+    usb.isForbidden = true;
     const error = await failure(listUsbDevices());
     expect(error.code).toBe(ErrorCode.SystemResourcePermissionDenied);
     expect(error.message).toContain('a frame needs allow="usb"');

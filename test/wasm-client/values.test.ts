@@ -200,7 +200,7 @@ it("carries 10 MB both ways", async () => {
   const root = await service();
   const large = Float64Array.from({ length: 1_310_720 }, (_, index) => index);
   await root[member("double[]")]!.set(large);
-  const found = (await root[member("double[]")]!.get()) as Float64Array;
+  const found = await root[member("double[]")]!.get<Float64Array>();
   expect(found.length).toBe(large.length);
   expect(found.findIndex((number, index) => number !== index)).toBe(-1);
   await root.$.close();

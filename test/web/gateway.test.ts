@@ -1,22 +1,22 @@
-import { format_route, parse_route } from "../../web/src/app/router";
-import { read_requests, read_who } from "../../web/src/gateway/access";
-import { read_devices, relay_url } from "../../web/src/gateway/devices";
-import { read_frame } from "../../web/src/camera/frame";
-import { fit, grid_step, include, START, to_canvas } from "../../web/src/chart/view";
-import { sentence, span, stale_age } from "../../web/src/ui/words";
+import { formatRoute, parseRoute } from "../../web/src/app/router";
+import { readRequests, readWho } from "../../web/src/gateway/access";
+import { readDevices, relayUrl } from "../../web/src/gateway/devices";
+import { readFrame } from "../../web/src/camera/frame";
+import { fit, gridStep, include, START, toCanvas } from "../../web/src/chart/view";
+import { sentence, span, staleAge } from "../../web/src/ui/words";
 
 describe("access", () => {
   it("reads who the gateway takes the page for", () => {
     const who = { user: "root", login: true, requests: true, admin: true };
-    expect(read_who({ ...who, roles: ["admin"], proof: "password" })).toEqual(who);
-    expect(read_who(null)).toEqual({ user: null, login: false, requests: false, admin: false });
+    expect(readWho({ ...who, roles: ["admin"], proof: "password" })).toEqual(who);
+    expect(readWho(null)).toEqual({ user: null, login: false, requests: false, admin: false });
   });
 
   it("lists the requests that are to be decided on", () => {
     const request = { id: "a", name: "tablet", reason: "cell 3", client: "192.0.2.1:5" };
     const answer = { requests: [{ ...request, state: "pending" }, { ...request, state: "approved" }, null, { state: "pending" }] };
-    expect(read_requests(answer)).toEqual([request]);
-    expect(read_requests({})).toEqual([]);
+    expect(readRequests(answer)).toEqual([request]);
+    expect(readRequests({})).toEqual([]);
   });
 });
 
@@ -34,18 +34,19 @@ describe("list of devices", () => {
       mode: "shared",
       clients: 3,
     };
-    expect(read_devices({ devices: [device] })).toEqual([device]);
+    const { node_id: nodeId, node_name: nodeName, last_error: lastError, ...rest } = device;
+    expect(readDevices({ devices: [device] })).toEqual([{ ...rest, nodeId, nodeName, lastError }]);
   });
   it("does without fields that an older gateway leaves out", () => {
-    expect(read_devices({ devices: [{ name: "arm", state: "sleeping" }, null] })).toEqual([
+    expect(readDevices({ devices: [{ name: "arm", state: "sleeping" }, null] })).toEqual([
       {
         name: "arm",
         url: "",
         found: false,
-        node_id: "",
-        node_name: "",
+        nodeId: "",
+        nodeName: "",
         state: "offline",
-        last_error: null,
+        lastError: null,
         services: [],
         mode: null,
         clients: null,
@@ -53,22 +54,22 @@ describe("list of devices", () => {
     ]);
   });
   it("refuses an answer that is no list of devices", () => {
-    expect(() => read_devices("<html>")).toThrow('no list "devices"');
-    expect(() => read_devices(null)).toThrow('no list "devices"');
+    expect(() => readDevices("<html>")).toThrow('no list "devices"');
+    expect(() => readDevices(null)).toThrow('no list "devices"');
   });
   it("finds the relay beside the page, secure where the page is", () => {
-    expect(relay_url("create", "Create", "http://127.0.0.1:8080/")).toBe("ws://127.0.0.1:8080/devices/create?service=Create");
-    expect(relay_url("a b", "S&T", "https://host/robots/#/x")).toBe("wss://host/robots/devices/a%20b?service=S%26T");
+    expect(relayUrl("create", "Create", "http://127.0.0.1:8080/")).toBe("ws://127.0.0.1:8080/devices/create?service=Create");
+    expect(relayUrl("a b", "S&T", "https://host/robots/#/x")).toBe("wss://host/robots/devices/a%20b?service=S%26T");
   });
 });
 
 describe("addresses", () => {
   it("name pages, services and the objects in them", () => {
-    expect(parse_route("")).toEqual({ page: "devices" });
-    expect(parse_route("#/")).toEqual({ page: "devices" });
-    expect(parse_route("#/devices/create/Create")).toEqual({ page: "service", device: "create", service: "Create", path: [], view: "auto" });
-    expect(parse_route("#/else")).toEqual({ page: "unknown", address: "/else" });
-    expect(parse_route("#/devices/%")).toEqual({ page: "unknown", address: "/devices/%" });
+    expect(parseRoute("")).toEqual({ page: "devices" });
+    expect(parseRoute("#/")).toEqual({ page: "devices" });
+    expect(parseRoute("#/devices/create/Create")).toEqual({ page: "service", device: "create", service: "Create", path: [], view: "auto" });
+    expect(parseRoute("#/else")).toEqual({ page: "unknown", address: "/else" });
+    expect(parseRoute("#/devices/%")).toEqual({ page: "unknown", address: "/devices/%" });
   });
   it("are read back as they were written", () => {
     const path = [
@@ -76,56 +77,56 @@ describe("addresses", () => {
       { member: "parts", index: "a/b]?" },
       { member: "lens", index: null },
     ];
-    expect(parse_route(format_route("my cam", "W", path))).toEqual({ page: "service", device: "my cam", service: "W", path, view: "auto" });
-    expect(parse_route(format_route("c", "C", [], "members"))).toMatchObject({ view: "members" });
+    expect(parseRoute(formatRoute("my cam", "W", path))).toEqual({ page: "service", device: "my cam", service: "W", path, view: "auto" });
+    expect(parseRoute(formatRoute("c", "C", [], "members"))).toMatchObject({ view: "members" });
   });
 });
 
 describe("camera frames", () => {
   it("turns blue, green, red rows with padding into pixels", () => {
     const data = Uint8Array.of(1, 2, 3, 4, 5, 6, 0, 0, 7, 8, 9, 10, 11, 12);
-    const frame = read_frame({ width: 2, height: 2, step: 8, data });
+    const frame = readFrame({ width: 2, height: 2, step: 8, data });
     expect([...(frame.rgba ?? [])]).toEqual([3, 2, 1, 255, 6, 5, 4, 255, 9, 8, 7, 255, 12, 11, 10, 255]);
   });
   it("shows one byte a pixel as grey", () => {
-    expect([...(read_frame({ width: 1, height: 1, step: 1, data: Uint8Array.of(9) }).rgba ?? [])]).toEqual([9, 9, 9, 255]);
+    expect([...(readFrame({ width: 1, height: 1, step: 1, data: Uint8Array.of(9) }).rgba ?? [])]).toEqual([9, 9, 9, 255]);
   });
   it("leaves image files to the browser", () => {
-    const frame = read_frame({ width: 0, height: 0, step: 0, data: Uint8Array.of(0xff, 0xd8, 0xff, 0xe0) });
+    const frame = readFrame({ width: 0, height: 0, step: 0, data: Uint8Array.of(0xff, 0xd8, 0xff, 0xe0) });
     expect(frame.encoded).toHaveLength(4);
   });
   it("refuses frames whose size and bytes contradict each other", () => {
-    expect(() => read_frame({ width: 2, height: 2, step: 6, data: new Uint8Array(11) })).toThrow("has 11 bytes in rows of 6; expected 12");
-    expect(() => read_frame({ width: -1, height: 2, step: 6, data: new Uint8Array(12) })).toThrow("-1 by 2 pixels");
-    expect(() => read_frame({ width: 1e9, height: 1e9, step: 6, data: new Uint8Array(12) })).toThrow("pixels");
-    expect(() => read_frame(null)).toThrow("no bytes");
+    expect(() => readFrame({ width: 2, height: 2, step: 6, data: new Uint8Array(11) })).toThrow("has 11 bytes in rows of 6; expected 12");
+    expect(() => readFrame({ width: -1, height: 2, step: 6, data: new Uint8Array(12) })).toThrow("-1 by 2 pixels");
+    expect(() => readFrame({ width: 1e9, height: 1e9, step: 6, data: new Uint8Array(12) })).toThrow("pixels");
+    expect(() => readFrame(null)).toThrow("no bytes");
   });
 });
 
 describe("view of the chart", () => {
   it("fits the wanted floor, centred, north up", () => {
-    const view = fit({ x_min: -2, x_max: 2, y_min: -1, y_max: 1 }, 10, 20, 400, 400);
+    const view = fit({ xMin: -2, xMax: 2, yMin: -1, yMax: 1 }, 10, 20, 400, 400);
     expect(view.scale).toBe(100);
-    expect(to_canvas(view, 0, 0)).toEqual([210, 220]);
-    expect(to_canvas(view, 2, 2)).toEqual([410, 20]);
+    expect(toCanvas(view, 0, 0)).toEqual([210, 220]);
+    expect(toCanvas(view, 2, 2)).toEqual([410, 20]);
   });
   it("grows in half metres to hold the robot, and stays while it is inside", () => {
     expect(include(START, 1, 1)).toBe(START);
-    expect(include(START, 2.2, 0)).toEqual({ ...START, x_max: 3 });
+    expect(include(START, 2.2, 0)).toEqual({ ...START, xMax: 3 });
     expect(include(START, NaN, 0)).toBe(START);
   });
   it("labels the grid at readable distances", () => {
-    expect(grid_step(120)).toBe(0.5);
-    expect(grid_step(60)).toBe(1);
-    expect(grid_step(10)).toBe(10);
-    expect(grid_step(0.001)).toBeGreaterThan(1000);
+    expect(gridStep(120)).toBe(0.5);
+    expect(gridStep(60)).toBe(1);
+    expect(gridStep(10)).toBe(10);
+    expect(gridStep(0.001)).toBeGreaterThan(1000);
   });
 });
 
 describe("words", () => {
   it("say within a second that no newer value came, and how old the last one is", () => {
-    expect([0, 799].map(stale_age)).toEqual([null, null]);
-    expect([800, 1400, 3000, 61_000].map(stale_age)).toEqual(["1 s old", "1 s old", "3 s old", "1 min old"]);
+    expect([0, 799].map(staleAge)).toEqual([null, null]);
+    expect([800, 1400, 3000, 61_000].map(staleAge)).toEqual(["1 s old", "1 s old", "3 s old", "1 min old"]);
   });
   it("say spans as people do", () => {
     expect(span(4_999)).toBe("4 s");

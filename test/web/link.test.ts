@@ -18,10 +18,10 @@ interface FakeRemote {
   drop: (reason: string) => void;
 }
 
-function fake_remote(): FakeRemote {
+function fakeRemote(): FakeRemote {
   let heard: (reason: string) => void = () => undefined;
   let closed = false;
-  const remote = { type: "a.B", members: [], on_close: (f: typeof heard) => (heard = f), close: () => (closed = true) };
+  const remote = { type: "a.B", members: [], onClose: (f: typeof heard) => (heard = f), close: () => (closed = true) };
   return { remote: remote as unknown as Remote, closed: () => closed, drop: (reason) => heard(reason) };
 }
 
@@ -32,7 +32,7 @@ function setup(): { link: Link; openings: Opening[] } {
       openings.push({
         signal,
         succeed: async () => {
-          const made = fake_remote();
+          const made = fakeRemote();
           resolve(made.remote);
           await vi.advanceTimersByTimeAsync(0);
           return made;
@@ -66,11 +66,11 @@ describe("link", () => {
     const { link, openings } = setup();
     const first = await at(openings, 0).succeed();
     first.drop("device create is down");
-    expect(link.state.value).toMatchObject({ kind: "lost", since: 1_000_000, reason: "device create is down", retry_at: 1_000_500 });
+    expect(link.state.value).toMatchObject({ kind: "lost", since: 1_000_000, reason: "device create is down", retryAt: 1_000_500 });
     await vi.advanceTimersByTimeAsync(500);
-    expect(link.state.value).toMatchObject({ kind: "lost", retry_at: null });
+    expect(link.state.value).toMatchObject({ kind: "lost", retryAt: null });
     await at(openings, 1).fail("refused");
-    expect(link.state.value).toMatchObject({ kind: "lost", since: 1_000_000, reason: "refused", attempts: 2, retry_at: 1_001_500 });
+    expect(link.state.value).toMatchObject({ kind: "lost", since: 1_000_000, reason: "refused", attempts: 2, retryAt: 1_001_500 });
     await vi.advanceTimersByTimeAsync(1000);
     await at(openings, 2).succeed();
     expect(link.state.value.kind).toBe("online");
@@ -80,7 +80,7 @@ describe("link", () => {
     await at(openings, 0).fail("refused");
     await vi.advanceTimersByTimeAsync(500);
     (await at(openings, 1).succeed()).drop("gone");
-    expect(link.state.value).toMatchObject({ kind: "lost", retry_at: Date.now() + 500 });
+    expect(link.state.value).toMatchObject({ kind: "lost", retryAt: Date.now() + 500 });
   });
   it("tries at once when the device is back, and only once", async () => {
     const { link, openings } = setup();
@@ -88,9 +88,9 @@ describe("link", () => {
       await at(openings, i).fail("refused");
       if (i < 4) await vi.advanceTimersByTimeAsync(10_000);
     }
-    link.device_is_back();
-    link.device_is_back();
-    link.retry_now();
+    link.deviceIsBack();
+    link.deviceIsBack();
+    link.retryNow();
     expect(openings).toHaveLength(6);
     await at(openings, 5).succeed();
     await vi.advanceTimersByTimeAsync(60_000);

@@ -1,27 +1,27 @@
-import { backoff_ms } from "../../web/src/robot/backoff";
+import { backoffMs } from "../../web/src/robot/backoff";
 import { Driver } from "../../web/src/robot/driver";
 import { Holds } from "../../web/src/robot/holds";
-import { advance, ORIGIN, Reckoner, wrap_angle } from "../../web/src/robot/reckoning";
-import { loops_of, obstacles_of, pose_of, walls_of } from "../../web/src/robot/room";
-import { read_sensor_packet } from "../../web/src/robot/sensor_packet";
-import { rate_of, Series } from "../../web/src/robot/series";
-import { name_notes, song_after } from "../../web/src/robot/song";
-import { command_for, direction_of_key, SPIN_LEFT, SPIN_RIGHT, STOP, STRAIGHT, TURN_RADIUS } from "../../web/src/robot/steering";
+import { advance, ORIGIN, Reckoner, wrapAngle } from "../../web/src/robot/reckoning";
+import { loopsOf, obstaclesOf, poseOf, wallsOf } from "../../web/src/robot/room";
+import { readSensorPacket } from "../../web/src/robot/sensor_packet";
+import { rateOf, Series } from "../../web/src/robot/series";
+import { nameNotes, songAfter } from "../../web/src/robot/song";
+import { commandFor, directionOfKey, SPIN_LEFT, SPIN_RIGHT, STOP, STRAIGHT, TURN_RADIUS } from "../../web/src/robot/steering";
 import type { Direction, DriveCommand } from "../../web/src/robot/steering";
 import { Trail } from "../../web/src/robot/trail";
 
 describe("waits between attempts", () => {
   it("double from half a second to ten seconds", () => {
-    const least = [0, 1, 2, 3].map((attempt) => backoff_ms(attempt, () => 0));
+    const least = [0, 1, 2, 3].map((attempt) => backoffMs(attempt, () => 0));
     expect(least).toEqual([500, 1000, 2000, 4000]);
-    expect(backoff_ms(50, () => 0.999999)).toBe(10_000);
-    expect(backoff_ms(1e9, () => 1)).toBe(10_000);
+    expect(backoffMs(50, () => 0.999999)).toBe(10_000);
+    expect(backoffMs(1e9, () => 1)).toBe(10_000);
   });
   it("differ from page to page, on the first attempt already", () => {
-    expect(backoff_ms(0, () => 0)).not.toBe(backoff_ms(0, () => 0.9));
+    expect(backoffMs(0, () => 0)).not.toBe(backoffMs(0, () => 0.9));
     for (let attempt = 0; attempt < 20; attempt++) {
-      expect(backoff_ms(attempt)).toBeGreaterThanOrEqual(500);
-      expect(backoff_ms(attempt)).toBeLessThanOrEqual(10_000);
+      expect(backoffMs(attempt)).toBeGreaterThanOrEqual(500);
+      expect(backoffMs(attempt)).toBeLessThanOrEqual(10_000);
     }
   });
 });
@@ -57,32 +57,32 @@ describe("dead reckoning", () => {
     expect(reckoner.pose.x).toBeCloseTo(1.5);
   });
   it("keeps angles between -180 and 180 degrees", () => {
-    expect(wrap_angle(3 * Math.PI)).toBeCloseTo(Math.PI);
-    expect(wrap_angle(-Math.PI - 0.1)).toBeCloseTo(Math.PI - 0.1);
-    expect(wrap_angle(0)).toBe(0);
+    expect(wrapAngle(3 * Math.PI)).toBeCloseTo(Math.PI);
+    expect(wrapAngle(-Math.PI - 0.1)).toBeCloseTo(Math.PI - 0.1);
+    expect(wrapAngle(0)).toBe(0);
   });
 });
 
 describe("steering", () => {
   const held = (...directions: Direction[]): Set<Direction> => new Set(directions);
   it("turns directions into velocity and radius of the Create", () => {
-    expect(command_for(held(), 200)).toEqual(STOP);
-    expect(command_for(held("forward"), 200)).toEqual({ velocity: 200, radius: STRAIGHT });
-    expect(command_for(held("back"), 200)).toEqual({ velocity: -200, radius: STRAIGHT });
-    expect(command_for(held("forward", "left"), 200)).toEqual({ velocity: 200, radius: TURN_RADIUS });
-    expect(command_for(held("forward", "right"), 200)).toEqual({ velocity: 200, radius: -TURN_RADIUS });
-    expect(command_for(held("left"), 200)).toEqual({ velocity: 100, radius: SPIN_LEFT });
-    expect(command_for(held("right"), 200)).toEqual({ velocity: 100, radius: SPIN_RIGHT });
+    expect(commandFor(held(), 200)).toEqual(STOP);
+    expect(commandFor(held("forward"), 200)).toEqual({ velocity: 200, radius: STRAIGHT });
+    expect(commandFor(held("back"), 200)).toEqual({ velocity: -200, radius: STRAIGHT });
+    expect(commandFor(held("forward", "left"), 200)).toEqual({ velocity: 200, radius: TURN_RADIUS });
+    expect(commandFor(held("forward", "right"), 200)).toEqual({ velocity: 200, radius: -TURN_RADIUS });
+    expect(commandFor(held("left"), 200)).toEqual({ velocity: 100, radius: SPIN_LEFT });
+    expect(commandFor(held("right"), 200)).toEqual({ velocity: 100, radius: SPIN_RIGHT });
   });
   it("stops where directions contradict each other", () => {
-    expect(command_for(held("forward", "back"), 200)).toEqual(STOP);
-    expect(command_for(held("left", "right"), 200)).toEqual(STOP);
-    expect(command_for(held("forward", "left", "right"), 200)).toEqual({ velocity: 200, radius: STRAIGHT });
+    expect(commandFor(held("forward", "back"), 200)).toEqual(STOP);
+    expect(commandFor(held("left", "right"), 200)).toEqual(STOP);
+    expect(commandFor(held("forward", "left", "right"), 200)).toEqual({ velocity: 200, radius: STRAIGHT });
   });
   it("knows arrows and WASD", () => {
-    expect(direction_of_key("ArrowUp")).toBe("forward");
-    expect(direction_of_key("KeyA")).toBe("left");
-    expect(direction_of_key("KeyQ")).toBeUndefined();
+    expect(directionOfKey("ArrowUp")).toBe("forward");
+    expect(directionOfKey("KeyA")).toBe("left");
+    expect(directionOfKey("KeyQ")).toBeUndefined();
   });
   it("holds a direction as long as any finger or key does", () => {
     const holds = new Holds();
@@ -127,7 +127,7 @@ describe("driver", () => {
   it("has one moving command in flight, and the newest wish replaces those that wait", async () => {
     const { calls, send } = connection();
     const driver = new Driver(() => undefined);
-    driver.set_connection(send);
+    driver.setConnection(send);
     driver.want(GO);
     driver.want(BACK);
     driver.want(TURN);
@@ -138,7 +138,7 @@ describe("driver", () => {
   it("sends a stop at once, past a command that is never answered", () => {
     const { calls, send } = connection();
     const driver = new Driver(() => undefined);
-    driver.set_connection(send);
+    driver.setConnection(send);
     driver.want(GO);
     driver.want(TURN);
     vi.advanceTimersByTime(1000);
@@ -149,19 +149,19 @@ describe("driver", () => {
   it("sends nothing more to a robot at rest", async () => {
     const { calls, send } = connection();
     const driver = new Driver(() => undefined);
-    driver.set_connection(send);
+    driver.setConnection(send);
     driver.want(GO);
     driver.want(STOP);
     await calls[0]?.answer();
     await calls[1]?.answer();
-    expect(driver.is_moving).toBe(false);
+    expect(driver.isMoving).toBe(false);
     vi.advanceTimersByTime(5000);
     expect(calls).toHaveLength(2);
   });
   it("drives on only when the stop before is answered", async () => {
     const { calls, send } = connection();
     const driver = new Driver(() => undefined);
-    driver.set_connection(send);
+    driver.setConnection(send);
     driver.want(GO);
     driver.want(STOP);
     driver.want(TURN);
@@ -173,11 +173,11 @@ describe("driver", () => {
   it("stops once more where a moving command is answered after the stop that followed it", async () => {
     const { calls, send } = connection();
     const driver = new Driver(() => undefined);
-    driver.set_connection(send);
+    driver.setConnection(send);
     driver.want(GO);
     driver.want(STOP);
     await calls[1]?.answer();
-    expect(driver.is_moving).toBe(true);
+    expect(driver.isMoving).toBe(true);
     await calls[0]?.answer();
     vi.advanceTimersByTime(450);
     expect(calls.map((c) => c.command)).toEqual([GO, STOP, STOP]);
@@ -185,7 +185,7 @@ describe("driver", () => {
   it("stops a robot that others move when somebody asks for it, until the robot answers", async () => {
     const { calls, send } = connection();
     const driver = new Driver(() => undefined);
-    driver.set_connection(send);
+    driver.setConnection(send);
     driver.stop();
     expect(calls.map((c) => c.command)).toEqual([STOP]);
     await calls[0]?.fail(new Error("timeout"));
@@ -198,7 +198,7 @@ describe("driver", () => {
   it("repeats a held command, and not a stop", async () => {
     const { calls, send } = connection();
     const driver = new Driver(() => undefined);
-    driver.set_connection(send);
+    driver.setConnection(send);
     driver.want(GO);
     await calls[0]?.answer();
     vi.advanceTimersByTime(450);
@@ -207,20 +207,20 @@ describe("driver", () => {
   it("stops a robot that was moving when its connection broke, as soon as there is one again", async () => {
     const { calls, send } = connection();
     const driver = new Driver(() => undefined);
-    driver.set_connection(send);
+    driver.setConnection(send);
     driver.want(GO);
     await calls[0]?.answer();
-    driver.set_connection(null);
+    driver.setConnection(null);
     driver.want(GO);
     expect(calls).toHaveLength(1);
     const again = connection();
-    driver.set_connection(again.send);
+    driver.setConnection(again.send);
     expect(again.calls.map((c) => c.command)).toEqual([STOP]);
   });
   it("leaves a robot alone that it never moved: somebody else may be driving", () => {
     const { calls, send } = connection();
     const driver = new Driver(() => undefined);
-    driver.set_connection(send);
+    driver.setConnection(send);
     driver.want(STOP);
     expect(calls).toHaveLength(0);
   });
@@ -228,7 +228,7 @@ describe("driver", () => {
     const { calls, send } = connection();
     const errors: unknown[] = [];
     const driver = new Driver((error) => errors.push(error));
-    driver.set_connection(send);
+    driver.setConnection(send);
     driver.want(GO);
     await calls[0]?.fail(new Error("timeout"));
     expect(calls.map((c) => c.command)).toEqual([GO, STOP]);
@@ -245,12 +245,12 @@ describe("driver", () => {
     const { calls, send } = connection();
     const errors: unknown[] = [];
     const driver = new Driver((error) => errors.push(error));
-    driver.set_connection(send);
+    driver.setConnection(send);
     driver.want(GO);
-    driver.set_connection(null);
+    driver.setConnection(null);
     await calls[0]?.fail(new Error("connection lost"));
     expect(errors).toEqual([]);
-    expect(driver.is_moving).toBe(true);
+    expect(driver.isMoving).toBe(true);
   });
 });
 
@@ -262,36 +262,36 @@ describe("sensor packets", () => {
     view.setUint16(17, 16_100);
     view.setInt16(48, -120);
     view.setInt16(50, 250);
-    expect(read_sensor_packet(6, bytes)).toEqual({
+    expect(readSensorPacket(6, bytes)).toEqual({
       bumpers: 3,
-      voltage_mv: 16_100,
-      charge_mah: 0,
-      right_wheel_mm_s: -120,
-      left_wheel_mm_s: 250,
+      voltageMv: 16_100,
+      chargeMah: 0,
+      rightWheelMmS: -120,
+      leftWheelMmS: 250,
     });
   });
   it("reads a single packet, at an unaligned place too", () => {
     const bytes = Uint8Array.of(9, 0xff, 0x88).subarray(1);
-    expect(read_sensor_packet(42, bytes)).toEqual({ left_wheel_mm_s: -120 });
+    expect(readSensorPacket(42, bytes)).toEqual({ leftWheelMmS: -120 });
   });
   it("reads nothing from unknown or misshapen packets", () => {
-    expect(read_sensor_packet(6, new Uint8Array(51))).toEqual({});
-    expect(read_sensor_packet(200, new Uint8Array(2))).toEqual({});
-    expect(read_sensor_packet(3, new Uint8Array(0))).toEqual({});
+    expect(readSensorPacket(6, new Uint8Array(51))).toEqual({});
+    expect(readSensorPacket(200, new Uint8Array(2))).toEqual({});
+    expect(readSensorPacket(3, new Uint8Array(0))).toEqual({});
   });
 });
 
 describe("room and trail", () => {
   it("reads poses, walls and obstacles, and leaves out what is none", () => {
-    expect(pose_of({ x: 1, y: 2, heading: 3, velocity: 0 })).toEqual({ x: 1, y: 2, theta: 3 });
-    expect(pose_of({ x: 1, y: NaN, heading: 0 })).toBeNull();
-    expect(pose_of(null)).toBeNull();
+    expect(poseOf({ x: 1, y: 2, heading: 3, velocity: 0 })).toEqual({ x: 1, y: 2, theta: 3 });
+    expect(poseOf({ x: 1, y: NaN, heading: 0 })).toBeNull();
+    expect(poseOf(null)).toBeNull();
     const wall = { x1: 0, y1: 1, x2: 2, y2: 3 };
-    expect(walls_of([{ ...wall, height: 0.5 }, { x1: "?" }, null])).toEqual([wall]);
-    expect(walls_of(null)).toEqual([]);
+    expect(wallsOf([{ ...wall, height: 0.5 }, { x1: "?" }, null])).toEqual([wall]);
+    expect(wallsOf(null)).toEqual([]);
     const obstacle = { x: 0, y: 1, radius: 0.2 };
-    expect(obstacles_of([{ ...obstacle, height: 0.3 }, { x: 1 }, null])).toEqual([obstacle]);
-    expect(obstacles_of("?")).toEqual([]);
+    expect(obstaclesOf([{ ...obstacle, height: 0.3 }, { x: 1 }, null])).toEqual([obstacle]);
+    expect(obstaclesOf("?")).toEqual([]);
   });
   it("joins walls that come back to their start", () => {
     const square = [
@@ -300,7 +300,7 @@ describe("room and trail", () => {
       { x1: 1, y1: 1, x2: 0, y2: 0 },
     ];
     const free = { x1: 5, y1: 5, x2: 6, y2: 6 };
-    const { loops, open } = loops_of([free, ...square, free]);
+    const { loops, open } = loopsOf([free, ...square, free]);
     expect(loops).toEqual([[{ x: 0, y: 0 }, { x: 1, y: 0 }, { x: 1, y: 1 }]]);
     expect(open).toEqual([free, free]);
   });
@@ -333,19 +333,19 @@ describe("series", () => {
   it("counts a rate over two seconds", () => {
     const series = new Series(5000);
     for (let t = 0; t < 4000; t += 50) series.push(t, 1);
-    expect(rate_of(series, 3999)).toBe(20);
-    expect(rate_of(series, 9000)).toBe(0);
+    expect(rateOf(series, 3999)).toBe(20);
+    expect(rateOf(series, 9000)).toBe(0);
   });
 });
 
 describe("the song", () => {
   it("is pairs of note and length, and rises with the way", () => {
-    expect(Array.from(song_after(0)).slice(0, 4)).toEqual([60, 16, 64, 16]);
-    expect(song_after(100)[0]).toBe(61);
-    expect(song_after(1200)[0]).toBe(60);
-    expect(song_after(-100)[0]).toBe(71);
+    expect(Array.from(songAfter(0)).slice(0, 4)).toEqual([60, 16, 64, 16]);
+    expect(songAfter(100)[0]).toBe(61);
+    expect(songAfter(1200)[0]).toBe(60);
+    expect(songAfter(-100)[0]).toBe(71);
   });
   it("is named as musicians do", () => {
-    expect(name_notes(Uint8Array.of(60, 16, 61, 8, 71, 1))).toBe("C4 C♯4 B4");
+    expect(nameNotes(Uint8Array.of(60, 16, 61, 8, 71, 1))).toBe("C4 C♯4 B4");
   });
 });

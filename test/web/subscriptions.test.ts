@@ -1,9 +1,9 @@
 // What the clients of a shared device listen to: read, kept while the gateway is away, asked for only while shown.
-import { away_after, read_subscriptions, SubscriptionList } from "../../web/src/gateway/subscriptions";
-import type { SubscriptionsState } from "../../web/src/gateway/subscriptions";
-import { age_text } from "../../web/src/ui/words";
+import { awayAfter, readSubscriptions, SubscriptionList } from "../../web/src/gateway/subscriptions";
+import type { Subscription, SubscriptionsState } from "../../web/src/gateway/subscriptions";
+import { ageText } from "../../web/src/ui/words";
 
-const frames = {
+const frames: Subscription = {
   client: "192.0.2.1:5",
   path: "Webcam.Webcams[0]",
   member: "FrameStream",
@@ -11,26 +11,30 @@ const frames = {
   delivered: 12,
   conflated: 0,
   dropped: 1,
-  age_p50_ms: 0.5,
-  age_p99_ms: 16.4,
+  ageP50Ms: 0.5,
+  ageP99Ms: 16.4,
 };
+
+/** As the gateway writes it. */
+const written = ({ ageP50Ms, ageP99Ms, ...rest }: Subscription): object => ({ ...rest, age_p50_ms: ageP50Ms, age_p99_ms: ageP99Ms });
 
 describe("subscriptions", () => {
   it("are read by member, then client", () => {
     const other = { ...frames, client: "192.0.2.1:4" };
     const wire = { ...frames, path: "Create", member: "state", kind: "wire", conflated: 7 };
-    expect(read_subscriptions({ subscriptions: [frames, other, null, { ...wire, service: "Create" }] })).toEqual([wire, other, frames]);
-    expect(read_subscriptions({ subscriptions: [{}] })).toMatchObject([{ client: "", member: "", delivered: 0, age_p99_ms: 0 }]);
-    expect(() => read_subscriptions({ devices: [] })).toThrow('no list "subscriptions"');
+    const answer = { subscriptions: [written(frames), written(other), null, { ...written(wire), service: "Create" }] };
+    expect(readSubscriptions(answer)).toEqual([wire, other, frames]);
+    expect(readSubscriptions({ subscriptions: [{}] })).toMatchObject([{ client: "", member: "", delivered: 0, ageP99Ms: 0 }]);
+    expect(() => readSubscriptions({ devices: [] })).toThrow('no list "subscriptions"');
   });
 
   it("stay as they were while the gateway is away, since when it went", () => {
     const known: SubscriptionsState = { kind: "known", subscriptions: [frames] };
-    const away = away_after(known, new TypeError("fetch failed"), 1000);
+    const away = awayAfter(known, new TypeError("fetch failed"), 1000);
     expect(away).toEqual({ kind: "away", since: 1000, reason: "the gateway cannot be reached", subscriptions: [frames] });
-    expect(away_after(away, new Error("late"), 2000)).toMatchObject({ since: 1000, reason: "late", subscriptions: [frames] });
-    expect(away_after({ kind: "loading" }, new Error("late"), 2000)).toMatchObject({ since: 2000, subscriptions: null });
-    expect(away_after({ kind: "denied", reason: "no" }, new Error("late"), 3)).toMatchObject({ subscriptions: null });
+    expect(awayAfter(away, new Error("late"), 2000)).toMatchObject({ since: 1000, reason: "late", subscriptions: [frames] });
+    expect(awayAfter({ kind: "loading" }, new Error("late"), 2000)).toMatchObject({ since: 2000, subscriptions: null });
+    expect(awayAfter({ kind: "denied", reason: "no" }, new Error("late"), 3)).toMatchObject({ subscriptions: null });
   });
 });
 
@@ -64,7 +68,7 @@ describe("a list of subscriptions", () => {
   });
 
   it("is asked again every 3 s, and no more once it is closed", async () => {
-    answers.push(Response.json({ subscriptions: [frames] }), Response.json({ subscriptions: [] }));
+    answers.push(Response.json({ subscriptions: [written(frames)] }), Response.json({ subscriptions: [] }));
     const list = new SubscriptionList("a b");
     list.start();
     await vi.advanceTimersByTimeAsync(0);
@@ -105,5 +109,5 @@ describe("a list of subscriptions", () => {
 });
 
 it("an age has the digits that matter", () => {
-  expect([0, 0.44, 12.3, 999, 1512].map(age_text)).toEqual(["0.0 ms", "0.4 ms", "12 ms", "999 ms", "1.5 s"]);
+  expect([0, 0.44, 12.3, 999, 1512].map(ageText)).toEqual(["0.0 ms", "0.4 ms", "12 ms", "999 ms", "1.5 s"]);
 });

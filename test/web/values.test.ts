@@ -1,79 +1,79 @@
-import { format_bytes, format_hex, format_number, format_value } from "../../web/src/values/format";
-import { readings_of } from "../../web/src/values/numeric";
-import { parse_input, placeholder } from "../../web/src/values/parse";
-import { parse_type, short_name } from "../../web/src/values/type_text";
+import { formatBytes, formatHex, formatNumber, formatValue } from "../../web/src/values/format";
+import { readingsOf } from "../../web/src/values/numeric";
+import { parseInput, placeholder } from "../../web/src/values/parse";
+import { parseType, shortName } from "../../web/src/values/type_text";
 
 describe("type text", () => {
   it("takes a type apart", () => {
-    expect(parse_type("double")).toEqual({ base: "double", array: "none", sizes: [], container: "none" });
-    expect(parse_type("uint8[]")).toMatchObject({ base: "uint8", array: "any" });
-    expect(parse_type("double[3]{list}")).toEqual({ base: "double", array: "fixed", sizes: [3], container: "list" });
-    expect(parse_type("int16[5-]")).toMatchObject({ array: "max", sizes: [5] });
-    expect(parse_type("single[*]")).toMatchObject({ array: "multidim", sizes: [] });
-    expect(parse_type("single[3,4]")).toMatchObject({ array: "multidim", sizes: [3, 4] });
-    expect(parse_type("single[3,]")).toMatchObject({ array: "multidim", sizes: [3] });
-    expect(parse_type("com.example.Pose{string}")).toMatchObject({ base: "com.example.Pose", container: "string" });
-    expect(short_name("experimental.create2.Create")).toBe("Create");
+    expect(parseType("double")).toEqual({ base: "double", array: "none", sizes: [], container: "none" });
+    expect(parseType("uint8[]")).toMatchObject({ base: "uint8", array: "any" });
+    expect(parseType("double[3]{list}")).toEqual({ base: "double", array: "fixed", sizes: [3], container: "list" });
+    expect(parseType("int16[5-]")).toMatchObject({ array: "max", sizes: [5] });
+    expect(parseType("single[*]")).toMatchObject({ array: "multidim", sizes: [] });
+    expect(parseType("single[3,4]")).toMatchObject({ array: "multidim", sizes: [3, 4] });
+    expect(parseType("single[3,]")).toMatchObject({ array: "multidim", sizes: [3] });
+    expect(parseType("com.example.Pose{string}")).toMatchObject({ base: "com.example.Pose", container: "string" });
+    expect(shortName("experimental.create2.Create")).toBe("Create");
   });
   it("refuses what is no type, and says what it found", () => {
-    expect(() => parse_type("double [3]")).toThrow('"double [3]" is not a Robot Raconteur type');
-    expect(() => parse_type("")).toThrow();
+    expect(() => parseType("double [3]")).toThrow('"double [3]" is not a Robot Raconteur type');
+    expect(() => parseType("")).toThrow();
   });
 });
 
 describe("typed input", () => {
   it("reads integers in their range, hexadecimal too", () => {
-    expect(parse_input(" -32768 ", "int16")).toBe(-32768);
-    expect(parse_input("0xff", "uint8")).toBe(255);
-    expect(parse_input("-0x80", "int8")).toBe(-128);
-    expect(() => parse_input("32768", "int16")).toThrow("32768 is out of range; expected int16, -32768 to 32767");
-    expect(() => parse_input("1.5", "int32")).toThrow('"1.5" is not a whole number; expected int32');
-    expect(() => parse_input("", "uint8")).toThrow('"" is not a whole number');
+    expect(parseInput(" -32768 ", "int16")).toBe(-32768);
+    expect(parseInput("0xff", "uint8")).toBe(255);
+    expect(parseInput("-0x80", "int8")).toBe(-128);
+    expect(() => parseInput("32768", "int16")).toThrow("32768 is out of range; expected int16, -32768 to 32767");
+    expect(() => parseInput("1.5", "int32")).toThrow('"1.5" is not a whole number; expected int32');
+    expect(() => parseInput("", "uint8")).toThrow('"" is not a whole number');
   });
   it("reads 64-bit integers without rounding", () => {
-    expect(parse_input("9223372036854775807", "int64")).toBe(9223372036854775807n);
-    expect(parse_input("18446744073709551615", "uint64")).toBe(2n ** 64n - 1n);
-    expect(() => parse_input("18446744073709551616", "uint64")).toThrow("out of range");
-    expect(parse_input("[9007199254740993, 1]", "int64[]")).toEqual(BigInt64Array.of(9007199254740993n, 1n));
-    expect(parse_input("[9007199254740993]", "int64{list}")).toEqual([9007199254740993n]);
+    expect(parseInput("9223372036854775807", "int64")).toBe(9223372036854775807n);
+    expect(parseInput("18446744073709551615", "uint64")).toBe(2n ** 64n - 1n);
+    expect(() => parseInput("18446744073709551616", "uint64")).toThrow("out of range");
+    expect(parseInput("[9007199254740993, 1]", "int64[]")).toEqual(BigInt64Array.of(9007199254740993n, 1n));
+    expect(parseInput("[9007199254740993]", "int64{list}")).toEqual([9007199254740993n]);
   });
   it("reads floating point, the special numbers by name", () => {
-    expect(parse_input("-1.5e3", "double")).toBe(-1500);
-    expect(parse_input("nan", "single")).toBeNaN();
-    expect(parse_input("-Infinity", "double")).toBe(-Infinity);
-    expect(() => parse_input("fast", "double")).toThrow('"fast" is not a number; expected a double');
-    expect(() => parse_input("  ", "double")).toThrow("is not a number");
+    expect(parseInput("-1.5e3", "double")).toBe(-1500);
+    expect(parseInput("nan", "single")).toBeNaN();
+    expect(parseInput("-Infinity", "double")).toBe(-Infinity);
+    expect(() => parseInput("fast", "double")).toThrow('"fast" is not a number; expected a double');
+    expect(() => parseInput("  ", "double")).toThrow("is not a number");
   });
   it("reads bool and string", () => {
-    expect(parse_input("true", "bool")).toBe(true);
-    expect(parse_input("0", "bool")).toBe(false);
-    expect(() => parse_input("yes", "bool")).toThrow('"yes" is not a bool');
-    expect(parse_input("  as it is  ", "string")).toBe("  as it is  ");
+    expect(parseInput("true", "bool")).toBe(true);
+    expect(parseInput("0", "bool")).toBe(false);
+    expect(() => parseInput("yes", "bool")).toThrow('"yes" is not a bool');
+    expect(parseInput("  as it is  ", "string")).toBe("  as it is  ");
   });
   it("reads numeric arrays with or without brackets, and checks their length", () => {
-    expect(parse_input("1, 2 3", "double[]")).toEqual(Float64Array.of(1, 2, 3));
-    expect(parse_input("[1, 2]", "uint8[]")).toEqual(Uint8Array.of(1, 2));
-    expect(parse_input("", "int16[]")).toEqual(new Int16Array());
-    expect(() => parse_input("1, 2", "double[3]")).toThrow("found 2 elements, expected exactly 3");
-    expect(() => parse_input("1, 2, 3", "double[2-]")).toThrow("found 3 elements, expected at most 2");
-    expect(() => parse_input("1, 256", "uint8[]")).toThrow("element 1: 256 is out of range; expected uint8, 0 to 255");
+    expect(parseInput("1, 2 3", "double[]")).toEqual(Float64Array.of(1, 2, 3));
+    expect(parseInput("[1, 2]", "uint8[]")).toEqual(Uint8Array.of(1, 2));
+    expect(parseInput("", "int16[]")).toEqual(new Int16Array());
+    expect(() => parseInput("1, 2", "double[3]")).toThrow("found 2 elements, expected exactly 3");
+    expect(() => parseInput("1, 2, 3", "double[2-]")).toThrow("found 3 elements, expected at most 2");
+    expect(() => parseInput("1, 256", "uint8[]")).toThrow("element 1: 256 is out of range; expected uint8, 0 to 255");
   });
   it("reads complex and multidimensional values", () => {
-    expect(parse_input("[1, -2]", "cdouble")).toEqual({ re: 1, im: -2 });
-    expect(parse_input('{"dims": [2, 1], "data": [1, 2]}', "double[*]")).toEqual({ dims: [2, 1], data: Float64Array.of(1, 2) });
-    expect(() => parse_input('{"dims": [2, 2], "data": [1]}', "double[*]")).toThrow("dims 2 × 2 need 4 elements, found 1");
+    expect(parseInput("[1, -2]", "cdouble")).toEqual({ re: 1, im: -2 });
+    expect(parseInput('{"dims": [2, 1], "data": [1, 2]}', "double[*]")).toEqual({ dims: [2, 1], data: Float64Array.of(1, 2) });
+    expect(() => parseInput('{"dims": [2, 2], "data": [1]}', "double[*]")).toThrow("dims 2 × 2 need 4 elements, found 1");
   });
   it("reads containers: lists, and maps by number and by name", () => {
-    expect(parse_input("[1, 2]", "int32{list}")).toEqual([1, 2]);
-    expect(parse_input('{"-5": "a"}', "string{int32}")).toEqual(new Map([[-5, "a"]]));
-    expect(parse_input('{"__proto__": 1}', "double{string}")).toEqual(new Map([["__proto__", 1]]));
-    expect(() => parse_input('{"x": 1}', "double{int32}")).toThrow("is not a whole number");
-    expect(() => parse_input("5", "double{list}")).toThrow("expected a list");
+    expect(parseInput("[1, 2]", "int32{list}")).toEqual([1, 2]);
+    expect(parseInput('{"-5": "a"}', "string{int32}")).toEqual(new Map([[-5, "a"]]));
+    expect(parseInput('{"__proto__": 1}', "double{string}")).toEqual(new Map([["__proto__", 1]]));
+    expect(() => parseInput('{"x": 1}', "double{int32}")).toThrow("is not a whole number");
+    expect(() => parseInput("5", "double{list}")).toThrow("expected a list");
   });
   it("reads structs and enums as JSON, and says what is no JSON", () => {
-    expect(parse_input('{"x": 1}', "com.example.Pose")).toEqual({ x: 1 });
-    expect(parse_input("3", "com.example.Mode")).toBe(3);
-    expect(() => parse_input("{x: 1}", "com.example.Pose")).toThrow('"{x: 1}" is not valid JSON; expected com.example.Pose');
+    expect(parseInput('{"x": 1}', "com.example.Pose")).toEqual({ x: 1 });
+    expect(parseInput("3", "com.example.Mode")).toBe(3);
+    expect(() => parseInput("{x: 1}", "com.example.Pose")).toThrow('"{x: 1}" is not valid JSON; expected com.example.Pose');
   });
   it("shows an example for every kind of type", () => {
     for (const type of ["double", "int8", "string", "cdouble", "double[]", "double[*]", "int8{list}", "int8{int32}", "int8{string}", "a.B"]) {
@@ -84,50 +84,50 @@ describe("typed input", () => {
 
 describe("shown values", () => {
   it("shows numbers shortly and without losing whole ones", () => {
-    expect(format_number(123456789)).toBe("123456789");
-    expect(format_number(1 / 3)).toBe("0.333333");
-    expect(format_number(0.1 + 0.2)).toBe("0.3");
-    expect(format_number(1.5e-9)).toBe("1.5000e-9");
-    expect(format_number(NaN)).toBe("NaN");
+    expect(formatNumber(123456789)).toBe("123456789");
+    expect(formatNumber(1 / 3)).toBe("0.333333");
+    expect(formatNumber(0.1 + 0.2)).toBe("0.3");
+    expect(formatNumber(1.5e-9)).toBe("1.5000e-9");
+    expect(formatNumber(NaN)).toBe("NaN");
   });
   it("shows nested values, and no more than a bounded part of large ones", () => {
-    expect(format_value({ x: 1, label: "a" })).toBe('x: 1\nlabel: "a"');
-    expect(format_value({ a: { b: 1, c: 2 } })).toBe("a: {b: 1, c: 2}");
-    expect(format_value([{ x: 1, note: "n".repeat(80) }])).toBe(`[\n  {\n    x: 1\n    note: "${"n".repeat(80)}"\n  }\n]`);
-    expect(format_value(Uint8Array.of(1, 2))).toBe("[1, 2]");
-    expect(format_value(new Map([[0, "front"]]))).toBe('0: "front"');
-    expect(format_value({ dims: [2, 1], data: Float64Array.of(1, 2) })).toBe("2 × 1 [1, 2]");
-    expect(format_value(new Uint8Array(1_000_000))).toMatch(/… 999984 more\]$/);
-    expect(format_value("x".repeat(10_000)).length).toBeLessThan(450);
-    expect(format_value(9007199254740993n)).toBe("9007199254740993");
-    expect(format_value(null)).toBe("null");
-    expect(format_value({ re: 1.5, im: -2 })).toBe("1.5 - 2i");
+    expect(formatValue({ x: 1, label: "a" })).toBe('x: 1\nlabel: "a"');
+    expect(formatValue({ a: { b: 1, c: 2 } })).toBe("a: {b: 1, c: 2}");
+    expect(formatValue([{ x: 1, note: "n".repeat(80) }])).toBe(`[\n  {\n    x: 1\n    note: "${"n".repeat(80)}"\n  }\n]`);
+    expect(formatValue(Uint8Array.of(1, 2))).toBe("[1, 2]");
+    expect(formatValue(new Map([[0, "front"]]))).toBe('0: "front"');
+    expect(formatValue({ dims: [2, 1], data: Float64Array.of(1, 2) })).toBe("2 × 1 [1, 2]");
+    expect(formatValue(new Uint8Array(1_000_000))).toMatch(/… 999984 more\]$/);
+    expect(formatValue("x".repeat(10_000)).length).toBeLessThan(450);
+    expect(formatValue(9007199254740993n)).toBe("9007199254740993");
+    expect(formatValue(null)).toBe("null");
+    expect(formatValue({ re: 1.5, im: -2 })).toBe("1.5 - 2i");
   });
   it("ends on values that contain themselves", () => {
     const loop: Record<string, unknown> = {};
     loop["self"] = loop;
-    expect(format_value(loop)).toContain("…");
+    expect(formatValue(loop)).toContain("…");
   });
   it("shows bytes and sizes", () => {
-    expect(format_hex(Uint8Array.of(1, 255, 16), 2)).toBe("01 ff …");
-    expect(format_bytes(512)).toBe("512 B");
-    expect(format_bytes(10 * 1024 * 1024)).toBe("10.0 MB");
+    expect(formatHex(Uint8Array.of(1, 255, 16), 2)).toBe("01 ff …");
+    expect(formatBytes(512)).toBe("512 B");
+    expect(formatBytes(10 * 1024 * 1024)).toBe("10.0 MB");
   });
 });
 
 describe("readings for a plot", () => {
   it("finds numbers by their place in the value", () => {
-    expect(readings_of(5)).toEqual([{ label: "", value: 5 }]);
-    expect(readings_of({ pose: { x: 1, y: 2 }, on: true })).toEqual([
+    expect(readingsOf(5)).toEqual([{ label: "", value: 5 }]);
+    expect(readingsOf({ pose: { x: 1, y: 2 }, on: true })).toEqual([
       { label: "pose.x", value: 1 },
       { label: "pose.y", value: 2 },
       { label: "on", value: 1 },
     ]);
-    expect(readings_of(Float64Array.of(1, 2)).map((r) => r.label)).toEqual(["[0]", "[1]"]);
-    expect(readings_of(7n)).toEqual([{ label: "", value: 7 }]);
+    expect(readingsOf(Float64Array.of(1, 2)).map((r) => r.label)).toEqual(["[0]", "[1]"]);
+    expect(readingsOf(7n)).toEqual([{ label: "", value: 7 }]);
   });
   it("leaves out data and text, and stops at six", () => {
-    expect(readings_of({ image: new Uint8Array(1000), name: "x" })).toEqual([]);
-    expect(readings_of({ a: 1, b: 2, c: 3, d: 4, e: 5, f: 6, g: 7 })).toHaveLength(6);
+    expect(readingsOf({ image: new Uint8Array(1000), name: "x" })).toEqual([]);
+    expect(readingsOf({ a: 1, b: 2, c: 3, d: 4, e: 5, f: 6, g: 7 })).toHaveLength(6);
   });
 });

@@ -5,7 +5,7 @@ export interface Clock {
   after(milliseconds: number, due: () => void): () => void;
 }
 
-export const system_clock: Clock = {
+export const systemClock: Clock = {
   after(milliseconds, due) {
     const timer = setTimeout(due, milliseconds);
     return () => clearTimeout(timer);

@@ -1,15 +1,15 @@
 // connect(): from a URL to an object. Layer: wasm-client/ts.
-import { make_error } from "./errors.js";
+import { makeError } from "./errors.js";
 import { ObjectTree } from "./object.js";
-import { check_timeout, Session } from "./session.js";
+import { checkTimeout, Session } from "./session.js";
 import type { OpenTransport, Transport } from "./transport.js";
 import type { ObjectInfo, RemoteObject } from "./types.js";
-import { parse_service_url } from "./url.js";
-import { open_usb } from "./usb_devices.js";
+import { parseServiceUrl } from "./url.js";
+import { openUsb } from "./usb_devices.js";
 import { Core } from "./wasm_module.js";
 import type { KnownDefinitions } from "./wasm_module.js";
-import { open_websocket } from "./websocket.js";
-import { check_signal } from "./within.js";
+import { openWebsocket } from "./websocket.js";
+import { checkSignal } from "./within.js";
 
 export interface ConnectOptions {
   /** Gives up connecting. Once connected it has no effect; use `$.close()`. */
@@ -36,8 +36,8 @@ export interface ConnectOptions {
   transport?: OpenTransport | undefined;
 }
 
-const default_connect_timeout = 30_000;
-const default_request_timeout = 15_000;
+const defaultConnectTimeout = 30_000;
+const defaultRequestTimeout = 15_000;
 
 /** What stays from one connection of a subscription to the next. */
 export interface Memory {
@@ -57,36 +57,36 @@ export function connect<T = RemoteObject>(
   url: string | URL,
   options: ConnectOptions = {},
 ): Promise<T & { readonly $: ObjectInfo }> {
-  return connect_with<T>(url, options);
+  return connectWith<T>(url, options);
 }
 
 /** As connect(). A service that has the definitions in `memory` does not send them again; in the end others are there. */
-export async function connect_with<T>(
+export async function connectWith<T>(
   url: string | URL,
   options: ConnectOptions,
   memory?: Memory,
 ): Promise<T & { readonly $: ObjectInfo }> {
   const { signal } = options;
-  check_signal(signal);
+  checkSignal(signal);
   signal?.throwIfAborted();
-  const { address, service, nodeId, nodeName } = parse_service_url(url);
-  const timeout = check_timeout(options.timeout ?? default_connect_timeout);
-  const request_timeout = check_timeout(options.requestTimeout ?? default_request_timeout, "requestTimeout");
+  const { address, service, nodeId, nodeName } = parseServiceUrl(url);
+  const timeout = checkTimeout(options.timeout ?? defaultConnectTimeout);
+  const requestTimeout = checkTimeout(options.requestTimeout ?? defaultRequestTimeout, "requestTimeout");
   if (options.username === undefined && (options.password ?? options.credentials) !== undefined) {
     // Without it there would be a session, but nobody's.
-    throw make_error("InvalidArgument", "found a password or credentials without username");
+    throw makeError("InvalidArgument", "found a password or credentials without username");
   }
 
   const attempt = new Attempt();
   const abort = () => attempt.fail(signal?.reason);
   signal?.addEventListener("abort", abort, { once: true });
   const timer = setTimeout(
-    () => attempt.fail(make_error("RequestTimeout", `${address.host || address.href}: no session within ${timeout} ms`)),
+    () => attempt.fail(makeError("RequestTimeout", `${address.host || address.href}: no session within ${timeout} ms`)),
     Math.min(timeout, 2 ** 31 - 1),
   );
   try {
-    await attempt.open(address, options.transport ?? (address.protocol === "rr+usb:" ? open_usb : open_websocket));
-    const core = await attempt.unless_failed(
+    await attempt.open(address, options.transport ?? (address.protocol === "rr+usb:" ? openUsb : openWebsocket));
+    const core = await attempt.unlessFailed(
       Core.create({
         service,
         nodeId,
@@ -102,9 +102,9 @@ export async function connect_with<T>(
         known: memory?.known,
       }),
     );
-    const session = attempt.begin(core, request_timeout);
-    if (memory) session.on_close(() => (memory.known = core.known_definitions()));
-    const type = await attempt.unless_failed(session.start());
+    const session = attempt.begin(core, requestTimeout);
+    if (memory) session.onClose(() => (memory.known = core.knownDefinitions()));
+    const type = await attempt.unlessFailed(session.start());
     return new ObjectTree(session).root(service, type) as T & { readonly $: ObjectInfo };
   } catch (error) {
     attempt.fail(error);
@@ -121,7 +121,7 @@ class Attempt {
   #session: Session | undefined;
   /** Comes before the core is there, if a peer speaks first. */
   #early: Uint8Array[] = [];
-  #has_failed = false;
+  #hasFailed = false;
   readonly #failure: Promise<never>;
   #reject!: (reason: unknown) => void;
 
@@ -132,7 +132,7 @@ class Attempt {
 
   async open(url: URL, open: OpenTransport): Promise<void> {
     let opened!: () => void;
-    const is_open = new Promise<void>((resolve) => (opened = resolve));
+    const isOpen = new Promise<void>((resolve) => (opened = resolve));
     const opening = Promise.resolve(
       open(url, {
         opened,
@@ -142,19 +142,19 @@ class Attempt {
         },
         closed: (reason) => {
           if (this.#session) this.#session.lost(reason);
-          else this.fail(make_error("ConnectionError", reason));
+          else this.fail(makeError("ConnectionError", reason));
         },
       }),
     );
     void opening.then(
       (transport) => {
         this.#transport = transport;
-        if (this.#has_failed) transport.close();
+        if (this.#hasFailed) transport.close();
       },
       () => undefined,
     );
-    await this.unless_failed(opening);
-    await this.unless_failed(is_open);
+    await this.unlessFailed(opening);
+    await this.unlessFailed(isOpen);
   }
 
   begin(core: Core, timeout: number): Session {
@@ -164,14 +164,14 @@ class Attempt {
     return session;
   }
 
-  unless_failed<T>(step: Promise<T>): Promise<T> {
+  unlessFailed<T>(step: Promise<T>): Promise<T> {
     return Promise.race([step, this.#failure]);
   }
 
   /** Ends what there is; the first reason counts. */
   fail(reason: unknown): void {
-    if (this.#has_failed) return;
-    this.#has_failed = true;
+    if (this.#hasFailed) return;
+    this.#hasFailed = true;
     this.#reject(reason);
     if (this.#session) void this.#session.close();
     else this.#transport?.close();

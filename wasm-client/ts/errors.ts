@@ -55,7 +55,7 @@ export const ErrorCode = {
  * The `subName` of ConnectionError where a connection that was up broke: calls that were under way may have been
  * carried out or not.
  */
-export const connection_lost = "connection_lost";
+export const connectionLost = "connection_lost";
 
 export interface ErrorFields {
   code: number;
@@ -69,7 +69,7 @@ export interface ErrorFields {
 export class RobotRaconteurError extends Error {
   /** The protocol's number, as in {@link ErrorCode}; 100 for exceptions that a service definition declares. */
   readonly code: number;
-  /** What a service adds to the name; usually "". "connection_lost": this call was under way when the session broke. */
+  /** What a service adds to the name; usually "". "connectionLost": this call was under way when the session broke. */
   readonly subName: string;
   /** What a service adds to the message, as a varvalue; usually null. */
   readonly param: unknown;
@@ -86,12 +86,12 @@ export class RobotRaconteurError extends Error {
 
 type CodeName = keyof typeof ErrorCode;
 
-export function make_error(name: CodeName, message: string): RobotRaconteurError {
+export function makeError(name: CodeName, message: string): RobotRaconteurError {
   return new RobotRaconteurError({ code: ErrorCode[name], name: `RobotRaconteur.${name}`, message });
 }
 
 /** The message of whatever was thrown. */
-export const text_of = (thrown: unknown): string => (thrown instanceof Error ? thrown.message : String(thrown));
+export const textOf = (thrown: unknown): string => (thrown instanceof Error ? thrown.message : String(thrown));
 
 /** Hands an exception of application code to whoever collects those, so that it ends nothing else. */
 export function report(error: unknown): void {
@@ -101,7 +101,7 @@ export function report(error: unknown): void {
 }
 
 /** Calls application code; what it throws is reported and disturbs nothing else. */
-export function call_safely(what: () => void): void {
+export function callSafely(what: () => void): void {
   try {
     what();
   } catch (error) {

@@ -1,5 +1,5 @@
 // Services of a type, among the devices of a gateway. Layer: wasm-client/ts. Source: GET /api/v1/devices.
-import { make_error, text_of } from "./errors.js";
+import { makeError, textOf } from "./errors.js";
 
 /** A service of a device of a gateway. */
 export interface FoundService {
@@ -22,6 +22,7 @@ export interface ServiceQuery {
   filter?: ((found: FoundService) => boolean) | undefined;
 }
 
+/* eslint-disable @typescript-eslint/naming-convention -- names of the gateway */
 interface Device {
   name: string;
   state: string;
@@ -29,6 +30,7 @@ interface Device {
   node_name: string | null;
   services: { name: string; type: string }[];
 }
+/* eslint-enable @typescript-eslint/naming-convention */
 
 /**
  * The services that are there now, on devices that are online.
@@ -40,14 +42,14 @@ export async function findServices(query: ServiceQuery, signal?: AbortSignal): P
     const gateway = new URL(String(query.gateway).replace(/\/*$/, "/"), globalThis.location?.href);
     const response = await fetch(new URL("api/v1/devices", gateway), { signal: signal ?? null, cache: "no-store" });
     if (!response.ok) throw new Error(`HTTP ${response.status}`);
-    for (const { name, state, node_id, node_name, services } of (await response.json()).devices as Device[])
+    for (const { name, state, node_id: nodeId, node_name: nodeName, services } of ((await response.json()) as { devices: Device[] }).devices)
       for (const { name: service, type } of state === "online" ? services : [])
         if (type === query.type) {
           const url = new URL(`devices/${encodeURIComponent(name)}?service=${encodeURIComponent(service)}`, gateway);
-          found.push({ url: String(url), device: name, service, type, nodeId: node_id, nodeName: node_name });
+          found.push({ url: String(url), device: name, service, type, nodeId, nodeName });
         }
   } catch (error) {
-    throw make_error("ConnectionError", `devices of the gateway ${query.gateway}: ${text_of(error)}`);
+    throw makeError("ConnectionError", `devices of the gateway ${query.gateway}: ${textOf(error)}`);
   }
   return found.filter(query.filter ?? (() => true));
 }

@@ -7,13 +7,13 @@
 export type Handle = number;
 const failed: Handle = 0;
 
-const exact_mark = Symbol.for("rrgate.exactValue");
-const type_mark = Symbol.for("rrgate.type");
+const exactMark = Symbol.for("rrgate.exactValue");
+const typeMark = Symbol.for("rrgate.type");
 const decoder = new TextDecoder("utf-8", { ignoreBOM: true });
 const encoder = new TextEncoder();
 
 /** By rr::DataType, from 1 on. */
-const item_types = [
+const itemTypes = [
   Float64Array,
   Float32Array,
   Int8Array,
@@ -25,9 +25,9 @@ const item_types = [
   BigInt64Array,
   BigUint64Array,
 ];
-const item_names = item_types.map((type) => type.name);
+const itemNames = itemTypes.map((type) => type.name);
 /** The engine's own getter: knows arrays of other realms (frames, vm contexts), runs no foreign code, never throws. */
-const name_of_items = Object.getOwnPropertyDescriptor(
+const nameOfItems = Object.getOwnPropertyDescriptor(
   Object.getPrototypeOf(Uint8Array.prototype) as object,
   Symbol.toStringTag,
 )!.get!;
@@ -35,13 +35,13 @@ const name_of_items = Object.getOwnPropertyDescriptor(
 type Dictionary = Record<PropertyKey, unknown>;
 
 /** 0 for what is no TypedArray. */
-function items_type(value: unknown): number {
-  const name = name_of_items.call(value) as string | undefined;
-  return name === undefined ? 0 : 1 + item_names.indexOf(name === "Uint8ClampedArray" ? "Uint8Array" : name);
+function itemsType(value: unknown): number {
+  const name = nameOfItems.call(value) as string | undefined;
+  return name === undefined ? 0 : 1 + itemNames.indexOf(name === "Uint8ClampedArray" ? "Uint8Array" : name);
 }
 
 /** As rr::JsKind. */
-function kind_of(value: unknown): number {
+function kindOf(value: unknown): number {
   switch (typeof value) {
     case "undefined":
       return 0;
@@ -60,15 +60,15 @@ function kind_of(value: unknown): number {
   }
   if (value === null) return 1;
   if (Array.isArray(value)) return 6;
-  if (items_type(value)) return 7;
+  if (itemsType(value)) return 7;
   const tag = Object.prototype.toString.call(value);
   if (tag === "[object Map]") return 8;
-  if ((value as Dictionary)[exact_mark] === true) return 9;
+  if ((value as Dictionary)[exactMark] === true) return 9;
   return tag === "[object ArrayBuffer]" || tag === "[object Date]" || ArrayBuffer.isView(value) ? 11 : 10;
 }
 
 /** Members that the object or its class brings; not what every object has ("constructor"). */
-function field_of(object: Dictionary, name: string): unknown {
+function fieldOf(object: Dictionary, name: string): unknown {
   if (Object.prototype.hasOwnProperty.call(object, name)) return object[name];
   return name in object && !(name in Object.prototype) ? object[name] : undefined;
 }
@@ -94,7 +94,7 @@ export class JsValues {
   /** A view on the core's memory as it is now. */
   get bytes(): Uint8Array<ArrayBuffer> {
     // Growing detaches the buffer; then its views are empty.
-    if (this.#bytes.length === 0) this.#bytes = new Uint8Array(this.#core.memory.buffer as ArrayBuffer);
+    if (this.#bytes.length === 0) this.#bytes = new Uint8Array(this.#core.memory.buffer);
     return this.#bytes;
   }
 
@@ -144,7 +144,7 @@ export class JsValues {
   }
 
   /** Reads `count` items of an array: -1, or the index of the first that `write` does not take, or -2 on a throw. */
-  #read_items(handle: Handle, count: number, write: (item: unknown, index: number) => boolean): number {
+  #readItems(handle: Handle, count: number, write: (item: unknown, index: number) => boolean): number {
     try {
       const items = this.#values[handle] as ArrayLike<unknown>;
       for (let i = 0; i < count; ++i) if (!write(items[i], i)) return i;
@@ -161,27 +161,27 @@ export class JsValues {
 
       kind: (handle: Handle): number => {
         try {
-          return kind_of(this.#values[handle]);
+          return kindOf(this.#values[handle]);
         } catch {
           return 11;
         }
       },
-      items_type: (handle: Handle) => items_type(this.#values[handle]),
+      items_type: (handle: Handle) => itemsType(this.#values[handle]),
       number: (handle: Handle) => this.#values[handle] as number,
-      bigint: (handle: Handle, is_unsigned: number, to: number): number => {
+      bigint: (handle: Handle, isUnsigned: number, to: number): number => {
         const value = this.#values[handle] as bigint;
-        if (value !== (is_unsigned ? BigInt.asUintN(64, value) : BigInt.asIntN(64, value))) return 0;
+        if (value !== (isUnsigned ? BigInt.asUintN(64, value) : BigInt.asIntN(64, value))) return 0;
         new DataView(this.bytes.buffer).setBigUint64(to, BigInt.asUintN(64, value), true);
         return 1;
       },
       /** Allocates; 0 where a surrogate stands alone: such text has no UTF-8. */
-      text: (handle: Handle, length_to: number): number => {
+      text: (handle: Handle, lengthTo: number): number => {
         const text = this.#values[handle] as string;
         if (/\p{Surrogate}/u.test(text)) return 0;
         const encoded = encoder.encode(text);
         const at = this.#core.allocate(encoded.length + 1);
         this.bytes.set(encoded, at);
-        new DataView(this.bytes.buffer).setUint32(length_to, encoded.length, true);
+        new DataView(this.bytes.buffer).setUint32(lengthTo, encoded.length, true);
         return at;
       },
       length: (handle: Handle): number => {
@@ -194,7 +194,7 @@ export class JsValues {
       },
       item: (handle: Handle, index: number) => this.#attempt(() => (this.#values[handle] as unknown[])[index]),
       field: (handle: Handle, name: number, length: number) =>
-        this.#attempt(() => field_of(this.#values[handle] as Dictionary, this.#text(name, length))),
+        this.#attempt(() => fieldOf(this.#values[handle] as Dictionary, this.#text(name, length))),
       keys: (handle: Handle) => this.#attempt(() => Object.keys(this.#values[handle] as object)),
       /** [key, value, key, value, ...] */
       map_items: (handle: Handle) =>
@@ -205,7 +205,7 @@ export class JsValues {
         }),
       type_mark: (handle: Handle) =>
         this.#attempt(() => {
-          const mark = (this.#values[handle] as Dictionary)[type_mark];
+          const mark = (this.#values[handle] as Dictionary)[typeMark];
           return typeof mark === "string" ? mark : undefined;
         }),
       copy_items: (handle: Handle, to: number) => {
@@ -214,7 +214,7 @@ export class JsValues {
       },
       read_numbers: (handle: Handle, to: number, count: number) => {
         let view = new DataView(this.bytes.buffer);
-        return this.#read_items(handle, count, (item, index) => {
+        return this.#readItems(handle, count, (item, index) => {
           if (typeof item !== "number") return false;
           // A getter may have made the memory grow.
           if (view.buffer !== this.bytes.buffer) view = new DataView(this.bytes.buffer);
@@ -223,7 +223,7 @@ export class JsValues {
         });
       },
       read_booleans: (handle: Handle, to: number, count: number) =>
-        this.#read_items(handle, count, (item, index) => {
+        this.#readItems(handle, count, (item, index) => {
           if (typeof item !== "boolean") return false;
           this.bytes[to + index] = item ? 1 : 0;
           return true;
@@ -231,12 +231,12 @@ export class JsValues {
 
       make_text: (at: number, length: number) => this.give(this.#text(at, length)),
       make_number: (value: number) => this.give(value),
-      make_bigint: (at: number, is_unsigned: number) => {
+      make_bigint: (at: number, isUnsigned: number) => {
         const view = new DataView(this.bytes.buffer);
-        return this.give(is_unsigned ? view.getBigUint64(at, true) : view.getBigInt64(at, true));
+        return this.give(isUnsigned ? view.getBigUint64(at, true) : view.getBigInt64(at, true));
       },
       make_items: (type: number, at: number, size: number) =>
-        this.give(new item_types[type - 1]!(this.bytes.slice(at, at + size).buffer)),
+        this.give(new itemTypes[type - 1]!(this.bytes.slice(at, at + size).buffer)),
       make_booleans: (at: number, count: number) => this.give(Array.from(this.bytes.subarray(at, at + count), Boolean)),
       /** Parts of complex numbers: every second one. */
       make_parts: (type: number, at: number, count: number, part: number) => {
@@ -262,7 +262,7 @@ export class JsValues {
       set_key: (map: Handle, key: Handle, value: Handle) =>
         void (this.#values[map] as Map<unknown, unknown>).set(this.#values[key], this.#values[value]),
       mark_type: (object: Handle, name: number, length: number) => {
-        Object.defineProperty(this.#values[object], type_mark, { value: this.#text(name, length) });
+        Object.defineProperty(this.#values[object], typeMark, { value: this.#text(name, length) });
       },
 
       random: (to: number, size: number) => void crypto.getRandomValues(this.bytes.subarray(to, to + size)),

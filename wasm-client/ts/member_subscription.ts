@@ -1,6 +1,6 @@
 // Wires and pipes that outlive connections. Layer: wasm-client/ts. Source: sessions spec section 2.17.
 import type { Clock } from "./clock.js";
-import { call_safely, make_error } from "./errors.js";
+import { callSafely, makeError } from "./errors.js";
 import { ValueQueue } from "./members/queue.js";
 import type { Subscription } from "./subscribe.js";
 import type { CallOptions, Losses, PipeEndpoint, RemoteObject, RrValue, WireConnection, WireTime } from "./types.js";
@@ -16,7 +16,7 @@ export interface PipeSubscriptionOptions extends MemberSubscriptionOptions {
 }
 
 /** To the next attempt, where a member could not be connected or the service closed it. */
-const retry_ms = 2_500;
+const retryMs = 2_500;
 
 interface Connection {
   send(value: unknown): Promise<void>;
@@ -30,7 +30,7 @@ abstract class MemberSubscription<C extends Connection> implements AsyncIterable
   readonly #loops = new Set<ValueQueue<RrValue>>();
   readonly #failed = new Set<(error: unknown) => void>();
   readonly #stops: (() => void)[];
-  #stop_waiting: (() => void) | undefined;
+  #stopWaiting: (() => void) | undefined;
   #closed: Promise<void> | undefined;
 
   constructor(
@@ -60,7 +60,7 @@ abstract class MemberSubscription<C extends Connection> implements AsyncIterable
    */
   send(value: unknown): Promise<void> {
     if (this.connection) return this.connection.send(value);
-    return Promise.reject(make_error("InvalidOperation", `${this.member}: is not connected at the moment`));
+    return Promise.reject(makeError("InvalidOperation", `${this.member}: is not connected at the moment`));
   }
 
   /** Of the connection that is up; undefined while there is none, and where the service keeps no account of it. */
@@ -70,7 +70,7 @@ abstract class MemberSubscription<C extends Connection> implements AsyncIterable
 
   /** Leaving the loop closes this subscription of the member. */
   [Symbol.asyncIterator](): AsyncIterator<RrValue, undefined> {
-    const queue = this.make_queue(() => {
+    const queue = this.makeQueue(() => {
       this.#loops.delete(queue);
       void this.close();
     });
@@ -84,7 +84,7 @@ abstract class MemberSubscription<C extends Connection> implements AsyncIterable
     return (this.#closed ??= this.#end());
   }
 
-  protected abstract make_queue(on_return: () => void): ValueQueue<RrValue>;
+  protected abstract makeQueue(onReturn: () => void): ValueQueue<RrValue>;
   /** Connects the member of `object`. */
   protected abstract connect(object: RemoteObject): Promise<C>;
   /** Takes what comes until the connection ends. */
@@ -96,14 +96,14 @@ abstract class MemberSubscription<C extends Connection> implements AsyncIterable
 
   async #end(): Promise<void> {
     for (const stop of this.#stops) stop();
-    this.#stop_waiting?.();
+    this.#stopWaiting?.();
     for (const loop of this.#loops) loop.end();
     this.#loops.clear();
     await this.connection?.close();
   }
 
   async #attach(client: RemoteObject): Promise<void> {
-    this.#stop_waiting?.();
+    this.#stopWaiting?.();
     let connection: C | undefined;
     try {
       const object = this.path === "*" ? client : await client.$.find(this.path);
@@ -111,16 +111,16 @@ abstract class MemberSubscription<C extends Connection> implements AsyncIterable
       if (this.#closed) return void connection.close();
       this.connection = connection;
       await this.follow(connection);
-      throw make_error("InvalidOperation", `${this.member}: the service closed the connection of this member`);
+      throw makeError("InvalidOperation", `${this.member}: the service closed the connection of this member`);
     } catch (error) {
       if (this.#closed) return;
-      for (const failed of [...this.#failed]) call_safely(() => failed(error));
+      for (const failed of [...this.#failed]) callSafely(() => failed(error));
     } finally {
       if (connection && this.connection === connection) this.connection = undefined;
     }
     // Without its client this waits for the next one instead.
     if (client.$.state !== "connected") return;
-    this.#stop_waiting = this.clock.after(retry_ms, () => void this.#attach(client));
+    this.#stopWaiting = this.clock.after(retryMs, () => void this.#attach(client));
   }
 }
 
@@ -148,8 +148,8 @@ export class WireSubscription extends MemberSubscription<WireConnection> {
     return this.#time;
   }
 
-  protected make_queue(on_return: () => void): ValueQueue<RrValue> {
-    const queue = new ValueQueue<RrValue>(1, on_return);
+  protected makeQueue(onReturn: () => void): ValueQueue<RrValue> {
+    const queue = new ValueQueue<RrValue>(1, onReturn);
     if (this.#value !== undefined) queue.push(this.#value);
     return queue;
   }
@@ -179,9 +179,9 @@ export class PipeSubscription extends MemberSubscription<PipeEndpoint> {
     this.#limit = options.limit ?? 10_000;
   }
 
-  protected make_queue(on_return: () => void): ValueQueue<RrValue> {
-    return new ValueQueue<RrValue>(this.#limit, on_return, () =>
-      make_error("OutOfSystemResource", `${this.#limit} packets of pipe ${this.member} wait and nobody takes them`),
+  protected makeQueue(onReturn: () => void): ValueQueue<RrValue> {
+    return new ValueQueue<RrValue>(this.#limit, onReturn, () =>
+      makeError("OutOfSystemResource", `${this.#limit} packets of pipe ${this.member} wait and nobody takes them`),
     );
   }
 

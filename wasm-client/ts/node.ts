@@ -3,19 +3,19 @@
  * @module
  */
 import { readFile } from "node:fs/promises";
-import { make_error } from "./errors.js";
+import { makeError } from "./errors.js";
 import { platform } from "./platform.js";
 
 export * from "./index.js";
 
-platform.load_wasm = async (url) => WebAssembly.compile(await readFile(url));
+platform.loadWasm = async (url) => WebAssembly.compile(await readFile(url));
 
 /** Node's own since version 22, before that the package "ws". */
-platform.find_websocket = async () => {
+platform.findWebsocket = async () => {
   if (typeof globalThis.WebSocket === "function") return globalThis.WebSocket;
   const name = "ws"; // not a literal: the package is optional
   const found = (await import(name).catch(() => null)) as { WebSocket: WsClass } | null;
-  if (!found) throw make_error("SystemResourceError", 'Node before version 22 has no WebSocket: install the package "ws"');
+  if (!found) throw makeError("SystemResourceError", 'Node before version 22 has no WebSocket: install the package "ws"');
   const { WebSocket: Base } = found;
   return class extends Base {
     constructor(url: string | URL, protocols?: string | string[]) {

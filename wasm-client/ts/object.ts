@@ -1,18 +1,18 @@
 // Objects of a service, built from the definition that the service sent. Layer: wasm-client/ts.
-import { call_safely, make_error } from "./errors.js";
+import { callSafely, makeError } from "./errors.js";
 import type { RobotRaconteurError } from "./errors.js";
-import { make_callback } from "./members/callback.js";
-import { make_event } from "./members/event.js";
-import { make_function } from "./members/function.js";
+import { makeCallback } from "./members/callback.js";
+import { makeEvent } from "./members/event.js";
+import { makeFunction } from "./members/function.js";
 import type { MemberContext } from "./members/member.js";
-import { make_memory } from "./members/memory.js";
-import { make_objref } from "./members/objref.js";
-import { make_pipe } from "./members/pipe.js";
-import { make_property } from "./members/property.js";
-import { make_wire } from "./members/wire.js";
-import { check_timeout } from "./session.js";
+import { makeMemory } from "./members/memory.js";
+import { makeObjref } from "./members/objref.js";
+import { makePipe } from "./members/pipe.js";
+import { makeProperty } from "./members/property.js";
+import { makeWire } from "./members/wire.js";
+import { checkTimeout } from "./session.js";
 import type { Session } from "./session.js";
-import { check_signal, within } from "./within.js";
+import { checkSignal, within } from "./within.js";
 import type {
   CallOptions,
   DynamicMember,
@@ -27,21 +27,21 @@ import type {
 
 /** One row a kind of member. */
 const faces: Record<MemberKind, (context: MemberContext) => unknown> = {
-  property: make_property,
-  function: make_function,
-  event: make_event,
-  objref: make_objref,
-  wire: make_wire,
-  pipe: make_pipe,
-  callback: make_callback,
-  memory: make_memory,
+  property: makeProperty,
+  function: makeFunction,
+  event: makeEvent,
+  objref: makeObjref,
+  wire: makeWire,
+  pipe: makePipe,
+  callback: makeCallback,
+  memory: makeMemory,
 };
 
 /**
  * Names that JavaScript calls by itself: `await robot` would call a function `then`, text conversion a `toString`.
  * Such members are reached by `robot.$.member(name)`.
  */
-const implicit_names = new Set(["then", "toString", "toJSON", "valueOf"]);
+const implicitNames = new Set(["then", "toString", "toJSON", "valueOf"]);
 
 /** The objects of one session, by path. */
 export class ObjectTree {
@@ -50,7 +50,7 @@ export class ObjectTree {
 
   constructor(session: Session) {
     this.#session = session;
-    session.on_release((path) => this.#release(path));
+    session.onRelease((path) => this.#release(path));
   }
 
   root(path: string, type: string): RemoteObject {
@@ -64,12 +64,12 @@ export class ObjectTree {
     const known = this.#objects.get(path);
     // A look-up with limits of its own shares nothing: its end must not be that of others.
     // Nor does one that comes too late: the request says why.
-    const is_shared = !options.signal && options.timeout === undefined && !this.#session.is_closed;
-    if (known && is_shared) return known.object;
+    const isShared = !options.signal && options.timeout === undefined && !this.#session.isClosed;
+    if (known && isShared) return known.object;
     const released: (() => void)[] = [];
     const object = this.#session
-      .request((core) => core.find_object(path), options)
-      .then((type) => this.#build(path, String(type), released));
+      .request((core) => core.findObject(path), options)
+      .then((type) => this.#build(path, type as string, released));
     if (known) return object;
     const entry = { object, released };
     this.#objects.set(path, entry);
@@ -89,16 +89,16 @@ export class ObjectTree {
 
   #build(path: string, type: string, released: (() => void)[]): RemoteObject {
     const session = this.#session;
-    const members = (session.look((core) => core.members(path)) ?? []).map(freeze_info);
+    const members = (session.look((core) => core.members(path)) ?? []).map(freezeInfo);
     const handles = new Map<string, DynamicMember>();
     for (const info of members) {
-      const context: MemberContext = { session, path, info, find_object: (child, options) => this.find(child, options) };
+      const context: MemberContext = { session, path, info, findObject: (child, options) => this.find(child, options) };
       handles.set(info.name, faces[info.kind](context) as DynamicMember);
     }
     // No prototype: what is not a member of the service is not there at all.
-    const object: object = Object.create(null);
+    const object = Object.create(null) as object;
     for (const [name, handle] of handles) {
-      if (!implicit_names.has(name)) Object.defineProperty(object, name, { value: handle, enumerable: true });
+      if (!implicitNames.has(name)) Object.defineProperty(object, name, { value: handle, enumerable: true });
     }
     Object.defineProperty(object, "$", { value: new Info(this, session, type, path, members, handles, released) });
     Object.defineProperty(object, Symbol.toStringTag, { value: type });
@@ -107,7 +107,7 @@ export class ObjectTree {
 }
 
 class Info implements ObjectInfo {
-  #is_released = false;
+  #isReleased = false;
   readonly #tree: ObjectTree;
   readonly #session: Session;
   readonly #handles: ReadonlyMap<string, DynamicMember>;
@@ -135,8 +135,8 @@ class Info implements ObjectInfo {
   }
 
   get state(): ObjectState {
-    if (this.#session.is_closed) return "closed";
-    return this.#is_released ? "released" : "connected";
+    if (this.#session.isClosed) return "closed";
+    return this.#isReleased ? "released" : "connected";
   }
 
   get attributes(): ReadonlyMap<string, RrValue> {
@@ -157,7 +157,7 @@ class Info implements ObjectInfo {
 
   member(name: string): DynamicMember {
     const handle = this.#handles.get(name);
-    if (!handle) throw make_error("MemberNotFound", `${this.type} has no member "${name}"`);
+    if (!handle) throw makeError("MemberNotFound", `${this.type} has no member "${name}"`);
     return handle;
   }
 
@@ -181,7 +181,7 @@ class Info implements ObjectInfo {
 
   async lock(kind: "user" | "client" = "user", options: CallOptions = {}): Promise<void> {
     if (kind !== "user" && kind !== "client") {
-      throw make_error("InvalidArgument", `lock: found "${String(kind)}", expected "user" or "client"`);
+      throw makeError("InvalidArgument", `lock: found "${String(kind)}", expected "user" or "client"`);
     }
     await this.#session.request((core) => core.lock(this.path, kind), options);
   }
@@ -193,12 +193,12 @@ class Info implements ObjectInfo {
   async monitor<R>(action: () => R | Promise<R>, { signal, timeout }: CallOptions = {}): Promise<R> {
     const session = this.#session;
     if (typeof action !== "function") {
-      throw make_error("InvalidArgument", `monitor: found ${typeof action}, expected a function`);
+      throw makeError("InvalidArgument", `monitor: found ${typeof action}, expected a function`);
     }
-    check_signal(signal);
-    if (timeout !== undefined) check_timeout(timeout);
-    const entering = session.request((core) => core.enter_monitor(this.path, timeout ?? -1));
-    const leave = () => session.request((core) => core.exit_monitor(this.path));
+    checkSignal(signal);
+    if (timeout !== undefined) checkTimeout(timeout);
+    const entering = session.request((core) => core.enterMonitor(this.path, timeout ?? -1));
+    const leave = () => session.request((core) => core.exitMonitor(this.path));
     try {
       await within(entering, { signal }, "");
     } catch (error) {
@@ -222,7 +222,7 @@ class Info implements ObjectInfo {
   }
 
   onClose(closed: (reason?: RobotRaconteurError) => void): () => void {
-    const stop = this.#session.on_close((reason) => {
+    const stop = this.#session.onClose((reason) => {
       this.#closers.delete(closer);
       if (reason) closed(reason);
       else closed();
@@ -239,15 +239,15 @@ class Info implements ObjectInfo {
   }
 
   #release(): void {
-    this.#is_released = true;
+    this.#isReleased = true;
     const closers = [...this.#closers];
     this.#closers.clear();
-    const reason = make_error("ObjectNotFound", `the service released object "${this.path}": look it up again`);
-    for (const closed of closers) call_safely(() => closed(reason));
+    const reason = makeError("ObjectNotFound", `the service released object "${this.path}": look it up again`);
+    for (const closed of closers) callSafely(() => closed(reason));
   }
 }
 
-function freeze_info(info: MemberInfo): MemberInfo {
+function freezeInfo(info: MemberInfo): MemberInfo {
   info.parameters.forEach((parameter) => Object.freeze(parameter));
   Object.freeze(info.parameters);
   Object.freeze(info.modifiers);

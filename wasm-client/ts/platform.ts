@@ -3,13 +3,13 @@
 
 export interface Platform {
   /** Compiles a file of this package. */
-  load_wasm(url: URL): Promise<WebAssembly.Module>;
+  loadWasm(url: URL): Promise<WebAssembly.Module>;
   /** @throws RobotRaconteurError SystemResourceError: there is none. */
-  find_websocket(): Promise<typeof WebSocket>;
+  findWebsocket(): Promise<typeof WebSocket>;
 }
 
 export const platform: Platform = {
-  async load_wasm(url) {
+  async loadWasm(url) {
     const response = await fetch(url);
     if (!response.ok) throw new Error(`${url.href} answered ${response.status} ${response.statusText}`);
     if (response.headers.get("Content-Type")?.startsWith("application/wasm")) {
@@ -18,5 +18,5 @@ export const platform: Platform = {
     return WebAssembly.compile(await response.arrayBuffer());
   },
 
-  find_websocket: () => Promise.resolve(WebSocket),
+  findWebsocket: () => Promise.resolve(WebSocket),
 };

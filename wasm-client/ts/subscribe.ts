@@ -1,18 +1,18 @@
 // subscribe(): a service for as long as it is wanted, whatever becomes of connections. Layer: wasm-client/ts.
 // Source: sessions spec section 2.17.
-import { Backoff, system_clock } from "./clock.js";
+import { Backoff, systemClock } from "./clock.js";
 import type { Clock } from "./clock.js";
-import { connect_with } from "./connect.js";
+import { connectWith } from "./connect.js";
 import type { ConnectOptions, Memory } from "./connect.js";
-import { call_safely, make_error } from "./errors.js";
+import { callSafely, makeError } from "./errors.js";
 import type { RobotRaconteurError } from "./errors.js";
 import { findServices } from "./find_services.js";
 import type { ServiceQuery } from "./find_services.js";
 import { PipeSubscription, WireSubscription } from "./member_subscription.js";
 import type { MemberSubscriptionOptions, PipeSubscriptionOptions } from "./member_subscription.js";
 import type { CallOptions, ObjectInfo, RemoteObject } from "./types.js";
-import { parse_service_url } from "./url.js";
-import { check_signal } from "./within.js";
+import { parseServiceUrl } from "./url.js";
+import { checkSignal } from "./within.js";
 
 export interface SubscribeOptions extends ConnectOptions {
   /** Ends the subscription. */
@@ -41,13 +41,13 @@ export function subscribe<T = RemoteObject>(
   urls: string | URL | readonly (string | URL)[] | ServiceQuery,
   options: SubscribeOptions = {},
 ): Subscription<T> {
-  check_signal(options.signal);
+  checkSignal(options.signal);
   if (typeof urls === "object" && "gateway" in urls) return new Subscription<T>(urls, options);
-  const list = [urls].flat() as (string | URL)[];
-  const services = new Set(list.map((url) => parse_service_url(url).service));
+  const list: (string | URL)[] = [urls].flat();
+  const services = new Set(list.map((url) => parseServiceUrl(url).service));
   if (services.size !== 1) {
     const found = services.size === 0 ? "no URL" : `the services ${[...services].join(", ")}`;
-    throw make_error("InvalidArgument", `subscribe: found ${found}, expected URLs of one service`);
+    throw makeError("InvalidArgument", `subscribe: found ${found}, expected URLs of one service`);
   }
   return new Subscription<T>(list, options);
 }
@@ -62,7 +62,7 @@ export class Subscription<T = RemoteObject> {
   /** Of whichever service it was: one with other definitions sends its own. */
   readonly #memory: Memory = { known: [] };
   #client: Client<T> | undefined;
-  #stop_waiting: (() => void) | undefined;
+  #stopWaiting: (() => void) | undefined;
   #closed: Promise<void> | undefined;
   readonly #connected = new Set<(client: Client<T>) => void>();
   readonly #lost = new Set<(reason: RobotRaconteurError) => void>();
@@ -73,7 +73,7 @@ export class Subscription<T = RemoteObject> {
   constructor(urls: readonly (string | URL)[] | ServiceQuery, options: SubscribeOptions) {
     this.#urls = urls;
     this.#options = options;
-    this.#clock = options.clock ?? system_clock;
+    this.#clock = options.clock ?? systemClock;
     this.#backoff = new Backoff(options.firstRetry ?? 500, options.longestRetry ?? 30_000, options.random ?? Math.random);
     const { signal } = options;
     if (signal?.aborted) void this.close();
@@ -97,9 +97,9 @@ export class Subscription<T = RemoteObject> {
   client(options: CallOptions = {}): Promise<Client<T>> {
     const { signal, timeout } = options;
     return new Promise((resolve, reject) => {
-      check_signal(signal);
+      checkSignal(signal);
       if (signal?.aborted) return reject(signal.reason);
-      if (this.isClosed) return reject(closed_error());
+      if (this.isClosed) return reject(closedError());
       if (this.#client) return resolve(this.#client);
       const end = () => {
         stops.forEach((stop) => stop());
@@ -108,23 +108,23 @@ export class Subscription<T = RemoteObject> {
       const abort = () => (end(), reject(signal?.reason));
       const stops = [
         this.onConnected((client) => (end(), resolve(client))),
-        this.#on(this.#ended, () => (end(), reject(closed_error()))),
+        this.#on(this.#ended, () => (end(), reject(closedError()))),
       ];
       signal?.addEventListener("abort", abort, { once: true });
       if (timeout === undefined) return;
-      const late = () => (end(), reject(make_error("RequestTimeout", `no connection within ${timeout} ms`)));
+      const late = () => (end(), reject(makeError("RequestTimeout", `no connection within ${timeout} ms`)));
       stops.push(this.#clock.after(timeout, late));
     });
   }
 
   /** Calls `connected` with each new root object, also with the one that is there. @returns a function that ends it. */
   onConnected(connected: (client: Client<T>) => void): () => void {
-    let is_wanted = true;
+    let isWanted = true;
     const stop = this.#on(this.#connected, connected);
     const client = this.#client;
-    if (client) queueMicrotask(() => is_wanted && this.#client === client && call_safely(() => connected(client)));
+    if (client) queueMicrotask(() => isWanted && this.#client === client && callSafely(() => connected(client)));
     return () => {
-      is_wanted = false;
+      isWanted = false;
       stop();
     };
   }
@@ -162,10 +162,10 @@ export class Subscription<T = RemoteObject> {
   async #end(): Promise<void> {
     const client = this.#client;
     this.#client = undefined;
-    this.#stop_waiting?.();
-    this.#ending.abort(closed_error());
+    this.#stopWaiting?.();
+    this.#ending.abort(closedError());
     await Promise.resolve(); // whoever closes has the promise before anybody hears of it
-    for (const ended of [...this.#ended]) call_safely(ended);
+    for (const ended of [...this.#ended]) callSafely(ended);
     for (const listeners of [this.#connected, this.#lost, this.#failed, this.#ended]) listeners.clear();
     await client?.$.close();
   }
@@ -177,9 +177,9 @@ export class Subscription<T = RemoteObject> {
     for (const url of await this.#ways()) {
       if (this.isClosed) return;
       try {
-        return this.#take(await connect_with<T>(url, { ...options, signal }, this.#memory));
+        return this.#take(await connectWith<T>(url, { ...options, signal }, this.#memory));
       } catch (error) {
-        this.#tell_failed(error, url);
+        this.#tellFailed(error, url);
       }
     }
     this.#retry();
@@ -191,16 +191,16 @@ export class Subscription<T = RemoteObject> {
     try {
       const found = await findServices(query, this.#ending.signal);
       if (found.length > 0) return found.map(({ url }) => url);
-      throw make_error("ServiceNotFound", `no service of type ${query.type} at the gateway ${query.gateway}`);
+      throw makeError("ServiceNotFound", `no service of type ${query.type} at the gateway ${query.gateway}`);
     } catch (error) {
-      this.#tell_failed(error, query.gateway);
+      this.#tellFailed(error, query.gateway);
       return [];
     }
   }
 
-  #tell_failed(error: unknown, url: string | URL): void {
+  #tellFailed(error: unknown, url: string | URL): void {
     if (this.isClosed) return;
-    for (const failed of [...this.#failed]) call_safely(() => failed(error, String(url)));
+    for (const failed of [...this.#failed]) callSafely(() => failed(error, String(url)));
   }
 
   #take(client: Client<T>): void {
@@ -210,16 +210,16 @@ export class Subscription<T = RemoteObject> {
     client.$.onClose((reason) => {
       if (this.#client !== client) return;
       this.#client = undefined;
-      const why = reason ?? make_error("ConnectionError", "the client was closed by this side");
-      for (const lost of [...this.#lost]) call_safely(() => lost(why));
+      const why = reason ?? makeError("ConnectionError", "the client was closed by this side");
+      for (const lost of [...this.#lost]) callSafely(() => lost(why));
       this.#retry();
     });
-    for (const connected of [...this.#connected]) call_safely(() => connected(client));
+    for (const connected of [...this.#connected]) callSafely(() => connected(client));
   }
 
   #retry(): void {
     if (this.isClosed) return;
-    this.#stop_waiting = this.#clock.after(this.#backoff.next(), () => void this.#connect());
+    this.#stopWaiting = this.#clock.after(this.#backoff.next(), () => void this.#connect());
   }
 
   #on<F>(listeners: Set<F>, listener: F): () => void {
@@ -229,4 +229,4 @@ export class Subscription<T = RemoteObject> {
   }
 }
 
-const closed_error = () => make_error("InvalidOperation", "the subscription is closed");
+const closedError = () => makeError("InvalidOperation", "the subscription is closed");

@@ -1,6 +1,6 @@
 // USB devices in a page, by WebUSB: what is loaded at once, so that a click may lead to the browser's chooser. The rest
 // comes when there is a device to speak to. Layer: wasm-client/ts. Source: hardware spec section 2.1.
-import { make_error, text_of } from "./errors.js";
+import { makeError, textOf } from "./errors.js";
 import type { RobotRaconteurError } from "./errors.js";
 import type { OpenTransport } from "./transport.js";
 import type { UsbFilter, WebUsb } from "./usb/webusb.js";
@@ -27,11 +27,11 @@ export interface UsbNode {
  *         SystemResourceError: no WebUSB here; ConnectionError: the device is no node, or cannot be asked.
  */
 export async function requestUsbDevice(filters: UsbFilter[] = [{ classCode: 0xff }]): Promise<UsbNode> {
-  const usb = find_usb();
-  if (!usb.requestDevice) throw make_error("InvalidOperation", "a worker cannot ask the user for a USB device: ask in the page");
+  const usb = findUsb();
+  if (!usb.requestDevice) throw makeError("InvalidOperation", "a worker cannot ask the user for a USB device: ask in the page");
   const device = await usb.requestDevice({ filters }).catch((error: unknown) => {
-    if ((error as Error).name === "NotFoundError") throw make_error("OperationCancelled", "no USB device was chosen");
-    throw make_error("InvalidOperation", `the user cannot be asked for a USB device: ${text_of(error)}`);
+    if ((error as Error).name === "NotFoundError") throw makeError("OperationCancelled", "no USB device was chosen");
+    throw makeError("InvalidOperation", `the user cannot be asked for a USB device: ${textOf(error)}`);
   });
   return (await load()).describe(usb, device);
 }
@@ -41,20 +41,20 @@ export async function requestUsbDevice(filters: UsbFilter[] = [{ classCode: 0xff
  * @throws RobotRaconteurError SystemResourceError: no WebUSB here; SystemResourcePermissionDenied: not for this frame.
  */
 export async function listUsbDevices(): Promise<UsbNode[]> {
-  return (await load()).list_nodes(find_usb());
+  return (await load()).listNodes(findUsb());
 }
 
 /** A device that was granted; `nodeid` and `nodename` of the URL say which. */
-export const open_usb: OpenTransport = async (url, listener) => (await load()).open_stream(find_usb(), url, listener);
+export const openUsb: OpenTransport = async (url, listener) => (await load()).openStream(findUsb(), url, listener);
 
 const load = () => import("./usb/nodes.js");
 
-function find_usb(): WebUsb {
+function findUsb(): WebUsb {
   const { navigator, isSecureContext } = globalThis as { navigator?: { usb?: WebUsb }; isSecureContext?: boolean };
   if (navigator?.usb) return navigator.usb;
   const why =
     isSecureContext === false
       ? "pages that came without encryption may not use USB; serve this one by https:, or from localhost"
       : "this browser has no WebUSB, which Chromium, Chrome and Edge have; elsewhere connect through a gateway";
-  throw make_error("SystemResourceError", `rr+usb: ${why}`);
+  throw makeError("SystemResourceError", `rr+usb: ${why}`);
 }

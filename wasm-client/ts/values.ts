@@ -1,7 +1,7 @@
 // Values that say their type. Layer: wasm-client/ts. The marks are read in js_values.ts.
 
-const exact_mark = Symbol.for("rrgate.exactValue");
-const type_mark = Symbol.for("rrgate.type");
+const exactMark = Symbol.for("rrgate.exactValue");
+const typeMark = Symbol.for("rrgate.type");
 
 /** A value with the type that it is to be sent as, where the definition leaves that open (varvalue). */
 export interface ExactValue {
@@ -15,13 +15,13 @@ export interface ExactValue {
  */
 export function rrValue(type: string, value: unknown): ExactValue {
   return Object.freeze(
-    Object.defineProperty({ type, value }, exact_mark, { value: true, enumerable: false }),
-  ) as ExactValue;
+    Object.defineProperty({ type, value }, exactMark, { value: true, enumerable: false }),
+  );
 }
 
 /** The named type of a value that came as a varvalue ("com.example.Pose"), undefined for all others. */
 export function typeOf(value: unknown): string | undefined {
   if (typeof value !== "object" || value === null) return undefined;
-  const mark = (value as { [type_mark]?: unknown })[type_mark];
+  const mark = (value as { [typeMark]?: unknown })[typeMark];
   return typeof mark === "string" ? mark : undefined;
 }

@@ -1,6 +1,6 @@
 // The compiled core: the only file that knows its handles and its memory. Layer: wasm-client/ts.
 // Source: src/wasm_session.hpp, and core/session/client/client_session.hpp behind it.
-import { make_error, RobotRaconteurError, text_of } from "./errors.js";
+import { makeError, RobotRaconteurError, textOf } from "./errors.js";
 import type { ErrorFields } from "./errors.js";
 import { JsValues } from "./js_values.js";
 import type { CoreExports, Handle } from "./js_values.js";
@@ -42,14 +42,15 @@ export type CoreEvent =
   | { kind: "closed"; error: ErrorFields };
 
 /** As rr::GeneratorStep. */
-const generator_steps = ["next", "close", "abort"] as const;
-export type GeneratorStep = (typeof generator_steps)[number];
+const generatorSteps = ["next", "close", "abort"] as const;
+export type GeneratorStep = (typeof generatorSteps)[number];
 
 /** Native peers take WebSocket frames of at most this many bytes. */
-const frame_limit = 65_535;
+const frameLimit = 65_535;
 /** Bytes that go into the core at once; its receive buffer stays as small. */
-const receive_limit = 1024 * 1024;
+const receiveLimit = 1024 * 1024;
 
+/* eslint-disable @typescript-eslint/naming-convention -- names of C++ */
 /** What src/bindings.cpp exports. */
 interface WasmSession extends CoreExports {
   /** Runs what C++ runs before main(). */
@@ -106,6 +107,7 @@ interface WasmSession extends CoreExports {
   members(path: Handle): Handle;
   child_path(parent: Handle, member: Handle, index: Handle): Handle;
 }
+/* eslint-enable @typescript-eslint/naming-convention */
 
 let compiled: Promise<WebAssembly.Module> | undefined;
 
@@ -120,9 +122,9 @@ export class Core {
   /** @throws RobotRaconteurError SystemResourceError: the file cannot be loaded; those of options that make no sense. */
   static async create(options: CoreOptions): Promise<Core> {
     // Written out so that bundlers see it and ship the file.
-    compiled ??= platform.load_wasm(new URL("./rrgate.wasm", import.meta.url)).catch((error: unknown) => {
+    compiled ??= platform.loadWasm(new URL("./rrgate.wasm", import.meta.url)).catch((error: unknown) => {
       compiled = undefined; // the next connect() tries again
-      throw make_error("SystemResourceError", `the protocol core could not be loaded: ${text_of(error)}`);
+      throw makeError("SystemResourceError", `the protocol core could not be loaded: ${textOf(error)}`);
     });
     const code = await compiled;
     const values = new JsValues();
@@ -141,111 +143,111 @@ export class Core {
 
   // --- told ---
 
-  handle_bytes(bytes: Uint8Array): void {
-    for (let from = 0; from < bytes.length; from += receive_limit) {
-      const part = bytes.subarray(from, from + receive_limit);
-      const session = this.#at_now();
+  handleBytes(bytes: Uint8Array): void {
+    for (let from = 0; from < bytes.length; from += receiveLimit) {
+      const part = bytes.subarray(from, from + receiveLimit);
+      const session = this.#atNow();
       const address = session.receive_buffer(part.length);
       this.#values.bytes.set(part, address);
       session.handle_bytes(part.length);
     }
   }
 
-  handle_transmitted(size: number): void {
-    this.#at_now().handle_transmitted(size);
+  handleTransmitted(size: number): void {
+    this.#atNow().handle_transmitted(size);
   }
 
-  handle_timeout(): void {
-    this.#at_now().handle_timeout();
+  handleTimeout(): void {
+    this.#atNow().handle_timeout();
   }
 
-  handle_closed(reason: string): void {
-    this.#at_now().handle_closed(this.#values.give(reason));
+  handleClosed(reason: string): void {
+    this.#atNow().handle_closed(this.#values.give(reason));
   }
 
   // --- asked: the number of the request; throws RobotRaconteurError for values that do not fit ---
 
-  set_request_timeout(milliseconds: number): void {
+  setRequestTimeout(milliseconds: number): void {
     this.#session.set_request_timeout(milliseconds);
   }
 
-  get_property(path: string, member: string): number {
+  getProperty(path: string, member: string): number {
     return this.#ask("get_property", path, member);
   }
 
-  set_property(path: string, member: string, value: unknown): number {
+  setProperty(path: string, member: string, value: unknown): number {
     return this.#ask("set_property", path, member, value);
   }
 
-  call_function(path: string, member: string, args: readonly unknown[]): number {
+  callFunction(path: string, member: string, args: readonly unknown[]): number {
     return this.#ask("call_function", path, member, args);
   }
 
   /** Without the generator parameter, which comes with each step. */
-  open_generator(path: string, member: string, args: readonly unknown[]): number {
+  openGenerator(path: string, member: string, args: readonly unknown[]): number {
     return this.#ask("open_generator", path, member, args);
   }
 
-  step_generator(step: GeneratorStep, path: string, member: string, index: number, parameter: unknown): number {
-    const number = generator_steps.indexOf(step);
+  stepGenerator(step: GeneratorStep, path: string, member: string, index: number, parameter: unknown): number {
+    const number = generatorSteps.indexOf(step);
     const handle = this.#give(parameter);
     return this.#checked(
-      this.#at_now().step_generator(number, this.#give(path), this.#give(member), index, handle),
+      this.#atNow().step_generator(number, this.#give(path), this.#give(member), index, handle),
     );
   }
 
-  get_memory_dimensions(path: string, member: string): number {
+  getMemoryDimensions(path: string, member: string): number {
     return this.#ask("get_memory_dimensions", path, member);
   }
 
-  read_memory(path: string, member: string, position: readonly number[], count: readonly number[]): number {
+  readMemory(path: string, member: string, position: readonly number[], count: readonly number[]): number {
     return this.#ask("read_memory", path, member, position, count);
   }
 
-  write_memory(path: string, member: string, position: readonly number[], value: unknown): number {
+  writeMemory(path: string, member: string, position: readonly number[], value: unknown): number {
     return this.#ask("write_memory", path, member, position, value);
   }
 
-  find_object(path: string): number {
+  findObject(path: string): number {
     return this.#ask("find_object", path);
   }
 
-  connect_wire(path: string, member: string): number {
+  connectWire(path: string, member: string): number {
     return this.#ask("connect_wire", path, member);
   }
 
-  disconnect_wire(path: string, member: string): number {
+  disconnectWire(path: string, member: string): number {
     return this.#ask("disconnect_wire", path, member);
   }
 
-  peek_in_value(path: string, member: string): number {
+  peekInValue(path: string, member: string): number {
     return this.#ask("peek_in_value", path, member);
   }
 
-  peek_out_value(path: string, member: string): number {
+  peekOutValue(path: string, member: string): number {
     return this.#ask("peek_out_value", path, member);
   }
 
-  poke_out_value(path: string, member: string, value: unknown): number {
+  pokeOutValue(path: string, member: string, value: unknown): number {
     return this.#ask("poke_out_value", path, member, value);
   }
 
-  send_wire(path: string, member: string, value: unknown): void {
+  sendWire(path: string, member: string, value: unknown): void {
     this.#ask("send_wire", path, member, value);
   }
 
   /** `index` -1: any. */
-  connect_pipe(path: string, member: string, index: number): number {
-    return this.#checked(this.#at_now().connect_pipe(this.#give(path), this.#give(member), index));
+  connectPipe(path: string, member: string, index: number): number {
+    return this.#checked(this.#atNow().connect_pipe(this.#give(path), this.#give(member), index));
   }
 
-  disconnect_pipe(path: string, member: string, index: number): number {
-    return this.#checked(this.#at_now().disconnect_pipe(this.#give(path), this.#give(member), index));
+  disconnectPipe(path: string, member: string, index: number): number {
+    return this.#checked(this.#atNow().disconnect_pipe(this.#give(path), this.#give(member), index));
   }
 
   /** @returns the packet's number. */
-  send_pipe_packet(path: string, member: string, index: number, value: unknown, wants_ack: boolean): number {
-    const number = this.#at_now().send_pipe_packet(this.#give(path), this.#give(member), index, this.#give(value), wants_ack);
+  sendPipePacket(path: string, member: string, index: number, value: unknown, wantsAck: boolean): number {
+    const number = this.#atNow().send_pipe_packet(this.#give(path), this.#give(member), index, this.#give(value), wantsAck);
     if (number < 0) this.#checked(0);
     return number;
   }
@@ -258,12 +260,12 @@ export class Core {
     return this.#ask("logout");
   }
 
-  get_attributes(): number {
+  getAttributes(): number {
     return this.#ask("get_attributes");
   }
 
   lock(path: string, kind: "user" | "client"): number {
-    return this.#checked(this.#at_now().lock(this.#give(path), kind === "client"));
+    return this.#checked(this.#atNow().lock(this.#give(path), kind === "client"));
   }
 
   unlock(path: string): number {
@@ -271,23 +273,23 @@ export class Core {
   }
 
   /** `milliseconds` below 0: no limit. */
-  enter_monitor(path: string, milliseconds: number): number {
-    return this.#checked(this.#at_now().enter_monitor(this.#give(path), milliseconds));
+  enterMonitor(path: string, milliseconds: number): number {
+    return this.#checked(this.#atNow().enter_monitor(this.#give(path), milliseconds));
   }
 
-  exit_monitor(path: string): number {
+  exitMonitor(path: string): number {
     return this.#ask("exit_monitor", path);
   }
 
   /** @throws RobotRaconteurError where the value does not fit; the service has been told so, too. */
-  reply_callback(id: number, path: string, member: string, value: unknown): void {
+  replyCallback(id: number, path: string, member: string, value: unknown): void {
     const handles = [this.#give(path), this.#give(member), this.#give(value)] as const;
-    const error = this.#values.take(this.#at_now().reply_callback(id, ...handles));
+    const error = this.#values.take(this.#atNow().reply_callback(id, ...handles));
     if (error) throw new RobotRaconteurError(error as ErrorFields);
   }
 
-  fail_callback(id: number, error: Partial<ErrorFields>): void {
-    this.#at_now().fail_callback(id, this.#give(error));
+  failCallback(id: number, error: Partial<ErrorFields>): void {
+    this.#atNow().fail_callback(id, this.#give(error));
   }
 
   cancel(id: number): void {
@@ -295,36 +297,36 @@ export class Core {
   }
 
   disconnect(): void {
-    this.#at_now().disconnect();
+    this.#atNow().disconnect();
   }
 
   // --- answers ---
 
   /** Bytes to send now, in the core's own memory: copy them, then call handle_transmitted() before anything else. */
-  poll_transmit(): Uint8Array | undefined {
-    const size = this.#session.poll_transmit(frame_limit);
+  pollTransmit(): Uint8Array | undefined {
+    const size = this.#session.poll_transmit(frameLimit);
     if (size === 0) return undefined;
     const address = this.#session.transmit_address();
     return this.#values.bytes.subarray(address, address + size);
   }
 
-  wants_close(): boolean {
+  wantsClose(): boolean {
     return this.#session.wants_close() !== 0;
   }
 
   /** By performance.now(); Infinity for never. */
-  poll_timeout(): number {
+  pollTimeout(): number {
     return this.#session.poll_timeout();
   }
 
-  poll_event(): CoreEvent | undefined {
+  pollEvent(): CoreEvent | undefined {
     return this.#values.take(this.#session.poll_event()) as CoreEvent | undefined;
   }
 
   // --- looked at ---
 
   /** What waits for the transport. */
-  queued_bytes(): number {
+  queuedBytes(): number {
     return this.#session.queued_bytes();
   }
 
@@ -344,7 +346,7 @@ export class Core {
     return this.#values.take(this.#session.definitions()) as string[];
   }
 
-  known_definitions(): KnownDefinitions {
+  knownDefinitions(): KnownDefinitions {
     return this.#values.take(this.#session.known_definitions()) as KnownDefinitions;
   }
 
@@ -353,12 +355,12 @@ export class Core {
     return (this.#values.take(this.#session.members(this.#give(path))) as MemberInfo[] | undefined) ?? [];
   }
 
-  child_path(parent: string, member: string, index: string | undefined): string {
+  childPath(parent: string, member: string, index: string | undefined): string {
     const path = this.#session.child_path(this.#give(parent), this.#give(member), this.#give(index));
     return this.#values.take(path) as string;
   }
 
-  #at_now(): WasmSession {
+  #atNow(): WasmSession {
     this.#session.set_now(performance.now(), Date.now());
     return this.#session;
   }
@@ -374,7 +376,7 @@ export class Core {
 
   /** Makes a request of the core with `args`. */
   #ask(request: MemberRequest, ...args: unknown[]): number {
-    const session = this.#at_now();
+    const session = this.#atNow();
     const handles = args.map((arg) => this.#values.give(arg)) as [Handle, Handle, Handle, Handle];
     return this.#checked(session[request](...handles));
   }

@@ -1,5 +1,5 @@
 // Robot Raconteur over WebSocket. Layer: wasm-client/ts. Source: transports spec section 4.
-import { make_error, text_of } from "./errors.js";
+import { makeError, textOf } from "./errors.js";
 import { platform } from "./platform.js";
 import type { Transport, TransportListener } from "./transport.js";
 
@@ -7,39 +7,39 @@ export const subprotocol = "robotraconteur.robotraconteur.com";
 
 /** Browsers do not tell a page why it could not connect. */
 const page = globalThis.location?.origin;
-const in_page = page && `nobody answers there, or does not let pages of ${page} in (a gateway: allowed_origins)`;
+const inPage = page && `nobody answers there, or does not let pages of ${page} in (a gateway: allowed_origins)`;
 
 /**
  * @throws RobotRaconteurError SystemResourceError: this engine has no WebSocket; ConnectionError: it refuses this URL.
  *         Everything later is told to `listener`.
  */
-export async function open_websocket(url: URL, listener: TransportListener): Promise<Transport> {
-  const WebSocketClass = await platform.find_websocket();
+export async function openWebsocket(url: URL, listener: TransportListener): Promise<Transport> {
+  const WebSocketClass = await platform.findWebsocket();
   const where = `${url.protocol}//${url.host}${url.pathname}`;
   let socket: WebSocket;
   try {
     socket = new WebSocketClass(url.href, [subprotocol]);
   } catch (error) {
     // A page that came encrypted may not open ws:.
-    throw make_error("ConnectionError", `could not connect to ${where}: ${text_of(error)}`);
+    throw makeError("ConnectionError", `could not connect to ${where}: ${textOf(error)}`);
   }
   socket.binaryType = "arraybuffer";
-  let is_open = false;
-  let is_told = false;
+  let isOpen = false;
+  let isTold = false;
   let failure = "";
 
-  const tell_closed = (reason: string) => {
-    if (is_told) return;
-    is_told = true;
+  const tellClosed = (reason: string) => {
+    if (isTold) return;
+    isTold = true;
     listener.closed(reason);
   };
   socket.addEventListener("open", () => {
-    if (is_told) return;
-    is_open = true;
+    if (isTold) return;
+    isOpen = true;
     listener.opened();
   });
   socket.addEventListener("message", (event: MessageEvent) => {
-    if (is_told) return;
+    if (isTold) return;
     if (event.data instanceof ArrayBuffer) listener.received(new Uint8Array(event.data));
     else socket.close(1003, "text frames are not part of the protocol");
   });
@@ -50,8 +50,8 @@ export async function open_websocket(url: URL, listener: TransportListener): Pro
   });
   socket.addEventListener("close", (event: CloseEvent) => {
     const why = event.reason || failure;
-    if (is_open) tell_closed(`the connection to ${where} was closed${why ? `: ${why}` : ` (WebSocket code ${event.code})`}`);
-    else tell_closed(`could not connect to ${where}${why || in_page ? `: ${why || in_page}` : ""}`);
+    if (isOpen) tellClosed(`the connection to ${where} was closed${why ? `: ${why}` : ` (WebSocket code ${event.code})`}`);
+    else tellClosed(`could not connect to ${where}${why || inPage ? `: ${why || inPage}` : ""}`);
   });
   return {
     send: (bytes) => socket.send(bytes as Uint8Array<ArrayBuffer>),
@@ -59,7 +59,7 @@ export async function open_websocket(url: URL, listener: TransportListener): Pro
       return socket.bufferedAmount;
     },
     close: () => {
-      is_told = true;
+      isTold = true;
       socket.close(1000);
     },
   };

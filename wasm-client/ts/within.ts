@@ -1,11 +1,11 @@
 // Limits for what has none of its own. Layer: wasm-client/ts.
-import { make_error } from "./errors.js";
+import { makeError } from "./errors.js";
 import type { CallOptions } from "./types.js";
 
 /** An AbortController in its place is a common slip. @throws RobotRaconteurError InvalidArgument */
-export function check_signal(signal: AbortSignal | null | undefined): void {
+export function checkSignal(signal: AbortSignal | null | undefined): void {
   if (signal === undefined || signal === null || typeof signal.addEventListener === "function") return;
-  throw make_error("InvalidArgument", "signal: expected an AbortSignal (the `signal` of an AbortController)");
+  throw makeError("InvalidArgument", "signal: expected an AbortSignal (the `signal` of an AbortController)");
 }
 
 /**
@@ -15,14 +15,14 @@ export function check_signal(signal: AbortSignal | null | undefined): void {
 export function within<T>(promise: Promise<T>, { signal, timeout }: CallOptions, late: string): Promise<T> {
   if (signal === undefined && timeout === undefined) return promise;
   return new Promise((resolve, reject) => {
-    check_signal(signal);
+    checkSignal(signal);
     if (signal?.aborted) reject(signal.reason);
     const abort = () => reject(signal?.reason);
     signal?.addEventListener("abort", abort, { once: true });
     const timer =
       timeout === undefined
         ? undefined
-        : setTimeout(() => reject(make_error("RequestTimeout", `${late} within ${timeout} ms`)), timeout);
+        : setTimeout(() => reject(makeError("RequestTimeout", `${late} within ${timeout} ms`)), timeout);
     void promise.then(resolve, reject).finally(() => {
       clearTimeout(timer);
       signal?.removeEventListener("abort", abort);

@@ -3,7 +3,7 @@
 
 import { render } from "preact";
 import { App } from "./app/app";
-import { watch_route } from "./app/router";
+import { watchRoute } from "./app/router";
 import { AccessDesk } from "./gateway/access";
 import { DeviceList } from "./gateway/devices";
 import { UsbDeviceList } from "./gateway/usb_devices";
@@ -23,4 +23,4 @@ access.start();
 
 const place = document.getElementById("app");
 if (!place) throw new Error("index.html has no element #app");
-render(<App route={watch_route()} list={list} usb={usb} access={access} />, place);
+render(<App route={watchRoute()} list={list} usb={usb} access={access} />, place);

@@ -3,7 +3,7 @@ import { cpSync, existsSync, mkdtempSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import path from "node:path";
 import { expect, test } from "@playwright/test";
-import { Program, repository_root, rrgate, start_gateway } from "../processes";
+import { Program, repositoryRoot, rrgate, startGateway } from "../processes";
 
 const service = path.join(path.dirname(rrgate), "../test/interop/cpp/rr-test-service");
 
@@ -17,9 +17,9 @@ postMessage(robot.$.state);
 `;
 
 /** A folder for the gateway to serve: the package as it is published, an empty page and a worker. */
-function make_site(): string {
+function makeSite(): string {
   const site = mkdtempSync(path.join(tmpdir(), "rrgate-site-"));
-  cpSync(path.join(repository_root, "wasm-client/dist"), site, { recursive: true });
+  cpSync(path.join(repositoryRoot, "wasm-client/dist"), site, { recursive: true });
   writeFileSync(path.join(site, "index.html"), "<!doctype html><title>client</title>");
   writeFileSync(path.join(site, "worker.js"), worker);
   return site;
@@ -32,8 +32,8 @@ test.beforeAll(async () => {
   if (!existsSync(service)) throw new Error(`${service} is missing: build the target rr-test-service`);
   device = new Program(service, []);
   device.start();
-  const found = await device.wait_for_output(/"url": *"([^"]+)"/);
-  gateway = await start_gateway("big", found[1] ?? "", make_site());
+  const found = await device.waitForOutput(/"url": *"([^"]+)"/);
+  gateway = await startGateway("big", found[1] ?? "", makeSite());
 });
 
 test.afterAll(async () => {
@@ -52,19 +52,19 @@ test("10 MiB of doubles cross device, gateway and browser unharmed; more than th
     const ramp: Float64Array = await big.ramp(count);
     const wrong = ramp.findIndex((value, index) => value !== index);
     const sum: number = await big.sum(ramp);
-    const too_much: string = await big.sum(new Float64Array(2 * count)).then(
+    const tooMuch: string = await big.sum(new Float64Array(2 * count)).then(
       () => "accepted",
       (error: { code: number }) => `refused with ${error.code}`,
     );
     const after: number = await other.add(2, 3);
-    return { kind: ramp.constructor.name, length: ramp.length, wrong, sum, too_much, after };
+    return { kind: ramp.constructor.name, length: ramp.length, wrong, sum, tooMuch, after };
   });
   expect(seen).toEqual({
     kind: "Float64Array",
     length: 1_310_720,
     wrong: -1,
     sum: (1_310_720 * 1_310_719) / 2,
-    too_much: "refused with 2",
+    tooMuch: "refused with 2",
     after: 5,
   });
 });

@@ -35,7 +35,7 @@ test("says plainly when the gateway itself is away, and recovers", async ({ page
   await expect(page.locator('[data-device="create"]')).toContainText("was online");
   lab.gateway.start();
   await expect(page.locator('[data-gateway="known"]')).toBeVisible();
-  await lab.wait_until_online();
+  await lab.waitUntilOnline();
   await expect(page.locator('[data-device="create"]').locator('[data-state="online"]')).toHaveText("online");
 });
 

@@ -4,11 +4,11 @@ import { cpSync, existsSync, mkdirSync, mkdtempSync, rmSync, symlinkSync } from 
 import { tmpdir } from "node:os";
 import path from "node:path";
 import { expect, test } from "@playwright/test";
-import { Program, repository_root, rrgate, start_gateway } from "../processes";
+import { Program, repositoryRoot, rrgate, startGateway } from "../processes";
 
 const program = path.join(path.dirname(rrgate), "../test/examples/thermostat_device");
-const example = path.join(repository_root, "examples/thermostat");
-const client = path.join(repository_root, "wasm-client");
+const example = path.join(repositoryRoot, "examples/thermostat");
+const client = path.join(repositoryRoot, "wasm-client");
 
 let folder: string;
 let device: Program;
@@ -23,8 +23,8 @@ test.beforeAll(async () => {
 
   device = new Program(program, ["rr+tcp://127.0.0.1:0"]);
   device.start();
-  const [url] = await device.wait_for_output(/rr\+tcp:\S+/);
-  gateway = await start_gateway("room", url, site);
+  const [url] = await device.waitForOutput(/rr\+tcp:\S+/);
+  gateway = await startGateway("room", url, site);
 });
 
 test.afterAll(async () => {

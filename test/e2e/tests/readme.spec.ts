@@ -5,10 +5,10 @@ import { tmpdir } from "node:os";
 import path from "node:path";
 import { expect, test } from "../lab_test";
 import type { Lab } from "../processes";
-import { repository_root } from "../processes";
+import { repositoryRoot } from "../processes";
 
 function run(readme: string, lab: Lab): string {
-  const text = readFileSync(path.join(repository_root, readme), "utf8");
+  const text = readFileSync(path.join(repositoryRoot, readme), "utf8");
   const [, code] = /```js\n(.*?)```/s.exec(text) ?? [];
   if (!code) throw new Error(`${readme} shows no JavaScript`);
   const address = lab.url.replace("http", "ws").replace(/\/$/, "");
@@ -16,7 +16,7 @@ function run(readme: string, lab: Lab): string {
   const folder = mkdtempSync(path.join(tmpdir(), "rrgate-readme-"));
   try {
     mkdirSync(path.join(folder, "node_modules"));
-    symlinkSync(path.join(repository_root, "wasm-client"), path.join(folder, "node_modules/rrgate-client"));
+    symlinkSync(path.join(repositoryRoot, "wasm-client"), path.join(folder, "node_modules/rrgate-client"));
     const script = path.join(folder, "readme.mjs");
     writeFileSync(script, `${finite.replaceAll(/wss?:\/\/[\w.:]+/g, address)}\nprocess.exit(0);\n`);
     const env = { ...process.env, FORCE_COLOR: "0" };

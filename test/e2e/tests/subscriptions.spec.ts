@@ -3,10 +3,10 @@ import type { Browser, Page } from "@playwright/test";
 import { expect, test } from "../lab_test";
 import type { Lab } from "../processes";
 
-const row_of = (page: Page, device: string) => page.locator(`[data-device="${device}"]`);
+const rowOf = (page: Page, device: string) => page.locator(`[data-device="${device}"]`);
 
 /** Somebody who looks at the left camera. */
-async function watch_camera(browser: Browser, lab: Lab): Promise<Page> {
+async function watchCamera(browser: Browser, lab: Lab): Promise<Page> {
   const page = await browser.newPage();
   await page.goto(`${lab.url}#/devices/webcams/Webcam/Webcams%5B0%5D`);
   await page.getByRole("button", { name: "Call StartStreaming" }).click();
@@ -17,23 +17,23 @@ async function watch_camera(browser: Browser, lab: Lab): Promise<Page> {
 
 test("says which device is relayed and which is shared, and how many clients each has", async ({ page, lab, browser }) => {
   await page.goto(lab.url);
-  await expect(row_of(page, "create")).toContainText("Moderelay");
-  await expect(row_of(page, "webcams")).toContainText("Modeshared");
-  await expect(row_of(page, "create").locator("details")).toHaveCount(0);
-  await expect(row_of(page, "webcams")).toContainText(/Clients\d/);
-  const before = Number(/Clients\s*(\d+)/.exec(await row_of(page, "webcams").innerText())?.[1] ?? NaN);
-  const viewer = await watch_camera(browser, lab);
-  await expect(row_of(page, "webcams")).toContainText(`Clients${before + 1}`);
+  await expect(rowOf(page, "create")).toContainText("Moderelay");
+  await expect(rowOf(page, "webcams")).toContainText("Modeshared");
+  await expect(rowOf(page, "create").locator("details")).toHaveCount(0);
+  await expect(rowOf(page, "webcams")).toContainText(/Clients\d/);
+  const before = Number(/Clients\s*(\d+)/.exec(await rowOf(page, "webcams").innerText())?.[1] ?? NaN);
+  const viewer = await watchCamera(browser, lab);
+  await expect(rowOf(page, "webcams")).toContainText(`Clients${before + 1}`);
   await viewer.close();
 });
 
 test("lists the pipes of two viewers as they go on, by keyboard alone", async ({ page, lab, browser }) => {
   await page.goto(lab.url);
-  const part = row_of(page, "webcams").locator("details");
+  const part = rowOf(page, "webcams").locator("details");
   await part.locator("summary").focus();
   await page.keyboard.press("Enter");
   await expect(part).toContainText("No client listens to a wire or a pipe of it now.");
-  const viewers = [await watch_camera(browser, lab), await watch_camera(browser, lab)];
+  const viewers = [await watchCamera(browser, lab), await watchCamera(browser, lab)];
   const table = part.getByRole("table", { name: "Subscriptions of webcams" });
   await expect(table.getByRole("row")).toHaveCount(3);
   await expect(table.getByRole("columnheader")).toHaveText(["Member", "Client", "Delivered", "Conflated", "Dropped", "Age p50", "Age p99"]);
@@ -53,7 +53,7 @@ test("asks only while it is open", async ({ page, lab }) => {
   let asked = 0;
   await page.route("**/subscriptions", (route) => (asked++, route.continue()));
   await page.goto(lab.url);
-  const part = row_of(page, "webcams").locator("details");
+  const part = rowOf(page, "webcams").locator("details");
   await expect(part).toBeVisible();
   expect(asked).toBe(0);
   await part.locator("summary").click();
@@ -63,7 +63,7 @@ test("asks only while it is open", async ({ page, lab }) => {
 });
 
 test("says plainly when they may not be seen, when the device is away, and when the gateway is", async ({ page, lab }) => {
-  const part = row_of(page, "webcams").locator("details");
+  const part = rowOf(page, "webcams").locator("details");
   await page.route("**/subscriptions", (route) =>
     route.fulfill({ status: 403, contentType: "application/problem+json", body: JSON.stringify({ detail: "vera may not read" }) }),
   );
@@ -81,22 +81,22 @@ test("says plainly when they may not be seen, when the device is away, and when 
   await lab.gateway.kill();
   await expect(part).toContainText(/The gateway has not told them since .*: the gateway cannot be reached\./);
   lab.gateway.start();
-  await lab.wait_until_online();
+  await lab.waitUntilOnline();
   await expect(part).toContainText("No client listens");
 });
 
 for (const width of [375, 1280])
   test(`is not wider than a screen of ${width} px`, async ({ page, lab, browser }, info) => {
-    const viewer = await watch_camera(browser, lab);
+    const viewer = await watchCamera(browser, lab);
     await page.setViewportSize({ width, height: 900 });
     for (const scheme of ["light", "dark"] as const) {
       await page.emulateMedia({ colorScheme: scheme });
       await page.goto(lab.url);
-      await row_of(page, "webcams").locator("summary").click();
-      await expect(row_of(page, "webcams").getByRole("cell").first()).toBeVisible();
-      await expect(row_of(page, "webcams").getByRole("rowheader")).toHaveCount(1);
-      const too_wide = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
-      expect(too_wide).toBeLessThanOrEqual(0); // below: the gutter of a scroll bar
+      await rowOf(page, "webcams").locator("summary").click();
+      await expect(rowOf(page, "webcams").getByRole("cell").first()).toBeVisible();
+      await expect(rowOf(page, "webcams").getByRole("rowheader")).toHaveCount(1);
+      const tooWide = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+      expect(tooWide).toBeLessThanOrEqual(0); // below: the gutter of a scroll bar
       await page.screenshot({ path: info.outputPath(`${scheme}.png`), fullPage: true });
       await page.reload();
     }

@@ -4,8 +4,8 @@ import { existsSync, writeFileSync } from "node:fs";
 import path from "node:path";
 import { expect, test } from "@playwright/test";
 import type { Page } from "@playwright/test";
-import { Program, rrgate, start_gateway } from "../processes";
-import { make_usb_site } from "../usb_site";
+import { Program, rrgate, startGateway } from "../processes";
+import { makeUsbSite } from "../usb_site";
 
 const service = path.join(path.dirname(rrgate), "../test/interop/cpp/rr-test-service");
 
@@ -67,8 +67,8 @@ globalThis.said = {
 };
 `;
 
-function make_site(): string {
-  const site = make_usb_site();
+function makeSite(): string {
+  const site = makeUsbSite();
   writeFileSync(path.join(site, "usb_script.js"), script);
   writeFileSync(path.join(site, "worker.js"), 'import { run } from "./usb_script.js"; postMessage(await run(false));');
   writeFileSync(path.join(site, "own.js"), own);
@@ -84,8 +84,8 @@ test.beforeAll(async () => {
   if (!existsSync(service)) throw new Error(`${service} is missing: build the target rr-test-service`);
   device = new Program(service, []);
   device.start();
-  const found = await device.wait_for_output(/"url": *"([^"]+)"/);
-  gateway = await start_gateway("big", found[1] ?? "", make_site());
+  const found = await device.waitForOutput(/"url": *"([^"]+)"/);
+  gateway = await startGateway("big", found[1] ?? "", makeSite());
 });
 
 test.afterAll(async () => {
@@ -96,6 +96,7 @@ test.afterAll(async () => {
 /** The gateway has to know who its device is. */
 async function open(page: Page): Promise<void> {
   await expect(async () => {
+    // eslint-disable-next-line @typescript-eslint/naming-convention -- of the gateway
     const answer = (await (await page.request.get(`${gateway.url}api/v1/devices`)).json()) as { devices: { node_name: string }[] };
     expect(answer.devices[0]?.node_name).not.toBe("");
   }).toPass();
@@ -103,14 +104,14 @@ async function open(page: Page): Promise<void> {
 }
 
 const expected = {
-  loaded_before: false,
-  is_same_node: true,
+  loadedBefore: false,
+  isSameNode: true,
   sum: 5,
   ramp: "20000 doubles, wrong at -1",
   counted: [1, 2, 3],
   call: "connection_lost",
   end: expect.stringMatching(/USB device "Test robot" \(1209:5252\): .*(unplugged|the device is gone); plug it in again$/),
-  loaded_after: true,
+  loadedAfter: true,
 };
 
 test("a page lets the user choose a USB device and speaks to the service behind it", async ({ page }) => {

@@ -2,7 +2,7 @@
 import path from "node:path";
 import type { Page } from "@playwright/test";
 import { expect, test } from "../lab_test";
-import { make_usb_site } from "../usb_site";
+import { makeUsbSite } from "../usb_site";
 
 /** A navigator.usb whose one device leads to the robot; the user chooses it when asked. */
 const setup = `
@@ -34,14 +34,14 @@ globalThis.unplug = () => {
 Object.defineProperty(navigator, "usb", { value: usb });
 `;
 
-async function fake_usb(page: Page): Promise<void> {
-  const site = make_usb_site();
+async function fakeUsb(page: Page): Promise<void> {
+  const site = makeUsbSite();
   await page.route("**/usb-test/**", (route) => route.fulfill({ path: path.join(site, new URL(route.request().url()).pathname.slice(10)) }));
   await page.addInitScript(setup);
 }
 
 test("a USB device is chosen, listed and driven, and goes when it is unplugged", async ({ page, lab }) => {
-  await fake_usb(page);
+  await fakeUsb(page);
   await page.goto(lab.url);
   await expect(page.locator('[data-device="create"] [data-state="online"]')).toBeVisible();
   await page.getByRole("button", { name: "Connect USB device" }).click();

@@ -3,25 +3,25 @@
 import { ErrorCode, RobotRaconteurError } from "../errors.js";
 import type { CallOptions, MemberInfo, RrValue } from "../types.js";
 import type { GeneratorStep } from "../wasm_module.js";
-import { signature, split_arguments } from "./member.js";
+import { signature, splitArguments } from "./member.js";
 import type { MemberContext } from "./member.js";
 
 const suffix = "{generator}";
 
-export function is_generator({ type, parameters }: MemberInfo): boolean {
-  return type.endsWith(suffix) || takes_values({ parameters });
+export function isGenerator({ type, parameters }: MemberInfo): boolean {
+  return type.endsWith(suffix) || takesValues({ parameters });
 }
 
-function takes_values({ parameters }: Pick<MemberInfo, "parameters">): boolean {
+function takesValues({ parameters }: Pick<MemberInfo, "parameters">): boolean {
   return parameters.at(-1)?.type.endsWith(suffix) ?? false;
 }
 
 type Result = IteratorResult<RrValue | undefined, undefined>;
 
-export function make_generator_function(context: MemberContext): (...args: unknown[]) => Generator {
-  const count = context.info.parameters.length - (takes_values(context.info) ? 1 : 0);
+export function makeGeneratorFunction(context: MemberContext): (...args: unknown[]) => Generator {
+  const count = context.info.parameters.length - (takesValues(context.info) ? 1 : 0);
   const call = (...args: unknown[]) => {
-    const { values, options } = split_arguments(signature(context.info), count, args);
+    const { values, options } = splitArguments(signature(context.info), count, args);
     return new Generator(context, values, options);
   };
   return Object.defineProperty(call, "name", { value: context.info.name });
@@ -30,9 +30,9 @@ export function make_generator_function(context: MemberContext): (...args: unkno
 /** One run. The service hears of it with the first next(); steps follow one another, however they are asked for. */
 class Generator implements AsyncGenerator<RrValue | undefined, undefined, unknown> {
   #index: number | undefined;
-  #is_done = false;
+  #isDone = false;
   /** Whether the core took the last step. */
-  #is_sent = false;
+  #isSent = false;
   /** The step before. */
   #last: Promise<unknown> = Promise.resolve();
 
@@ -47,14 +47,14 @@ class Generator implements AsyncGenerator<RrValue | undefined, undefined, unknow
   }
 
   next(parameter?: unknown): Promise<Result> {
-    return this.#after_last(async () => {
-      if (this.#is_done) return { done: true, value: undefined };
+    return this.#afterLast(async () => {
+      if (this.#isDone) return { done: true, value: undefined };
       try {
         this.#index ??= await this.#open();
         const value = await this.#step("next", parameter);
         return { done: false, value: this.context.info.type === "void" ? undefined : value };
       } catch (error) {
-        this.#give_up(error);
+        this.#giveUp(error);
         if (error instanceof RobotRaconteurError && error.code === ErrorCode.StopIteration) {
           return { done: true, value: undefined };
         }
@@ -65,7 +65,7 @@ class Generator implements AsyncGenerator<RrValue | undefined, undefined, unknow
 
   /** Closes the generator. */
   return(): Promise<Result> {
-    return this.#after_last(async () => {
+    return this.#afterLast(async () => {
       await this.#end("close");
       return { done: true, value: undefined };
     });
@@ -73,7 +73,7 @@ class Generator implements AsyncGenerator<RrValue | undefined, undefined, unknow
 
   /** Aborts the generator. */
   throw(error: unknown): Promise<Result> {
-    return this.#after_last(async () => {
+    return this.#afterLast(async () => {
       await this.#end("abort");
       throw error;
     });
@@ -85,36 +85,36 @@ class Generator implements AsyncGenerator<RrValue | undefined, undefined, unknow
 
   async #open(): Promise<number> {
     const { session, path, info } = this.context;
-    return Number(await session.request((core) => core.open_generator(path, info.name, this.args), this.options));
+    return Number(await session.request((core) => core.openGenerator(path, info.name, this.args), this.options));
   }
 
   #step(step: GeneratorStep, parameter?: unknown): Promise<RrValue> {
     const { session, path, info } = this.context;
     const index = this.#index as number;
     const options = step === "next" ? this.options : {};
-    this.#is_sent = false;
+    this.#isSent = false;
     return session.request((core) => {
-      const id = core.step_generator(step, path, info.name, index, parameter);
-      this.#is_sent = true;
+      const id = core.stepGenerator(step, path, info.name, index, parameter);
+      this.#isSent = true;
       return id;
     }, options);
   }
 
   async #end(step: GeneratorStep): Promise<void> {
-    const is_running = this.#index !== undefined && !this.#is_done && !this.context.session.is_closed;
-    this.#is_done = true;
-    if (is_running) await this.#step(step);
+    const isRunning = this.#index !== undefined && !this.#isDone && !this.context.session.isClosed;
+    this.#isDone = true;
+    if (isRunning) await this.#step(step);
   }
 
   /** An error of the service ended the generator there too; after one of this side it still runs. */
-  #give_up(error: unknown): void {
-    const is_remote = error instanceof RobotRaconteurError && error.code !== ErrorCode.RequestTimeout && this.#is_sent;
+  #giveUp(error: unknown): void {
+    const isRemote = error instanceof RobotRaconteurError && error.code !== ErrorCode.RequestTimeout && this.#isSent;
     // Nobody waits for it: the first error is the one to tell.
-    if (!is_remote) void this.#end("abort").catch(() => undefined);
-    this.#is_done = true;
+    if (!isRemote) void this.#end("abort").catch(() => undefined);
+    this.#isDone = true;
   }
 
-  #after_last(step: () => Promise<Result>): Promise<Result> {
+  #afterLast(step: () => Promise<Result>): Promise<Result> {
     const result = this.#last.then(step);
     this.#last = result.catch(() => undefined);
     return result;

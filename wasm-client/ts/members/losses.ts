@@ -4,12 +4,12 @@ import type { CallOptions, Losses, RrValue } from "../types.js";
 import type { MemberContext } from "./member.js";
 
 /** `index`: of a pipe endpoint. */
-export async function losses_of(
+export async function lossesOf(
   { session, path, info }: MemberContext,
   options: CallOptions = {},
   index?: number,
 ): Promise<Losses | undefined> {
-  const attributes = (await session.request((core) => core.get_attributes(), options)) as Map<string, RrValue>;
+  const attributes = (await session.request((core) => core.getAttributes(), options)) as Map<string, RrValue>;
   const all = attributes.get("rrgate.subscriptions");
   const numbers = all instanceof Map && all.get(`${path}.${info.name}${index === undefined ? "" : `[${index}]`}` as never);
   if (!(numbers instanceof Float64Array) || numbers.length !== 5) return undefined;

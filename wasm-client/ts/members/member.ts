@@ -1,5 +1,5 @@
 // What the faces of all members have in common. Layer: wasm-client/ts.
-import { make_error } from "../errors.js";
+import { makeError } from "../errors.js";
 import type { Session } from "../session.js";
 import type { CallOptions, MemberInfo, RemoteObject } from "../types.js";
 
@@ -9,7 +9,7 @@ export interface MemberContext {
   readonly path: string;
   readonly info: MemberInfo;
   /** The object that a path leads to; concurrent look-ups share one. */
-  find_object(path: string, options?: CallOptions): Promise<RemoteObject>;
+  findObject(path: string, options?: CallOptions): Promise<RemoteObject>;
 }
 
 /** "Drive(velocity, radius)": for messages. */
@@ -18,22 +18,22 @@ export function signature(info: MemberInfo): string {
 }
 
 /** Arguments by position, then CallOptions where wanted. @throws RobotRaconteurError InvalidArgument */
-export function split_arguments(
+export function splitArguments(
   what: string,
   count: number,
   args: readonly unknown[],
 ): { values: readonly unknown[]; options: CallOptions } {
   if (args.length < count || args.length > count + 1) {
-    throw make_error("InvalidArgument", `${what}: got ${args.length} arguments, expected ${count}`);
+    throw makeError("InvalidArgument", `${what}: got ${args.length} arguments, expected ${count}`);
   }
-  return { values: args.slice(0, count), options: check_options(what, args[count]) };
+  return { values: args.slice(0, count), options: checkOptions(what, args[count]) };
 }
 
 /** The argument behind the last parameter; anything else there is one argument too many. */
-function check_options(what: string, given: unknown): CallOptions {
+function checkOptions(what: string, given: unknown): CallOptions {
   if (given === undefined) return {};
   if (typeof given === "object" && given !== null && Object.keys(given).every((key) => key === "signal" || key === "timeout")) {
     return given;
   }
-  throw make_error("InvalidArgument", `${what}: the argument behind the last parameter is not {signal, timeout}`);
+  throw makeError("InvalidArgument", `${what}: the argument behind the last parameter is not {signal, timeout}`);
 }

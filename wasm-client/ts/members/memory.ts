@@ -4,16 +4,16 @@ import type { MemberContext } from "./member.js";
 
 type Numbers = number | readonly number[];
 
-export function make_memory({ session, path, info }: MemberContext): MemoryMember<unknown> {
+export function makeMemory({ session, path, info }: MemberContext): MemoryMember<unknown> {
   return Object.freeze({
     dimensions: async (options: CallOptions = {}) => {
-      const found = await session.request((core) => core.get_memory_dimensions(path, info.name), options);
+      const found = await session.request((core) => core.getMemoryDimensions(path, info.name), options);
       return Array.from(found as BigUint64Array, Number);
     },
     read: async (position: Numbers, count: Numbers, options: CallOptions = {}) =>
-      session.request((core) => core.read_memory(path, info.name, numbers(position), numbers(count)), options),
+      session.request((core) => core.readMemory(path, info.name, numbers(position), numbers(count)), options),
     write: async (position: Numbers, value: unknown, options: CallOptions = {}) => {
-      await session.request((core) => core.write_memory(path, info.name, numbers(position), value), options);
+      await session.request((core) => core.writeMemory(path, info.name, numbers(position), value), options);
     },
   } satisfies MemoryMember<unknown>);
 }

@@ -2,11 +2,11 @@
 import type { PropertyMember } from "../types.js";
 import type { MemberContext } from "./member.js";
 
-export function make_property({ session, path, info }: MemberContext): PropertyMember<unknown> {
+export function makeProperty({ session, path, info }: MemberContext): PropertyMember<unknown> {
   return Object.freeze({
-    get: async (options = {}) => session.request((core) => core.get_property(path, info.name), options),
+    get: async (options = {}) => session.request((core) => core.getProperty(path, info.name), options),
     set: async (value: unknown, options = {}) => {
-      await session.request((core) => core.set_property(path, info.name, value), options);
+      await session.request((core) => core.setProperty(path, info.name, value), options);
     },
   } satisfies PropertyMember<unknown>);
 }

@@ -8,15 +8,15 @@ export class ValueQueue<T> implements AsyncIterator<T, undefined> {
   #end: { error?: unknown } | undefined;
 
   /**
-   * @param on_return    the consumer left its loop.
-   * @param on_overflow  what to fail with where a value is too much; without it the oldest goes.
-   * @param max_bytes    about as much memory may wait.
+   * @param onReturn    the consumer left its loop.
+   * @param onOverflow  what to fail with where a value is too much; without it the oldest goes.
+   * @param maxBytes    about as much memory may wait.
    */
   constructor(
     private readonly limit: number,
-    private readonly on_return: () => void,
-    private readonly on_overflow?: () => unknown,
-    private readonly max_bytes = Infinity,
+    private readonly onReturn: () => void,
+    private readonly onOverflow?: () => unknown,
+    private readonly maxBytes = Infinity,
   ) {}
 
   push(value: T): void {
@@ -26,10 +26,10 @@ export class ValueQueue<T> implements AsyncIterator<T, undefined> {
       waiting.resolve({ done: false, value });
       return;
     }
-    const size = this.max_bytes === Infinity ? 0 : rough_size(value);
-    const is_full = this.#values.length >= this.limit || (this.#bytes > 0 && this.#bytes + size > this.max_bytes);
-    if (is_full && this.on_overflow) return this.fail(this.on_overflow());
-    if (is_full) this.#values.shift();
+    const size = this.maxBytes === Infinity ? 0 : roughSize(value);
+    const isFull = this.#values.length >= this.limit || (this.#bytes > 0 && this.#bytes + size > this.maxBytes);
+    if (isFull && this.onOverflow) return this.fail(this.onOverflow());
+    if (isFull) this.#values.shift();
     this.#bytes += size;
     this.#values.push(value);
   }
@@ -47,7 +47,7 @@ export class ValueQueue<T> implements AsyncIterator<T, undefined> {
   next(): Promise<IteratorResult<T, undefined>> {
     if (this.#values.length > 0) {
       const value = this.#values.shift() as T;
-      if (this.max_bytes !== Infinity) this.#bytes -= rough_size(value);
+      if (this.maxBytes !== Infinity) this.#bytes -= roughSize(value);
       return Promise.resolve({ done: false, value });
     }
     if (!this.#end) return new Promise((resolve, reject) => this.#waiting.push({ resolve, reject }));
@@ -59,7 +59,7 @@ export class ValueQueue<T> implements AsyncIterator<T, undefined> {
   return(): Promise<IteratorResult<T, undefined>> {
     this.#values.length = 0;
     this.#finish({});
-    this.on_return();
+    this.onReturn();
     return Promise.resolve({ done: true, value: undefined });
   }
 
@@ -74,12 +74,12 @@ export class ValueQueue<T> implements AsyncIterator<T, undefined> {
 }
 
 /** About the bytes that a value takes, without its names. Received values are trees: nothing holds itself. */
-function rough_size(value: unknown): number {
+function roughSize(value: unknown): number {
   if (typeof value === "string") return 2 * value.length;
   if (typeof value !== "object" || value === null) return 8;
   if (ArrayBuffer.isView(value)) return value.byteLength;
   const items = value instanceof Map ? value.values() : Object.values(value);
   let size = 16;
-  for (const item of items) size += rough_size(item);
+  for (const item of items) size += roughSize(item);
   return size;
 }

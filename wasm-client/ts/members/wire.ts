@@ -1,25 +1,25 @@
 // Wires: the newest value wins. Layer: wasm-client/ts/members. Source: sessions spec section 2.12.
-import { make_error } from "../errors.js";
+import { makeError } from "../errors.js";
 import type { CallOptions, Losses, RrValue, WireConnection, WireMember, WireTime } from "../types.js";
-import { check_signal } from "../within.js";
-import { losses_of } from "./losses.js";
+import { checkSignal } from "../within.js";
+import { lossesOf } from "./losses.js";
 import type { MemberContext } from "./member.js";
 import { ValueQueue } from "./queue.js";
 
-export function make_wire(context: MemberContext): WireMember<unknown> {
+export function makeWire(context: MemberContext): WireMember<unknown> {
   const { session, path, info } = context;
   const name = info.name;
   let shared: SharedWire | undefined;
   return Object.freeze({
     connect: (options = {}) => {
-      check_signal(options.signal);
-      if (!shared || shared.is_over) shared = new SharedWire(context);
+      checkSignal(options.signal);
+      if (!shared || shared.isOver) shared = new SharedWire(context);
       return shared.join(options);
     },
-    peek: async (options = {}) => session.request((core) => core.peek_in_value(path, name), options),
-    peekOut: async (options = {}) => session.request((core) => core.peek_out_value(path, name), options),
+    peek: async (options = {}) => session.request((core) => core.peekInValue(path, name), options),
+    peekOut: async (options = {}) => session.request((core) => core.peekOutValue(path, name), options),
     poke: async (value: unknown, options = {}) => {
-      await session.request((core) => core.poke_out_value(path, name, value), options);
+      await session.request((core) => core.pokeOutValue(path, name, value), options);
     },
   } satisfies WireMember<unknown>);
 }
@@ -29,32 +29,32 @@ export function make_wire(context: MemberContext): WireMember<unknown> {
  * makes it, the last one that closes ends it.
  */
 class SharedWire {
-  is_over = false;
+  isOver = false;
   value: RrValue | undefined;
   time: WireTime | undefined;
   readonly ready: Promise<void>;
   readonly #members = new Set<Connection>();
-  readonly #stop_listening: () => void;
-  readonly #stop_closing: () => void;
-  #is_connected = false;
+  readonly #stopListening: () => void;
+  readonly #stopClosing: () => void;
+  #isConnected = false;
 
   constructor(readonly context: MemberContext) {
     const { session, path, info } = context;
-    this.#stop_listening = session.listen(path, info.name, {
-      on_wire_value: (value, seconds, nanoseconds) => {
+    this.#stopListening = session.listen(path, info.name, {
+      onWireValue: (value, seconds, nanoseconds) => {
         this.value = value;
         this.time = { seconds, nanoseconds };
         for (const member of [...this.#members]) member.receive(value);
       },
-      on_wire_closed: () => this.#end(),
+      onWireClosed: () => this.#end(),
     });
-    this.#stop_closing = session.on_close((reason) => this.#end(reason));
+    this.#stopClosing = session.onClose((reason) => this.#end(reason));
     this.ready = session
-      .request((core) => core.connect_wire(path, info.name))
+      .request((core) => core.connectWire(path, info.name))
       .then(
         () => {
-          this.#is_connected = true;
-          if (this.is_over) this.#disconnect();
+          this.#isConnected = true;
+          if (this.isOver) void this.#disconnect();
         },
         (error: unknown) => {
           this.#end(error);
@@ -73,26 +73,26 @@ class SharedWire {
   /** Resolves when the service knows, if this was the last one. */
   async leave(connection: Connection): Promise<void> {
     this.#members.delete(connection);
-    if (this.#members.size > 0 || this.is_over) return;
+    if (this.#members.size > 0 || this.isOver) return;
     this.#over();
-    if (this.#is_connected) await this.#disconnect();
+    if (this.#isConnected) await this.#disconnect();
   }
 
   async send(value: unknown): Promise<void> {
     await this.ready;
     const { session, path, info } = this.context;
-    if (this.is_over) throw closed_wire(info.name);
-    session.tell((core) => core.send_wire(path, info.name, value));
+    if (this.isOver) throw closedWire(info.name);
+    session.tell((core) => core.sendWire(path, info.name, value));
   }
 
   #over(): void {
-    this.is_over = true;
-    this.#stop_listening();
-    this.#stop_closing();
+    this.isOver = true;
+    this.#stopListening();
+    this.#stopClosing();
   }
 
   #end(reason?: unknown): void {
-    if (this.is_over) return;
+    if (this.isOver) return;
     this.#over();
     const members = [...this.#members];
     this.#members.clear();
@@ -102,8 +102,8 @@ class SharedWire {
   /** A wire that is gone already needs no leave; nothing waits for the answer but close(). */
   async #disconnect(): Promise<void> {
     const { session, path, info } = this.context;
-    if (session.is_closed) return;
-    await session.request((core) => core.disconnect_wire(path, info.name)).catch(() => undefined);
+    if (session.isClosed) return;
+    await session.request((core) => core.disconnectWire(path, info.name)).catch(() => undefined);
   }
 }
 
@@ -145,12 +145,13 @@ class Connection implements WireConnection {
   }
 
   send(value: unknown): Promise<void> {
-    if (this.#end) return Promise.reject(this.#end.reason ?? closed_wire(this.wire.context.info.name));
-    return this.wire.send(value);
+    if (!this.#end) return this.wire.send(value);
+    const reason: unknown = this.#end.reason ?? closedWire(this.wire.context.info.name);
+    return Promise.reject(reason);
   }
 
   losses(options?: CallOptions): Promise<Losses | undefined> {
-    return losses_of(this.wire.context, options);
+    return lossesOf(this.wire.context, options);
   }
 
   close(): Promise<void> {
@@ -178,19 +179,19 @@ class Connection implements WireConnection {
   /** The shared connection's `ready`, within the limits of this one. */
   #limited(signal: AbortSignal | undefined, timeout: number | undefined): Promise<void> {
     return new Promise((resolve, reject) => {
-      const give_up = (reason: unknown) => {
+      const giveUp = (reason: unknown) => {
         reject(reason);
         if (this.#end) return;
         this.end(reason);
         void this.wire.leave(this);
       };
-      const abort = () => give_up(signal?.reason);
+      const abort = () => giveUp(signal?.reason);
       const timer =
         timeout === undefined
           ? undefined
           : setTimeout(() => {
               const name = this.wire.context.info.name;
-              give_up(make_error("RequestTimeout", `wire ${name} was not connected within ${timeout} ms`));
+              giveUp(makeError("RequestTimeout", `wire ${name} was not connected within ${timeout} ms`));
             }, timeout);
       this.#abort = () => {
         clearTimeout(timer);
@@ -208,4 +209,4 @@ function finish(queue: ValueQueue<RrValue>, end: { reason?: unknown }): void {
   else queue.fail(end.reason);
 }
 
-const closed_wire = (name: string) => make_error("InvalidOperation", `wire ${name} is closed`);
+const closedWire = (name: string) => makeError("InvalidOperation", `wire ${name} is closed`);

@@ -1,18 +1,18 @@
 // One USB device as the core sees it: requests that are carried out, and how they ended. Layer: wasm-client/ts.
 // Source: hardware spec sections 3.1 to 3.4; https://wicg.github.io/webusb/. A page may cancel nothing but by closing.
-import { make_error, text_of } from "../errors.js";
+import { makeError, textOf } from "../errors.js";
 import type { RobotRaconteurError } from "../errors.js";
 import type { UsbControl, UsbStatus } from "./usb_module.js";
 import type { WebUsb, WebUsbConfiguration, WebUsbDevice, WebUsbInResult, WebUsbOutResult } from "./webusb.js";
 
-const control_timeout_ms = 5000;
-const busy_pause_ms = 100;
-const busy_attempts = 20;
+const controlTimeoutMs = 5000;
+const busyPauseMs = 100;
+const busyAttempts = 20;
 /** Some systems let transfers fail a little before they say that the device is gone. */
-const gone_grace_ms = 300;
+const goneGraceMs = 300;
 
 /** By the DOMExceptions of WebUSB. */
-const status_names: Record<string, UsbStatus> = {
+const statusNames: Record<string, UsbStatus> = {
   NotFoundError: "no_device",
   SecurityError: "denied",
   TimeoutError: "timed_out",
@@ -36,7 +36,7 @@ export interface UsbOutcome {
 }
 
 /** 'USB device "Robot" (1209:5252)' */
-export function name_of(device: WebUsbDevice): string {
+export function nameOf(device: WebUsbDevice): string {
   const hex = (number: number) => number.toString(16).padStart(4, "0");
   const product = device.productName ? `"${device.productName.slice(0, 64)}" ` : "";
   return `USB device ${product}(${hex(device.vendorId)}:${hex(device.productId)})`;
@@ -46,26 +46,26 @@ export class UsbBus {
   readonly name: string;
   /** Resolves when the device is unplugged. */
   readonly gone: Promise<void>;
-  #is_gone = false;
-  #was_open = false;
+  #isGone = false;
+  #wasOpen = false;
   #claimed: number | undefined;
   /** The last one that was not "ok": what there is to advise. */
   #failure: UsbStatus = "ok";
-  #stop_listening!: () => void;
+  #stopListening!: () => void;
 
   constructor(
     usb: WebUsb,
     private readonly device: WebUsbDevice,
   ) {
-    this.name = name_of(device);
+    this.name = nameOf(device);
     this.gone = new Promise((resolve) => {
       const heard = (event: Event & { device?: unknown }) => {
         if (event.device !== device) return;
-        this.#is_gone = true;
+        this.#isGone = true;
         resolve();
       };
       usb.addEventListener("disconnect", heard);
-      this.#stop_listening = () => usb.removeEventListener("disconnect", heard);
+      this.#stopListening = () => usb.removeEventListener("disconnect", heard);
     });
   }
 
@@ -73,15 +73,15 @@ export class UsbBus {
   async open(): Promise<WebUsbConfiguration> {
     const [configuration] = this.device.configurations;
     if (!configuration) throw this.error("has no configuration");
-    this.#was_open = this.device.opened;
+    this.#wasOpen = this.device.opened;
     try {
-      if (!this.#was_open) await this.device.open();
+      if (!this.#wasOpen) await this.device.open();
       if (this.device.configuration?.configurationValue !== configuration.configurationValue) {
         await this.device.selectConfiguration(configuration.configurationValue);
       }
     } catch (error) {
-      this.#failure = status_names[name_of_error(error)] ?? "failed";
-      throw this.error(`could not be opened: ${text_of(error)}`);
+      this.#failure = statusNames[nameOfError(error)] ?? "failed";
+      throw this.error(`could not be opened: ${textOf(error)}`);
     }
     return configuration;
   }
@@ -93,39 +93,39 @@ export class UsbBus {
     }
     let timer: ReturnType<typeof setTimeout> | undefined;
     const late = new Promise<never>((_, reject) => {
-      timer = setTimeout(() => reject(new DOMException("no answer", "TimeoutError")), control_timeout_ms);
+      timer = setTimeout(() => reject(new DOMException("no answer", "TimeoutError")), controlTimeoutMs);
     });
     const asked = () =>
       typeof data === "number" ? this.device.controlTransferIn(setup, data) : this.device.controlTransferOut(setup, data);
-    const outcome = await this.#carry_out(() => Promise.race([asked(), late]));
+    const outcome = await this.#carryOut(() => Promise.race([asked(), late]));
     clearTimeout(timer);
     return outcome;
   }
 
   read(endpoint: number, size: number): Promise<UsbOutcome> {
-    return this.#carry_out(() => this.device.transferIn(endpoint, size));
+    return this.#carryOut(() => this.device.transferIn(endpoint, size));
   }
 
   write(endpoint: number, bytes: Uint8Array<ArrayBuffer>): Promise<UsbOutcome> {
-    return this.#carry_out(() => this.device.transferOut(endpoint, bytes));
+    return this.#carryOut(() => this.device.transferOut(endpoint, bytes));
   }
 
   /** Ends what is still under way. */
   async release(): Promise<void> {
-    this.#stop_listening();
+    this.#stopListening();
     // Neither can be done for a device that is gone, and nothing depends on it.
     if (this.#claimed !== undefined) await this.device.releaseInterface(this.#claimed).catch(() => undefined);
-    if (!this.#was_open && this.device.opened) await this.device.close().catch(() => undefined);
+    if (!this.#wasOpen && this.device.opened) await this.device.close().catch(() => undefined);
   }
 
   /** `what`: as the core says it; what can be done is added. */
   text(what: string): string {
-    const help = advice[this.#is_gone ? "no_device" : this.#failure];
+    const help = advice[this.#isGone ? "no_device" : this.#failure];
     return `${this.name}: ${what.replace(/^USB (device: )?/, "")}${help ? `; ${help}` : ""}`;
   }
 
   error(what: string): RobotRaconteurError {
-    return make_error("ConnectionError", this.text(what));
+    return makeError("ConnectionError", this.text(what));
   }
 
   /** Requests to an interface need it, and so do its endpoints. The page before may not have let go of it yet. */
@@ -137,14 +137,14 @@ export class UsbBus {
         this.#claimed = number;
         return "ok";
       } catch (error) {
-        const status = this.#is_gone ? "no_device" : (status_names[name_of_error(error)] ?? "busy");
-        if (status !== "busy" || attempt === busy_attempts) return (this.#failure = status);
-        await pause(busy_pause_ms);
+        const status = this.#isGone ? "no_device" : (statusNames[nameOfError(error)] ?? "busy");
+        if (status !== "busy" || attempt === busyAttempts) return (this.#failure = status);
+        await pause(busyPauseMs);
       }
     }
   }
 
-  async #carry_out(transfer: () => Promise<WebUsbInResult | WebUsbOutResult>): Promise<UsbOutcome> {
+  async #carryOut(transfer: () => Promise<WebUsbInResult | WebUsbOutResult>): Promise<UsbOutcome> {
     let status: UsbStatus;
     let data = new Uint8Array(0);
     let size = 0;
@@ -154,14 +154,14 @@ export class UsbBus {
       if ("bytesWritten" in result) size = result.bytesWritten;
       else if (result.data) data = new Uint8Array(result.data.buffer as ArrayBuffer, result.data.byteOffset, result.data.byteLength);
     } catch (error) {
-      status = status_names[name_of_error(error)] ?? "failed";
-      if (status === "failed") await Promise.race([this.gone, pause(gone_grace_ms)]);
+      status = statusNames[nameOfError(error)] ?? "failed";
+      if (status === "failed") await Promise.race([this.gone, pause(goneGraceMs)]);
     }
-    if (status !== "ok") this.#failure = status = this.#is_gone ? "no_device" : status;
+    if (status !== "ok") this.#failure = status = this.#isGone ? "no_device" : status;
     return { status, data, size };
   }
 }
 
-const name_of_error = (error: unknown): string => (error as { name?: string } | undefined)?.name ?? "";
+const nameOfError = (error: unknown): string => (error as { name?: string } | undefined)?.name ?? "";
 
 const pause = (milliseconds: number) => new Promise<void>((resolve) => void setTimeout(resolve, milliseconds));

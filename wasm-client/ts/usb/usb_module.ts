@@ -1,6 +1,6 @@
 // The compiled USB half of the core: the only file that knows its handles and its memory. Layer: wasm-client/ts.
 // Source: src/usb_bindings.cpp, and core/hardware/usb_probe.hpp and usb_link.hpp behind it.
-import { make_error, text_of } from "../errors.js";
+import { makeError, textOf } from "../errors.js";
 import { JsValues } from "../js_values.js";
 import type { CoreExports, Handle } from "../js_values.js";
 import { platform } from "../platform.js";
@@ -23,6 +23,7 @@ export interface UsbEvent {
   reason: string;
 }
 
+/* eslint-disable @typescript-eslint/naming-convention -- names of C++ */
 interface WasmUsb extends CoreExports {
   _initialize(): void;
   buffer(size: number): number;
@@ -55,11 +56,12 @@ interface WasmUsb extends CoreExports {
   unsent_bytes(stream: number): number;
   unread_bytes(stream: number): number;
 }
+/* eslint-enable @typescript-eslint/naming-convention */
 
-const request_types = ["standard", "class", "vendor"] as const;
+const requestTypes = ["standard", "class", "vendor"] as const;
 const recipients = ["device", "interface", "endpoint", "other"] as const;
-const in_bit = 0x80;
-const endpoint_bits = 0x0f;
+const inBit = 0x80;
+const endpointBits = 0x0f;
 
 let compiled: Promise<WebAssembly.Module> | undefined;
 
@@ -74,9 +76,9 @@ export class UsbCore {
   /** @throws RobotRaconteurError SystemResourceError: the file cannot be loaded. */
   static async create(configuration: WebUsbConfiguration): Promise<UsbCore> {
     // Written out so that bundlers see it and ship the file.
-    compiled ??= platform.load_wasm(new URL("./rrgate-usb.wasm", import.meta.url)).catch((error: unknown) => {
+    compiled ??= platform.loadWasm(new URL("./rrgate-usb.wasm", import.meta.url)).catch((error: unknown) => {
       compiled = undefined; // the next one tries again
-      throw make_error("SystemResourceError", `the protocol core for USB could not be loaded: ${text_of(error)}`);
+      throw makeError("SystemResourceError", `the protocol core for USB could not be loaded: ${textOf(error)}`);
     });
     const code = await compiled;
     const values = new JsValues();
@@ -93,7 +95,7 @@ export class UsbCore {
       for (const { alternateSetting, interfaceClass, endpoints } of alternates) {
         usb.add_interface(interfaceNumber, alternateSetting, interfaceClass);
         for (const { endpointNumber, direction, type, packetSize } of endpoints) {
-          usb.add_endpoint(endpointNumber | (direction === "in" ? in_bit : 0), type === "bulk", packetSize);
+          usb.add_endpoint(endpointNumber | (direction === "in" ? inBit : 0), type === "bulk", packetSize);
         }
       }
     }
@@ -111,31 +113,31 @@ export class UsbCore {
     const usb = this.#usb;
     return {
       interface: usb.interface_number(),
-      in: usb.in_address() & endpoint_bits,
-      out: usb.out_address() & endpoint_bits,
+      in: usb.in_address() & endpointBits,
+      out: usb.out_address() & endpointBits,
     };
   }
 
   // --- told ---
 
-  handle_control(status: UsbStatus, data: Uint8Array): void {
+  handleControl(status: UsbStatus, data: Uint8Array): void {
     this.#put(data);
     this.#usb.handle_control(statuses.indexOf(status), data.length);
   }
 
-  handle_written(slot: number, status: UsbStatus, size: number): void {
+  handleWritten(slot: number, status: UsbStatus, size: number): void {
     this.#usb.handle_written(slot, statuses.indexOf(status), size);
   }
 
   /** `data`: no more than poll_read() asked for. */
-  handle_read(slot: number, address: number, status: UsbStatus, data: Uint8Array): void {
+  handleRead(slot: number, address: number, status: UsbStatus, data: Uint8Array): void {
     this.#values.bytes.set(data, address);
     this.#usb.handle_read(slot, statuses.indexOf(status), data.length);
   }
 
   // --- asked ---
 
-  open_stream(): number {
+  openStream(): number {
     return this.#usb.open_stream();
   }
 
@@ -153,7 +155,7 @@ export class UsbCore {
     return this.#values.bytes.slice(address, address + size);
   }
 
-  close_stream(stream: number): void {
+  closeStream(stream: number): void {
     this.#usb.close_stream(stream);
   }
 
@@ -163,7 +165,7 @@ export class UsbCore {
 
   // --- answers ---
 
-  poll_control(): UsbControl | undefined {
+  pollControl(): UsbControl | undefined {
     const at = this.#usb.poll_control();
     if (at === 0) return undefined;
     const view = new DataView(this.#values.bytes.buffer, at);
@@ -171,53 +173,53 @@ export class UsbCore {
     const length = view.getUint16(6, true);
     return {
       setup: {
-        requestType: request_types[(type >> 5) & 3] ?? "vendor",
+        requestType: requestTypes[(type >> 5) & 3] ?? "vendor",
         recipient: recipients[type & 31] ?? "other",
         request: view.getUint8(1),
         value: view.getUint16(2, true),
         index: view.getUint16(4, true),
       },
-      data: type & in_bit ? length : this.#values.bytes.slice(at + 8, at + 8 + length),
+      data: type & inBit ? length : this.#values.bytes.slice(at + 8, at + 8 + length),
     };
   }
 
-  poll_write(): { slot: number; bytes: Uint8Array<ArrayBuffer> } | undefined {
+  pollWrite(): { slot: number; bytes: Uint8Array<ArrayBuffer> } | undefined {
     const slot = this.#usb.poll_write();
     if (slot === 0) return undefined;
     const at = this.#usb.write_address();
     return { slot, bytes: this.#values.bytes.slice(at, at + this.#usb.write_size()) };
   }
 
-  poll_read(): { slot: number; address: number; size: number } | undefined {
+  pollRead(): { slot: number; address: number; size: number } | undefined {
     const slot = this.#usb.poll_read();
     return slot === 0 ? undefined : { slot, address: this.#usb.read_address(), size: this.#usb.read_size() };
   }
 
-  poll_event(): UsbEvent | undefined {
+  pollEvent(): UsbEvent | undefined {
     return this.#values.take(this.#usb.poll_event()) as UsbEvent | undefined;
   }
 
   // --- looked at ---
 
   /** Whether a stream was ever asked for. */
-  has_link(): boolean {
+  hasLink(): boolean {
     return this.#usb.has_link() !== 0;
   }
 
   /** New streams need a new claim. */
-  is_ending(): boolean {
+  isEnding(): boolean {
     return this.#usb.is_ending() !== 0;
   }
 
-  is_closed(): boolean {
+  isClosed(): boolean {
     return this.#usb.is_closed() !== 0;
   }
 
-  is_sent(stream: number): boolean {
+  isSent(stream: number): boolean {
     return this.#usb.is_sent(stream) !== 0;
   }
 
-  unsent_bytes(stream: number): number {
+  unsentBytes(stream: number): number {
     return this.#usb.unsent_bytes(stream);
   }
 

@@ -4,7 +4,7 @@
 import { useEffect, useRef } from "preact/hooks";
 import { useStore } from "./store";
 import type { Store } from "./store";
-import { format_route, format_step } from "./router";
+import { formatRoute, formatStep } from "./router";
 import type { Route } from "./router";
 import { theme } from "./theme";
 import type { Theme } from "./theme";
@@ -25,7 +25,7 @@ interface AppParts {
 export function App({ route, list, usb, access }: AppParts) {
   const where = useStore(route);
   const main = useRef<HTMLElement>(null);
-  const title = title_of(where);
+  const title = titleOf(where);
   const first = useRef(true);
   useEffect(() => {
     document.title = title === "" ? "rrgate" : `${title} · rrgate`;
@@ -59,10 +59,10 @@ function Crumbs({ route }: { route: Route }) {
   if (route.page !== "service") return <span class="crumbs" />;
   const { device, service, path, view } = route;
   const links = [
-    { text: device, href: path.length > 0 || view === "members" ? format_route(device, service) : null },
+    { text: device, href: path.length > 0 || view === "members" ? formatRoute(device, service) : null },
     ...path.map((step, depth) => ({
-      text: format_step(step),
-      href: depth < path.length - 1 ? format_route(device, service, path.slice(0, depth + 1)) : null,
+      text: formatStep(step),
+      href: depth < path.length - 1 ? formatRoute(device, service, path.slice(0, depth + 1)) : null,
     })),
   ];
   return (
@@ -107,9 +107,9 @@ function UnknownPage({ address }: { address: string }) {
   );
 }
 
-function title_of(route: Route): string {
+function titleOf(route: Route): string {
   if (route.page === "devices") return "Devices";
   if (route.page === "unknown") return "No such page";
   const last = route.path[route.path.length - 1];
-  return last ? `${format_step(last)} of ${route.device}` : route.device;
+  return last ? `${formatStep(last)} of ${route.device}` : route.device;
 }

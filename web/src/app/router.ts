@@ -14,7 +14,7 @@ export type Route =
   | { page: "service"; device: string; service: string; path: PathStep[]; view: "auto" | "members" }
   | { page: "unknown"; address: string };
 
-export function parse_route(hash: string): Route {
+export function parseRoute(hash: string): Route {
   const address = hash.replace(/^#/, "");
   const [path = "", query = ""] = address.split("?", 2);
   let segments: string[];
@@ -27,26 +27,26 @@ export function parse_route(hash: string): Route {
   const [kind, device, service, ...steps] = segments;
   if (kind !== "devices" || !device || !service) return { page: "unknown", address };
   const view = new URLSearchParams(query).get("view") === "members" ? "members" : "auto";
-  return { page: "service", device, service, path: steps.map(parse_step), view };
+  return { page: "service", device, service, path: steps.map(parseStep), view };
 }
 
-export function format_route(device: string, service: string, path: readonly PathStep[] = [], view = "auto"): string {
-  const segments = [device, service, ...path.map(format_step)].map(encodeURIComponent);
+export function formatRoute(device: string, service: string, path: readonly PathStep[] = [], view = "auto"): string {
+  const segments = [device, service, ...path.map(formatStep)].map(encodeURIComponent);
   return `#/devices/${segments.join("/")}${view === "members" ? "?view=members" : ""}`;
 }
 
-export function format_step(step: PathStep): string {
+export function formatStep(step: PathStep): string {
   return step.index === null ? step.member : `${step.member}[${step.index}]`;
 }
 
-function parse_step(segment: string): PathStep {
+function parseStep(segment: string): PathStep {
   const match = /^([^[]+)\[(.*)\]$/s.exec(segment);
   return match ? { member: match[1] ?? "", index: match[2] ?? "" } : { member: segment, index: null };
 }
 
 /** The current page; follows the address bar. */
-export function watch_route(): Store<Route> {
-  const route = new Store(parse_route(location.hash));
-  window.addEventListener("hashchange", () => (route.value = parse_route(location.hash)));
+export function watchRoute(): Store<Route> {
+  const route = new Store(parseRoute(location.hash));
+  window.addEventListener("hashchange", () => (route.value = parseRoute(location.hash)));
   return route;
 }

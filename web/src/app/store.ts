@@ -29,20 +29,20 @@ export class Store<T> {
 }
 
 export function useStore<T>(store: Store<T>): T {
-  const [value, set_value] = useState(store.value);
+  const [value, setValue] = useState(store.value);
   useEffect(() => {
-    set_value(() => store.value);
-    return store.watch((next) => set_value(() => next));
+    setValue(() => store.value);
+    return store.watch((next) => setValue(() => next));
   }, [store]);
   return value;
 }
 
-/** The current time, refreshed every `every_ms` while mounted: for "since 12 s". */
-export function useNow(every_ms: number): number {
-  const [now, set_now] = useState(Date.now());
+/** The current time, refreshed every `everyMs` while mounted: for "since 12 s". */
+export function useNow(everyMs: number): number {
+  const [now, setNow] = useState(Date.now());
   useEffect(() => {
-    const timer = setInterval(() => set_now(Date.now()), every_ms);
+    const timer = setInterval(() => setNow(Date.now()), everyMs);
     return () => clearInterval(timer);
-  }, [every_ms]);
+  }, [everyMs]);
   return now;
 }

@@ -7,7 +7,7 @@ export type Theme = "system" | "light" | "dark";
 
 const KEY = "rrgate-theme";
 
-export const theme = new Store<Theme>(read_theme());
+export const theme = new Store<Theme>(readTheme());
 
 theme.watch((chosen) => {
   if (chosen === "system") delete document.documentElement.dataset["theme"];
@@ -21,7 +21,7 @@ theme.watch((chosen) => {
 });
 
 /** Runs `changed` whenever the colours on the page change, by choice or by the system. */
-export function on_colours_changed(changed: () => void): () => void {
+export function onColoursChanged(changed: () => void): () => void {
   const system = matchMedia("(prefers-color-scheme: dark)");
   system.addEventListener("change", changed);
   const unwatch = theme.watch(changed);
@@ -31,7 +31,7 @@ export function on_colours_changed(changed: () => void): () => void {
   };
 }
 
-function read_theme(): Theme {
+function readTheme(): Theme {
   const chosen = document.documentElement.dataset["theme"];
   return chosen === "light" || chosen === "dark" ? chosen : "system";
 }

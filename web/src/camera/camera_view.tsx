@@ -4,15 +4,15 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { useStore } from "../app/store";
-import { devices_of, relay_url } from "../gateway/devices";
+import { devicesOf, relayUrl } from "../gateway/devices";
 import type { DeviceList, GatewayState } from "../gateway/devices";
 import { Link } from "../robot/link";
-import { explain, open_remote } from "../robot/remote";
+import { explain, openRemote } from "../robot/remote";
 import type { Remote } from "../robot/remote";
-import { draw_frame } from "./draw_frame";
+import { drawFrame } from "./draw_frame";
 import { Snapshot } from "./snapshot";
 import { useAge } from "../ui/use_age";
-import { clock_time } from "../ui/words";
+import { clockTime } from "../ui/words";
 
 const PAUSE_MS = 80; // between frames, so that the camera never takes the line from the robot
 
@@ -22,8 +22,8 @@ interface Place {
 }
 
 /** The robot's own webcam service, else the first one that another device offers. */
-export function find_camera(gateway: GatewayState, robot: string): Place | null {
-  const found = (devices_of(gateway) ?? []).flatMap((device) =>
+export function findCamera(gateway: GatewayState, robot: string): Place | null {
+  const found = (devicesOf(gateway) ?? []).flatMap((device) =>
     device.services
       .filter((service) => service.type.endsWith(".WebcamHost"))
       .map((service) => ({ device: device.name, service: service.name })),
@@ -33,14 +33,14 @@ export function find_camera(gateway: GatewayState, robot: string): Place | null 
 
 export function CameraView({ list, robot, shown }: { list: DeviceList; robot: string; shown: boolean }) {
   const gateway = useStore(list.state);
-  const now_found = find_camera(gateway, robot);
+  const nowFound = findCamera(gateway, robot);
   // A camera that was there stays: its device may be away for a while, and its services with it.
-  const [place, set_place] = useState<Place | null>(null);
+  const [place, setPlace] = useState<Place | null>(null);
   useEffect(() => {
-    if (now_found && (place?.device !== now_found.device || place.service !== now_found.service)) {
-      if (place === null || devices_of(gateway)?.some((d) => d.name === place.device) === false) set_place(now_found);
+    if (nowFound && (place?.device !== nowFound.device || place.service !== nowFound.service)) {
+      if (place === null || devicesOf(gateway)?.some((d) => d.name === place.device) === false) setPlace(nowFound);
     }
-  }, [now_found?.device, now_found?.service]);
+  }, [nowFound?.device, nowFound?.service]);
   return (
     <section class="panel camera" aria-labelledby="camera-title">
       <h2 id="camera-title" class="unseen">
@@ -62,11 +62,11 @@ function NoCamera({ loading }: { loading: boolean }) {
 }
 
 function Camera({ place, shown }: { place: Place; shown: boolean }) {
-  const [link, set_link] = useState<Link | null>(null);
+  const [link, setLink] = useState<Link | null>(null);
   useEffect(() => {
-    const url = relay_url(place.device, place.service);
-    const made = new Link((signal) => open_remote(url, signal));
-    set_link(made);
+    const url = relayUrl(place.device, place.service);
+    const made = new Link((signal) => openRemote(url, signal));
+    setLink(made);
     return () => made.dispose();
   }, [place.device, place.service]);
   return link && <Picture link={link} place={place} shown={shown} />;
@@ -76,17 +76,17 @@ function Picture({ link, place, shown }: { link: Link; place: Place; shown: bool
   const state = useStore(link.state);
   const remote = state.kind === "online" ? state.remote : null;
   const cameras = useCameras(remote);
-  const [chosen, set_chosen] = useState<number | null>(null);
+  const [chosen, setChosen] = useState<number | null>(null);
   const index = chosen !== null && cameras.some((c) => c.index === chosen) ? chosen : (cameras[0]?.index ?? null);
   const canvas = useRef<HTMLCanvasElement>(null);
-  const { failure, has_frame, size, age } = useFrames(canvas, remote, index, shown);
+  const { failure, hasFrame, size, age } = useFrames(canvas, remote, index, shown);
   const note =
     state.kind === "lost"
-      ? `No connection to ${place.device} since ${clock_time(state.since)}. Retrying by itself.`
-      : (failure ?? (has_frame ? age && `This picture is ${age}.` : "Waiting for the first picture …"));
+      ? `No connection to ${place.device} since ${clockTime(state.since)}. Retrying by itself.`
+      : (failure ?? (hasFrame ? age && `This picture is ${age}.` : "Waiting for the first picture …"));
   return (
     <>
-      <div class={`camera-frame ${note !== null && has_frame ? "is-stale" : ""}`}>
+      <div class={`camera-frame ${note !== null && hasFrame ? "is-stale" : ""}`}>
         <canvas ref={canvas} width={4} height={3} role="img" aria-label={`Picture from camera ${cameras.find((c) => c.index === index)?.name ?? ""}`} />
         {note !== null && (
           <p class="camera-note" role={failure === null ? undefined : "alert"}>
@@ -98,7 +98,7 @@ function Picture({ link, place, shown }: { link: Link; place: Place; shown: bool
         {cameras.length > 1 ? (
           <label>
             <span class="unseen">Camera</span>
-            <select class="field" value={String(index)} onChange={(event) => set_chosen(Number(event.currentTarget.value))}>
+            <select class="field" value={String(index)} onChange={(event) => setChosen(Number(event.currentTarget.value))}>
               {cameras.map((camera) => (
                 <option key={camera.index} value={String(camera.index)}>
                   {camera.name}
@@ -122,27 +122,27 @@ interface NamedCamera {
 }
 
 function useCameras(remote: Remote | null): readonly NamedCamera[] {
-  const [cameras, set_cameras] = useState<readonly NamedCamera[]>([]);
+  const [cameras, setCameras] = useState<readonly NamedCamera[]>([]);
   useEffect(() => {
     if (!remote) return;
     let current = true;
     remote.get("WebcamNames").then(
-      (names) => current && set_cameras(read_names(names)),
-      () => current && set_cameras([{ index: 0, name: "camera 0" }]), // an older host without names still has its first
+      (names) => current && setCameras(readNames(names)),
+      () => current && setCameras([{ index: 0, name: "camera 0" }]), // an older host without names still has its first
     );
     return () => void (current = false);
   }, [remote]);
   return cameras;
 }
 
-function read_names(names: unknown): NamedCamera[] {
-  const entries = names instanceof Map ? [...names.entries()] : Object.entries((names ?? {}) as object);
+function readNames(names: unknown): NamedCamera[] {
+  const entries = names instanceof Map ? [...names.entries()] : Object.entries((names ?? {}));
   return entries.map(([index, name]) => ({ index: Number(index), name: String(name) })).sort((a, b) => a.index - b.index);
 }
 
 interface Frames {
   failure: string | null;
-  has_frame: boolean;
+  hasFrame: boolean;
   size: string;
   /** Of the picture; null while they come. */
   age: string | null;
@@ -154,37 +154,37 @@ function useFrames(
   index: number | null,
   shown: boolean,
 ): Frames {
-  const [frames, set_frames] = useState<Omit<Frames, "age">>({ failure: null, has_frame: false, size: "" });
-  const drawn_at = useRef<number | null>(null);
-  const age = useAge(() => drawn_at.current);
+  const [frames, setFrames] = useState<Omit<Frames, "age">>({ failure: null, hasFrame: false, size: "" });
+  const drawnAt = useRef<number | null>(null);
+  const age = useAge(() => drawnAt.current);
   useEffect(() => {
     if (!remote || index === null || !shown) return;
     const stop = new AbortController();
     const follow = async (): Promise<void> => {
       const camera = await remote.child("Webcams", index);
-      for await (const frame of frames_of(camera, stop.signal)) {
+      for await (const frame of framesOf(camera, stop.signal)) {
         if (document.hidden) continue;
-        const size = await draw_frame(canvas.current, frame);
+        const size = await drawFrame(canvas.current, frame);
         if (stop.signal.aborted) return;
-        drawn_at.current = performance.now();
-        set_frames((old) => (old.failure === null && old.size === size ? old : { failure: null, has_frame: true, size }));
+        drawnAt.current = performance.now();
+        setFrames((old) => (old.failure === null && old.size === size ? old : { failure: null, hasFrame: true, size }));
       }
     };
-    const keep_following = async (): Promise<void> => {
+    const keepFollowing = async (): Promise<void> => {
       while (!stop.signal.aborted) {
         await follow().catch((error: unknown) => {
-          if (!stop.signal.aborted) set_frames((old) => ({ ...old, failure: explain(error) }));
+          if (!stop.signal.aborted) setFrames((old) => ({ ...old, failure: explain(error) }));
         });
         await new Promise((resolve) => setTimeout(resolve, 1000));
       }
     };
-    void keep_following();
+    void keepFollowing();
     return () => stop.abort();
   }, [remote, index, shown]);
   return { ...frames, age };
 }
 
-async function* frames_of(camera: Remote, signal: AbortSignal): AsyncGenerator<unknown, void> {
+async function* framesOf(camera: Remote, signal: AbortSignal): AsyncGenerator<unknown, void> {
   if (camera.has("FrameStream", "pipe")) {
     const stream = camera.pipe("FrameStream", signal);
     await camera.call("StartStreaming", []);

@@ -1,11 +1,11 @@
 // Draws a camera's frame.
 // Layer: web/camera.
 
-import { read_frame } from "./frame";
+import { readFrame } from "./frame";
 
 /** @returns the size in words. @throws Error when the value is no picture. */
-export async function draw_frame(canvas: HTMLCanvasElement | null, value: unknown): Promise<string> {
-  const frame = read_frame(value);
+export async function drawFrame(canvas: HTMLCanvasElement | null, value: unknown): Promise<string> {
+  const frame = readFrame(value);
   const bitmap = frame.encoded ? await createImageBitmap(new Blob([frame.encoded])) : null;
   const width = bitmap?.width ?? frame.width;
   const height = bitmap?.height ?? frame.height;

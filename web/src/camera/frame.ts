@@ -13,10 +13,10 @@ export interface Frame {
 const MAX_PIXELS = 4096 * 4096;
 
 /** @throws Error when the struct is no picture, with what was found and what was expected. */
-export function read_frame(value: unknown): Frame {
+export function readFrame(value: unknown): Frame {
   const { width, height, step, data } = (value ?? {}) as Record<string, unknown>;
   if (!(data instanceof Uint8Array)) throw new Error("the camera's frame has no bytes in field 'data'");
-  if (is_image_file(data)) return { width: 0, height: 0, rgba: null, encoded: new Uint8Array(data) };
+  if (isImageFile(data)) return { width: 0, height: 0, rgba: null, encoded: new Uint8Array(data) };
   if (typeof width !== "number" || typeof height !== "number" || width < 1 || height < 1 || width * height > MAX_PIXELS) {
     throw new Error(`the camera's frame is ${String(width)} by ${String(height)} pixels; expected at least 1 by 1`);
   }
@@ -27,10 +27,10 @@ export function read_frame(value: unknown): Frame {
       `the camera's frame has ${data.length} bytes in rows of ${row}; expected ${width * height * 3} for ${width} by ${height} pixels`,
     );
   }
-  return { width, height, rgba: to_rgba(data, width, height, row, channels), encoded: null };
+  return { width, height, rgba: toRgba(data, width, height, row, channels), encoded: null };
 }
 
-function to_rgba(data: Uint8Array, width: number, height: number, row: number, channels: 1 | 3): Uint8ClampedArray<ArrayBuffer> {
+function toRgba(data: Uint8Array, width: number, height: number, row: number, channels: 1 | 3): Uint8ClampedArray<ArrayBuffer> {
   const rgba = new Uint8ClampedArray(width * height * 4);
   const [red, green] = channels === 3 ? [2, 1] : [0, 0];
   let to = 0;
@@ -48,7 +48,7 @@ function to_rgba(data: Uint8Array, width: number, height: number, row: number, c
   return rgba;
 }
 
-function is_image_file(data: Uint8Array): boolean {
+function isImageFile(data: Uint8Array): boolean {
   const jpeg = data[0] === 0xff && data[1] === 0xd8 && data[2] === 0xff;
   const png = data[0] === 0x89 && data[1] === 0x50 && data[2] === 0x4e && data[3] === 0x47;
   return jpeg || png;

@@ -3,11 +3,11 @@
 // Layer: web/chart. Draws into a 2D context whose unit is the CSS pixel.
 
 import type { Pose } from "../robot/reckoning";
-import { loops_of } from "../robot/room";
+import { loopsOf } from "../robot/room";
 import type { Room } from "../robot/room";
 import type { Point } from "../robot/trail";
 import type { Palette } from "./palette";
-import { grid_step, to_canvas } from "./view";
+import { gridStep, toCanvas } from "./view";
 import type { View } from "./view";
 
 export interface ChartContent {
@@ -15,7 +15,7 @@ export interface ChartContent {
   strokes: readonly (readonly Point[])[];
   room: Room;
   bumps: readonly { pose: Pose }[];
-  radius_m: number;
+  radiusM: number;
   /** Bit 0 right, bit 1 left. */
   bumpers: number;
   /** Whether the pose is current; an old one is drawn hollow. */
@@ -25,7 +25,7 @@ export interface ChartContent {
 export const FRAME_PX = 26;
 const WALL_M = 0.04;
 
-export function draw_chart(ctx: CanvasRenderingContext2D, view: View, content: ChartContent, palette: Palette): void {
+export function drawChart(ctx: CanvasRenderingContext2D, view: View, content: ChartContent, palette: Palette): void {
   const { left, top, width, height } = view;
   ctx.fillStyle = palette.sea;
   ctx.fillRect(left, top, width, height);
@@ -33,33 +33,33 @@ export function draw_chart(ctx: CanvasRenderingContext2D, view: View, content: C
   ctx.beginPath();
   ctx.rect(left, top, width, height);
   ctx.clip();
-  draw_grid(ctx, view, palette);
-  draw_land(ctx, view, content.room, palette);
-  draw_wake(ctx, view, content.strokes, palette);
-  for (const bump of content.bumps) draw_rock(ctx, view, bump.pose, content.radius_m, palette);
-  draw_robot(ctx, view, content, palette);
+  drawGrid(ctx, view, palette);
+  drawLand(ctx, view, content.room, palette);
+  drawWake(ctx, view, content.strokes, palette);
+  for (const bump of content.bumps) drawRock(ctx, view, bump.pose, content.radiusM, palette);
+  drawRobot(ctx, view, content, palette);
   ctx.restore();
-  draw_frame(ctx, view, palette);
+  drawFrame(ctx, view, palette);
 }
 
-function draw_grid(ctx: CanvasRenderingContext2D, view: View, palette: Palette): void {
-  const step = grid_step(view.scale);
-  ctx.strokeStyle = palette.sea_line;
+function drawGrid(ctx: CanvasRenderingContext2D, view: View, palette: Palette): void {
+  const step = gridStep(view.scale);
+  ctx.strokeStyle = palette.seaLine;
   ctx.lineWidth = 1;
   ctx.beginPath();
-  for (const x of multiples(view.extent.x_min, view.extent.x_max, step)) {
-    const [px] = to_canvas(view, x, 0);
+  for (const x of multiples(view.extent.xMin, view.extent.xMax, step)) {
+    const [px] = toCanvas(view, x, 0);
     ctx.moveTo(Math.round(px) + 0.5, view.top);
     ctx.lineTo(Math.round(px) + 0.5, view.top + view.height);
   }
-  for (const y of multiples(view.extent.y_min, view.extent.y_max, step)) {
-    const [, py] = to_canvas(view, 0, y);
+  for (const y of multiples(view.extent.yMin, view.extent.yMax, step)) {
+    const [, py] = toCanvas(view, 0, y);
     ctx.moveTo(view.left, Math.round(py) + 0.5);
     ctx.lineTo(view.left + view.width, Math.round(py) + 0.5);
   }
   ctx.stroke();
-  const [ox, oy] = to_canvas(view, 0, 0); // the start: a small cross
-  ctx.strokeStyle = palette.ink_soft;
+  const [ox, oy] = toCanvas(view, 0, 0); // the start: a small cross
+  ctx.strokeStyle = palette.inkSoft;
   ctx.beginPath();
   ctx.moveTo(ox - 6, oy);
   ctx.lineTo(ox + 6, oy);
@@ -69,9 +69,9 @@ function draw_grid(ctx: CanvasRenderingContext2D, view: View, palette: Palette):
 }
 
 /** The largest closed loop of walls is the room: all outside of it is land, and so is the inside of smaller loops. */
-function draw_land(ctx: CanvasRenderingContext2D, view: View, room: Room, palette: Palette): void {
-  const { loops, open } = loops_of(room.walls);
-  loops.sort((a, b) => area_of(b) - area_of(a));
+function drawLand(ctx: CanvasRenderingContext2D, view: View, room: Room, palette: Palette): void {
+  const { loops, open } = loopsOf(room.walls);
+  loops.sort((a, b) => areaOf(b) - areaOf(a));
   ctx.lineJoin = "round";
   ctx.lineCap = "round";
   ctx.fillStyle = palette.land;
@@ -81,8 +81,8 @@ function draw_land(ctx: CanvasRenderingContext2D, view: View, room: Room, palett
   if (loops.length > 0) ctx.rect(view.left - 4, view.top - 4, view.width + 8, view.height + 8);
   for (const loop of loops) {
     loop.forEach(({ x, y }, i) => {
-      if (i === 0) ctx.moveTo(...to_canvas(view, x, y));
-      else ctx.lineTo(...to_canvas(view, x, y));
+      if (i === 0) ctx.moveTo(...toCanvas(view, x, y));
+      else ctx.lineTo(...toCanvas(view, x, y));
     });
     ctx.closePath();
   }
@@ -90,7 +90,7 @@ function draw_land(ctx: CanvasRenderingContext2D, view: View, room: Room, palett
   ctx.stroke();
   for (const { x, y, radius } of room.obstacles) {
     ctx.beginPath();
-    ctx.arc(...to_canvas(view, x, y), radius * view.scale, 0, 2 * Math.PI);
+    ctx.arc(...toCanvas(view, x, y), radius * view.scale, 0, 2 * Math.PI);
     ctx.fill();
     ctx.stroke();
   }
@@ -101,14 +101,14 @@ function draw_land(ctx: CanvasRenderingContext2D, view: View, room: Room, palett
     ctx.lineWidth = width;
     ctx.beginPath();
     for (const wall of open) {
-      ctx.moveTo(...to_canvas(view, wall.x1, wall.y1));
-      ctx.lineTo(...to_canvas(view, wall.x2, wall.y2));
+      ctx.moveTo(...toCanvas(view, wall.x1, wall.y1));
+      ctx.lineTo(...toCanvas(view, wall.x2, wall.y2));
     }
     ctx.stroke();
   }
 }
 
-function area_of(loop: readonly Point[]): number {
+function areaOf(loop: readonly Point[]): number {
   let twice = 0;
   loop.forEach((point, i) => {
     const next = loop[(i + 1) % loop.length] ?? point;
@@ -117,7 +117,7 @@ function area_of(loop: readonly Point[]): number {
   return Math.abs(twice / 2);
 }
 
-function draw_wake(
+function drawWake(
   ctx: CanvasRenderingContext2D,
   view: View,
   strokes: readonly (readonly Point[])[],
@@ -130,7 +130,7 @@ function draw_wake(
   for (const stroke of strokes) {
     ctx.beginPath();
     stroke.forEach((point, i) => {
-      const at = to_canvas(view, point.x, point.y);
+      const at = toCanvas(view, point.x, point.y);
       if (i === 0) ctx.moveTo(...at);
       else ctx.lineTo(...at);
     });
@@ -139,11 +139,11 @@ function draw_wake(
 }
 
 /** The chart sign of a rock awash: a cross with four dots, off the nose of the robot where it touched. */
-function draw_rock(ctx: CanvasRenderingContext2D, view: View, pose: Pose, radius_m: number, palette: Palette): void {
-  const [x, y] = to_canvas(
+function drawRock(ctx: CanvasRenderingContext2D, view: View, pose: Pose, radiusM: number, palette: Palette): void {
+  const [x, y] = toCanvas(
     view,
-    pose.x + Math.cos(pose.theta) * radius_m,
-    pose.y + Math.sin(pose.theta) * radius_m,
+    pose.x + Math.cos(pose.theta) * radiusM,
+    pose.y + Math.sin(pose.theta) * radiusM,
   );
   ctx.strokeStyle = ctx.fillStyle = palette.ink;
   ctx.lineWidth = 1.5;
@@ -156,11 +156,11 @@ function draw_rock(ctx: CanvasRenderingContext2D, view: View, pose: Pose, radius
   for (const [dx, dy] of [[-3, -3], [3, -3], [-3, 3], [3, 3]] as const) ctx.fillRect(x + dx - 0.75, y + dy - 0.75, 1.5, 1.5);
 }
 
-function draw_robot(ctx: CanvasRenderingContext2D, view: View, content: ChartContent, palette: Palette): void {
-  const { pose, bumpers, live, radius_m } = content;
-  const radius = Math.max(radius_m * view.scale, 9);
+function drawRobot(ctx: CanvasRenderingContext2D, view: View, content: ChartContent, palette: Palette): void {
+  const { pose, bumpers, live, radiusM } = content;
+  const radius = Math.max(radiusM * view.scale, 9);
   ctx.save();
-  ctx.translate(...to_canvas(view, pose.x, pose.y));
+  ctx.translate(...toCanvas(view, pose.x, pose.y));
   ctx.rotate(-pose.theta); // canvas y is down: counterclockwise on the floor is negative here
   ctx.beginPath();
   ctx.arc(0, 0, radius, 0, 2 * Math.PI);
@@ -192,9 +192,9 @@ function draw_robot(ctx: CanvasRenderingContext2D, view: View, content: ChartCon
 }
 
 /** The graduated border: bars of half a grid step, black and white in turn, with the metres beside them. */
-function draw_frame(ctx: CanvasRenderingContext2D, view: View, palette: Palette): void {
+function drawFrame(ctx: CanvasRenderingContext2D, view: View, palette: Palette): void {
   const { left, top, width, height, extent } = view;
-  const step = grid_step(view.scale);
+  const step = gridStep(view.scale);
   const bar = 6;
   ctx.fillStyle = palette.sheet;
   ctx.fillRect(left - FRAME_PX, top - FRAME_PX, width + 2 * FRAME_PX, FRAME_PX);
@@ -203,17 +203,17 @@ function draw_frame(ctx: CanvasRenderingContext2D, view: View, palette: Palette)
   ctx.fillRect(left + width, top, FRAME_PX, height);
   ctx.fillStyle = palette.ink;
   const half = step / 2;
-  for (let n = Math.floor(extent.x_min / half); n * half < extent.x_max; n++) {
+  for (let n = Math.floor(extent.xMin / half); n * half < extent.xMax; n++) {
     if (n % 2 === 0) continue;
-    const from = Math.max(to_canvas(view, n * half, 0)[0], left);
-    const to = Math.min(to_canvas(view, (n + 1) * half, 0)[0], left + width);
+    const from = Math.max(toCanvas(view, n * half, 0)[0], left);
+    const to = Math.min(toCanvas(view, (n + 1) * half, 0)[0], left + width);
     ctx.fillRect(from, top - bar, to - from, bar);
     ctx.fillRect(from, top + height, to - from, bar);
   }
-  for (let n = Math.floor(extent.y_min / half); n * half < extent.y_max; n++) {
+  for (let n = Math.floor(extent.yMin / half); n * half < extent.yMax; n++) {
     if (n % 2 === 0) continue;
-    const from = Math.max(to_canvas(view, 0, (n + 1) * half)[1], top);
-    const to = Math.min(to_canvas(view, 0, n * half)[1], top + height);
+    const from = Math.max(toCanvas(view, 0, (n + 1) * half)[1], top);
+    const to = Math.min(toCanvas(view, 0, n * half)[1], top + height);
     ctx.fillRect(left - bar, from, bar, to - from);
     ctx.fillRect(left + width, from, bar, to - from);
   }
@@ -221,23 +221,23 @@ function draw_frame(ctx: CanvasRenderingContext2D, view: View, palette: Palette)
   ctx.lineWidth = 1;
   ctx.strokeRect(left - 0.5, top - 0.5, width + 1, height + 1);
   ctx.strokeRect(left - bar - 0.5, top - bar - 0.5, width + 2 * bar + 1, height + 2 * bar + 1);
-  draw_labels(ctx, view, step, bar, palette);
+  drawLabels(ctx, view, step, bar, palette);
 }
 
-function draw_labels(ctx: CanvasRenderingContext2D, view: View, step: number, bar: number, palette: Palette): void {
+function drawLabels(ctx: CanvasRenderingContext2D, view: View, step: number, bar: number, palette: Palette): void {
   const { left, top, width, height, extent } = view;
   const digits = step < 1 ? 1 : 0;
-  ctx.fillStyle = palette.ink_soft;
+  ctx.fillStyle = palette.inkSoft;
   ctx.font = `11px ${palette.font}`;
   ctx.textAlign = "center";
   ctx.textBaseline = "middle";
-  for (const x of multiples(extent.x_min, extent.x_max, step)) {
-    const px = to_canvas(view, x, 0)[0];
+  for (const x of multiples(extent.xMin, extent.xMax, step)) {
+    const px = toCanvas(view, x, 0)[0];
     if (px < left + 10 || px > left + width - 10) continue;
     ctx.fillText(x.toFixed(digits), px, top + height + bar + 10);
   }
-  for (const y of multiples(extent.y_min, extent.y_max, step)) {
-    const py = to_canvas(view, 0, y)[1];
+  for (const y of multiples(extent.yMin, extent.yMax, step)) {
+    const py = toCanvas(view, 0, y)[1];
     if (py < top + 12 || py > top + height - 12) continue;
     ctx.save();
     ctx.translate(left - bar - 9, py);

@@ -4,10 +4,10 @@
 export interface Palette {
   sheet: string;
   ink: string;
-  ink_soft: string;
+  inkSoft: string;
   line: string;
   sea: string;
-  sea_line: string;
+  seaLine: string;
   land: string;
   coast: string;
   accent: string;
@@ -15,16 +15,16 @@ export interface Palette {
   font: string;
 }
 
-export function read_palette(element: Element): Palette {
+export function readPalette(element: Element): Palette {
   const style = getComputedStyle(element);
   const colour = (name: string): string => style.getPropertyValue(name).trim() || "gray";
   return {
     sheet: colour("--sheet"),
     ink: colour("--ink"),
-    ink_soft: colour("--ink-soft"),
+    inkSoft: colour("--ink-soft"),
     line: colour("--line"),
     sea: colour("--sea"),
-    sea_line: colour("--sea-line"),
+    seaLine: colour("--sea-line"),
     land: colour("--land"),
     coast: colour("--coast"),
     accent: colour("--accent"),

@@ -13,16 +13,16 @@ export interface PlotProps {
   /** What a screen reader says in place of the picture. */
   label: string;
   /** The smallest span of the value axis: noise must not look like a storm. */
-  min_span?: number;
+  minSpan?: number;
   /** Which of the palette's series colours the first line takes. */
-  first_colour?: number;
+  firstColour?: number;
   /** Whether values still arrive: the time axis stands still otherwise. */
   live?: boolean;
 }
 
-export function Plot({ series, label, min_span = 1, first_colour = 0, live = true }: PlotProps) {
+export function Plot({ series, label, minSpan = 1, firstColour = 0, live = true }: PlotProps) {
   const { canvas, redraw } = useCanvas((ctx, width, height, palette) => {
-    draw_plot(ctx, width, height, series, palette, min_span, first_colour, live ? performance.now() : newest_of(series));
+    drawPlot(ctx, width, height, series, palette, minSpan, firstColour, live ? performance.now() : newestOf(series));
   });
   useEffect(() => {
     redraw();
@@ -35,24 +35,24 @@ export function Plot({ series, label, min_span = 1, first_colour = 0, live = tru
   return <canvas ref={canvas} class="plot" role="img" aria-label={label} />;
 }
 
-function newest_of(series: readonly Series[]): number {
+function newestOf(series: readonly Series[]): number {
   return Math.max(0, ...series.map((s) => s.newest?.t ?? 0));
 }
 
-function draw_plot(
+function drawPlot(
   ctx: CanvasRenderingContext2D,
   width: number,
   height: number,
   series: readonly Series[],
   palette: Palette,
-  min_span: number,
-  first_colour: number,
+  minSpan: number,
+  firstColour: number,
   now: number,
 ): void {
-  const [low, high] = span_of(series, min_span);
+  const [low, high] = spanOf(series, minSpan);
   const pad = 4;
-  const x_of = (t: number): number => width - ((now - t) / WINDOW_MS) * width;
-  const y_of = (value: number): number => pad + ((high - value) / (high - low)) * (height - 2 * pad);
+  const xOf = (t: number): number => width - ((now - t) / WINDOW_MS) * width;
+  const yOf = (value: number): number => pad + ((high - value) / (high - low)) * (height - 2 * pad);
   ctx.strokeStyle = palette.line;
   ctx.lineWidth = 1;
   ctx.beginPath();
@@ -62,27 +62,27 @@ function draw_plot(
     ctx.lineTo(x, height);
   }
   if (low < 0 && high > 0) {
-    ctx.moveTo(0, Math.round(y_of(0)) + 0.5);
-    ctx.lineTo(width, Math.round(y_of(0)) + 0.5);
+    ctx.moveTo(0, Math.round(yOf(0)) + 0.5);
+    ctx.lineTo(width, Math.round(yOf(0)) + 0.5);
   }
   ctx.stroke();
   ctx.lineWidth = 1.75;
   ctx.lineJoin = "round";
   series.forEach((one, index) => {
-    ctx.strokeStyle = palette.series[(first_colour + index) % palette.series.length] ?? palette.accent;
+    ctx.strokeStyle = palette.series[(firstColour + index) % palette.series.length] ?? palette.accent;
     ctx.beginPath();
     let drawing = false;
     for (const { t, value } of one.samples) {
       if (t < now - WINDOW_MS - 1000) continue;
-      if (drawing) ctx.lineTo(x_of(t), y_of(value));
-      else ctx.moveTo(x_of(t), y_of(value));
+      if (drawing) ctx.lineTo(xOf(t), yOf(value));
+      else ctx.moveTo(xOf(t), yOf(value));
       drawing = true;
     }
     ctx.stroke();
   });
 }
 
-function span_of(series: readonly Series[], min_span: number): [number, number] {
+function spanOf(series: readonly Series[], minSpan: number): [number, number] {
   let low = Infinity;
   let high = -Infinity;
   for (const one of series) {
@@ -91,7 +91,7 @@ function span_of(series: readonly Series[], min_span: number): [number, number] 
       high = Math.max(high, value);
     }
   }
-  if (low > high) return [0, min_span];
-  const missing = Math.max(0, min_span - (high - low)) / 2;
+  if (low > high) return [0, minSpan];
+  const missing = Math.max(0, minSpan - (high - low)) / 2;
   return [low - missing, high + missing];
 }

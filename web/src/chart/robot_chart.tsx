@@ -5,7 +5,7 @@ import { useEffect, useRef } from "preact/hooks";
 import { useStore } from "../app/store";
 import type { RobotModel } from "../robot/robot_model";
 import type { Room } from "../robot/room";
-import { draw_chart, FRAME_PX } from "./draw_chart";
+import { drawChart, FRAME_PX } from "./draw_chart";
 import { useCanvas } from "./use_canvas";
 import { fit, include, START } from "./view";
 import type { Extent } from "./view";
@@ -15,16 +15,16 @@ export function RobotChart({ model, live }: { model: RobotModel; live: boolean }
   const room = useStore(model.room);
   const readings = useStore(model.readings);
   const { canvas, redraw } = useCanvas((ctx, width, height, palette) => {
-    extent.current = include(extent.current ?? extent_of(room), model.pose.x, model.pose.y);
+    extent.current = include(extent.current ?? extentOf(room), model.pose.x, model.pose.y);
     const view = fit(extent.current, FRAME_PX, FRAME_PX, width - 2 * FRAME_PX, height - 2 * FRAME_PX);
-    draw_chart(
+    drawChart(
       ctx,
       view,
       {
         pose: model.pose,
         strokes: model.trail.strokes,
         room,
-        radius_m: model.radius_m,
+        radiusM: model.radiusM,
         bumps: model.bumps.value,
         bumpers: live ? (readings.bumpers ?? 0) : 0,
         live,
@@ -32,7 +32,7 @@ export function RobotChart({ model, live }: { model: RobotModel; live: boolean }
       palette,
     );
   });
-  useEffect(() => model.on_moved(redraw), [model, redraw]);
+  useEffect(() => model.onMoved(redraw), [model, redraw]);
   useEffect(() => {
     extent.current = null;
     redraw();
@@ -48,22 +48,22 @@ export function RobotChart({ model, live }: { model: RobotModel; live: boolean }
   );
 }
 
-function extent_of({ walls }: Room): Extent {
+function extentOf({ walls }: Room): Extent {
   if (walls.length === 0) return START;
-  let extent: Extent = { x_min: Infinity, x_max: -Infinity, y_min: Infinity, y_max: -Infinity };
+  let extent: Extent = { xMin: Infinity, xMax: -Infinity, yMin: Infinity, yMax: -Infinity };
   for (const { x1, y1, x2, y2 } of walls) {
     extent = {
-      x_min: Math.min(extent.x_min, x1, x2),
-      x_max: Math.max(extent.x_max, x1, x2),
-      y_min: Math.min(extent.y_min, y1, y2),
-      y_max: Math.max(extent.y_max, y1, y2),
+      xMin: Math.min(extent.xMin, x1, x2),
+      xMax: Math.max(extent.xMax, x1, x2),
+      yMin: Math.min(extent.yMin, y1, y2),
+      yMax: Math.max(extent.yMax, y1, y2),
     };
   }
   const margin = 0.1;
   return {
-    x_min: extent.x_min - margin,
-    x_max: extent.x_max + margin,
-    y_min: extent.y_min - margin,
-    y_max: extent.y_max + margin,
+    xMin: extent.xMin - margin,
+    xMax: extent.xMax + margin,
+    yMin: extent.yMin - margin,
+    yMax: extent.yMax + margin,
   };
 }

@@ -3,8 +3,8 @@
 
 import { useCallback, useEffect, useRef } from "preact/hooks";
 import type { RefObject } from "preact";
-import { on_colours_changed } from "../app/theme";
-import { read_palette } from "./palette";
+import { onColoursChanged } from "../app/theme";
+import { readPalette } from "./palette";
 import type { Palette } from "./palette";
 
 export type Paint = (ctx: CanvasRenderingContext2D, width: number, height: number, palette: Palette) => void;
@@ -30,7 +30,7 @@ export function useCanvas(paint: Paint): { canvas: RefObject<HTMLCanvasElement |
       if (element.width !== pixels[0]) element.width = pixels[0];
       if (element.height !== pixels[1]) element.height = pixels[1];
       if (width === 0 || height === 0) return;
-      palette.current ??= read_palette(element);
+      palette.current ??= readPalette(element);
       ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
       ctx.clearRect(0, 0, width, height);
       latest.current(ctx, width, height, palette.current);
@@ -42,7 +42,7 @@ export function useCanvas(paint: Paint): { canvas: RefObject<HTMLCanvasElement |
     if (!element) return;
     const resized = new ResizeObserver(redraw);
     resized.observe(element);
-    const unwatch = on_colours_changed(() => {
+    const unwatch = onColoursChanged(() => {
       palette.current = null;
       redraw();
     });

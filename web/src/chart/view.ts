@@ -2,10 +2,10 @@
 // Layer: web/chart, pure. Floor in metres with y up, canvas in CSS pixels with y down.
 
 export interface Extent {
-  x_min: number;
-  x_max: number;
-  y_min: number;
-  y_max: number;
+  xMin: number;
+  xMax: number;
+  yMin: number;
+  yMax: number;
 }
 
 export interface View {
@@ -21,49 +21,49 @@ export interface View {
 }
 
 /** What the chart shows before anything is known: four metres around the start. */
-export const START: Extent = { x_min: -2, x_max: 2, y_min: -2, y_max: 2 };
+export const START: Extent = { xMin: -2, xMax: 2, yMin: -2, yMax: 2 };
 
 /** `extent` grown to hold the point with a margin, in half-metre steps so that the picture does not creep. */
 export function include(extent: Extent, x: number, y: number, margin = 0.4): Extent {
   const down = (value: number): number => Math.floor((value - margin) * 2) / 2;
   const up = (value: number): number => Math.ceil((value + margin) * 2) / 2;
   const fits =
-    x - margin >= extent.x_min && x + margin <= extent.x_max && y - margin >= extent.y_min && y + margin <= extent.y_max;
+    x - margin >= extent.xMin && x + margin <= extent.xMax && y - margin >= extent.yMin && y + margin <= extent.yMax;
   if (fits || !Number.isFinite(x) || !Number.isFinite(y)) return extent;
   return {
-    x_min: Math.min(extent.x_min, down(x)),
-    x_max: Math.max(extent.x_max, up(x)),
-    y_min: Math.min(extent.y_min, down(y)),
-    y_max: Math.max(extent.y_max, up(y)),
+    xMin: Math.min(extent.xMin, down(x)),
+    xMax: Math.max(extent.xMax, up(x)),
+    yMin: Math.min(extent.yMin, down(y)),
+    yMax: Math.max(extent.yMax, up(y)),
   };
 }
 
 /** Fits `wanted` into the frame, whole and centred; the rest of the frame shows more floor. */
 export function fit(wanted: Extent, left: number, top: number, width: number, height: number): View {
-  const wide = Math.max(wanted.x_max - wanted.x_min, 0.1);
-  const tall = Math.max(wanted.y_max - wanted.y_min, 0.1);
+  const wide = Math.max(wanted.xMax - wanted.xMin, 0.1);
+  const tall = Math.max(wanted.yMax - wanted.yMin, 0.1);
   const scale = Math.max(Math.min(width / wide, height / tall), 0.001);
-  const x_mid = (wanted.x_min + wanted.x_max) / 2;
-  const y_mid = (wanted.y_min + wanted.y_max) / 2;
-  const half_x = width / scale / 2;
-  const half_y = height / scale / 2;
-  const extent = { x_min: x_mid - half_x, x_max: x_mid + half_x, y_min: y_mid - half_y, y_max: y_mid + half_y };
+  const xMid = (wanted.xMin + wanted.xMax) / 2;
+  const yMid = (wanted.yMin + wanted.yMax) / 2;
+  const halfX = width / scale / 2;
+  const halfY = height / scale / 2;
+  const extent = { xMin: xMid - halfX, xMax: xMid + halfX, yMin: yMid - halfY, yMax: yMid + halfY };
   return { scale, extent, left, top, width, height };
 }
 
-export function to_canvas(view: View, x: number, y: number): [number, number] {
+export function toCanvas(view: View, x: number, y: number): [number, number] {
   return [
-    view.left + (x - view.extent.x_min) * view.scale,
-    view.top + (view.extent.y_max - y) * view.scale,
+    view.left + (x - view.extent.xMin) * view.scale,
+    view.top + (view.extent.yMax - y) * view.scale,
   ];
 }
 
-/** Metres between labelled grid lines, so that they stand at least `min_px` apart: 0.5, 1, 2, 5, 10, ... */
-export function grid_step(scale: number, min_px = 56): number {
+/** Metres between labelled grid lines, so that they stand at least `minPx` apart: 0.5, 1, 2, 5, 10, ... */
+export function gridStep(scale: number, minPx = 56): number {
   for (let power = 0.1; ; power *= 10) {
     for (const step of [5, 10, 20]) {
       const metres = step * power;
-      if (metres * scale >= min_px) return Math.round(metres * 1e6) / 1e6;
+      if (metres * scale >= minPx) return Math.round(metres * 1e6) / 1e6;
     }
     if (power > 1e6) return power;
   }

@@ -2,6 +2,7 @@
 // Layer: web/gateway. Source: GET /api/v1/access, /api/v1/access/requests.
 
 import { Store } from "../app/store";
+import { isRecord, text } from "./fields";
 
 export interface Who {
   /** null: the page has shown nothing. */
@@ -54,7 +55,7 @@ export class AccessDesk {
   async #look(): Promise<void> {
     try {
       const response = await fetch(address(""), { cache: "no-store" });
-      if (response.ok) this.who.value = read_who(await response.json());
+      if (response.ok) this.who.value = readWho(await response.json());
     } catch {
       // The list of devices tells that the gateway is away.
     }
@@ -66,7 +67,7 @@ export class AccessDesk {
   async #list(): Promise<void> {
     try {
       const response = await fetch(address("requests"), { cache: "no-store" });
-      if (response.ok) this.pending.value = read_requests(await response.json());
+      if (response.ok) this.pending.value = readRequests(await response.json());
     } catch {
       // As above.
     }
@@ -89,7 +90,7 @@ async function send(path: string, body: object): Promise<void> {
   throw new Error(typeof problem?.detail === "string" ? problem.detail : `the gateway answered ${response.status}`);
 }
 
-export function read_who(answer: unknown): Who {
+export function readWho(answer: unknown): Who {
   const given = (answer ?? {}) as Record<string, unknown>;
   const user = given["user"];
   return {
@@ -101,16 +102,16 @@ export function read_who(answer: unknown): Who {
 }
 
 /** Those that are to be decided on. */
-export function read_requests(answer: unknown): AccessRequest[] {
+export function readRequests(answer: unknown): AccessRequest[] {
   const list = (answer as { requests?: unknown } | null)?.requests;
   if (!Array.isArray(list)) return [];
   return list
-    .filter((each): each is Record<string, unknown> => typeof each === "object" && each !== null)
+    .filter(isRecord)
     .filter((each) => each["state"] === "pending" && typeof each["id"] === "string")
     .map((each) => ({
-      id: String(each["id"]),
-      name: String(each["name"] ?? ""),
-      reason: String(each["reason"] ?? ""),
-      client: String(each["client"] ?? ""),
+      id: text(each["id"]),
+      name: text(each["name"]),
+      reason: text(each["reason"]),
+      client: text(each["client"]),
     }));
 }

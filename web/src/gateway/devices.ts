@@ -2,8 +2,8 @@
 // Layer: web/gateway. Source: GET /api/v1/devices.
 
 import { Store } from "../app/store";
-import { is_record, text } from "./fields";
-import { Poller, reason_of } from "./poller";
+import { isRecord, text } from "./fields";
+import { Poller, reasonOf } from "./poller";
 
 export type DeviceState = "online" | "offline" | "connecting";
 
@@ -21,10 +21,10 @@ export interface Device {
   url: string;
   /** By discovery; not configured. */
   found: boolean;
-  node_id: string;
-  node_name: string;
+  nodeId: string;
+  nodeName: string;
   state: DeviceState;
-  last_error: string | null;
+  lastError: string | null;
   services: Service[];
   /** null: not the gateway's, or an older gateway does not say. */
   mode: DeviceMode | null;
@@ -42,19 +42,19 @@ const POLL_MS = 2_000;
 export class DeviceList {
   readonly state = new Store<GatewayState>({ kind: "loading" });
   readonly #poller = new Poller<Device[]>({
-    ask: fetch_devices,
+    ask: fetchDevices,
     answered: (devices) => (this.state.value = { kind: "known", devices }),
     failed: (error) => {
       const before = this.state.value;
       this.state.value = {
         kind: "away",
         since: before.kind === "away" ? before.since : Date.now(),
-        reason: reason_of(error),
-        devices: devices_of(before),
+        reason: reasonOf(error),
+        devices: devicesOf(before),
       };
     },
     period: POLL_MS,
-    hidden_period: POLL_MS * 5, // enough to be right when it is shown
+    hiddenPeriod: POLL_MS * 5, // enough to be right when it is shown
   });
 
   start(): void {
@@ -71,45 +71,45 @@ export class DeviceList {
   }
 }
 
-export function devices_of(state: GatewayState): Device[] | null {
+export function devicesOf(state: GatewayState): Device[] | null {
   return state.kind === "loading" ? null : state.devices;
 }
 
-async function fetch_devices(signal: AbortSignal): Promise<Device[]> {
+async function fetchDevices(signal: AbortSignal): Promise<Device[]> {
   const response = await fetch(new URL("api/v1/devices", document.baseURI), { signal, cache: "no-store" });
   if (!response.ok) throw new Error(`the gateway answered ${response.status} ${response.statusText}`.trim());
-  return read_devices(await response.json());
+  return readDevices(await response.json());
 }
 
 /** Reads the answer field by field: an older or newer gateway may leave some out. @throws Error when it is no list. */
-export function read_devices(answer: unknown): Device[] {
+export function readDevices(answer: unknown): Device[] {
   const list = (answer as { devices?: unknown } | null)?.devices;
   if (!Array.isArray(list)) throw new Error('the answer of the gateway has no list "devices"');
-  return list.filter(is_record).map((device) => ({
+  return list.filter(isRecord).map((device) => ({
     name: text(device["name"]),
     url: text(device["url"]),
     found: device["found"] === true,
-    node_id: text(device["node_id"]),
-    node_name: text(device["node_name"]),
-    state: state_of(device["state"]),
-    last_error: typeof device["last_error"] === "string" ? device["last_error"] : null,
-    services: read_services(device["services"]),
+    nodeId: text(device["node_id"]),
+    nodeName: text(device["node_name"]),
+    state: stateOf(device["state"]),
+    lastError: typeof device["last_error"] === "string" ? device["last_error"] : null,
+    services: readServices(device["services"]),
     mode: device["mode"] === "relay" || device["mode"] === "shared" ? device["mode"] : null,
     clients: typeof device["clients"] === "number" ? device["clients"] : null,
   }));
 }
 
-function read_services(services: unknown): Service[] {
+function readServices(services: unknown): Service[] {
   if (!Array.isArray(services)) return [];
-  return services.filter(is_record).map((service) => ({ name: text(service["name"]), type: text(service["type"]) }));
+  return services.filter(isRecord).map((service) => ({ name: text(service["name"]), type: text(service["type"]) }));
 }
 
-function state_of(state: unknown): DeviceState {
+function stateOf(state: unknown): DeviceState {
   return state === "online" || state === "connecting" ? state : "offline";
 }
 
 /** Where a service of a device is reached through the gateway that served this page. */
-export function relay_url(device: string, service: string, base: string = document.baseURI): string {
+export function relayUrl(device: string, service: string, base: string = document.baseURI): string {
   const url = new URL(`devices/${encodeURIComponent(device)}`, base);
   url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
   url.search = new URLSearchParams({ service }).toString();

@@ -1,6 +1,6 @@
 // Reads answers field by field: an older or newer gateway may leave some out. Layer: web/gateway.
 
-export function is_record(value: unknown): value is Record<string, unknown> {
+export function isRecord(value: unknown): value is Record<string, unknown> {
   return typeof value === "object" && value !== null;
 }
 

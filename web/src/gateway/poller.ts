@@ -10,7 +10,7 @@ export interface PollerOptions<T> {
   /** Milliseconds from one look to the next. */
   period: number;
   /** The same in a hidden tab; null: not until it is shown. */
-  hidden_period: number | null;
+  hiddenPeriod: number | null;
 }
 
 export class Poller<T> {
@@ -23,12 +23,12 @@ export class Poller<T> {
   }
 
   start(): void {
-    document.addEventListener("visibilitychange", this.#on_visibility);
+    document.addEventListener("visibilitychange", this.#onVisibility);
     void this.#poll();
   }
 
   stop(): void {
-    document.removeEventListener("visibilitychange", this.#on_visibility);
+    document.removeEventListener("visibilitychange", this.#onVisibility);
     clearTimeout(this.#timer);
     this.#abort?.abort();
     this.#abort = null;
@@ -41,13 +41,13 @@ export class Poller<T> {
     void this.#poll();
   }
 
-  readonly #on_visibility = (): void => {
+  readonly #onVisibility = (): void => {
     if (!document.hidden) this.refresh();
-    else if (this.#options.hidden_period === null) clearTimeout(this.#timer);
+    else if (this.#options.hiddenPeriod === null) clearTimeout(this.#timer);
   };
 
   async #poll(): Promise<void> {
-    const { ask, answered, failed, period, hidden_period } = this.#options;
+    const { ask, answered, failed, period, hiddenPeriod } = this.#options;
     const abort = new AbortController();
     this.#abort = abort;
     const deadline = setTimeout(() => abort.abort(new Error("the gateway did not answer within 5 s")), DEADLINE_MS);
@@ -63,12 +63,12 @@ export class Poller<T> {
     if (this.#abort !== abort) return; // stopped meanwhile
     this.#abort = null;
     tell();
-    const next = document.hidden ? hidden_period : period;
+    const next = document.hidden ? hiddenPeriod : period;
     if (next !== null) this.#timer = setTimeout(() => void this.#poll(), next);
   }
 }
 
 /** Why it does not answer, for people. */
-export function reason_of(error: unknown): string {
+export function reasonOf(error: unknown): string {
   return error instanceof TypeError ? "the gateway cannot be reached" : (error as Error).message;
 }

@@ -2,8 +2,8 @@
 // Layer: web/gateway. Source: GET /api/v1/devices/NAME/subscriptions.
 
 import { Store } from "../app/store";
-import { is_record, text } from "./fields";
-import { Poller, reason_of } from "./poller";
+import { isRecord, text } from "./fields";
+import { Poller, reasonOf } from "./poller";
 
 export interface Subscription {
   client: string;
@@ -16,8 +16,8 @@ export interface Subscription {
   conflated: number;
   dropped: number;
   /** Milliseconds, when they were handed to the client's connection. */
-  age_p50_ms: number;
-  age_p99_ms: number;
+  ageP50Ms: number;
+  ageP99Ms: number;
 }
 
 export type SubscriptionsState =
@@ -36,9 +36,9 @@ export class SubscriptionList {
   readonly #poller = new Poller<SubscriptionsState>({
     ask: (signal) => this.#fetch(signal),
     answered: (next) => (this.state.value = next),
-    failed: (error) => (this.state.value = away_after(this.state.value, error, Date.now())),
+    failed: (error) => (this.state.value = awayAfter(this.state.value, error, Date.now())),
     period: POLL_MS,
-    hidden_period: null, // nobody looks at a hidden tab
+    hiddenPeriod: null, // nobody looks at a hidden tab
   });
 
   constructor(device: string) {
@@ -56,7 +56,7 @@ export class SubscriptionList {
   async #fetch(signal: AbortSignal): Promise<SubscriptionsState> {
     const url = new URL(`api/v1/devices/${encodeURIComponent(this.#device)}/subscriptions`, document.baseURI);
     const response = await fetch(url, { signal, cache: "no-store" });
-    if (response.ok) return { kind: "known", subscriptions: read_subscriptions(await response.json()) };
+    if (response.ok) return { kind: "known", subscriptions: readSubscriptions(await response.json()) };
     const problem = (await response.json().catch(() => null)) as { detail?: unknown } | null;
     const reason = typeof problem?.detail === "string" ? problem.detail : `the gateway answered ${response.status}`;
     if (response.status === 401 || response.status === 403) return { kind: "denied", reason };
@@ -65,25 +65,25 @@ export class SubscriptionList {
 }
 
 /** The state when asking has failed: it keeps what was known. */
-export function away_after(before: SubscriptionsState, error: unknown, now: number): SubscriptionsState {
+export function awayAfter(before: SubscriptionsState, error: unknown, now: number): SubscriptionsState {
   return {
     kind: "away",
     since: before.kind === "away" ? before.since : now,
-    reason: reason_of(error),
-    subscriptions: subscriptions_of(before),
+    reason: reasonOf(error),
+    subscriptions: subscriptionsOf(before),
   };
 }
 
-export function subscriptions_of(state: SubscriptionsState): Subscription[] | null {
+export function subscriptionsOf(state: SubscriptionsState): Subscription[] | null {
   return state.kind === "known" || state.kind === "away" ? state.subscriptions : null;
 }
 
 /** By member, then client: rows stay where they are from look to look. @throws Error when it is no list. */
-export function read_subscriptions(answer: unknown): Subscription[] {
+export function readSubscriptions(answer: unknown): Subscription[] {
   const list = (answer as { subscriptions?: unknown } | null)?.subscriptions;
   if (!Array.isArray(list)) throw new Error('the answer of the gateway has no list "subscriptions"');
   return list
-    .filter(is_record)
+    .filter(isRecord)
     .map((each) => ({
       client: text(each["client"]),
       path: text(each["path"]),
@@ -92,8 +92,8 @@ export function read_subscriptions(answer: unknown): Subscription[] {
       delivered: count(each["delivered"]),
       conflated: count(each["conflated"]),
       dropped: count(each["dropped"]),
-      age_p50_ms: count(each["age_p50_ms"]),
-      age_p99_ms: count(each["age_p99_ms"]),
+      ageP50Ms: count(each["age_p50_ms"]),
+      ageP99Ms: count(each["age_p99_ms"]),
     }))
     .sort((a, b) => compare(`${a.path}.${a.member}`, `${b.path}.${b.member}`) || compare(a.client, b.client));
 }

@@ -11,16 +11,16 @@ const INDEX = "RobotRaconteurServiceIndex";
 
 export class UsbDeviceList {
   /** Whether this browser can; nothing else here makes sense where it cannot. */
-  readonly is_possible = usb_of_browser() !== undefined;
+  readonly isPossible = usbOfBrowser() !== undefined;
   readonly devices = new Store<Device[]>([]);
   /** Why choosing or listing failed. */
   readonly trouble = new Store<string | null>(null);
   #round = 0;
 
   start(): void {
-    usb_of_browser()?.addEventListener("connect", this.#refresh);
-    usb_of_browser()?.addEventListener("disconnect", this.#refresh);
-    if (this.is_possible) void this.#refresh();
+    usbOfBrowser()?.addEventListener("connect", () => void this.#refresh());
+    usbOfBrowser()?.addEventListener("disconnect", () => void this.#refresh());
+    if (this.isPossible) void this.#refresh();
   }
 
   /** From a click: the browser asks which device this page may use. */
@@ -29,8 +29,8 @@ export class UsbDeviceList {
     try {
       await requestUsbDevice();
     } catch (error) {
-      const is_cancelled = error instanceof RobotRaconteurError && error.code === ErrorCode.OperationCancelled;
-      if (!is_cancelled) this.trouble.value = (error as Error).message;
+      const isCancelled = error instanceof RobotRaconteurError && error.code === ErrorCode.OperationCancelled;
+      if (!isCancelled) this.trouble.value = (error as Error).message;
     }
     await this.#refresh();
   }
@@ -47,12 +47,12 @@ export class UsbDeviceList {
 }
 
 /** Whether a device's name is one of this list. */
-export function is_usb(device: string): boolean {
+export function isUsb(device: string): boolean {
   return device.startsWith(MARK);
 }
 
 /** Where a service of such a device is: by the node's id, or its name. */
-export function usb_url(device: string, service: string): string {
+export function usbUrl(device: string, service: string): string {
   const who = device.slice(MARK.length);
   const key = /^[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}$/.test(who) ? "nodeid" : "nodename";
   return `rr+usb:///?${new URLSearchParams({ [key]: who, service }).toString()}`;
@@ -63,23 +63,23 @@ async function describe(node: UsbNode): Promise<Device> {
     name: MARK + (node.url === undefined ? node.device.replace(/^USB device /, "") : node.nodeName || node.nodeId),
     url: node.url ?? "rr+usb:",
     found: false,
-    node_id: node.nodeId,
-    node_name: node.nodeName,
+    nodeId: node.nodeId,
+    nodeName: node.nodeName,
     state: "offline",
-    last_error: node.error?.message ?? null,
+    lastError: node.error?.message ?? null,
     services: [],
     mode: null,
     clients: null,
   };
   if (node.url === undefined) return device;
   try {
-    return { ...device, services: await services_of(node.url), state: "online" };
+    return { ...device, services: await servicesOf(node.url), state: "online" };
   } catch (error) {
-    return { ...device, last_error: (error as Error).message };
+    return { ...device, lastError: (error as Error).message };
   }
 }
 
-async function services_of(url: string): Promise<Service[]> {
+async function servicesOf(url: string): Promise<Service[]> {
   const index = await connect(`${url}&service=${INDEX}`, { timeout: 5_000 });
   try {
     const found = (await index.$.member("GetLocalNodeServices")()) as unknown as Map<number, { Name: string; RootObjectType: string }>;
@@ -89,6 +89,6 @@ async function services_of(url: string): Promise<Service[]> {
   }
 }
 
-function usb_of_browser(): EventTarget | undefined {
+function usbOfBrowser(): EventTarget | undefined {
   return (navigator as { usb?: EventTarget }).usb;
 }

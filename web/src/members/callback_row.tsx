@@ -4,29 +4,29 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { explain } from "../robot/remote";
 import { Failure } from "../ui/failure";
-import { parse_input } from "../values/parse";
-import { format_arguments, Log, useLog } from "./log";
+import { parseInput } from "../values/parse";
+import { formatArguments, Log, useLog } from "./log";
 import { RowHead } from "./row";
 import type { MemberRowProps } from "./row";
-import { initial_text, ValueInput } from "./value_input";
+import { initialText, ValueInput } from "./value_input";
 
 export function CallbackRow({ object, member, live }: MemberRowProps) {
-  const [answering, set_answering] = useState(false);
-  const [text, set_text] = useState(initial_text(member.type));
-  const [failure, set_failure] = useState<string | null>(null);
+  const [answering, setAnswering] = useState(false);
+  const [text, setText] = useState(initialText(member.type));
+  const [failure, setFailure] = useState<string | null>(null);
   const log = useLog();
   const answer = useRef(text);
   answer.current = text;
   useEffect(() => {
     if (!live || !answering) return;
-    set_failure(null);
+    setFailure(null);
     try {
       return object.answer(member.name, (...args) => {
-        log.add(format_arguments(member, args));
-        return member.type === "void" ? undefined : parse_input(answer.current, member.type);
+        log.add(formatArguments(member, args));
+        return member.type === "void" ? undefined : parseInput(answer.current, member.type);
       });
     } catch (error) {
-      set_failure(explain(error));
+      setFailure(explain(error));
       return undefined;
     }
   }, [object, member, live, answering]);
@@ -36,9 +36,9 @@ export function CallbackRow({ object, member, live }: MemberRowProps) {
       <RowHead member={member} signature={signature} />
       <div class="row-line">
         {member.type !== "void" && (
-          <ValueInput quiet label={`Answer of ${member.name}`} type={member.type} text={text} disabled={!live} on_text={set_text} />
+          <ValueInput quiet label={`Answer of ${member.name}`} type={member.type} text={text} disabled={!live} onText={setText} />
         )}
-        <button class="button" type="button" disabled={!live} aria-pressed={answering} onClick={() => set_answering(!answering)}>
+        <button class="button" type="button" disabled={!live} aria-pressed={answering} onClick={() => setAnswering(!answering)}>
           {answering ? "Stop answering" : "Answer"}
           <span class="unseen"> {member.name}</span>
         </button>

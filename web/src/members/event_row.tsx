@@ -4,20 +4,20 @@
 import { useEffect, useState } from "preact/hooks";
 import { explain } from "../robot/remote";
 import { Failure } from "../ui/failure";
-import { format_arguments, Log, useLog } from "./log";
+import { formatArguments, Log, useLog } from "./log";
 import { RowHead } from "./row";
 import type { MemberRowProps } from "./row";
 
 export function EventRow({ object, member, live }: MemberRowProps) {
   const log = useLog();
-  const [failure, set_failure] = useState<string | null>(null);
+  const [failure, setFailure] = useState<string | null>(null);
   useEffect(() => {
     if (!live) return;
-    set_failure(null);
+    setFailure(null);
     try {
-      return object.on(member.name, (...args) => log.add(format_arguments(member, args)));
+      return object.on(member.name, (...args) => log.add(formatArguments(member, args)));
     } catch (error) {
-      set_failure(explain(error));
+      setFailure(explain(error));
       return undefined;
     }
   }, [object, member, live]);

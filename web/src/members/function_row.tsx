@@ -3,36 +3,36 @@
 
 import { useState } from "preact/hooks";
 import { Failure } from "../ui/failure";
-import { format_value } from "../values/format";
-import { parse_input } from "../values/parse";
+import { formatValue } from "../values/format";
+import { parseInput } from "../values/parse";
 import { RowHead, useAction } from "./row";
 import type { MemberRowProps } from "./row";
-import { initial_text, ValueInput } from "./value_input";
+import { initialText, ValueInput } from "./value_input";
 
 interface Answer {
   text: string;
-  took_ms: number;
+  tookMs: number;
 }
 
 export function FunctionRow({ object, member, live }: MemberRowProps) {
-  const [texts, set_texts] = useState(() => member.parameters.map((p) => initial_text(p.type)));
-  const [answer, set_answer] = useState<Answer | null>(null);
+  const [texts, setTexts] = useState(() => member.parameters.map((p) => initialText(p.type)));
+  const [answer, setAnswer] = useState<Answer | null>(null);
   const calling = useAction();
   const streams = [member.type, ...member.parameters.map((p) => p.type)].some((type) => type.endsWith("{generator}"));
   const call = (event: Event): void => {
     event.preventDefault();
-    set_answer(null);
+    setAnswer(null);
     calling.run(async () => {
-      const args = member.parameters.map((parameter, i) => read_argument(texts[i] ?? "", parameter));
+      const args = member.parameters.map((parameter, i) => readArgument(texts[i] ?? "", parameter));
       const begun = performance.now();
       const result = await object.call(member.name, args);
-      const took_ms = performance.now() - begun;
-      set_answer({ text: member.type === "void" ? "done" : format_value(result), took_ms });
+      const tookMs = performance.now() - begun;
+      setAnswer({ text: member.type === "void" ? "done" : formatValue(result), tookMs });
     });
   };
   return (
     <form onSubmit={call}>
-      <RowHead member={member} signature={signature_of(member)} />
+      <RowHead member={member} signature={signatureOf(member)} />
       {member.parameters.length > 0 && (
         <div class="parameters">
           {member.parameters.map((parameter, i) => (
@@ -42,7 +42,7 @@ export function FunctionRow({ object, member, live }: MemberRowProps) {
               type={parameter.type}
               text={texts[i] ?? ""}
               disabled={!live || streams}
-              on_text={(text) => set_texts(texts.map((old, at) => (at === i ? text : old)))}
+              onText={(text) => setTexts(texts.map((old, at) => (at === i ? text : old)))}
             />
           ))}
         </div>
@@ -56,7 +56,7 @@ export function FunctionRow({ object, member, live }: MemberRowProps) {
         <output class="value" hidden={answer === null}>
           {answer && (
             <>
-              {answer.text} <small class="took">{answer.took_ms.toFixed(1)} ms</small>
+              {answer.text} <small class="took">{answer.tookMs.toFixed(1)} ms</small>
             </>
           )}
         </output>
@@ -66,14 +66,14 @@ export function FunctionRow({ object, member, live }: MemberRowProps) {
   );
 }
 
-function read_argument(text: string, parameter: { name: string; type: string }): unknown {
+function readArgument(text: string, parameter: { name: string; type: string }): unknown {
   try {
-    return parse_input(text, parameter.type);
+    return parseInput(text, parameter.type);
   } catch (error) {
     throw new Error(`${parameter.name}: ${(error as Error).message}`, { cause: error });
   }
 }
 
-function signature_of(member: MemberRowProps["member"]): string {
+function signatureOf(member: MemberRowProps["member"]): string {
   return `(${member.parameters.map((p) => `${p.type} ${p.name}`).join(", ")}) → ${member.type}`;
 }

@@ -3,8 +3,8 @@
 
 import { useMemo, useState } from "preact/hooks";
 import type { Member } from "../robot/remote";
-import { clock_time_ms } from "../ui/words";
-import { format_value } from "../values/format";
+import { clockTimeMs } from "../ui/words";
+import { formatValue } from "../values/format";
 
 const MAX_ENTRIES = 50;
 
@@ -16,18 +16,18 @@ export interface LogEntry {
 
 /** Entries, newest first, and how to add one. */
 export function useLog(): { entries: readonly LogEntry[]; add(text: string): void } {
-  const [entries, set_entries] = useState<readonly LogEntry[]>([]);
+  const [entries, setEntries] = useState<readonly LogEntry[]>([]);
   const add = useMemo(
     () => (text: string) =>
-      set_entries((old) => [{ number: (old[0]?.number ?? 0) + 1, time: Date.now(), text }, ...old.slice(0, MAX_ENTRIES - 1)]),
+      setEntries((old) => [{ number: (old[0]?.number ?? 0) + 1, time: Date.now(), text }, ...old.slice(0, MAX_ENTRIES - 1)]),
     [],
   );
   return { entries, add };
 }
 
 /** "value: 3, why: 'reset'". */
-export function format_arguments(member: Member, args: readonly unknown[]): string {
-  return member.parameters.map((p, i) => `${p.name}: ${format_value(args[i], 1)}`).join(", ");
+export function formatArguments(member: Member, args: readonly unknown[]): string {
+  return member.parameters.map((p, i) => `${p.name}: ${formatValue(args[i], 1)}`).join(", ");
 }
 
 export function Log({ name, entries }: { name: string; entries: readonly LogEntry[] }) {
@@ -36,7 +36,7 @@ export function Log({ name, entries }: { name: string; entries: readonly LogEntr
       {entries.map((entry) => (
         <li key={entry.number}>
           <span class="log-number">{entry.number}</span>
-          <time class="log-time">{clock_time_ms(entry.time)}</time>
+          <time class="log-time">{clockTimeMs(entry.time)}</time>
           <span>{entry.text}</span>
         </li>
       ))}

@@ -2,33 +2,33 @@
 // Layer: web/members.
 
 import { useState } from "preact/hooks";
-import { format_route } from "../app/router";
+import { formatRoute } from "../app/router";
 import { RowHead } from "./row";
 import type { MemberRowProps } from "./row";
 import { ValueInput } from "./value_input";
 import { Failure } from "../ui/failure";
-import { parse_input } from "../values/parse";
+import { parseInput } from "../values/parse";
 
 export function ObjrefRow({ member, route, live }: MemberRowProps) {
-  const [index, set_index] = useState("");
-  const [failure, set_failure] = useState<string | null>(null);
-  const index_type = member.type.endsWith("{string}") ? "string" : /(\{int32\}|\[\])$/.test(member.type) ? "int32" : null;
+  const [index, setIndex] = useState("");
+  const [failure, setFailure] = useState<string | null>(null);
+  const indexType = member.type.endsWith("{string}") ? "string" : /(\{int32\}|\[\])$/.test(member.type) ? "int32" : null;
   const address = (at: string | null): string =>
-    format_route(route.device, route.service, [...route.path, { member: member.name, index: at }]);
+    formatRoute(route.device, route.service, [...route.path, { member: member.name, index: at }]);
   const open = (event: Event): void => {
     event.preventDefault();
     try {
-      const at = String(parse_input(index, index_type ?? "string"));
+      const at = String(parseInput(index, indexType ?? "string"));
       if (at === "") throw new Error("nothing given; expected a key");
       location.hash = address(at);
     } catch (error) {
-      set_failure((error as Error).message);
+      setFailure((error as Error).message);
     }
   };
   return (
     <>
       <RowHead member={member} />
-      {index_type === null ? (
+      {indexType === null ? (
         <a class="button" href={address(null)}>
           Open<span class="unseen"> {member.name}</span>
         </a>
@@ -37,10 +37,10 @@ export function ObjrefRow({ member, route, live }: MemberRowProps) {
           <ValueInput
             quiet
             label={`Index of ${member.name}`}
-            type={index_type}
+            type={indexType}
             text={index}
             disabled={!live}
-            on_text={(text) => (set_index(text), set_failure(null))}
+            onText={(text) => (setIndex(text), setFailure(null))}
           />
           <button class="button" type="submit" disabled={!live}>
             Open<span class="unseen"> {member.name}</span>

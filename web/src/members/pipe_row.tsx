@@ -4,27 +4,27 @@
 import { useEffect, useState } from "preact/hooks";
 import { explain } from "../robot/remote";
 import { Failure } from "../ui/failure";
-import { format_value } from "../values/format";
+import { formatValue } from "../values/format";
 import { Log, useLog } from "./log";
 import { RowHead } from "./row";
 import type { MemberRowProps } from "./row";
 
 export function PipeRow({ object, member, live }: MemberRowProps) {
-  const [following, set_following] = useState(false);
-  const [failure, set_failure] = useState<string | null>(null);
+  const [following, setFollowing] = useState(false);
+  const [failure, setFailure] = useState<string | null>(null);
   const log = useLog();
   useEffect(() => {
     if (!live || !following) return;
     const stop = new AbortController();
-    set_failure(null);
+    setFailure(null);
     const follow = async (): Promise<void> => {
-      for await (const packet of object.pipe(member.name, stop.signal)) log.add(format_value(packet, 1));
+      for await (const packet of object.pipe(member.name, stop.signal)) log.add(formatValue(packet, 1));
       if (!stop.signal.aborted) throw new Error("the device closed this pipe");
     };
     follow().catch((error: unknown) => {
       if (stop.signal.aborted) return;
-      set_failure(explain(error));
-      set_following(false);
+      setFailure(explain(error));
+      setFollowing(false);
     });
     return () => stop.abort();
   }, [object, member, live, following]);
@@ -33,7 +33,7 @@ export function PipeRow({ object, member, live }: MemberRowProps) {
       <RowHead member={member} />
       {!member.modifiers.includes("writeonly") && (
         <div class="row-line">
-          <button class="button" type="button" disabled={!live} aria-pressed={following} onClick={() => set_following(!following)}>
+          <button class="button" type="button" disabled={!live} aria-pressed={following} onClick={() => setFollowing(!following)}>
             {following ? "Stop" : "Follow"}
             <span class="unseen"> {member.name}</span>
           </button>

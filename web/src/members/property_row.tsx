@@ -3,28 +3,28 @@
 
 import { useEffect, useState } from "preact/hooks";
 import { Failure } from "../ui/failure";
-import { format_value } from "../values/format";
-import { parse_input } from "../values/parse";
+import { formatValue } from "../values/format";
+import { parseInput } from "../values/parse";
 import { RowHead, useAction } from "./row";
 import type { MemberRowProps } from "./row";
-import { initial_text, ValueInput } from "./value_input";
+import { initialText, ValueInput } from "./value_input";
 
 export function PropertyRow({ object, member, live }: MemberRowProps) {
   const readable = !member.modifiers.includes("writeonly");
   const writable = !member.modifiers.includes("readonly");
   const reading = useAction();
   const writing = useAction();
-  const [shown, set_shown] = useState<string | null>(null);
-  const [text, set_text] = useState(initial_text(member.type));
-  const read = (): void => reading.run(async () => set_shown(format_value(await object.get(member.name))));
+  const [shown, setShown] = useState<string | null>(null);
+  const [text, setText] = useState(initialText(member.type));
+  const read = (): void => reading.run(async () => setShown(formatValue(await object.get(member.name))));
   useEffect(() => {
     if (live && readable) read();
   }, [object, live]);
   const write = (event: Event): void => {
     event.preventDefault();
     writing.run(async () => {
-      await object.set(member.name, parse_input(text, member.type));
-      if (readable) set_shown(format_value(await object.get(member.name)));
+      await object.set(member.name, parseInput(text, member.type));
+      if (readable) setShown(formatValue(await object.get(member.name)));
     });
   };
   return (
@@ -41,7 +41,7 @@ export function PropertyRow({ object, member, live }: MemberRowProps) {
       <Failure text={reading.failure} />
       {writable && (
         <form class="row-line" onSubmit={write}>
-          <ValueInput quiet label={`New value of ${member.name}`} type={member.type} text={text} disabled={!live} on_text={set_text} />
+          <ValueInput quiet label={`New value of ${member.name}`} type={member.type} text={text} disabled={!live} onText={setText} />
           <button class="button" type="submit" disabled={!live || writing.busy}>
             Set<span class="unseen"> {member.name}</span>
           </button>

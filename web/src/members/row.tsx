@@ -39,23 +39,23 @@ export interface Action {
 
 /** One thing at a time: `busy` while it runs, `failure` until the next begins. */
 export function useAction(): Action {
-  const [busy, set_busy] = useState(false);
-  const [failure, set_failure] = useState<string | null>(null);
+  const [busy, setBusy] = useState(false);
+  const [failure, setFailure] = useState<string | null>(null);
   const mounted = useRef(true);
   useEffect(() => {
     mounted.current = true;
     return () => void (mounted.current = false);
   }, []);
   const run = useCallback((work: () => Promise<void>) => {
-    set_busy(true);
-    set_failure(null);
+    setBusy(true);
+    setFailure(null);
     work()
       .catch((error: unknown) => {
-        if (mounted.current) set_failure(explain(error));
+        if (mounted.current) setFailure(explain(error));
       })
       .finally(() => {
-        if (mounted.current) set_busy(false);
+        if (mounted.current) setBusy(false);
       });
   }, []);
-  return { busy, failure, run, fail: set_failure };
+  return { busy, failure, run, fail: setFailure };
 }

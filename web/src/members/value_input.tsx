@@ -2,7 +2,7 @@
 // Layer: web/members.
 
 import { useId } from "preact/hooks";
-import { is_numeric, parse_type } from "../values/type_text";
+import { isNumeric, parseType } from "../values/type_text";
 import { placeholder } from "../values/parse";
 
 export interface ValueInputProps {
@@ -10,17 +10,17 @@ export interface ValueInputProps {
   type: string;
   text: string;
   disabled: boolean;
-  on_text: (text: string) => void;
+  onText: (text: string) => void;
   /** Hides the label from the eye where the row already names the value. */
   quiet?: boolean;
 }
 
-export function ValueInput({ label, type, text, disabled, on_text, quiet = false }: ValueInputProps) {
+export function ValueInput({ label, type, text, disabled, onText, quiet = false }: ValueInputProps) {
   const id = useId();
-  const parsed = parse_type(type);
+  const parsed = parseType(type);
   const scalar = parsed.array === "none" && parsed.container === "none";
   const common = { id, disabled, class: "field" };
-  const changed = (event: Event): void => on_text((event.currentTarget as HTMLInputElement).value);
+  const changed = (event: Event): void => onText((event.currentTarget as HTMLInputElement).value);
   return (
     <div class="value-input">
       <label for={id} class={quiet ? "unseen" : "value-label"}>
@@ -31,7 +31,7 @@ export function ValueInput({ label, type, text, disabled, on_text, quiet = false
           <option value="false">false</option>
           <option value="true">true</option>
         </select>
-      ) : !is_numeric(parsed.base) && !(scalar && parsed.base === "string") ? (
+      ) : !isNumeric(parsed.base) && !(scalar && parsed.base === "string") ? (
         <textarea {...common} rows={2} spellcheck={false} value={text} placeholder={placeholder(type)} onInput={changed} />
       ) : (
         <input
@@ -49,6 +49,6 @@ export function ValueInput({ label, type, text, disabled, on_text, quiet = false
 }
 
 /** What an untouched field stands for. */
-export function initial_text(type: string): string {
+export function initialText(type: string): string {
   return type === "bool" ? "false" : "";
 }

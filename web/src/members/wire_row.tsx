@@ -4,15 +4,15 @@
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { Plot } from "../chart/plot";
 import { explain } from "../robot/remote";
-import { rate_of, Series } from "../robot/series";
+import { rateOf, Series } from "../robot/series";
 import { Failure } from "../ui/failure";
 import { useAge } from "../ui/use_age";
-import { format_value } from "../values/format";
-import { readings_of } from "../values/numeric";
-import { parse_input } from "../values/parse";
+import { formatValue } from "../values/format";
+import { readingsOf } from "../values/numeric";
+import { parseInput } from "../values/parse";
 import { RowHead, useAction } from "./row";
 import type { MemberRowProps } from "./row";
-import { initial_text, ValueInput } from "./value_input";
+import { initialText, ValueInput } from "./value_input";
 
 const SHOW_MS = 100;
 
@@ -30,11 +30,11 @@ export function WireRow({ object, member, live }: MemberRowProps) {
 
 function WireReader({ object, name, live }: { object: MemberRowProps["object"]; name: string; live: boolean }) {
   const arrivals = useMemo(() => new Series(5_000, 5_000), []);
-  const by_label = useMemo(() => new Map<string, Series>(), []);
-  const [labels, set_labels] = useState<readonly string[]>([]);
-  const [text, set_text] = useState<string | null>(null);
-  const [rate, set_rate] = useState(0);
-  const [failure, set_failure] = useState<string | null>(null);
+  const byLabel = useMemo(() => new Map<string, Series>(), []);
+  const [labels, setLabels] = useState<readonly string[]>([]);
+  const [text, setText] = useState<string | null>(null);
+  const [rate, setRate] = useState(0);
+  const [failure, setFailure] = useState<string | null>(null);
   const age = useAge(() => arrivals.newest?.t ?? null);
 
   useEffect(() => {
@@ -48,33 +48,33 @@ function WireReader({ object, name, live }: { object: MemberRowProps["object"]; 
         newest = value;
         fresh = true;
         arrivals.push(now, 1);
-        const readings = readings_of(value);
+        const readings = readingsOf(value);
         for (const { label, value: number } of readings) {
-          const series = by_label.get(label) ?? new Series();
-          by_label.set(label, series);
+          const series = byLabel.get(label) ?? new Series();
+          byLabel.set(label, series);
           series.push(now, number);
         }
       }
     };
-    set_failure(null);
+    setFailure(null);
     follow().catch((error: unknown) => {
-      if (!stop.signal.aborted) set_failure(explain(error));
+      if (!stop.signal.aborted) setFailure(explain(error));
     });
     // Values may come a thousand times a second; the text follows ten times.
     const timer = setInterval(() => {
-      set_rate(rate_of(arrivals, performance.now()));
+      setRate(rateOf(arrivals, performance.now()));
       if (!fresh) return;
       fresh = false;
-      set_text(format_value(newest));
-      set_labels((old) => (old.length === by_label.size ? old : [...by_label.keys()]));
+      setText(formatValue(newest));
+      setLabels((old) => (old.length === byLabel.size ? old : [...byLabel.keys()]));
     }, SHOW_MS);
     return () => {
       clearInterval(timer);
       stop.abort();
     };
-  }, [object, name, live, arrivals, by_label]);
+  }, [object, name, live, arrivals, byLabel]);
 
-  const lines = useMemo(() => labels.map((label) => by_label.get(label)).filter((s) => s !== undefined), [labels, by_label]);
+  const lines = useMemo(() => labels.map((label) => byLabel.get(label)).filter((s) => s !== undefined), [labels, byLabel]);
   return (
     <>
       <div class={`wire ${age === null ? "" : "is-stale"}`}>
@@ -102,16 +102,16 @@ function WireReader({ object, name, live }: { object: MemberRowProps["object"]; 
 }
 
 function WireWriter({ object, name, type, live }: { object: MemberRowProps["object"]; name: string; type: string; live: boolean }) {
-  const [text, set_text] = useState(initial_text(type));
+  const [text, setText] = useState(initialText(type));
   const sending = useAction();
   const send = (event: Event): void => {
     event.preventDefault();
-    sending.run(async () => object.poke(name, parse_input(text, type)));
+    sending.run(async () => object.poke(name, parseInput(text, type)));
   };
   return (
     <>
       <form class="row-line" onSubmit={send}>
-        <ValueInput quiet label={`Value to send on ${name}`} type={type} text={text} disabled={!live} on_text={set_text} />
+        <ValueInput quiet label={`Value to send on ${name}`} type={type} text={text} disabled={!live} onText={setText} />
         <button class="button" type="submit" disabled={!live || sending.busy}>
           Send<span class="unseen"> on {name}</span>
         </button>

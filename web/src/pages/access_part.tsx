@@ -29,7 +29,7 @@ export function AccessPart({ access }: { access: AccessDesk }) {
 }
 
 function RequestRow({ request, access }: { request: AccessRequest; access: AccessDesk }) {
-  const [roles, set_roles] = useState("viewer");
+  const [roles, setRoles] = useState("viewer");
   const words = roles.split(/[\s,]+/).filter((role) => role !== "");
   return (
     <li class="device" data-request={request.name}>
@@ -46,7 +46,7 @@ function RequestRow({ request, access }: { request: AccessRequest; access: Acces
       >
         <label>
           Roles{" "}
-          <input type="text" value={roles} onInput={(event) => set_roles(event.currentTarget.value)} />
+          <input type="text" value={roles} onInput={(event) => setRoles(event.currentTarget.value)} />
         </label>
         <button class="button" type="submit" disabled={words.length === 0}>
           Approve

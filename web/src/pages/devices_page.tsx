@@ -2,20 +2,20 @@
 // Layer: web/pages.
 
 import { useNow, useStore } from "../app/store";
-import { format_route } from "../app/router";
-import { devices_of } from "../gateway/devices";
+import { formatRoute } from "../app/router";
+import { devicesOf } from "../gateway/devices";
 import type { Device, DeviceList, DeviceMode, GatewayState, Service } from "../gateway/devices";
-import { is_usb } from "../gateway/usb_devices";
+import { isUsb } from "../gateway/usb_devices";
 import type { UsbDeviceList } from "../gateway/usb_devices";
 import type { AccessDesk } from "../gateway/access";
 import { AccessPart } from "./access_part";
 import { SubscriptionsPart } from "./subscriptions_part";
 import { StateBadge } from "../ui/state_badge";
-import { clock_time, sentence, span } from "../ui/words";
+import { clockTime, sentence, span } from "../ui/words";
 
 export function DevicesPage({ list, usb, access }: { list: DeviceList; usb: UsbDeviceList; access: AccessDesk }) {
   const state = useStore(list.state);
-  const devices = devices_of(state);
+  const devices = devicesOf(state);
   return (
     <div class="page page-narrow">
       <h1>Devices</h1>
@@ -29,7 +29,7 @@ export function DevicesPage({ list, usb, access }: { list: DeviceList; usb: UsbD
           ))}
         </ul>
       )}
-      {usb.is_possible && <UsbPart usb={usb} />}
+      {usb.isPossible && <UsbPart usb={usb} />}
       <AccessPart access={access} />
     </div>
   );
@@ -78,7 +78,7 @@ function GatewayStrip({ state }: { state: GatewayState }) {
 
 function headline(state: GatewayState): string {
   if (state.kind === "loading") return "Asking the gateway for its devices";
-  if (state.kind === "away") return `The gateway does not answer since ${clock_time(state.since)}`;
+  if (state.kind === "away") return `The gateway does not answer since ${clockTime(state.since)}`;
   const online = state.devices.filter((device) => device.state === "online").length;
   return state.devices.length === 0 ? "No devices configured" : `${online} of ${state.devices.length} devices online`;
 }
@@ -104,7 +104,7 @@ function DeviceRow({ device, stale }: { device: Device; stale: boolean }) {
             found
           </span>
         )}
-        {is_usb(device.name) && (
+        {isUsb(device.name) && (
           <span class="found-mark" title="Plugged into this computer; the page speaks to it without the gateway">
             USB
           </span>
@@ -116,11 +116,11 @@ function DeviceRow({ device, stale }: { device: Device; stale: boolean }) {
           <dt>Address</dt>
           <dd class="code">{device.url}</dd>
         </div>
-        {device.node_name !== "" && (
+        {device.nodeName !== "" && (
           <div>
             <dt>Node</dt>
-            <dd class="code" title={device.node_id}>
-              {device.node_name}
+            <dd class="code" title={device.nodeId}>
+              {device.nodeName}
             </dd>
           </div>
         )}
@@ -139,7 +139,7 @@ function DeviceRow({ device, stale }: { device: Device; stale: boolean }) {
       </dl>
       {device.state !== "online" && (
         <p class="device-trouble">
-          {sentence(device.last_error ?? "Not reached yet")} {!stale && !is_usb(device.name) && "The gateway keeps trying."}
+          {sentence(device.lastError ?? "Not reached yet")} {!stale && !isUsb(device.name) && "The gateway keeps trying."}
         </p>
       )}
       <ul class="services">
@@ -166,7 +166,7 @@ const MODE: Readonly<Record<DeviceMode, string>> = {
 
 function ServiceLink({ device, service }: { device: Device; service: Service }) {
   return (
-    <a class="service" href={format_route(device.name, service.name)}>
+    <a class="service" href={formatRoute(device.name, service.name)}>
       <span class="service-name">{service.name}</span>
       <span class="code service-type">{service.type === "" ? "type not read yet" : service.type}</span>
     </a>

@@ -14,15 +14,15 @@ import type { MemberRowProps } from "../members/row";
 import { WireRow } from "../members/wire_row";
 import type { MemberKind, Remote } from "../robot/remote";
 
-const GROUPS: readonly { kind: MemberKind; title: string; row: ComponentType<MemberRowProps> }[] = [
-  { kind: "objref", title: "Objects", row: ObjrefRow },
-  { kind: "property", title: "Properties", row: PropertyRow },
-  { kind: "function", title: "Functions", row: FunctionRow },
-  { kind: "wire", title: "Wires", row: WireRow },
-  { kind: "event", title: "Events", row: EventRow },
-  { kind: "pipe", title: "Pipes", row: PipeRow },
-  { kind: "callback", title: "Callbacks", row: CallbackRow },
-  { kind: "memory", title: "Memories", row: MemoryRow },
+const GROUPS: readonly { kind: MemberKind; title: string; Row: ComponentType<MemberRowProps> }[] = [
+  { kind: "objref", title: "Objects", Row: ObjrefRow },
+  { kind: "property", title: "Properties", Row: PropertyRow },
+  { kind: "function", title: "Functions", Row: FunctionRow },
+  { kind: "wire", title: "Wires", Row: WireRow },
+  { kind: "event", title: "Events", Row: EventRow },
+  { kind: "pipe", title: "Pipes", Row: PipeRow },
+  { kind: "callback", title: "Callbacks", Row: CallbackRow },
+  { kind: "memory", title: "Memories", Row: MemoryRow },
 ];
 
 export interface ObjectViewProps {
@@ -42,7 +42,7 @@ export function ObjectView({ object, live, route }: ObjectViewProps) {
       {object.members.length === 0 && <p class="empty">This object has no members.</p>}
       {groups
         .filter((group) => group.members.length > 0)
-        .map(({ kind, title, row: Row, members }) => (
+        .map(({ kind, title, Row, members }) => (
           <section key={kind} class="group" aria-labelledby={`group-${kind}`}>
             <h2 id={`group-${kind}`}>{title}</h2>
             <ul class="rows">

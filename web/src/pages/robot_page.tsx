@@ -30,17 +30,17 @@ export function RobotPage({ link, list, device, shown }: RobotPageProps) {
   const state = useStore(link.state);
   const remote = state.kind === "online" ? state.remote : null;
   const model = useMemo(() => new RobotModel(), []);
-  const [drive_failure, set_drive_failure] = useState<string | null>(null);
-  const driver = useMemo(() => new Driver((error) => set_drive_failure(`Drive: ${explain(error)}`)), []);
+  const [driveFailure, setDriveFailure] = useState<string | null>(null);
+  const driver = useMemo(() => new Driver((error) => setDriveFailure(`Drive: ${explain(error)}`)), []);
 
   useEffect(() => {
     if (!remote) return;
     const stop = new AbortController();
     model.attach(remote, stop.signal);
-    set_drive_failure(null);
-    driver.set_connection(async ({ velocity, radius }) => {
+    setDriveFailure(null);
+    driver.setConnection(async ({ velocity, radius }) => {
       await remote.call("Drive", [velocity, radius], { timeout: DRIVE_TIMEOUT_MS });
-      set_drive_failure(null);
+      setDriveFailure(null);
     });
     return () => {
       driver.dispose();
@@ -49,32 +49,32 @@ export function RobotPage({ link, list, device, shown }: RobotPageProps) {
   }, [remote, model, driver]);
 
   const live = remote !== null;
-  const pose_age = useAge(() => model.heard_at("pose"));
-  const pose_comes = live && pose_age === null;
-  const put_back = (robot: Remote): void => {
-    robot.call("reset", []).catch((error: unknown) => set_drive_failure(`reset: ${explain(error)}`));
+  const poseAge = useAge(() => model.heardAt("pose"));
+  const poseComes = live && poseAge === null;
+  const putBack = (robot: Remote): void => {
+    robot.call("reset", []).catch((error: unknown) => setDriveFailure(`reset: ${explain(error)}`));
   };
   return (
     <div class="robot">
-      <section class={`panel chart-panel ${pose_comes ? "" : "is-stale"}`} aria-labelledby="chart-title">
+      <section class={`panel chart-panel ${poseComes ? "" : "is-stale"}`} aria-labelledby="chart-title">
         <h2 id="chart-title" class="unseen">
           Chart
         </h2>
-        <RobotChart model={model} live={pose_comes} />
+        <RobotChart model={model} live={poseComes} />
         <div class="chart-foot">
-          <PoseLine model={model} live={live} age={pose_age} />
+          <PoseLine model={model} live={live} age={poseAge} />
           {remote?.has("reset", "function") && (
-            <button class="button button-quiet" type="button" onClick={() => put_back(remote)}>
+            <button class="button button-quiet" type="button" onClick={() => putBack(remote)}>
               To start
             </button>
           )}
-          <button class="button button-quiet" type="button" onClick={() => model.clear_trail()}>
+          <button class="button button-quiet" type="button" onClick={() => model.clearTrail()}>
             Clear trail
           </button>
           <SongBox robot={remote} />
         </div>
       </section>
-      <DrivePanel driver={driver} enabled={live && shown} lost={state.kind === "lost"} failure={drive_failure} device={device} />
+      <DrivePanel driver={driver} enabled={live && shown} lost={state.kind === "lost"} failure={driveFailure} device={device} />
       <CameraView list={list} robot={device} shown={shown} />
       <ValuesPanel model={model} live={live} />
       <BumpLog model={model} />

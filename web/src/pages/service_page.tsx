@@ -2,16 +2,16 @@
 // Layer: web/pages.
 
 import { useEffect, useState } from "preact/hooks";
-import { format_route } from "../app/router";
+import { formatRoute } from "../app/router";
 import type { PathStep, Route } from "../app/router";
 import { useStore } from "../app/store";
-import { devices_of, relay_url } from "../gateway/devices";
+import { devicesOf, relayUrl } from "../gateway/devices";
 import type { DeviceList } from "../gateway/devices";
-import { is_usb, usb_url } from "../gateway/usb_devices";
+import { isUsb, usbUrl } from "../gateway/usb_devices";
 import { Link } from "../robot/link";
-import { explain, open_remote } from "../robot/remote";
+import { explain, openRemote } from "../robot/remote";
 import type { Remote } from "../robot/remote";
-import { is_create } from "../robot/robot_model";
+import { isCreate } from "../robot/robot_model";
 import { LinkStrip } from "../ui/link_strip";
 import { ObjectView } from "./object_view";
 import { RobotPage } from "./robot_page";
@@ -30,10 +30,10 @@ export function ServicePage({ route, list }: { route: ServiceRoute; list: Device
         {link && <LinkStrip link={link} list={list} device={device} service={service} />}
         {drives && (
           <nav class="tabs" aria-label="Views of this service">
-            <a href={format_route(device, service)} aria-current={view === "auto" ? "page" : undefined}>
+            <a href={formatRoute(device, service)} aria-current={view === "auto" ? "page" : undefined}>
               Drive
             </a>
-            <a href={format_route(device, service, [], "members")} aria-current={view === "members" ? "page" : undefined}>
+            <a href={formatRoute(device, service, [], "members")} aria-current={view === "members" ? "page" : undefined}>
               All members
             </a>
           </nav>
@@ -46,17 +46,17 @@ export function ServicePage({ route, list }: { route: ServiceRoute; list: Device
 }
 
 function useLink(device: string, service: string, list: DeviceList): Link | null {
-  const [link, set_link] = useState<Link | null>(null);
+  const [link, setLink] = useState<Link | null>(null);
   useEffect(() => {
-    const url = is_usb(device) ? usb_url(device, service) : relay_url(device, service);
-    const made = new Link((signal) => open_remote(url, signal));
-    set_link(made);
-    let was_online = true;
+    const url = isUsb(device) ? usbUrl(device, service) : relayUrl(device, service);
+    const made = new Link((signal) => openRemote(url, signal));
+    setLink(made);
+    let wasOnline = true;
     const unwatch = list.state.watch((gateway) => {
       const known = gateway.kind === "known" && gateway.devices.find((d) => d.name === device);
-      const is_online = known !== false && known?.state === "online";
-      if (is_online && !was_online) made.device_is_back();
-      was_online = is_online;
+      const isOnline = known !== false && known?.state === "online";
+      if (isOnline && !wasOnline) made.deviceIsBack();
+      wasOnline = isOnline;
     });
     return () => {
       unwatch();
@@ -69,17 +69,17 @@ function useLink(device: string, service: string, list: DeviceList): Link | null
 /** Whether this is the demo robot: by what the gateway says at first, by the object itself once connected; then for good. */
 function useRobot(link: Link | null, device: string, service: string, list: DeviceList): boolean {
   const gateway = useStore(list.state);
-  const [by_object, set_by_object] = useState<boolean | null>(null);
+  const [byObject, setByObject] = useState<boolean | null>(null);
   useEffect(() => {
     if (!link) return;
     const look = (): void => {
-      if (link.state.value.kind === "online") set_by_object(is_create(link.state.value.remote));
+      if (link.state.value.kind === "online") setByObject(isCreate(link.state.value.remote));
     };
     look();
     return link.state.watch(look);
   }, [link]);
-  if (by_object !== null) return by_object;
-  const known = devices_of(gateway)?.find((d) => d.name === device)?.services.find((s) => s.name === service);
+  if (byObject !== null) return byObject;
+  const known = devicesOf(gateway)?.find((d) => d.name === device)?.services.find((s) => s.name === service);
   return /^experimental\.(create\d*\.Create|simulatedcreate\.SimulatedCreate)$/.test(known?.type ?? "");
 }
 
@@ -87,16 +87,16 @@ function useRobot(link: Link | null, device: string, service: string, list: Devi
 function MembersPage({ link, route, path }: { link: Link; route: ServiceRoute; path: readonly PathStep[] }) {
   const state = useStore(link.state);
   const remote = state.kind === "online" ? state.remote : null;
-  const [found, set_found] = useState<{ object: Remote; of: Remote } | null>(null);
-  const [failure, set_failure] = useState<string | null>(null);
+  const [found, setFound] = useState<{ object: Remote; of: Remote } | null>(null);
+  const [failure, setFailure] = useState<string | null>(null);
   const key = JSON.stringify(path);
   useEffect(() => {
     if (!remote) return;
     let current = true;
-    set_failure(null);
+    setFailure(null);
     walk(remote, path).then(
-      (object) => current && set_found({ object, of: remote }),
-      (error: unknown) => current && set_failure(explain(error)),
+      (object) => current && setFound({ object, of: remote }),
+      (error: unknown) => current && setFailure(explain(error)),
     );
     return () => void (current = false);
   }, [remote, key]);
@@ -116,8 +116,8 @@ async function walk(root: Remote, path: readonly PathStep[]): Promise<Remote> {
   for (const { member, index } of path) {
     const declared = object.members.find((m) => m.name === member && m.kind === "objref");
     if (!declared) throw new Error(`${object.type} has no object "${member}"`);
-    const by_number = /(\{int32\}|\[\])$/.test(declared.type);
-    object = await object.child(member, index === null ? undefined : by_number ? Number(index) : index);
+    const byNumber = /(\{int32\}|\[\])$/.test(declared.type);
+    object = await object.child(member, index === null ? undefined : byNumber ? Number(index) : index);
   }
   return object;
 }

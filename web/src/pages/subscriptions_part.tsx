@@ -3,9 +3,9 @@
 
 import { useEffect, useState } from "preact/hooks";
 import { useStore } from "../app/store";
-import { SubscriptionList, subscriptions_of } from "../gateway/subscriptions";
+import { SubscriptionList, subscriptionsOf } from "../gateway/subscriptions";
 import type { Subscription, SubscriptionsState } from "../gateway/subscriptions";
-import { age_text, clock_time, sentence } from "../ui/words";
+import { ageText, clockTime, sentence } from "../ui/words";
 
 interface Props {
   device: string;
@@ -14,9 +14,9 @@ interface Props {
 }
 
 export function SubscriptionsPart({ device, online, stale }: Props) {
-  const [open, set_open] = useState(false);
+  const [open, setOpen] = useState(false);
   return (
-    <details class="subscriptions" onToggle={(event) => set_open(event.currentTarget.open)}>
+    <details class="subscriptions" onToggle={(event) => setOpen(event.currentTarget.open)}>
       <summary>
         Subscriptions<span class="unseen"> of {device}</span>
       </summary>
@@ -32,7 +32,7 @@ function Subscriptions({ device, online, stale }: Props) {
     return () => list.stop();
   }, [list]);
   const state = useStore(list.state);
-  const subscriptions = subscriptions_of(state);
+  const subscriptions = subscriptionsOf(state);
   return (
     <div data-subscriptions={state.kind}>
       <p class="note" role="status">
@@ -50,7 +50,7 @@ function headline(state: SubscriptionsState, online: boolean, stale: boolean): s
   if (state.kind === "denied") return `You may not see them: ${sentence(state.reason)}`;
   if (state.kind === "away") {
     const below = state.subscriptions && state.subscriptions.length > 0 ? " Below is what it said last." : "";
-    return `The gateway has not told them since ${clock_time(state.since)}: ${sentence(state.reason)}${below}`;
+    return `The gateway has not told them since ${clockTime(state.since)}: ${sentence(state.reason)}${below}`;
   }
   if (!online && !stale) return "The device is away: nothing comes until it is back, and then they go on.";
   if (state.subscriptions.length === 0) return "No client listens to a wire or a pipe of it now.";
@@ -88,15 +88,15 @@ const HINTS: Readonly<Record<string, string>> = {
 };
 
 function Row({ subscription }: { subscription: Subscription }) {
-  const { path, member, kind, client, delivered, conflated, dropped, age_p50_ms, age_p99_ms } = subscription;
-  const aged = (ms: number): string => (delivered > 0 ? age_text(ms) : "none yet");
+  const { path, member, kind, client, delivered, conflated, dropped, ageP50Ms, ageP99Ms } = subscription;
+  const aged = (ms: number): string => (delivered > 0 ? ageText(ms) : "none yet");
   const cells: [name: string, value: string, mark: string][] = [
     ["Client", client === "" ? "unknown" : client, "code"],
     ["Delivered", String(delivered), ""],
     ["Conflated", String(conflated), conflated > 0 ? "is-conflated" : ""],
     ["Dropped", String(dropped), dropped > 0 ? "is-dropped" : ""],
-    ["Age p50", aged(age_p50_ms), ""],
-    ["Age p99", aged(age_p99_ms), ""],
+    ["Age p50", aged(ageP50Ms), ""],
+    ["Age p99", aged(ageP99Ms), ""],
   ];
   return (
     <tr role="row" data-member={member}>

@@ -6,8 +6,8 @@ const LONGEST_MS = 10_000;
 const JITTER = 0.5; // each wait is 1 to 1.5 times its step, so pages that lost the same device do not return in step
 
 /** Wait before attempt `attempt` (0 is the first): 500 ms doubling to 10 s, jitter included. */
-export function backoff_ms(attempt: number, random: () => number = Math.random): number {
-  const longest_step = LONGEST_MS / (1 + JITTER);
-  const step = Math.min(FIRST_MS * 2 ** Math.min(attempt, 16), longest_step);
+export function backoffMs(attempt: number, random: () => number = Math.random): number {
+  const longestStep = LONGEST_MS / (1 + JITTER);
+  const step = Math.min(FIRST_MS * 2 ** Math.min(attempt, 16), longestStep);
   return Math.round(step * (1 + JITTER * random()));
 }

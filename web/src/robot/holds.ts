@@ -4,22 +4,22 @@
 import type { Direction } from "./steering";
 
 export class Holds {
-  readonly #by_source = new Map<string, Direction>();
+  readonly #bySource = new Map<string, Direction>();
 
   press(source: string, direction: Direction): void {
-    this.#by_source.set(source, direction);
+    this.#bySource.set(source, direction);
   }
 
   release(source: string): void {
-    this.#by_source.delete(source);
+    this.#bySource.delete(source);
   }
 
   /** Lets go of everything: the window lost focus, the connection went, somebody pressed stop. */
   clear(): void {
-    this.#by_source.clear();
+    this.#bySource.clear();
   }
 
   get directions(): ReadonlySet<Direction> {
-    return new Set(this.#by_source.values());
+    return new Set(this.#bySource.values());
   }
 }

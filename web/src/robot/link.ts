@@ -2,15 +2,15 @@
 // Layer: web/robot. Time and the way to connect are given, so that a lost device is tested without one.
 
 import { Store } from "../app/store";
-import { backoff_ms } from "./backoff";
+import { backoffMs } from "./backoff";
 import { explain } from "./remote";
 import type { Remote } from "./remote";
 
 export type LinkState =
   | { kind: "connecting" }
   | { kind: "online"; since: number; remote: Remote }
-  /** Not connected. `since`: when it was lost (or first failed); `retry_at`: null while an attempt runs. */
-  | { kind: "lost"; since: number; reason: string; attempts: number; retry_at: number | null };
+  /** Not connected. `since`: when it was lost (or first failed); `retryAt`: null while an attempt runs. */
+  | { kind: "lost"; since: number; reason: string; attempts: number; retryAt: number | null };
 
 export type OpenRemote = (signal: AbortSignal) => Promise<Remote>;
 
@@ -32,17 +32,17 @@ export class Link {
   }
 
   /** Connects now instead of at the end of the wait; nothing happens while online or connecting. */
-  retry_now(): void {
+  retryNow(): void {
     if (this.#disposed || this.#remote || this.#attempt) return;
     clearTimeout(this.#timer);
     void this.#connect();
   }
 
   /** The gateway has news of the device: one that came back is tried at once, with the waits starting over. */
-  device_is_back(): void {
+  deviceIsBack(): void {
     if (this.#remote || this.#attempt) return;
     this.#attempts = 0;
-    this.retry_now();
+    this.retryNow();
   }
 
   dispose(): void {
@@ -58,7 +58,7 @@ export class Link {
     const attempt = new AbortController();
     this.#attempt = attempt;
     const before = this.state.value;
-    if (before.kind === "lost") this.state.value = { ...before, retry_at: null };
+    if (before.kind === "lost") this.state.value = { ...before, retryAt: null };
     try {
       const remote = await this.#open(attempt.signal);
       if (this.#disposed) {
@@ -68,7 +68,7 @@ export class Link {
       this.#attempt = null;
       this.#attempts = 0;
       this.#remote = remote;
-      remote.on_close((reason) => {
+      remote.onClose((reason) => {
         if (this.#remote !== remote) return;
         this.#remote = null;
         this.#lose(reason);
@@ -84,9 +84,9 @@ export class Link {
     if (this.#disposed) return;
     const before = this.state.value;
     const since = before.kind === "lost" ? before.since : Date.now();
-    const wait = backoff_ms(this.#attempts, this.#random);
+    const wait = backoffMs(this.#attempts, this.#random);
     this.#attempts += 1;
-    this.state.value = { kind: "lost", since, reason, attempts: this.#attempts, retry_at: Date.now() + wait };
+    this.state.value = { kind: "lost", since, reason, attempts: this.#attempts, retryAt: Date.now() + wait };
     this.#timer = setTimeout(() => void this.#connect(), wait);
   }
 }

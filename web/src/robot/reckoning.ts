@@ -9,20 +9,20 @@ export interface Pose {
 
 export const ORIGIN: Pose = { x: 0, y: 0, theta: 0 };
 
-/** The pose after driving `distance_m` along an arc that turns by `turn_rad`. */
-export function advance(pose: Pose, distance_m: number, turn_rad: number): Pose {
+/** The pose after driving `distanceM` along an arc that turns by `turnRad`. */
+export function advance(pose: Pose, distanceM: number, turnRad: number): Pose {
   // The chord of the arc points along the middle heading; its length is 2 r sin(turn / 2) with r = distance / turn.
-  const half = turn_rad / 2;
-  const chord = Math.abs(half) < 1e-6 ? distance_m : (distance_m * Math.sin(half)) / half;
+  const half = turnRad / 2;
+  const chord = Math.abs(half) < 1e-6 ? distanceM : (distanceM * Math.sin(half)) / half;
   return {
     x: pose.x + chord * Math.cos(pose.theta + half),
     y: pose.y + chord * Math.sin(pose.theta + half),
-    theta: wrap_angle(pose.theta + turn_rad),
+    theta: wrapAngle(pose.theta + turnRad),
   };
 }
 
 /** The same angle in (-pi, pi]. */
-export function wrap_angle(angle: number): number {
+export function wrapAngle(angle: number): number {
   const turn = 2 * Math.PI;
   const wrapped = ((angle % turn) + turn) % turn;
   return wrapped > Math.PI ? wrapped - turn : wrapped;
@@ -31,7 +31,7 @@ export function wrap_angle(angle: number): number {
 /** Follows two counters that only ever grow from an unknown start: total distance in mm, total turn in degrees. */
 export class Reckoner {
   #pose: Pose;
-  #last: { distance_mm: number; angle_deg: number } | null = null;
+  #last: { distanceMm: number; angleDeg: number } | null = null;
 
   constructor(start: Pose = ORIGIN) {
     this.#pose = start;
@@ -42,15 +42,15 @@ export class Reckoner {
   }
 
   /** Takes the counters' next values. The first ones after construction or `rebase` only set the baseline. */
-  update(distance_mm: number, angle_deg: number): Pose {
+  update(distanceMm: number, angleDeg: number): Pose {
     if (this.#last) {
       this.#pose = advance(
         this.#pose,
-        (distance_mm - this.#last.distance_mm) / 1000,
-        ((angle_deg - this.#last.angle_deg) * Math.PI) / 180,
+        (distanceMm - this.#last.distanceMm) / 1000,
+        ((angleDeg - this.#last.angleDeg) * Math.PI) / 180,
       );
     }
-    this.#last = { distance_mm, angle_deg };
+    this.#last = { distanceMm, angleDeg };
     return this.#pose;
   }
 

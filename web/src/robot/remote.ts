@@ -30,12 +30,12 @@ export interface Remote {
   /** @returns a function that unsubscribes. */
   on(name: string, heard: (...args: unknown[]) => void): () => void;
   child(name: string, index?: string | number): Promise<Remote>;
-  on_close(heard: (reason: string) => void): void;
+  onClose(heard: (reason: string) => void): void;
   close(): void;
 }
 
 /** Opens a service. @throws Error with a sentence for people; see `explain` for the names behind it. */
-export async function open_remote(url: string, signal: AbortSignal): Promise<Remote> {
+export async function openRemote(url: string, signal: AbortSignal): Promise<Remote> {
   return wrap(await connect(url, { signal, timeout: 10_000 }));
 }
 
@@ -62,8 +62,8 @@ function wrap(object: RemoteObject): Remote {
     call: async (name, args, options) => member(name)(...args, ...(options ? [options] : [])),
     get: async (name) => member(name).get(),
     set: async (name, value) => member(name).set(value),
-    wire: (name, signal) => values_of(() => member(name).connect({ signal }), signal),
-    pipe: (name, signal) => values_of(() => member(name).connect(-1, { signal }), signal),
+    wire: (name, signal) => valuesOf(() => member(name).connect({ signal }), signal),
+    pipe: (name, signal) => valuesOf(() => member(name).connect(-1, { signal }), signal),
     dimensions: async (name) => member(name).dimensions(),
     read: async (name, position, count) => member(name).read(position, count),
     answer: (name, handler) => {
@@ -75,7 +75,7 @@ function wrap(object: RemoteObject): Remote {
     on: (name, heard) => member(name).on(heard),
     child: async (name, index) =>
       wrap(await (index === undefined ? member(name).get<RemoteObject>() : member(name).get(index))),
-    on_close: (heard) => void info.onClose((reason) => heard(reason ? explain(reason) : "the connection was closed")),
+    onClose: (heard) => void info.onClose((reason) => heard(reason ? explain(reason) : "the connection was closed")),
     close: () => {
       info.close().catch(() => undefined); // it ends either way; there is nobody left to tell
     },
@@ -83,7 +83,7 @@ function wrap(object: RemoteObject): Remote {
 }
 
 /** Leaving the loop, or `signal`, closes the wire's connection or the pipe's endpoint. */
-async function* values_of(
+async function* valuesOf(
   open: () => AsyncIterable<unknown> | Promise<AsyncIterable<unknown>>,
   signal: AbortSignal,
 ): AsyncGenerator<unknown, void> {

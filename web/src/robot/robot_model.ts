@@ -6,9 +6,9 @@ import { Reckoner } from "./reckoning";
 import type { Pose } from "./reckoning";
 import { explain } from "./remote";
 import type { Remote } from "./remote";
-import { EMPTY_ROOM, obstacles_of, pose_of, walls_of } from "./room";
+import { EMPTY_ROOM, obstaclesOf, poseOf, wallsOf } from "./room";
 import type { Room } from "./room";
-import { read_sensor_packet } from "./sensor_packet";
+import { readSensorPacket } from "./sensor_packet";
 import { Series } from "./series";
 import { Trail } from "./trail";
 
@@ -20,11 +20,11 @@ export interface Bump {
 }
 
 export interface Readings {
-  distance_mm: number | null;
-  angle_deg: number | null;
+  distanceMm: number | null;
+  angleDeg: number | null;
   bumpers: number | null;
-  left_wheel_mm_s: number | null;
-  right_wheel_mm_s: number | null;
+  leftWheelMmS: number | null;
+  rightWheelMmS: number | null;
   packet: { id: number; bytes: Uint8Array } | null;
 }
 
@@ -36,28 +36,28 @@ const RETRY_MS = 1_000;
 const SHOW_MS = 100; // numbers faster than this cannot be read
 const MAX_BUMPS = 200;
 const NO_READINGS: Readings = {
-  distance_mm: null,
-  angle_deg: null,
+  distanceMm: null,
+  angleDeg: null,
   bumpers: null,
-  left_wheel_mm_s: null,
-  right_wheel_mm_s: null,
+  leftWheelMmS: null,
+  rightWheelMmS: null,
   packet: null,
 };
 
 export class RobotModel {
   pose: Pose = { x: 0, y: 0, theta: 0 };
   /** Whether the device tells its pose itself; else it is reckoned from distance and angle. */
-  readonly pose_source = new Store<"device" | "reckoned">("reckoned");
+  readonly poseSource = new Store<"device" | "reckoned">("reckoned");
   readonly trail = new Trail();
   readonly room = new Store<Room>(EMPTY_ROOM);
-  radius_m = 0.165;
+  radiusM = 0.165;
   readonly readings = new Store<Readings>(NO_READINGS);
   readonly bumps = new Store<readonly Bump[]>([]);
   readonly series = {
     distance: new Series(),
     angle: new Series(),
-    left_wheel: new Series(),
-    right_wheel: new Series(),
+    leftWheel: new Series(),
+    rightWheel: new Series(),
     packets: new Series(5_000),
   };
   /** The last thing that failed while reading, shown beside the values; null when all is well. */
@@ -67,17 +67,17 @@ export class RobotModel {
   readonly #moved = new Set<() => void>();
   readonly #heard = new Map<Told, number>();
   #latest: Readings = NO_READINGS;
-  #show_timer: ReturnType<typeof setTimeout> | undefined;
-  #bump_count = 0;
+  #showTimer: ReturnType<typeof setTimeout> | undefined;
+  #bumpCount = 0;
 
   /** Runs `moved` whenever the map needs a new picture. */
-  on_moved(moved: () => void): () => void {
+  onMoved(moved: () => void): () => void {
     this.#moved.add(moved);
     return () => void this.#moved.delete(moved);
   }
 
   /** When the robot last told of it, by performance.now(); null when it never did. */
-  heard_at(what: Told): number | null {
+  heardAt(what: Told): number | null {
     return this.#heard.get(what) ?? null;
   }
 
@@ -90,44 +90,44 @@ export class RobotModel {
         if (!signal.aborted) this.trouble.value = `${what}: ${explain(error)}`;
       });
     };
-    guard("reading the room", this.#read_room(remote));
+    guard("reading the room", this.#readRoom(remote));
     const state = remote.members.find((m) => m.kind === "wire" && m.name === "state");
-    this.pose_source.value = state ? "device" : "reckoned";
-    if (state) guard(`wire ${state.name}`, this.#follow_state(remote, state.name, signal));
-    void this.#keep_polling(remote, signal);
-    if (remote.has("packets", "wire")) guard("wire packets", this.#follow_packets(remote, signal));
-    if (remote.has("Bump", "event")) this.#follow_bumps(remote, signal);
+    this.poseSource.value = state ? "device" : "reckoned";
+    if (state) guard(`wire ${state.name}`, this.#followState(remote, state.name, signal));
+    void this.#keepPolling(remote, signal);
+    if (remote.has("packets", "wire")) guard("wire packets", this.#followPackets(remote, signal));
+    if (remote.has("Bump", "event")) this.#followBumps(remote, signal);
   }
 
-  clear_trail(): void {
+  clearTrail(): void {
     this.trail.clear();
     this.bumps.value = [];
     this.#redraw();
   }
 
-  async #read_room(remote: Remote): Promise<void> {
+  async #readRoom(remote: Remote): Promise<void> {
     const read = async (name: string): Promise<unknown> => (remote.has(name, "property") ? remote.get(name) : null);
     const [walls, obstacles, radius] = await Promise.all([read("walls"), read("obstacles"), read("radius")]);
-    this.room.value = { walls: walls_of(walls), obstacles: obstacles_of(obstacles) };
-    if (typeof radius === "number" && radius > 0) this.radius_m = radius;
+    this.room.value = { walls: wallsOf(walls), obstacles: obstaclesOf(obstacles) };
+    if (typeof radius === "number" && radius > 0) this.radiusM = radius;
     this.#redraw();
   }
 
-  async #follow_state(remote: Remote, wire: string, signal: AbortSignal): Promise<void> {
+  async #followState(remote: Remote, wire: string, signal: AbortSignal): Promise<void> {
     for await (const value of remote.wire(wire, signal)) {
-      const pose = pose_of(value);
-      if (pose) this.#move_to(pose);
+      const pose = poseOf(value);
+      if (pose) this.#moveTo(pose);
       const { bumpers } = (value ?? {}) as { bumpers?: unknown };
       if (typeof bumpers === "number") this.#show({ bumpers });
     }
   }
 
   /** Each round begins after the one before it is answered; a failed one is shown and tried again a second later. */
-  async #keep_polling(remote: Remote, signal: AbortSignal): Promise<void> {
+  async #keepPolling(remote: Remote, signal: AbortSignal): Promise<void> {
     let failed = false;
     while (!signal.aborted) {
       try {
-        await this.#poll_once(remote, signal);
+        await this.#pollOnce(remote, signal);
         if (failed) this.trouble.value = null;
         failed = false;
       } catch (error) {
@@ -139,65 +139,65 @@ export class RobotModel {
     }
   }
 
-  async #poll_once(remote: Remote, signal: AbortSignal): Promise<void> {
+  async #pollOnce(remote: Remote, signal: AbortSignal): Promise<void> {
     const read = async (name: string): Promise<number | null> =>
       remote.has(name, "property") ? Number(await remote.get(name)) : null;
-    const [distance_mm, angle_deg, bumpers] = await Promise.all([
+    const [distanceMm, angleDeg, bumpers] = await Promise.all([
       read("DistanceTraveled"),
       read("AngleTraveled"),
       read("Bumpers"),
     ]);
     if (signal.aborted) return;
     const now = performance.now();
-    if (distance_mm !== null) this.series.distance.push(now, distance_mm);
-    if (angle_deg !== null) this.series.angle.push(now, angle_deg);
-    if (distance_mm !== null && angle_deg !== null && this.pose_source.value === "reckoned") {
-      this.#move_to(this.#reckoner.update(distance_mm, angle_deg));
+    if (distanceMm !== null) this.series.distance.push(now, distanceMm);
+    if (angleDeg !== null) this.series.angle.push(now, angleDeg);
+    if (distanceMm !== null && angleDeg !== null && this.poseSource.value === "reckoned") {
+      this.#moveTo(this.#reckoner.update(distanceMm, angleDeg));
     }
-    this.#show({ distance_mm, angle_deg, ...(bumpers === null ? {} : { bumpers }) });
+    this.#show({ distanceMm, angleDeg, ...(bumpers === null ? {} : { bumpers }) });
   }
 
-  async #follow_packets(remote: Remote, signal: AbortSignal): Promise<void> {
+  async #followPackets(remote: Remote, signal: AbortSignal): Promise<void> {
     const values = remote.wire("packets", signal);
     // Counted per client on some robots, one switch for all on others: so it is never stopped from here. The count ends
     // with the connection, and a switch is not ours to turn off.
     if (remote.has("StartStreaming", "function")) await remote.call("StartStreaming", []);
-    for await (const value of values) this.#take_packet(value);
+    for await (const value of values) this.#takePacket(value);
   }
 
-  #take_packet(value: unknown): void {
+  #takePacket(value: unknown): void {
     const { ID, Data } = (value ?? {}) as { ID?: unknown; Data?: unknown };
     if (typeof ID !== "number" || !(Data instanceof Uint8Array)) return;
     const now = performance.now();
-    const { bumpers, left_wheel_mm_s, right_wheel_mm_s } = read_sensor_packet(ID, Data);
+    const { bumpers, leftWheelMmS, rightWheelMmS } = readSensorPacket(ID, Data);
     this.series.packets.push(now, Data.length);
-    if (left_wheel_mm_s !== undefined) this.series.left_wheel.push(now, left_wheel_mm_s);
-    if (right_wheel_mm_s !== undefined) this.series.right_wheel.push(now, right_wheel_mm_s);
+    if (leftWheelMmS !== undefined) this.series.leftWheel.push(now, leftWheelMmS);
+    if (rightWheelMmS !== undefined) this.series.rightWheel.push(now, rightWheelMmS);
     this.#show({
       packet: { id: ID, bytes: Data },
       ...(bumpers === undefined ? {} : { bumpers }),
-      ...(left_wheel_mm_s === undefined ? {} : { left_wheel_mm_s }),
-      ...(right_wheel_mm_s === undefined ? {} : { right_wheel_mm_s }),
+      ...(leftWheelMmS === undefined ? {} : { leftWheelMmS }),
+      ...(rightWheelMmS === undefined ? {} : { rightWheelMmS }),
     });
   }
 
-  #follow_bumps(remote: Remote, signal: AbortSignal): void {
+  #followBumps(remote: Remote, signal: AbortSignal): void {
     const unsubscribe = remote.on("Bump", () => {
       const time = Date.now();
       // The event has no parameters; the side is in the property, read while the robot still touches.
       const bumpers = remote.has("Bumpers", "property") ? remote.get("Bumpers") : Promise.resolve(0);
-      bumpers.then(Number).catch(() => 0).then((bits) => this.#log_bump(time, bits), () => undefined);
+      bumpers.then(Number).catch(() => 0).then((bits) => this.#logBump(time, bits), () => undefined);
     });
     signal.addEventListener("abort", unsubscribe, { once: true });
   }
 
-  #log_bump(time: number, bits: number): void {
-    const bump: Bump = { number: ++this.#bump_count, time, side: side_of(bits), pose: this.pose };
+  #logBump(time: number, bits: number): void {
+    const bump: Bump = { number: ++this.#bumpCount, time, side: sideOf(bits), pose: this.pose };
     this.bumps.value = [bump, ...this.bumps.value].slice(0, MAX_BUMPS);
     this.#redraw();
   }
 
-  #move_to(pose: Pose): void {
+  #moveTo(pose: Pose): void {
     this.#heard.set("pose", performance.now());
     this.pose = pose;
     this.trail.add({ x: pose.x, y: pose.y });
@@ -207,8 +207,8 @@ export class RobotModel {
   #show(change: Partial<Readings>): void {
     for (const name of Object.keys(change)) this.#heard.set(name as keyof Readings, performance.now());
     this.#latest = { ...this.#latest, ...change };
-    this.#show_timer ??= setTimeout(() => {
-      this.#show_timer = undefined;
+    this.#showTimer ??= setTimeout(() => {
+      this.#showTimer = undefined;
       this.readings.value = this.#latest;
     }, SHOW_MS);
   }
@@ -218,12 +218,12 @@ export class RobotModel {
   }
 }
 
-export function side_of(bits: number): string {
+export function sideOf(bits: number): string {
   return ["", "right", "left", "both sides"][bits & 3] ?? "";
 }
 
 /** By the members that the page cannot do without. */
-export function is_create(remote: Remote): boolean {
+export function isCreate(remote: Remote): boolean {
   const drive = remote.members.find((m) => m.name === "Drive" && m.kind === "function");
   return drive?.parameters.length === 2 && drive.parameters.every((p) => p.type === "int16") && remote.has("DistanceTraveled", "property");
 }

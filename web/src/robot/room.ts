@@ -25,20 +25,20 @@ export interface Room {
 export const EMPTY_ROOM: Room = { walls: [], obstacles: [] };
 
 /** A pose from a struct with x, y and heading; null when there is none. */
-export function pose_of(value: unknown): Pose | null {
+export function poseOf(value: unknown): Pose | null {
   const { x, y, heading } = (value ?? {}) as Record<string, unknown>;
-  const pose = [x, y, heading].map(number_of);
+  const pose = [x, y, heading].map(numberOf);
   if (pose.includes(null)) return null;
   const [a = 0, b = 0, theta = 0] = pose as number[];
   return { x: a, y: b, theta };
 }
 
 /** A list of structs with x1, y1, x2, y2; what is something else is left out. */
-export function walls_of(value: unknown): Wall[] {
+export function wallsOf(value: unknown): Wall[] {
   if (!Array.isArray(value)) return [];
   return value.flatMap((item) => {
     const { x1, y1, x2, y2 } = (item ?? {}) as Record<string, unknown>;
-    const wall = [x1, y1, x2, y2].map(number_of);
+    const wall = [x1, y1, x2, y2].map(numberOf);
     if (wall.includes(null)) return [];
     const [a = 0, b = 0, c = 0, d = 0] = wall as number[];
     return [{ x1: a, y1: b, x2: c, y2: d }];
@@ -46,11 +46,11 @@ export function walls_of(value: unknown): Wall[] {
 }
 
 /** A list of structs with x, y and radius; what is something else is left out. */
-export function obstacles_of(value: unknown): Obstacle[] {
+export function obstaclesOf(value: unknown): Obstacle[] {
   if (!Array.isArray(value)) return [];
   return value.flatMap((item) => {
     const { x, y, radius } = (item ?? {}) as Record<string, unknown>;
-    const circle = [x, y, radius].map(number_of);
+    const circle = [x, y, radius].map(numberOf);
     if (circle.includes(null)) return [];
     const [a = 0, b = 0, r = 0] = circle as number[];
     return [{ x: a, y: b, radius: r }];
@@ -61,7 +61,7 @@ export function obstacles_of(value: unknown): Obstacle[] {
  * Walls that join end to end and come back to where they began, as corners; and the walls that do not.
  * Walls of one loop follow each other in the list.
  */
-export function loops_of(walls: readonly Wall[]): { loops: { x: number; y: number }[][]; open: Wall[] } {
+export function loopsOf(walls: readonly Wall[]): { loops: { x: number; y: number }[][]; open: Wall[] } {
   const loops: { x: number; y: number }[][] = [];
   const open: Wall[] = [];
   let chain: Wall[] = [];
@@ -82,6 +82,6 @@ export function loops_of(walls: readonly Wall[]): { loops: { x: number; y: numbe
   return { loops, open: [...open, ...chain] };
 }
 
-function number_of(value: unknown): number | null {
+function numberOf(value: unknown): number | null {
   return typeof value === "number" && Number.isFinite(value) ? value : null;
 }

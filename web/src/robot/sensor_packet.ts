@@ -3,10 +3,10 @@
 
 export interface SensorReadings {
   bumpers?: number;
-  voltage_mv?: number;
-  charge_mah?: number;
-  right_wheel_mm_s?: number;
-  left_wheel_mm_s?: number;
+  voltageMv?: number;
+  chargeMah?: number;
+  rightWheelMmS?: number;
+  leftWheelMmS?: number;
 }
 
 /** Bytes of each packet 7, 8, ... 42. */
@@ -27,7 +27,7 @@ const GROUPS: Readonly<Record<number, readonly [number, number]>> = {
 };
 
 /** Readings by name; empty when the packet is unknown or its length does not fit its number. */
-export function read_sensor_packet(id: number, data: Uint8Array): SensorReadings {
+export function readSensorPacket(id: number, data: Uint8Array): SensorReadings {
   const [first, last] = GROUPS[id] ?? [id, id];
   const sizes = SIZES.slice(first - FIRST, last - FIRST + 1);
   if (first < FIRST || sizes.reduce((sum, size) => sum + size, 0) !== data.length || sizes.length === 0) return {};
@@ -35,16 +35,16 @@ export function read_sensor_packet(id: number, data: Uint8Array): SensorReadings
   const readings: SensorReadings = {};
   let offset = 0;
   for (let packet = first; packet <= last; packet++) {
-    read_one(packet, view, offset, readings);
+    readOne(packet, view, offset, readings);
     offset += SIZES[packet - FIRST] ?? 0;
   }
   return readings;
 }
 
-function read_one(packet: number, view: DataView, offset: number, readings: SensorReadings): void {
+function readOne(packet: number, view: DataView, offset: number, readings: SensorReadings): void {
   if (packet === 7) readings.bumpers = view.getUint8(offset) & 0x03; // bit 0 right, bit 1 left; the rest are wheel drops
-  else if (packet === 22) readings.voltage_mv = view.getUint16(offset);
-  else if (packet === 25) readings.charge_mah = view.getUint16(offset);
-  else if (packet === 41) readings.right_wheel_mm_s = view.getInt16(offset);
-  else if (packet === 42) readings.left_wheel_mm_s = view.getInt16(offset);
+  else if (packet === 22) readings.voltageMv = view.getUint16(offset);
+  else if (packet === 25) readings.chargeMah = view.getUint16(offset);
+  else if (packet === 41) readings.rightWheelMmS = view.getInt16(offset);
+  else if (packet === 42) readings.leftWheelMmS = view.getInt16(offset);
 }

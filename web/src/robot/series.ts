@@ -9,12 +9,12 @@ export interface Sample {
 
 export class Series {
   readonly #samples: Sample[] = [];
-  readonly #window_ms: number;
+  readonly #windowMs: number;
   readonly #limit: number;
 
-  /** Keeps `window_ms` of samples, and `limit` of them at most. */
-  constructor(window_ms = 30_000, limit = 1200) {
-    this.#window_ms = window_ms;
+  /** Keeps `windowMs` of samples, and `limit` of them at most. */
+  constructor(windowMs = 30_000, limit = 1200) {
+    this.#windowMs = windowMs;
     this.#limit = limit;
   }
 
@@ -22,7 +22,7 @@ export class Series {
     if (!Number.isFinite(value)) return;
     this.#samples.push({ t, value });
     let stale = Math.max(0, this.#samples.length - this.#limit);
-    while (stale < this.#samples.length - 1 && (this.#samples[stale]?.t ?? t) < t - this.#window_ms) stale++;
+    while (stale < this.#samples.length - 1 && (this.#samples[stale]?.t ?? t) < t - this.#windowMs) stale++;
     if (stale > 0) this.#samples.splice(0, stale);
   }
 
@@ -36,7 +36,7 @@ export class Series {
 }
 
 /** Samples per second over the last two seconds before `now`. */
-export function rate_of(series: Series, now: number): number {
+export function rateOf(series: Series, now: number): number {
   const recent = series.samples.filter((sample) => sample.t > now - 2000).length;
   return recent / 2;
 }

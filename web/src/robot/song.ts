@@ -6,13 +6,13 @@ const LENGTH = 16;
 const LOWEST = 60; // middle C
 
 /** Rises by a half tone every 100 mm that the robot has gone, up to one octave. */
-export function song_after(distance_mm: number): Uint8Array {
-  const half_tones = ((Math.round(distance_mm / 100) % 12) + 12) % 12;
-  return Uint8Array.from(STEPS.flatMap((step) => [LOWEST + half_tones + step, LENGTH]));
+export function songAfter(distanceMm: number): Uint8Array {
+  const halfTones = ((Math.round(distanceMm / 100) % 12) + 12) % 12;
+  return Uint8Array.from(STEPS.flatMap((step) => [LOWEST + halfTones + step, LENGTH]));
 }
 
 /** "C4 E4 G4". */
-export function name_notes(song: Uint8Array): string {
+export function nameNotes(song: Uint8Array): string {
   const names = ["C", "C♯", "D", "D♯", "E", "F", "F♯", "G", "G♯", "A", "A♯", "B"];
   const notes = [...song].filter((_, index) => index % 2 === 0);
   return notes.map((note) => `${names[note % 12] ?? ""}${Math.floor(note / 12) - 1}`).join(" ");

@@ -18,7 +18,7 @@ export const SPEED_MIN = 50;
 export const SPEED_MAX = 500;
 
 /** Opposite directions cancel; left or right alone spins on the spot, at half speed so that it can be aimed. */
-export function command_for(held: ReadonlySet<Direction>, speed: number): DriveCommand {
+export function commandFor(held: ReadonlySet<Direction>, speed: number): DriveCommand {
   const ahead = Number(held.has("forward")) - Number(held.has("back"));
   const left = Number(held.has("left")) - Number(held.has("right"));
   if (ahead === 0 && left === 0) return STOP;
@@ -26,11 +26,11 @@ export function command_for(held: ReadonlySet<Direction>, speed: number): DriveC
   return { velocity: ahead * speed, radius: left === 0 ? STRAIGHT : left * TURN_RADIUS };
 }
 
-export function is_stop(command: DriveCommand): boolean {
+export function isStop(command: DriveCommand): boolean {
   return command.velocity === 0;
 }
 
-export function same_command(a: DriveCommand, b: DriveCommand): boolean {
+export function sameCommand(a: DriveCommand, b: DriveCommand): boolean {
   return a.velocity === b.velocity && a.radius === b.radius;
 }
 
@@ -46,6 +46,6 @@ const KEYS: Readonly<Record<string, Direction>> = {
 };
 
 /** By `KeyboardEvent.code`, so WASD stays where it is on every keyboard layout. */
-export function direction_of_key(code: string): Direction | undefined {
+export function directionOfKey(code: string): Direction | undefined {
   return KEYS[code];
 }

@@ -31,7 +31,7 @@ export class Trail {
     }
     stroke.push(point);
     this.#count++;
-    if (this.#count > MAX_POINTS) this.#forget_oldest();
+    if (this.#count > MAX_POINTS) this.#forgetOldest();
   }
 
   clear(): void {
@@ -48,7 +48,7 @@ export class Trail {
     this.#count++;
   }
 
-  #forget_oldest(): void {
+  #forgetOldest(): void {
     const oldest = this.strokes[0];
     if (!oldest) return;
     const dropped = Math.min(oldest.length, MAX_POINTS / 10);

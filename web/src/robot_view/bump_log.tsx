@@ -3,7 +3,7 @@
 
 import { useStore } from "../app/store";
 import type { RobotModel } from "../robot/robot_model";
-import { clock_time_ms } from "../ui/words";
+import { clockTimeMs } from "../ui/words";
 
 export function BumpLog({ model }: { model: RobotModel }) {
   const bumps = useStore(model.bumps);
@@ -18,7 +18,7 @@ export function BumpLog({ model }: { model: RobotModel }) {
             <li key={bump.number}>
               <span class="log-number">{bump.number}</span>
               <time class="log-time" dateTime={new Date(bump.time).toISOString()}>
-                {clock_time_ms(bump.time)}
+                {clockTimeMs(bump.time)}
               </time>
               <span>{bump.side}</span>
               <span class="log-place">

@@ -19,7 +19,7 @@ export interface DrivePanelProps {
 }
 
 export function DrivePanel({ driver, enabled, lost, failure, device }: DrivePanelProps) {
-  const [speed, set_speed] = useState(200);
+  const [speed, setSpeed] = useState(200);
   const driving = useDriving(driver, speed, enabled);
   return (
     <section class="panel drive" aria-labelledby="drive-title">
@@ -45,7 +45,7 @@ export function DrivePanel({ driver, enabled, lost, failure, device }: DrivePane
           max={SPEED_MAX}
           step={10}
           value={speed}
-          onInput={(event) => set_speed(Number(event.currentTarget.value))}
+          onInput={(event) => setSpeed(Number(event.currentTarget.value))}
           // The arrows belong to the robot again as soon as the mouse lets go of the slider.
           onPointerUp={(event) => event.currentTarget.blur()}
         />
@@ -73,7 +73,7 @@ interface HoldButtonProps {
 function HoldButton({ direction, label, driving, enabled }: HoldButtonProps) {
   const held = driving.held.has(direction);
   const source = (event: PointerEvent): string => `pointer ${event.pointerId}`;
-  const key_source = `button ${direction}`;
+  const keySource = `button ${direction}`;
   return (
     <button
       class={`pad-button pad-${direction} ${held ? "is-held" : ""}`}
@@ -90,10 +90,10 @@ function HoldButton({ direction, label, driving, enabled }: HoldButtonProps) {
       onKeyDown={(event) => {
         if (event.code !== "Space" && event.code !== "Enter") return;
         event.preventDefault();
-        if (!event.repeat) driving.press(key_source, direction);
+        if (!event.repeat) driving.press(keySource, direction);
       }}
-      onKeyUp={() => driving.release(key_source)}
-      onBlur={() => driving.release(key_source)}
+      onKeyUp={() => driving.release(keySource)}
+      onBlur={() => driving.release(keySource)}
     >
       <ArrowIcon towards={direction} />
       <span>{label}</span>

@@ -16,12 +16,12 @@ export interface PoseLineProps {
 }
 
 export function PoseLine({ model, live, age }: PoseLineProps) {
-  const source = useStore(model.pose_source);
-  const [pose, set_pose] = useState<Pose>(model.pose);
+  const source = useStore(model.poseSource);
+  const [pose, setPose] = useState<Pose>(model.pose);
   useEffect(() => {
     let timer: ReturnType<typeof setTimeout> | undefined;
-    const unwatch = model.on_moved(() => {
-      timer ??= setTimeout(() => ((timer = undefined), set_pose(model.pose)), SHOW_MS);
+    const unwatch = model.onMoved(() => {
+      timer ??= setTimeout(() => ((timer = undefined), setPose(model.pose)), SHOW_MS);
     });
     return () => {
       unwatch();

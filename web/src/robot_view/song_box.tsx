@@ -4,22 +4,22 @@
 import { useEffect, useState } from "preact/hooks";
 import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
-import { name_notes, song_after } from "../robot/song";
+import { nameNotes, songAfter } from "../robot/song";
 
 export function SongBox({ robot }: { robot: Remote | null }) {
-  const [text, set_text] = useState("");
-  const can_play = robot?.has("play_callback", "callback") && robot.has("press_play", "function");
+  const [text, setText] = useState("");
+  const canPlay = robot?.has("play_callback", "callback") && robot.has("press_play", "function");
   useEffect(() => {
-    if (!robot || !can_play) return;
+    if (!robot || !canPlay) return;
     return robot.answer("play_callback", (distance) => {
-      const song = song_after(Number(distance));
-      set_text(`♪ ${name_notes(song)}`);
+      const song = songAfter(Number(distance));
+      setText(`♪ ${nameNotes(song)}`);
       return song;
     });
-  }, [robot, can_play]);
-  if (!robot || !can_play) return null;
+  }, [robot, canPlay]);
+  if (!robot || !canPlay) return null;
   const press = (): void => {
-    robot.call("press_play", []).catch((error: unknown) => set_text(`press_play: ${explain(error)}`));
+    robot.call("press_play", []).catch((error: unknown) => setText(`press_play: ${explain(error)}`));
   };
   return (
     <>

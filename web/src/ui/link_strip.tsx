@@ -2,12 +2,12 @@
 // Layer: web/ui.
 
 import { useNow, useStore } from "../app/store";
-import { devices_of } from "../gateway/devices";
+import { devicesOf } from "../gateway/devices";
 import type { DeviceList } from "../gateway/devices";
-import { is_usb } from "../gateway/usb_devices";
+import { isUsb } from "../gateway/usb_devices";
 import type { Link, LinkState } from "../robot/link";
 import { StateBadge } from "./state_badge";
-import { clock_time, sentence, span } from "./words";
+import { clockTime, sentence, span } from "./words";
 
 export interface LinkStripProps {
   link: Link;
@@ -32,7 +32,7 @@ export function LinkStrip({ link, list, device, service }: LinkStripProps) {
           {lost ? <LostDetail state={state} list={list} device={device} /> : detail(state, device)}
         </p>
       </div>
-      <button class="button" type="button" hidden={!lost} disabled={lost && state.retry_at === null} onClick={() => link.retry_now()}>
+      <button class="button" type="button" hidden={!lost} disabled={lost && state.retryAt === null} onClick={() => link.retryNow()}>
         Try now
       </button>
     </section>
@@ -41,24 +41,24 @@ export function LinkStrip({ link, list, device, service }: LinkStripProps) {
 
 function headline(state: LinkState, device: string, service: string): string {
   if (state.kind === "connecting") return `Connecting to ${device}, service ${service}`;
-  if (state.kind === "online") return `Connected to ${device} since ${clock_time(state.since)}`;
-  return `No connection to ${device} since ${clock_time(state.since)}`;
+  if (state.kind === "online") return `Connected to ${device} since ${clockTime(state.since)}`;
+  return `No connection to ${device} since ${clockTime(state.since)}`;
 }
 
 function detail(state: LinkState, device: string): string {
-  return state.kind === "online" ? state.remote.type : `Asking ${is_usb(device) ? "this browser" : "the gateway"} for the device`;
+  return state.kind === "online" ? state.remote.type : `Asking ${isUsb(device) ? "this browser" : "the gateway"} for the device`;
 }
 
 function LostDetail({ state, list, device }: { state: LinkState & { kind: "lost" }; list: DeviceList; device: string }) {
   const now = useNow(500);
   const gateway = useStore(list.state);
-  const known = devices_of(gateway)?.find((d) => d.name === device);
-  const next = state.retry_at === null ? "trying now" : `next try in ${span(Math.max(0, state.retry_at - now) + 999)}`;
+  const known = devicesOf(gateway)?.find((d) => d.name === device);
+  const next = state.retryAt === null ? "trying now" : `next try in ${span(Math.max(0, state.retryAt - now) + 999)}`;
   const why =
-    gateway.kind === "away" && !is_usb(device)
+    gateway.kind === "away" && !isUsb(device)
       ? `The gateway itself does not answer (${gateway.reason}).`
       : known && known.state !== "online"
-        ? `The gateway says: device ${known.state}${known.last_error ? `, ${known.last_error}` : ""}.`
+        ? `The gateway says: device ${known.state}${known.lastError ? `, ${known.lastError}` : ""}.`
         : sentence(state.reason);
   return (
     <>

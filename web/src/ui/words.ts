@@ -2,13 +2,13 @@
 // Layer: web/ui, pure.
 
 /** `14:03:22` in the reader's own time. */
-export function clock_time(ms: number): string {
+export function clockTime(ms: number): string {
   return new Date(ms).toLocaleTimeString(undefined, { hour: "2-digit", minute: "2-digit", second: "2-digit", hour12: false });
 }
 
 /** `14:03:22.417`: for logs, where order matters. */
-export function clock_time_ms(ms: number): string {
-  return `${clock_time(ms)}.${String(Math.floor(ms) % 1000).padStart(3, "0")}`;
+export function clockTimeMs(ms: number): string {
+  return `${clockTime(ms)}.${String(Math.floor(ms) % 1000).padStart(3, "0")}`;
 }
 
 /** `4 s`, `3 min`, `2 h 5 min`. */
@@ -23,8 +23,8 @@ export function span(ms: number): string {
 const STALE_MS = 800; // a value says that it is old within a second, wherever it is looked at ten times a second
 
 /** `3 s old` for a value that ought to be newer; null for one that is young. */
-export function stale_age(age_ms: number): string | null {
-  return age_ms < STALE_MS ? null : `${span(age_ms + 500)} old`;
+export function staleAge(ageMs: number): string | null {
+  return ageMs < STALE_MS ? null : `${span(ageMs + 500)} old`;
 }
 
 /** The same text with an end. */
@@ -34,7 +34,7 @@ export function sentence(text: string): string {
 }
 
 /** `0.4 ms`, `12 ms`, `1.5 s`: how old a value is. */
-export function age_text(ms: number): string {
+export function ageText(ms: number): string {
   if (ms >= 1000) return `${(ms / 1000).toFixed(1)} s`;
   return ms < 10 ? `${ms.toFixed(1)} ms` : `${Math.round(ms)} ms`;
 }

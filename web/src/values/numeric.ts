@@ -11,7 +11,7 @@ const MAX_READINGS = 6;
 const MAX_ARRAY = 6; // longer arrays are data (images, packets), not readings
 
 /** The numeric leaves of `value` in order, at most six; booleans count as 0 and 1. */
-export function readings_of(value: unknown): Reading[] {
+export function readingsOf(value: unknown): Reading[] {
   const found: Reading[] = [];
   collect(value, "", found, 0);
   return found;

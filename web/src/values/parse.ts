@@ -1,7 +1,7 @@
 // Turns what a person typed into the value that a member of a given type takes.
 // Layer: web/values, pure. Named types (struct, enum, pod) are typed in as JSON; their definition is checked by the client.
 
-import { INTEGER_RANGES, is_complex, is_float, is_integer, is_numeric, is_wide_integer, parse_type } from "./type_text";
+import { INTEGER_RANGES, isComplex, isFloat, isInteger, isNumeric, isWideInteger, parseType } from "./type_text";
 import type { TypeText } from "./type_text";
 
 /**
@@ -9,36 +9,36 @@ import type { TypeText } from "./type_text";
  * everything else as JSON.
  * @throws Error with what was found and what was expected.
  */
-export function parse_input(text: string, type_text: string): unknown {
-  const type = parse_type(type_text);
+export function parseInput(text: string, typeText: string): unknown {
+  const type = parseType(typeText);
   if (type.container === "none" && type.array === "none") {
     if (type.base === "string") return text;
-    if (is_numeric(type.base) && !is_complex(type.base)) return scalar(text.trim(), type.base);
+    if (isNumeric(type.base) && !isComplex(type.base)) return scalar(text.trim(), type.base);
   }
   const source = text.trim();
   if (source === "") {
-    if (type.container === "none" && (type.array === "any" || type.array === "max") && is_numeric(type.base)) {
-      return typed_array([], type);
+    if (type.container === "none" && (type.array === "any" || type.array === "max") && isNumeric(type.base)) {
+      return typedArray([], type);
     }
-    throw new Error(`nothing given; expected ${describe(type_text, type)}`);
+    throw new Error(`nothing given; expected ${describe(typeText, type)}`);
   }
-  if (type.container === "none" && type.array !== "none" && type.array !== "multidim" && is_numeric(type.base)) {
-    if (!source.startsWith("[")) return typed_array(source.split(/[\s,;]+/).filter(Boolean), type);
+  if (type.container === "none" && type.array !== "none" && type.array !== "multidim" && isNumeric(type.base)) {
+    if (!source.startsWith("[")) return typedArray(source.split(/[\s,;]+/).filter(Boolean), type);
   }
-  return convert(read_json(source, type_text, type), type);
+  return convert(readJson(source, typeText, type), type);
 }
 
 /** An example of what to type, shown in an empty field. */
-export function placeholder(type_text: string): string {
-  const type = parse_type(type_text);
+export function placeholder(typeText: string): string {
+  const type = parseType(typeText);
   if (type.container === "list") return "[…]";
   if (type.container !== "none") return type.container === "int32" ? '{"0": …}' : '{"key": …}';
   if (type.array === "multidim") return '{"dims": [2, 2], "data": [1, 2, 3, 4]}';
-  if (type.array !== "none") return is_numeric(type.base) ? "1, 2, 3" : "[…]";
+  if (type.array !== "none") return isNumeric(type.base) ? "1, 2, 3" : "[…]";
   if (type.base === "string") return "text";
-  if (is_complex(type.base)) return "[re, im]";
-  if (is_float(type.base)) return "0.0";
-  if (is_integer(type.base)) return "0";
+  if (isComplex(type.base)) return "[re, im]";
+  if (isFloat(type.base)) return "0.0";
+  if (isInteger(type.base)) return "0";
   return '{"field": …} or a number';
 }
 
@@ -46,10 +46,10 @@ function describe(text: string, type: TypeText): string {
   return `${text}, such as ${placeholder(text).replace("…", type.base === "string" ? '"text"' : "1")}`;
 }
 
-function read_json(source: string, text: string, type: TypeText): unknown {
+function readJson(source: string, text: string, type: TypeText): unknown {
   try {
     // A 64-bit integer beyond 2^53 would be rounded by JSON.parse: quote long bare integers, `scalar` reads strings.
-    return JSON.parse(is_wide_integer(type.base) ? source.replace(/(?<![\w".])-?\d{16,}(?![\w".])/g, '"$&"') : source);
+    return JSON.parse(isWideInteger(type.base) ? source.replace(/(?<![\w".])-?\d{16,}(?![\w".])/g, '"$&"') : source);
   } catch {
     throw new Error(`${quote(source)} is not valid JSON; expected ${describe(text, type)}`);
   }
@@ -59,24 +59,24 @@ function convert(json: unknown, type: TypeText): unknown {
   if (json === null) return null;
   const element: TypeText = { ...type, container: "none" };
   if (type.container === "list" || type.container === "generator") {
-    if (!Array.isArray(json)) throw new Error(`found ${kind_of(json)}, expected a list [ … ]`);
+    if (!Array.isArray(json)) throw new Error(`found ${kindOf(json)}, expected a list [ … ]`);
     return json.map((item) => convert(item, element));
   }
-  if (type.container === "string" || type.container === "int32") return convert_map(json, element, type.container);
-  if (type.array === "multidim" && is_numeric(type.base)) return multidim(json, type);
-  if (type.array !== "none" && is_numeric(type.base)) {
-    if (!Array.isArray(json)) throw new Error(`found ${kind_of(json)}, expected numbers [ … ]`);
-    return typed_array(json, type);
+  if (type.container === "string" || type.container === "int32") return convertMap(json, element, type.container);
+  if (type.array === "multidim" && isNumeric(type.base)) return multidim(json, type);
+  if (type.array !== "none" && isNumeric(type.base)) {
+    if (!Array.isArray(json)) throw new Error(`found ${kindOf(json)}, expected numbers [ … ]`);
+    return typedArray(json, type);
   }
-  if (is_complex(type.base)) return complex(json);
-  if (is_numeric(type.base)) return scalar(json, type.base);
-  if (type.base === "string" && typeof json !== "string") throw new Error(`found ${kind_of(json)}, expected a "string"`);
+  if (isComplex(type.base)) return complex(json);
+  if (isNumeric(type.base)) return scalar(json, type.base);
+  if (type.base === "string" && typeof json !== "string") throw new Error(`found ${kindOf(json)}, expected a "string"`);
   return json;
 }
 
-function convert_map(json: unknown, element: TypeText, keys: "string" | "int32"): Map<string | number, unknown> {
+function convertMap(json: unknown, element: TypeText, keys: "string" | "int32"): Map<string | number, unknown> {
   if (typeof json !== "object" || json === null || Array.isArray(json)) {
-    throw new Error(`found ${kind_of(json)}, expected a map {"key": …}`);
+    throw new Error(`found ${kindOf(json)}, expected a map {"key": …}`);
   }
   const map = new Map<string | number, unknown>();
   for (const [key, value] of Object.entries(json)) {
@@ -88,16 +88,16 @@ function convert_map(json: unknown, element: TypeText, keys: "string" | "int32")
 function multidim(json: unknown, type: TypeText): { dims: number[]; data: unknown } {
   const { dims, data } = (json ?? {}) as { dims?: unknown; data?: unknown };
   if (!Array.isArray(dims) || !Array.isArray(data)) {
-    throw new Error(`found ${kind_of(json)}, expected {"dims": [rows, columns], "data": [column by column]}`);
+    throw new Error(`found ${kindOf(json)}, expected {"dims": [rows, columns], "data": [column by column]}`);
   }
   const sizes = dims.map((d) => scalar(d, "uint32") as number);
   const count = sizes.reduce((product, size) => product * size, 1);
   if (count !== data.length) throw new Error(`dims ${sizes.join(" × ")} need ${count} elements, found ${data.length}`);
-  return { dims: sizes, data: typed_array(data, { ...type, array: "any", sizes: [] }) };
+  return { dims: sizes, data: typedArray(data, { ...type, array: "any", sizes: [] }) };
 }
 
 function complex(json: unknown): { re: number; im: number } {
-  if (!Array.isArray(json) || json.length !== 2) throw new Error(`found ${kind_of(json)}, expected [re, im]`);
+  if (!Array.isArray(json) || json.length !== 2) throw new Error(`found ${kindOf(json)}, expected [re, im]`);
   return { re: scalar(json[0], "double") as number, im: scalar(json[1], "double") as number };
 }
 
@@ -108,7 +108,7 @@ function scalar(found: unknown, base: string): number | bigint | boolean {
     throw new Error(`${quote(found)} is not a bool; expected true or false`);
   }
   const text = String(found).trim();
-  if (is_float(base)) {
+  if (isFloat(base)) {
     const number = /^[+-]?(inf|infinity)$/i.test(text) ? (text.startsWith("-") ? -Infinity : Infinity) : Number(text);
     if (text === "" || (Number.isNaN(number) && !/^nan$/i.test(text))) {
       throw new Error(`${quote(found)} is not a number; expected a ${base} such as 1.5 or -2e3`);
@@ -125,7 +125,7 @@ function integer(text: string, base: string): number | bigint {
   const magnitude = BigInt(match[2] ?? "0");
   const value = match[1] === "-" ? -magnitude : magnitude;
   if (value < low || value > high) throw new Error(`${text} is out of range; expected ${base}, ${low} to ${high}`);
-  return is_wide_integer(base) ? value : Number(value);
+  return isWideInteger(base) ? value : Number(value);
 }
 
 const ARRAY_OF: Readonly<Record<string, new (length: number) => ArrayLike<number>>> = {
@@ -140,9 +140,9 @@ const ARRAY_OF: Readonly<Record<string, new (length: number) => ArrayLike<number
   bool: Uint8Array,
 };
 
-function typed_array(items: readonly unknown[], type: TypeText): unknown {
-  check_length(items.length, type);
-  if (is_complex(type.base)) {
+function typedArray(items: readonly unknown[], type: TypeText): unknown {
+  checkLength(items.length, type);
+  if (isComplex(type.base)) {
     const numbers = items.map(complex);
     const [re, im] = [numbers.map((n) => n.re), numbers.map((n) => n.im)];
     return type.base === "cdouble"
@@ -165,7 +165,7 @@ function typed_array(items: readonly unknown[], type: TypeText): unknown {
   return array;
 }
 
-function check_length(found: number, type: TypeText): void {
+function checkLength(found: number, type: TypeText): void {
   const size = type.sizes[0] ?? 0;
   if (type.array === "fixed" && found !== size) throw new Error(`found ${found} elements, expected exactly ${size}`);
   if (type.array === "max" && found > size) throw new Error(`found ${found} elements, expected at most ${size}`);
@@ -176,7 +176,7 @@ function quote(found: unknown): string {
   return `"${text.length > 40 ? `${text.slice(0, 40)}…` : text}"`;
 }
 
-function kind_of(json: unknown): string {
+function kindOf(json: unknown): string {
   if (json === null) return "null";
   if (Array.isArray(json)) return `a list of ${json.length}`;
   return typeof json === "object" ? "an object" : `${typeof json} ${quote(json)}`;

@@ -16,15 +16,15 @@ export interface TypeText {
 const TYPE = /^([A-Za-z][\w.]*)(\[[^\]]*\])?(\{(list|int32|string|generator)\})?$/;
 
 /** @throws Error when `text` is not a type. */
-export function parse_type(text: string): TypeText {
+export function parseType(text: string): TypeText {
   const match = TYPE.exec(text.trim());
   if (!match) throw new Error(`"${text}" is not a Robot Raconteur type`);
   const [, base = "", brackets, , container = "none"] = match;
-  const { array, sizes } = parse_array(brackets);
+  const { array, sizes } = parseArray(brackets);
   return { base, array, sizes, container: container as Container };
 }
 
-function parse_array(brackets: string | undefined): Pick<TypeText, "array" | "sizes"> {
+function parseArray(brackets: string | undefined): Pick<TypeText, "array" | "sizes"> {
   if (brackets === undefined) return { array: "none", sizes: [] };
   const inner = brackets.slice(1, -1);
   if (inner === "") return { array: "any", sizes: [] };
@@ -46,28 +46,28 @@ export const INTEGER_RANGES: Readonly<Record<string, readonly [bigint, bigint]>>
   uint64: [0n, 2n ** 64n - 1n],
 };
 
-export function is_integer(base: string): boolean {
+export function isInteger(base: string): boolean {
   return base in INTEGER_RANGES;
 }
 
-export function is_wide_integer(base: string): boolean {
+export function isWideInteger(base: string): boolean {
   return base === "int64" || base === "uint64";
 }
 
-export function is_float(base: string): boolean {
+export function isFloat(base: string): boolean {
   return base === "double" || base === "single";
 }
 
-export function is_complex(base: string): boolean {
+export function isComplex(base: string): boolean {
   return base === "cdouble" || base === "csingle";
 }
 
 /** Words whose arrays travel as TypedArrays. */
-export function is_numeric(base: string): boolean {
-  return is_integer(base) || is_float(base) || is_complex(base) || base === "bool";
+export function isNumeric(base: string): boolean {
+  return isInteger(base) || isFloat(base) || isComplex(base) || base === "bool";
 }
 
 /** The last segment of a qualified name: `experimental.create.Create` gives `Create`. */
-export function short_name(qualified: string): string {
+export function shortName(qualified: string): string {
   return qualified.slice(qualified.lastIndexOf(".") + 1);
 }
