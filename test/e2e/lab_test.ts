@@ -20,7 +20,8 @@ export const test = base.extend<{ quiet: void }, { lab: Lab }>({
       const complaints: string[] = [];
       page.on("pageerror", (error) => complaints.push(String(error)));
       page.on("console", (message) => {
-        if (message.type() === "error" && /Content Security Policy/.test(message.text())) complaints.push(message.text());
+        if (message.type() === "error" && /Content Security Policy/.test(message.text()))
+          complaints.push(message.text());
       });
       await use();
       expect(complaints).toEqual([]);

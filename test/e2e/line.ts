@@ -17,7 +17,10 @@ export class Line {
       this.#ends.push({ client, device });
       client.pipe(device);
       if (!this.#isMuted) device.pipe(client);
-      for (const [end, other] of [[client, device], [device, client]] as const) {
+      for (const [end, other] of [
+        [client, device],
+        [device, client],
+      ] as const) {
         end.on("error", () => other.destroy());
         end.on("close", () => other.destroy());
       }

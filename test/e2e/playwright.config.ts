@@ -17,7 +17,11 @@ export default defineConfig({
   expect: { timeout: 15_000 },
   workers: 1,
   forbidOnly: !!process.env["CI"],
-  reporter: [["list"], ["./assertions_reporter.ts"], ...(process.env["PLAYWRIGHT_JUNIT_OUTPUT_FILE"] ? [["junit"] as const] : [])],
+  reporter: [
+    ["list"],
+    ["./assertions_reporter.ts"],
+    ...(process.env["PLAYWRIGHT_JUNIT_OUTPUT_FILE"] ? [["junit"] as const] : []),
+  ],
   use: { trace: "retain-on-failure", launchOptions: chromium },
   projects: [
     { name: "desktop", use: { viewport: { width: 1280, height: 800 } }, testIgnore: "phone.spec.ts" },

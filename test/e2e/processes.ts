@@ -71,10 +71,17 @@ export class Program {
 }
 
 /** A gateway of its own to one device. */
-export async function startGateway(device: string, deviceUrl: string, site: string): Promise<{ program: Program; url: string }> {
+export async function startGateway(
+  device: string,
+  deviceUrl: string,
+  site: string,
+): Promise<{ program: Program; url: string }> {
   const port = await freePort();
   const config = path.join(mkdtempSync(path.join(tmpdir(), "rrgate-e2e-")), "gateway.json");
-  writeFileSync(config, JSON.stringify({ listen: [`127.0.0.1:${port}`], web_root: site, devices: [{ name: device, url: deviceUrl }] }));
+  writeFileSync(
+    config,
+    JSON.stringify({ listen: [`127.0.0.1:${port}`], web_root: site, devices: [{ name: device, url: deviceUrl }] }),
+  );
   const program = new Program(rrgate, ["serve", "--config", config]);
   program.start();
   const url = `http://127.0.0.1:${port}/`;
@@ -124,7 +131,8 @@ export class Lab {
 
   static async start(): Promise<Lab> {
     if (!existsSync(rrgate)) throw new Error(`${rrgate} is missing: build it, or name it in RRGATE`);
-    if (!existsSync(path.join(webRoot, "index.html"))) throw new Error(`${webRoot} is missing: run npm run build in web/`);
+    if (!existsSync(path.join(webRoot, "index.html")))
+      throw new Error(`${webRoot} is missing: run npm run build in web/`);
     const lab = new Lab(await freePort(), await freePort(), await freePort());
     for (const program of [lab.create, lab.webcams, lab.gateway]) program.start();
     await lab.waitUntilOnline();

@@ -17,7 +17,15 @@ interface WasmDevice extends CoreExports {
   _initialize(): void;
   buffer(size: number): number;
   address(): number;
-  start(name: Handle, id: number, number: number, code: number, packet: number, streams: number, class_code: number): void;
+  start(
+    name: Handle,
+    id: number,
+    number: number,
+    code: number,
+    packet: number,
+    streams: number,
+    class_code: number,
+  ): void;
   configuration(): number;
   control(type: number, request: number, value: number, index: number, length: number): number;
   bulk_out(): number;
@@ -106,7 +114,14 @@ export class FakeUsbDevice implements WebUsbDevice {
     const device = exports as unknown as WasmDevice;
     values.attach(device);
     device._initialize();
-    const { name = "test.service", lastIdByte = 1, vendorCode = 0xba, packetSize = 64, maxStreams = 16, classCode = 255 } = options;
+    const {
+      name = "test.service",
+      lastIdByte = 1,
+      vendorCode = 0xba,
+      packetSize = 64,
+      maxStreams = 16,
+      classCode = 255,
+    } = options;
     device.start(values.give(name), lastIdByte, options.interface ?? 0, vendorCode, packetSize, maxStreams, classCode);
     return new FakeUsbDevice(values, device, options);
   }
@@ -146,7 +161,8 @@ export class FakeUsbDevice implements WebUsbDevice {
 
   async claimInterface(number: number): Promise<void> {
     this.#checkOpen();
-    if (!this.configuration) throw new DOMException("The device must have a configuration selected.", "InvalidStateError");
+    if (!this.configuration)
+      throw new DOMException("The device must have a configuration selected.", "InvalidStateError");
     if (!this.configuration.interfaces.some(({ interfaceNumber }) => interfaceNumber === number)) {
       throw new DOMException("The interface number provided is not supported by the device.", "NotFoundError");
     }
@@ -190,16 +206,23 @@ export class FakeUsbDevice implements WebUsbDevice {
   }
 
   /** @returns what came in; undefined for a stall. */
-  async #control(direction: number, setup: WebUsbSetup, length: number, data?: Uint8Array): Promise<Uint8Array<ArrayBuffer> | undefined> {
+  async #control(
+    direction: number,
+    setup: WebUsbSetup,
+    length: number,
+    data?: Uint8Array,
+  ): Promise<Uint8Array<ArrayBuffer> | undefined> {
     this.#checkOpen();
-    if (!this.configuration) throw new DOMException("The device must have a configuration selected.", "InvalidStateError");
+    if (!this.configuration)
+      throw new DOMException("The device must have a configuration selected.", "InvalidStateError");
     if (setup.recipient === "interface" && !this.#claimed.has(setup.index & 0xff)) {
       throw new DOMException("The specified interface has not been claimed.", "InvalidStateError");
     }
     await new Promise<unknown>((resolve, reject) => {
       const waiting = { resolve, reject };
       this.#controls.add(waiting);
-      if (setup.request !== this.muteRequest) queueMicrotask(() => this.#controls.delete(waiting) && resolve(undefined));
+      if (setup.request !== this.muteRequest)
+        queueMicrotask(() => this.#controls.delete(waiting) && resolve(undefined));
     });
     const type = direction | (types[setup.requestType] << 5) | recipients[setup.recipient];
     const hex = (value: number, digits: number) => value.toString(16).padStart(digits, "0");
@@ -232,7 +255,10 @@ export class FakeUsbDevice implements WebUsbDevice {
         alternates[0]?.endpoints.some((one) => one.endpointNumber === number && one.direction === direction),
     );
     if (!isThere) {
-      throw new DOMException("The specified endpoint is not part of a claimed and selected alternate interface.", "NotFoundError");
+      throw new DOMException(
+        "The specified endpoint is not part of a claimed and selected alternate interface.",
+        "NotFoundError",
+      );
     }
   }
 
@@ -412,7 +438,8 @@ export class FakeUsb extends EventTarget implements WebUsb {
   isForbidden = false;
 
   async getDevices(): Promise<FakeUsbDevice[]> {
-    if (this.isForbidden) throw new DOMException('Access to the feature "usb" is disallowed by permissions policy.', "SecurityError");
+    if (this.isForbidden)
+      throw new DOMException('Access to the feature "usb" is disallowed by permissions policy.', "SecurityError");
     return [...this.devices];
   }
 

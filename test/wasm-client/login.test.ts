@@ -30,7 +30,9 @@ it("logs in while it connects", async () => {
 });
 
 it("rejects a wrong login, and none where one is needed", async () => {
-  expect((await failure(start(true, { username: "alice", password: "guess" }))).code).toBe(ErrorCode.AuthenticationError);
+  expect((await failure(start(true, { username: "alice", password: "guess" }))).code).toBe(
+    ErrorCode.AuthenticationError,
+  );
   const service = await TestService.start({ definitions: [definition], root: "test.login.Root", requireUser: true });
   expect((await failure(service.connect())).code).toBe(ErrorCode.AuthenticationError);
 });

@@ -81,11 +81,23 @@ describe("the object", () => {
 
   it("lists its members as the definition declares them", () => {
     expect(robot.$.members.find(({ name }) => name === "distance")).toEqual({
-      name: "distance", kind: "property", type: "double", parameters: [], modifiers: ["readonly"], documentation: "Millimetres.",
+      name: "distance",
+      kind: "property",
+      type: "double",
+      parameters: [],
+      modifiers: ["readonly"],
+      documentation: "Millimetres.",
     });
     expect(robot.$.members.find(({ name }) => name === "add")).toEqual({
-      name: "add", kind: "function", type: "double", modifiers: [], documentation: "",
-      parameters: [{ name: "left", type: "double" }, { name: "right", type: "double" }],
+      name: "add",
+      kind: "function",
+      type: "double",
+      modifiers: [],
+      documentation: "",
+      parameters: [
+        { name: "left", type: "double" },
+        { name: "right", type: "double" },
+      ],
     });
     expect(robot.$.members.find(({ name }) => name === "parts")).toMatchObject({ kind: "objref", type: "Part{int32}" });
     expect(robot.$.members.map(({ name }) => name)).toContain("buffer");
@@ -93,7 +105,7 @@ describe("the object", () => {
 
   it("cannot be changed", () => {
     expect(() => ((robot as Record<string, unknown>)["speed"] = 5)).toThrow(TypeError);
-    expect(() => ((robot.$.members as unknown[]).push as (x: unknown) => void)).not.toThrow();
+    expect(() => (robot.$.members as unknown[]).push as (x: unknown) => void).not.toThrow();
     expect(Object.isFrozen(robot.$.members[0])).toBe(true);
   });
 
@@ -126,7 +138,9 @@ describe("functions", () => {
     expect(few).toBeInstanceOf(RobotRaconteurError);
     expect(few.code).toBe(ErrorCode.InvalidArgument);
     expect(few.message).toBe("add(left, right): got 1 arguments, expected 2");
-    expect((await failure(m("add")(1, 2, 3))).message).toBe("add(left, right): the argument behind the last parameter is not {signal, timeout}");
+    expect((await failure(m("add")(1, 2, 3))).message).toBe(
+      "add(left, right): the argument behind the last parameter is not {signal, timeout}",
+    );
     expect((await failure(m("add")(1, 2, {}, 4))).message).toContain("got 4 arguments");
     expect((await failure(m("add")(1, "x"))).message).toBe("convert 'right': found a string, expected double");
     expect(service.sent.length).toBe(before);
@@ -174,7 +188,11 @@ describe("events", () => {
     off();
     off();
     await m("fire_bump")(2, "right");
-    expect(heard).toEqual([["a", 1, "left"], ["b", 1, "left"], ["b", 2, "right"]]);
+    expect(heard).toEqual([
+      ["a", 1, "left"],
+      ["b", 1, "left"],
+      ["b", 2, "right"],
+    ]);
   });
 
   it("reach the others when one listener throws", async () => {
@@ -249,7 +267,10 @@ describe("wires", () => {
     await wire.ready;
     await m("publish_packets")({ left: 1, right: 2 });
     await loop;
-    expect(seen).toEqual([{ left: 1, right: 2 }, { left: 4, right: 0 }]);
+    expect(seen).toEqual([
+      { left: 1, right: 2 },
+      { left: 4, right: 0 },
+    ]);
     expect(wire.value).toEqual({ left: 4, right: 0 });
     expect(wire.time!.seconds).toBeGreaterThanOrEqual(0);
   });
@@ -378,7 +399,13 @@ it("hears what became of the values of a wire and of a pipe", async () => {
   await wire.ready;
   for (let i = 0; i < 3; ++i) await robot["publish_both"]!(i);
   const losses = await wire.losses();
-  expect(losses).toEqual({ delivered: 3, conflated: 0, dropped: 0, ageP50: expect.any(Number), ageP99: expect.any(Number) });
+  expect(losses).toEqual({
+    delivered: 3,
+    conflated: 0,
+    dropped: 0,
+    ageP50: expect.any(Number),
+    ageP99: expect.any(Number),
+  });
   const end = await robot["stream"]!.connect(7);
   await end.send(1);
   expect((await end.losses({ timeout: 1000 }))!.delivered).toBe(1);

@@ -33,7 +33,9 @@ const refused = async (what: () => unknown): Promise<string> => {
 
 it("refuses an AbortController where its signal is meant; the session goes on", async () => {
   const signal = new AbortController() as unknown as AbortSignal;
-  const end = (await robot["packets"]!.connect(0)) as unknown as { send(value: number, options: object): Promise<void> };
+  const end = (await robot["packets"]!.connect(0)) as unknown as {
+    send(value: number, options: object): Promise<void>;
+  };
   for (const slip of [
     () => robot["speed"]!.get({ signal }),
     () => robot["bumped"]!.once({ signal }),
@@ -51,12 +53,18 @@ it("refuses an AbortController where its signal is meant; the session goes on", 
 });
 
 it("refuses limits that are none", async () => {
-  expect(await refused(() => robot.$.monitor(() => 1, { timeout: -1 }))).toBe("timeout -1: expected milliseconds above 0");
-  expect(await refused(() => service.connect({ requestTimeout: 0 }))).toBe("requestTimeout 0: expected milliseconds above 0");
+  expect(await refused(() => robot.$.monitor(() => 1, { timeout: -1 }))).toBe(
+    "timeout -1: expected milliseconds above 0",
+  );
+  expect(await refused(() => service.connect({ requestTimeout: 0 }))).toBe(
+    "requestTimeout 0: expected milliseconds above 0",
+  );
 });
 
 it("refuses what is no function", async () => {
-  expect(await refused(() => robot["bumped"]!.on(undefined as never))).toBe("bumped.on: found undefined, expected a function");
+  expect(await refused(() => robot["bumped"]!.on(undefined as never))).toBe(
+    "bumped.on: found undefined, expected a function",
+  );
   expect(await refused(() => robot.$.monitor("x" as never))).toBe("monitor: found string, expected a function");
 });
 

@@ -26,7 +26,8 @@ it("needs no eval, no shared memory, no bundler and nothing of Node in a page", 
     expect(read(file), file).not.toMatch(/\beval\(|new Function\(|SharedArrayBuffer|require\(/);
     expect(read(file), file).not.toMatch(/from "node:|import\("node:|process\./);
     // What a page resolves by itself: paths.
-    for (const [, from] of read(file).matchAll(/\b(?:from|import)\s*\(?"([^"]*)"/g)) expect(from, file).toMatch(/^\.\.?\//);
+    for (const [, from] of read(file).matchAll(/\b(?:from|import)\s*\(?"([^"]*)"/g))
+      expect(from, file).toMatch(/^\.\.?\//);
   }
 });
 

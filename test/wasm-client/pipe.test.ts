@@ -46,7 +46,7 @@ beforeEach(async () => {
 afterEach(() => robot.$.close());
 
 it("carries packets both ways, in order", async () => {
-  const endpoint = (await robot["echo"]!.connect());
+  const endpoint = await robot["echo"]!.connect();
   expect(endpoint.index).toBe(1);
   for (let i = 0; i < 100; ++i) await endpoint.send(i);
   expect(await take(endpoint, 100)).toEqual(Array.from({ length: 100 }, (_, i) => i));

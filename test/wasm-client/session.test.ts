@@ -27,8 +27,19 @@ afterEach(() => {
 });
 
 /** A transport in the hands of the test. */
-function manual(): { open: OpenTransport; listener: TransportListener; sent: Uint8Array[]; closed: number; buffered: number } {
-  const state = { listener: undefined as unknown as TransportListener, sent: [] as Uint8Array[], closed: 0, buffered: 0 };
+function manual(): {
+  open: OpenTransport;
+  listener: TransportListener;
+  sent: Uint8Array[];
+  closed: number;
+  buffered: number;
+} {
+  const state = {
+    listener: undefined as unknown as TransportListener,
+    sent: [] as Uint8Array[],
+    closed: 0,
+    buffered: 0,
+  };
   const open: OpenTransport = (_url, listener) => {
     state.listener = listener;
     return {
@@ -98,7 +109,9 @@ describe("connecting", () => {
   });
 
   it("ends when its signal says so", async () => {
-    expect((await failure(connect("ws://test/?service=test", { signal: AbortSignal.abort(new Error("early")) }))).message).toBe("early");
+    expect(
+      (await failure(connect("ws://test/?service=test", { signal: AbortSignal.abort(new Error("early")) }))).message,
+    ).toBe("early");
     const abort = new AbortController();
     const transport = manual();
     const connecting = failure(connect("ws://test/?service=test", { transport: transport.open, signal: abort.signal }));
@@ -256,7 +269,10 @@ describe("the end of a session", () => {
     service.drop("the connection to ws://test/ was closed: device offline: create");
     service.drop("again");
     expect((await hanging).message).toContain("device offline: create");
-    expect(told).toEqual(["the connection to ws://test/ was closed: device offline: create", ErrorCode.ConnectionError]);
+    expect(told).toEqual([
+      "the connection to ws://test/ was closed: device offline: create",
+      ErrorCode.ConnectionError,
+    ]);
     expect(reported).toHaveBeenCalledOnce();
     reported.mockRestore();
     expect((await failure(robot["twice"]!(1))).message).toContain("device offline: create");
@@ -335,7 +351,7 @@ describe("a slow network", () => {
     const robot = await start();
     await robot["text"]!.set("x".repeat(1_000_000));
     expect(Math.max(...service.sent.map(({ length }) => length))).toBe(65_535);
-    expect((await robot["text"]!.get() as unknown as string).length).toBe(1_000_000);
+    expect(((await robot["text"]!.get()) as unknown as string).length).toBe(1_000_000);
     await robot.$.close();
   });
 

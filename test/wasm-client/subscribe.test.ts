@@ -319,7 +319,13 @@ it("ends a loop over a pipe that is too far behind", async () => {
 /** A gateway's answer: name, state and type of the one service "test" of each device. */
 function answerDevices(...devices: [name: string, state: string, type: string][]): string[] {
   const asked: string[] = [];
-  const list = devices.map(([name, state, type]) => ({ name, state, node_id: "id", node_name: null, services: [{ name: "test", type }] }));
+  const list = devices.map(([name, state, type]) => ({
+    name,
+    state,
+    node_id: "id",
+    node_name: null,
+    services: [{ name: "test", type }],
+  }));
   vi.stubGlobal("fetch", async (url: URL) => {
     asked.push(String(url));
     return new Response(JSON.stringify({ devices: list }));
@@ -331,13 +337,27 @@ afterEach(() => vi.unstubAllGlobals());
 const type = "test.subscribe.Root";
 
 it("finds services of a type among the devices of a gateway", async () => {
-  const asked = answerDevices(["a b", "online", type], ["other", "online", "test.Other"], ["off", "offline", type], ["c", "online", type]);
+  const asked = answerDevices(
+    ["a b", "online", type],
+    ["other", "online", "test.Other"],
+    ["off", "offline", type],
+    ["c", "online", type],
+  );
   const gateway = "http://gateway:8080/lab";
   const found = await findServices({ gateway, type });
   expect(asked).toEqual(["http://gateway:8080/lab/api/v1/devices"]);
   expect(found.map(({ device }) => device)).toEqual(["a b", "c"]);
-  expect(found[0]).toEqual({ url: "http://gateway:8080/lab/devices/a%20b?service=test", device: "a b", service: "test", type, nodeId: "id", nodeName: null });
-  expect(await findServices({ gateway: `${gateway}/`, type, filter: ({ device }) => device === "c" })).toEqual([found[1]]);
+  expect(found[0]).toEqual({
+    url: "http://gateway:8080/lab/devices/a%20b?service=test",
+    device: "a b",
+    service: "test",
+    type,
+    nodeId: "id",
+    nodeName: null,
+  });
+  expect(await findServices({ gateway: `${gateway}/`, type, filter: ({ device }) => device === "c" })).toEqual([
+    found[1],
+  ]);
   for (const response of [new Response("no", { status: 404 }), new Response("{}"), new Response("<html>")]) {
     vi.stubGlobal("fetch", async () => response);
     const error = await failure(findServices({ gateway, type }));

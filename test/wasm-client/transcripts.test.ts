@@ -35,7 +35,12 @@ it.each([
   const m = (member: string) => robot[member]!;
   expect(robot.$.type).toBe("experimental.transcript.station");
   expect(robot.$.node).toEqual({ id: "11111111-2222-3333-4444-555555555555", name: "transcript.service" });
-  expect(robot.$.attributes).toEqual(new Map<string, unknown>([["place", "bench"], ["revision", Int32Array.of(3)]]));
+  expect(robot.$.attributes).toEqual(
+    new Map<string, unknown>([
+      ["place", "bench"],
+      ["revision", Int32Array.of(3)],
+    ]),
+  );
   expect(await m("level").get()).toBe(1.5);
   await m("level").set(-7.25);
   expect(await m("counts").get()).toStrictEqual(Int32Array.of(1, 2, 3));
@@ -64,15 +69,29 @@ it.each([
   expect(await m("add")(1.5, 2.25)).toBe(3.75);
   const custom = await failure(m("fail")("custom"));
   expect({ ...custom, name: custom.name, message: custom.message }).toEqual({
-    code: 100, name: "experimental.transcript.TranscriptError", message: "custom failure", subName: "", param: null,
+    code: 100,
+    name: "experimental.transcript.TranscriptError",
+    message: "custom failure",
+    subName: "",
+    param: null,
   });
   const standard = await failure(m("fail")("standard"));
   expect({ ...standard, name: standard.name, message: standard.message }).toEqual({
-    code: ErrorCode.InvalidArgument, name: "RobotRaconteur.InvalidArgument", message: "bad argument", subName: "sub.kind",
-    param: new Map<string, unknown>([["limit", Int32Array.of(10)], ["name", "x"]]),
+    code: ErrorCode.InvalidArgument,
+    name: "RobotRaconteur.InvalidArgument",
+    message: "bad argument",
+    subName: "sub.kind",
+    param: new Map<string, unknown>([
+      ["limit", Int32Array.of(10)],
+      ["name", "x"],
+    ]),
   });
   const foreign = await failure(m("fail")("plain"));
-  expect([foreign.code, foreign.name, foreign.message]).toEqual([ErrorCode.UnknownError, "ValueError", "plain failure"]);
+  expect([foreign.code, foreign.name, foreign.message]).toEqual([
+    ErrorCode.UnknownError,
+    "ValueError",
+    "plain failure",
+  ]);
   await robot.$.close();
   // The order of a message's own string table is free: there only the sizes are determined.
   expect(transcript.isOver).toBe(true);
@@ -145,7 +164,10 @@ it("rr+ws-v4-event: events before the answer of the function that caused them", 
   robot["changed"]!.on((...args) => events.push(args));
   await robot["reset"]!();
   await robot["reset"]!();
-  expect(events).toEqual([[0, "reset"], [0, "reset"]]);
+  expect(events).toEqual([
+    [0, "reset"],
+    [0, "reset"],
+  ]);
   await robot.$.close();
   expectSameBytes(transcript);
 });

@@ -38,9 +38,15 @@ it.each([
 });
 
 it("is relative to the page where there is one", () => {
-  expect(parse("/devices/create?service=Create", "https://gw.example/app/").address).toBe("wss://gw.example/devices/create?service=Create");
-  expect(parse("devices/create?service=Create", "http://gw.example:8080/app/").address).toBe("ws://gw.example:8080/app/devices/create?service=Create");
-  expect(parse("//other.example/?service=Create", "http://gw.example/").address).toBe("ws://other.example/?service=Create");
+  expect(parse("/devices/create?service=Create", "https://gw.example/app/").address).toBe(
+    "wss://gw.example/devices/create?service=Create",
+  );
+  expect(parse("devices/create?service=Create", "http://gw.example:8080/app/").address).toBe(
+    "ws://gw.example:8080/app/devices/create?service=Create",
+  );
+  expect(parse("//other.example/?service=Create", "http://gw.example/").address).toBe(
+    "ws://other.example/?service=Create",
+  );
 });
 
 it.each([

@@ -1,7 +1,13 @@
 // Services behind USB devices, by a navigator.usb that is not there: fake_usb.ts.
 import { readFileSync } from "node:fs";
 import { connect, ErrorCode, listUsbDevices, requestUsbDevice, subscribe } from "../../wasm-client/dist/node.js";
-import type { DynamicMember, ObjectInfo, OpenTransport, Transport, TransportListener } from "../../wasm-client/dist/node.js";
+import type {
+  DynamicMember,
+  ObjectInfo,
+  OpenTransport,
+  Transport,
+  TransportListener,
+} from "../../wasm-client/dist/node.js";
 import { FakeUsb, FakeUsbDevice } from "./fake_usb.js";
 import type { FakeDeviceOptions } from "./fake_usb.js";
 import { failure, settle, TestService } from "./service.js";
@@ -20,7 +26,10 @@ object Root
   pipe double echo
 end`;
 
-type Robot = Record<"speed" | "numbers" | "same" | "hang" | "bump" | "fire_bump" | "both" | "publish_both" | "echo", DynamicMember>;
+type Robot = Record<
+  "speed" | "numbers" | "same" | "hang" | "bump" | "fire_bump" | "both" | "publish_both" | "echo",
+  DynamicMember
+>;
 type Client = Robot & { readonly $: ObjectInfo };
 
 const file = new URL("../../build/wasm/test/wasm-client/usb_device/test_usb_device.wasm", import.meta.url);
@@ -126,7 +135,9 @@ describe("a session", () => {
       "close",
     ]);
     // What it said when it was closed went out before.
-    expect(device.log.map((entry) => entry.startsWith("out")).lastIndexOf(true)).toBe(device.log.indexOf("41 02 0000 0000 4: 07 00 00 00") - 1);
+    expect(device.log.map((entry) => entry.startsWith("out")).lastIndexOf(true)).toBe(
+      device.log.indexOf("41 02 0000 0000 4: 07 00 00 00") - 1,
+    );
   });
 
   it.each([9, 64, 512, 1024])("carries large values in packets of %i bytes", async (packetSize) => {
@@ -247,16 +258,30 @@ describe("a device that cannot be had", () => {
 
   it("is told where the system keeps this user from it", async () => {
     device.isDenied = true;
-    expect((await failure(connect(url))).message).toMatch(/could not be opened: Access denied\.; on Linux .* on Windows/);
+    expect((await failure(connect(url))).message).toMatch(
+      /could not be opened: Access denied\.; on Linux .* on Windows/,
+    );
   });
 
   it.each<[string, (device: FakeUsbDevice) => void, RegExp]>([
     ["has no BOS", (one) => one.replaceBos([]), /BOS descriptor: refused by the device \(stall\)/],
-    ["has another BOS", (one) => one.replaceBos([5, 15, 12, 0, 1, 7, 16, 2, 0, 0, 0, 0]), /no Robot Raconteur capability/],
+    [
+      "has another BOS",
+      (one) => one.replaceBos([5, 15, 12, 0, 1, 7, 16, 2, 0, 0, 0, 0]),
+      /no Robot Raconteur capability/,
+    ],
     ["has no block", (one) => one.stallControl(0xba), /descriptor block: refused/],
-    ["has a block of another version", (one) => one.replaceBlock([8, 0, 0, 0, 0, 2, 22, 0]), /version: found 0x0200, expected 0x0100/],
+    [
+      "has a block of another version",
+      (one) => one.replaceBlock([8, 0, 0, 0, 0, 2, 22, 0]),
+      /version: found 0x0200, expected 0x0100/,
+    ],
     ["has a NodeID that is none", (one) => one.replaceString(4, [6, 3, 120, 0, 121, 0]), /NodeID string: /],
-    ["has half a string", (one) => one.replaceString(5, [6, 3, 120, 0]), /string descriptor bLength: found 6, expected the 4 bytes received/],
+    [
+      "has half a string",
+      (one) => one.replaceString(5, [6, 3, 120, 0]),
+      /string descriptor bLength: found 6, expected the 4 bytes received/,
+    ],
   ])("%s", async (_, spoil, message) => {
     spoil(device);
     const error = await failure(connect(url));
@@ -266,7 +291,11 @@ describe("a device that cannot be had", () => {
   });
 
   it.each<[string, (device: FakeUsbDevice) => void, RegExp]>([
-    ["no more streams", (one) => one.answerConnect(le32(-1)), /could not connect: USB device .*: stream refused: the device answered -1/],
+    [
+      "no more streams",
+      (one) => one.answerConnect(le32(-1)),
+      /could not connect: USB device .*: stream refused: the device answered -1/,
+    ],
     ["half an answer", (one) => one.answerConnect([1, 0]), /stream refused: 2 bytes in the answer, expected 4/],
     ["a stall", (one) => one.stallControl(1), /stream refused: refused by the device \(stall\)/],
     ["no reset", (one) => one.stallControl(3), /reset: refused by the device \(stall\)/],
@@ -315,7 +344,9 @@ describe("a session that is up", () => {
     unplug(device);
     for (const reason of await Promise.all([...calls, ...ends, writing])) {
       expect(reason.subName).toBe("connection_lost");
-      expect(reason.message).toMatch(/the connection was lost: USB device "Test robot" \(1209:5252\): .*(unplugged|is gone); plug it in again/);
+      expect(reason.message).toMatch(
+        /the connection was lost: USB device "Test robot" \(1209:5252\): .*(unplugged|is gone); plug it in again/,
+      );
     }
     const again = await plug();
     expect(await (await connect<Robot>(url)).same(3)).toBe(3);
@@ -324,7 +355,11 @@ describe("a session that is up", () => {
 
   it.each<[string, (device: FakeUsbDevice) => void, RegExp]>([
     ["stalls a read", (one) => one.stallNextIn(), /read: refused by the device \(stall\)/],
-    ["stalls a write", (one) => (one.stallNextOut(), void failure(robot.hang())), /write: refused by the device \(stall\)/],
+    [
+      "stalls a write",
+      (one) => (one.stallNextOut(), void failure(robot.hang())),
+      /write: refused by the device \(stall\)/,
+    ],
     ["tells a wrong length", (one) => one.sendRaw([9, 0, 0, 0, 7, 0, 0, 0]), /len is 9, the transfer has 8 bytes/],
     ["sends half a header", (one) => one.sendRaw([5, 0, 0, 0, 7]), /found 5 bytes, expected 8 or more/],
     ["sends more than a packet", (one) => one.sendRaw(Array<number>(65).fill(0)), /sent more than was asked for/],
@@ -411,7 +446,11 @@ describe("the stream below", () => {
 
   it("says what it holds back, and posts four transfers at most", async () => {
     let received = 0;
-    device.accept = () => () => ({ send: (bytes) => void (received += bytes.length), buffered: 0, close: () => undefined });
+    device.accept = () => () => ({
+      send: (bytes) => void (received += bytes.length),
+      buffered: 0,
+      close: () => undefined,
+    });
     const transport = await open();
     const sent = 300_000;
     device.isDeaf = true;
@@ -429,9 +468,16 @@ describe("the stream below", () => {
 
   it("delivers what was sent before it is closed, and says nothing afterwards", async () => {
     let received = 0;
-    device.accept = () => () => ({ send: (bytes) => void (received += bytes.length), buffered: 0, close: () => undefined });
+    device.accept = () => () => ({
+      send: (bytes) => void (received += bytes.length),
+      buffered: 0,
+      close: () => undefined,
+    });
     const heard: string[] = [];
-    const transport = await open({ received: () => void heard.push("bytes"), closed: (reason) => void heard.push(reason) });
+    const transport = await open({
+      received: () => void heard.push("bytes"),
+      closed: (reason) => void heard.push(reason),
+    });
     device.isDeaf = true;
     transport.send(new Uint8Array(10_000));
     transport.close();
@@ -513,7 +559,9 @@ describe("requestUsbDevice()", () => {
 
   it("says what is wrong with the device", async () => {
     usb.choice = await FakeUsbDevice.make(await code, { classCode: 3 });
-    expect((await failure(requestUsbDevice())).message).toMatch(/^USB device "Test robot" \(1209:5252\): is no Robot Raconteur device/);
+    expect((await failure(requestUsbDevice())).message).toMatch(
+      /^USB device "Test robot" \(1209:5252\): is no Robot Raconteur device/,
+    );
   });
 });
 
@@ -551,14 +599,17 @@ describe("listUsbDevices()", () => {
 });
 
 describe("without WebUSB", () => {
-  it.each([connect.bind(null, url), listUsbDevices, requestUsbDevice.bind(null, undefined)])("everything says so", async (call) => {
-    vi.stubGlobal("navigator", {});
-    const error = await failure(call());
-    expect(error.code).toBe(ErrorCode.SystemResourceError);
-    expect(error.message).toContain("this browser has no WebUSB");
-    vi.stubGlobal("isSecureContext", false);
-    expect((await failure(call())).message).toContain("serve this one by https:");
-  });
+  it.each([connect.bind(null, url), listUsbDevices, requestUsbDevice.bind(null, undefined)])(
+    "everything says so",
+    async (call) => {
+      vi.stubGlobal("navigator", {});
+      const error = await failure(call());
+      expect(error.code).toBe(ErrorCode.SystemResourceError);
+      expect(error.message).toContain("this browser has no WebUSB");
+      vi.stubGlobal("isSecureContext", false);
+      expect((await failure(call())).message).toContain("serve this one by https:");
+    },
+  );
 });
 
 const silent: OpenTransport = () => ({ send: () => undefined, buffered: 0, close: () => undefined });

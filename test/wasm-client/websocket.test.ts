@@ -26,7 +26,11 @@ let greet: (socket: Socket) => void;
 
 beforeEach(async () => {
   greet = () => undefined;
-  server = new WebSocketServer({ host: "127.0.0.1", port: 0, handleProtocols: (offered: Set<string>) => [...offered][0] });
+  server = new WebSocketServer({
+    host: "127.0.0.1",
+    port: 0,
+    handleProtocols: (offered: Set<string>) => [...offered][0],
+  });
   server.on("connection", (socket: Socket, request: typeof upgrade) => {
     upgrade = request;
     greet(socket);
@@ -53,7 +57,9 @@ it("says why the server closed", async () => {
   greet = (socket) => socket.close(1013, "device offline: create: connection refused");
   const error = await failure(connect(url));
   expect(error.code).toBe(ErrorCode.ConnectionError);
-  expect(error.message).toMatch(/^the connection to ws:\/\/127\.0\.0\.1:\d+\/devices\/create was closed: device offline: create/);
+  expect(error.message).toMatch(
+    /^the connection to ws:\/\/127\.0\.0\.1:\d+\/devices\/create was closed: device offline: create/,
+  );
 });
 
 it("says so where the server gives no reason", async () => {

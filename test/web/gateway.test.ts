@@ -14,7 +14,9 @@ describe("access", () => {
 
   it("lists the requests that are to be decided on", () => {
     const request = { id: "a", name: "tablet", reason: "cell 3", client: "192.0.2.1:5" };
-    const answer = { requests: [{ ...request, state: "pending" }, { ...request, state: "approved" }, null, { state: "pending" }] };
+    const answer = {
+      requests: [{ ...request, state: "pending" }, { ...request, state: "approved" }, null, { state: "pending" }],
+    };
     expect(readRequests(answer)).toEqual([request]);
     expect(readRequests({})).toEqual([]);
   });
@@ -58,7 +60,9 @@ describe("list of devices", () => {
     expect(() => readDevices(null)).toThrow('no list "devices"');
   });
   it("finds the relay beside the page, secure where the page is", () => {
-    expect(relayUrl("create", "Create", "http://127.0.0.1:8080/")).toBe("ws://127.0.0.1:8080/devices/create?service=Create");
+    expect(relayUrl("create", "Create", "http://127.0.0.1:8080/")).toBe(
+      "ws://127.0.0.1:8080/devices/create?service=Create",
+    );
     expect(relayUrl("a b", "S&T", "https://host/robots/#/x")).toBe("wss://host/robots/devices/a%20b?service=S%26T");
   });
 });
@@ -67,7 +71,13 @@ describe("addresses", () => {
   it("name pages, services and the objects in them", () => {
     expect(parseRoute("")).toEqual({ page: "devices" });
     expect(parseRoute("#/")).toEqual({ page: "devices" });
-    expect(parseRoute("#/devices/create/Create")).toEqual({ page: "service", device: "create", service: "Create", path: [], view: "auto" });
+    expect(parseRoute("#/devices/create/Create")).toEqual({
+      page: "service",
+      device: "create",
+      service: "Create",
+      path: [],
+      view: "auto",
+    });
     expect(parseRoute("#/else")).toEqual({ page: "unknown", address: "/else" });
     expect(parseRoute("#/devices/%")).toEqual({ page: "unknown", address: "/devices/%" });
   });
@@ -77,7 +87,13 @@ describe("addresses", () => {
       { member: "parts", index: "a/b]?" },
       { member: "lens", index: null },
     ];
-    expect(parseRoute(formatRoute("my cam", "W", path))).toEqual({ page: "service", device: "my cam", service: "W", path, view: "auto" });
+    expect(parseRoute(formatRoute("my cam", "W", path))).toEqual({
+      page: "service",
+      device: "my cam",
+      service: "W",
+      path,
+      view: "auto",
+    });
     expect(parseRoute(formatRoute("c", "C", [], "members"))).toMatchObject({ view: "members" });
   });
 });
@@ -89,14 +105,18 @@ describe("camera frames", () => {
     expect([...(frame.rgba ?? [])]).toEqual([3, 2, 1, 255, 6, 5, 4, 255, 9, 8, 7, 255, 12, 11, 10, 255]);
   });
   it("shows one byte a pixel as grey", () => {
-    expect([...(readFrame({ width: 1, height: 1, step: 1, data: Uint8Array.of(9) }).rgba ?? [])]).toEqual([9, 9, 9, 255]);
+    expect([...(readFrame({ width: 1, height: 1, step: 1, data: Uint8Array.of(9) }).rgba ?? [])]).toEqual([
+      9, 9, 9, 255,
+    ]);
   });
   it("leaves image files to the browser", () => {
     const frame = readFrame({ width: 0, height: 0, step: 0, data: Uint8Array.of(0xff, 0xd8, 0xff, 0xe0) });
     expect(frame.encoded).toHaveLength(4);
   });
   it("refuses frames whose size and bytes contradict each other", () => {
-    expect(() => readFrame({ width: 2, height: 2, step: 6, data: new Uint8Array(11) })).toThrow("has 11 bytes in rows of 6; expected 12");
+    expect(() => readFrame({ width: 2, height: 2, step: 6, data: new Uint8Array(11) })).toThrow(
+      "has 11 bytes in rows of 6; expected 12",
+    );
     expect(() => readFrame({ width: -1, height: 2, step: 6, data: new Uint8Array(12) })).toThrow("-1 by 2 pixels");
     expect(() => readFrame({ width: 1e9, height: 1e9, step: 6, data: new Uint8Array(12) })).toThrow("pixels");
     expect(() => readFrame(null)).toThrow("no bytes");

@@ -66,11 +66,22 @@ describe("link", () => {
     const { link, openings } = setup();
     const first = await at(openings, 0).succeed();
     first.drop("device create is down");
-    expect(link.state.value).toMatchObject({ kind: "lost", since: 1_000_000, reason: "device create is down", retryAt: 1_000_500 });
+    expect(link.state.value).toMatchObject({
+      kind: "lost",
+      since: 1_000_000,
+      reason: "device create is down",
+      retryAt: 1_000_500,
+    });
     await vi.advanceTimersByTimeAsync(500);
     expect(link.state.value).toMatchObject({ kind: "lost", retryAt: null });
     await at(openings, 1).fail("refused");
-    expect(link.state.value).toMatchObject({ kind: "lost", since: 1_000_000, reason: "refused", attempts: 2, retryAt: 1_001_500 });
+    expect(link.state.value).toMatchObject({
+      kind: "lost",
+      since: 1_000_000,
+      reason: "refused",
+      attempts: 2,
+      retryAt: 1_001_500,
+    });
     await vi.advanceTimersByTimeAsync(1000);
     await at(openings, 2).succeed();
     expect(link.state.value.kind).toBe("online");

@@ -6,7 +6,15 @@ import { loopsOf, obstaclesOf, poseOf, wallsOf } from "../../web/src/robot/room"
 import { readSensorPacket } from "../../web/src/robot/sensor_packet";
 import { rateOf, Series } from "../../web/src/robot/series";
 import { nameNotes, songAfter } from "../../web/src/robot/song";
-import { commandFor, directionOfKey, SPIN_LEFT, SPIN_RIGHT, STOP, STRAIGHT, TURN_RADIUS } from "../../web/src/robot/steering";
+import {
+  commandFor,
+  directionOfKey,
+  SPIN_LEFT,
+  SPIN_RIGHT,
+  STOP,
+  STRAIGHT,
+  TURN_RADIUS,
+} from "../../web/src/robot/steering";
 import type { Direction, DriveCommand } from "../../web/src/robot/steering";
 import { Trail } from "../../web/src/robot/trail";
 
@@ -301,7 +309,13 @@ describe("room and trail", () => {
     ];
     const free = { x1: 5, y1: 5, x2: 6, y2: 6 };
     const { loops, open } = loopsOf([free, ...square, free]);
-    expect(loops).toEqual([[{ x: 0, y: 0 }, { x: 1, y: 0 }, { x: 1, y: 1 }]]);
+    expect(loops).toEqual([
+      [
+        { x: 0, y: 0 },
+        { x: 1, y: 0 },
+        { x: 1, y: 1 },
+      ],
+    ]);
     expect(open).toEqual([free, free]);
   });
   it("draws a new stroke after a jump and none for standing still", () => {

@@ -16,7 +16,11 @@ const frames: Subscription = {
 };
 
 /** As the gateway writes it. */
-const written = ({ ageP50Ms, ageP99Ms, ...rest }: Subscription): object => ({ ...rest, age_p50_ms: ageP50Ms, age_p99_ms: ageP99Ms });
+const written = ({ ageP50Ms, ageP99Ms, ...rest }: Subscription): object => ({
+  ...rest,
+  age_p50_ms: ageP50Ms,
+  age_p99_ms: ageP99Ms,
+});
 
 describe("subscriptions", () => {
   it("are read by member, then client", () => {
@@ -24,15 +28,26 @@ describe("subscriptions", () => {
     const wire = { ...frames, path: "Create", member: "state", kind: "wire", conflated: 7 };
     const answer = { subscriptions: [written(frames), written(other), null, { ...written(wire), service: "Create" }] };
     expect(readSubscriptions(answer)).toEqual([wire, other, frames]);
-    expect(readSubscriptions({ subscriptions: [{}] })).toMatchObject([{ client: "", member: "", delivered: 0, ageP99Ms: 0 }]);
+    expect(readSubscriptions({ subscriptions: [{}] })).toMatchObject([
+      { client: "", member: "", delivered: 0, ageP99Ms: 0 },
+    ]);
     expect(() => readSubscriptions({ devices: [] })).toThrow('no list "subscriptions"');
   });
 
   it("stay as they were while the gateway is away, since when it went", () => {
     const known: SubscriptionsState = { kind: "known", subscriptions: [frames] };
     const away = awayAfter(known, new TypeError("fetch failed"), 1000);
-    expect(away).toEqual({ kind: "away", since: 1000, reason: "the gateway cannot be reached", subscriptions: [frames] });
-    expect(awayAfter(away, new Error("late"), 2000)).toMatchObject({ since: 1000, reason: "late", subscriptions: [frames] });
+    expect(away).toEqual({
+      kind: "away",
+      since: 1000,
+      reason: "the gateway cannot be reached",
+      subscriptions: [frames],
+    });
+    expect(awayAfter(away, new Error("late"), 2000)).toMatchObject({
+      since: 1000,
+      reason: "late",
+      subscriptions: [frames],
+    });
     expect(awayAfter({ kind: "loading" }, new Error("late"), 2000)).toMatchObject({ since: 2000, subscriptions: null });
     expect(awayAfter({ kind: "denied", reason: "no" }, new Error("late"), 3)).toMatchObject({ subscriptions: null });
   });
@@ -90,7 +105,11 @@ describe("a list of subscriptions", () => {
     await vi.advanceTimersByTimeAsync(3000);
     expect(list.state.value).toEqual({ kind: "denied", reason: "the gateway answered 401" });
     await vi.advanceTimersByTimeAsync(3000);
-    expect(list.state.value).toMatchObject({ kind: "away", reason: "the gateway cannot be reached", subscriptions: null });
+    expect(list.state.value).toMatchObject({
+      kind: "away",
+      reason: "the gateway cannot be reached",
+      subscriptions: null,
+    });
     list.stop();
   });
 

@@ -60,8 +60,13 @@ describe("typed input", () => {
   });
   it("reads complex and multidimensional values", () => {
     expect(parseInput("[1, -2]", "cdouble")).toEqual({ re: 1, im: -2 });
-    expect(parseInput('{"dims": [2, 1], "data": [1, 2]}', "double[*]")).toEqual({ dims: [2, 1], data: Float64Array.of(1, 2) });
-    expect(() => parseInput('{"dims": [2, 2], "data": [1]}', "double[*]")).toThrow("dims 2 × 2 need 4 elements, found 1");
+    expect(parseInput('{"dims": [2, 1], "data": [1, 2]}', "double[*]")).toEqual({
+      dims: [2, 1],
+      data: Float64Array.of(1, 2),
+    });
+    expect(() => parseInput('{"dims": [2, 2], "data": [1]}', "double[*]")).toThrow(
+      "dims 2 × 2 need 4 elements, found 1",
+    );
   });
   it("reads containers: lists, and maps by number and by name", () => {
     expect(parseInput("[1, 2]", "int32{list}")).toEqual([1, 2]);
@@ -73,10 +78,23 @@ describe("typed input", () => {
   it("reads structs and enums as JSON, and says what is no JSON", () => {
     expect(parseInput('{"x": 1}', "com.example.Pose")).toEqual({ x: 1 });
     expect(parseInput("3", "com.example.Mode")).toBe(3);
-    expect(() => parseInput("{x: 1}", "com.example.Pose")).toThrow('"{x: 1}" is not valid JSON; expected com.example.Pose');
+    expect(() => parseInput("{x: 1}", "com.example.Pose")).toThrow(
+      '"{x: 1}" is not valid JSON; expected com.example.Pose',
+    );
   });
   it("shows an example for every kind of type", () => {
-    for (const type of ["double", "int8", "string", "cdouble", "double[]", "double[*]", "int8{list}", "int8{int32}", "int8{string}", "a.B"]) {
+    for (const type of [
+      "double",
+      "int8",
+      "string",
+      "cdouble",
+      "double[]",
+      "double[*]",
+      "int8{list}",
+      "int8{int32}",
+      "int8{string}",
+      "a.B",
+    ]) {
       expect(placeholder(type)).not.toBe("");
     }
   });
@@ -93,7 +111,9 @@ describe("shown values", () => {
   it("shows nested values, and no more than a bounded part of large ones", () => {
     expect(formatValue({ x: 1, label: "a" })).toBe('x: 1\nlabel: "a"');
     expect(formatValue({ a: { b: 1, c: 2 } })).toBe("a: {b: 1, c: 2}");
-    expect(formatValue([{ x: 1, note: "n".repeat(80) }])).toBe(`[\n  {\n    x: 1\n    note: "${"n".repeat(80)}"\n  }\n]`);
+    expect(formatValue([{ x: 1, note: "n".repeat(80) }])).toBe(
+      `[\n  {\n    x: 1\n    note: "${"n".repeat(80)}"\n  }\n]`,
+    );
     expect(formatValue(Uint8Array.of(1, 2))).toBe("[1, 2]");
     expect(formatValue(new Map([[0, "front"]]))).toBe('0: "front"');
     expect(formatValue({ dims: [2, 1], data: Float64Array.of(1, 2) })).toBe("2 × 1 [1, 2]");

@@ -93,7 +93,8 @@ export async function connectWith<T>(
         nodeName,
         selfName: options.nodeName,
         username: options.username,
-        credentials: options.credentials ?? (options.password === undefined ? undefined : { password: options.password }),
+        credentials:
+          options.credentials ?? (options.password === undefined ? undefined : { password: options.password }),
         objectType: options.objectType,
         version: options.version,
         stringTable: options.stringTable,

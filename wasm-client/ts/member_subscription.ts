@@ -130,12 +130,7 @@ export class WireSubscription extends MemberSubscription<WireConnection> {
   #time: WireTime | undefined;
 
   /** Use Subscription.wire(). */
-  constructor(
-    subscription: Subscription<unknown>,
-    clock: Clock,
-    member: string,
-    options: MemberSubscriptionOptions,
-  ) {
+  constructor(subscription: Subscription<unknown>, clock: Clock, member: string, options: MemberSubscriptionOptions) {
     super(subscription, clock, member, options.path ?? "*");
   }
 

@@ -15,7 +15,8 @@ platform.findWebsocket = async () => {
   if (typeof globalThis.WebSocket === "function") return globalThis.WebSocket;
   const name = "ws"; // not a literal: the package is optional
   const found = (await import(name).catch(() => null)) as { WebSocket: WsClass } | null;
-  if (!found) throw makeError("SystemResourceError", 'Node before version 22 has no WebSocket: install the package "ws"');
+  if (!found)
+    throw makeError("SystemResourceError", 'Node before version 22 has no WebSocket: install the package "ws"');
   const { WebSocket: Base } = found;
   return class extends Base {
     constructor(url: string | URL, protocols?: string | string[]) {

@@ -163,7 +163,10 @@ class Info implements ObjectInfo {
 
   find(path: string, options: CallOptions = {}): Promise<RemoteObject> {
     const service = this.path.split(".", 1)[0]!;
-    return this.#tree.find(path.replace(/^\*(?=\.|$)/, () => service), options);
+    return this.#tree.find(
+      path.replace(/^\*(?=\.|$)/, () => service),
+      options,
+    );
   }
 
   async login(

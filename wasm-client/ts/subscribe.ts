@@ -74,7 +74,11 @@ export class Subscription<T = RemoteObject> {
     this.#urls = urls;
     this.#options = options;
     this.#clock = options.clock ?? systemClock;
-    this.#backoff = new Backoff(options.firstRetry ?? 500, options.longestRetry ?? 30_000, options.random ?? Math.random);
+    this.#backoff = new Backoff(
+      options.firstRetry ?? 500,
+      options.longestRetry ?? 30_000,
+      options.random ?? Math.random,
+    );
     const { signal } = options;
     if (signal?.aborted) void this.close();
     else signal?.addEventListener("abort", () => void this.close(), { once: true, signal: this.#ending.signal });

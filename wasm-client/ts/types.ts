@@ -297,7 +297,11 @@ export interface DynamicMember extends AsyncIterable<RrValue[]> {
   peekOut(options?: CallOptions): Promise<RrValue>;
   poke(value: unknown, options?: CallOptions): Promise<void>;
   dimensions(options?: CallOptions): Promise<number[]>;
-  read(position: number | readonly number[], count: number | readonly number[], options?: CallOptions): Promise<RrValue>;
+  read(
+    position: number | readonly number[],
+    count: number | readonly number[],
+    options?: CallOptions,
+  ): Promise<RrValue>;
   write(position: number | readonly number[], value: unknown, options?: CallOptions): Promise<void>;
 }
 

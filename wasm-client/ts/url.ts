@@ -34,7 +34,9 @@ export function parseServiceUrl(text: string | URL, base = globalThis.location?.
   const rest = scheme === undefined ? String(text) : String(text).slice(scheme.length);
   if (scheme !== undefined && !(scheme in schemes)) {
     const known = Object.keys(schemes).map((name) => name.slice(0, -1));
-    const why = scheme.startsWith("rrs+") ? "encryption inside of the stream is not available here, use rr+wss" : "scheme unknown";
+    const why = scheme.startsWith("rrs+")
+      ? "encryption inside of the stream is not available here, use rr+wss"
+      : "scheme unknown";
     throw refuse(`${why}; known: ${known.join(", ")}`);
   }
   const isUsb = scheme === "rr+usb:";

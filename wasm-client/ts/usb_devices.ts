@@ -28,7 +28,8 @@ export interface UsbNode {
  */
 export async function requestUsbDevice(filters: UsbFilter[] = [{ classCode: 0xff }]): Promise<UsbNode> {
   const usb = findUsb();
-  if (!usb.requestDevice) throw makeError("InvalidOperation", "a worker cannot ask the user for a USB device: ask in the page");
+  if (!usb.requestDevice)
+    throw makeError("InvalidOperation", "a worker cannot ask the user for a USB device: ask in the page");
   const device = await usb.requestDevice({ filters }).catch((error: unknown) => {
     if ((error as Error).name === "NotFoundError") throw makeError("OperationCancelled", "no USB device was chosen");
     throw makeError("InvalidOperation", `the user cannot be asked for a USB device: ${textOf(error)}`);

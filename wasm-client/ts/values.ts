@@ -14,9 +14,7 @@ export interface ExactValue {
  * @param type as in a service definition; named types with their service.
  */
 export function rrValue(type: string, value: unknown): ExactValue {
-  return Object.freeze(
-    Object.defineProperty({ type, value }, exactMark, { value: true, enumerable: false }),
-  );
+  return Object.freeze(Object.defineProperty({ type, value }, exactMark, { value: true, enumerable: false }));
 }
 
 /** The named type of a value that came as a varvalue ("com.example.Pose"), undefined for all others. */

@@ -191,9 +191,7 @@ export class Core {
   stepGenerator(step: GeneratorStep, path: string, member: string, index: number, parameter: unknown): number {
     const number = generatorSteps.indexOf(step);
     const handle = this.#give(parameter);
-    return this.#checked(
-      this.#atNow().step_generator(number, this.#give(path), this.#give(member), index, handle),
-    );
+    return this.#checked(this.#atNow().step_generator(number, this.#give(path), this.#give(member), index, handle));
   }
 
   getMemoryDimensions(path: string, member: string): number {
@@ -247,7 +245,13 @@ export class Core {
 
   /** @returns the packet's number. */
   sendPipePacket(path: string, member: string, index: number, value: unknown, wantsAck: boolean): number {
-    const number = this.#atNow().send_pipe_packet(this.#give(path), this.#give(member), index, this.#give(value), wantsAck);
+    const number = this.#atNow().send_pipe_packet(
+      this.#give(path),
+      this.#give(member),
+      index,
+      this.#give(value),
+      wantsAck,
+    );
     if (number < 0) this.#checked(0);
     return number;
   }

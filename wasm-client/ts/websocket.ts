@@ -50,7 +50,8 @@ export async function openWebsocket(url: URL, listener: TransportListener): Prom
   });
   socket.addEventListener("close", (event: CloseEvent) => {
     const why = event.reason || failure;
-    if (isOpen) tellClosed(`the connection to ${where} was closed${why ? `: ${why}` : ` (WebSocket code ${event.code})`}`);
+    if (isOpen)
+      tellClosed(`the connection to ${where} was closed${why ? `: ${why}` : ` (WebSocket code ${event.code})`}`);
     else tellClosed(`could not connect to ${where}${why || inPage ? `: ${why || inPage}` : ""}`);
   });
   return {

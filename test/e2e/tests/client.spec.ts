@@ -41,7 +41,9 @@ test.afterAll(async () => {
   await device?.kill("SIGTERM");
 });
 
-test("10 MiB of doubles cross device, gateway and browser unharmed; more than the limit fails alone", async ({ page }) => {
+test("10 MiB of doubles cross device, gateway and browser unharmed; more than the limit fails alone", async ({
+  page,
+}) => {
   await page.goto(gateway.url);
   const seen = await page.evaluate(async () => {
     const count = 1_310_720; // doubles in 10 MiB

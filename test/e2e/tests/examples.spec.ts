@@ -36,7 +36,9 @@ test.afterAll(async () => {
 test("the client in Node, with the package as npm would install it", () => {
   const modules = path.join(folder, "node_modules");
   mkdirSync(path.join(modules, "rrgate-client"), { recursive: true });
-  const packed = execFileSync("npm", ["pack", "--silent", "--pack-destination", folder, client], { encoding: "utf8" }).trim();
+  const packed = execFileSync("npm", ["pack", "--silent", "--pack-destination", folder, client], {
+    encoding: "utf8",
+  }).trim();
   const unpack = ["--strip-components=1", "-C", path.join(modules, "rrgate-client")];
   execFileSync("tar", ["-xzf", path.join(folder, packed), ...unpack]);
   symlinkSync(path.join(client, "node_modules/ws"), path.join(modules, "ws"));

@@ -12,7 +12,9 @@ test("reads properties, calls functions and follows wires of the robot", async (
   await member("Drive").getByLabel("velocity").fill("40000");
   await member("Drive").getByLabel("radius").fill("1");
   await member("Drive").getByRole("button", { name: "Call Drive" }).click();
-  await expect(member("Drive").getByRole("alert")).toHaveText("velocity: 40000 is out of range; expected int16, -32768 to 32767");
+  await expect(member("Drive").getByRole("alert")).toHaveText(
+    "velocity: 40000 is out of range; expected int16, -32768 to 32767",
+  );
   await member("Drive").getByLabel("velocity").fill("0");
   await member("Drive").getByRole("button", { name: "Call Drive" }).click();
   await expect(member("Drive").locator("output")).toContainText("done");

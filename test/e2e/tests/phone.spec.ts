@@ -1,5 +1,14 @@
 // The robot page under a finger, on a small screen.
-import { expect, openRobot, poseOf, putAtStart, test, waitUntilMoved, waitUntilStill, waitUntilStopped } from "../lab_test";
+import {
+  expect,
+  openRobot,
+  poseOf,
+  putAtStart,
+  test,
+  waitUntilMoved,
+  waitUntilStill,
+  waitUntilStopped,
+} from "../lab_test";
 
 test("a finger that holds drives, and nothing is wider than the screen", async ({ page, lab }) => {
   await openRobot(page, lab);
@@ -20,6 +29,8 @@ test("a finger that holds drives, and nothing is wider than the screen", async (
   expect(end.x).toBeGreaterThan(start.x);
   expect((await poseOf(page)).x).toBe(end.x);
 
-  const tooWide = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+  const tooWide = await page.evaluate(
+    () => document.documentElement.scrollWidth - document.documentElement.clientWidth,
+  );
   expect(tooWide).toBe(0);
 });

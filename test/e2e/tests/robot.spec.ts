@@ -99,7 +99,11 @@ test("Stop stops a robot that somebody else drives", async ({ page, lab }) => {
   await waitUntilStopped(page);
 });
 
-test("letting go stops a robot whose answers do not arrive, while the page says how old its values are", async ({ page, context, lab }) => {
+test("letting go stops a robot whose answers do not arrive, while the page says how old its values are", async ({
+  page,
+  context,
+  lab,
+}) => {
   const line = await Line.to(lab.createUrl);
   const { program, url } = await startGateway("create", line.url, webRoot);
   try {

@@ -15,7 +15,11 @@ async function watchCamera(browser: Browser, lab: Lab): Promise<Page> {
   return page;
 }
 
-test("says which device is relayed and which is shared, and how many clients each has", async ({ page, lab, browser }) => {
+test("says which device is relayed and which is shared, and how many clients each has", async ({
+  page,
+  lab,
+  browser,
+}) => {
   await page.goto(lab.url);
   await expect(rowOf(page, "create")).toContainText("Moderelay");
   await expect(rowOf(page, "webcams")).toContainText("Modeshared");
@@ -36,7 +40,15 @@ test("lists the pipes of two viewers as they go on, by keyboard alone", async ({
   const viewers = [await watchCamera(browser, lab), await watchCamera(browser, lab)];
   const table = part.getByRole("table", { name: "Subscriptions of webcams" });
   await expect(table.getByRole("row")).toHaveCount(3);
-  await expect(table.getByRole("columnheader")).toHaveText(["Member", "Client", "Delivered", "Conflated", "Dropped", "Age p50", "Age p99"]);
+  await expect(table.getByRole("columnheader")).toHaveText([
+    "Member",
+    "Client",
+    "Delivered",
+    "Conflated",
+    "Dropped",
+    "Age p50",
+    "Age p99",
+  ]);
   await expect(table.getByRole("rowheader")).toHaveText(Array(2).fill("Webcam.Webcams[0].FrameStream pipe"));
   const clients = await table.locator('[data-label="Client"]').allInnerTexts();
   expect(new Set(clients).size).toBe(2);
@@ -62,10 +74,17 @@ test("asks only while it is open", async ({ page, lab }) => {
   await expect(part.locator("[data-subscriptions]")).toHaveCount(0);
 });
 
-test("says plainly when they may not be seen, when the device is away, and when the gateway is", async ({ page, lab }) => {
+test("says plainly when they may not be seen, when the device is away, and when the gateway is", async ({
+  page,
+  lab,
+}) => {
   const part = rowOf(page, "webcams").locator("details");
   await page.route("**/subscriptions", (route) =>
-    route.fulfill({ status: 403, contentType: "application/problem+json", body: JSON.stringify({ detail: "vera may not read" }) }),
+    route.fulfill({
+      status: 403,
+      contentType: "application/problem+json",
+      body: JSON.stringify({ detail: "vera may not read" }),
+    }),
   );
   await page.goto(lab.url);
   await part.locator("summary").click();
@@ -95,7 +114,9 @@ for (const width of [375, 1280])
       await rowOf(page, "webcams").locator("summary").click();
       await expect(rowOf(page, "webcams").getByRole("cell").first()).toBeVisible();
       await expect(rowOf(page, "webcams").getByRole("rowheader")).toHaveCount(1);
-      const tooWide = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+      const tooWide = await page.evaluate(
+        () => document.documentElement.scrollWidth - document.documentElement.clientWidth,
+      );
       expect(tooWide).toBeLessThanOrEqual(0); // below: the gutter of a scroll bar
       await page.screenshot({ path: info.outputPath(`${scheme}.png`), fullPage: true });
       await page.reload();

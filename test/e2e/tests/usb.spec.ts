@@ -72,7 +72,10 @@ function makeSite(): string {
   writeFileSync(path.join(site, "usb_script.js"), script);
   writeFileSync(path.join(site, "worker.js"), 'import { run } from "./usb_script.js"; postMessage(await run(false));');
   writeFileSync(path.join(site, "own.js"), own);
-  writeFileSync(path.join(site, "own.html"), '<!doctype html><title>USB</title><script type="module" src="own.js"></script>');
+  writeFileSync(
+    path.join(site, "own.html"),
+    '<!doctype html><title>USB</title><script type="module" src="own.js"></script>',
+  );
   writeFileSync(path.join(site, "index.html"), "<!doctype html><title>USB</title>");
   return site;
 }
@@ -96,8 +99,9 @@ test.afterAll(async () => {
 /** The gateway has to know who its device is. */
 async function open(page: Page): Promise<void> {
   await expect(async () => {
-    // eslint-disable-next-line @typescript-eslint/naming-convention -- of the gateway
-    const answer = (await (await page.request.get(`${gateway.url}api/v1/devices`)).json()) as { devices: { node_name: string }[] };
+    const answer = (await (await page.request.get(`${gateway.url}api/v1/devices`)).json()) as {
+      devices: Record<"node_name", string>[];
+    };
     expect(answer.devices[0]?.node_name).not.toBe("");
   }).toPass();
   await page.goto(gateway.url);
@@ -110,7 +114,9 @@ const expected = {
   ramp: "20000 doubles, wrong at -1",
   counted: [1, 2, 3],
   call: "connection_lost",
-  end: expect.stringMatching(/USB device "Test robot" \(1209:5252\): .*(unplugged|the device is gone); plug it in again$/),
+  end: expect.stringMatching(
+    /USB device "Test robot" \(1209:5252\): .*(unplugged|the device is gone); plug it in again$/,
+  ),
   loadedAfter: true,
 };
 

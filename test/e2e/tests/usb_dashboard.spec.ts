@@ -36,7 +36,9 @@ Object.defineProperty(navigator, "usb", { value: usb });
 
 async function fakeUsb(page: Page): Promise<void> {
   const site = makeUsbSite();
-  await page.route("**/usb-test/**", (route) => route.fulfill({ path: path.join(site, new URL(route.request().url()).pathname.slice(10)) }));
+  await page.route("**/usb-test/**", (route) =>
+    route.fulfill({ path: path.join(site, new URL(route.request().url()).pathname.slice(10)) }),
+  );
   await page.addInitScript(setup);
 }
 

@@ -27,7 +27,9 @@ const server = createServer(async (request, response) => {
   }
   try {
     const content = await readFile(new URL(path, repository));
-    response.writeHead(200, { "Content-Type": types[path.split(".").at(-1)], "Cache-Control": "max-age=3600" }).end(content);
+    response
+      .writeHead(200, { "Content-Type": types[path.split(".").at(-1)], "Cache-Control": "max-age=3600" })
+      .end(content);
   } catch {
     response.writeHead(404).end();
   }

@@ -26,7 +26,19 @@ export async function carry_out(url, steps) {
 const patience = 10_000; // ms for anything that has to come by itself
 
 const service = "experimental.interop";
-const numberWords = ["double", "single", "int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "bool"];
+const numberWords = [
+  "double",
+  "single",
+  "int8",
+  "uint8",
+  "int16",
+  "uint16",
+  "int32",
+  "uint32",
+  "int64",
+  "uint64",
+  "bool",
+];
 const complexWords = ["cdouble", "csingle"];
 
 /** A scenario's value -> what rrgate-client takes. */
@@ -66,7 +78,10 @@ function exact(tagged) {
 function readSchema(texts) {
   const schema = new Map();
   for (const [, kind, name, body] of texts.join("\n").matchAll(/^(struct|pod|namedarray) (\w+)\n(.*?)\nend$/gms)) {
-    schema.set(name, { kind, fields: [...body.matchAll(/^\s*field (\S+) (\w+)/gm)].map(([, type, field]) => [type, field]) });
+    schema.set(name, {
+      kind,
+      fields: [...body.matchAll(/^\s*field (\S+) (\w+)/gm)].map(([, type, field]) => [type, field]),
+    });
   }
   return schema;
 }
@@ -93,7 +108,8 @@ function plainItems(items, base, schema) {
 function plainItem(value, base, schema) {
   if (complexWords.includes(base)) return [number(value.re), number(value.im)];
   const kind = schema.get(base)?.kind;
-  if (kind === "namedarray") return schema.get(base).fields.flatMap(([type, field]) => plain(value[field], type, schema));
+  if (kind === "namedarray")
+    return schema.get(base).fields.flatMap(([type, field]) => plain(value[field], type, schema));
   if (kind === "pod") return [plainFields(value, base, schema)];
   return kind === "struct" ? plainFields(value, base, schema) : number(value);
 }
@@ -303,9 +319,12 @@ class Client {
     },
     async abort_generator(target, name) {
       const reason = new Error("enough");
-      await this.#generators.get(name).run.throw(reason).catch((error) => {
-        if (error !== reason) throw error;
-      });
+      await this.#generators
+        .get(name)
+        .run.throw(reason)
+        .catch((error) => {
+          if (error !== reason) throw error;
+        });
       return null;
     },
     async answer(target, member, step) {

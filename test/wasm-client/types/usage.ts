@@ -95,7 +95,10 @@ export async function every_kind(): Promise<void> {
   // @ts-expect-error readonly
   await object.image.write([0, 0], block);
   await object.numbers.write([3], new Float64Array(3));
-  const next: words.switch_ | null = await object.constructor({ ...((await object.switch_value.get()) as words.switch_) }, 5);
+  const next: words.switch_ | null = await object.constructor(
+    { ...((await object.switch_value.get()) as words.switch_) },
+    5,
+  );
   next?.next?.next?.pod_grid.data.at(0)?.corners.at(0)?.static.at(0);
   // @ts-expect-error JavaScript would take the object for a promise
   object.then;

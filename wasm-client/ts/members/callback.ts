@@ -11,7 +11,10 @@ export function makeCallback({ session, path, info }: MemberContext): CallbackMe
     },
     set handler(handler: CallbackHandler | null) {
       if (handler !== null && typeof handler !== "function") {
-        throw makeError("InvalidArgument", `${info.name}.handler: found ${typeof handler}, expected a function or null`);
+        throw makeError(
+          "InvalidArgument",
+          `${info.name}.handler: found ${typeof handler}, expected a function or null`,
+        );
       }
       session.setHandler(path, info.name, handler);
     },

@@ -33,7 +33,10 @@ export function makeEvent({ session, path, info }: MemberContext): EventMember {
         const timer =
           timeout === undefined
             ? undefined
-            : setTimeout(() => fail(makeError("RequestTimeout", `no event ${info.name} within ${timeout} ms`)), timeout);
+            : setTimeout(
+                () => fail(makeError("RequestTimeout", `no event ${info.name} within ${timeout} ms`)),
+                timeout,
+              );
         signal?.addEventListener("abort", abort, { once: true });
       }),
 

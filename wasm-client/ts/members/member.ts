@@ -32,7 +32,11 @@ export function splitArguments(
 /** The argument behind the last parameter; anything else there is one argument too many. */
 function checkOptions(what: string, given: unknown): CallOptions {
   if (given === undefined) return {};
-  if (typeof given === "object" && given !== null && Object.keys(given).every((key) => key === "signal" || key === "timeout")) {
+  if (
+    typeof given === "object" &&
+    given !== null &&
+    Object.keys(given).every((key) => key === "signal" || key === "timeout")
+  ) {
     return given;
   }
   throw makeError("InvalidArgument", `${what}: the argument behind the last parameter is not {signal, timeout}`);

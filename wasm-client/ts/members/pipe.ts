@@ -1,6 +1,14 @@
 // Pipes: every packet, in order. Layer: wasm-client/ts/members. Source: sessions spec section 2.11.
 import { callSafely, makeError } from "../errors.js";
-import type { CallOptions, Losses, PipeConnectOptions, PipeEndpoint, PipeMember, PipeSendOptions, RrValue } from "../types.js";
+import type {
+  CallOptions,
+  Losses,
+  PipeConnectOptions,
+  PipeEndpoint,
+  PipeMember,
+  PipeSendOptions,
+  RrValue,
+} from "../types.js";
 import { checkSignal, within } from "../within.js";
 import { lossesOf } from "./losses.js";
 import type { MemberContext } from "./member.js";
@@ -54,15 +62,19 @@ class PipeEnds {
     let endpoint: Endpoint | undefined;
     ++this.#connects;
     try {
-      await session.request((core) => core.connectPipe(path, info.name, wanted), options, (value) => {
-        // At once: packets may follow the reply in the same message.
-        const index = Number(value);
-        endpoint = new Endpoint(this.context, index, options, () => {
-          this.#endpoints.delete(index);
-          this.#checkUse();
-        });
-        this.#endpoints.set(index, endpoint);
-      });
+      await session.request(
+        (core) => core.connectPipe(path, info.name, wanted),
+        options,
+        (value) => {
+          // At once: packets may follow the reply in the same message.
+          const index = Number(value);
+          endpoint = new Endpoint(this.context, index, options, () => {
+            this.#endpoints.delete(index);
+            this.#checkUse();
+          });
+          this.#endpoints.set(index, endpoint);
+        },
+      );
       return endpoint as PipeEndpoint;
     } finally {
       --this.#connects;
@@ -127,7 +139,9 @@ class Endpoint implements PipeEndpoint {
     const taken = acknowledged ?? session.room();
     if (!taken) return;
     const unlessOver = within(taken, { signal: this.#ending.signal }, "");
-    await within(unlessOver, limits, `pipe ${info.name}: the packet was not taken`).finally(() => this.#acks.delete(number));
+    await within(unlessOver, limits, `pipe ${info.name}: the packet was not taken`).finally(() =>
+      this.#acks.delete(number),
+    );
   }
 
   losses(options?: CallOptions): Promise<Losses | undefined> {

@@ -96,7 +96,9 @@ export class UsbBus {
       timer = setTimeout(() => reject(new DOMException("no answer", "TimeoutError")), controlTimeoutMs);
     });
     const asked = () =>
-      typeof data === "number" ? this.device.controlTransferIn(setup, data) : this.device.controlTransferOut(setup, data);
+      typeof data === "number"
+        ? this.device.controlTransferIn(setup, data)
+        : this.device.controlTransferOut(setup, data);
     const outcome = await this.#carryOut(() => Promise.race([asked(), late]));
     clearTimeout(timer);
     return outcome;
@@ -152,7 +154,8 @@ export class UsbBus {
       const result = await transfer();
       status = result.status === "babble" ? "overflow" : (result.status ?? "ok");
       if ("bytesWritten" in result) size = result.bytesWritten;
-      else if (result.data) data = new Uint8Array(result.data.buffer as ArrayBuffer, result.data.byteOffset, result.data.byteLength);
+      else if (result.data)
+        data = new Uint8Array(result.data.buffer as ArrayBuffer, result.data.byteOffset, result.data.byteLength);
     } catch (error) {
       status = statusNames[nameOfError(error)] ?? "failed";
       if (status === "failed") await Promise.race([this.gone, pause(goneGraceMs)]);

@@ -22,7 +22,8 @@ export async function openStream(usb: WebUsb, url: URL, listener: TransportListe
   const name = url.searchParams.get("nodename");
   const devices = await grantedDevices(usb);
   if (devices.length === 0) {
-    const what = "this page may use no USB device, or none is plugged in; let the user choose one with requestUsbDevice()";
+    const what =
+      "this page may use no USB device, or none is plugged in; let the user choose one with requestUsbDevice()";
     throw makeError("ConnectionError", `${url.href}: ${what}`);
   }
   const check = (device: WebUsbDevice, node: UsbNodeName): void => {
@@ -51,7 +52,12 @@ export async function listNodes(usb: WebUsb): Promise<UsbNode[]> {
   const devices = await grantedDevices(usb);
   return Promise.all(
     devices.map((device) =>
-      describe(usb, device).catch((error: RobotRaconteurError) => ({ device: nameOf(device), nodeId: "", nodeName: "", error })),
+      describe(usb, device).catch((error: RobotRaconteurError) => ({
+        device: nameOf(device),
+        nodeId: "",
+        nodeName: "",
+        error,
+      })),
     ),
   );
 }
@@ -59,7 +65,10 @@ export async function listNodes(usb: WebUsb): Promise<UsbNode[]> {
 /** @throws RobotRaconteurError ConnectionError: it is no node, or cannot be asked. */
 export async function describe(usb: WebUsb, device: WebUsbDevice): Promise<UsbNode> {
   if (!mayBeNode(device)) {
-    throw makeError("ConnectionError", `${nameOf(device)}: is no Robot Raconteur device (it needs USB 2.1 and a vendor specific interface)`);
+    throw makeError(
+      "ConnectionError",
+      `${nameOf(device)}: is no Robot Raconteur device (it needs USB 2.1 and a vendor specific interface)`,
+    );
   }
   const node = UsbClaim.known(device) ?? (await UsbClaim.use(usb, device, (_, node) => node));
   const who = node.id === anyId ? `nodename=${node.name}` : `nodeid=${node.id}`;
@@ -70,7 +79,10 @@ async function grantedDevices(usb: WebUsb): Promise<WebUsbDevice[]> {
   try {
     return (await usb.getDevices()).filter(mayBeNode);
   } catch (error) {
-    throw makeError("SystemResourcePermissionDenied", `this page may not use USB: ${textOf(error)}; a frame needs allow="usb"`);
+    throw makeError(
+      "SystemResourcePermissionDenied",
+      `this page may not use USB: ${textOf(error)}; a frame needs allow="usb"`,
+    );
   }
 }
 
@@ -91,5 +103,8 @@ function plainId(text: string | null): string | undefined {
   if (text === null) return undefined;
   const plain = text.replace(/[{}-]/g, "").toLowerCase();
   if (/^[0-9a-f]{32}$/.test(plain)) return plain;
-  throw makeError("InvalidArgument", `nodeid "${text.slice(0, 64)}": expected the like of 82301bf1-e1ef-4e89-8d8f-0848291587ac`);
+  throw makeError(
+    "InvalidArgument",
+    `nodeid "${text.slice(0, 64)}": expected the like of 82301bf1-e1ef-4e89-8d8f-0848291587ac`,
+  );
 }

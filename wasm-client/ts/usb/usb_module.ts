@@ -7,7 +7,17 @@ import { platform } from "../platform.js";
 import type { WebUsbConfiguration, WebUsbSetup } from "./webusb.js";
 
 /** As rr::UsbStatus. */
-const statuses = ["ok", "stall", "no_device", "timed_out", "cancelled", "overflow", "busy", "denied", "failed"] as const;
+const statuses = [
+  "ok",
+  "stall",
+  "no_device",
+  "timed_out",
+  "cancelled",
+  "overflow",
+  "busy",
+  "denied",
+  "failed",
+] as const;
 export type UsbStatus = (typeof statuses)[number];
 
 export interface UsbControl {

@@ -98,7 +98,8 @@ function UnknownPage({ address }: { address: string }) {
     <div class="page page-narrow">
       <h1>No such page</h1>
       <p>
-        There is nothing at <code>{address}</code>. Services live at <code>/devices/&lt;device&gt;/&lt;service&gt;</code>.
+        There is nothing at <code>{address}</code>. Services live at{" "}
+        <code>/devices/&lt;device&gt;/&lt;service&gt;</code>.
       </p>
       <p>
         <a href="#/">All devices</a>

@@ -46,7 +46,11 @@ export function CameraView({ list, robot, shown }: { list: DeviceList; robot: st
       <h2 id="camera-title" class="unseen">
         Camera
       </h2>
-      {place ? <Camera key={`${place.device}/${place.service}`} place={place} shown={shown} /> : <NoCamera loading={gateway.kind === "loading"} />}
+      {place ? (
+        <Camera key={`${place.device}/${place.service}`} place={place} shown={shown} />
+      ) : (
+        <NoCamera loading={gateway.kind === "loading"} />
+      )}
     </section>
   );
 }
@@ -87,7 +91,13 @@ function Picture({ link, place, shown }: { link: Link; place: Place; shown: bool
   return (
     <>
       <div class={`camera-frame ${note !== null && hasFrame ? "is-stale" : ""}`}>
-        <canvas ref={canvas} width={4} height={3} role="img" aria-label={`Picture from camera ${cameras.find((c) => c.index === index)?.name ?? ""}`} />
+        <canvas
+          ref={canvas}
+          width={4}
+          height={3}
+          role="img"
+          aria-label={`Picture from camera ${cameras.find((c) => c.index === index)?.name ?? ""}`}
+        />
         {note !== null && (
           <p class="camera-note" role={failure === null ? undefined : "alert"}>
             {note}
@@ -98,7 +108,11 @@ function Picture({ link, place, shown }: { link: Link; place: Place; shown: bool
         {cameras.length > 1 ? (
           <label>
             <span class="unseen">Camera</span>
-            <select class="field" value={String(index)} onChange={(event) => setChosen(Number(event.currentTarget.value))}>
+            <select
+              class="field"
+              value={String(index)}
+              onChange={(event) => setChosen(Number(event.currentTarget.value))}
+            >
               {cameras.map((camera) => (
                 <option key={camera.index} value={String(camera.index)}>
                   {camera.name}
@@ -136,8 +150,10 @@ function useCameras(remote: Remote | null): readonly NamedCamera[] {
 }
 
 function readNames(names: unknown): NamedCamera[] {
-  const entries = names instanceof Map ? [...names.entries()] : Object.entries((names ?? {}));
-  return entries.map(([index, name]) => ({ index: Number(index), name: String(name) })).sort((a, b) => a.index - b.index);
+  const entries = names instanceof Map ? [...names.entries()] : Object.entries(names ?? {});
+  return entries
+    .map(([index, name]) => ({ index: Number(index), name: String(name) }))
+    .sort((a, b) => a.index - b.index);
 }
 
 interface Frames {

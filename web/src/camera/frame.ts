@@ -17,7 +17,13 @@ export function readFrame(value: unknown): Frame {
   const { width, height, step, data } = (value ?? {}) as Record<string, unknown>;
   if (!(data instanceof Uint8Array)) throw new Error("the camera's frame has no bytes in field 'data'");
   if (isImageFile(data)) return { width: 0, height: 0, rgba: null, encoded: new Uint8Array(data) };
-  if (typeof width !== "number" || typeof height !== "number" || width < 1 || height < 1 || width * height > MAX_PIXELS) {
+  if (
+    typeof width !== "number" ||
+    typeof height !== "number" ||
+    width < 1 ||
+    height < 1 ||
+    width * height > MAX_PIXELS
+  ) {
     throw new Error(`the camera's frame is ${String(width)} by ${String(height)} pixels; expected at least 1 by 1`);
   }
   const row = typeof step === "number" && step > 0 ? step : data.length / height;
@@ -30,7 +36,13 @@ export function readFrame(value: unknown): Frame {
   return { width, height, rgba: toRgba(data, width, height, row, channels), encoded: null };
 }
 
-function toRgba(data: Uint8Array, width: number, height: number, row: number, channels: 1 | 3): Uint8ClampedArray<ArrayBuffer> {
+function toRgba(
+  data: Uint8Array,
+  width: number,
+  height: number,
+  row: number,
+  channels: 1 | 3,
+): Uint8ClampedArray<ArrayBuffer> {
   const rgba = new Uint8ClampedArray(width * height * 4);
   const [red, green] = channels === 3 ? [2, 1] : [0, 0];
   let to = 0;

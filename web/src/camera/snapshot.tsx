@@ -44,6 +44,8 @@ async function takeSnapshot(host: Remote, index: number): Promise<Blob> {
   const canvas = document.createElement("canvas");
   await drawFrame(canvas, { ...size, data });
   return new Promise((resolve, reject) => {
-    canvas.toBlob((picture) => (picture ? resolve(picture) : reject(new Error("this browser made no PNG of the picture"))));
+    canvas.toBlob((picture) =>
+      picture ? resolve(picture) : reject(new Error("this browser made no PNG of the picture")),
+    );
   });
 }

@@ -96,7 +96,10 @@ function drawLand(ctx: CanvasRenderingContext2D, view: View, room: Room, palette
   }
   // Walls that stand free have no inside: a spit of land, coast line first and land over it.
   const thick = Math.max(WALL_M * view.scale, 4);
-  for (const [style, width] of [[palette.coast, thick + 3.5], [palette.land, thick]] as const) {
+  for (const [style, width] of [
+    [palette.coast, thick + 3.5],
+    [palette.land, thick],
+  ] as const) {
     ctx.strokeStyle = style;
     ctx.lineWidth = width;
     ctx.beginPath();
@@ -140,11 +143,7 @@ function drawWake(
 
 /** The chart sign of a rock awash: a cross with four dots, off the nose of the robot where it touched. */
 function drawRock(ctx: CanvasRenderingContext2D, view: View, pose: Pose, radiusM: number, palette: Palette): void {
-  const [x, y] = toCanvas(
-    view,
-    pose.x + Math.cos(pose.theta) * radiusM,
-    pose.y + Math.sin(pose.theta) * radiusM,
-  );
+  const [x, y] = toCanvas(view, pose.x + Math.cos(pose.theta) * radiusM, pose.y + Math.sin(pose.theta) * radiusM);
   ctx.strokeStyle = ctx.fillStyle = palette.ink;
   ctx.lineWidth = 1.5;
   ctx.beginPath();
@@ -153,7 +152,13 @@ function drawRock(ctx: CanvasRenderingContext2D, view: View, pose: Pose, radiusM
   ctx.moveTo(x, y - 5);
   ctx.lineTo(x, y + 5);
   ctx.stroke();
-  for (const [dx, dy] of [[-3, -3], [3, -3], [-3, 3], [3, 3]] as const) ctx.fillRect(x + dx - 0.75, y + dy - 0.75, 1.5, 1.5);
+  for (const [dx, dy] of [
+    [-3, -3],
+    [3, -3],
+    [-3, 3],
+    [3, 3],
+  ] as const)
+    ctx.fillRect(x + dx - 0.75, y + dy - 0.75, 1.5, 1.5);
 }
 
 function drawRobot(ctx: CanvasRenderingContext2D, view: View, content: ChartContent, palette: Palette): void {
@@ -182,7 +187,10 @@ function drawRobot(ctx: CanvasRenderingContext2D, view: View, content: ChartCont
   ctx.lineWidth = Math.max(radius * 0.22, 3.5);
   ctx.strokeStyle = palette.accent;
   ctx.lineCap = "butt";
-  for (const [bit, from, to] of [[1, 0.08, 1.2], [2, -1.2, -0.08]] as const) {
+  for (const [bit, from, to] of [
+    [1, 0.08, 1.2],
+    [2, -1.2, -0.08],
+  ] as const) {
     if ((bumpers & bit) === 0) continue;
     ctx.beginPath();
     ctx.arc(0, 0, radius + ctx.lineWidth / 2, from, to); // right of the nose is positive with y down

@@ -52,10 +52,7 @@ export function fit(wanted: Extent, left: number, top: number, width: number, he
 }
 
 export function toCanvas(view: View, x: number, y: number): [number, number] {
-  return [
-    view.left + (x - view.extent.xMin) * view.scale,
-    view.top + (view.extent.yMax - y) * view.scale,
-  ];
+  return [view.left + (x - view.extent.xMin) * view.scale, view.top + (view.extent.yMax - y) * view.scale];
 }
 
 /** Metres between labelled grid lines, so that they stand at least `minPx` apart: 0.5, 1, 2, 5, 10, ... */

@@ -82,8 +82,13 @@ async function describe(node: UsbNode): Promise<Device> {
 async function servicesOf(url: string): Promise<Service[]> {
   const index = await connect(`${url}&service=${INDEX}`, { timeout: 5_000 });
   try {
-    const found = (await index.$.member("GetLocalNodeServices")()) as unknown as Map<number, { Name: string; RootObjectType: string }>;
-    return [...found.values()].filter(({ Name }) => Name !== INDEX).map(({ Name, RootObjectType }) => ({ name: Name, type: RootObjectType }));
+    const found = (await index.$.member("GetLocalNodeServices")()) as unknown as Map<
+      number,
+      { Name: string; RootObjectType: string }
+    >;
+    return [...found.values()]
+      .filter(({ Name }) => Name !== INDEX)
+      .map(({ Name, RootObjectType }) => ({ name: Name, type: RootObjectType }));
   } finally {
     void index.$.close();
   }

@@ -36,9 +36,22 @@ export function CallbackRow({ object, member, live }: MemberRowProps) {
       <RowHead member={member} signature={signature} />
       <div class="row-line">
         {member.type !== "void" && (
-          <ValueInput quiet label={`Answer of ${member.name}`} type={member.type} text={text} disabled={!live} onText={setText} />
+          <ValueInput
+            quiet
+            label={`Answer of ${member.name}`}
+            type={member.type}
+            text={text}
+            disabled={!live}
+            onText={setText}
+          />
         )}
-        <button class="button" type="button" disabled={!live} aria-pressed={answering} onClick={() => setAnswering(!answering)}>
+        <button
+          class="button"
+          type="button"
+          disabled={!live}
+          aria-pressed={answering}
+          onClick={() => setAnswering(!answering)}
+        >
           {answering ? "Stop answering" : "Answer"}
           <span class="unseen"> {member.name}</span>
         </button>

@@ -19,7 +19,10 @@ export function useLog(): { entries: readonly LogEntry[]; add(text: string): voi
   const [entries, setEntries] = useState<readonly LogEntry[]>([]);
   const add = useMemo(
     () => (text: string) =>
-      setEntries((old) => [{ number: (old[0]?.number ?? 0) + 1, time: Date.now(), text }, ...old.slice(0, MAX_ENTRIES - 1)]),
+      setEntries((old) => [
+        { number: (old[0]?.number ?? 0) + 1, time: Date.now(), text },
+        ...old.slice(0, MAX_ENTRIES - 1),
+      ]),
     [],
   );
   return { entries, add };

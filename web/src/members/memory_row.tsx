@@ -48,8 +48,22 @@ export function MemoryRow({ object, member, live }: MemberRowProps) {
       <Failure text={measuring.failure} />
       {readable && (
         <form class="row-line" onSubmit={read}>
-          <ValueInput quiet label={`Position in ${member.name}`} type="uint32[]" text={position} disabled={!live} onText={setPosition} />
-          <ValueInput quiet label={`Items of ${member.name}`} type="uint32[]" text={count} disabled={!live} onText={setCount} />
+          <ValueInput
+            quiet
+            label={`Position in ${member.name}`}
+            type="uint32[]"
+            text={position}
+            disabled={!live}
+            onText={setPosition}
+          />
+          <ValueInput
+            quiet
+            label={`Items of ${member.name}`}
+            type="uint32[]"
+            text={count}
+            disabled={!live}
+            onText={setCount}
+          />
           <button class="button" type="submit" disabled={!live || reading.busy}>
             Read<span class="unseen"> {member.name}</span>
           </button>

@@ -12,7 +12,11 @@ import { parseInput } from "../values/parse";
 export function ObjrefRow({ member, route, live }: MemberRowProps) {
   const [index, setIndex] = useState("");
   const [failure, setFailure] = useState<string | null>(null);
-  const indexType = member.type.endsWith("{string}") ? "string" : /(\{int32\}|\[\])$/.test(member.type) ? "int32" : null;
+  const indexType = member.type.endsWith("{string}")
+    ? "string"
+    : /(\{int32\}|\[\])$/.test(member.type)
+      ? "int32"
+      : null;
   const address = (at: string | null): string =>
     formatRoute(route.device, route.service, [...route.path, { member: member.name, index: at }]);
   const open = (event: Event): void => {

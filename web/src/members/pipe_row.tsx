@@ -33,7 +33,13 @@ export function PipeRow({ object, member, live }: MemberRowProps) {
       <RowHead member={member} />
       {!member.modifiers.includes("writeonly") && (
         <div class="row-line">
-          <button class="button" type="button" disabled={!live} aria-pressed={following} onClick={() => setFollowing(!following)}>
+          <button
+            class="button"
+            type="button"
+            disabled={!live}
+            aria-pressed={following}
+            onClick={() => setFollowing(!following)}
+          >
             {following ? "Stop" : "Follow"}
             <span class="unseen"> {member.name}</span>
           </button>

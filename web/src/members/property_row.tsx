@@ -41,7 +41,14 @@ export function PropertyRow({ object, member, live }: MemberRowProps) {
       <Failure text={reading.failure} />
       {writable && (
         <form class="row-line" onSubmit={write}>
-          <ValueInput quiet label={`New value of ${member.name}`} type={member.type} text={text} disabled={!live} onText={setText} />
+          <ValueInput
+            quiet
+            label={`New value of ${member.name}`}
+            type={member.type}
+            text={text}
+            disabled={!live}
+            onText={setText}
+          />
           <button class="button" type="submit" disabled={!live || writing.busy}>
             Set<span class="unseen"> {member.name}</span>
           </button>

@@ -16,16 +16,16 @@ export interface MemberRowProps {
 export function RowHead({ member, signature }: { member: Member; signature?: string }) {
   return (
     <>
-    <div class="row-head">
-      <h3 class="member-name">{member.name}</h3>
-      <code class="member-type">{signature ?? member.type}</code>
-      {member.modifiers.map((modifier) => (
-        <span key={modifier} class="modifier">
-          {modifier}
-        </span>
-      ))}
-    </div>
-    {member.documentation !== "" && <p class="note row-documentation">{member.documentation}</p>}
+      <div class="row-head">
+        <h3 class="member-name">{member.name}</h3>
+        <code class="member-type">{signature ?? member.type}</code>
+        {member.modifiers.map((modifier) => (
+          <span key={modifier} class="modifier">
+            {modifier}
+          </span>
+        ))}
+      </div>
+      {member.documentation !== "" && <p class="note row-documentation">{member.documentation}</p>}
     </>
   );
 }

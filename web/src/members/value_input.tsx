@@ -32,7 +32,14 @@ export function ValueInput({ label, type, text, disabled, onText, quiet = false 
           <option value="true">true</option>
         </select>
       ) : !isNumeric(parsed.base) && !(scalar && parsed.base === "string") ? (
-        <textarea {...common} rows={2} spellcheck={false} value={text} placeholder={placeholder(type)} onInput={changed} />
+        <textarea
+          {...common}
+          rows={2}
+          spellcheck={false}
+          value={text}
+          placeholder={placeholder(type)}
+          onInput={changed}
+        />
       ) : (
         <input
           {...common}

@@ -74,7 +74,10 @@ function WireReader({ object, name, live }: { object: MemberRowProps["object"]; 
     };
   }, [object, name, live, arrivals, byLabel]);
 
-  const lines = useMemo(() => labels.map((label) => byLabel.get(label)).filter((s) => s !== undefined), [labels, byLabel]);
+  const lines = useMemo(
+    () => labels.map((label) => byLabel.get(label)).filter((s) => s !== undefined),
+    [labels, byLabel],
+  );
   return (
     <>
       <div class={`wire ${age === null ? "" : "is-stale"}`}>
@@ -101,7 +104,17 @@ function WireReader({ object, name, live }: { object: MemberRowProps["object"]; 
   );
 }
 
-function WireWriter({ object, name, type, live }: { object: MemberRowProps["object"]; name: string; type: string; live: boolean }) {
+function WireWriter({
+  object,
+  name,
+  type,
+  live,
+}: {
+  object: MemberRowProps["object"];
+  name: string;
+  type: string;
+  live: boolean;
+}) {
   const [text, setText] = useState(initialText(type));
   const sending = useAction();
   const send = (event: Event): void => {
@@ -111,7 +124,14 @@ function WireWriter({ object, name, type, live }: { object: MemberRowProps["obje
   return (
     <>
       <form class="row-line" onSubmit={send}>
-        <ValueInput quiet label={`Value to send on ${name}`} type={type} text={text} disabled={!live} onText={setText} />
+        <ValueInput
+          quiet
+          label={`Value to send on ${name}`}
+          type={type}
+          text={text}
+          disabled={!live}
+          onText={setText}
+        />
         <button class="button" type="submit" disabled={!live || sending.busy}>
           Send<span class="unseen"> on {name}</span>
         </button>

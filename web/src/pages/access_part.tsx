@@ -45,8 +45,7 @@ function RequestRow({ request, access }: { request: AccessRequest; access: Acces
         }}
       >
         <label>
-          Roles{" "}
-          <input type="text" value={roles} onInput={(event) => setRoles(event.currentTarget.value)} />
+          Roles <input type="text" value={roles} onInput={(event) => setRoles(event.currentTarget.value)} />
         </label>
         <button class="button" type="submit" disabled={words.length === 0}>
           Approve

@@ -64,8 +64,15 @@ function UsbPart({ usb }: { usb: UsbDeviceList }) {
 function GatewayStrip({ state }: { state: GatewayState }) {
   const badge = { loading: "connecting", known: "online", away: "offline" } as const;
   return (
-    <section class={`link-strip gateway-strip link-${badge[state.kind]}`} aria-label="Gateway" data-gateway={state.kind}>
-      <StateBadge state={badge[state.kind]} text={{ loading: "asking", known: "gateway", away: "gateway away" }[state.kind]} />
+    <section
+      class={`link-strip gateway-strip link-${badge[state.kind]}`}
+      aria-label="Gateway"
+      data-gateway={state.kind}
+    >
+      <StateBadge
+        state={badge[state.kind]}
+        text={{ loading: "asking", known: "gateway", away: "gateway away" }[state.kind]}
+      />
       <div class="link-words">
         <p class="link-head" role="status">
           {headline(state)}
@@ -139,7 +146,8 @@ function DeviceRow({ device, stale }: { device: Device; stale: boolean }) {
       </dl>
       {device.state !== "online" && (
         <p class="device-trouble">
-          {sentence(device.lastError ?? "Not reached yet")} {!stale && !isUsb(device.name) && "The gateway keeps trying."}
+          {sentence(device.lastError ?? "Not reached yet")}{" "}
+          {!stale && !isUsb(device.name) && "The gateway keeps trying."}
         </p>
       )}
       <ul class="services">
@@ -154,7 +162,9 @@ function DeviceRow({ device, stale }: { device: Device; stale: boolean }) {
           </li>
         )}
       </ul>
-      {device.mode === "shared" && <SubscriptionsPart device={device.name} online={device.state === "online"} stale={stale} />}
+      {device.mode === "shared" && (
+        <SubscriptionsPart device={device.name} online={device.state === "online"} stale={stale} />
+      )}
     </li>
   );
 }

@@ -74,7 +74,13 @@ export function RobotPage({ link, list, device, shown }: RobotPageProps) {
           <SongBox robot={remote} />
         </div>
       </section>
-      <DrivePanel driver={driver} enabled={live && shown} lost={state.kind === "lost"} failure={driveFailure} device={device} />
+      <DrivePanel
+        driver={driver}
+        enabled={live && shown}
+        lost={state.kind === "lost"}
+        failure={driveFailure}
+        device={device}
+      />
       <CameraView list={list} robot={device} shown={shown} />
       <ValuesPanel model={model} live={live} />
       <BumpLog model={model} />

@@ -33,13 +33,20 @@ export function ServicePage({ route, list }: { route: ServiceRoute; list: Device
             <a href={formatRoute(device, service)} aria-current={view === "auto" ? "page" : undefined}>
               Drive
             </a>
-            <a href={formatRoute(device, service, [], "members")} aria-current={view === "members" ? "page" : undefined}>
+            <a
+              href={formatRoute(device, service, [], "members")}
+              aria-current={view === "members" ? "page" : undefined}
+            >
               All members
             </a>
           </nav>
         )}
       </div>
-      {drives && link && <div hidden={view !== "auto"}><RobotPage link={link} list={list} device={device} shown={view === "auto"} /></div>}
+      {drives && link && (
+        <div hidden={view !== "auto"}>
+          <RobotPage link={link} list={list} device={device} shown={view === "auto"} />
+        </div>
+      )}
       {link && (!drives || view === "members") && <MembersPage link={link} route={route} path={path} />}
     </div>
   );
@@ -79,7 +86,9 @@ function useRobot(link: Link | null, device: string, service: string, list: Devi
     return link.state.watch(look);
   }, [link]);
   if (byObject !== null) return byObject;
-  const known = devicesOf(gateway)?.find((d) => d.name === device)?.services.find((s) => s.name === service);
+  const known = devicesOf(gateway)
+    ?.find((d) => d.name === device)
+    ?.services.find((s) => s.name === service);
   return /^experimental\.(create\d*\.Create|simulatedcreate\.SimulatedCreate)$/.test(known?.type ?? "");
 }
 
@@ -107,8 +116,17 @@ function MembersPage({ link, route, path }: { link: Link; route: ServiceRoute; p
       </p>
     );
   }
-  if (!found) return <div class="members-loading" aria-hidden="true"><span class="bone" /><span class="bone" /><span class="bone" /></div>;
-  return <ObjectView key={`${key}:${found.object.type}`} object={found.object} live={found.of === remote} route={route} />;
+  if (!found)
+    return (
+      <div class="members-loading" aria-hidden="true">
+        <span class="bone" />
+        <span class="bone" />
+        <span class="bone" />
+      </div>
+    );
+  return (
+    <ObjectView key={`${key}:${found.object.type}`} object={found.object} live={found.of === remote} route={route} />
+  );
 }
 
 async function walk(root: Remote, path: readonly PathStep[]): Promise<Remote> {

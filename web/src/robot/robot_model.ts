@@ -186,7 +186,13 @@ export class RobotModel {
       const time = Date.now();
       // The event has no parameters; the side is in the property, read while the robot still touches.
       const bumpers = remote.has("Bumpers", "property") ? remote.get("Bumpers") : Promise.resolve(0);
-      bumpers.then(Number).catch(() => 0).then((bits) => this.#logBump(time, bits), () => undefined);
+      bumpers
+        .then(Number)
+        .catch(() => 0)
+        .then(
+          (bits) => this.#logBump(time, bits),
+          () => undefined,
+        );
     });
     signal.addEventListener("abort", unsubscribe, { once: true });
   }
@@ -225,7 +231,11 @@ export function sideOf(bits: number): string {
 /** By the members that the page cannot do without. */
 export function isCreate(remote: Remote): boolean {
   const drive = remote.members.find((m) => m.name === "Drive" && m.kind === "function");
-  return drive?.parameters.length === 2 && drive.parameters.every((p) => p.type === "int16") && remote.has("DistanceTraveled", "property");
+  return (
+    drive?.parameters.length === 2 &&
+    drive.parameters.every((p) => p.type === "int16") &&
+    remote.has("DistanceTraveled", "property")
+  );
 }
 
 function pause(ms: number, signal: AbortSignal): Promise<void> {

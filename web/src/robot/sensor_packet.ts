@@ -42,7 +42,8 @@ export function readSensorPacket(id: number, data: Uint8Array): SensorReadings {
 }
 
 function readOne(packet: number, view: DataView, offset: number, readings: SensorReadings): void {
-  if (packet === 7) readings.bumpers = view.getUint8(offset) & 0x03; // bit 0 right, bit 1 left; the rest are wheel drops
+  if (packet === 7)
+    readings.bumpers = view.getUint8(offset) & 0x03; // bit 0 right, bit 1 left; the rest are wheel drops
   else if (packet === 22) readings.voltageMv = view.getUint16(offset);
   else if (packet === 25) readings.chargeMah = view.getUint16(offset);
   else if (packet === 41) readings.rightWheelMmS = view.getInt16(offset);

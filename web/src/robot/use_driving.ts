@@ -65,7 +65,8 @@ export function useDriving(driver: Driver, speed: number, enabled: boolean): Dri
       }
     };
     const keyUp = (event: KeyboardEvent): void => {
-      if (event.key === "Meta") letGo(); // macOS tells no key-up of keys that were held with it
+      if (event.key === "Meta")
+        letGo(); // macOS tells no key-up of keys that were held with it
       else if (directionOfKey(event.code)) release(event.code);
     };
     const hidden = (): void => {

@@ -36,7 +36,10 @@ export function PoseLine({ model, live, age }: PoseLineProps) {
         <Coordinate name="y" sign="y" text={`${fixed(pose.y, 3)} m`} />
         <Coordinate name="heading" sign="θ" text={`${fixed(degrees, 1)}°`} />
       </dl>
-      <p class="note" title={source === "device" ? undefined : "From DistanceTraveled and AngleTraveled, since this page was opened"}>
+      <p
+        class="note"
+        title={source === "device" ? undefined : "From DistanceTraveled and AngleTraveled, since this page was opened"}
+      >
         {age !== null ? `last known, ${age}` : !live ? "last known" : source === "device" ? "" : "reckoned"}
       </p>
     </>

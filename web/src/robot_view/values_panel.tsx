@@ -30,7 +30,13 @@ export function ValuesPanel({ model, live }: { model: RobotModel; live: boolean 
           <Plot series={[series.angle]} label="Angle, last 30 seconds" minSpan={10} firstColour={1} live={live} />
         </Reading>
         <Reading model={model} told="leftWheelMmS" name="Wheels" id="wheels" value={hasWheels ? "" : null} unit="mm/s">
-          <Plot series={[series.leftWheel, series.rightWheel]} label="Wheel speeds, last 30 seconds" minSpan={50} firstColour={2} live={live} />
+          <Plot
+            series={[series.leftWheel, series.rightWheel]}
+            label="Wheel speeds, last 30 seconds"
+            minSpan={50}
+            firstColour={2}
+            live={live}
+          />
           <p class="legend-line">
             <span class="legend-3">
               left <b data-reading="left-wheel">{leftWheelMmS ?? "–"}</b>
@@ -40,7 +46,13 @@ export function ValuesPanel({ model, live }: { model: RobotModel; live: boolean 
             </span>
           </p>
         </Reading>
-        <Reading model={model} told="bumpers" name="Bumpers" id="bumpers" value={bumpers === null ? null : sideOf(bumpers) || "free"}>
+        <Reading
+          model={model}
+          told="bumpers"
+          name="Bumpers"
+          id="bumpers"
+          value={bumpers === null ? null : sideOf(bumpers) || "free"}
+        >
           <BumperPicture bits={bumpers ?? 0} />
         </Reading>
         <Reading model={model} told="packet" name="Packets" id="packets" value={packet && packetRate} unit="a second">

@@ -22,7 +22,10 @@ export function LinkStrip({ link, list, device, service }: LinkStripProps) {
   const badge = lost ? "offline" : state.kind;
   return (
     <section class={`link-strip link-${badge}`} aria-label="Connection" data-link={state.kind}>
-      <StateBadge state={badge} text={{ online: "connected", connecting: "connecting", offline: "not connected" }[badge]} />
+      <StateBadge
+        state={badge}
+        text={{ online: "connected", connecting: "connecting", offline: "not connected" }[badge]}
+      />
       <div class="link-words">
         {/* Only what changes rarely is announced; the seconds beside it are for the eye. */}
         <p class="link-head" role="status">
@@ -32,7 +35,13 @@ export function LinkStrip({ link, list, device, service }: LinkStripProps) {
           {lost ? <LostDetail state={state} list={list} device={device} /> : detail(state, device)}
         </p>
       </div>
-      <button class="button" type="button" hidden={!lost} disabled={lost && state.retryAt === null} onClick={() => link.retryNow()}>
+      <button
+        class="button"
+        type="button"
+        hidden={!lost}
+        disabled={lost && state.retryAt === null}
+        onClick={() => link.retryNow()}
+      >
         Try now
       </button>
     </section>
@@ -46,10 +55,20 @@ function headline(state: LinkState, device: string, service: string): string {
 }
 
 function detail(state: LinkState, device: string): string {
-  return state.kind === "online" ? state.remote.type : `Asking ${isUsb(device) ? "this browser" : "the gateway"} for the device`;
+  return state.kind === "online"
+    ? state.remote.type
+    : `Asking ${isUsb(device) ? "this browser" : "the gateway"} for the device`;
 }
 
-function LostDetail({ state, list, device }: { state: LinkState & { kind: "lost" }; list: DeviceList; device: string }) {
+function LostDetail({
+  state,
+  list,
+  device,
+}: {
+  state: LinkState & { kind: "lost" };
+  list: DeviceList;
+  device: string;
+}) {
   const now = useNow(500);
   const gateway = useStore(list.state);
   const known = devicesOf(gateway)?.find((d) => d.name === device);

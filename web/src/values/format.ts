@@ -75,7 +75,9 @@ function formatObject(object: Record<string, unknown>, depth: number): string {
 
 function formatFields(fields: readonly (readonly [unknown, unknown])[], depth: number): string {
   if (fields.length === 0) return "{ }";
-  const lines = fields.slice(0, MAX_ITEMS * 2).map(([key, value]) => `${String(key)}: ${formatValue(value, depth + 1)}`);
+  const lines = fields
+    .slice(0, MAX_ITEMS * 2)
+    .map(([key, value]) => `${String(key)}: ${formatValue(value, depth + 1)}`);
   if (fields.length > lines.length) lines.push(`… ${fields.length - lines.length} more`);
   if (depth === 0) return lines.join("\n");
   const line = `{${lines.join(", ")}}`;
