@@ -117,7 +117,7 @@ test("letting go stops a robot whose answers do not arrive, while the page says 
     line.mute();
     const distanceReading = page.locator('[data-told="distance"]');
     await expect(distanceReading).toContainText(/\d s old/, { timeout: 2_000 });
-    await expect(page.getByRole("region", { name: "Chart" })).toContainText(/last known, \d s old/);
+    await expect(page.getByRole("region", { name: "Chart" })).toContainText(/Last known, \d s old/);
     await page.keyboard.up("ArrowUp");
     await waitUntilStopped(watcher, 1_000);
     await expect(page.getByRole("region", { name: "Drive" })).toContainText("RequestTimeout");

@@ -61,8 +61,9 @@ export function RobotPage({ link, list, device, shown }: RobotPageProps) {
           Chart
         </h2>
         <RobotChart model={model} live={poseComes} />
+        {poseAge !== null && <p class="chart-age">Last known, {poseAge}</p>}
         <div class="chart-foot">
-          <PoseLine model={model} live={live} age={poseAge} />
+          <PoseLine model={model} live={live} />
           {remote?.has("reset", "function") && (
             <button class="button button-quiet" type="button" onClick={() => putBack(remote)}>
               To start

@@ -8,14 +8,7 @@ import type { RobotModel } from "../robot/robot_model";
 
 const SHOW_MS = 100;
 
-export interface PoseLineProps {
-  model: RobotModel;
-  live: boolean;
-  /** Of the pose; null while it comes. */
-  age: string | null;
-}
-
-export function PoseLine({ model, live, age }: PoseLineProps) {
+export function PoseLine({ model, live }: { model: RobotModel; live: boolean }) {
   const source = useStore(model.poseSource);
   const [pose, setPose] = useState<Pose>(model.pose);
   useEffect(() => {
@@ -40,7 +33,7 @@ export function PoseLine({ model, live, age }: PoseLineProps) {
         class="note"
         title={source === "device" ? undefined : "From DistanceTraveled and AngleTraveled, since this page was opened"}
       >
-        {age !== null ? `last known, ${age}` : !live ? "last known" : source === "device" ? "" : "reckoned"}
+        {!live ? "last known" : source === "device" ? "" : "reckoned"}
       </p>
     </>
   );
