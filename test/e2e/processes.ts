@@ -16,7 +16,9 @@ export const webRoot = process.env["RRGATE_WEB_ROOT"] ?? path.join(repository, "
 /** A device's program: beside the gateway (installed) or in the build tree. */
 function deviceProgram(name: string): string {
   const folder = path.dirname(rrgate);
-  const found = [".", "../examples/demo", "../libexec/rrgate"].map((at) => path.join(folder, at, name)).find(existsSync);
+  const found = [".", "../examples/demo", "../libexec/rrgate"]
+    .map((at) => path.join(folder, at, name))
+    .find(existsSync);
   if (!found) throw new Error(`${name} is not beside ${rrgate} or in ../examples/demo; build the target ${name} first`);
   return found;
 }

@@ -72,4 +72,32 @@ test("follows a pipe, and answers a callback", async ({ page, lab }) => {
 test("a service that the device does not have is said, not shown as loading for ever", async ({ page, lab }) => {
   await page.goto(`${lab.url}#/devices/create/Nothing`);
   await expect(page.locator('[data-link="lost"]')).toContainText("No connection to create since");
+  await expect(page.locator(".bone")).toHaveCount(0);
+});
+
+test("a device that the gateway does not have is said to be missing, and not asked for again and again", async ({
+  page,
+  lab,
+}) => {
+  await page.goto(`${lab.url}#/devices/nowhere/Create`);
+  await expect(page.locator("main")).toContainText("The gateway has no device of this name.");
+  await expect(page.locator("[data-link]")).toHaveCount(0);
+  await expect(page.locator(".bone")).toHaveCount(0);
+  await page.getByRole("main").getByRole("link", { name: "All devices" }).click();
+  await expect(page.getByRole("heading", { name: "Devices" })).toBeVisible();
+});
+
+test("the fields of a memory say what they are, and its value stands below them", async ({ page, lab }) => {
+  await page.goto(`${lab.url}#/devices/webcams/Webcam/Webcams%5B0%5D`);
+  const buffer = page.locator('[data-member="buffer"]');
+  await page.getByRole("button", { name: "Call CaptureFrameToBuffer" }).click();
+  await page.getByRole("button", { name: "Measure buffer" }).click();
+  await page.getByRole("button", { name: "Read buffer" }).click();
+  const value = await buffer.locator("output").boundingBox();
+  for (const label of ["Position in buffer", "Items of buffer"]) {
+    const field = await buffer.getByLabel(label).boundingBox();
+    const words = await buffer.getByText(label).boundingBox();
+    expect(words?.width, label).toBeGreaterThan(50);
+    expect(value?.y, label).toBeGreaterThanOrEqual((field?.y ?? Infinity) + (field?.height ?? 0));
+  }
 });

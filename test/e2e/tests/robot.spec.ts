@@ -179,7 +179,9 @@ test("a snapshot comes through the camera's memory", async ({ page }) => {
 
 test("the play button makes the robot ask this page for a song", async ({ page }) => {
   await page.getByRole("button", { name: "Play a song" }).click();
-  await expect(page.getByLabel("Song")).toHaveText(/^♪( [A-G]♯?\d){7}$/);
+  const song = page.getByLabel("Song");
+  await expect(song).toHaveText(/^♪( [A-G]♯?\d){7}$/);
+  expect(await song.evaluate((element) => element.scrollWidth - element.clientWidth)).toBe(0); // nothing is cut off
 });
 
 test("says when the device is lost, disables driving, and recovers without a reload", async ({ page, lab }) => {

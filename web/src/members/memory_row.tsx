@@ -47,9 +47,8 @@ export function MemoryRow({ object, member, live }: MemberRowProps) {
       </div>
       <Failure text={measuring.failure} />
       {readable && (
-        <form class="row-line" onSubmit={read}>
+        <form class="row-line row-form" onSubmit={read}>
           <ValueInput
-            quiet
             label={`Position in ${member.name}`}
             type="uint32[]"
             text={position}
@@ -57,7 +56,6 @@ export function MemoryRow({ object, member, live }: MemberRowProps) {
             onText={setPosition}
           />
           <ValueInput
-            quiet
             label={`Items of ${member.name}`}
             type="uint32[]"
             text={count}

@@ -1,7 +1,7 @@
 // One service of one device: keeps it connected, and shows the robot's page where the object is a Create, else its members.
 // Layer: web/pages.
 
-import { useEffect, useState } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import { formatRoute } from "../app/router";
 import type { PathStep, Route } from "../app/router";
 import { useStore } from "../app/store";
@@ -20,7 +20,8 @@ type ServiceRoute = Route & { page: "service" };
 
 export function ServicePage({ route, list }: { route: ServiceRoute; list: DeviceList }) {
   const { device, service, path, view } = route;
-  const link = useLink(device, service, list);
+  const isMissing = useMissing(device, list);
+  const link = useLink(device, service, list, !isMissing);
   const robot = useRobot(link, device, service, list);
   const drives = robot && path.length === 0;
   return (
@@ -48,13 +49,27 @@ export function ServicePage({ route, list }: { route: ServiceRoute; list: Device
         </div>
       )}
       {link && (!drives || view === "members") && <MembersPage link={link} route={route} path={path} />}
+      {isMissing && (
+        <p class="empty">
+          The gateway has no device of this name. If one comes, it opens here by itself. <a href="#/">All devices</a>
+        </p>
+      )}
     </div>
   );
 }
 
-function useLink(device: string, service: string, list: DeviceList): Link | null {
+/** Whether the gateway knows no such device, and knew none since the page was opened: one that goes away stays shown. */
+function useMissing(device: string, list: DeviceList): boolean {
+  const known = devicesOf(useStore(list.state));
+  const wasThere = useRef(isUsb(device));
+  if (known?.some((d) => d.name === device)) wasThere.current = true;
+  return known !== null && !wasThere.current;
+}
+
+function useLink(device: string, service: string, list: DeviceList, isWanted: boolean): Link | null {
   const [link, setLink] = useState<Link | null>(null);
   useEffect(() => {
+    if (!isWanted) return setLink(null);
     const url = isUsb(device) ? usbUrl(device, service) : relayUrl(device, service);
     const made = new Link((signal) => openRemote(url, signal));
     setLink(made);
@@ -69,7 +84,7 @@ function useLink(device: string, service: string, list: DeviceList): Link | null
       unwatch();
       made.dispose();
     };
-  }, [device, service, list]);
+  }, [device, service, list, isWanted]);
   return link;
 }
 
@@ -116,7 +131,8 @@ function MembersPage({ link, route, path }: { link: Link; route: ServiceRoute; p
       </p>
     );
   }
-  if (!found)
+  if (!found) {
+    if (state.kind === "lost") return null; // the strip above says why
     return (
       <div class="members-loading" aria-hidden="true">
         <span class="bone" />
@@ -124,6 +140,7 @@ function MembersPage({ link, route, path }: { link: Link; route: ServiceRoute; p
         <span class="bone" />
       </div>
     );
+  }
   return (
     <ObjectView key={`${key}:${found.object.type}`} object={found.object} live={found.of === remote} route={route} />
   );

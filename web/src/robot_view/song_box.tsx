@@ -26,7 +26,7 @@ export function SongBox({ robot }: { robot: Remote | null }) {
       <button class="button button-quiet" type="button" onClick={press}>
         Play a song
       </button>
-      <output class="note" aria-label="Song">
+      <output class="chart-song" aria-label="Song">
         {text}
       </output>
     </>

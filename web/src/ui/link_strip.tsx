@@ -3,7 +3,7 @@
 
 import { useNow, useStore } from "../app/store";
 import { devicesOf } from "../gateway/devices";
-import type { DeviceList } from "../gateway/devices";
+import type { DeviceList, GatewayState } from "../gateway/devices";
 import { isUsb } from "../gateway/usb_devices";
 import type { Link, LinkState } from "../robot/link";
 import { StateBadge } from "./state_badge";
@@ -71,14 +71,8 @@ function LostDetail({
 }) {
   const now = useNow(500);
   const gateway = useStore(list.state);
-  const known = devicesOf(gateway)?.find((d) => d.name === device);
   const next = state.retryAt === null ? "trying now" : `next try in ${span(Math.max(0, state.retryAt - now) + 999)}`;
-  const why =
-    gateway.kind === "away" && !isUsb(device)
-      ? `The gateway itself does not answer (${gateway.reason}).`
-      : known && known.state !== "online"
-        ? `The gateway says: device ${known.state}${known.lastError ? `, ${known.lastError}` : ""}.`
-        : sentence(state.reason);
+  const why = isUsb(device) ? sentence(state.reason) : reasonOf(state, gateway, device);
   return (
     <>
       {why}{" "}
@@ -87,4 +81,14 @@ function LostDetail({
       </span>
     </>
   );
+}
+
+/** What the gateway says of the device tells more than the connection that failed. */
+function reasonOf(state: LinkState & { kind: "lost" }, gateway: GatewayState, device: string): string {
+  if (gateway.kind === "away") return `The gateway itself does not answer (${gateway.reason}).`;
+  const devices = devicesOf(gateway);
+  const known = devices?.find((d) => d.name === device);
+  if (devices && !known) return `The gateway has no device "${device}" any more.`;
+  if (!known || known.state === "online") return sentence(state.reason);
+  return `The gateway says: device ${known.state}${known.lastError ? `, ${known.lastError}` : ""}.`;
 }
