@@ -144,6 +144,30 @@ it("waits longer after each failure, up to a limit, and starts again after a suc
   await subscription.close();
 });
 
+it("says how long it waits, and attempts at once when it is asked to", async () => {
+  const refused = Array.from({ length: 3 }, () => new Error("refused"));
+  const connections = inTurn(...refused, await start());
+  let attempts = 0;
+  const subscription = follow((to, listener) => (++attempts, connections(to, listener)));
+  const waits: number[] = [];
+  subscription.onWaiting((milliseconds) => waits.push(milliseconds));
+  await vi.waitUntil(() => clock.waits.length > 0);
+  clock.fire();
+  await vi.waitUntil(() => clock.waits.length > 0);
+  subscription.retryNow();
+  subscription.retryNow(); // it does already
+  expect(clock.waits).toHaveLength(0);
+  await vi.waitUntil(() => clock.waits.length > 0);
+  expect(waits).toEqual([375, 750, 375]);
+  expect(attempts).toBe(3);
+  subscription.retryNow();
+  await subscription.client();
+  subscription.retryNow(); // it is connected
+  await settle();
+  expect(attempts).toBe(4);
+  await subscription.close();
+});
+
 it("tries the ways to a service in order", async () => {
   const tried: string[] = [];
   const service = await start();

@@ -1,125 +1,63 @@
 import { Link } from "../../web/src/robot/link";
-import type { Remote } from "../../web/src/robot/remote";
 
-vi.mock("rrgate-client", () => ({
-  RobotRaconteurError: class extends Error {},
-  connect: () => Promise.reject(new Error("not in this test")),
-}));
-
-interface Opening {
-  signal: AbortSignal;
-  succeed: () => Promise<FakeRemote>;
-  fail: (message: string) => Promise<void>;
+/** A subscription in the hands of the test. */
+function setup() {
+  const heard: Record<string, (news: never) => void> = {};
+  const listen = (name: string) => (listener: (news: never) => void) => (heard[name] = listener);
+  const subscription = {
+    onConnected: listen("connected"),
+    onLost: listen("lost"),
+    onFailed: listen("failed"),
+    onWaiting: listen("waiting"),
+    retryNow: vi.fn(),
+    close: vi.fn(() => Promise.resolve()),
+  };
+  const link = new Link("ws://test/devices/create?service=Create", () => subscription as never);
+  const tell = (name: string, news: unknown): void => heard[name]?.(news as never);
+  return { link, subscription, tell };
 }
 
-interface FakeRemote {
-  remote: Remote;
-  closed: () => boolean;
-  drop: (reason: string) => void;
-}
-
-function fakeRemote(): FakeRemote {
-  let heard: (reason: string) => void = () => undefined;
-  let closed = false;
-  const remote = { type: "a.B", members: [], onClose: (f: typeof heard) => (heard = f), close: () => (closed = true) };
-  return { remote: remote as unknown as Remote, closed: () => closed, drop: (reason) => heard(reason) };
-}
-
-function setup(): { link: Link; openings: Opening[] } {
-  const openings: Opening[] = [];
-  const open = (signal: AbortSignal): Promise<Remote> =>
-    new Promise((resolve, reject) => {
-      openings.push({
-        signal,
-        succeed: async () => {
-          const made = fakeRemote();
-          resolve(made.remote);
-          await vi.advanceTimersByTimeAsync(0);
-          return made;
-        },
-        fail: async (message) => {
-          reject(new Error(message));
-          await vi.advanceTimersByTimeAsync(0);
-        },
-      });
-    });
-  return { link: new Link(open, () => 0), openings };
-}
-
-function at<T>(list: readonly T[], index: number): T {
-  const found = list[index];
-  if (found === undefined) throw new Error(`no item ${index} in a list of ${list.length}`);
-  return found;
-}
+const client = { $: { type: "a.B", members: [] } };
 
 describe("link", () => {
   beforeEach(() => void vi.useFakeTimers({ now: 1_000_000 }));
   afterEach(() => void vi.useRealTimers());
 
-  it("connects at once", async () => {
-    const { link, openings } = setup();
+  it("is connecting, then online", () => {
+    const { link, tell } = setup();
     expect(link.state.value.kind).toBe("connecting");
-    await at(openings, 0).succeed();
-    expect(link.state.value).toMatchObject({ kind: "online", since: 1_000_000 });
+    tell("connected", client);
+    expect(link.state.value).toMatchObject({ kind: "online", since: 1_000_000, remote: { type: "a.B" } });
   });
-  it("says since when it is lost, through all attempts, and comes back by itself", async () => {
-    const { link, openings } = setup();
-    const first = await at(openings, 0).succeed();
-    first.drop("device create is down");
-    expect(link.state.value).toMatchObject({
+  it("says since when it is lost, and when the next attempt begins, through all attempts", () => {
+    const { link, tell } = setup();
+    tell("connected", client);
+    tell("lost", new Error("device create is down"));
+    tell("waiting", 500);
+    expect(link.state.value).toEqual({
       kind: "lost",
       since: 1_000_000,
       reason: "device create is down",
       retryAt: 1_000_500,
     });
-    await vi.advanceTimersByTimeAsync(500);
-    expect(link.state.value).toMatchObject({ kind: "lost", retryAt: null });
-    await at(openings, 1).fail("refused");
-    expect(link.state.value).toMatchObject({
-      kind: "lost",
-      since: 1_000_000,
-      reason: "refused",
-      attempts: 2,
-      retryAt: 1_001_500,
-    });
-    await vi.advanceTimersByTimeAsync(1000);
-    await at(openings, 2).succeed();
-    expect(link.state.value.kind).toBe("online");
+    vi.advanceTimersByTime(700);
+    tell("failed", new Error("refused"));
+    tell("waiting", 1000);
+    expect(link.state.value).toEqual({ kind: "lost", since: 1_000_000, reason: "refused", retryAt: 1_001_700 });
+    tell("connected", client);
+    expect(link.state.value).toMatchObject({ kind: "online", since: 1_000_700 });
   });
-  it("waits anew from the start after a success", async () => {
-    const { link, openings } = setup();
-    await at(openings, 0).fail("refused");
-    await vi.advanceTimersByTimeAsync(500);
-    (await at(openings, 1).succeed()).drop("gone");
-    expect(link.state.value).toMatchObject({ kind: "lost", retryAt: Date.now() + 500 });
-  });
-  it("tries at once when the device is back, and only once", async () => {
-    const { link, openings } = setup();
-    for (let i = 0; i < 5; i++) {
-      await at(openings, i).fail("refused");
-      if (i < 4) await vi.advanceTimersByTimeAsync(10_000);
-    }
-    link.deviceIsBack();
-    link.deviceIsBack();
+  it("tries at once when it is asked to", () => {
+    const { link, subscription, tell } = setup();
+    tell("failed", new Error("refused"));
+    tell("waiting", 10_000);
     link.retryNow();
-    expect(openings).toHaveLength(6);
-    await at(openings, 5).succeed();
-    await vi.advanceTimersByTimeAsync(60_000);
-    expect(openings).toHaveLength(6);
+    expect(subscription.retryNow).toHaveBeenCalledOnce();
+    expect(link.state.value).toMatchObject({ kind: "lost", retryAt: 1_000_000 });
   });
-  it("ends with the page: aborts an attempt, closes a connection, never tries again", async () => {
-    const attempt = setup();
-    attempt.link.dispose();
-    expect(at(attempt.openings, 0).signal.aborted).toBe(true);
-    expect((await at(attempt.openings, 0).succeed()).closed()).toBe(true);
-
-    const { link, openings } = setup();
-    const made = await at(openings, 0).succeed();
+  it("ends with the page", () => {
+    const { link, subscription } = setup();
     link.dispose();
-    link.dispose();
-    expect(made.closed()).toBe(true);
-    made.drop("closed");
-    await vi.advanceTimersByTimeAsync(60_000);
-    expect(openings).toHaveLength(1);
+    expect(subscription.close).toHaveBeenCalledOnce();
   });
 });

@@ -1,4 +1,3 @@
-import { backoffMs } from "../../web/src/robot/backoff";
 import { Driver } from "../../web/src/robot/driver";
 import { Holds } from "../../web/src/robot/holds";
 import { advance, ORIGIN, Reckoner, wrapAngle } from "../../web/src/robot/reckoning";
@@ -17,22 +16,6 @@ import {
 } from "../../web/src/robot/steering";
 import type { Direction, DriveCommand } from "../../web/src/robot/steering";
 import { Trail } from "../../web/src/robot/trail";
-
-describe("waits between attempts", () => {
-  it("double from half a second to ten seconds", () => {
-    const least = [0, 1, 2, 3].map((attempt) => backoffMs(attempt, () => 0));
-    expect(least).toEqual([500, 1000, 2000, 4000]);
-    expect(backoffMs(50, () => 0.999999)).toBe(10_000);
-    expect(backoffMs(1e9, () => 1)).toBe(10_000);
-  });
-  it("differ from page to page, on the first attempt already", () => {
-    expect(backoffMs(0, () => 0)).not.toBe(backoffMs(0, () => 0.9));
-    for (let attempt = 0; attempt < 20; attempt++) {
-      expect(backoffMs(attempt)).toBeGreaterThanOrEqual(500);
-      expect(backoffMs(attempt)).toBeLessThanOrEqual(10_000);
-    }
-  });
-});
 
 describe("dead reckoning", () => {
   it("drives straight along the heading", () => {

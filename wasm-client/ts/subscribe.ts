@@ -67,6 +67,7 @@ export class Subscription<T = RemoteObject> {
   readonly #connected = new Set<(client: Client<T>) => void>();
   readonly #lost = new Set<(reason: RobotRaconteurError) => void>();
   readonly #failed = new Set<(error: unknown, url: string) => void>();
+  readonly #waiting = new Set<(milliseconds: number) => void>();
   readonly #ended = new Set<() => void>();
 
   /** Use subscribe(). */
@@ -143,6 +144,19 @@ export class Subscription<T = RemoteObject> {
     return this.#on(this.#failed, failed);
   }
 
+  /** Calls `waiting` with the milliseconds to the next attempt each time that one is put off. */
+  onWaiting(waiting: (milliseconds: number) => void): () => void {
+    return this.#on(this.#waiting, waiting);
+  }
+
+  /** Attempts now instead of at the end of such a wait; the waits after it are short again. Else nothing happens. */
+  retryNow(): void {
+    if (!this.#stopWaiting) return;
+    this.#stopWaiting();
+    this.#backoff.reset();
+    void this.#connect();
+  }
+
   /** The newest value of a wire, over all connections. `options.path`: of the object, "*" for the root. */
   wire(member: string, options: MemberSubscriptionOptions = {}): WireSubscription {
     return new WireSubscription(this as Subscription<unknown>, this.#clock, member, options);
@@ -170,12 +184,13 @@ export class Subscription<T = RemoteObject> {
     this.#ending.abort(closedError());
     await Promise.resolve(); // whoever closes has the promise before anybody hears of it
     for (const ended of [...this.#ended]) callSafely(ended);
-    for (const listeners of [this.#connected, this.#lost, this.#failed, this.#ended]) listeners.clear();
+    for (const listeners of [this.#connected, this.#lost, this.#failed, this.#waiting, this.#ended]) listeners.clear();
     await client?.$.close();
   }
 
   /** One attempt: the first URL that works. Without any, the next attempt follows after a while. */
   async #connect(): Promise<void> {
+    this.#stopWaiting = undefined;
     const { signal: _, ...options } = this.#options;
     const { signal } = this.#ending;
     for (const url of await this.#ways()) {
@@ -223,7 +238,9 @@ export class Subscription<T = RemoteObject> {
 
   #retry(): void {
     if (this.isClosed) return;
-    this.#stopWaiting = this.#clock.after(this.#backoff.next(), () => void this.#connect());
+    const wait = this.#backoff.next();
+    this.#stopWaiting = this.#clock.after(wait, () => void this.#connect());
+    for (const waiting of [...this.#waiting]) callSafely(() => waiting(wait));
   }
 
   #on<F>(listeners: Set<F>, listener: F): () => void {

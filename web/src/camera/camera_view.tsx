@@ -7,7 +7,7 @@ import { useStore } from "../app/store";
 import { devicesOf, relayUrl } from "../gateway/devices";
 import type { DeviceList, GatewayState } from "../gateway/devices";
 import { Link } from "../robot/link";
-import { explain, openRemote } from "../robot/remote";
+import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
 import { drawFrame } from "./draw_frame";
 import { Snapshot } from "./snapshot";
@@ -69,7 +69,7 @@ function Camera({ place, shown }: { place: Place; shown: boolean }) {
   const [link, setLink] = useState<Link | null>(null);
   useEffect(() => {
     const url = relayUrl(place.device, place.service);
-    const made = new Link((signal) => openRemote(url, signal));
+    const made = new Link(url);
     setLink(made);
     return () => made.dispose();
   }, [place.device, place.service]);

@@ -9,7 +9,7 @@ import { devicesOf, relayUrl } from "../gateway/devices";
 import type { DeviceList } from "../gateway/devices";
 import { isUsb, usbUrl } from "../gateway/usb_devices";
 import { Link } from "../robot/link";
-import { explain, openRemote } from "../robot/remote";
+import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
 import { isCreate } from "../robot/robot_model";
 import { LinkStrip } from "../ui/link_strip";
@@ -71,13 +71,13 @@ function useLink(device: string, service: string, list: DeviceList, isWanted: bo
   useEffect(() => {
     if (!isWanted) return setLink(null);
     const url = isUsb(device) ? usbUrl(device, service) : relayUrl(device, service);
-    const made = new Link((signal) => openRemote(url, signal));
+    const made = new Link(url);
     setLink(made);
     let wasOnline = true;
     const unwatch = list.state.watch((gateway) => {
       const known = gateway.kind === "known" && gateway.devices.find((d) => d.name === device);
       const isOnline = known !== false && known?.state === "online";
-      if (isOnline && !wasOnline) made.deviceIsBack();
+      if (isOnline && !wasOnline) made.retryNow();
       wasOnline = isOnline;
     });
     return () => {

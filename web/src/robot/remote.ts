@@ -1,8 +1,8 @@
 // The part of `rrgate-client` that this page uses, by name: members appear only at run time, so they are looked up
 // and checked here, once, instead of being cast all over the pages.
-// Layer: web/robot. Beside gateway/usb_devices.ts the only file that imports `rrgate-client`.
+// Layer: web/robot. Beside link.ts and gateway/usb_devices.ts the only file that imports `rrgate-client`.
 
-import { connect, RobotRaconteurError } from "rrgate-client";
+import { RobotRaconteurError } from "rrgate-client";
 import type { CallOptions, DynamicMember, MemberInfo, MemberKind, RemoteObject } from "rrgate-client";
 
 export type Member = MemberInfo;
@@ -30,13 +30,6 @@ export interface Remote {
   /** @returns a function that unsubscribes. */
   on(name: string, heard: (...args: unknown[]) => void): () => void;
   child(name: string, index?: string | number): Promise<Remote>;
-  onClose(heard: (reason: string) => void): void;
-  close(): void;
-}
-
-/** Opens a service. @throws Error with a sentence for people; see `explain` for the names behind it. */
-export async function openRemote(url: string, signal: AbortSignal): Promise<Remote> {
-  return wrap(await connect(url, { signal, timeout: 10_000 }));
 }
 
 /** One sentence for any failure; errors of a device keep the name of their Robot Raconteur exception. */
@@ -48,7 +41,7 @@ export function explain(error: unknown): string {
   return error instanceof Error ? error.message : String(error);
 }
 
-function wrap(object: RemoteObject): Remote {
+export function remoteOf(object: RemoteObject): Remote {
   const info = object.$;
   // By name through `$`: a definition may call a member "then" or "toString".
   const member = (name: string): DynamicMember => {
@@ -74,11 +67,7 @@ function wrap(object: RemoteObject): Remote {
     poke: async (name, value) => member(name).poke(value),
     on: (name, heard) => member(name).on(heard),
     child: async (name, index) =>
-      wrap(await (index === undefined ? member(name).get<RemoteObject>() : member(name).get(index))),
-    onClose: (heard) => void info.onClose((reason) => heard(reason ? explain(reason) : "the connection was closed")),
-    close: () => {
-      info.close().catch(() => undefined); // it ends either way; there is nobody left to tell
-    },
+      remoteOf(await (index === undefined ? member(name).get<RemoteObject>() : member(name).get(index))),
   };
 }
 

@@ -35,13 +35,7 @@ export function LinkStrip({ link, list, device, service }: LinkStripProps) {
           {lost ? <LostDetail state={state} list={list} device={device} /> : detail(state, device)}
         </p>
       </div>
-      <button
-        class="button"
-        type="button"
-        hidden={!lost}
-        disabled={lost && state.retryAt === null}
-        onClick={() => link.retryNow()}
-      >
+      <button class="button" type="button" hidden={!lost} onClick={() => link.retryNow()}>
         Try now
       </button>
     </section>
@@ -71,7 +65,7 @@ function LostDetail({
 }) {
   const now = useNow(500);
   const gateway = useStore(list.state);
-  const next = state.retryAt === null ? "trying now" : `next try in ${span(Math.max(0, state.retryAt - now) + 999)}`;
+  const next = state.retryAt <= now ? "trying now" : `next try in ${span(state.retryAt - now + 999)}`;
   const why = isUsb(device) ? sentence(state.reason) : reasonOf(state, gateway, device);
   return (
     <>
