@@ -1,14 +1,16 @@
 #include "node/service/node.hpp"
 
 #include <algorithm>
+#include <boost/asio/bind_cancellation_slot.hpp>
+#include <boost/asio/cancellation_signal.hpp>
 #include <boost/asio/co_spawn.hpp>
-#include <boost/asio/detached.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <iostream>
 #include <map>
 #include <optional>
+#include <set>
 #include <system_error>
 
 #include "core/discovery/announcement.hpp"
@@ -101,6 +103,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
         stop_timer_(io_) {}
 
   ~Implementation() {
+    alive_.reset();
     close_listeners();
     stop_timer_.cancel();
     for (const auto& service : services_) service->detach();
@@ -183,8 +186,8 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     for (const auto& [id, client] : clients) client->close_service();
     if (clients_.empty()) return stopped();
     stop_timer_.expires_after(stop_deadline);
-    stop_timer_.async_wait([this](const error_code& error) {
-      if (error) return;
+    stop_timer_.async_wait([this, alive = std::weak_ptr(alive_)](const error_code& error) {
+      if (error || alive.expired()) return;
       const auto stubborn = clients_;
       for (const auto& [id, client] : stubborn)
         client->close(make_error(ErrorCode::connection_error, "the node stops"));
@@ -287,6 +290,8 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   }
 
  private:
+  using Arrival = std::shared_ptr<asio::cancellation_signal>;
+
   /// Clients that are lost while they are sent to, or by what handlers do then, leave clients_ meanwhile.
   template <class F>
   void for_clients_of(const Service& service, F&& what) {
@@ -301,31 +306,39 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     error_code error;
     const auto local = socket.local_endpoint(error);
     if (error) return;  // gone already
-    if (clients_.size() + arriving_ >= options_.max_clients) return;
-    ++arriving_;
+    if (is_full()) return;
     auto stream = make_tcp_stream(std::move(socket), send_stall);
     std::string host = local.address().to_string();
     host.resize(std::min(host.size(), host.find('%')));  // the zone is what this machine calls the link
-    asio::co_spawn(io_, welcome(std::move(stream), format_host_port(host, local.port()), requires_tls), asio::detached);
+    const auto arrival = std::make_shared<asio::cancellation_signal>();
+    arriving_.insert(arrival);
+    const auto keep = [arrival](std::exception_ptr) {};  // the coroutine uses the slot until this is called
+    asio::co_spawn(io_, welcome(std::move(stream), format_host_port(host, local.port()), requires_tls, arrival, alive_),
+                   asio::bind_cancellation_slot(arrival->slot(), keep));
   }
 
   /// From this machine: nothing has to be found out first.
   void accept_near(std::unique_ptr<ByteStream> stream, std::string scheme) {
-    if (is_stopping_ || clients_.size() + arriving_ >= options_.max_clients) return;
+    if (is_stopping_ || is_full()) return;
     Accepted accepted;
     accepted.stream = std::move(stream);
     accepted.scheme = std::move(scheme);
     add_client(std::move(accepted), "");
   }
 
-  awaitable<void> welcome(std::unique_ptr<ByteStream> stream, std::string local, bool requires_tls) {
+  bool is_full() const { return clients_.size() + arriving_.size() >= options_.max_clients; }
+
+  /// `alive`  the node may go while a client says nothing.
+  awaitable<void> welcome(std::unique_ptr<ByteStream> stream, std::string local, bool requires_tls, Arrival arrival,
+                          std::weak_ptr<const bool> alive) {
     AcceptOptions how;
     how.allowed_origins = options_.allowed_origins;
     how.self = identity();
     how.tls = options_.tls;
     how.requires_tls = requires_tls;
     auto accepted = co_await accept_stream(std::move(stream), std::move(how));
-    --arriving_;
+    if (alive.expired()) co_return;
+    arriving_.erase(arrival);
     if (!accepted && accepted.error().code == ErrorCode::authentication_error) report(accepted.error().message);
     if (accepted && !is_stopping_) add_client(std::move(*accepted), local);
   }
@@ -359,6 +372,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     local_.reset();
     intra_.reset();
     listens_.clear();
+    for (const auto& arrival : std::exchange(arriving_, {})) arrival->emit(asio::cancellation_type::terminal);
     for (const auto& job : repeats_) {
       job->is_stopped = true;
       job->timer.cancel();
@@ -380,10 +394,11 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   std::vector<ListenUrl> listens_;  ///< of the listeners: addresses with their true ports
   std::vector<std::shared_ptr<Repeat>> repeats_;
   std::map<ClientId, std::shared_ptr<ServiceClient>> clients_;
-  std::size_t arriving_ = 0;  ///< connections whose first bytes are awaited
+  std::set<Arrival> arriving_;  ///< connections whose first bytes are awaited
   ClientId last_client_id_ = 0;
   ClientId current_client_ = 0;
   bool is_stopping_ = false;
+  std::shared_ptr<const bool> alive_ = std::make_shared<const bool>(true);  ///< gone: handlers keep away from the node
   asio::steady_timer stop_timer_;
   asio::signal_set* signals_ = nullptr;
   LoginJudge judge_;

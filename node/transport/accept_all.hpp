@@ -20,11 +20,11 @@ awaitable<void> accept_all(std::shared_ptr<Acceptor> acceptor, OnAccept on_accep
   boost::asio::steady_timer pause(acceptor->get_executor());
   while (acceptor->is_open()) {
     auto [error, socket] = co_await acceptor->async_accept(await_tuple);
+    if (!acceptor->is_open()) break;  // whom to hand it to is gone as well
     if (!error) {
       on_accept(std::move(socket));
       continue;
     }
-    if (error == boost::asio::error::operation_aborted) break;
     // Out of descriptors or memory: accepting again at once would spin.
     on_problem("accept: " + error.message());
     pause.expires_after(std::chrono::milliseconds(200));

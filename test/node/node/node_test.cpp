@@ -367,3 +367,20 @@ TEST_CASE("a node on somebody else's io_context goes away while clients are conn
   CHECK(counter.gone.empty());
   io.run();
 }
+
+TEST_CASE("a node may go while somebody who has connected says nothing yet: he is let go at once") {
+  boost::asio::io_context io;
+  auto node = std::make_unique<Node>(io, "test.node");
+  const auto port = node->listen("rr+tcp://127.0.0.1:0");
+  boost::asio::ip::tcp::socket silent(io);
+  silent.connect({boost::asio::ip::make_address("127.0.0.1"), port});
+  io.poll();
+  io.poll();
+  node.reset();
+  bool is_let_go = false;
+  char byte = 0;
+  silent.async_read_some(boost::asio::buffer(&byte, 1),
+                         [&](const boost::system::error_code& error, std::size_t) { is_let_go = bool(error); });
+  io.run_for(2s);  // a node waits for 5 s
+  CHECK(is_let_go);
+}
