@@ -34,7 +34,8 @@ struct NodeOptions {
   bool local_is_public = false;
   /// None: as the reference on each transport (heartbeat_of()).
   std::optional<Heartbeat> heartbeat = {};
-  /// A sentence about something that went wrong and that no client hears of; the default writes it to stderr.
+  /// A sentence about something that went wrong by mistake, as a handler that threw what is no rr::Exception; the
+  /// default writes it to stderr.
   std::function<void(const std::string& problem)> report = {};
 };
 

@@ -231,10 +231,11 @@ Result<std::shared_ptr<ServiceObject>> Object::find_child(const MemberDefinition
   std::shared_ptr<Object> child;
   try {
     child = found->second.find(index ? std::string_view(*index) : std::string_view{});
-  } catch (const Exception& exception) {
-    return exception.error();
-  } catch (const std::exception& exception) {
-    return make_error(ErrorCode::object_not_found, exception.what());
+  } catch (...) {
+    auto error = handler_error(std::current_exception());
+    if (!is_unhandled(error)) return error;
+    if (service_.host_) service_.host_->report(describe_failure("objref", objref.name, error));
+    return make_error(ErrorCode::object_not_found, std::move(error.message));
   }
   if (child && !may_stand_behind(*service_.types_, child->type_name(), objref))
     return make_error(ErrorCode::internal_error, "objref '" + objref.name + "' is " + format_type(objref.type) +

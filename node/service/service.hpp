@@ -11,7 +11,7 @@
 // Handlers take and return C++ numbers, bool, enums, std::string, std::vector of numbers, or rr::Value for anything
 // else (Value accepts all of them). They run on the node's thread. A handler may throw rr::ServiceException to send an
 // error to the client; exceptions that are no rr::Exception reach it as code 100, "rrgate.UnhandledException", with
-// their text.
+// their text, and are reported (NodeOptions::report).
 //
 // Handlers are checked against the definition before anything listens: one that does not fit (no such member, wrong
 // kind, wrong parameter type or count) is a std::invalid_argument where it is set, one that is missing where the
@@ -254,6 +254,8 @@ class ServiceHost {
                              const MemberDefinition& callback, std::span<const Value> arguments, CallbackDone done) = 0;
   virtual ClientId current_client() const = 0;
   virtual Caller find_client(ClientId id) const = 0;
+  /// A handler failed by mistake.
+  virtual void report(const std::string& problem) = 0;
 
  protected:
   ~ServiceHost() = default;

@@ -1,7 +1,5 @@
 #include "node/service/service_client.hpp"
 
-#include <exception>
-#include <optional>
 #include <stdexcept>
 #include <variant>
 
@@ -9,19 +7,9 @@ namespace rr {
 
 namespace {
 
-Error error_of(const std::exception& exception) {
-  if (const auto* known = dynamic_cast<const Exception*>(&exception)) return known->error();
-  return {ErrorCode::remote_error, exception.what(), "rrgate.UnhandledException"};
-}
-
 /// As reply() wants it: the end, and whatever else is no value, is an error.
 Result<Value> next_value(const Generator& generator, std::span<const Value> arguments) {
-  Result<std::optional<Value>> value = std::nullopt;
-  try {
-    value = generator.next(arguments.empty() ? Value{} : arguments.front());
-  } catch (const std::exception& exception) {
-    return error_of(exception);
-  }
+  auto value = generator.next(arguments.empty() ? Value{} : arguments.front());
   if (!value) return value.error();
   if (!*value) return make_error(ErrorCode::stop_iteration, {});
   return std::move(**value);
@@ -76,15 +64,33 @@ void ServiceClient::ended() {
 }
 
 void ServiceClient::handle(const Called& called, Now now) {
-  owner_->set_current_client(id_);
   Result<Value> answer = Value{};
-  try {
+  auto failure = run_handler(member_kind_name(called.member->kind), called.member->name, [&] {
     answer = called.generator != 0 ? answer_generator(called) : static_cast<Object&>(*called.object).answer(called);
-  } catch (const std::exception& exception) {
-    answer = error_of(exception);
-  }
-  if (owner_) owner_->set_current_client(0);
+  });
+  if (failure) answer = std::move(*failure);
   session_.reply(called.id, answer, now);
+}
+
+template <class F>
+std::optional<Error> ServiceClient::run_handler(std::string_view kind, std::string_view name, F&& handler) {
+  std::optional<Error> failure;
+  owner_->set_current_client(id_);
+  try {
+    handler();
+  } catch (...) {
+    failure = handler_error(std::current_exception());
+  }
+  if (!owner_) return failure;
+  owner_->set_current_client(0);
+  if (failure && is_unhandled(*failure)) owner_->report(describe_failure(kind, name, *failure));
+  return failure;
+}
+
+template <class F>
+void ServiceClient::notify(std::string_view kind, std::string_view name, F&& handler) {
+  const auto failure = run_handler(kind, name, handler);
+  if (failure && owner_ && !is_unhandled(*failure)) owner_->report(describe_failure(kind, name, *failure));
 }
 
 /// Generators end here when they say so, and in GeneratorEnded when the session does.
@@ -96,10 +102,15 @@ Result<Value> ServiceClient::answer_generator(const Called& called) {
     return Value{};
   }
   if (called.kind == CallKind::generator_next) {
-    const auto found = generators_.find(called.generator);
-    if (found == generators_.end()) return make_error(ErrorCode::invalid_operation, "Invalid generator");
-    auto value = next_value(found->second, called.arguments);
-    if (!value) generators_.erase(found);
+    // Out of the map while it runs: an exception ends it, and the client may go meanwhile.
+    auto running = generators_.extract(called.generator);
+    if (!running) return make_error(ErrorCode::invalid_operation, "Invalid generator");
+    auto value = next_value(running.mapped(), called.arguments);
+    if (!value) return value;
+    if (!is_closed())
+      generators_.insert(std::move(running));
+    else if (owner_)
+      abandon_generator(running.mapped());
     return value;
   }
   auto ended = generators_.extract(called.generator);
@@ -110,7 +121,7 @@ Result<Value> ServiceClient::answer_generator(const Called& called) {
 }
 
 void ServiceClient::abandon_generator(const Generator& generator) {
-  if (generator.abort) run_handler("a generator's", "abort", generator.abort);
+  if (generator.abort) notify("a generator's", "abort", generator.abort);
 }
 
 void ServiceClient::handle(const GeneratorEnded& ended, Now) {
@@ -119,7 +130,9 @@ void ServiceClient::handle(const GeneratorEnded& ended, Now) {
 
 void ServiceClient::handle(const ClientConnected& connected, Now) {
   service_ = owner_->find_service(*connected.service);
-  if (service_ && service_->on_connected_) service_->on_connected_(id_);
+  if (!service_ || !service_->on_connected_) return;
+  const auto handler = service_->on_connected_;  // it may replace itself
+  notify("a client of service", service_->name(), [&] { handler(id_); });
 }
 
 void ServiceClient::handle(const LoginRequested& login, Now) {
@@ -145,19 +158,8 @@ void ServiceClient::handle(const WireConnected& connected, Now now) {
   if (value) (void)session_.send_wire(connected.path, *connected.member, *value, now);  // checked when it was set
 }
 
-template <class F>
-void ServiceClient::run_handler(const char* kind, const std::string& member, F&& handler) {
-  owner_->set_current_client(id_);
-  try {
-    handler();
-  } catch (const std::exception& exception) {
-    if (owner_) owner_->report(std::string(kind) + " '" + member + "': its handler failed: " + exception.what());
-  }
-  if (owner_) owner_->set_current_client(0);
-}
-
 void ServiceClient::handle(const WireReceived& received, Now) {
-  run_handler("wire", received.member->name, [&] { static_cast<Object&>(*received.object).receive_wire(received); });
+  notify("wire", received.member->name, [&] { static_cast<Object&>(*received.object).receive_wire(received); });
 }
 
 // --- pipes ---
@@ -170,14 +172,9 @@ void ServiceClient::handle(const PipeConnected& connected, Now now) {
                                .member = connected.member,
                                .index = connected.index});
   pipes_.emplace(connected.id, endpoint);
-  std::optional<Error> refusal;
-  owner_->set_current_client(id_);
-  try {
+  const auto refusal = run_handler("pipe", connected.member->name, [&] {
     static_cast<Object&>(*connected.object).connect_pipe(*connected.member, endpoint);
-  } catch (const std::exception& exception) {
-    refusal = error_of(exception);
-  }
-  if (owner_) owner_->set_current_client(0);
+  });
   if (!refusal) return session_.accept_pipe(connected.id, now);
   session_.refuse_pipe(connected.id, *refusal, now);
   close_pipe(connected.id);  // where the handler has sent something, which lets the client in
@@ -188,7 +185,7 @@ void ServiceClient::handle(const PipeReceived& received, Now) {
   if (found == pipes_.end()) return;
   const PipeEndpoint endpoint = found->second;  // the handler may close it
   const auto& member = *endpoint.state_->member;
-  run_handler("pipe", member.name, [&] {
+  notify("pipe", member.name, [&] {
     auto& object = static_cast<Object&>(*endpoint.state_->object);
     if (auto fits = object.receive_packet(member, endpoint, received.value); !fits)
       throw std::invalid_argument(fits.error().message);
@@ -225,7 +222,7 @@ void ServiceClient::end_pipe(PipeId id, bool tells_handler) {
   const auto object = std::exchange(found.mapped().state_->object, nullptr);
   const auto close = [&] { static_cast<Object&>(*object).close_pipe(*state.member, found.mapped(), tells_handler); };
   if (tells_handler)
-    run_handler("pipe", state.member->name, close);
+    notify("pipe", state.member->name, close);
   else
     close();
 }
@@ -240,7 +237,7 @@ void ServiceClient::call_callback(const std::string& path, const MemberDefinitio
   } else {
     // Not before the caller has returned: nobody expects an answer in the middle of a call.
     post([this, self = shared_from_this(), name = callback.name, done = std::move(done), error = called.error()] {
-      if (owner_) run_handler("callback", name, [&] { done(error); });
+      if (owner_) notify("callback", name, [&] { done(error); });
     });
   }
   settle();
@@ -249,7 +246,7 @@ void ServiceClient::call_callback(const std::string& path, const MemberDefinitio
 void ServiceClient::handle(const CallbackCompleted& completed, Now) {
   auto found = callbacks_.extract(completed.id);
   if (!found || !found.mapped().done) return;
-  run_handler("callback", found.mapped().member->name, [&] { found.mapped().done(completed.result); });
+  notify("callback", found.mapped().member->name, [&] { found.mapped().done(completed.result); });
 }
 
 void ServiceClient::handle(const ClientGone&, Now) {
@@ -257,7 +254,9 @@ void ServiceClient::handle(const ClientGone&, Now) {
   for (const auto& [id, generator] : std::exchange(generators_, {}))
     if (owner_) abandon_generator(generator);
   Service* const left = std::exchange(service_, nullptr);
-  if (left && left->on_gone_) left->on_gone_(id_);
+  if (!left || !owner_ || !left->on_gone_) return;
+  const auto handler = left->on_gone_;
+  notify("a lost client of service", left->name(), [&] { handler(id_); });
 }
 
 }  // namespace rr

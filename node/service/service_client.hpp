@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string_view>
 #include <unordered_map>
 
@@ -19,7 +20,7 @@ class ServiceClientOwner {
  public:
   virtual Service* find_service(const HostedService& hosted) = 0;
   virtual void set_current_client(ClientId id) = 0;  ///< 0: no handler runs
-  /// A handler failed and no client waits for the answer.
+  /// A handler failed by mistake, or no client waits for its answer.
   virtual void report(const std::string& problem) = 0;
   /// Has the login judged, away from the node's thread, and answers it with client.answer_login() unless that is gone.
   virtual void judge_login(const LoginRequested& login, const std::shared_ptr<ServiceClient>& client) = 0;
@@ -81,9 +82,12 @@ class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSe
   void close_pipe(PipeId id) override;
   std::size_t queued_bytes() const override { return session_.queued_bytes(); }
   void end_pipe(PipeId id, bool tells_handler);
-  /// Runs a handler whose failure no client waits for.
+  /// Runs a handler for this client. Returns what it threw, which is reported where it was not thrown for the client.
   template <class F>
-  void run_handler(const char* kind, const std::string& member, F&& handler);
+  std::optional<Error> run_handler(std::string_view kind, std::string_view name, F&& handler);
+  /// The same where no client waits for the outcome: whatever it throws is reported.
+  template <class F>
+  void notify(std::string_view kind, std::string_view name, F&& handler);
 
   ClientId id_;
   ServiceClientOwner* owner_;

@@ -1,0 +1,150 @@
+// Handlers that throw: an error for who called, a line in the report, and the connection goes on.
+#include <catch2/catch.hpp>
+#include <mutex>
+
+#include "node/client/async_object.hpp"
+#include "test/node/node/node_fixture.hpp"
+
+using namespace rr;
+using namespace std::chrono_literals;
+using Catch::Matchers::VectorContains;
+
+namespace {
+
+constexpr const char* definition = R"(service test.fragile
+stdver 0.10
+object Part
+end
+object Fragile
+    property int32 level
+    function int32 twice(int32 number)
+    function int32{generator} count()
+    function void stop_counting(int32{generator} numbers)
+    function int32 ask(int32 number)
+    event struck(int32 number)
+    wire int32 both
+    pipe int32 both_ways
+    memory uint8[] cells
+    callback int32 guess(int32 number)
+    objref Part{int32} parts
+end
+)";
+
+/// What a node or a client reports; any thread.
+class Reports {
+ public:
+  std::function<void(const std::string&)> sink() {
+    return [this](const std::string& problem) {
+      const std::lock_guard lock(mutex_);
+      texts_.push_back(problem);
+    };
+  }
+  std::vector<std::string> texts() {
+    const std::lock_guard lock(mutex_);
+    return texts_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::string> texts_;
+};
+
+/// Throws what is no std::exception where the number is negative.
+std::int32_t twice(std::int32_t number) {
+  if (number == 0) throw std::runtime_error("nothing to double");
+  if (number < 0) throw number;
+  return 2 * number;
+}
+
+std::shared_ptr<Service> make_fragile() {
+  auto made = Service::from_text({definition}, "Fragile", "Fragile");
+  auto* service = made.get();
+  service->property("level").get([] { return twice(-1); }).set([](std::int32_t level) { twice(level); });
+  service->function("twice", [service](std::int32_t number) {
+    service->fire("struck", number);
+    service->set_wire("both", number);
+    service->pipe("both_ways").broadcast(number);
+    return twice(number);
+  });
+  service->generator("count", [] { return [] { return std::optional<std::int32_t>(twice(-1)); }; });
+  service->generator("stop_counting", [] { return [](std::int32_t) {}; });
+  service->function("ask", [service](std::int32_t number) {
+    service->call_callback(service->current_client(), "guess", {Value(number)}, [service](const Result<Value>& answer) {
+      service->fire("struck", answer ? *answer->to<std::int32_t>() : -static_cast<std::int32_t>(answer.error().code));
+    });
+    return number;
+  });
+  service->on_wire("both", [](std::int32_t number) { twice(number); });
+  service->pipe("both_ways").on_packet([](const PipeEndpoint&, std::int32_t number) { twice(number); });
+  MemoryHandlers cells;
+  cells.dimensions = [] { return MemoryShape{4}; };
+  cells.read = [](const MemoryRange&) -> Value { throw 5; };
+  cells.write = [](const MemoryRange&, const Value&) { throw std::runtime_error("read only glass"); };
+  service->memory("cells", cells);
+  service->objref("parts", [](std::string_view) -> std::shared_ptr<Object> { throw 6; });
+  return made;
+}
+
+struct FragileNode {
+  Reports reports;
+  std::shared_ptr<Service> service = make_fragile();
+  RunningNode node;
+
+  explicit FragileNode(std::size_t max_clients = 16)
+      : node([this](Node& made) { made.add(service); }, options(max_clients)) {}
+  NodeOptions options(std::size_t max_clients) {
+    NodeOptions made;
+    made.report = reports.sink();
+    made.max_clients = max_clients;
+    return made;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a service's handlers may throw anything: each is an error for its client, who stays") {
+  FragileNode device;
+  const auto fragile = connect(device.node.url("Fragile"));
+  const auto code_of = [&](auto&& work) { return error_of(work).code; };
+  CHECK(code_of([&] { fragile.get("level"); }) == ErrorCode::remote_error);
+  CHECK(code_of([&] { fragile.set("level", 0); }) == ErrorCode::remote_error);
+  CHECK(code_of([&] { fragile.call("twice", -1); }) == ErrorCode::remote_error);
+  CHECK(code_of([&] { fragile.generator("count").next(); }) == ErrorCode::remote_error);
+  CHECK(code_of([&] { fragile.poke_out("both", -1); }) == ErrorCode::remote_error);
+  const auto cells = fragile.memory("cells");
+  CHECK(code_of([&] { cells.read({0}, {1}); }) == ErrorCode::remote_error);
+  CHECK(error_of([&] { cells.write({0}, Value(std::vector<std::uint8_t>{1})); }).message == "read only glass");
+  CHECK(code_of([&] { fragile.object("parts", "1"); }) == ErrorCode::object_not_found);
+  fragile.connect_wire("both", [](const Value&, TimeSpec) {});
+  fragile.send_wire("both", -1);
+  const auto pipe = fragile.connect_pipe("both_ways", [](const Value&) {});
+  pipe.send(Value(-1));
+  CHECK(fragile.call("twice", 4) == Value(8));
+
+  const std::string other = "an exception that is no std::exception";
+  const auto failed = [](const std::string& what, const std::string& why) {
+    return what + ": its handler failed: " + why;
+  };
+  CHECK(device.reports.texts() ==
+        std::vector<std::string>{failed("property 'level'", other), failed("property 'level'", "nothing to double"),
+                                 failed("function 'twice'", other), failed("function 'count'", other),
+                                 failed("wire 'both'", other), failed("memory 'cells'", other),
+                                 failed("memory 'cells'", "read only glass"), failed("objref 'parts'", other),
+                                 failed("wire 'both'", other), failed("pipe 'both_ways'", other)});
+}
+
+TEST_CASE("a service that throws when clients come and go keeps them, and gives up their seats") {
+  FragileNode device(1);
+  device.service->on_client_connected([](ClientId) { throw std::runtime_error("who is that?"); });
+  device.service->on_client_gone([](ClientId) { throw 7; });
+  {
+    const auto first = connect(device.node.url("Fragile"));
+    CHECK(first.call("twice", 4) == Value(8));
+  }
+  const auto second = connect(device.node.url("Fragile"));  // the only seat
+  CHECK(second.call("twice", 4) == Value(8));
+  const auto reports = device.reports.texts();
+  REQUIRE(reports.size() == 3);
+  CHECK(reports[0] == "a client of service 'Fragile': its handler failed: who is that?");
+  CHECK(reports[1] == "a lost client of service 'Fragile': its handler failed: an exception that is no std::exception");
+}
