@@ -39,7 +39,8 @@ BlockingConnection::BlockingConnection(std::string_view url, ConnectOptions opti
     else
       failure = opened.error();
   });
-  while (!connection_ && !failure) io_.run_one();
+  while (!connection_ && !failure && io_.run_one() != 0) {
+  }
   if (failure) throw ClientException(*failure);
   connection_->on_closed([this](const Error& reason) { close_reason_ = reason; });
 }
@@ -69,7 +70,9 @@ Value BlockingConnection::wait_for(const std::function<void(ClientConnection&, C
   std::optional<Result<Value>> result;
   start(*connection_, [&](Result<Value> completed) { result = std::move(completed); });
   io_.restart();
-  while (!result) io_.run_one();
+  while (!result && io_.run_one() != 0) {
+  }
+  if (!result) throw ClientException(make_error(ErrorCode::connection_error, "the connection is gone"));
   if (!*result) throw ClientException(result->error());
   return std::move(**result);
 }

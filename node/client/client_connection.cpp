@@ -3,11 +3,13 @@
 #include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/post.hpp>
+#include <iostream>
 #include <variant>
 
 #include "core/session/service_path.hpp"
 #include "core/session/url.hpp"
 #include "core/support/random.hpp"
+#include "node/values/exception.hpp"
 
 namespace rr {
 
@@ -51,10 +53,12 @@ void ClientOpening::cancel() {
     connection->close(make_error(ErrorCode::operation_cancelled, "connecting was given up"));
 }
 
-ClientConnection::ClientConnection(std::unique_ptr<ByteStream> stream, ClientOptions options, Opened opened)
-    : SessionDriver(std::move(stream), std::move(options), read_clocks()), opened_(std::move(opened)) {}
+ClientConnection::ClientConnection(std::unique_ptr<ByteStream> stream, ConnectOptions options, Opened opened)
+    : SessionDriver(std::move(stream), std::move(static_cast<ClientOptions&>(options)), read_clocks()),
+      report_(std::move(options.report)),
+      opened_(std::move(opened)) {}
 
-void ClientConnection::open(std::unique_ptr<ByteStream> stream, ClientOptions options, Opened done) {
+void ClientConnection::open(std::unique_ptr<ByteStream> stream, ConnectOptions options, Opened done) {
   options.connection.known_peer = stream->verified_peer();
   if (options.connection.self.id.is_any()) options.connection.self.id = random_node_id();
   std::make_shared<ClientConnection>(std::move(stream), std::move(options), std::move(done))->start();
@@ -284,59 +288,82 @@ bool ClientConnection::handle_event(Now) {
   return true;
 }
 
+template <class F>
+void ClientConnection::run_handler(std::string_view kind, std::string_view name, F&& handler) {
+  try {
+    handler();
+  } catch (...) {
+    report(describe_failure(kind, name, handler_error(std::current_exception())));
+  }
+}
+
+void ClientConnection::report(const std::string& problem) const {
+  if (report_)
+    report_(problem);
+  else
+    std::cerr << "client of " << session_.service() << ": " << problem << '\n';
+}
+
 void ClientConnection::handle(Connected&&) {
   const Opened opened = std::exchange(opened_, nullptr);
-  opened(std::static_pointer_cast<ClientConnection>(shared_from_this()));
+  run_handler("connecting to", session_.service(),
+              [&] { opened(std::static_pointer_cast<ClientConnection>(shared_from_this())); });
 }
 
 void ClientConnection::handle(Completed&& completed) {
   auto found = completions_.extract(completed.id);
-  if (!found.empty() && found.mapped()) found.mapped()(std::move(completed.result));
+  if (found.empty() || !found.mapped()) return;
+  run_handler("request to", session_.service(), [&] { found.mapped()(std::move(completed.result)); });
 }
 
 void ClientConnection::handle(EventReceived&& received) {
-  const auto found = event_handlers_.find({std::move(received.path), std::move(received.member)});
+  const MemberKey key{std::move(received.path), std::move(received.member)};
+  const auto found = event_handlers_.find(key);
   if (found == event_handlers_.end()) return;
   const auto handler = found->second;  // it may replace itself
-  (*handler)(received.arguments);
+  run_handler("event", key.second, [&] { (*handler)(received.arguments); });
 }
 
 void ClientConnection::handle(WireValueReceived&& received) {
-  const auto found = wire_handlers_.find({std::move(received.path), std::move(received.member)});
+  const MemberKey key{std::move(received.path), std::move(received.member)};
+  const auto found = wire_handlers_.find(key);
   if (found == wire_handlers_.end()) return;
   const auto handler = found->second;
-  (*handler)(received.value, received.time);
+  run_handler("wire", key.second, [&] { (*handler)(received.value, received.time); });
 }
 
 void ClientConnection::handle(WireClosedByService&& closed) {
   const MemberKey key{std::move(closed.path), std::move(closed.member)};
   wire_handlers_.erase(key);
   const auto found = wire_closed_handlers_.extract(key);
-  if (found && found.mapped()) found.mapped()();
+  if (found && found.mapped()) run_handler("wire", key.second, found.mapped());
 }
 
 void ClientConnection::handle(PipePacketReceived&& received) {
-  const auto found = pipe_handlers_.find({std::move(received.path), std::move(received.member), received.index});
+  const PipeKey key{std::move(received.path), std::move(received.member), received.index};
+  const auto found = pipe_handlers_.find(key);
   if (found == pipe_handlers_.end()) return;
   const auto handlers = found->second;  // it may disconnect
-  if (handlers->received) handlers->received(std::move(received.value));
+  if (handlers->received) run_handler("pipe", std::get<1>(key), [&] { handlers->received(std::move(received.value)); });
 }
 
 void ClientConnection::handle(PipePacketsAcknowledged&& acknowledged) {
-  const auto found =
-      pipe_handlers_.find({std::move(acknowledged.path), std::move(acknowledged.member), acknowledged.index});
+  const PipeKey key{std::move(acknowledged.path), std::move(acknowledged.member), acknowledged.index};
+  const auto found = pipe_handlers_.find(key);
   if (found == pipe_handlers_.end()) return;
   const auto handlers = found->second;  // it may disconnect
-  if (handlers->acknowledged) handlers->acknowledged(acknowledged.numbers);
+  if (handlers->acknowledged)
+    run_handler("pipe", std::get<1>(key), [&] { handlers->acknowledged(acknowledged.numbers); });
 }
 
 void ClientConnection::handle(PipeClosedByService&& closed) {
   const auto found = pipe_handlers_.extract({std::move(closed.path), std::move(closed.member), closed.index});
-  if (found && found.mapped()->closed) found.mapped()->closed();
+  if (found && found.mapped()->closed) run_handler("pipe", std::get<1>(found.key()), found.mapped()->closed);
 }
 
 void ClientConnection::handle(CallbackCalled&& called) {
-  const auto found = callback_handlers_.find({std::move(called.path), std::move(called.member)});
+  const MemberKey key{std::move(called.path), std::move(called.member)};
+  const auto found = callback_handlers_.find(key);
   if (found == callback_handlers_.end())
     return session_.reply_callback(called.id, make_error(ErrorCode::invalid_operation, "Callback function not set"),
                                    read_clocks());
@@ -350,8 +377,10 @@ void ClientConnection::handle(CallbackCalled&& called) {
   };
   try {
     (*handler)(called.arguments, reply);
-  } catch (const std::exception& exception) {
-    reply(Error{ErrorCode::remote_error, exception.what(), "rrgate.UnhandledException"});
+  } catch (...) {
+    const auto error = handler_error(std::current_exception());
+    if (is_unhandled(error)) report(describe_failure("callback", key.second, error));
+    reply(error);
   }
 }
 
@@ -362,7 +391,7 @@ void ClientConnection::handle(PathReleased&& released) {
   std::erase_if(wire_handlers_, is_released);
   std::erase_if(callback_handlers_, is_released);
   const auto handler = path_released_;
-  if (handler) handler(released.path);
+  if (handler) run_handler("object", released.path, [&] { handler(released.path); });
 }
 
 void ClientConnection::handle(SessionClosed&& closed) {
@@ -372,9 +401,10 @@ void ClientConnection::handle(SessionClosed&& closed) {
   callback_handlers_.clear();
   pipe_handlers_.clear();
   path_released_ = nullptr;
-  if (const Opened opened = std::exchange(opened_, nullptr)) return opened(std::move(closed.reason));
+  if (const Opened opened = std::exchange(opened_, nullptr))
+    return run_handler("connecting to", session_.service(), [&] { opened(std::move(closed.reason)); });
   for (const auto& handler : std::exchange(on_closed_, {}))
-    if (handler) handler(closed.reason);
+    if (handler) run_handler("the end of", session_.service(), [&] { handler(closed.reason); });
 }
 
 }  // namespace rr

@@ -31,6 +31,8 @@ struct ConnectOptions : ClientOptions {
   std::vector<std::string> other_urls = {};
   /// None: as the reference on the transport (heartbeat_of()). What `connection` says of it is not used.
   std::optional<Heartbeat> heartbeat = {};
+  /// A sentence about a handler that threw; the connection goes on. The default writes it to stderr.
+  std::function<void(const std::string& problem)> report = {};
 };
 
 /// A connection that is being opened.
@@ -49,9 +51,9 @@ class ClientOpening {
   bool is_over_ = false;
 };
 
-/// One connection to a service. All callbacks run on the thread of the io_context. Each completion is called exactly
-/// once, when the reply is there or the connection has ended; for a request that cannot be sent, maybe before the
-/// function returns.
+/// One connection to a service. All callbacks run on the thread of the io_context; one that throws is
+/// reported (ConnectOptions::report), and the connection goes on. Each completion is called exactly once, when the
+/// reply is there or the connection has ended; for a request that cannot be sent, maybe before the function returns.
 class ClientConnection final : public SessionDriver<ClientSession> {
  public:
   using Opened = std::function<void(Result<std::shared_ptr<ClientConnection>>)>;
@@ -77,7 +79,7 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   static std::shared_ptr<ClientOpening> open(boost::asio::io_context& io, std::string_view url, ConnectOptions options,
                                              Opened done);
   /// Opens the session on a stream to the node, within options.connect_timeout.
-  static void open(std::unique_ptr<ByteStream> stream, ClientOptions options, Opened done);
+  static void open(std::unique_ptr<ByteStream> stream, ConnectOptions options, Opened done);
 
   // Paths name objects: root_path(), or those of child_path() after find_object(). See ClientSession for what requests
   // complete with.
@@ -150,7 +152,7 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   const ClientSession& session() const { return session_; }
 
   /// For open(): use that.
-  ClientConnection(std::unique_ptr<ByteStream> stream, ClientOptions options, Opened opened);
+  ClientConnection(std::unique_ptr<ByteStream> stream, ConnectOptions options, Opened opened);
 
  private:
   using MemberKey = std::pair<std::string, std::string>;               // path, member
@@ -171,7 +173,12 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   void handle(PathReleased&& released);
   void handle(SessionClosed&& closed);
   void expect(RequestId id, Completion done);
+  /// Runs a handler; what it throws is reported.
+  template <class F>
+  void run_handler(std::string_view kind, std::string_view name, F&& handler);
+  void report(const std::string& problem) const;
 
+  std::function<void(const std::string&)> report_;
   Opened opened_;
   std::unordered_map<RequestId, Completion> completions_;
   std::map<MemberKey, std::shared_ptr<EventHandler>> event_handlers_;

@@ -1,11 +1,12 @@
 #include "node/driver/stream_driver.hpp"
 
 #include <boost/asio/co_spawn.hpp>
-#include <boost/asio/detached.hpp>
 #include <boost/asio/error.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/container/static_vector.hpp>
 #include <chrono>
+#include <exception>
+#include <string>
 
 namespace rr {
 
@@ -21,6 +22,16 @@ Error stream_error(const error_code& error) {
   return make_error(ErrorCode::connection_error, "connection lost: " + error.message());
 }
 
+std::string text_of(const std::exception_ptr& thrown) {
+  try {
+    std::rethrow_exception(thrown);
+  } catch (const std::exception& exception) {
+    return exception.what();
+  } catch (...) {
+    return "an exception that is no std::exception";
+  }
+}
+
 }  // namespace
 
 StreamDriver::StreamDriver(std::unique_ptr<ByteStream> stream)
@@ -28,7 +39,14 @@ StreamDriver::StreamDriver(std::unique_ptr<ByteStream> stream)
 
 void StreamDriver::start() {
   settle();
-  if (!is_closed_) asio::co_spawn(executor(), read_all(shared_from_this()), asio::detached);
+  if (!is_closed_) spawn(read_all(shared_from_this()));
+}
+
+void StreamDriver::spawn(awaitable<void> work) {
+  asio::co_spawn(executor(), std::move(work), [self = shared_from_this()](const std::exception_ptr& failure) {
+    if (!failure) return;
+    self->close(make_error(ErrorCode::internal_error, "the connection failed: " + text_of(failure)));
+  });
 }
 
 awaitable<void> StreamDriver::read_all(std::shared_ptr<StreamDriver> self) {
@@ -76,7 +94,7 @@ void StreamDriver::write(Now now) {
     if (bytes == 0) {
       is_writing_ = true;
       // A stream that takes all at once is done when this returns, with the first slices: the others are due as well.
-      asio::co_spawn(executor(), write_waiting(shared_from_this()), asio::detached);
+      spawn(write_waiting(shared_from_this()));
       continue;
     }
     handle_transmitted(bytes, now);

@@ -61,6 +61,8 @@ class StreamDriver : public std::enable_shared_from_this<StreamDriver> {
   /// The stream is closed and all events are handled; called once, last.
   virtual void ended() = 0;
 
+  /// Runs work of this driver, which never ends in silence: what it throws closes the stream.
+  void spawn(awaitable<void> work);
   static awaitable<void> read_all(std::shared_ptr<StreamDriver> self);
   static awaitable<void> write_waiting(std::shared_ptr<StreamDriver> self);
   void write(Now now);

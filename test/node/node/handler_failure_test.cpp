@@ -148,3 +148,64 @@ TEST_CASE("a service that throws when clients come and go keeps them, and gives 
   CHECK(reports[0] == "a client of service 'Fragile': its handler failed: who is that?");
   CHECK(reports[1] == "a lost client of service 'Fragile': its handler failed: an exception that is no std::exception");
 }
+
+TEST_CASE("a client's handlers may throw anything, and the connection goes on") {
+  FragileNode device;
+  Reports reports;
+  ConnectOptions options;
+  options.report = reports.sink();
+  const auto fragile = connect(device.node.url("Fragile"), options);
+  std::vector<std::int32_t> struck;
+  fragile.on_event("struck", [&](std::span<const Value> arguments) {
+    struck.push_back(*arguments.front().to<std::int32_t>());
+    throw std::runtime_error("struck too hard");
+  });
+  fragile.connect_wire("both", [](const Value&, TimeSpec) { throw 1; });
+  const auto pipe = fragile.connect_pipe("both_ways", [](const Value&) { throw 2; });
+  fragile.on_callback("guess", [](std::int32_t number) -> std::int32_t {
+    if (number == 1) throw ServiceException("no idea", ErrorCode::invalid_argument);
+    throw number;
+  });
+
+  CHECK(fragile.call("twice", 4) == Value(8));
+  CHECK(fragile.call("ask", 1) == Value(1));
+  CHECK(fragile.call("ask", 2) == Value(2));
+  const auto& connection = fragile.connection();
+  REQUIRE(fragile.connection().run_until([&] { return struck.size() == 3; }, 5s));
+  CHECK(struck ==
+        std::vector{4, -static_cast<int>(ErrorCode::invalid_argument), -static_cast<int>(ErrorCode::remote_error)});
+
+  const std::array<Value, 1> three{Value(3)};
+  fragile.connection().asynchronous().call("Fragile", "twice", three, [](const Result<Value>&) { throw 3; });
+  CHECK(fragile.call("twice", 5) == Value(10));
+  CHECK_FALSE(connection.is_closed());
+  const auto texts = reports.texts();
+  const auto other = std::string(": its handler failed: an exception that is no std::exception");
+  CHECK_THAT(texts, VectorContains(std::string("event 'struck': its handler failed: struck too hard")));
+  for (const auto* what : {"wire 'both'", "pipe 'both_ways'", "callback 'guess'", "request to 'Fragile'"})
+    CHECK_THAT(texts, VectorContains(what + other));
+}
+
+TEST_CASE("handlers that throw when a connection opens or ends are reported") {
+  FragileNode device;
+  Reports reports;
+  ConnectOptions options;
+  options.report = reports.sink();
+  boost::asio::io_context io;
+  std::shared_ptr<ClientConnection> connection;
+  bool is_lost = false;
+  ClientConnection::open(io, device.node.url("Fragile"), options, [&](const auto& opened) {
+    connection = opened.value();
+    connection->on_closed([](const Error&) { throw 4; });
+    connection->on_closed([&](const Error&) { is_lost = true; });
+    throw std::runtime_error("not now");
+  });
+  while (reports.texts().empty() && io.run_one() != 0) {
+  }
+  connection->disconnect();
+  io.run();
+  CHECK(is_lost);
+  CHECK(reports.texts() ==
+        std::vector<std::string>{"connecting to 'Fragile': its handler failed: not now",
+                                 "the end of 'Fragile': its handler failed: an exception that is no std::exception"});
+}
