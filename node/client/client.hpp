@@ -141,7 +141,7 @@ class RemoteObject {
   /// handler of the callback's C++ types, or Value; returns the answer. What it throws, the service gets as an error.
   template <class F>
   void on_callback(std::string_view callback, F&& handler) const {
-    on_callback_values(callback, make_handler(std::forward<F>(handler)).call);
+    on_callback_values(callback, make_plain_handler(std::forward<F>(handler)).call);
   }
   void on_callback_values(std::string_view callback, ClientConnection::CallbackHandler handler) const;
   void on_event(std::string_view event, ClientConnection::EventHandler handler) const;

@@ -28,6 +28,8 @@ struct MemoryHandlers {
   std::function<Value(const MemoryRange& range)> read = {};
   /// `items` as read() returns them. Not for readonly memories.
   std::function<void(const MemoryRange& range, const Value& items)> write = {};
+  /// `read` and `write` block, and run on the node's pool: rr::blocking(handlers).
+  bool is_blocking = false;
 };
 
 /// Numbers of a plain or multi-dimensional array, or of named arrays, one after another. The service may change both

@@ -100,6 +100,8 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
         io_(io ? *io : *own_io_),
         claim_(claim_stored_id(name, options_)),
         directory_(make_identity(std::move(name), claim_ ? claim_->id() : options_.id)),
+        thread_(std::make_shared<NodeThread>(io_.get_executor())),
+        blocking_pool_(options_.max_blocking),
         stop_timer_(io_) {}
 
   ~Implementation() {
@@ -108,6 +110,8 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     stop_timer_.cancel();
     for (const auto& service : services_) service->detach();
     for (const auto& [id, client] : std::exchange(clients_, {})) client->abandon();
+    blocking_pool_.stop();
+    thread_->close();
   }
 
   void add(const std::shared_ptr<Service>& service) {
@@ -264,11 +268,13 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
 
   // ServiceClientOwner: from clients
 
-  Service* find_service(const HostedService& hosted) override {
+  std::shared_ptr<Service> find_service(const HostedService& hosted) override {
     for (const auto& service : services_)
-      if (service->name() == hosted.name()) return service.get();
+      if (service->name() == hosted.name()) return service;
     return nullptr;  // the service index
   }
+  const std::shared_ptr<NodeThread>& thread() override { return thread_; }
+  BlockingPool& blocking_pool() override { return blocking_pool_; }
   void set_current_client(ClientId id) override { current_client_ = id; }
   void report(const std::string& problem) override {
     if (options_.report)
@@ -399,6 +405,8 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   ClientId current_client_ = 0;
   bool is_stopping_ = false;
   std::shared_ptr<const bool> alive_ = std::make_shared<const bool>(true);  ///< gone: handlers keep away from the node
+  const std::shared_ptr<NodeThread> thread_;
+  BlockingPool blocking_pool_;
   asio::steady_timer stop_timer_;
   asio::signal_set* signals_ = nullptr;
   LoginJudge judge_;

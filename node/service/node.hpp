@@ -21,6 +21,7 @@ struct NodeOptions {
   Features features = {};
   std::size_t max_message_size = 12u * 1024 * 1024;
   std::size_t max_clients = 4096;  ///< more connections are closed at once
+  std::size_t max_blocking = 64;   ///< threads for handlers marked rr::blocking, started when needed; more calls wait
   /// Pages of other hosts that may open WebSockets: "https://lab.example", "https://*.example.org:8443".
   std::vector<std::string> allowed_origins = {};
   /// With the certificate of `id`, by load_node_tls() or make_node_tls(): clients may use TLS, on the same port. Null:
@@ -39,7 +40,8 @@ struct NodeOptions {
   std::function<void(const std::string& problem)> report = {};
 };
 
-/// A node on one thread: everything runs in run(), handlers included. Other threads use post() alone.
+/// A node on one thread: everything runs in run(), handlers included but those marked rr::blocking. Other threads use
+/// post() alone, and the Reply of a request.
 class Node {
  public:
   /// `name` may be empty.
@@ -47,6 +49,7 @@ class Node {
   explicit Node(std::string name, NodeOptions options = {});
   /// Runs on somebody else's io_context, which must outlive the node; run() is not for it then.
   Node(boost::asio::io_context& io, std::string name, NodeOptions options = {});
+  /// Waits for blocking handlers that run.
   ~Node();
 
   /// Throws   std::invalid_argument that names the missing handlers or the name that is taken.

@@ -7,12 +7,10 @@
 #include <vector>
 
 #include "core/session/service/service_session.hpp"
+#include "node/service/caller.hpp"
 #include "node/values/handler.hpp"
 
 namespace rr {
-
-/// One client of a node, for as long as it is connected; never 0, never used again.
-using ClientId = std::uint64_t;
 
 /// The backlog of broadcasts that ask for no acknowledgements.
 inline constexpr std::int32_t no_backlog_limit = -1;

@@ -42,7 +42,7 @@ bool may_stand_behind(const TypeRegistry& types, const std::string& type, const 
 std::string read_file(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   std::ostringstream text;
-  if (!file || !(text << file.rdbuf())) refuse("service definition " + quoted(path, 200) + " cannot be read");
+  if (!file || !(text << file.rdbuf())) refuse("service definition " + rr::quoted(path, 200) + " cannot be read");
   return text.str();
 }
 
@@ -68,7 +68,7 @@ void check_result(const std::string& where, const HandlerType& result, const Typ
 
 const MemberDefinition& Object::require_member(std::string_view name, MemberKind kind) const {
   const MemberDefinition* member = type_->find_member(name);
-  if (!member) refuse(type_name() + " has no member " + quoted(name));
+  if (!member) refuse(type_name() + " has no member " + rr::quoted(name));
   if (member->kind != kind)
     refuse(type_name() + "." + member->name + " is a " + std::string(member_kind_name(member->kind)) + ", not a " +
            std::string(member_kind_name(kind)));
@@ -103,6 +103,7 @@ void Object::set_handler(std::string_view name, HandlerSlot slot, Handler handle
       break;
     case HandlerSlot::wire_received:
       if (direction == MemberDirection::readonly) refuse(where + " is readonly: clients send nothing on it");
+      if (handler.start) refuse(where + ": newer values do not wait for a handler, so it can't wait either");
       check_parameters(where, handler.parameters, {{"value", member.type}});
       mine.wire_received = std::move(handler);
       break;
@@ -212,11 +213,11 @@ std::vector<std::string> Object::missing_handlers() const {
     };
     const MemberDirection direction = member.direction();
     if (member.kind == MemberKind::function)
-      report(mine && (member.is_generator() ? bool(mine->generator.open) : bool(mine->call.call)), "function");
+      report(mine && (member.is_generator() ? bool(mine->generator.open) : bool(mine->call)), "function");
     if (member.kind == MemberKind::objref) report(mine && mine->find, "objref");
     if (member.kind != MemberKind::property) continue;
-    if (direction != MemberDirection::writeonly) report(mine && mine->get.call, "get of property");
-    if (direction != MemberDirection::readonly) report(mine && mine->set.call, "set of property");
+    if (direction != MemberDirection::writeonly) report(mine && mine->get, "get of property");
+    if (direction != MemberDirection::readonly) report(mine && mine->set, "set of property");
   }
   return missing;
 }
@@ -243,7 +244,12 @@ Result<std::shared_ptr<ServiceObject>> Object::find_child(const MemberDefinition
   return std::shared_ptr<ServiceObject>(std::move(child));
 }
 
-Result<Value> Object::answer(const Called& called) {
+std::optional<Result<Value>> Object::answer(Called& called, const BeginLate& begin_late) {
+  const auto ask = [&](const Handler& handler) -> std::optional<Result<Value>> {
+    if (handler.call) return handler.call(called.arguments);
+    handler.start(std::move(called.arguments), begin_late());
+    return std::nullopt;
+  };
   const auto missing = [&](std::string_view what) {
     return make_error(ErrorCode::not_implemented_error,
                       std::string(what) + " '" + called.member->name + "' has no handler");
@@ -252,11 +258,11 @@ Result<Value> Object::answer(const Called& called) {
   Member* mine = found == members_.end() ? nullptr : &found->second;
   switch (called.kind) {
     case CallKind::function:
-      return mine && mine->call.call ? mine->call.call(called.arguments) : missing("function");
+      return mine && mine->call ? ask(mine->call) : missing("function");
     case CallKind::property_get:
-      return mine && mine->get.call ? mine->get.call({}) : missing("get of property");
+      return mine && mine->get ? ask(mine->get) : missing("get of property");
     case CallKind::property_set:
-      return mine && mine->set.call ? mine->set.call(called.arguments) : missing("set of property");
+      return mine && mine->set ? ask(mine->set) : missing("set of property");
     case CallKind::peek_in:
     case CallKind::peek_out: {
       if (mine && called.kind == CallKind::peek_in && mine->in_value) return *mine->in_value;
@@ -271,7 +277,7 @@ Result<Value> Object::answer(const Called& called) {
     case CallKind::memory_dimensions:
     case CallKind::memory_read:
     case CallKind::memory_write:
-      return answer_memory(called);
+      return answer_memory(called, begin_late);
     case CallKind::generator_open:
     case CallKind::generator_next:
     case CallKind::generator_close:
@@ -306,8 +312,8 @@ std::shared_ptr<Service> Service::from_text(const std::vector<std::string>& defi
   service->name_ = std::move(name);
   service->types_ = std::make_shared<TypeRegistry>();
   if (auto added = service->types_->add(definitions, RobdefMode::strict); !added)
-    refuse("service " + quoted(service->name_) + ": " + added.error().message);
-  if (definitions.empty()) refuse("service " + quoted(service->name_) + " has no definition");
+    refuse("service " + rr::quoted(service->name_) + ": " + added.error().message);
+  if (definitions.empty()) refuse("service " + rr::quoted(service->name_) + " has no definition");
   service->definition_ = parse_service_definition(definitions.back(), RobdefMode::strict).definition.name;
   service->root_ = service->make_object(root_type);
   return service;
@@ -325,7 +331,7 @@ std::shared_ptr<Object> Service::make_object(std::string_view type) {
   if (qualified.find('.') == std::string::npos) qualified = definition_ + "." + qualified;
   const EntityDefinition* entity = types_->find_entity(qualified);
   if (!entity || entity->kind != EntityKind::object)
-    refuse("service " + quoted(name_) + ": there is no object type " + quoted(qualified));
+    refuse("service " + rr::quoted(name_) + ": there is no object type " + rr::quoted(qualified));
   std::shared_ptr<Object> object(new Object(*this, *entity));
   std::erase_if(objects_, [](const std::weak_ptr<Object>& other) { return other.expired(); });
   objects_.push_back(object);
@@ -333,27 +339,27 @@ std::shared_ptr<Object> Service::make_object(std::string_view type) {
 }
 
 void Service::set_attribute(std::string key, Value value) {
-  if (host_) refuse("service " + quoted(name_) + ": attributes are set before the service is added to a node");
+  if (host_) refuse("service " + rr::quoted(name_) + ": attributes are set before the service is added to a node");
   std::erase_if(attributes_.items, [&](const auto& item) { return item.first == key; });
   attributes_.items.emplace_back(std::move(key), std::move(value));
 }
 
 void Service::set_security(SecurityPolicy policy) {
-  if (host_) refuse("service " + quoted(name_) + ": security is set before the service is added to a node");
+  if (host_) refuse("service " + rr::quoted(name_) + ": security is set before the service is added to a node");
   if (policy.require_valid_user && !policy.authenticator)
-    refuse("service " + quoted(name_) + " requires a user, but has no authenticator: nobody could log in");
+    refuse("service " + rr::quoted(name_) + " requires a user, but has no authenticator: nobody could log in");
   security_ = std::move(policy);
 }
 
 std::shared_ptr<HostedService> Service::attach(ServiceHost& host) {
-  if (hosted_) refuse("service " + quoted(name_) + " was added to a node before");
+  if (hosted_) refuse("service " + rr::quoted(name_) + " was added to a node before");
   std::string missing;
   for (const std::weak_ptr<Object>& weak : objects_)
     if (const auto object = weak.lock())
       for (const std::string& handler : object->missing_handlers()) missing += (missing.empty() ? "" : ", ") + handler;
-  if (!missing.empty()) refuse("service " + quoted(name_) + ": no handler for " + missing);
+  if (!missing.empty()) refuse("service " + rr::quoted(name_) + ": no handler for " + missing);
   auto hosted = HostedService::make(name_, root_, types_, attributes_);
-  if (!hosted) refuse("service " + quoted(name_) + ": " + hosted.error().message);
+  if (!hosted) refuse("service " + rr::quoted(name_) + ": " + hosted.error().message);
   hosted_ = std::move(*hosted);
   hosted_->set_policy(security_);
   host_ = &host;

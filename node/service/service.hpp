@@ -9,9 +9,10 @@
 //   node.run();
 //
 // Handlers take and return C++ numbers, bool, enums, std::string, std::vector of numbers, or rr::Value for anything
-// else (Value accepts all of them). They run on the node's thread. A handler may throw rr::ServiceException to send an
-// error to the client; exceptions that are no rr::Exception reach it as code 100, "rrgate.UnhandledException", with
-// their text, and are reported (NodeOptions::report).
+// else (Value accepts all of them). They run on the node's thread, which serves all clients: one that takes its time is
+// a coroutine, marked rr::blocking, or answers later (late_handler.hpp). A handler may throw rr::ServiceException to
+// send an error to the client; exceptions that are no rr::Exception reach it as code 100, "rrgate.UnhandledException",
+// with their text, and are reported (NodeOptions::report).
 //
 // Handlers are checked against the definition before anything listens: one that does not fit (no such member, wrong
 // kind, wrong parameter type or count) is a std::invalid_argument where it is set, one that is missing where the
@@ -31,7 +32,9 @@
 
 #include "core/session/service/hosted_service.hpp"
 #include "core/session/service/service_session.hpp"
+#include "node/service/caller.hpp"
 #include "node/service/generator.hpp"
+#include "node/service/late_handler.hpp"
 #include "node/service/memory.hpp"
 #include "node/service/pipe_endpoint.hpp"
 #include "node/values/exception.hpp"
@@ -40,15 +43,6 @@
 namespace rr {
 
 class Service;
-
-/// Who sent the request that a handler works on.
-struct Caller {
-  ClientId id = 0;             ///< 0: there is none
-  std::string user = {};       ///< the name it has logged in by; empty while it has not
-  std::uint32_t endpoint = 0;  ///< the service's number of the session, as the reference names clients
-  NodeIdentity node = {};      ///< as the client says
-  NodeId verified_node = {};   ///< as its certificate proves; any: nobody vouches for it
-};
 
 using CallbackDone = std::function<void(Result<Value> answer)>;
 
@@ -196,7 +190,7 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   struct Member {
     Handler call;                ///< functions
     GeneratorHandler generator;  ///< generator functions
-    MemoryHandlers memory;
+    std::shared_ptr<const MemoryHandlers> memory;
     Handler get;
     Handler set;
     Handler wire_received;
@@ -225,10 +219,13 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   /// Texts like "function Drive", for functions, property accessors and objrefs without handler.
   std::vector<std::string> missing_handlers() const;
 
-  // Requests of clients; handlers run in here and may throw.
-  Result<Value> answer(const Called& called);
+  /// Makes what a handler that answers later is handed.
+  using BeginLate = std::function<std::shared_ptr<LateCall>()>;
+
+  // Requests of clients; handlers run in here and may throw. No answer: it comes later.
+  std::optional<Result<Value>> answer(Called& called, const BeginLate& begin_late);
   Result<Generator> open_generator(const Called& called);
-  Result<Value> answer_memory(const Called& called);
+  std::optional<Result<Value>> answer_memory(Called& called, const BeginLate& begin_late);
   void receive_wire(const WireReceived& received);
   void connect_pipe(const MemberDefinition& pipe, const PipeEndpoint& endpoint);
   Result<> receive_packet(const MemberDefinition& pipe, const PipeEndpoint& endpoint, const Value& packet);

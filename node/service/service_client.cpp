@@ -5,18 +5,6 @@
 
 namespace rr {
 
-namespace {
-
-/// As reply() wants it: the end, and whatever else is no value, is an error.
-Result<Value> next_value(const Generator& generator, std::span<const Value> arguments) {
-  auto value = generator.next(arguments.empty() ? Value{} : arguments.front());
-  if (!value) return value.error();
-  if (!*value) return make_error(ErrorCode::stop_iteration, {});
-  return std::move(**value);
-}
-
-}  // namespace
-
 ServiceClient::ServiceClient(ClientId id, ServiceClientOwner& owner, ServiceDirectory& directory,
                              ServiceSessionOptions options, std::unique_ptr<ByteStream> stream)
     : SessionDriver(std::move(stream), directory, std::move(options), read_clocks()), id_(id), owner_(&owner) {}
@@ -47,15 +35,16 @@ void ServiceClient::close_service() {
 }
 
 void ServiceClient::abandon() {
+  cancel_late_calls();
   owner_ = nullptr;
   while (!pipes_.empty()) end_pipe(pipes_.begin()->first, false);
   close(make_error(ErrorCode::connection_error, "the node was destroyed"));
 }
 
 bool ServiceClient::handle_event(Now now) {
-  const auto event = session_.poll_event();
+  auto event = session_.poll_event();
   if (!event) return false;
-  if (owner_) std::visit([&](const auto& happened) { handle(happened, now); }, *event);
+  if (owner_) std::visit([&](auto& happened) { handle(happened, now); }, *event);
   return true;
 }
 
@@ -63,14 +52,59 @@ void ServiceClient::ended() {
   if (owner_) owner_->client_ended(*this);
 }
 
-void ServiceClient::handle(const Called& called, Now now) {
-  Result<Value> answer = Value{};
+void ServiceClient::handle(Called& called, Now now) {
+  const CallId id = called.id;
+  const GeneratorId generator = called.generator;
+  const auto object = called.object;
+  std::optional<Result<Value>> answer;
   auto failure = run_handler(member_kind_name(called.member->kind), called.member->name, [&] {
-    answer = called.generator != 0 ? answer_generator(called) : static_cast<Object&>(*called.object).answer(called);
+    if (called.generator != 0)
+      answer = answer_generator(called);
+    else
+      answer = static_cast<Object&>(*object).answer(called, [&] { return begin_late_call(called); });
   });
-  if (failure) answer = std::move(*failure);
-  session_.reply(called.id, answer, now);
+  if (failure) {
+    late_calls_.erase(id);
+    generators_.erase(generator);
+    answer = std::move(*failure);
+  }
+  if (answer) session_.reply(id, *answer, now);
 }
+
+// --- answers that come later ---
+
+std::shared_ptr<LateCall> ServiceClient::begin_late_call(const Called& called) {
+  auto done = [weak = weak_from_this(), id = called.id](const Result<Value>& answer) {
+    if (const auto self = weak.lock()) static_cast<ServiceClient&>(*self).finish_late_call(id, answer);
+  };
+  using Needed = std::pair<std::shared_ptr<Service>, std::shared_ptr<ServiceObject>>;
+  auto call =
+      std::make_shared<LateCall>(owner_->thread(), executor(), owner_->blocking_pool(), owner_->find_client(id_),
+                                 std::make_shared<const Needed>(service_, called.object), std::move(done));
+  late_calls_[called.id] = {call, called.member, called.generator};
+  return call;
+}
+
+void ServiceClient::finish_late_call(CallId id, const Result<Value>& answer) {
+  const auto found = late_calls_.extract(id);
+  if (!found) return;
+  const auto& member = *found.mapped().member;
+  if (owner_ && !answer && is_unhandled(answer.error()))
+    owner_->report(describe_failure(member_kind_name(member.kind), member.name, answer.error()));
+  session_.reply(id, answer, read_clocks());
+  if (found.mapped().generator != 0) finish_step(found.mapped().generator, answer.has_error());
+  settle();
+}
+
+void ServiceClient::cancel_late_calls() {
+  const auto left = std::exchange(late_calls_, {});
+  if (left.empty()) return;
+  if (owner_) owner_->blocking_pool().drop(id_);
+  for (const auto& [id, late] : left)
+    if (const auto call = late.call.lock()) call->cancel();
+}
+
+// --- handlers that answer at once ---
 
 template <class F>
 std::optional<Error> ServiceClient::run_handler(std::string_view kind, std::string_view name, F&& handler) {
@@ -93,31 +127,62 @@ void ServiceClient::notify(std::string_view kind, std::string_view name, F&& han
   if (failure && owner_ && !is_unhandled(*failure)) owner_->report(describe_failure(kind, name, *failure));
 }
 
-/// Generators end here when they say so, and in GeneratorEnded when the session does.
-Result<Value> ServiceClient::answer_generator(const Called& called) {
+/// Generators end here when they say so, and in GeneratorEnded when the session does. They take one step at a time.
+std::optional<Result<Value>> ServiceClient::answer_generator(Called& called) {
   if (called.kind == CallKind::generator_open) {
     auto opened = static_cast<Object&>(*called.object).open_generator(called);
     if (!opened) return opened.error();
-    generators_.emplace(called.generator, std::move(*opened));
+    generators_.emplace(called.generator, RunningGenerator{std::move(*opened)});
     return Value{};
   }
-  if (called.kind == CallKind::generator_next) {
-    // Out of the map while it runs: an exception ends it, and the client may go meanwhile.
-    auto running = generators_.extract(called.generator);
-    if (!running) return make_error(ErrorCode::invalid_operation, "Invalid generator");
-    auto value = next_value(running.mapped(), called.arguments);
-    if (!value) return value;
-    if (!is_closed())
-      generators_.insert(std::move(running));
-    else if (owner_)
-      abandon_generator(running.mapped());
-    return value;
+  const bool is_next = called.kind == CallKind::generator_next;
+  const auto found = generators_.find(called.generator);
+  if (found == generators_.end())
+    return is_next ? Result<Value>(make_error(ErrorCode::invalid_operation, "Invalid generator")) : Value{};
+  auto& running = found->second;
+  if (running.is_stepping && called.kind != CallKind::generator_abort) {
+    running.waiting.push_back(std::move(called));
+    return std::nullopt;
   }
-  auto ended = generators_.extract(called.generator);
-  if (ended.empty()) return Value{};
-  const auto& handler = called.kind == CallKind::generator_close ? ended.mapped().close : ended.mapped().abort;
-  if (handler) handler();
+  if (is_next && running.generator.start) {
+    running.is_stepping = true;
+    const auto start = running.generator.start;
+    start(called.arguments.empty() ? Value{} : std::move(called.arguments.front()), begin_late_call(called));
+    return std::nullopt;
+  }
+  if (is_next) return take_step(called);
+  const auto ended = generators_.extract(found);
+  for (const auto& [id, late] : late_calls_)
+    if (late.generator == called.generator)
+      if (const auto call = late.call.lock()) call->cancel();
+  for (const auto& waiting : ended.mapped().waiting)
+    session_.reply(waiting.id, make_error(ErrorCode::operation_aborted, "the generator was aborted"), read_clocks());
+  const auto& generator = ended.mapped().generator;
+  if (const auto& handler = called.kind == CallKind::generator_close ? generator.close : generator.abort) handler();
   return Value{};
+}
+
+Result<Value> ServiceClient::take_step(const Called& called) {
+  // Out of the map while it runs: an exception ends it, and the client may go meanwhile.
+  auto running = generators_.extract(called.generator);
+  auto answer = detail::step_answer(
+      running.mapped().generator.next(called.arguments.empty() ? Value{} : called.arguments.front()));
+  if (!answer) return answer;
+  if (!is_closed())
+    generators_.insert(std::move(running));
+  else if (owner_)
+    abandon_generator(running.mapped().generator);
+  return answer;
+}
+
+void ServiceClient::finish_step(GeneratorId id, bool has_failed) {
+  const auto found = generators_.find(id);
+  if (found == generators_.end()) return;
+  found->second.is_stepping = false;
+  auto waiting = std::exchange(found->second.waiting, {});
+  if (has_failed) generators_.erase(found);
+  for (auto& called : waiting)
+    if (owner_) handle(called, read_clocks());
 }
 
 void ServiceClient::abandon_generator(const Generator& generator) {
@@ -125,7 +190,7 @@ void ServiceClient::abandon_generator(const Generator& generator) {
 }
 
 void ServiceClient::handle(const GeneratorEnded& ended, Now) {
-  if (const auto left = generators_.extract(ended.id)) abandon_generator(left.mapped());
+  if (const auto left = generators_.extract(ended.id)) abandon_generator(left.mapped().generator);
 }
 
 void ServiceClient::handle(const ClientConnected& connected, Now) {
@@ -250,10 +315,11 @@ void ServiceClient::handle(const CallbackCompleted& completed, Now) {
 }
 
 void ServiceClient::handle(const ClientGone&, Now) {
+  cancel_late_calls();
   while (owner_ && !pipes_.empty()) end_pipe(pipes_.begin()->first, true);
-  for (const auto& [id, generator] : std::exchange(generators_, {}))
-    if (owner_) abandon_generator(generator);
-  Service* const left = std::exchange(service_, nullptr);
+  for (const auto& [id, running] : std::exchange(generators_, {}))
+    if (owner_) abandon_generator(running.generator);
+  const auto left = std::exchange(service_, nullptr);
   if (!left || !owner_ || !left->on_gone_) return;
   const auto handler = left->on_gone_;
   notify("a lost client of service", left->name(), [&] { handler(id_); });

@@ -18,7 +18,11 @@ class ServiceClient;
 /// What a client needs of its node.
 class ServiceClientOwner {
  public:
-  virtual Service* find_service(const HostedService& hosted) = 0;
+  virtual std::shared_ptr<Service> find_service(const HostedService& hosted) = 0;
+  virtual Caller find_client(ClientId id) const = 0;
+  /// For handlers that answer later.
+  virtual const std::shared_ptr<NodeThread>& thread() = 0;
+  virtual BlockingPool& blocking_pool() = 0;
   virtual void set_current_client(ClientId id) = 0;  ///< 0: no handler runs
   /// A handler failed by mistake, or no client waits for its answer.
   virtual void report(const std::string& problem) = 0;
@@ -41,7 +45,7 @@ class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSe
   void handle_locks_changed();
   void answer_login(LoginId id, Result<AuthenticatedUser> result);
   /// Null while the client is in no service of ours.
-  Service* service() const { return service_; }
+  Service* service() const { return service_.get(); }
   void send_event(const std::string& path, const MemberDefinition& event, std::span<const Value> arguments);
   void send_wire(WirePacket& packet);
   void release_path(const std::string& path);
@@ -56,8 +60,14 @@ class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSe
   bool handle_event(Now now) override;
   void ended() override;
 
-  void handle(const Called& called, Now now);
-  Result<Value> answer_generator(const Called& called);
+  void handle(Called& called, Now now);
+  std::shared_ptr<LateCall> begin_late_call(const Called& called);
+  void finish_late_call(CallId id, const Result<Value>& answer);
+  /// Nobody waits for answers any more.
+  void cancel_late_calls();
+  std::optional<Result<Value>> answer_generator(Called& called);
+  Result<Value> take_step(const Called& called);
+  void finish_step(GeneratorId id, bool has_failed);
   /// Tells a generator that nobody will ask it any more.
   void abandon_generator(const Generator& generator);
   void handle(const ClientConnected& connected, Now now);
@@ -91,9 +101,21 @@ class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSe
 
   ClientId id_;
   ServiceClientOwner* owner_;
-  Service* service_ = nullptr;
+  std::shared_ptr<Service> service_;
   std::unordered_map<PipeId, PipeEndpoint> pipes_;
-  std::unordered_map<GeneratorId, Generator> generators_;  ///< as many as the session allows
+  struct RunningGenerator {
+    Generator generator;
+    bool is_stepping = false;          ///< a step answers later
+    std::vector<Called> waiting = {};  ///< what the client asks of it meanwhile
+  };
+  std::unordered_map<GeneratorId, RunningGenerator> generators_;  ///< as many as the session allows
+  /// Requests whose handlers answer later.
+  struct Late {
+    std::weak_ptr<LateCall> call;
+    const MemberDefinition* member = nullptr;
+    GeneratorId generator = 0;  ///< 0: it is no step
+  };
+  std::unordered_map<CallId, Late> late_calls_;
   struct CalledCallback {
     const MemberDefinition* member = nullptr;
     CallbackDone done;

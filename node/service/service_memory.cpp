@@ -64,7 +64,7 @@ void Object::memory(std::string_view name, MemoryHandlers handlers) {
   if (!handlers.dimensions) refuse(where + ": a memory needs a handler for its dimensions");
   if (!handlers.read && member.direction() != MemberDirection::writeonly) refuse(where + ": it has no read handler");
   if (!handlers.write && member.direction() != MemberDirection::readonly) refuse(where + ": it has no write handler");
-  members_[&member].memory = std::move(handlers);
+  members_[&member].memory = std::make_shared<const MemoryHandlers>(std::move(handlers));
 }
 
 void Object::memory(std::string_view name, std::shared_ptr<PodMemory> memory) {
@@ -90,17 +90,38 @@ detail::MemoryForm Object::memory_form(std::string_view name, DataType items) co
   return form;
 }
 
-Result<Value> Object::answer_memory(const Called& called) {
-  const auto found = members_.find(called.member);
-  if (found == members_.end() || !found->second.memory.dimensions)
-    return make_error(ErrorCode::not_implemented_error, "memory '" + called.member->name + "' has no handler");
-  const auto& memory = found->second.memory;
-  const MemoryShape dimensions = memory.dimensions();
-  if (called.kind == CallKind::memory_dimensions) return Value(dimensions);
-  if (auto fits = check_memory_range(called.range, dimensions, *called.member); !fits) return fits.error();
+namespace {
+
+Result<Value> ask_memory(const MemoryHandlers& memory, const Called& called) {
   if (called.kind == CallKind::memory_read) return memory.read(called.range);
   memory.write(called.range, called.arguments.front());
   return Value{};
+}
+
+}  // namespace
+
+std::optional<Result<Value>> Object::answer_memory(Called& called, const BeginLate& begin_late) {
+  const auto found = members_.find(called.member);
+  if (found == members_.end() || !found->second.memory)
+    return make_error(ErrorCode::not_implemented_error, "memory '" + called.member->name + "' has no handler");
+  const auto memory = found->second.memory;
+  const MemoryShape dimensions = memory->dimensions();
+  if (called.kind == CallKind::memory_dimensions) return Value(dimensions);
+  if (auto fits = check_memory_range(called.range, dimensions, *called.member); !fits) return fits.error();
+  if (!memory->is_blocking) return ask_memory(*memory, called);
+  auto call = begin_late();
+  auto& late = *call;
+  called.object = nullptr;  // the call keeps it, and lets it go on the node's thread
+  late.run_blocking([memory, called = std::move(called), call = std::move(call)] {
+    Result<Value> answer = Value{};
+    try {
+      answer = ask_memory(*memory, called);
+    } catch (...) {
+      answer = handler_error(std::current_exception());
+    }
+    call->answer(std::move(answer), memory);
+  });
+  return std::nullopt;
 }
 
 }  // namespace rr

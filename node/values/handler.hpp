@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -35,12 +36,18 @@ bool accepts(const HandlerType& handler, const TypeDefinition& type);
 /// are sent.
 bool returns(const HandlerType& handler, const TypeDefinition& type);
 
-/// A callable with its deduced signature.
+class LateCall;
+
+/// A callable with its deduced signature. It has either `call` or `start`.
 struct Handler {
   std::vector<HandlerType> parameters;
   HandlerType result;
-  /// `arguments` as many as `parameters`. Errors: data_type_mismatch, out_of_range.
-  std::function<Result<Value>(std::span<const Value>)> call;
+  /// Answers at once. `arguments` as many as `parameters`. Errors: data_type_mismatch, out_of_range.
+  std::function<Result<Value>(std::span<const Value> arguments)> call;
+  /// Answers later: see late_handler.hpp.
+  std::function<void(std::vector<Value> arguments, const std::shared_ptr<LateCall>& call)> start = {};
+
+  explicit operator bool() const { return call || start; }
 };
 
 namespace detail {
@@ -141,35 +148,35 @@ template <class F>
 using SignatureTagOf = typename SignatureOf<std::remove_cvref_t<F>>::Tag;
 
 template <class R, class... Args, class F>
+Result<Value> call_function(F& function, std::span<const Value> arguments) {
+  return with_arguments<Args...>(arguments, std::index_sequence_for<Args...>{},
+                                 [&](std::remove_cvref_t<Args>... converted) -> Result<Value> {
+                                   if constexpr (std::is_void_v<R>) {
+                                     function(std::move(converted)...);
+                                     return Value{};
+                                   } else {
+                                     return to_value(function(std::move(converted)...));
+                                   }
+                                 });
+}
+
+template <class R, class... Args, class F>
 Handler make_typed_handler(SignatureTag<R, Args...>, F function) {
   Handler handler;
   handler.parameters = {handler_type<Args>()...};
   handler.result = handler_type<R>();
   handler.call = [function = std::move(function)](std::span<const Value> arguments) mutable {
-    return with_arguments<Args...>(arguments, std::index_sequence_for<Args...>{},
-                                   [&](std::remove_cvref_t<Args>... converted) -> Result<Value> {
-                                     if constexpr (std::is_void_v<R>) {
-                                       function(std::move(converted)...);
-                                       return Value{};
-                                     } else {
-                                       return to_value(function(std::move(converted)...));
-                                     }
-                                   });
+    return call_function<R, Args...>(function, arguments);
   };
   return handler;
 }
 
 }  // namespace detail
 
-/// Wraps a callable whose operator() is not overloaded.
+/// Wraps a callable that answers at once and whose operator() is not overloaded.
 template <class F>
-Handler make_handler(F&& function) {
+Handler make_plain_handler(F&& function) {
   return detail::make_typed_handler(detail::SignatureTagOf<F>{}, std::forward<F>(function));
-}
-
-/// One that was put together by hand.
-inline Handler make_handler(Handler handler) {
-  return handler;
 }
 
 }  // namespace rr
