@@ -194,8 +194,9 @@ class AsyncObject {
   void on_callback(std::string_view callback, ClientConnection::CallbackHandler handler) const {
     connection_->on_callback(path_, callback, std::move(handler));
   }
-  void on_event(std::string_view event, ClientConnection::EventHandler handler) const {
-    connection_->on_event(path_, event, std::move(handler));
+  /// One handler more; all are called.
+  HandlerRegistration on_event(std::string_view event, ClientConnection::EventHandler handler) const {
+    return connection_->add_event_handler(path_, event, std::move(handler));
   }
 
   /// Logs in; one login a connection.

@@ -234,10 +234,10 @@ template <class... Args>
 class AsyncEvent : public AsyncMember {
  public:
   using AsyncMember::AsyncMember;
-  /// handler(Args...). A second one replaces the first.
+  /// handler(Args...), one more; all are called.
   template <class F>
-  void on(F handler) const {
-    object().on_event(name(), detail::typed_event_handler<Args...>(std::move(handler)));
+  HandlerRegistration on(F handler) const {
+    return object().on_event(name(), detail::typed_event_handler<Args...>(std::move(handler)));
   }
 };
 

@@ -10,14 +10,18 @@ namespace {
 constexpr std::size_t room_for_packets = 1024 * 1024;
 constexpr std::chrono::seconds wait_for_room{15};
 
-/// Marks that handlers run; refuses to wait in one.
-class Running {
+constexpr std::size_t max_waiting_handlers = 65'536;
+
+/// Marks that the io_context runs; refuses to run it from within itself.
+class Serving {
  public:
-  explicit Running(bool& flag) : flag_(flag) {
-    if (flag_) throw std::logic_error("a handler of a blocking client cannot wait; use asynchronous()");
+  explicit Serving(bool& flag) : flag_(flag) {
+    if (flag_) throw std::logic_error("an asynchronous handler cannot wait: it holds up what it would wait for");
     flag_ = true;
   }
-  ~Running() { flag_ = false; }
+  Serving(const Serving&) = delete;
+  Serving& operator=(const Serving&) = delete;
+  ~Serving() { flag_ = false; }
 
  private:
   bool& flag_;
@@ -53,25 +57,53 @@ void BlockingConnection::run_for(std::chrono::milliseconds duration) {
   (void)run_until([] { return false; }, duration);
 }
 
+bool BlockingConnection::serve(std::optional<std::chrono::steady_clock::time_point> until) {
+  const Serving serving(is_serving_);
+  io_.restart();
+  return (until ? io_.run_one_until(*until) : io_.run_one()) != 0;
+}
+
+void BlockingConnection::queue(HandlerCall handler) {
+  if (handlers_.size() < max_waiting_handlers) return handlers_.push_back(std::move(handler));
+  connection_->close(make_error(ErrorCode::out_of_system_resource,
+                                std::to_string(max_waiting_handlers) + " calls of handlers wait: they take too long"));
+}
+
+void BlockingConnection::run_handlers() {
+  if (is_handling_) return;
+  is_handling_ = true;
+  while (!handlers_.empty()) {
+    const auto next = std::move(handlers_.front());
+    handlers_.pop_front();
+    try {
+      next.call();
+    } catch (...) {
+      connection_->handler_failed(next.kind, next.name);
+    }
+  }
+  is_handling_ = false;
+}
+
 bool BlockingConnection::run_until(const std::function<bool()>& is_done, std::chrono::milliseconds timeout) {
-  const Running running(is_running_);
   const auto deadline = std::chrono::steady_clock::now() + timeout;
+  run_handlers();
   while (!is_done()) {
-    io_.restart();
-    if (io_.run_one_until(deadline) == 0 && (is_closed() || std::chrono::steady_clock::now() >= deadline))
-      return is_done();
+    const bool was_served = serve(deadline);
+    run_handlers();
+    if (!was_served && (is_closed() || std::chrono::steady_clock::now() >= deadline)) return is_done();
   }
   return true;
 }
 
 Value BlockingConnection::wait_for(const std::function<void(ClientConnection&, ClientConnection::Completion)>& start) {
   if (close_reason_) throw ClientException(*close_reason_);
-  const Running running(is_running_);
   std::optional<Result<Value>> result;
-  start(*connection_, [&](Result<Value> completed) { result = std::move(completed); });
-  io_.restart();
-  while (!result && io_.run_one() != 0) {
+  {
+    const Serving serving(is_serving_);
+    start(*connection_, [&](Result<Value> completed) { result = std::move(completed); });
   }
+  while (!result && serve({})) run_handlers();
+  run_handlers();  // of what came before the answer
   if (!result) throw ClientException(make_error(ErrorCode::connection_error, "the connection is gone"));
   if (!*result) throw ClientException(result->error());
   return std::move(**result);
@@ -156,12 +188,33 @@ void RemoteObject::poke_out(std::string_view wire, const Value& value) const {
 }
 
 void RemoteObject::connect_wire(std::string_view wire, ClientConnection::WireHandler handler) const {
+  struct Newest {
+    ClientConnection::WireHandler handler;
+    std::shared_ptr<bool> is_disconnected;
+    std::optional<std::pair<Value, TimeSpec>> value;  ///< that waits for the handler
+  };
+  const auto newest = std::make_shared<Newest>();
+  newest->handler = std::move(handler);
+  newest->is_disconnected = std::make_shared<bool>(false);
+  connection_->wires_[{path_, std::string(wire)}] = newest->is_disconnected;
+  ClientConnection::WireHandler received;
+  if (newest->handler)
+    received = [connection = connection_.get(), newest, name = std::string(wire)](const Value& value, TimeSpec time) {
+      const bool is_queued = newest->value.has_value();
+      newest->value.emplace(value, time);
+      if (is_queued) return;
+      connection->queue({"wire", name, [newest] {
+                           const auto [taken, at] = *std::exchange(newest->value, std::nullopt);
+                           if (!*newest->is_disconnected) newest->handler(taken, at);
+                         }});
+    };
   connection_->wait_for([&](ClientConnection& connection, auto done) {
-    connection.connect_wire(path_, wire, std::move(handler), std::move(done));
+    connection.connect_wire(path_, wire, std::move(received), std::move(done));
   });
 }
 
 void RemoteObject::disconnect_wire(std::string_view wire) const {
+  if (const auto found = connection_->wires_.extract({path_, std::string(wire)})) *found.mapped() = true;
   connection_->wait_for(
       [&](ClientConnection& connection, auto done) { connection.disconnect_wire(path_, wire, std::move(done)); });
 }
@@ -173,7 +226,15 @@ void RemoteObject::send_wire(std::string_view wire, const Value& value) const {
 RemotePipe RemoteObject::connect_pipe(std::string_view pipe, std::function<void(Value)> received,
                                       std::int32_t index) const {
   RemotePipe endpoint(connection_, path_, std::string(pipe));
-  ClientConnection::PipeHandlers handlers{std::move(received), [state = endpoint.state_] { state->is_open = false; }};
+  ClientConnection::PipeHandlers handlers;
+  handlers.closed = [state = endpoint.state_] { state->is_open = false; };
+  if (received)
+    handlers.received = [connection = connection_.get(), state = endpoint.state_, name = std::string(pipe),
+                         handler = std::make_shared<std::function<void(Value)>>(std::move(received))](Value packet) {
+      connection->queue({"pipe", name, [state, handler, packet = std::move(packet)] {
+                           if (!state->is_closed_here) (*handler)(packet);
+                         }});
+    };
   const Value connected = connection_->wait_for([&](ClientConnection& connection, auto done) {
     connection.connect_pipe(path_, pipe, index, std::move(handlers), std::move(done));
   });
@@ -184,7 +245,7 @@ RemotePipe RemoteObject::connect_pipe(std::string_view pipe, std::function<void(
 void RemotePipe::send(const Value& packet) const {
   ClientConnection& connection = connection_->asynchronous();
   auto sent = connection.send_pipe(path_, pipe_, index(), packet);
-  if (!sent && sent.error().code == ErrorCode::out_of_system_resource && !connection_->is_running()) {
+  if (!sent && sent.error().code == ErrorCode::out_of_system_resource) {
     const auto has_room = [&] {
       return connection_->is_closed() || connection.session().queued_bytes() < room_for_packets;
     };
@@ -196,17 +257,39 @@ void RemotePipe::send(const Value& packet) const {
 void RemotePipe::close() const {
   if (!is_open()) return;
   state_->is_open = false;
+  state_->is_closed_here = true;
   connection_->wait_for([&](ClientConnection& connection, auto done) {
     connection.disconnect_pipe(path_, pipe_, index(), std::move(done));
   });
 }
 
 void RemoteObject::on_callback_values(std::string_view callback, ClientConnection::CallbackHandler handler) const {
-  connection_->asynchronous().on_callback(path_, callback, std::move(handler));
+  auto called = [connection = connection_.get(), name = std::string(callback),
+                 handler = std::make_shared<ClientConnection::CallbackHandler>(std::move(handler))](
+                    std::span<const Value> arguments, const ClientConnection::CallbackReply& reply) {
+    connection->queue({"callback", name, [handler, values = std::vector(arguments.begin(), arguments.end()), reply] {
+                         try {
+                           reply((*handler)(values));
+                         } catch (...) {
+                           const auto error = handler_error(std::current_exception());
+                           reply(error);
+                           if (is_unhandled(error)) throw;
+                         }
+                       }});
+  };
+  connection_->asynchronous().on_callback_later(path_, callback, std::move(called));
 }
 
-void RemoteObject::on_event(std::string_view event, ClientConnection::EventHandler handler) const {
-  connection_->asynchronous().on_event(path_, event, std::move(handler));
+HandlerRegistration RemoteObject::on_event(std::string_view event, ClientConnection::EventHandler handler) const {
+  const auto is_removed = std::make_shared<bool>(false);
+  auto received = [connection = connection_.get(), is_removed, name = std::string(event),
+                   handler = std::make_shared<ClientConnection::EventHandler>(std::move(handler))](
+                      std::span<const Value> arguments) {
+    connection->queue({"event", name, [is_removed, handler, values = std::vector(arguments.begin(), arguments.end())] {
+                         if (!*is_removed) (*handler)(values);
+                       }});
+  };
+  return connection_->asynchronous().add_event_handler(path_, event, std::move(received), is_removed);
 }
 
 void RemoteObject::lock(LockKind kind) const {

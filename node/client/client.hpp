@@ -3,14 +3,17 @@
 //   auto create = rr::connect("rr+tcp://127.0.0.1:52222/?service=Create");
 //   create.call("Drive", 100, 5000);
 //   std::cout << *create.get("DistanceTraveled").to<std::int32_t>() << " mm\n";
-//   create.on_event("Bump", [](std::span<const rr::Value>) { std::cout << "bump\n"; });
+//   create.on_event("Bump", [&](std::span<const rr::Value>) { create.call("Drive", 0, 0); });
 //   create.connection().run_for(std::chrono::seconds(5));
 #pragma once
 
 #include <array>
 #include <chrono>
+#include <deque>
 #include <functional>
+#include <map>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -30,7 +33,10 @@ class ClientException : public Exception {
 };
 
 /// A connection and the io_context that it runs on, which runs only while one of the functions here waits: handlers of
-/// events and wires are called then, and may not wait themselves (std::logic_error). For one thread.
+/// events, wires, pipes and callbacks are called then, on the thread that waits, one after another in the order of what
+/// they tell of. A handler may make requests and wait for them; the others are called when it has returned. What waits
+/// for handlers that take too long: of a wire the newest value, of the rest up to 65,536 calls, above which the
+/// connection is closed. For one thread.
 class BlockingConnection {
  public:
   /// Throws   ClientException.
@@ -52,15 +58,31 @@ class BlockingConnection {
   const MapString& attributes() const { return connection_->session().attributes(); }
   void close();
   bool is_closed() const { return close_reason_.has_value(); }
-  /// Whether a handler runs: nothing can wait.
-  bool is_running() const { return is_running_; }
+  /// Handlers that are given to it are called where nothing can wait (std::logic_error).
   ClientConnection& asynchronous() { return *connection_; }
 
  private:
+  friend class RemoteObject;
+  struct HandlerCall {
+    const char* kind;
+    std::string name;
+    std::function<void()> call;
+  };
+
+  /// Has a handler called by whoever waits here.
+  void queue(HandlerCall handler);
+  void run_handlers();
+  /// Handles what comes next. Returns whether there was anything before `until`.
+  bool serve(std::optional<std::chrono::steady_clock::time_point> until);
+
   boost::asio::io_context io_{1};
   std::shared_ptr<ClientConnection> connection_;
   std::optional<Error> close_reason_;
-  bool is_running_ = false;
+  std::deque<HandlerCall> handlers_;
+  bool is_handling_ = false;  ///< one of them runs
+  bool is_serving_ = false;
+  /// For each connected wire, whether it was disconnected since.
+  std::map<std::pair<std::string, std::string>, std::shared_ptr<bool>> wires_;
 };
 
 /// Holds the monitor lock of an object for as long as it lives.
@@ -83,7 +105,7 @@ class MonitorGuard {
 /// An endpoint of a pipe: a handle that is cheap to copy. Everything throws ClientException.
 class RemotePipe {
  public:
-  /// Waits while the stream is full, as long as a request may take; not in handlers: there it throws instead.
+  /// Waits while the stream is full, as long as a request may take.
   void send(const Value& packet) const;
   void close() const;
   std::int32_t index() const { return state_->index; }
@@ -94,6 +116,7 @@ class RemotePipe {
   struct State {
     std::int32_t index = 0;
     bool is_open = true;
+    bool is_closed_here = false;  ///< packets that came before are dropped
   };
   RemotePipe(std::shared_ptr<BlockingConnection> connection, std::string path, std::string pipe)
       : connection_(std::move(connection)), path_(std::move(path)), pipe_(std::move(pipe)) {}
@@ -144,7 +167,8 @@ class RemoteObject {
     on_callback_values(callback, make_plain_handler(std::forward<F>(handler)).call);
   }
   void on_callback_values(std::string_view callback, ClientConnection::CallbackHandler handler) const;
-  void on_event(std::string_view event, ClientConnection::EventHandler handler) const;
+  /// One handler more; all are called.
+  HandlerRegistration on_event(std::string_view event, ClientConnection::EventHandler handler) const;
 
   /// Keeps others out of this object and all below it, until unlock() or until this client has gone.
   void lock(LockKind kind = LockKind::user) const;

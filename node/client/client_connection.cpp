@@ -3,6 +3,7 @@
 #include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/post.hpp>
+#include <boost/container/small_vector.hpp>
 #include <iostream>
 #include <variant>
 
@@ -244,8 +245,26 @@ void ClientConnection::forget_callback(std::string_view path, std::string_view c
   callback_handlers_.erase({std::string(path), std::string(callback)});
 }
 
+HandlerRegistration ClientConnection::add_event_handler(std::string_view path, std::string_view event,
+                                                        EventHandler handler, std::shared_ptr<bool> is_removed) {
+  HandlerRegistration registration;
+  registration.connection_ = std::static_pointer_cast<ClientConnection>(shared_from_this());
+  registration.is_removed_ = is_removed;
+  event_handlers_.emplace(MemberKey(path, event), std::make_shared<EventSubscription>(
+                                                      EventSubscription{std::move(handler), std::move(is_removed)}));
+  return registration;
+}
+
+void HandlerRegistration::remove() const {
+  if (!is_removed_ || std::exchange(*is_removed_, true)) return;
+  if (const auto connection = connection_.lock())
+    std::erase_if(connection->event_handlers_,
+                  [&](const auto& item) { return item.second->is_removed == is_removed_; });
+}
+
 void ClientConnection::on_event(std::string_view path, std::string_view event, EventHandler handler) {
-  event_handlers_[{std::string(path), std::string(event)}] = std::make_shared<EventHandler>(std::move(handler));
+  event_handlers_.erase(MemberKey(path, event));
+  add_event_handler(path, event, std::move(handler));
 }
 
 void ClientConnection::authenticate(std::string_view username, const Value& credentials, Completion done) {
@@ -293,8 +312,12 @@ void ClientConnection::run_handler(std::string_view kind, std::string_view name,
   try {
     handler();
   } catch (...) {
-    report(describe_failure(kind, name, handler_error(std::current_exception())));
+    handler_failed(kind, name);
   }
+}
+
+void ClientConnection::handler_failed(std::string_view kind, std::string_view name) const {
+  report(describe_failure(kind, name, handler_error(std::current_exception())));
 }
 
 void ClientConnection::report(const std::string& problem) const {
@@ -318,10 +341,11 @@ void ClientConnection::handle(Completed&& completed) {
 
 void ClientConnection::handle(EventReceived&& received) {
   const MemberKey key{std::move(received.path), std::move(received.member)};
-  const auto found = event_handlers_.find(key);
-  if (found == event_handlers_.end()) return;
-  const auto handler = found->second;  // it may replace itself
-  run_handler("event", key.second, [&] { (*handler)(received.arguments); });
+  const auto [first, last] = event_handlers_.equal_range(key);
+  boost::container::small_vector<std::shared_ptr<EventSubscription>, 4> present;  // they may come and go meanwhile
+  for (auto each = first; each != last; ++each) present.push_back(each->second);
+  for (const auto& each : present)
+    if (!*each->is_removed) run_handler("event", key.second, [&] { each->handler(received.arguments); });
 }
 
 void ClientConnection::handle(WireValueReceived&& received) {
@@ -329,6 +353,7 @@ void ClientConnection::handle(WireValueReceived&& received) {
   const auto found = wire_handlers_.find(key);
   if (found == wire_handlers_.end()) return;
   const auto handler = found->second;
+  if (!*handler) return;  // connected to send alone
   run_handler("wire", key.second, [&] { (*handler)(received.value, received.time); });
 }
 

@@ -51,6 +51,19 @@ class ClientOpening {
   bool is_over_ = false;
 };
 
+/// A handler that was added to others: a handle that is cheap to copy. Forgetting it changes nothing.
+class HandlerRegistration {
+ public:
+  HandlerRegistration() = default;  ///< of nothing
+  /// Takes the handler out, also from within it: it is not called any more. Once: more often does nothing.
+  void remove() const;
+
+ private:
+  friend class ClientConnection;
+  std::weak_ptr<ClientConnection> connection_;
+  std::shared_ptr<bool> is_removed_;
+};
+
 /// One connection to a service. All callbacks run on the thread of the io_context; one that throws is
 /// reported (ConnectOptions::report), and the connection goes on. Each completion is called exactly once, when the
 /// reply is there or the connection has ended; for a request that cannot be sent, maybe before the function returns.
@@ -139,8 +152,14 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   void on_callback_later(std::string_view path, std::string_view callback, LateCallbackHandler handler);
   /// From now on the service hears that nobody answers.
   void forget_callback(std::string_view path, std::string_view callback);
-  /// One handler an event; a second replaces the first.
+  /// One handler beside those that the event has already; they are called in the order of coming.
+  /// `is_removed`  becomes true when the handler is taken out, for who wants to know.
+  HandlerRegistration add_event_handler(std::string_view path, std::string_view event, EventHandler handler,
+                                        std::shared_ptr<bool> is_removed = std::make_shared<bool>(false));
+  /// Instead of all handlers that the event has.
   void on_event(std::string_view path, std::string_view event, EventHandler handler);
+  /// In a catch block: reports what a handler has thrown.
+  void handler_failed(std::string_view kind, std::string_view name) const;
   /// `handler` hears that the service has replaced the objects at and below a path; its other handlers there are gone.
   void on_path_released(std::function<void(const std::string& path)> handler) { path_released_ = std::move(handler); }
   /// Called once, when the session has ended for whatever reason; not after a failed open(). Each handler that is
@@ -155,6 +174,7 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   ClientConnection(std::unique_ptr<ByteStream> stream, ConnectOptions options, Opened opened);
 
  private:
+  friend class HandlerRegistration;
   using MemberKey = std::pair<std::string, std::string>;               // path, member
   using PipeKey = std::tuple<std::string, std::string, std::int32_t>;  // path, member, index
 
@@ -181,7 +201,11 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   std::function<void(const std::string&)> report_;
   Opened opened_;
   std::unordered_map<RequestId, Completion> completions_;
-  std::map<MemberKey, std::shared_ptr<EventHandler>> event_handlers_;
+  struct EventSubscription {
+    EventHandler handler;
+    std::shared_ptr<bool> is_removed;
+  };
+  std::multimap<MemberKey, std::shared_ptr<EventSubscription>> event_handlers_;
   std::map<MemberKey, std::shared_ptr<WireHandler>> wire_handlers_;
   std::map<MemberKey, std::function<void()>> wire_closed_handlers_;
   std::map<MemberKey, std::shared_ptr<LateCallbackHandler>> callback_handlers_;

@@ -132,12 +132,11 @@ template <class... Args>
 class TypedEvent : public MemberHandle {
  public:
   using MemberHandle::MemberHandle;
-  /// handler(Args...). A second one replaces the first. Called while one of the functions of rr_object.connection()
-  /// runs.
+  /// handler(Args...), one more; all are called, while one of the functions of rr_object.connection() runs.
   template <class F>
-  void on(F handler) const {
-    ask([&](const RemoteObject& object, const char* name) {
-      object.on_event(name, detail::typed_event_handler<Args...>(std::move(handler)));
+  HandlerRegistration on(F handler) const {
+    return ask([&](const RemoteObject& object, const char* name) {
+      return object.on_event(name, detail::typed_event_handler<Args...>(std::move(handler)));
     });
   }
 };
@@ -147,7 +146,7 @@ template <class T, MemberDirection direction = MemberDirection::both>
 class TypedPipeEndpoint {
  public:
   explicit TypedPipeEndpoint(RemotePipe pipe) : pipe_(std::move(pipe)) {}
-  /// Waits while the stream is full; not in handlers: there it throws instead.
+  /// Waits while the stream is full.
   void send(T packet) const requires(direction != MemberDirection::readonly) {
     pipe_.send(pack_value(std::move(packet)));
   }

@@ -1,5 +1,6 @@
 #include "node/client/client.hpp"
 
+#include <algorithm>
 #include <boost/asio/ip/tcp.hpp>
 #include <catch2/catch.hpp>
 
@@ -17,8 +18,11 @@ constexpr const char* definition = R"(service test.echo
 stdver 0.10
 object Echo
     function string say(string text)
+    function void provoke()
     event said(string text)
     wire int32 count
+    pipe string words
+    callback int32 ask(string question)
 end
 )";
 
@@ -27,6 +31,15 @@ void add_echo(Node& node) {
   service->function("say", [service = service.get()](std::string text) {
     service->fire("said", text);
     return text;
+  });
+  // The callback's answer comes by the wire.
+  service->function("provoke", [service = service.get()] {
+    service->set_wire("count", 4);
+    service->pipe("words").broadcast(Value("word"));
+    service->call_callback(service->current_client(), "ask", {Value("how many?")},
+                           [service](const Result<Value>& answer) {
+                             if (answer) service->set_wire("count", *answer);
+                           });
   });
   service->set_wire("count", 5);
   node.add(service);
@@ -87,24 +100,102 @@ TEST_CASE("a client hears what became of the values of its wire") {
   CHECK(losses()->conflated == 0);
 }
 
-TEST_CASE("handlers may use the connection, but not wait on it") {
+TEST_CASE("handlers may make requests and wait for them; one is called after the other") {
   RunningNode node(add_echo);
   const auto echo = connect(node.url("Echo"));
   std::vector<std::string> said;
-  bool is_refused = false;
+  int running = 0;
   echo.on_event("said", [&](std::span<const Value> arguments) {
+    CHECK(++running == 1);
     said.emplace_back(*arguments.front().to_text());
-    if (said.size() > 1) return;
-    const std::array<Value, 1> more{Value("two")};
-    echo.connection().asynchronous().call("Echo", "say", more, nullptr);
+    if (said.size() == 1) CHECK(echo.call("say", "two") == Value("two"));
+    --running;
+  });
+  CHECK(echo.call("say", "one") == Value("one"));
+  REQUIRE(echo.connection().run_until([&] { return said.size() == 2; }, 5s));
+  CHECK(said == std::vector<std::string>{"one", "two"});
+}
+
+TEST_CASE("handlers of wires, pipes and callbacks may wait as well") {
+  RunningNode node(add_echo);
+  const auto echo = connect(node.url("Echo"));
+  std::vector<std::string> answers;
+  const auto ask = [&](const std::string& text) { answers.emplace_back(*echo.call("say", text).to_text()); };
+  echo.connect_wire("count", [&](const Value&, TimeSpec) { ask("of the wire"); });
+  const auto pipe = echo.connect_pipe("words", [&](const Value&) { ask("of the pipe"); });
+  echo.on_callback("ask", [&](const std::string&) {
+    ask("of the callback");
+    return 5;
+  });
+  echo.call("provoke");
+  REQUIRE(echo.connection().run_until([&] { return answers.size() >= 4; }, 5s));
+  CHECK(std::count(answers.begin(), answers.end(), "of the pipe") == 1);
+  CHECK(std::count(answers.begin(), answers.end(), "of the callback") == 1);
+  REQUIRE(echo.connection().run_until([&] { return echo.peek_in("count") == Value(5); }, 5s));  // what it answered
+}
+
+TEST_CASE("a handler that ends its wire or pipe hears no more of it") {
+  RunningNode node(add_echo);
+  const auto echo = connect(node.url("Echo"));
+  int values = 0;
+  int packets = 0;
+  std::optional<RemotePipe> pipe;
+  echo.connect_wire("count", [&](const Value&, TimeSpec) {
+    ++values;
+    echo.disconnect_wire("count");
+  });
+  pipe = echo.connect_pipe("words", [&](const Value&) {
+    ++packets;
+    echo.call("provoke");  // more packets
+    pipe->close();
+  });
+  echo.call("provoke");
+  echo.call("provoke");
+  REQUIRE(echo.connection().run_until([&] { return packets > 0; }, 5s));
+  echo.call("provoke");
+  CHECK(values == 1);
+  CHECK(packets == 1);
+}
+
+TEST_CASE("asynchronous handlers may use the connection, but not wait on it") {
+  RunningNode node(add_echo);
+  const auto echo = connect(node.url("Echo"));
+  bool is_refused = false;
+  const std::array<Value, 1> text{Value("one")};
+  echo.connection().asynchronous().call("Echo", "say", text, [&](const Result<Value>&) {
     try {
-      echo.call("say", "three");
+      echo.call("say", "two");
     } catch (const std::logic_error&) {
       is_refused = true;
     }
   });
+  REQUIRE(echo.connection().run_until([&] { return is_refused; }, 5s));
+  CHECK(echo.call("say", "three") == Value("three"));
+}
+
+TEST_CASE("an event calls all its handlers, in their order, until they are taken out") {
+  RunningNode node(add_echo);
+  const auto echo = connect(node.url("Echo"));
+  std::string order;
+  HandlerRegistration third;
+  const auto first = echo.on_event("said", [&](std::span<const Value>) { order += 'a'; });
+  HandlerRegistration second;
+  second = echo.on_event("said", [&](std::span<const Value>) {
+    order += 'b';
+    second.remove();
+    third.remove();  // was not called yet for this event
+  });
+  third = echo.on_event("said", [&](std::span<const Value>) { order += 'c'; });
+  echo.on_event("said", [&](std::span<const Value>) { order += 'd'; });
   echo.call("say", "one");
-  REQUIRE(echo.connection().run_until([&] { return said.size() == 2; }, 5s));
-  CHECK(said == std::vector<std::string>{"one", "two"});
-  CHECK(is_refused);
+  CHECK(order == "abd");
+  echo.call("say", "two");
+  CHECK(order == "abdad");
+  first.remove();
+  first.remove();
+  HandlerRegistration().remove();
+  echo.call("say", "three");
+  CHECK(order == "abdadd");
+  echo.connection().close();
+  third.remove();
 }
