@@ -8,14 +8,20 @@
 //
 // A token is asio::use_awaitable (the default), asio::use_future, a callback void(std::exception_ptr, Value), or any
 // other of Asio's. What fails is a ClientException.
+//
+// Cancellation slots work (`co_await (arm.call("Home") || timer.async_wait(...))`): a request that is cancelled fails
+// with operation_cancelled at once. The service is not told and goes on; what it answers then is dropped, and what was
+// begun for the client (a wire, a pipe endpoint, a generator, a lock) is ended.
 #pragma once
 
 #include <boost/asio/any_io_executor.hpp>
+#include <boost/asio/associated_cancellation_slot.hpp>
 #include <boost/asio/associated_executor.hpp>
 #include <boost/asio/async_result.hpp>
 #include <boost/asio/dispatch.hpp>
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <exception>
 #include <memory>
@@ -32,20 +38,43 @@ namespace rr {
 namespace detail {
 
 /// Calls a completion handler once, on its own executor, with what a request came to: void(std::exception_ptr, T), or
-/// without the T where that is void.
+/// without the T where that is void. Where its cancellation slot says so, with operation_cancelled.
 template <class T, class Handler>
 class CompleteOnce {
  public:
   /// `fallback` where the handler has no executor of its own.
-  CompleteOnce(Handler handler, const boost::asio::any_io_executor& fallback)
-      : state_(std::make_shared<State>(std::move(handler), fallback)) {}
+  CompleteOnce(Handler handler, const boost::asio::any_io_executor& fallback) {
+    auto slot = boost::asio::get_associated_cancellation_slot(handler);
+    state_ = std::make_shared<State>(std::move(handler), fallback);
+    if (!slot.is_connected()) return;
+    slot.assign([weak = std::weak_ptr(state_)](boost::asio::cancellation_type type) {
+      using Type = boost::asio::cancellation_type;
+      const auto state = weak.lock();
+      if (!state || (type & (Type::terminal | Type::partial)) == Type::none) return;
+      // Posted: whoever completes may let go of the signal, which is being used.
+      boost::asio::post(state->fallback, [weak] {
+        if (const auto still_there = weak.lock()) CompleteOnce(still_there).cancel();
+      });
+    });
+  }
 
   void operator()(Result<T> result) const {
     if (result)
       finish(nullptr, std::move(*result));
     else
-      finish(std::make_exception_ptr(ClientException(result.error())), T{});
+      fail(std::move(result.error()));
   }
+  void fail(Error error) const {
+    const auto failure = std::make_exception_ptr(ClientException(std::move(error)));
+    if constexpr (std::is_void_v<T>)
+      finish(failure);
+    else
+      finish(failure, T{});
+  }
+  /// `what` is done where the operation is cancelled.
+  void on_cancelled(std::function<void()> what) const { state_->cancelled = std::move(what); }
+  /// Whether the handler was called: what comes now comes too late.
+  bool is_over() const { return !state_->handler; }
   template <class... Results>
   void finish(std::exception_ptr failure, Results... results) const {
     if (!state_->handler) return;
@@ -64,10 +93,46 @@ class CompleteOnce {
         : handler(std::move(with)), fallback(on), work(boost::asio::make_work_guard(*handler, on)) {}
     std::optional<Handler> handler;
     boost::asio::any_io_executor fallback;
+    std::function<void()> cancelled;
     boost::asio::executor_work_guard<boost::asio::associated_executor_t<Handler, boost::asio::any_io_executor>> work;
   };
+  explicit CompleteOnce(std::shared_ptr<State> state) : state_(std::move(state)) {}
+  void cancel() const {
+    if (is_over()) return;
+    if (state_->cancelled) state_->cancelled();
+    fail(make_error(ErrorCode::operation_cancelled, "was cancelled"));
+  }
+
   std::shared_ptr<State> state_;
 };
+
+// What ends what a request has begun, where its result comes too late.
+inline auto end_wire(std::string wire) {
+  return [wire = std::move(wire)](ClientConnection& connection, const std::string& path, const Value&) {
+    connection.disconnect_wire(path, wire, nullptr);
+  };
+}
+inline auto end_pipe(std::string pipe) {
+  return [pipe = std::move(pipe)](ClientConnection& connection, const std::string& path, const Value& index) {
+    connection.disconnect_pipe(path, pipe, index.to<std::int32_t>().value(), nullptr);
+  };
+}
+inline auto end_generator(std::string function) {
+  return [function = std::move(function)](ClientConnection& connection, const std::string& path, const Value& index) {
+    connection.close_generator(path, function, index.to<std::int32_t>().value(), nullptr);
+  };
+}
+
+/// `complete` as long as the operation is not over; a result that comes later is ended by `end`.
+template <class Complete, class End>
+ClientConnection::Completion complete_or_end(Complete complete, std::shared_ptr<ClientConnection> connection,
+                                             std::string path, End end, std::function<bool()> is_over) {
+  return [complete = std::move(complete), connection = std::move(connection), path = std::move(path),
+          end = std::move(end), is_over = std::move(is_over)](Result<Value> result) {
+    if (!is_over()) return complete(std::move(result));
+    if (result && !connection->is_closed()) end(*connection, path, *result);
+  };
+}
 
 }  // namespace detail
 
@@ -130,7 +195,8 @@ class AsyncObject {
   /// `received` gets each newer InValue until disconnect_wire().
   template <class Token = boost::asio::use_awaitable_t<>>
   auto connect_wire(std::string_view wire, ClientConnection::WireHandler received, Token&& token = {}) const {
-    return request<&ClientConnection::connect_wire>(token, std::string(wire), std::move(received));
+    return request_and_end<&ClientConnection::connect_wire>(detail::end_wire(std::string(wire)), token,
+                                                            std::string(wire), std::move(received));
   }
   template <class Token = boost::asio::use_awaitable_t<>>
   auto disconnect_wire(std::string_view wire, Token&& token = {}) const {
@@ -144,7 +210,8 @@ class AsyncObject {
   template <class Token = boost::asio::use_awaitable_t<>>
   auto connect_pipe(std::string_view pipe, ClientConnection::PipeHandlers handlers, std::int32_t index = any_pipe_index,
                     Token&& token = {}) const {
-    return request<&ClientConnection::connect_pipe>(token, std::string(pipe), index, std::move(handlers));
+    return request_and_end<&ClientConnection::connect_pipe>(detail::end_pipe(std::string(pipe)), token,
+                                                            std::string(pipe), index, std::move(handlers));
   }
   template <class Token = boost::asio::use_awaitable_t<>>
   auto disconnect_pipe(std::string_view pipe, std::int32_t index, Token&& token = {}) const {
@@ -157,7 +224,8 @@ class AsyncObject {
   /// Calls a generator function; completes with the generator's index as int32, which the three below take.
   template <class Token = boost::asio::use_awaitable_t<>>
   auto open_generator(std::string_view function, std::vector<Value> arguments = {}, Token&& token = {}) const {
-    return request<&ClientConnection::open_generator>(token, std::string(function), std::move(arguments));
+    return request_and_end<&ClientConnection::open_generator>(detail::end_generator(std::string(function)), token,
+                                                              std::string(function), std::move(arguments));
   }
   /// Completes with the next value; behind the last one a ClientException with stop_iteration.
   template <class Token = boost::asio::use_awaitable_t<>>
@@ -212,7 +280,10 @@ class AsyncObject {
   }
   template <class Token = boost::asio::use_awaitable_t<>>
   auto lock(LockKind kind = LockKind::user, Token&& token = {}) const {
-    return request<&ClientConnection::lock>(token, kind);
+    const auto end = [](ClientConnection& connection, const std::string& path, const Value&) {
+      connection.unlock(path, nullptr);
+    };
+    return request_and_end<&ClientConnection::lock>(end, token, kind);
   }
   template <class Token = boost::asio::use_awaitable_t<>>
   auto unlock(Token&& token = {}) const {
@@ -221,7 +292,10 @@ class AsyncObject {
   /// `timeout` negative: for ever.
   template <class Token = boost::asio::use_awaitable_t<>>
   auto enter_monitor(std::chrono::milliseconds timeout = std::chrono::milliseconds(-1), Token&& token = {}) const {
-    return request<&ClientConnection::enter_monitor>(token, timeout);
+    const auto end = [](ClientConnection& connection, const std::string& path, const Value&) {
+      connection.exit_monitor(path, nullptr);
+    };
+    return request_and_end<&ClientConnection::enter_monitor>(end, token, timeout);
   }
   template <class Token = boost::asio::use_awaitable_t<>>
   auto exit_monitor(Token&& token = {}) const {
@@ -246,6 +320,19 @@ class AsyncObject {
         },
         token);
   }
+  /// The same for what lasts: `end(connection, path, result)` ends it where it comes after the request was cancelled.
+  template <auto Request, class End, class Token, class... Args>
+  auto request_and_end(End end, Token& token, Args... arguments) const {
+    return boost::asio::async_initiate<Token, void(std::exception_ptr, Value)>(
+        [connection = connection_, path = path_, end = std::move(end),
+         ... rest = std::move(arguments)](auto handler) mutable {
+          const detail::CompleteOnce<Value, decltype(handler)> complete(std::move(handler), connection->executor());
+          ((*connection).*Request)(path, std::move(rest)...,
+                                   detail::complete_or_end(complete, connection, path, std::move(end),
+                                                           [complete] { return complete.is_over(); }));
+        },
+        token);
+  }
 
   std::shared_ptr<ClientConnection> connection_;
   std::string path_;
@@ -258,9 +345,13 @@ auto async_connect(boost::asio::io_context& io, std::string url, const ConnectOp
   return boost::asio::async_initiate<Token, void(std::exception_ptr, AsyncObject)>(
       [&io, url = std::move(url), options](auto handler) {
         const detail::CompleteOnce<AsyncObject, decltype(handler)> complete(std::move(handler), io.get_executor());
-        ClientConnection::open(io, url, options, [complete](const Result<std::shared_ptr<ClientConnection>>& opened) {
-          complete(opened ? Result<AsyncObject>(AsyncObject(*opened, (*opened)->root_path()))
-                          : Result<AsyncObject>(opened.error()));
+        const auto opening = ClientConnection::open(
+            io, url, options, [complete](const Result<std::shared_ptr<ClientConnection>>& opened) {
+              complete(opened ? Result<AsyncObject>(AsyncObject(*opened, (*opened)->root_path()))
+                              : Result<AsyncObject>(opened.error()));
+            });
+        complete.on_cancelled([weak = std::weak_ptr(opening)] {
+          if (const auto begun = weak.lock()) begun->cancel();
         });
       },
       token);

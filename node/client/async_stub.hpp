@@ -56,29 +56,34 @@ class AsyncClientStub {
   AsyncObject rr_object;
 
   /// For handles of members: `start(connection, path, completion)` begins a request, `convert` makes a T of what it
-  /// completes with: a Value, or the Result<Value> where it takes that.
-  template <class T, class Token, class Start, class Convert>
-  auto rr_request(Token& token, Start start, Convert convert) const {
+  /// completes with: a Value, or the Result<Value> where it takes that. `end` as in AsyncObject, or null.
+  template <class T, class Token, class Start, class Convert, class End = std::nullptr_t>
+  auto rr_request(Token& token, Start start, Convert convert, End end = {}) const {
     return boost::asio::async_initiate<Token, typename detail::CompletionOf<T>::Signature>(
-        [object = rr_object, throw_declared = throw_declared_, start = std::move(start),
-         convert = std::move(convert)](auto handler) mutable {
+        [object = rr_object, throw_declared = throw_declared_, start = std::move(start), convert = std::move(convert),
+         end = std::move(end)](auto handler) mutable {
           using Complete = detail::CompleteOnce<T, decltype(handler)>;
           const Complete complete(std::move(handler), object.connection()->executor());
-          start(*object.connection(), object.path(),
-                [complete, throw_declared, convert = std::move(convert)](Result<Value> result) {
-                  const auto value = [&]() -> T {
-                    if constexpr (std::is_invocable_v<Convert, Result<Value>>) {
-                      return convert(std::move(result));
-                    } else {
-                      if (!result) {
-                        throw_declared(result.error());
-                        throw ClientException(result.error());
-                      }
-                      return convert(std::move(*result));
-                    }
-                  };
-                  finish<T>(complete, value);
-                });
+          auto completed = [complete, throw_declared, convert = std::move(convert)](Result<Value> result) {
+            const auto value = [&]() -> T {
+              if constexpr (std::is_invocable_v<Convert, Result<Value>>) {
+                return convert(std::move(result));
+              } else {
+                if (!result) {
+                  throw_declared(result.error());
+                  throw ClientException(result.error());
+                }
+                return convert(std::move(*result));
+              }
+            };
+            finish<T>(complete, value);
+          };
+          if constexpr (std::is_null_pointer_v<End>)
+            start(*object.connection(), object.path(), std::move(completed));
+          else
+            start(*object.connection(), object.path(),
+                  detail::complete_or_end(std::move(completed), object.connection(), object.path(), std::move(end),
+                                          [complete] { return complete.is_over(); }));
         },
         token);
   }
@@ -108,7 +113,8 @@ class AsyncClientStub {
         },
         [client = *this, function](const Value& index) {
           return AsyncGenerator<T, Parameter>(client, function, index.to<std::int32_t>().value());
-        });
+        },
+        detail::end_generator(function));
   }
   template <class Client, class Token, class... Index>
   auto rr_child(const char* objref, Token& token, const Index&... index) const {
@@ -200,13 +206,12 @@ class AsyncWire : public AsyncMember {
   requires(std::is_invocable_v<F&, T> || std::is_invocable_v<F&, T, TimeSpec>) auto connect(F handler,
                                                                                             Token&& token = {}) const
       requires(direction != MemberDirection::writeonly) {
-    return ask<&ClientConnection::connect_wire, void>(token, detail::typed_wire_handler<T>(std::move(handler)));
+    return connect_with(token, detail::typed_wire_handler<T>(std::move(handler)));
   }
   /// To send alone.
   template <class Token = UseAwaitable>
   auto connect_to_send(Token&& token = {}) const requires(direction != MemberDirection::readonly) {
-    return ask<&ClientConnection::connect_wire, void>(token,
-                                                      ClientConnection::WireHandler([](const Value&, TimeSpec) {}));
+    return connect_with(token, nullptr);
   }
   template <class Token = UseAwaitable>
   auto disconnect(Token&& token = {}) const {
@@ -227,6 +232,18 @@ class AsyncWire : public AsyncMember {
   template <class Token = UseAwaitable>
   auto poke(const T& value, Token&& token = {}) const requires(direction != MemberDirection::readonly) {
     return ask<&ClientConnection::poke_out, void>(token, pack_value<T>(value));
+  }
+
+ private:
+  template <class Token>
+  auto connect_with(Token& token, ClientConnection::WireHandler handler) const {
+    return client().template rr_request<void>(
+        token,
+        [name = name(), handler = std::move(handler)](ClientConnection& connection, const std::string& path,
+                                                      ClientConnection::Completion done) mutable {
+          connection.connect_wire(path, name, std::move(handler), std::move(done));
+        },
+        [](const Value&) {}, detail::end_wire(name()));
   }
 };
 
@@ -302,7 +319,8 @@ class AsyncPipe : public AsyncMember {
         },
         [object = object(), name = name(), is_open](const Value& index) {
           return Endpoint(object, name, index.to<std::int32_t>().value(), is_open);
-        });
+        },
+        detail::end_pipe(name()));
   }
 };
 

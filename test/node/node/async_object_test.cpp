@@ -1,12 +1,15 @@
 #include "node/client/async_object.hpp"
 
 #include <boost/asio/as_tuple.hpp>
+#include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/bind_executor.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/experimental/awaitable_operators.hpp>
+#include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/use_future.hpp>
 #include <catch2/catch.hpp>
+#include <mutex>
 #include <thread>
 
 #include "test/node/node/node_fixture.hpp"
@@ -210,4 +213,154 @@ TEST_CASE("what was asked for ends when the connection does") {
     io.run();
   }
   CHECK_THROWS_AS(std::rethrow_exception(failure), ClientException);
+}
+
+namespace {
+
+/// A service that takes its time, until it is told.
+struct SlowArm {
+  std::mutex mutex;
+  std::vector<Reply<double>> replies;
+  int ended = 0;
+
+  void add_to(Node& node) {
+    auto service = Service::from_text({definition}, "Arm", "Arm");
+    auto* arm = service.get();
+    service->property("speed")
+        .get([this](Reply<double> reply) { replies.push_back(std::move(reply)); })
+        .set([](double) {});
+    service->function("add", [](double a, double b) { return a + b; });
+    service->function("jam", [this, arm] {
+      arm->set_wire("torque", 1.0);
+      for (const auto& reply : std::exchange(replies, {})) reply(1.0);
+    });
+    service->function("wonder", [] {});
+    service->objref("tools", [](std::string_view) { return nullptr; });
+    service->generator("count", [this](std::int32_t) {
+      Generator generator;
+      generator.next = [](const Value&) -> Result<std::optional<Value>> { return std::optional<Value>(Value(1)); };
+      generator.close = [this] { ++ended; };
+      return generator;
+    });
+    service->pipe("samples").on_close([this](const PipeEndpoint&) { ++ended; });
+    node.add(service);
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a request beside a timer ends with the timer, and its answer is dropped when it comes") {
+  SlowArm slow;
+  RunningNode node([&](Node& made) { slow.add_to(made); });
+  asio::io_context io;
+  int turns = 0;
+  asio::co_spawn(
+      io,
+      [&]() -> asio::awaitable<void> {
+        using namespace asio::experimental::awaitable_operators;
+        const auto arm = co_await async_connect(io, node.url("Arm"));
+        for (; turns < 3; ++turns) {
+          asio::steady_timer timer(io, std::chrono::milliseconds(1));
+          const auto first = co_await (arm.get("speed") || timer.async_wait(asio::use_awaitable));
+          CHECK(first.index() == 1);
+        }
+        co_await arm.call("jam");  // the answers
+        const auto sum = co_await arm.call("add", 1.0, 2.0);
+        CHECK(*sum.to<double>() == 3);
+        arm.connection()->disconnect();
+      },
+      [](std::exception_ptr failure) { CHECK(failure == nullptr); });
+  io.run_for(std::chrono::seconds(5));  // a request waits 15 s
+  CHECK(turns == 3);
+  CHECK(io.stopped());
+}
+
+TEST_CASE("a request that is cancelled fails so; cancelling what has ended does nothing") {
+  SlowArm slow;
+  RunningNode node([&](Node& made) { slow.add_to(made); });
+  asio::io_context io;
+  asio::cancellation_signal signal;
+  std::vector<ErrorCode> codes;
+  AsyncObject arm;
+  async_connect(io, node.url("Arm"), [&](const std::exception_ptr&, AsyncObject object) { arm = std::move(object); });
+  while (!arm.connection() && io.run_one() != 0) {
+  }
+  const auto note = [&](const std::exception_ptr& failure, const Value&) {
+    codes.push_back(failure ? error_of([&] { std::rethrow_exception(failure); }).code : ErrorCode::none);
+  };
+  arm.get("speed", asio::bind_cancellation_slot(signal.slot(), note));
+  signal.emit(asio::cancellation_type::total);  // promises that nothing has happened, which nobody can
+  io.poll();
+  CHECK(codes.empty());
+  signal.emit(asio::cancellation_type::terminal);
+  CHECK(codes.empty());  // not from within
+  while (codes.empty() && io.run_one() != 0) {
+  }
+  CHECK(codes == std::vector{ErrorCode::operation_cancelled});
+  signal.emit(asio::cancellation_type::terminal);
+  arm.call_values("add", {1.0, 2.0}, asio::bind_cancellation_slot(signal.slot(), note));
+  while (codes.size() < 2 && io.run_one() != 0) {
+  }
+  signal.emit(asio::cancellation_type::terminal);
+  io.poll();
+  CHECK(codes == std::vector{ErrorCode::operation_cancelled, ErrorCode::none});
+  arm.connection()->disconnect();
+  io.run();
+}
+
+TEST_CASE("what a cancelled request began with the service is ended") {
+  SlowArm slow;
+  RunningNode node([&](Node& made) { slow.add_to(made); });
+  asio::io_context io;
+  AsyncObject arm;
+  async_connect(io, node.url("Arm"), [&](const std::exception_ptr&, AsyncObject object) { arm = std::move(object); });
+  while (!arm.connection() && io.run_one() != 0) {
+  }
+  asio::cancellation_signal wire, pipe, generator;
+  int cancelled = 0;
+  int received = 0;
+  const auto note = [&](const std::exception_ptr& failure, const Value&) { cancelled += failure != nullptr; };
+  ClientConnection::PipeHandlers handlers;
+  handlers.received = [&](const Value&) { ++received; };
+  arm.connect_wire(
+      "torque", [&](const Value&, TimeSpec) { ++received; }, asio::bind_cancellation_slot(wire.slot(), note));
+  arm.connect_pipe("samples", handlers, any_pipe_index, asio::bind_cancellation_slot(pipe.slot(), note));
+  arm.open_generator("count", {Value(1)}, asio::bind_cancellation_slot(generator.slot(), note));
+  for (auto* signal : {&wire, &pipe, &generator}) signal->emit(asio::cancellation_type::terminal);
+  io.poll();
+  CHECK(cancelled == 3);
+  const auto ended = [&] { return node.ask([&](Node&) { return slow.ended; }); };
+  const auto jam = [&] {
+    bool is_done = false;
+    arm.call_values("jam", {}, [&](const std::exception_ptr&, const Value&) { is_done = true; });
+    while (!is_done && io.run_one() != 0) {
+    }
+  };
+  for (int turn = 0; turn < 100 && ended() != 2; ++turn) jam();
+  CHECK(ended() == 2);
+  jam();  // sets the wire
+  CHECK(received == 0);
+  CHECK(error_of([&] {
+          if (const auto sent = arm.send_wire("torque", 1.0); !sent) throw ClientException(sent.error());
+        }).code != ErrorCode::none);
+  arm.connection()->disconnect();
+  io.run();
+}
+
+TEST_CASE("connecting can be cancelled") {
+  asio::io_context io;
+  asio::ip::tcp::acceptor silent(io, {asio::ip::make_address("127.0.0.1"), 0});
+  const auto url = "rr+tcp://127.0.0.1:" + std::to_string(silent.local_endpoint().port()) + "/?service=Arm";
+  asio::cancellation_signal signal;
+  auto code = ErrorCode::none;
+  async_connect(io, url,
+                asio::bind_cancellation_slot(signal.slot(), [&](const std::exception_ptr& failure, AsyncObject) {
+                  code = error_of([&] { std::rethrow_exception(failure); }).code;
+                }));
+  while (io.poll() != 0) {
+  }
+  signal.emit(asio::cancellation_type::terminal);
+  io.run_for(std::chrono::seconds(5));
+  CHECK(code == ErrorCode::operation_cancelled);
+  CHECK(io.stopped());
 }
