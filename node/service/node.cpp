@@ -244,6 +244,14 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
       if (newest == value) client.send_wire(packet);
     });
   }
+  void send_wire_to(const Service& service, ClientId id, const std::string& path, const MemberDefinition& wire,
+                    const Value& value) override {
+    const auto client = clients_.find(id);
+    if (client == clients_.end() || client->second->service() != &service) return;
+    const Now now = read_clocks();
+    WirePacket packet(path, wire, value, now.utc, now.steady);
+    client->second->send_wire(packet);
+  }
   void release_path(const Service& service, const std::string& path) override {
     for_clients_of(service, [&](ServiceClient& client) { client.release_path(path); });
   }

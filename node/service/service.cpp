@@ -154,15 +154,34 @@ void Object::call_callback(ClientId client, std::string_view callback, const std
                                 arguments, std::move(done));
 }
 
-void Object::set_wire(std::string_view wire, Value value) {
+const MemberDefinition& Object::check_in_value(std::string_view wire, const Value& value) const {
   const MemberDefinition& member = require_member(wire, MemberKind::wire);
   if (member.direction() == MemberDirection::writeonly)
     refuse(type_name() + "." + member.name + " is writeonly: the service sends nothing on it");
   check_value(type_name() + "." + member.name, value, member.type, *service_.types_);
-  auto& in_value = members_[&member].in_value;
+  return member;
+}
+
+void Object::set_wire(std::string_view wire, Value value) {
+  const MemberDefinition& member = check_in_value(wire, value);
+  Member& mine = members_[&member];
+  mine.own_in_values.clear();
+  auto& in_value = mine.in_value;
   in_value = std::make_shared<const Value>(std::move(value));
   if (!service_.host_) return;
   for (const std::string& path : paths()) service_.host_->send_wire(service_, path, member, in_value);
+}
+
+void Object::set_wire_for(ClientId client, std::string_view wire, Value value) {
+  const MemberDefinition& member = check_in_value(wire, value);
+  if (service_.find_client(client).id == 0) return;
+  members_[&member].own_in_values.insert_or_assign(client, value);
+  service_.objects_of_clients_[client].insert(weak_from_this());
+  for (const std::string& path : paths()) service_.host_->send_wire_to(service_, client, path, member, value);
+}
+
+void Object::forget_client(ClientId client) {
+  for (auto& [member, mine] : members_) mine.own_in_values.erase(client);
 }
 
 void Object::objref(std::string_view name, std::shared_ptr<Object> child) {
@@ -265,7 +284,8 @@ std::optional<Result<Value>> Object::answer(Called& called, const BeginLate& beg
       return mine && mine->set ? ask(mine->set) : missing("set of property");
     case CallKind::peek_in:
     case CallKind::peek_out: {
-      if (mine && called.kind == CallKind::peek_in && mine->in_value) return *mine->in_value;
+      if (called.kind == CallKind::peek_in)
+        if (const Value* value = in_value(*called.member, service_.current_client())) return *value;
       if (mine && called.kind == CallKind::peek_out && mine->out_value) return *mine->out_value;
       return make_error(ErrorCode::value_not_set, "wire '" + called.member->name + "' has no value yet");
     }
@@ -299,9 +319,11 @@ void Object::receive_wire(const WireReceived& received) {
   if (wire.wire_received.call) (void)wire.wire_received.call({&received.value, 1});
 }
 
-const Value* Object::in_value(const MemberDefinition& wire) const {
+const Value* Object::in_value(const MemberDefinition& wire, ClientId client) const {
   const auto found = members_.find(&wire);
-  return found != members_.end() ? found->second.in_value.get() : nullptr;
+  if (found == members_.end()) return nullptr;
+  const auto own = found->second.own_in_values.find(client);
+  return own != found->second.own_in_values.end() ? &own->second : found->second.in_value.get();
 }
 
 // --- Service ---
@@ -336,6 +358,13 @@ std::shared_ptr<Object> Service::make_object(std::string_view type) {
   std::erase_if(objects_, [](const std::weak_ptr<Object>& other) { return other.expired(); });
   objects_.push_back(object);
   return object;
+}
+
+void Service::forget_client(ClientId client) {
+  const auto objects = objects_of_clients_.extract(client);
+  if (!objects) return;
+  for (const auto& weak : objects.mapped())
+    if (const auto object = weak.lock()) object->forget_client(client);
 }
 
 void Service::set_attribute(std::string key, Value value) {

@@ -24,6 +24,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -159,6 +160,10 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   /// Sets a wire's InValue: sent to every client that has connected it, to later ones when they connect, and to peeks.
   /// Throws   std::invalid_argument: no such wire, one that is writeonly, a value that does not fit its type.
   void set_wire(std::string_view wire, Value value);
+  /// Sets the InValue of one client alone, in place of the one that all have: for its peeks and for when it connects
+  /// the wire later, too. Until set_wire() sets that of all again. Nothing happens where the client is gone. Throws as
+  /// set_wire().
+  void set_wire_for(ClientId client, std::string_view wire, Value value);
   /// A client's newest OutValue: handler(Value) or of the wire's C++ type.
   template <class F>
   void on_wire(std::string_view wire, F&& handler) {
@@ -195,6 +200,7 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
     Handler set;
     Handler wire_received;
     std::shared_ptr<const Value> in_value = {};                          ///< wires: what clients receive
+    std::map<ClientId, Value> own_in_values = {};                        ///< wires: what single clients do instead
     std::optional<Value> out_value = {};                                 ///< wires: the newest that a client sent
     std::function<std::shared_ptr<Object>(std::string_view)> find = {};  ///< objrefs
     std::function<void(PipeEndpoint)> pipe_connected = {};
@@ -230,7 +236,9 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   void connect_pipe(const MemberDefinition& pipe, const PipeEndpoint& endpoint);
   Result<> receive_packet(const MemberDefinition& pipe, const PipeEndpoint& endpoint, const Value& packet);
   void close_pipe(const MemberDefinition& pipe, const PipeEndpoint& endpoint, bool tells_handler);
-  const Value* in_value(const MemberDefinition& wire) const;
+  const MemberDefinition& check_in_value(std::string_view wire, const Value& value) const;
+  const Value* in_value(const MemberDefinition& wire, ClientId client) const;
+  void forget_client(ClientId client);
 
   Service& service_;
   const EntityDefinition* type_;
@@ -246,6 +254,8 @@ class ServiceHost {
   /// `newest`  where the wire's value is: another one there is sent by a call of its own.
   virtual void send_wire(const Service& service, const std::string& path, const MemberDefinition& wire,
                          const std::shared_ptr<const Value>& newest) = 0;
+  virtual void send_wire_to(const Service& service, ClientId client, const std::string& path,
+                            const MemberDefinition& wire, const Value& value) = 0;
   virtual void release_path(const Service& service, const std::string& path) = 0;
   virtual void call_callback(const Service& service, ClientId client, const std::string& path,
                              const MemberDefinition& callback, std::span<const Value> arguments, CallbackDone done) = 0;
@@ -320,6 +330,9 @@ class Service {
     root_->call_callback(client, callback, arguments, std::move(done));
   }
   void set_wire(std::string_view wire, Value value) { root_->set_wire(wire, std::move(value)); }
+  void set_wire_for(ClientId client, std::string_view wire, Value value) {
+    root_->set_wire_for(client, wire, std::move(value));
+  }
   template <class F>
   void on_wire(std::string_view wire, F&& handler) {
     root_->on_wire(wire, std::forward<F>(handler));
@@ -339,12 +352,15 @@ class Service {
   friend class Object;
   friend class ServiceClient;
   Service() = default;
+  void forget_client(ClientId client);
 
   std::string name_;
   std::shared_ptr<TypeRegistry> types_;
   std::string definition_;  ///< name of the one that unqualified object types are of
   std::shared_ptr<Object> root_;
   std::vector<std::weak_ptr<Object>> objects_;
+  /// Those with wires that have a value for one client alone.
+  std::map<ClientId, std::set<std::weak_ptr<Object>, std::owner_less<>>> objects_of_clients_;
   MapString attributes_;
   SecurityPolicy security_;
   std::shared_ptr<HostedService> hosted_;

@@ -219,7 +219,7 @@ void ServiceClient::answer_login(LoginId id, Result<AuthenticatedUser> result) {
 }
 
 void ServiceClient::handle(const WireConnected& connected, Now now) {
-  const Value* value = static_cast<Object&>(*connected.object).in_value(*connected.member);
+  const Value* value = static_cast<Object&>(*connected.object).in_value(*connected.member, id_);
   if (value) (void)session_.send_wire(connected.path, *connected.member, *value, now);  // checked when it was set
 }
 
@@ -320,6 +320,7 @@ void ServiceClient::handle(const ClientGone&, Now) {
   for (const auto& [id, running] : std::exchange(generators_, {}))
     if (owner_) abandon_generator(running.generator);
   const auto left = std::exchange(service_, nullptr);
+  if (left) left->forget_client(id_);
   if (!left || !owner_ || !left->on_gone_) return;
   const auto handler = left->on_gone_;
   notify("a lost client of service", left->name(), [&] { handler(id_); });

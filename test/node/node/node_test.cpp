@@ -205,6 +205,39 @@ TEST_CASE("wires: the present value at once, newer ones as they come, peeks with
   CHECK(seen.size() == 2);
 }
 
+TEST_CASE("a wire's value for one client alone: sent, peeked, kept for when it connects, until all have a new one") {
+  CounterNode device;
+  const auto one = device.connect();
+  const auto two = device.connect();
+  const auto id = *one.call("who").to<std::uint64_t>();
+  one.call("add", 5);
+  std::vector<Value> seen_by_one, seen_by_two;
+  two.connect_wire("newest", [&](const Value& value, TimeSpec) { seen_by_two.push_back(value); });
+  const auto set_for = [&](std::int32_t value) {
+    device.node.ask([&](Node&) { return device.counter->service->set_wire_for(id, "newest", value), 0; });
+  };
+  set_for(50);
+  CHECK(one.peek_in("newest") == Value(50));
+  CHECK(two.peek_in("newest") == Value(5));
+  one.connect_wire("newest", [&](const Value& value, TimeSpec) { seen_by_one.push_back(value); });
+  REQUIRE(one.connection().run_until([&] { return seen_by_one.size() == 1; }, 5s));
+  set_for(51);
+  REQUIRE(one.connection().run_until([&] { return seen_by_one.size() == 2; }, 5s));
+  one.call("add", 1);
+  REQUIRE(one.connection().run_until([&] { return seen_by_one.size() == 3; }, 5s));
+  CHECK(seen_by_one == std::vector<Value>{Value(50), Value(51), Value(6)});
+  CHECK(one.peek_in("newest") == Value(6));
+  REQUIRE(two.connection().run_until([&] { return seen_by_two.size() == 2; }, 5s));
+  CHECK(seen_by_two == std::vector<Value>{Value(5), Value(6)});
+  device.node.ask([&](Node&) {
+    auto& service = *device.counter->service;
+    CHECK_THAT(refusal([&] { service.set_wire_for(id, "wish", 1.0); }), Contains("writeonly"));
+    CHECK_THAT(refusal([&] { service.set_wire_for(id, "newest", "text"); }), Contains("newest"));
+    CHECK_NOTHROW(service.set_wire_for(id + 100, "newest", 1));
+    return 0;
+  });
+}
+
 TEST_CASE("wires towards the service: sent, poked, answered") {
   CounterNode device;
   const auto counter = device.connect();
