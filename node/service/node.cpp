@@ -198,6 +198,26 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     });
   }
 
+  void accept(std::unique_ptr<ByteStream> stream, std::string_view url) {
+    const auto colon = url.find("://");
+    if (colon == std::string_view::npos || !url.starts_with("rr"))
+      throw std::invalid_argument("accept for " + rr::quoted(url) + ": expected a URL as \"rr+ws://HOST:PORT/\"");
+    Door door{std::string(url.substr(0, colon)), std::string(url.substr(colon + 3)), options_.require_tls};
+    if (door.address.ends_with('/')) door.address.pop_back();
+    if (!is_stopping_ && !is_full()) welcome(std::move(stream), std::move(door));
+  }
+
+  void accept(asio::ip::tcp::socket socket, bool requires_tls, ByteSpan seen = {}) {
+    error_code error;
+    const auto local = socket.local_endpoint(error);
+    if (error || is_stopping_ || is_full()) return;  // an error: gone already
+    std::string host = local.address().to_string();
+    host.resize(std::min(host.size(), host.find('%')));  // the zone is what this machine calls the link
+    auto stream = make_tcp_stream(std::move(socket), send_stall);
+    stream->put_back(seen);
+    welcome(std::move(stream), {{}, format_host_port(host, local.port()), requires_tls});
+  }
+
   void every(std::chrono::nanoseconds period, std::function<void()> work) {
     if (period <= std::chrono::nanoseconds::zero())
       throw std::invalid_argument("Node::every: the period must be longer than nothing");
@@ -223,6 +243,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   void on_services_changed(std::function<void()> handler) { services_changed_ = std::move(handler); }
 
   asio::io_context& io() { return io_; }
+  bool requires_tls() const { return options_.require_tls; }
   const NodeIdentity& identity() const { return directory_.identity(); }
   std::size_t client_count() const {
     return static_cast<std::size_t>(
@@ -316,18 +337,18 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     }
   }
 
-  void accept(asio::ip::tcp::socket socket, bool requires_tls) {
-    error_code error;
-    const auto local = socket.local_endpoint(error);
-    if (error) return;  // gone already
-    if (is_full()) return;
-    auto stream = make_tcp_stream(std::move(socket), send_stall);
-    std::string host = local.address().to_string();
-    host.resize(std::min(host.size(), host.find('%')));  // the zone is what this machine calls the link
+  /// Where clients come in: of the URL that they may have used.
+  struct Door {
+    std::string scheme = {};  ///< empty: the stream says it
+    std::string address = {};
+    bool requires_tls = false;
+  };
+
+  void welcome(std::unique_ptr<ByteStream> stream, Door door) {
     const auto arrival = std::make_shared<asio::cancellation_signal>();
     arriving_.insert(arrival);
     const auto keep = [arrival](std::exception_ptr) {};  // the coroutine uses the slot until this is called
-    asio::co_spawn(io_, welcome(std::move(stream), format_host_port(host, local.port()), requires_tls, arrival, alive_),
+    asio::co_spawn(io_, find_out(std::move(stream), std::move(door), arrival, alive_),
                    asio::bind_cancellation_slot(arrival->slot(), keep));
   }
 
@@ -343,18 +364,20 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   bool is_full() const { return clients_.size() + arriving_.size() >= options_.max_clients; }
 
   /// `alive`  the node may go while a client says nothing.
-  awaitable<void> welcome(std::unique_ptr<ByteStream> stream, std::string local, bool requires_tls, Arrival arrival,
-                          std::weak_ptr<const bool> alive) {
+  awaitable<void> find_out(std::unique_ptr<ByteStream> stream, Door door, Arrival arrival,
+                           std::weak_ptr<const bool> alive) {
     AcceptOptions how;
     how.allowed_origins = options_.allowed_origins;
     how.self = identity();
     how.tls = options_.tls;
-    how.requires_tls = requires_tls;
+    how.requires_tls = door.requires_tls;
     auto accepted = co_await accept_stream(std::move(stream), std::move(how));
     if (alive.expired()) co_return;
     arriving_.erase(arrival);
     if (!accepted && accepted.error().code == ErrorCode::authentication_error) report(accepted.error().message);
-    if (accepted && !is_stopping_) add_client(std::move(*accepted), local);
+    if (!accepted || is_stopping_) co_return;
+    if (!door.scheme.empty()) accepted->scheme = accepted->is_encrypted ? "rrs" + door.scheme.substr(2) : door.scheme;
+    add_client(std::move(*accepted), door.address);
   }
 
   void add_client(Accepted accepted, const std::string& local) {
@@ -431,6 +454,12 @@ void Node::add(const std::shared_ptr<Service>& service) {
 }
 std::uint16_t Node::listen(std::string_view url) {
   return implementation_->listen(url);
+}
+void Node::accept(std::unique_ptr<ByteStream> stream, std::string_view url) {
+  implementation_->accept(std::move(stream), url);
+}
+void Node::accept(asio::ip::tcp::socket socket, ByteSpan seen) {
+  implementation_->accept(std::move(socket), implementation_->requires_tls(), seen);
 }
 void Node::run() {
   implementation_->run();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
 #include <chrono>
 #include <functional>
 #include <memory>
@@ -10,8 +11,10 @@
 #include <string_view>
 #include <vector>
 
+#include "core/support/bytes.hpp"
 #include "node/service/service.hpp"
 #include "node/tls/tls_context.hpp"
+#include "node/transport/byte_stream.hpp"
 #include "node/transport/schemes.hpp"
 
 namespace rr {
@@ -62,6 +65,16 @@ class Node {
   /// Returns  the port, 0 for rr+local and rr+intra. Throws std::invalid_argument; std::runtime_error ("listen on ...:
   /// Address already in use").
   std::uint16_t listen(std::string_view url);
+
+  /// Serves a connection that the program has accepted itself, be it from a listener or out of a web server of its own,
+  /// as those of listen(): by the first bytes it is Robot Raconteur, a WebSocket to be upgraded, or refused. A
+  /// WebSocket that the program has upgraded comes as a stream of what it carries: make_beast_stream().
+  /// `stream`  runs on io_context(), or on what the node was given.
+  /// `url`     by which its clients come, for the service index: "rr+ws://robot.lab:8080/arm".
+  /// Throws   std::invalid_argument: not such a URL.
+  void accept(std::unique_ptr<ByteStream> stream, std::string_view url);
+  /// The same for a socket, whose address says the URL. `seen`: what was read of it already, a whole HTTP request, say.
+  void accept(boost::asio::ip::tcp::socket socket, ByteSpan seen = {});
 
   /// Runs until stop(), SIGINT or SIGTERM; what else was given to io_context() does not hold it up then.
   void run();
