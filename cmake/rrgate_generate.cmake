@@ -1,10 +1,10 @@
-# rrgate_generate(TARGET [IMPORTS folder...] FILES definition.robdef...)
+# rrgate_generate(TARGET [COMPAT] [IMPORTS folder...] FILES definition.robdef...)
 #
 # Adds the C++ classes of service definitions to a target: `#include "com__example__robot.hpp"` for com.example.robot.
 # Definitions that these import are looked for among them, beside them, and in the IMPORTS folders; what is found there
-# must be generated for a library that the target links.
+# must be generated for a library that the target links. COMPAT reads old definitions, as `rrgate generate --compat` does.
 function(rrgate_generate target)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "FILES;IMPORTS")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "COMPAT" "" "FILES;IMPORTS")
   if(NOT arg_FILES)
     set(arg_FILES ${arg_UNPARSED_ARGUMENTS})
   endif()
@@ -13,6 +13,9 @@ function(rrgate_generate target)
   set(files)
   set(outputs)
   set(search)
+  if(arg_COMPAT)
+    list(APPEND search --compat)
+  endif()
   foreach(import IN LISTS arg_IMPORTS)
     cmake_path(ABSOLUTE_PATH import)
     list(APPEND search -I "${import}")

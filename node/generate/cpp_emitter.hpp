@@ -19,7 +19,7 @@ using namespace rr;
 class CppEmitter {
  public:
   CppEmitter(const DefinitionSet& set, const ServiceDefinition& definition)
-      : set_(set), definition_(definition), types_(set, definition) {}
+      : set_(set), definition_(definition), is_strict_(set.is_strict(definition)), types_(set, definition) {}
 
   CppFiles emit();
 
@@ -69,6 +69,7 @@ class CppEmitter {
 
   const DefinitionSet& set_;
   const ServiceDefinition& definition_;
+  const bool is_strict_;  ///< else services read their definitions in compat mode
   CppTypes types_;
   SourceWriter header_{DocStyle::lines};
   SourceWriter source_{DocStyle::lines};

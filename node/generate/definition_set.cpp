@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <functional>
 #include <set>
 
 #include "core/robdef/model/names.hpp"
@@ -78,16 +77,39 @@ bool DefinitionSet::is_good() const {
                       [](const auto& diagnostic) { return diagnostic.severity == rr::Severity::error; });
 }
 
-std::vector<const rr::ServiceDefinition*> DefinitionSet::in_order() const {
-  std::vector<const rr::ServiceDefinition*> order;
-  std::set<const rr::ServiceDefinition*> seen;
-  const std::function<void(const rr::ServiceDefinition&)> visit = [&](const rr::ServiceDefinition& definition) {
-    if (!seen.insert(&definition).second) return;
-    for (const auto& import : definition.imports) visit(*find_service(import.name));
+class DefinitionSet::ImportsFirst {
+ public:
+  explicit ImportsFirst(const DefinitionSet& set) : set_(set) {}
+
+  void visit(const rr::ServiceDefinition& definition) {
+    if (!seen_.insert(&definition).second) return;
+    for (const auto& import : definition.imports) visit(*set_.find_service(import.name));
     order.push_back(&definition);
-  };
-  for (const auto& definition : definitions_) visit(definition);
-  return order;
+  }
+
+  std::vector<const rr::ServiceDefinition*> order = {};
+
+ private:
+  const DefinitionSet& set_;
+  std::set<const rr::ServiceDefinition*> seen_ = {};
+};
+
+std::vector<const rr::ServiceDefinition*> DefinitionSet::with_imports(const rr::ServiceDefinition& definition) const {
+  ImportsFirst walk(*this);
+  walk.visit(definition);
+  return std::move(walk.order);
+}
+
+std::vector<const rr::ServiceDefinition*> DefinitionSet::in_order() const {
+  ImportsFirst walk(*this);
+  for (const auto& definition : definitions_) walk.visit(definition);
+  return std::move(walk.order);
+}
+
+bool DefinitionSet::is_strict(const rr::ServiceDefinition& definition) const {
+  std::vector<std::string> texts;
+  for (const auto* part : with_imports(definition)) texts.push_back(part->text);
+  return from_texts(texts, rr::RobdefMode::strict).is_good();
 }
 
 const rr::ServiceDefinition* DefinitionSet::find_service(std::string_view name) const {

@@ -29,8 +29,12 @@ class DefinitionSet {
 
   /// The definitions that were asked for, as given; those found by their imports are not among them.
   std::span<const rr::ServiceDefinition* const> requested() const { return requested_; }
+  /// `definition` behind all that it imports, imports before importers. Of a good set.
+  std::vector<const rr::ServiceDefinition*> with_imports(const rr::ServiceDefinition& definition) const;
   /// All definitions, imports before importers. Of a good set.
   std::vector<const rr::ServiceDefinition*> in_order() const;
+  /// Whether `definition` and all that it imports are as authors write them today. Of a good set.
+  bool is_strict(const rr::ServiceDefinition& definition) const;
 
   /// Nullptr where there is none.
   const rr::ServiceDefinition* find_service(std::string_view name) const;
@@ -39,6 +43,8 @@ class DefinitionSet {
   bool has_service_within(std::string_view name) const;
 
  private:
+  class ImportsFirst;
+
   explicit DefinitionSet(rr::RobdefMode mode) : mode_(mode) {}
   const rr::ServiceDefinition* add(std::string_view text, std::string_view file);
   bool add_file(const std::string& file);

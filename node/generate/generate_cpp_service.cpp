@@ -19,6 +19,8 @@ void CppEmitter::emit_service(const EntityDefinition& item) {
   header_.gap();
   header_.line("std::string_view rr_object_type() const override;");
   header_.line("std::vector<std::string> rr_object_definitions() const override;");
+  if (!is_strict_)
+    header_.line("rr::RobdefMode rr_definition_mode() const override { return rr::RobdefMode::compat; }");
   header_.gap();
   header_.label("protected:");
   header_.line("void rr_bind(rr::Object& object) override;");

@@ -329,14 +329,14 @@ const Value* Object::in_value(const MemberDefinition& wire, ClientId client) con
 // --- Service ---
 
 std::shared_ptr<Service> Service::from_text(const std::vector<std::string>& definitions, std::string name,
-                                            std::string root_type) {
+                                            std::string root_type, RobdefMode mode) {
   const std::shared_ptr<Service> service(new Service);
   service->name_ = std::move(name);
   service->types_ = std::make_shared<TypeRegistry>();
-  if (auto added = service->types_->add(definitions, RobdefMode::strict); !added)
-    refuse("service " + rr::quoted(service->name_) + ": " + added.error().message);
+  if (auto added = service->types_->add(definitions, mode); !added)
+    refuse("service " + quoted(service->name_) + ": " + added.error().message);
   if (definitions.empty()) refuse("service " + rr::quoted(service->name_) + " has no definition");
-  service->definition_ = parse_service_definition(definitions.back(), RobdefMode::strict).definition.name;
+  service->definition_ = parse_service_definition(definitions.back(), mode).definition.name;
   service->root_ = service->make_object(root_type);
   return service;
 }

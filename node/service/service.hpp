@@ -271,12 +271,12 @@ class ServiceHost {
 /// A service: definition, name, root object.
 class Service {
  public:
-  /// `root_type` is the object's name in the last definition, or its qualified name.
+  /// `root_type` is the object's name in the last definition, or its qualified name. In compat mode the definitions may
+  /// be such as clients of other makes refuse.
   /// Throws   std::invalid_argument with the first finding where a definition is not valid, an import is missing, or
-  /// there
-  ///          is no such object.
+  ///          there is no such object.
   static std::shared_ptr<Service> from_text(const std::vector<std::string>& definitions, std::string name,
-                                            std::string root_type);
+                                            std::string root_type, RobdefMode mode = RobdefMode::strict);
   /// As from_text; the files may import one another. The last file holds the root type.
   /// Throws   std::invalid_argument: also for a file that cannot be read.
   static std::shared_ptr<Service> from_files(const std::vector<std::string>& paths, std::string name,

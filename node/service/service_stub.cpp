@@ -45,8 +45,8 @@ std::int32_t ServiceStub::rr_number(std::string_view text) {
 }
 
 std::shared_ptr<Service> make_service(std::string name, const std::shared_ptr<ServiceStub>& root) {
-  auto service =
-      Service::from_text(root->rr_object_definitions(), std::move(name), std::string(root->rr_object_type()));
+  auto service = Service::from_text(root->rr_object_definitions(), std::move(name), std::string(root->rr_object_type()),
+                                    root->rr_definition_mode());
   root->rr_attach(*service, service->root().shared_from_this());
   return service;
 }

@@ -36,6 +36,8 @@ class ServiceStub : public std::enable_shared_from_this<ServiceStub> {
   virtual std::string_view rr_object_type() const = 0;
   /// The texts of the type's definition and of all that it imports, imports first.
   virtual std::vector<std::string> rr_object_definitions() const = 0;
+  /// How to read them.
+  virtual RobdefMode rr_definition_mode() const { return RobdefMode::strict; }
 
   /// The service that this object was handed out by. Throws std::logic_error before that.
   Service& rr_service() const;
