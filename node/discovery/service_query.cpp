@@ -38,6 +38,12 @@ std::string text_of(const Structure& info, std::string_view field) {
   return text ? std::string(*text) : std::string();
 }
 
+/// Nodes write bases as the definition does: those of the root object's own definition without its name.
+std::string qualified(std::string_view base, std::string_view root_type) {
+  const auto definition = root_type.substr(0, root_type.rfind('.') + 1);
+  return (base.find('.') == std::string_view::npos ? std::string(definition) : std::string()) + std::string(base);
+}
+
 ServiceInfo read_service(const Structure& info, const NodeIdentity& node, const ConnectionUrl& url) {
   ServiceInfo out;
   out.node = node;
@@ -47,7 +53,8 @@ ServiceInfo read_service(const Structure& info, const NodeIdentity& node, const 
   if (const auto* field = info.find("RootObjectImplements"))
     if (const auto* names = field->get_if<MapInt32>())
       for (const auto& [key, name] : names->items)
-        if (const auto text = name.to_text()) out.root_object_implements.emplace_back(*text);
+        if (const auto text = name.to_text())
+          out.root_object_implements.push_back(qualified(*text, out.root_object_type));
   if (const auto* field = info.find("Attributes"))
     if (const auto* attributes = field->get_if<MapString>()) out.attributes = *attributes;
   return out;

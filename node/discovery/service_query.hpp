@@ -19,11 +19,11 @@ struct ServiceInfo {
   NodeIdentity node;  ///< as the node itself said it when connecting
   std::string name;
   std::string root_object_type;
-  std::vector<std::string> root_object_implements;
-  std::string connection_url;  ///< the way that the answer took, with the service's name
+  std::vector<std::string> root_object_implements;  ///< qualified
+  std::string connection_url;                       ///< the way that the answer took, with the service's name
   MapString attributes;
 
-  /// Whether the root object is of this type.
+  /// Whether the root object is of this type or implements it; qualified.
   bool implements(std::string_view type) const;
 };
 

@@ -334,7 +334,7 @@ std::shared_ptr<Service> Service::from_text(const std::vector<std::string>& defi
   service->name_ = std::move(name);
   service->types_ = std::make_shared<TypeRegistry>();
   if (auto added = service->types_->add(definitions, mode); !added)
-    refuse("service " + quoted(service->name_) + ": " + added.error().message);
+    refuse("service " + rr::quoted(service->name_) + ": " + added.error().message);
   if (definitions.empty()) refuse("service " + rr::quoted(service->name_) + " has no definition");
   service->definition_ = parse_service_definition(definitions.back(), mode).definition.name;
   service->root_ = service->make_object(root_type);

@@ -13,7 +13,8 @@ rr::awaitable<rr::Result<ProbeResult>> probe(rr::ConnectionUrl url, rr::DialOpti
   auto answer = co_await rr::query_services(std::move(url), std::move(query));
   if (!answer) co_return answer.error();
   ProbeResult result{answer->node.id, answer->node.name, {}};
-  for (const auto& service : answer->services) result.services.push_back({service.name, service.root_object_type});
+  for (const auto& service : answer->services)
+    result.services.push_back({service.name, service.root_object_type, service.root_object_implements});
   co_return result;
 }
 

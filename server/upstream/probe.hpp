@@ -12,6 +12,7 @@ namespace rrgate {
 struct DeviceService {
   std::string name;
   std::string type;
+  std::vector<std::string> implements;  ///< types that the root object can be used as, too
 
   bool operator==(const DeviceService&) const = default;
 };

@@ -162,7 +162,7 @@ def test_a_gateway_finds_three_nodes_and_uses_those_it_may(network, start, tmp_p
 
     names = {"lab.ours", "lab.theirs", "home.node"}
     devices = ask("devices", lambda answer: online(answer) == names)["devices"]
-    assert all(device["found"] and device["services"] == [{"name": "thing", "type": TYPE}] for device in devices)
+    assert all(device["found"] and device["services"] == [{"name": "thing", "type": TYPE, "implements": []}] for device in devices)
     nodes = ask("discovery", lambda answer: len(answer["nodes"]) == 4)["nodes"]
     assert {node["node_name"]: node["allowed"] for node in nodes} == {**dict.fromkeys(names, True), "home.other": False}
     assert all(node["age"] < 20 and "%eth0]" in node["urls"][0]["url"] for node in nodes)

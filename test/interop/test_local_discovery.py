@@ -101,7 +101,7 @@ def test_the_gateway_makes_a_device_of_it(start, tmp_path):
     gateway.wait_until(lambda: (found := devices()) and found[0]["state"] == "online")
     (device,) = devices()
     assert (device["name"], device["found"]) == ("local.device", True)
-    assert device["services"] == [{"name": "thing", "type": TYPE}]
+    assert device["services"] == [{"name": "thing", "type": TYPE, "implements": []}]
     (found,) = [each for each in ask("discovery")["nodes"] if each["node_id"] == node_id]
     assert (found["device"], found["urls"][0]["url"].split("?")[0]) == ("local.device", "rr+local:///")
     node.process.kill()

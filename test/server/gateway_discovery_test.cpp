@@ -26,8 +26,9 @@ rr::Announcement at(const rr::NodeId& id, std::uint16_t port, const std::string&
 }
 
 std::shared_ptr<rr::Service> make_thing() {
-  auto service =
-      rr::Service::from_text({"service com.x\nobject Arm\nproperty int32 one [readonly]\nend\n"}, "thing", "Arm");
+  auto service = rr::Service::from_text(
+      {"service com.x\nobject Base\nend\nobject Arm\nimplements Base\nproperty int32 one [readonly]\nend\n"}, "thing",
+      "Arm");
   service->property("one").get([] { return 1; });
   return service;
 }
@@ -77,7 +78,8 @@ TEST_CASE("an allowed node becomes a device, others are listed and left alone") 
   CHECK(devices[0]["found"] == false);
   CHECK(devices[1]["found"] == true);
   CHECK(devices[1]["name"] == "test.node");
-  CHECK(devices[1]["services"][0] == json::parse(R"({"name": "thing", "type": "com.x.Arm"})"));
+  CHECK(devices[1]["services"][0] ==
+        json::parse(R"({"name": "thing", "type": "com.x.Arm", "implements": ["com.x.Base"]})"));
 
   const auto nodes = wait_for_nodes(gateway, [](const json& all) { return all.size() == 2; });
   const auto& stranger = nodes[nodes[0]["node_name"] == "stranger" ? 0 : 1];
@@ -87,7 +89,7 @@ TEST_CASE("an allowed node becomes a device, others are listed and left alone") 
   CHECK(stranger["services"].is_null());
   CHECK(allowed["allowed"] == true);
   CHECK(allowed["device"] == "test.node");
-  CHECK(allowed["services"][0]["type"] == "com.x.Arm");
+  CHECK(allowed["services"][0] == devices[1]["services"][0]);
   CHECK(allowed["age"] >= 0);
   CHECK(allowed["urls"].size() == 1);
   CHECK_FALSE(trap.was_touched());

@@ -340,15 +340,11 @@ it("ends a loop over a pipe that is too far behind", async () => {
   await subscription.close();
 });
 
-/** A gateway's answer: name, state and type of the one service "test" of each device. */
-function answerDevices(...devices: [name: string, state: string, type: string][]): string[] {
+/** A gateway's answer: name, state, type and bases of the one service "test" of each device. */
+function answerDevices(...devices: [name: string, state: string, type: string, ...bases: string[]][]): string[] {
   const asked: string[] = [];
-  const list = devices.map(([name, state, type]) => ({
-    name,
-    state,
-    node_id: "id",
-    node_name: null,
-    services: [{ name: "test", type }],
+  const list = devices.map(([name, state, type, ...bases]) => ({
+    name, state, node_id: "id", node_name: null, services: [{ name: "test", type, implements: bases }],
   }));
   vi.stubGlobal("fetch", async (url: URL) => {
     asked.push(String(url));
@@ -371,22 +367,21 @@ it("finds services of a type among the devices of a gateway", async () => {
   const found = await findServices({ gateway, type });
   expect(asked).toEqual(["http://gateway:8080/lab/api/v1/devices"]);
   expect(found.map(({ device }) => device)).toEqual(["a b", "c"]);
-  expect(found[0]).toEqual({
-    url: "http://gateway:8080/lab/devices/a%20b?service=test",
-    device: "a b",
-    service: "test",
-    type,
-    nodeId: "id",
-    nodeName: null,
-  });
-  expect(await findServices({ gateway: `${gateway}/`, type, filter: ({ device }) => device === "c" })).toEqual([
-    found[1],
-  ]);
+  expect(found[0]).toEqual({ url: "http://gateway:8080/lab/devices/a%20b?service=test", device: "a b", service: "test", type, implements: [], nodeId: "id", nodeName: null });
+  expect(await findServices({ gateway: `${gateway}/`, type, filter: ({ device }) => device === "c" })).toEqual([found[1]]);
   for (const response of [new Response("no", { status: 404 }), new Response("{}"), new Response("<html>")]) {
     vi.stubGlobal("fetch", async () => response);
     const error = await failure(findServices({ gateway, type }));
     expect([error.code, error.message]).toEqual([ErrorCode.ConnectionError, expect.stringContaining(gateway)]);
   }
+});
+
+it("finds services whose root object implements the type", async () => {
+  answerDevices(["newer", "online", "test.subscribe.Newer", "test.Other", type], ["other", "online", "test.Other"]);
+  const found = await findServices({ gateway: "http://gateway", type });
+  expect(found.map(({ device, type: own, implements: bases }) => [device, own, bases])).toEqual([
+    ["newer", "test.subscribe.Newer", ["test.Other", type]],
+  ]);
 });
 
 it("follows a type: the first device that works, asked for anew after each loss", async () => {

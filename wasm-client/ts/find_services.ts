@@ -9,6 +9,8 @@ export interface FoundService {
   service: string;
   /** Of the root object, qualified. */
   type: string;
+  /** Types that the root object can be used as, too. */
+  implements: string[];
   nodeId: string | null;
   nodeName: string | null;
 }
@@ -16,7 +18,7 @@ export interface FoundService {
 export interface ServiceQuery {
   /** Where the gateway is: "https://gateway.example". In a page, relative to it. */
   gateway: string | URL;
-  /** Of the root object, qualified: "experimental.create2.Create". */
+  /** Of the root object, or one that it implements; qualified: "experimental.create2.Create". */
   type: string;
   /** Which of them; all. */
   filter?: ((found: FoundService) => boolean) | undefined;
@@ -28,7 +30,7 @@ interface Device {
   state: string;
   node_id: string | null;
   node_name: string | null;
-  services: { name: string; type: string }[];
+  services: { name: string; type: string; implements?: string[] }[];
 }
 /* eslint-enable @typescript-eslint/naming-convention */
 
@@ -42,13 +44,11 @@ export async function findServices(query: ServiceQuery, signal?: AbortSignal): P
     const gateway = new URL(String(query.gateway).replace(/\/*$/, "/"), globalThis.location?.href);
     const response = await fetch(new URL("api/v1/devices", gateway), { signal: signal ?? null, cache: "no-store" });
     if (!response.ok) throw new Error(`HTTP ${response.status}`);
-    for (const { name, state, node_id: nodeId, node_name: nodeName, services } of (
-      (await response.json()) as { devices: Device[] }
-    ).devices)
-      for (const { name: service, type } of state === "online" ? services : [])
-        if (type === query.type) {
+    for (const { name, state, node_id: nodeId, node_name: nodeName, services } of ((await response.json()) as { devices: Device[] }).devices)
+      for (const { name: service, type, implements: bases = [] } of state === "online" ? services : [])
+        if (type === query.type || bases.includes(query.type)) {
           const url = new URL(`devices/${encodeURIComponent(name)}?service=${encodeURIComponent(service)}`, gateway);
-          found.push({ url: String(url), device: name, service, type, nodeId, nodeName });
+          found.push({ url: String(url), device: name, service, type, implements: bases, nodeId, nodeName });
         }
   } catch (error) {
     throw makeError("ConnectionError", `devices of the gateway ${query.gateway}: ${textOf(error)}`);

@@ -38,7 +38,7 @@ nlohmann::ordered_json describe(const Device& device, const Request& request, co
   if (identity)
     for (const auto& service : identity->services)
       if (access.sees(request.identity, device.config().name, service.name))
-        out["services"].push_back({{"name", service.name}, {"type", service.type}});
+        out["services"].push_back({{"name", service.name}, {"type", service.type}, {"implements", service.implements}});
   out["clients"] = device.clients();
   return out;
 }

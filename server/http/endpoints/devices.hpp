@@ -9,7 +9,7 @@ class Access;
 class Device;
 class GatewayState;
 
-/// {"devices":[{"name","url","websocket_url","found","node_id","node_name","state","last_error","services":[{"name","type"}],"clients"}]};
+/// {"devices":[{"name","url","websocket_url","found","node_id","node_name","state","last_error","services":[{"name","type","implements"}],"clients"}]};
 /// url: the device's own; websocket_url: the way to it through the gateway, and the proxies before it, that the asker
 /// came; found: by discovery, not configured; node_id and node_name are null until the device has answered once,
 /// last_error is null while it is online. Devices and services of which the asker may use nothing are left out.

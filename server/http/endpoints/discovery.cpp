@@ -1,8 +1,8 @@
 #include "server/http/endpoints/discovery.hpp"
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
+#include "server/json/json.hpp"
 #include "server/state/gateway_state.hpp"
 
 namespace rrgate {
@@ -15,10 +15,11 @@ Json describe_services(const FoundDevices::Entry& entry) {
   Json out = Json::array();
   if (entry.device && entry.device->identity()) {
     for (const auto& service : entry.device->identity()->services)
-      out.push_back({{"name", service.name}, {"type", service.type}});
+      out.push_back({{"name", service.name}, {"type", service.type}, {"implements", service.implements}});
   } else if (entry.services) {
     for (const auto& service : *entry.services)
-      out.push_back({{"name", service.name}, {"type", service.root_object_type}});
+      out.push_back(
+          {{"name", service.name}, {"type", service.root_object_type}, {"implements", service.root_object_implements}});
   } else {
     return nullptr;
   }

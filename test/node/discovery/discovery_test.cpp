@@ -74,7 +74,7 @@ TEST_CASE("services are found by the type of their root object and by its base")
   });
   Listener listener;
   listener.hear(id_of(node), node.port());
-  for (const auto* type : {"experimental.found.Thing", "Base"}) {
+  for (const auto* type : {"experimental.found.Thing", "experimental.found.Base"}) {
     auto found = listener.get(listener.discovery.find_service_by_type(type, {"rr+tcp"}, milliseconds(4000)));
     REQUIRE(found.size() == 2);
     if (found[0].name != "thing") std::swap(found[0], found[1]);
@@ -87,24 +87,28 @@ TEST_CASE("services are found by the type of their root object and by its base")
   }
   CHECK(listener.get(listener.discovery.find_service_by_type("experimental.found.Nothing", {}, milliseconds(400)))
             .empty());
-  CHECK(listener.get(listener.discovery.find_service_by_type("Base", {"rrs+tcp"}, milliseconds(400))).empty());
+  CHECK(listener.get(listener.discovery.find_service_by_type("experimental.found.Base", {"rrs+tcp"}, milliseconds(400)))
+            .empty());
 }
 
 TEST_CASE("who answers must be the node that was announced") {
   RunningNode node([](Node& made) { made.add(make_thing("thing")); });
   Listener wrong_id;
   wrong_id.hear(NodeId{{1, 2, 3}}, node.port());
-  CHECK(wrong_id.get(wrong_id.discovery.find_service_by_type("Base", {}, milliseconds(400))).empty());
+  CHECK(
+      wrong_id.get(wrong_id.discovery.find_service_by_type("experimental.found.Base", {}, milliseconds(400))).empty());
   Listener wrong_name;
   wrong_name.hear(id_of(node), node.port(), "somebody.else");
-  CHECK(wrong_name.get(wrong_name.discovery.find_service_by_type("Base", {}, milliseconds(400))).empty());
+  CHECK(wrong_name.get(wrong_name.discovery.find_service_by_type("experimental.found.Base", {}, milliseconds(400)))
+            .empty());
 }
 
 TEST_CASE("an answer that is too long does not count") {
   RunningNode node([](Node& made) { made.add(make_thing("thing", std::string(64 * 1024, 'x'))); });
   Listener listener;
   listener.hear(id_of(node), node.port());
-  CHECK(listener.get(listener.discovery.find_service_by_type("Base", {}, milliseconds(800))).empty());
+  CHECK(
+      listener.get(listener.discovery.find_service_by_type("experimental.found.Base", {}, milliseconds(800))).empty());
 }
 
 TEST_CASE("a node that does not answer holds nobody up beyond the timeout") {
@@ -114,7 +118,9 @@ TEST_CASE("a node that does not answer holds nobody up beyond the timeout") {
   listener.hear(NodeId{{1, 2, 3}}, silent.local_endpoint().port(), "silent");
   listener.hear(id_of(node), node.port());
   const auto begin = std::chrono::steady_clock::now();
-  CHECK(listener.get(listener.discovery.find_service_by_type("Base", {}, milliseconds(2000))).size() == 1);
+  CHECK(
+      listener.get(listener.discovery.find_service_by_type("experimental.found.Base", {}, milliseconds(2000))).size() ==
+      1);
   CHECK(std::chrono::steady_clock::now() - begin < milliseconds(4000));
 }
 
@@ -124,7 +130,8 @@ TEST_CASE("of several URLs the one that answers is taken") {
   boost::asio::ip::tcp::acceptor silent(listener.io, {boost::asio::ip::address_v4::loopback(), 0});
   listener.hear(id_of(node), node.port());
   listener.hear(id_of(node), silent.local_endpoint().port());
-  const auto found = listener.get(listener.discovery.find_service_by_type("Base", {}, milliseconds(3000)));
+  const auto found =
+      listener.get(listener.discovery.find_service_by_type("experimental.found.Base", {}, milliseconds(3000)));
   REQUIRE(found.size() == 1);
   CHECK_THAT(found[0].connection_url, Catch::Contains(std::to_string(node.port())));
 }

@@ -107,7 +107,7 @@ TEST_CASE("a subscription by type connects every service of the type, or of its 
   RunningNode second([](Node& made) { made.add(make_thing("d")); });
   Listener listener;
   listener.hear(id_of(first), first.port());
-  const auto type = GENERATE("experimental.found.Thing", "Base");
+  const auto type = GENERATE("experimental.found.Thing", "experimental.found.Base");
   auto things = listener.subscribe({type});
   REQUIRE(listener.run_until([&] { return listener.connected.size() == 2; }));
   listener.hear(id_of(second), second.port());  // comes later
@@ -124,7 +124,7 @@ TEST_CASE("an announced service that comes later is connected, one that goes onl
   const auto id = id_of(*node);
   Listener listener;
   listener.hear(id, node->port(), "1");
-  auto things = listener.subscribe({"Base"});
+  auto things = listener.subscribe({"experimental.found.Base"});
   REQUIRE(listener.run_until([&] { return listener.connected["a"] == 1; }));
   node->ask([](Node& made) { return made.add(make_thing("b")), true; });
   listener.hear(id, node->port(), "2");
@@ -146,7 +146,7 @@ TEST_CASE("a node that restarts on another port is connected again") {
   Listener listener;
   listener.options.first_retry = 10min;
   listener.hear(options.id, node->port(), "1");
-  auto things = listener.subscribe({"Base"});
+  auto things = listener.subscribe({"experimental.found.Base"});
   REQUIRE(listener.run_until([&] { return listener.connected["a"] == 1; }));
   node.reset();
   REQUIRE(listener.run_until([&] { return listener.lost["a"] == 1; }));
@@ -162,7 +162,7 @@ TEST_CASE("no more services than the limit, others when there is room again") {
   Listener listener;
   listener.options.max_clients = 1;
   listener.hear(first_id, first->port());
-  auto things = listener.subscribe({"Base"});
+  auto things = listener.subscribe({"experimental.found.Base"});
   REQUIRE(listener.run_until([&] { return listener.connected.size() == 1; }));
   listener.hear(id_of(second), second.port());
   listener.run_for(800ms);  // it would be asked within 0.6 s
@@ -212,7 +212,7 @@ TEST_CASE("filters: nodes, services, attributes, schemes and a predicate") {
     filter.transport_schemes.push_back("rrs+tcp");
     expected.clear();
   }
-  auto things = listener.subscribe({"Base"}, filter);
+  auto things = listener.subscribe({"experimental.found.Base"}, filter);
   if (!expected.empty()) REQUIRE(listener.run_until([&] { return listener.connected.contains(expected); }));
   listener.run_for(expected.empty() ? 800ms : 100ms);
   CHECK(listener.connected.size() == (expected.empty() ? 0 : 1));
@@ -226,7 +226,7 @@ TEST_CASE("closing a subscription by type leaves nothing behind, whatever nodes 
   listener.hear(NodeId{{3, 2, 1}}, 1, "1", "gone");
   listener.hear(id_of(node), node.port());
   {
-    auto things = listener.subscribe({"Base"});
+    auto things = listener.subscribe({"experimental.found.Base"});
     REQUIRE(listener.run_until([&] { return listener.connected.size() == 1; }));
     listener.run_for(700ms);  // all are being asked by now
   }
