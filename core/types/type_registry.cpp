@@ -112,13 +112,6 @@ Result<> TypeRegistry::add(const std::vector<std::string>& texts, RobdefMode mod
   return {};
 }
 
-std::vector<std::string> TypeRegistry::imports_of(std::string_view text) {
-  std::vector<std::string> names;
-  for (const auto& import : parse_service_definition(text, RobdefMode::compat).definition.imports)
-    if (std::find(names.begin(), names.end(), import.name) == names.end()) names.push_back(import.name);
-  return names;
-}
-
 std::deque<ServiceDefinition> TypeRegistry::copy_imports(const Definitions& importers) const {
   std::deque<ServiceDefinition> copies;
   std::unordered_set<std::string_view> seen;

@@ -25,9 +25,6 @@ class TypeRegistry {
   /// Errors   service_definition_error, with the first diagnostic; the registry is then unchanged.
   Result<> add(const std::vector<std::string>& texts, RobdefMode mode);
 
-  /// Names that `text` imports, each once. Read leniently: errors in `text` are add()'s business.
-  static std::vector<std::string> imports_of(std::string_view text);
-
   const ServiceDefinition* find_service(std::string_view name) const;
   /// Qualified names, "com.x.Pose".
   const EntityDefinition* find_entity(std::string_view qualified_name) const;

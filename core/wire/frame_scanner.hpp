@@ -28,7 +28,6 @@ class FrameScanner {
   /// Takes effect for the next message.
   void set_max_message_size(std::size_t limit) { limit_ = limit; }
   /// Whether the stream may end here without cutting a message.
-  bool is_at_boundary() const { return buffer_.empty() || message_.has_value(); }
 
  private:
   void append(ByteSpan bytes);

@@ -18,7 +18,6 @@ constexpr std::size_t limit = 4096;
 struct Outcome {
   std::vector<Bytes> messages;
   bool is_refused = false;
-  bool is_at_boundary = true;
   bool operator==(const Outcome&) const = default;
 };
 
@@ -46,7 +45,6 @@ Outcome scan(ByteSpan stream, ByteSpan piece_sizes) {
       }
     }
   }
-  outcome.is_at_boundary = scanner.is_at_boundary();
   return outcome;
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/robdef/robdef.hpp"
+#include "test/support/is_equal.hpp"
 
 namespace {
 
@@ -28,7 +29,7 @@ void check_print(const rr::ServiceDefinition& definition, rr::RobdefMode mode) {
   const auto printed = rr::format_service_definition(definition);
   const auto again = rr::parse_service_definition(printed, mode);
   require(again.ok());
-  require(rr::is_equal(again.definition, definition));
+  require(rr::test::is_equal(again.definition, definition));
   require(rr::format_service_definition(again.definition) == printed);
 }
 

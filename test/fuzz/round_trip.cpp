@@ -5,8 +5,8 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "core/wire/format_message.hpp"
 #include "test/core/wire/message_tree.hpp"
+#include "test/support/format_message.hpp"
 
 namespace rr::fuzz {
 
@@ -37,7 +37,7 @@ void check_round_trip(ByteSpan input, std::uint16_t version, StringTableMode str
             decoded.error().message);
     return;
   }
-  (void)format_message(message);
+  (void)test::format_message(message);
 
   const auto done = encode(message, {.string_table = string_table}, encoded);
   if (!done) {
@@ -51,13 +51,13 @@ void check_round_trip(ByteSpan input, std::uint16_t version, StringTableMode str
   const auto difference = test::compare_messages(again, message);
   require(difference.empty(), "decoding gives back what was encoded", difference);
   require(encode(again, {.string_table = string_table}, encoded).has_value() && encoded.to_bytes() == first,
-          "encoding is stable", format_message(again));
+          "encoding is stable", test::format_message(again));
 
   // The other version carries it too, unless it uses what only version 4 has.
   message.header.version = version == 2 ? 4 : 2;
   if (encode(message, {}, encoded)) {
     const auto converted = encoded.to_bytes();
-    require(decode(converted, {}, again).has_value(), "a converted message decodes", format_message(message));
+    require(decode(converted, {}, again).has_value(), "a converted message decodes", test::format_message(message));
   }
 }
 

@@ -10,7 +10,4 @@ namespace rr {
 /// The canonical text (spec section 5.9).
 std::string format_service_definition(const ServiceDefinition& definition);
 
-/// Equality of spec section 5.9 (documentation does not count).
-bool is_equal(const ServiceDefinition& left, const ServiceDefinition& right);
-
 }  // namespace rr

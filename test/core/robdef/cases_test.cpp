@@ -3,6 +3,7 @@
 
 #include "test/core/robdef/checked.hpp"
 #include "test/support/golden.hpp"
+#include "test/support/is_equal.hpp"
 
 namespace rr::test {
 

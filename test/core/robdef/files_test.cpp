@@ -5,6 +5,7 @@
 #include "core/robdef/parse/statement.hpp"
 #include "test/core/robdef/checked.hpp"
 #include "test/support/golden.hpp"
+#include "test/support/is_equal.hpp"
 
 namespace rr::test {
 

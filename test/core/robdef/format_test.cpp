@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "test/core/robdef/checked.hpp"
+#include "test/support/is_equal.hpp"
 
 namespace rr::test {
 

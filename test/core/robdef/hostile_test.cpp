@@ -28,7 +28,6 @@ void check_quickly(const std::string& text, const std::vector<std::string>& impo
     const auto start = std::clock();  // processor time: the machine may be busy with other things
     auto checked = check(text, mode, imports);
     const auto printed = format_service_definition(checked.first());
-    CHECK(is_equal(checked.first(), checked.first()));
     CHECK(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC < 20.0);
     CHECK(checked.diagnostics.size() <= 4 * (max_diagnostics + 1));
     CHECK(printed.size() < 4 * text.size() + 100);

@@ -118,11 +118,6 @@ TEST_CASE("warnings are collected once") {
   CHECK(types.warnings().size() == count);
 }
 
-TEST_CASE("imports are read off a text") {
-  CHECK(TypeRegistry::imports_of(top) == std::vector<std::string>{"a.user", "a.base"});
-  CHECK(TypeRegistry::imports_of(base).empty());
-}
-
 TEST_CASE("a qualified name splits at its last dot") {
   CHECK(split_qualified_name("com.x.Pose") == std::pair<std::string_view, std::string_view>("com.x", "Pose"));
   CHECK(split_qualified_name("Pose") == std::pair<std::string_view, std::string_view>("", "Pose"));

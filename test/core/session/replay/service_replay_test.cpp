@@ -11,8 +11,8 @@
 #include "core/member/pipe.hpp"
 #include "core/member/wire.hpp"
 #include "core/session/service/service_session.hpp"
-#include "core/wire/format_message.hpp"
 #include "test/core/session/replay/recorded_peer.hpp"
+#include "test/support/format_message.hpp"
 #include "test/support/print.hpp"
 
 namespace rr::test {

@@ -7,9 +7,9 @@
 
 #include "core/robdef/robdef.hpp"
 #include "core/wire/codec.hpp"
-#include "core/wire/format_message.hpp"
 #include "core/wire/frame_scanner.hpp"
 #include "test/core/wire/message_tree.hpp"
+#include "test/support/format_message.hpp"
 #include "test/support/golden.hpp"
 
 namespace rr::test {

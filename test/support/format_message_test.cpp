@@ -1,4 +1,4 @@
-#include "core/wire/format_message.hpp"
+#include "test/support/format_message.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -1,4 +1,4 @@
-#include "core/wire/format_message.hpp"
+#include "test/support/format_message.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-namespace rr {
+namespace rr::test {
 
 namespace {
 
@@ -229,4 +229,4 @@ std::string format_element(const Message& message, const MessageElement& element
   return formatter.take();
 }
 
-}  // namespace rr
+}  // namespace rr::test
