@@ -4,6 +4,7 @@
 
 #include "core/session/url.hpp"
 #include "core/support/random.hpp"
+#include "core/support/words.hpp"
 
 namespace rr {
 
@@ -21,14 +22,9 @@ Error refused(std::string what) {
   return protocol_error("discovery packet: " + std::move(what));
 }
 
-/// Also CR and NUL, which some senders put behind a line or the packet.
-std::string_view trim(std::string_view text) {
-  const auto is_space = [](char c) {
-    return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '\v' || c == '\f' || c == '\0';
-  };
-  while (!text.empty() && is_space(text.front())) text.remove_prefix(1);
-  while (!text.empty() && is_space(text.back())) text.remove_suffix(1);
-  return text;
+/// Also without CR and NUL, which some senders put behind a line or the packet.
+std::string_view trimmed(std::string_view text) {
+  return trim(text, std::string_view(" \t\r\n\v\f\0", 7));
 }
 
 /// Takes the text up to the next LF off `rest`.
@@ -36,7 +32,7 @@ std::string_view take_line(std::string_view& rest) {
   const auto end = rest.find('\n');
   const auto line = rest.substr(0, end);
   rest.remove_prefix(end == std::string_view::npos ? rest.size() : end + 1);
-  return trim(line);
+  return trimmed(line);
 }
 
 Result<void> check_title(std::string_view packet, std::string_view& rest, std::string_view title) {
@@ -77,8 +73,8 @@ std::string find_nonce(std::string_view rest) {
   while (!rest.empty()) {
     const auto line = take_line(rest);
     const auto colon = line.find(':');
-    if (colon == std::string_view::npos || trim(line.substr(0, colon)) != nonce_name) continue;
-    const auto value = trim(line.substr(colon + 1));
+    if (colon == std::string_view::npos || trimmed(line.substr(0, colon)) != nonce_name) continue;
+    const auto value = trimmed(line.substr(colon + 1));
     return value.size() < nonce_bytes_end ? std::string(value) : std::string();
   }
   return {};
@@ -105,13 +101,13 @@ Result<Announcement> parse_announcement(std::string_view packet, const PacketSou
   const auto node = take_line(rest);
   const auto url_text = take_line(rest);
   const auto comma = node.find(',');
-  const auto id = parse_node_id(trim(node.substr(0, comma)));
+  const auto id = parse_node_id(trimmed(node.substr(0, comma)));
   if (!id) return refused(id.error().message);
   if (id->is_any()) return refused("the node id is all zeros");
   if (std::find(own.begin(), own.end(), *id) != own.end()) return refused("from a node of our own");
   Announcement out;
   out.node_id = *id;
-  const auto name = comma == std::string_view::npos ? std::string_view() : trim(node.substr(comma + 1));
+  const auto name = comma == std::string_view::npos ? std::string_view() : trimmed(node.substr(comma + 1));
   if (name.size() <= max_name_bytes && is_valid_node_name(name)) out.node_name = std::string(name);
   auto url = check_url(url_text, *id, source);
   if (!url) return url.error();

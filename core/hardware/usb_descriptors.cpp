@@ -4,6 +4,7 @@
 #include <array>
 
 #include "core/support/hex.hpp"
+#include "core/support/utf8.hpp"
 
 namespace rr {
 
@@ -35,25 +36,6 @@ Error bad_code(const std::string& what, std::uint32_t found, std::uint32_t expec
 
 std::uint16_t load16(ByteSpan bytes, std::size_t at) {
   return load<std::uint16_t>(bytes.data() + at);
-}
-
-void append_utf8(std::string& out, std::uint32_t code) {
-  const auto put = [&out](std::uint32_t byte) { out += static_cast<char>(static_cast<std::uint8_t>(byte)); };
-  if (code < 0x80) {
-    put(code);
-  } else if (code < 0x800) {
-    put(0xC0 | code >> 6);
-    put(0x80 | (code & 0x3F));
-  } else if (code < 0x10000) {
-    put(0xE0 | code >> 12);
-    put(0x80 | (code >> 6 & 0x3F));
-    put(0x80 | (code & 0x3F));
-  } else {
-    put(0xF0 | code >> 18);
-    put(0x80 | (code >> 12 & 0x3F));
-    put(0x80 | (code >> 6 & 0x3F));
-    put(0x80 | (code & 0x3F));
-  }
 }
 
 /// A string descriptor's own length is the number of bytes that came.

@@ -1,5 +1,6 @@
 #include "core/session/service_path.hpp"
 
+#include "core/robdef/model/names.hpp"
 #include "core/support/hex.hpp"
 
 namespace rr {
@@ -8,13 +9,6 @@ namespace {
 
 bool is_alnum(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
-}
-
-bool is_name(std::string_view name) {
-  if (name.empty() || !is_alnum(name.front()) || (name.front() >= '0' && name.front() <= '9')) return false;
-  for (const char c : name)
-    if (!is_alnum(c) && c != '_') return false;
-  return name.back() != '_';
 }
 
 std::optional<std::string> decode_index(std::string_view text) {

@@ -1,6 +1,7 @@
 #include "core/support/node_id.hpp"
 
 #include "core/support/hex.hpp"
+#include "core/support/words.hpp"
 
 namespace rr {
 
@@ -11,12 +12,6 @@ bool is_ascii_letter(char c) {
 }
 bool is_ascii_digit(char c) {
   return c >= '0' && c <= '9';
-}
-
-std::string_view trim(std::string_view text) {
-  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
-  while (!text.empty() && (text.back() == ' ' || text.back() == '\t')) text.remove_suffix(1);
-  return text;
 }
 
 }  // namespace

@@ -1,11 +1,16 @@
-// Whether text is UTF-8. Layer: support. Source: Unicode 15, table 3-7.
+// UTF-8: whether text is, and code points as. Layer: support. Source: Unicode 15, table 3-7; RFC 3629.
 #pragma once
 
+#include <cstdint>
+#include <string>
 #include <string_view>
 
 namespace rr {
 
 /// The shortest form of each character, no surrogates, nothing above U+10FFFF. Empty text is UTF-8.
 bool is_utf8(std::string_view text);
+
+/// `code`  0..0x10FFFF; surrogates become three bytes like any other.
+void append_utf8(std::string& out, std::uint32_t code);
 
 }  // namespace rr

@@ -16,4 +16,10 @@ std::vector<std::string_view> split_words(std::string_view text, std::string_vie
   }
 }
 
+std::string_view trim(std::string_view text, std::string_view blanks) {
+  const auto first = text.find_first_not_of(blanks);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(blanks) + 1 - first);
+}
+
 }  // namespace rr

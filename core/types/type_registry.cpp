@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <unordered_set>
 
+#include "core/robdef/model/names.hpp"
+
 namespace rr {
 
 namespace {
@@ -138,15 +140,9 @@ const EnumDefinition* TypeRegistry::find_enum(std::string_view qualified_name) c
 }
 
 bool TypeRegistry::has_exception(std::string_view qualified_name) const {
-  const auto [service, name] = split_qualified_name(qualified_name);
+  const auto [service, name] = split_qualified(qualified_name);
   const auto* definition = find_service(service);
   return definition && definition->find_exception(name);
-}
-
-std::pair<std::string_view, std::string_view> split_qualified_name(std::string_view name) {
-  const auto dot = name.rfind('.');
-  if (dot == std::string_view::npos) return {std::string_view(), name};
-  return {name.substr(0, dot), name.substr(dot + 1)};
 }
 
 }  // namespace rr

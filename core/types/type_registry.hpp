@@ -55,7 +55,4 @@ class TypeRegistry {
   std::vector<Diagnostic> warnings_;
 };
 
-/// Splits "com.x.Pose" into "com.x" and "Pose".
-std::pair<std::string_view, std::string_view> split_qualified_name(std::string_view name);
-
 }  // namespace rr

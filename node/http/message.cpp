@@ -4,15 +4,11 @@
 #include <boost/beast/http/status.hpp>
 #include <nlohmann/json.hpp>
 
+#include "core/support/words.hpp"
+
 namespace rrgate {
 
 namespace {
-
-std::string_view trimmed(std::string_view text) {
-  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
-  while (!text.empty() && (text.back() == ' ' || text.back() == '\t')) text.remove_suffix(1);
-  return text;
-}
 
 std::string_view view(boost::beast::string_view text) {
   return {text.data(), text.size()};
@@ -32,12 +28,12 @@ std::string_view HttpRequest::query() const {
 }
 
 std::string_view HttpRequest::header(http::field name) const {
-  return trimmed(view(message[name]));
+  return rr::trim(view(message[name]));
 }
 
 std::string_view HttpRequest::header(std::string_view name) const {
   const auto found = message.find(boost::beast::string_view(name.data(), name.size()));
-  return found == message.end() ? std::string_view() : trimmed(view(found->value()));
+  return found == message.end() ? std::string_view() : rr::trim(view(found->value()));
 }
 
 Response text_response(unsigned status, std::string_view content_type, std::string body) {
@@ -92,7 +88,7 @@ bool equals_ignoring_case(std::string_view left, std::string_view right) {
 bool has_token(std::string_view list, std::string_view token) {
   while (!list.empty()) {
     const auto comma = list.find(',');
-    if (equals_ignoring_case(trimmed(list.substr(0, comma)), token)) return true;
+    if (equals_ignoring_case(rr::trim(list.substr(0, comma)), token)) return true;
     if (comma == std::string_view::npos) break;
     list.remove_prefix(comma + 1);
   }

@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "core/support/random.hpp"
+#include "core/support/words.hpp"
 #include "node/platform/folders.hpp"
 
 namespace rr {
@@ -60,10 +61,7 @@ Result<NodeIdClaim> NodeIdClaim::take(std::string_view name) {
     if (!out) return make_error(ErrorCode::system_resource_error, "write " + file->string());
     return NodeIdClaim(id, std::move(*lock));
   }
-  const auto first = text.find_first_not_of(" \t\r\n");
-  const auto last = text.find_last_not_of(" \t\r\n");
-  const auto id = parse_node_id(first == std::string::npos ? std::string_view()
-                                                           : std::string_view(text).substr(first, last + 1 - first));
+  const auto id = parse_node_id(trim(text, " \t\r\n"));
   if (!id || id->is_any())
     return make_error(ErrorCode::invalid_configuration,
                       file->string() + " holds " + rr::quoted(text) + ", expected the NodeID of " + rr::quoted(name));

@@ -12,6 +12,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "core/support/words.hpp"
 #include "node/transport/await_tuple.hpp"
 #include "node/transport/watchdog.hpp"
 
@@ -31,9 +32,7 @@ std::string read_attribute(const std::filesystem::path& path) {
   in.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<std::size_t>(std::max<std::streamsize>(in.gcount(), 0)));
   constexpr std::string_view blanks(" \t\r\n\0", 5);
-  const auto first = text.find_first_not_of(blanks);
-  if (first == std::string::npos) return {};
-  return text.substr(first, text.find_last_not_of(blanks) - first + 1);
+  return std::string(trim(text, blanks));
 }
 
 class DriverStream final : public ByteStream {

@@ -7,6 +7,7 @@
 #include <map>
 #include <system_error>
 
+#include "core/support/words.hpp"
 #include "node/platform/folders.hpp"
 
 namespace rr {
@@ -23,12 +24,7 @@ bool is_key_char(char c) {
   return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '+' || c == '.' || c == '-';
 }
 
-std::string_view trim(std::string_view text) {
-  constexpr std::string_view space = " \t\r\v\f";
-  const auto first = text.find_first_not_of(space);
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(space) + 1 - first);
-}
+constexpr std::string_view line_blanks = " \t\r\v\f";
 
 /// Lines "key: value"; the first of a key counts, other lines don't.
 std::map<std::string, std::string, std::less<>> parse_lines(std::string_view text) {
@@ -39,9 +35,9 @@ std::map<std::string, std::string, std::less<>> parse_lines(std::string_view tex
     text = end == std::string_view::npos ? std::string_view() : text.substr(end + 1);
     const auto colon = line.find(':');
     if (colon == std::string_view::npos) continue;
-    const auto key = trim(line.substr(0, colon));
+    const auto key = trim(line.substr(0, colon), line_blanks);
     if (key.empty() || !std::all_of(key.begin(), key.end(), is_key_char)) continue;
-    values.emplace(key, trim(line.substr(colon + 1)));
+    values.emplace(key, trim(line.substr(colon + 1), line_blanks));
   }
   return values;
 }

@@ -7,6 +7,7 @@
 
 #include "core/session/start_tls.hpp"
 #include "core/support/random.hpp"
+#include "core/support/words.hpp"
 #include "node/platform/folders.hpp"
 #include "node/platform/secret_file.hpp"
 #include "node/platform/text_file.hpp"
@@ -90,9 +91,7 @@ rr::Result<rr::NodeId> id_of_name(const std::string& name) {
   if (!folder) return folder.error();
   const auto path = fs::path(*folder) / "nodeids" / name;
   if (const auto text = read_text_file(path.string()); text && !text->empty()) {
-    auto begin = text->find_first_not_of(" \t\r\n");
-    auto end = text->find_last_not_of(" \t\r\n");
-    auto id = rr::parse_node_id(begin == std::string::npos ? "" : text->substr(begin, end - begin + 1));
+    auto id = rr::parse_node_id(rr::trim(*text, " \t\r\n"));
     if (!id || id->is_any())
       return rr::make_error(rr::ErrorCode::invalid_configuration, path.string() + ": holds no node id");
     return id;

@@ -4,6 +4,7 @@
 #include <charconv>
 
 #include "core/session/url.hpp"
+#include "core/support/words.hpp"
 
 namespace rrgate {
 
@@ -21,12 +22,6 @@ bool share_first_bits(const Bytes& left, const Bytes& right, unsigned bits) {
   return true;
 }
 
-std::string_view trim(std::string_view text) {
-  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
-  while (!text.empty() && (text.back() == ' ' || text.back() == '\t')) text.remove_suffix(1);
-  return text;
-}
-
 /// Splits at `separator` where it is not inside a quoted string.
 std::vector<std::string_view> split(std::string_view text, char separator) {
   std::vector<std::string_view> out;
@@ -38,11 +33,11 @@ std::vector<std::string_view> split(std::string_view text, char separator) {
     } else if (i < text.size() && text[i] == '"') {
       is_quoted = !is_quoted;
     } else if (i >= text.size() || (!is_quoted && text[i] == separator)) {
-      out.push_back(trim(text.substr(begin, i - begin)));
+      out.push_back(rr::trim(text.substr(begin, i - begin)));
       begin = i + 1;
     }
   }
-  if (begin < text.size()) out.push_back(trim(text.substr(begin)));  // a quote that never ends
+  if (begin < text.size()) out.push_back(rr::trim(text.substr(begin)));  // a quote that never ends
   return out;
 }
 
@@ -89,8 +84,8 @@ std::vector<Hop> hops_of_forwarded(const HttpRequest& request) {
     for (const auto pair : split(element, ';')) {
       const auto equals = pair.find('=');
       if (equals == std::string_view::npos) continue;
-      const auto name = trim(pair.substr(0, equals));
-      auto value = trim(pair.substr(equals + 1));
+      const auto name = rr::trim(pair.substr(0, equals));
+      auto value = rr::trim(pair.substr(equals + 1));
       if (equals_ignoring_case(name, "for")) hop.from = parse_node(value);
       if (value.size() >= 2 && value.front() == '"' && value.back() == '"') value = value.substr(1, value.size() - 2);
       if (equals_ignoring_case(name, "proto")) hop.proto = value;
@@ -103,7 +98,7 @@ std::vector<Hop> hops_of_forwarded(const HttpRequest& request) {
 std::string last_of(const std::string& list) {
   const auto comma = list.rfind(',');
   return std::string(
-      trim(comma == std::string::npos ? std::string_view(list) : std::string_view(list).substr(comma + 1)));
+      rr::trim(comma == std::string::npos ? std::string_view(list) : std::string_view(list).substr(comma + 1)));
 }
 
 std::vector<Hop> hops_of_x_forwarded(const HttpRequest& request) {

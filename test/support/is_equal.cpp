@@ -4,6 +4,7 @@
 
 #include "core/robdef/model/canonical_names.hpp"
 #include "core/robdef/model/names.hpp"
+#include "core/support/words.hpp"
 
 namespace rr::test {
 
@@ -20,8 +21,7 @@ bool is_equal_options(const std::vector<OptionDefinition>& a, const std::vector<
 
 bool is_equal_constants(const std::vector<ConstantDefinition>& a, const std::vector<ConstantDefinition>& b) {
   return is_equal_list(a, b, [](const auto& x, const auto& y) {
-    return format_type(x.type) == format_type(y.type) && x.name == y.name &&
-           trim_blanks(x.value_text) == trim_blanks(y.value_text);
+    return format_type(x.type) == format_type(y.type) && x.name == y.name && trim(x.value_text) == trim(y.value_text);
   });
 }
 

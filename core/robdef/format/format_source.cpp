@@ -88,7 +88,7 @@ std::string SourceFormatter::format() {
         write_line(indent + "##" + std::string(line.text()));
         break;
       case LineKind::comment:
-        write_line(indent + std::string(trim_blanks(line.text())));
+        write_line(indent + std::string(trim(line.text())));
         break;
       case LineKind::statement:
         write_statement(line);

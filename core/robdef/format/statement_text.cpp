@@ -1,20 +1,19 @@
 #include "core/robdef/format/statement_text.hpp"
 
+#include <charconv>
+#include <iterator>
+
 #include "core/robdef/model/names.hpp"
 
 namespace rr {
 
 namespace {
 
-std::string hex_text(std::int32_t value) {
-  constexpr std::string_view digits = "0123456789abcdef";
-  auto magnitude = static_cast<std::uint64_t>(value < 0 ? -static_cast<std::int64_t>(value) : value);
-  std::string reversed;
-  do {
-    reversed += digits[magnitude % 16];
-    magnitude /= 16;
-  } while (magnitude != 0);
-  return (value < 0 ? "-0x" : "0x") + std::string(reversed.rbegin(), reversed.rend());
+std::string hex_literal(std::int32_t value) {
+  const auto wide = std::int64_t{value};
+  char digits[8];
+  const auto end = std::to_chars(std::begin(digits), std::end(digits), wide < 0 ? -wide : wide, 16).ptr;
+  return (value < 0 ? "-0x" : "0x") + std::string(digits, end);
 }
 
 }  // namespace
@@ -31,7 +30,7 @@ std::string constant_text(const ConstantDefinition& item) {
 
 std::string enum_value_text(const EnumValueDefinition& item) {
   if (item.is_implicit) return item.name;
-  return item.name + " = " + (item.is_hex ? hex_text(item.value) : std::to_string(item.value));
+  return item.name + " = " + (item.is_hex ? hex_literal(item.value) : std::to_string(item.value));
 }
 
 std::string entity_header_text(const EntityDefinition& item) {

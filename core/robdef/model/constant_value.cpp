@@ -7,6 +7,8 @@
 
 #include "core/robdef/model/names.hpp"
 #include "core/robdef/model/number_literal.hpp"
+#include "core/support/utf8.hpp"
+#include "core/support/words.hpp"
 
 namespace rr {
 
@@ -209,25 +211,6 @@ bool ValueReader::read_number(std::size_t from, std::size_t to, ConstantValue& o
   return true;
 }
 
-void append_utf8(std::uint32_t code, std::string& out) {
-  if (code < 0x80) {
-    out += static_cast<char>(code);
-    return;
-  }
-  if (code < 0x800) {
-    out += static_cast<char>(0xc0 | code >> 6);
-  } else {
-    if (code < 0x10000) {
-      out += static_cast<char>(0xe0 | code >> 12);
-    } else {
-      out += static_cast<char>(0xf0 | code >> 18);
-      out += static_cast<char>(0x80 | (code >> 12 & 0x3f));
-    }
-    out += static_cast<char>(0x80 | (code >> 6 & 0x3f));
-  }
-  out += static_cast<char>(0x80 | (code & 0x3f));
-}
-
 bool ValueReader::read_string(std::string& out) {
   if (!accept('"')) return fail_here("'\"' and a string");
   while (position_ < text_.size()) {
@@ -283,11 +266,11 @@ bool ValueReader::read_escape(std::string& out) {
     std::uint32_t low = 0;
     if (text_.substr(position_, 2) == "\\u" && read_code_unit(low) && is_low(low)) {
       position_ += 6;
-      append_utf8(0x10000 + ((code - 0xd800) << 10) + (low - 0xdc00), out);
+      append_utf8(out, 0x10000 + ((code - 0xd800) << 10) + (low - 0xdc00));
       return true;
     }
   } else if (!is_low(code)) {
-    append_utf8(code, out);
+    append_utf8(out, code);
     return true;
   }
   relax(from, from + 6, "constant-invalid",
@@ -332,7 +315,7 @@ ConstantValue read_constant_value(const TypeDefinition& type, std::string_view t
 
 Result<ConstantValue> parse_constant_value(const TypeDefinition& type, std::string_view text, RobdefMode mode) {
   std::vector<ConstantIssue> issues;
-  auto value = read_constant_value(type, trim_blanks(text), issues);
+  auto value = read_constant_value(type, trim(text), issues);
   for (const auto& issue : issues) {
     if (issue.is_relaxed && mode == RobdefMode::compat) continue;
     return make_error(ErrorCode::service_definition_error, "constant value: " + issue.message);

@@ -28,7 +28,6 @@ constexpr bool is_text_character(char c) {
   return (c >= ' ' && c <= '~') || c == '\t';
 }
 
-std::string_view trim_blanks(std::string_view text);
 std::string to_lower(std::string_view text);
 
 /// A letter, then letters, digits and underscores, the last one not an underscore.

@@ -7,6 +7,7 @@
 #include "core/robdef/model/version_levels.hpp"
 #include "core/robdef/parse/definition_parser.hpp"
 #include "core/robdef/parse/statement.hpp"
+#include "core/support/words.hpp"
 
 namespace rr {
 
@@ -24,7 +25,7 @@ std::optional<MemberKind> member_kind(std::string_view keyword) {
 }  // namespace
 
 std::string_view first_word(const LogicalLine& line) {
-  const auto text = trim_blanks(line.text());
+  const auto text = trim(line.text());
   return text.substr(0, std::min(text.find_first_of(" \t"), text.size()));
 }
 
@@ -47,7 +48,7 @@ void DefinitionParser::parse_enum(StatementReader& reader) {
 }
 
 void DefinitionParser::parse_entity(StatementReader& reader, EntityKind kind) {
-  const std::string keyword(trim_blanks(reader.text(0, reader.position())));
+  const std::string keyword(trim(reader.text(0, reader.position())));
   check_order(reader, keyword, Group::entities);
   EntityDefinition entity;
   entity.kind = kind;
@@ -74,7 +75,7 @@ void DefinitionParser::parse_block(const LogicalLine& header, std::string_view k
         return;
       }
       // In an enum the reserved words may also be what someone tried as the name of a value.
-      const auto rest = trim_blanks(trim_blanks(next->text()).substr(word.size()));
+      const auto rest = trim(trim(next->text()).substr(word.size()));
       const bool is_header = is_top_level_keyword(word) && (keyword != "enum" || (!rest.empty() && is_letter(rest[0])));
       if (is_header) break;
       auto line = lines_.take();

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/robdef/model/names.hpp"
+#include "core/support/words.hpp"
 
 namespace rr {
 
@@ -44,7 +45,7 @@ std::string_view StatementReader::rest(std::size_t& from) {
   skip_blanks();
   from = position_;
   position_ = text_.size();
-  return trim_blanks(text_.substr(from));
+  return trim(text_.substr(from));
 }
 
 bool StatementReader::expect_blank(std::string_view expected) {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/member/error_entry.hpp"
+#include "core/robdef/model/names.hpp"
 #include "core/session/client/client_session.hpp"
 
 namespace rr {
@@ -230,7 +231,7 @@ void ClientSession::handle_type_name_reply(const MessageEntry& entry, RequestId 
   fetch.path = std::move(path);
   fetch.object_type = read_text(*connection_.message(), entry, "objecttype");
   if (!types_.find_entity(fetch.object_type))
-    fetch.wanted.insert(std::string(split_qualified_name(fetch.object_type).first));
+    fetch.wanted.insert(std::string(split_qualified(fetch.object_type).service));
   advance_fetch(std::move(fetch), now);
 }
 
@@ -238,7 +239,7 @@ Result<std::string> ClientSession::choose_root_type() const {
   const auto& wanted = options_.object_type;
   if (wanted.empty() || wanted == root_type_) return root_type_;
   // The list that the service sent names local objects without their definition.
-  const std::string home(split_qualified_name(root_type_).first);
+  const std::string home(split_qualified(root_type_).service);
   for (const auto& base : root_implements_)
     if (base == wanted || home + "." + base == wanted) return wanted;
   std::vector<const EntityDefinition*> open{types_.find_entity(root_type_)};

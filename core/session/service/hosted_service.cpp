@@ -5,6 +5,7 @@
 #include <set>
 #include <utility>
 
+#include "core/robdef/model/names.hpp"
 #include "core/session/service/service_index.hpp"
 #include "core/session/service_path.hpp"
 
@@ -39,8 +40,8 @@ Result<> check_index(const MemberDefinition& objref, const std::optional<std::st
 }  // namespace
 
 std::string_view implements_name(const EntityDefinition& type, const ImplementsDefinition& base) {
-  const auto [definition, name] = split_qualified_name(base.qualified_name);
-  return definition == split_qualified_name(type.qualified_name).first ? name : std::string_view(base.qualified_name);
+  const auto [definition, name] = split_qualified(base.qualified_name);
+  return definition == split_qualified(type.qualified_name).service ? name : std::string_view(base.qualified_name);
 }
 
 Result<std::shared_ptr<HostedService>> HostedService::make(std::string name, std::shared_ptr<ServiceObject> root,
@@ -66,7 +67,7 @@ Result<std::shared_ptr<HostedService>> HostedService::make(std::string name, std
 }
 
 const ServiceDefinition& HostedService::root_definition() const {
-  return *types_->find_service(split_qualified_name(root_->type_name()).first);
+  return *types_->find_service(split_qualified(root_->type_name()).service);
 }
 
 std::vector<const ServiceDefinition*> HostedService::definitions_for_client() const {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/member/error_entry.hpp"
+#include "core/robdef/model/names.hpp"
 #include "core/session/known_definitions.hpp"
 #include "core/session/service/service_session.hpp"
 #include "core/support/random.hpp"
@@ -68,7 +69,7 @@ std::string type_for_client(const HostedService& service, const Version& client)
   if (client.is_unspecified() || home.version.is_unspecified() || home.version <= client) return type.qualified_name;
   std::set<std::string_view> seen_definitions;
   for (const auto& base : type.implements) {
-    const auto* definition = types.find_service(split_qualified_name(base.qualified_name).first);
+    const auto* definition = types.find_service(split_qualified(base.qualified_name).service);
     if (!definition || definition == &home || !seen_definitions.insert(definition->name).second) continue;
     if (definition->version.is_unspecified() || definition->version <= client) return base.qualified_name;
   }

@@ -117,8 +117,3 @@ TEST_CASE("warnings are collected once") {
   REQUIRE(types.add({user}, RobdefMode::compat));
   CHECK(types.warnings().size() == count);
 }
-
-TEST_CASE("a qualified name splits at its last dot") {
-  CHECK(split_qualified_name("com.x.Pose") == std::pair<std::string_view, std::string_view>("com.x", "Pose"));
-  CHECK(split_qualified_name("Pose") == std::pair<std::string_view, std::string_view>("", "Pose"));
-}
