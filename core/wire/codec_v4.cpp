@@ -262,22 +262,23 @@ std::uint8_t flags_of(const MessageElement& element, const EncodePlan::Item& ite
 }
 
 /// Section 4.2: MemberName, ServicePath, then the elements in order, ElementName before ElementTypeName.
-void assign_codes(const Message& message, StringCoder& coder, bool is_active, EncodePlan& plan) {
-  const auto code_for = [&](std::string_view text) {
-    return is_active ? coder.code_for(text).value_or(EncodePlan::inline_text) : EncodePlan::inline_text;
-  };
+void assign_codes(const Message& message, StringCoder& coder, EncodePlan& plan) {
   for (std::size_t index = 0; index < message.entries.size(); ++index) {
     const auto& entry = message.entries[index];
-    plan.entries[index].name_code = code_for(entry.member_name);
-    plan.entries[index].qualifier_code = code_for(entry.service_path);
+    plan.entries[index].name_code = coder.note(entry.member_name);
+    plan.entries[index].qualifier_code = coder.note(entry.service_path);
     for (auto at = entry.first_element; at < entry.end_element && at < message.elements.size(); ++at) {
       const auto& element = message.elements[at];
-      const bool is_named = element.key_kind == KeyKind::name;
-      plan.elements[at].name_code = is_named ? code_for(element.name) : EncodePlan::inline_text;
-      plan.elements[at].qualifier_code =
-          element.type_name.empty() ? EncodePlan::inline_text : code_for(element.type_name);
+      if (element.key_kind == KeyKind::name) plan.elements[at].name_code = coder.note(element.name);
+      if (!element.type_name.empty()) plan.elements[at].qualifier_code = coder.note(element.type_name);
     }
   }
+  coder.choose();
+  for (auto* items : {&plan.entries, &plan.elements})
+    for (auto& item : *items) {
+      item.name_code = coder.code_of(item.name_code);
+      item.qualifier_code = coder.code_of(item.qualifier_code);
+    }
 }
 
 std::size_t block_size(std::size_t bytes) {
@@ -371,10 +372,10 @@ void write_header(GatherWriter& out, const Message& message, const StringCoder& 
   }
   if ((flags & header_flag::string_table) != 0) {
     out.uint_x(static_cast<std::uint32_t>(coder.local_count()));
-    for (std::size_t index = 0; index < coder.local_count(); ++index) {
-      out.uint_x(static_cast<std::uint32_t>(index * 2 + 1));
-      out.text_x(coder.local_text(index));
-    }
+    coder.visit_local([&](std::uint32_t code, std::string_view text) {
+      out.uint_x(code);
+      out.text_x(text);
+    });
   }
   if ((flags & header_flag::multiple_entries) != 0) out.uint_x(static_cast<std::uint32_t>(message.entries.size()));
   if ((flags & header_flag::extended) != 0) out.bytes_x(header.extended);
@@ -446,7 +447,7 @@ Result<> encode_v4(const Message& message, const EncodeOptions& options, Encoded
   plan.entries.resize(message.entries.size());
   plan.elements.resize(message.elements.size());
   StringCoder coder(options.string_table.standard, options.string_table.local);
-  assign_codes(message, coder, options.string_table.is_active(), plan);
+  if (options.string_table.is_active()) assign_codes(message, coder, plan);
   Sizing sizing;
   SizePass pass(message, plan, sizing);
   if (auto sized = pass.run(); !sized) return sized;

@@ -106,25 +106,46 @@ std::optional<std::string_view> LocalTexts::find(std::uint32_t code) const {
   return row->text;
 }
 
-std::optional<std::uint32_t> StringCoder::code_for(std::string_view text) {
-  if (text.size() > max_text_size) return {};
+std::uint32_t StringCoder::note(std::string_view text) {
+  if (text.size() > max_text_size) return inline_text;
   const std::uint32_t hash = text_hash(text);
   if (use_standard_)
-    if (const auto code = find_standard(text, hash)) return code;
-  if (!use_local_) return {};
+    if (const auto code = find_standard(text, hash)) return *code;
+  if (!use_local_) return inline_text;
 
-  if (local_.empty()) slots_.fill(0);
+  if (texts_.empty()) slots_.fill(0);
   std::size_t slot = hash % slot_count;
-  for (; slots_[slot] != 0; slot = (slot + 1) % slot_count)
-    if (local_[slots_[slot] - 1u] == text) return (slots_[slot] - 1u) * 2 + 1;
+  for (; slots_[slot] != 0; slot = (slot + 1) % slot_count) {
+    const std::uint32_t index = slots_[slot] - 1u;
+    if (texts_[index].text != text) continue;
+    ++texts_[index].count;
+    return index * 2 + 1;
+  }
+  if (texts_.size() == max_texts) return inline_text;
+  texts_.push_back({text, 1, inline_text});
+  slots_[slot] = static_cast<std::uint8_t>(texts_.size());
+  return static_cast<std::uint32_t>(texts_.size() * 2 - 1);
+}
 
-  const auto code = static_cast<std::uint32_t>(local_.size() * 2 + 1);
-  const std::size_t size = uint_x_size(code) + uint_x_size(static_cast<std::uint32_t>(text.size())) + text.size();
-  if (local_size_ + size > max_table_size) return {};
-  local_size_ += size;
-  local_.push_back(text);
-  slots_[slot] = static_cast<std::uint16_t>(local_.size());
-  return code;
+void StringCoder::choose() {
+  std::size_t saved = 0;
+  for (auto& each : texts_) {
+    if (each.count < 2) continue;
+    const auto code = static_cast<std::uint32_t>(local_count_ * 2 + 1);
+    const std::size_t inline_size = uint_x_size(static_cast<std::uint32_t>(each.text.size())) + each.text.size();
+    const std::size_t entry_size = uint_x_size(code) + inline_size;
+    const std::size_t without = each.count * inline_size;
+    const std::size_t with = entry_size + each.count * uint_x_size(code);
+    if (with >= without || local_size_ + entry_size > max_table_size) continue;
+    each.code = code;
+    ++local_count_;
+    local_size_ += entry_size;
+    saved += without - with;
+  }
+  // The table's own count has to be earned, too.
+  if (saved > uint_x_size(static_cast<std::uint32_t>(local_count_))) return;
+  for (auto& each : texts_) each.code = inline_text;
+  local_count_ = local_size_ = 0;
 }
 
 }  // namespace rr

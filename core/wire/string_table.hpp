@@ -35,32 +35,50 @@ class LocalTexts {
 };
 
 /// Gives codes to the texts of one message to be sent: standard codes where the table has the text, else 1, 3, 5, ...
+/// to texts that the message has so often that it gets smaller by them. First every text is counted with note(), in the
+/// order of the specification; then choose() decides, and code_of() tells what has become of each.
 /// Texts are borrowed from the message.
 class StringCoder {
  public:
-  static constexpr std::size_t max_text_size = 128;    ///< bytes; longer texts stay inline
+  static constexpr std::uint32_t inline_text = 0xffffffff;  ///< instead of a code: the text itself is sent
+  static constexpr std::size_t max_text_size = 128;         ///< bytes; longer texts stay inline
   static constexpr std::size_t max_table_size = 1024;  ///< bytes of all local entries; what does not fit stays inline
+  static constexpr std::size_t max_texts = 255;        ///< that are counted; what comes behind them stays inline
 
   StringCoder(bool use_standard, bool use_local) : use_standard_(use_standard), use_local_(use_local) {}
 
-  /// The code to send instead of the text; nothing when it has to stay inline.
-  std::optional<std::uint32_t> code_for(std::string_view text);
+  /// Returns  what code_of() wants to know: a standard code, inline_text, or a place in the list of local texts.
+  std::uint32_t note(std::string_view text);
+  /// Once, behind the last note().
+  void choose();
+  std::uint32_t code_of(std::uint32_t noted) const {
+    return noted == inline_text || noted % 2 == 0 ? noted : texts_[noted / 2].code;
+  }
 
-  /// Local texts in code order: text i has code 2 * i + 1.
-  std::size_t local_count() const { return local_.size(); }
-  std::string_view local_text(std::size_t index) const { return local_[index]; }
+  /// Calls `visit(code, text)` for each entry of the local table, in the order of codes.
+  template <class Visit>
+  void visit_local(Visit&& visit) const {
+    for (const auto& each : texts_)
+      if (each.code != inline_text) visit(each.code, each.text);
+  }
+  std::size_t local_count() const { return local_count_; }
   /// Bytes of all local entries on the wire, without the count before them.
   std::size_t local_size() const { return local_size_; }
 
  private:
-  // 1024 bytes hold fewer than 342 entries of at least 3 bytes each (and one empty text of 2).
-  static constexpr std::size_t slot_count = 1024;
+  struct Text {
+    std::string_view text;
+    std::uint32_t count = 0;
+    std::uint32_t code = inline_text;
+  };
+  static constexpr std::size_t slot_count = 512;
 
   bool use_standard_;
   bool use_local_;
+  std::size_t local_count_ = 0;
   std::size_t local_size_ = 0;
-  boost::container::small_vector<std::string_view, 32> local_;
-  std::array<std::uint16_t, slot_count> slots_;  ///< hash -> index + 1 in local_; set up by the first local text
+  boost::container::small_vector<Text, 32> texts_;
+  std::array<std::uint8_t, slot_count> slots_;  ///< hash -> index + 1 in texts_; set up by the first local text
 };
 
 }  // namespace rr

@@ -6,6 +6,32 @@
 
 using namespace rr;
 
+namespace {
+
+using Codes = std::vector<std::uint32_t>;
+constexpr std::uint32_t none = StringCoder::inline_text;
+
+/// The codes that the texts of one message get.
+struct Coded {
+  Coded(bool use_standard, bool use_local, const std::vector<std::string>& texts) : coder(use_standard, use_local) {
+    for (const auto& text : texts) codes.push_back(coder.note(text));
+    coder.choose();
+    for (auto& code : codes) code = coder.code_of(code);
+  }
+  std::string table() const {
+    std::string out;
+    coder.visit_local([&](std::uint32_t code, std::string_view text) {
+      out += (out.empty() ? "" : ", ") + std::to_string(code) + " " + std::string(text);
+    });
+    return out;
+  }
+
+  StringCoder coder;
+  Codes codes;
+};
+
+}  // namespace
+
 TEST_CASE("the standard table has 113 codes, all multiples of 4, with a gap from 312 to 508") {
   int count = 0;
   for (std::uint32_t code = 0; code < 1000; ++code) {
@@ -57,61 +83,63 @@ TEST_CASE("every standard text is found again, at its lowest code") {
   CHECK_FALSE(standard_code("value "));
 }
 
-TEST_CASE("local texts get odd codes in the order of their first use") {
-  StringCoder coder(false, true);
-  CHECK(coder.code_for("member") == 1u);
-  CHECK(coder.code_for("path") == 3u);
-  CHECK(coder.code_for("member") == 1u);
-  CHECK(coder.code_for("value") == 5u);
-  REQUIRE(coder.local_count() == 3);
-  CHECK(coder.local_text(1) == "path");
-  CHECK(coder.local_size() == 3 * 2 + 6 + 4 + 5);
+TEST_CASE("texts that come twice get odd codes, in the order of their first use") {
+  Coded coded(false, true, {"member", "path", "member", "value", "once", "path", "value"});
+  CHECK(coded.codes == Codes{1, 3, 1, 5, none, 3, 5});
+  CHECK(coded.table() == "1 member, 3 path, 5 value");
+  CHECK(coded.coder.local_size() == 3 * 2 + 6 + 4 + 5);
+}
+
+TEST_CASE("a local table makes its message smaller, or there is none") {
+  CHECK(Coded(false, true, {"member", "path"}).table() == "");
+  CHECK(Coded(false, true, {"xyz", "xyz"}).table() == "");  // 8 bytes inline; 7 and the table's count with a code
+  CHECK(Coded(false, true, {"four", "four"}).table() == "1 four");
+  CHECK(Coded(false, true, {"xyz", "xyz", "four", "four"}).table() == "1 xyz, 3 four");
+  CHECK(Coded(false, true, {"x", "x", "x", "x"}).table() == "");
+  CHECK(Coded(false, true, std::vector<std::string>(100, "")).table() == "");
 }
 
 TEST_CASE("the standard table goes before the local one") {
-  StringCoder both(true, true);
-  CHECK(both.code_for("value") == 516u);
-  CHECK(both.code_for("") == 0u);
-  CHECK(both.code_for("x") == 1u);
-  StringCoder standard_only(true, false);
-  CHECK(standard_only.code_for("value") == 516u);
-  CHECK_FALSE(standard_only.code_for("x"));
-  StringCoder none(false, false);
-  CHECK_FALSE(none.code_for("value"));
+  CHECK(Coded(true, true, {"value", "", "twice", "twice", "once"}).codes == Codes{516, 0, 1, 1, none});
+  CHECK(Coded(true, false, {"value", "twice", "twice"}).codes == Codes{516, none, none});
+  CHECK(Coded(false, false, {"value", "value"}).codes == Codes{none, none});
 }
 
 TEST_CASE("texts above 128 bytes stay inline") {
-  StringCoder coder(true, true);
-  CHECK_FALSE(coder.code_for(std::string(129, 'x')));
   const std::string longest(128, 'x');
-  CHECK(coder.code_for(longest) == 1u);
+  const std::string longer(129, 'x');
+  CHECK(Coded(true, true, {longer, longer, longest, longest}).codes == Codes{none, none, 1, 1});
 }
 
 TEST_CASE("the local table ends at exactly 1024 bytes and smaller texts still fit behind a refused one") {
-  StringCoder coder(false, true);
   std::vector<std::string> texts;
   for (int i = 0; i < 8; ++i) texts.push_back(std::string(124, static_cast<char>('a' + i)));
   texts.push_back(std::string(15, 'z'));
-  for (int i = 0; i < 8; ++i) CHECK(coder.code_for(texts[static_cast<std::size_t>(i)]));
-  CHECK(coder.local_size() == 8 * 126);  // 16 bytes are left
-  CHECK_FALSE(coder.code_for(texts[8]));
-  CHECK(coder.code_for("fourteen bytes") == 17u);
-  CHECK(coder.local_size() == 1024);
-  CHECK_FALSE(coder.code_for("y"));
-  CHECK(coder.code_for(texts[0]) == 1u);
+  texts.push_back("fourteen bytes");
+  texts.push_back("yyyy");
+  const auto once = texts;
+  texts.insert(texts.end(), once.begin(), once.end());
+  const Coded coded(false, true, texts);
+  CHECK(coded.coder.local_size() == 1024);
+  CHECK(coded.codes[7] == 15u);
+  CHECK(coded.codes[8] == none);  // 8 * 126 bytes are used, 16 are left
+  CHECK(coded.codes[9] == 17u);
+  CHECK(coded.codes[10] == none);
 }
 
-TEST_CASE("as many short texts as the table can hold are told apart") {
+TEST_CASE("as many texts as are counted are told apart, those behind them stay inline") {
   std::vector<std::string> texts;
-  for (int i = 0; i < 2000; ++i) texts.push_back(std::to_string(i));
-  StringCoder coder(false, true);
-  std::vector<std::optional<std::uint32_t>> codes;
-  for (const auto& text : texts) codes.push_back(coder.code_for(text));
-  CHECK(coder.local_size() <= 1024);
-  CHECK(coder.local_count() > 150);
-  for (std::size_t i = 0; i < texts.size(); ++i) {
-    CHECK(coder.code_for(texts[i]) == codes[i]);
-    if (codes[i]) CHECK(coder.local_text(*codes[i] / 2) == texts[i]);
+  for (int i = 0; i < 2000; ++i) texts.push_back("text " + std::to_string(i));
+  for (int i = 0; i < 2000; ++i) texts.push_back("text " + std::to_string(i));
+  const Coded coded(false, true, texts);
+  CHECK(coded.coder.local_size() <= 1024);
+  CHECK(coded.coder.local_count() > 80);
+  std::vector<std::string> known(2 * coded.coder.local_count());
+  coded.coder.visit_local([&](std::uint32_t code, std::string_view text) { known[code] = text; });
+  for (std::size_t i = 0; i < 2000; ++i) {
+    CHECK(coded.codes[i] == coded.codes[i + 2000]);
+    if (coded.codes[i] != none) CHECK(known[coded.codes[i]] == texts[i]);
+    if (i >= StringCoder::max_texts) CHECK(coded.codes[i] == none);
   }
 }
 
