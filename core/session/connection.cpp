@@ -86,6 +86,12 @@ void Connection::set_endpoints(std::uint32_t local, std::uint32_t remote) {
 
 // --- receiving ---
 
+void Connection::release_message() {
+  has_message_ = false;
+  incoming_.clear();
+  scanner_.release();
+}
+
 Result<std::size_t> Connection::receive(ByteSpan input, Now now) {
   has_message_ = false;
   std::size_t consumed = 0;
@@ -95,8 +101,10 @@ Result<std::size_t> Connection::receive(ByteSpan input, Now now) {
     if (!fed) return closed_by(fed.error());
     consumed += *fed;
     stats_.bytes_received += *fed;
-    if (const auto bytes = scanner_.message())
-      if (auto handled = handle_message(*bytes, now); !handled) return closed_by(handled.error());
+    const auto bytes = scanner_.message();
+    if (!bytes) continue;
+    if (auto handled = handle_message(*bytes, now); !handled) return closed_by(handled.error());
+    if (!has_message_) release_message();
   }
   return consumed;
 }
@@ -298,6 +306,7 @@ Result<> Connection::send(Message& message, Now now, bool is_urgent) {
   if (state_ == ConnectionState::closed) return close_reason_;
   complete_header(message);
   if (auto queued = queue_.push(message, encode_options(), is_urgent); !queued) return queued;
+  message.clear();  // what is large in it lives as long as it waits for the stream, and no longer
   return note_sent(now);
 }
 

@@ -71,6 +71,8 @@ class Connection {
   Result<std::size_t> receive(ByteSpan input, Now now);
   /// The message that the last receive() stopped at, with all header fields filled in; nullptr if there is none.
   const Message* message() const { return has_message_ ? &incoming_ : nullptr; }
+  /// The message is dealt with: gives the memory of a large one back.
+  void release_message();
   /// Sends a due heartbeat, or fails with the reason for which the connection is now closed.
   Result<> handle_timeout(Now now);
   /// The bytes of poll_transmit() that were written.
@@ -79,7 +81,7 @@ class Connection {
   // --- asked ---
 
   /// Fills in version, node ids, names and elision, encodes and queues. Endpoints and message id are the caller's
-  /// (begin_message() sets them). Entry types below 500 keep full routing.
+  /// (begin_message() sets them). Entry types below 500 keep full routing. What was sent is empty afterwards.
   /// Errors   connection_error when closed or the queue is full; protocol_error above the size limit.
   Result<> send(Message& message, Now now, bool is_urgent = false);
   /// Sends what other peers are sent as well, addressed to this one's session. Errors   those of send().

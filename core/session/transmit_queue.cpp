@@ -81,6 +81,7 @@ void TransmitQueue::pop_front() {
   if (++first_ * 2 < messages_.size()) return;
   messages_.erase(messages_.begin(), messages_.begin() + static_cast<std::ptrdiff_t>(first_));
   first_ = 0;
+  if (messages_.empty()) clear_kept(messages_);
 }
 
 void TransmitQueue::clear() {

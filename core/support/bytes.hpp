@@ -27,6 +27,19 @@ inline std::string_view as_text(ByteSpan bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
+/// Buffers are kept for their memory, but not above this many bytes each: what one large message took is given back
+/// when that is done, and a steady stream of small ones allocates nothing.
+inline constexpr std::size_t max_kept_bytes = 16 * 1024;
+
+/// Empties a buffer that is used again and again.
+template <class T>
+void clear_kept(std::vector<T>& buffer) {
+  if (buffer.capacity() * sizeof(T) > max_kept_bytes)
+    buffer = std::vector<T>();
+  else
+    buffer.clear();
+}
+
 /// Reads one little-endian number; `from` need not be aligned but must hold sizeof(T) bytes.
 template <class T>
 requires std::is_trivially_copyable_v<T> T load(const std::uint8_t* from) {

@@ -63,8 +63,11 @@ void EncodedMessage::assign(const EncodedMessage& other, std::uint16_t message_i
 
 void EncodedMessage::clear() {
   size_ = 0;
-  slices_.clear();
-  owners_.clear();
+  clear_kept(slices_);
+  clear_kept(owners_);
+  if (scratch_.capacity() > max_kept_bytes) scratch_ = Bytes();  // a small one keeps its size: it is written over
+  clear_kept(plan_.entries);
+  clear_kept(plan_.elements);
 }
 
 }  // namespace rr

@@ -7,11 +7,7 @@
 namespace rr {
 
 Result<std::size_t> FrameScanner::feed(ByteSpan input) {
-  if (message_) {
-    message_.reset();
-    buffer_.clear();
-    expected_ = 0;
-  }
+  release();
 
   if (buffer_.empty()) {
     const auto start = input.first(std::min(input.size(), frame_start_size));
@@ -34,6 +30,13 @@ Result<std::size_t> FrameScanner::feed(ByteSpan input) {
   append(rest);
   if (buffer_.size() == expected_) message_ = ByteSpan(buffer_);
   return consumed + rest.size();
+}
+
+void FrameScanner::release() {
+  if (!message_) return;
+  message_.reset();
+  clear_kept(buffer_);
+  expected_ = 0;
 }
 
 void FrameScanner::append(ByteSpan bytes) {

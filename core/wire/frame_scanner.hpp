@@ -24,6 +24,9 @@ class FrameScanner {
   /// The complete message found by the last feed(): a view of its input where it lay there in one piece, else of the
   /// scanner's buffer. Empty when more bytes are needed.
   std::optional<ByteSpan> message() const { return message_; }
+  /// The message is not needed any more, if there is one. The next feed() does this by itself; before it, the memory of
+  /// a large message is given back.
+  void release();
 
   /// Takes effect for the next message.
   void set_max_message_size(std::size_t limit) { limit_ = limit; }

@@ -6,7 +6,6 @@ namespace rr {
 
 namespace {
 constexpr std::size_t block_size = 4096;
-constexpr std::size_t max_kept_elements = 1 << 14;  // clear() gives back more: one huge message must not cost for ever
 }  // namespace
 
 MessageEntry& Message::begin_entry(EntryType type, std::string_view service_path, std::string_view member_name,
@@ -105,13 +104,13 @@ ByteSpan Message::store(ByteSpan bytes) {
 
 void Message::clear() {
   header = {};
-  entries.clear();
-  elements.clear();
-  if (elements.capacity() > max_kept_elements) elements = std::vector<MessageElement>();
-  open_.clear();
+  clear_kept(entries);
+  clear_kept(elements);
+  clear_kept(open_);
+  if (blocks_.size() > max_kept_bytes / block_size) blocks_.resize(max_kept_bytes / block_size);
   block_index_ = 0;
   block_used_ = 0;
-  owners_.clear();
+  clear_kept(owners_);
 }
 
 std::string_view data_type_name(DataType type) {

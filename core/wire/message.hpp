@@ -270,8 +270,8 @@ class ElementRange {
 };
 
 /// One message. Everything in it is borrowed: from the received bytes after decode(), from the caller, from static
-/// text or from store() while it is built. Reuse one object: clear() keeps the capacity, so that a steady stream of
-/// small messages allocates nothing.
+/// text or from store() while it is built. Reuse one object: clear() keeps the memory of small messages
+/// (max_kept_bytes), so that a steady stream of them allocates nothing.
 ///
 /// Elements lie in pre-order in one vector; `end` skips a subtree.
 class Message {

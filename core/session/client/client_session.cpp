@@ -46,6 +46,7 @@ void ClientSession::handle_bytes(ByteSpan input, Now now) {
     input = input.subspan(*consumed);
     if (!has_started_ && connection_.state() == ConnectionState::open) start_session(now);
     if (const auto* message = connection_.message()) handle_message(*message, now);
+    connection_.release_message();
   }
 }
 

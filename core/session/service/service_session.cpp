@@ -52,8 +52,9 @@ void ServiceSession::handle_bytes(ByteSpan input, Now now) {
     const auto consumed = connection_.receive(input, now);
     if (!consumed) return leave(consumed.error(), now);
     input = input.subspan(*consumed);
-    if (closing_deadline_) continue;  // requests behind a disconnect get no answer
-    if (const auto* message = connection_.message()) handle_message(*message, now);
+    // Requests behind a disconnect get no answer.
+    if (const auto* message = connection_.message(); message && !closing_deadline_) handle_message(*message, now);
+    connection_.release_message();
   }
 }
 

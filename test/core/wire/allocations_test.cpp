@@ -1,47 +1,13 @@
 // Memory: nothing allocated in the steady state, and never more than the bytes in hand justify.
 
 #include <catch2/catch.hpp>
-#include <cstdlib>
-#include <new>
 
 #include "core/wire/codec.hpp"
 #include "core/wire/frame_scanner.hpp"
 #include "test/core/wire/message_tree.hpp"
 #include "test/core/wire/vectors.hpp"
+#include "test/support/count_allocations.hpp"
 #include "test/support/print.hpp"
-
-namespace {
-
-std::size_t allocation_count = 0;
-std::size_t allocated_bytes = 0;
-
-void* counted_allocation(std::size_t size) {
-  ++allocation_count;
-  allocated_bytes += size;
-  if (void* memory = std::malloc(size == 0 ? 1 : size)) return memory;
-  throw std::bad_alloc();
-}
-
-}  // namespace
-
-void* operator new(std::size_t size) {
-  return counted_allocation(size);
-}
-void* operator new[](std::size_t size) {
-  return counted_allocation(size);
-}
-void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
-void operator delete[](void* memory) noexcept {
-  std::free(memory);
-}
-void operator delete[](void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
 
 using namespace rr;
 using namespace rr::test;
@@ -124,4 +90,33 @@ TEST_CASE("the scanner's buffer grows with what arrived, not with what was annou
   for (int i = 0; i < 100; ++i) fed += scanner.feed(chunk).value();
   CHECK(fed == 100'010);
   CHECK(allocated_bytes - before <= 4 * fed);
+}
+
+TEST_CASE("one large message costs for as long as it lasts") {
+  Message message;
+  EncodedMessage encoded;
+  Message decoded;
+  FrameScanner scanner;
+  const auto send = [&](std::uint32_t elements) {
+    message.clear();
+    message.begin_entry(EntryType::function_call_req, "svc", "f");
+    for (std::uint32_t i = 0; i < elements; ++i) message.add_scalar("value", DataType::uint32_t, i);
+    REQUIRE(encode(message, {.string_table = {.local = true, .standard = true}}, encoded));
+    const auto bytes = encoded.to_bytes();
+    REQUIRE(scanner.feed(ByteSpan(bytes).first(20)));
+    REQUIRE(scanner.feed(ByteSpan(bytes).subspan(20)));
+    REQUIRE(decode(*scanner.message(), {.string_table = {.local = true, .standard = true}}, decoded));
+    message.clear();
+    encoded.clear();
+    decoded.clear();
+    scanner.release();
+  };
+  send(10);
+  const auto before = live_bytes;
+  send(100'000);
+  CHECK(live_bytes <= before + 8 * max_kept_bytes);
+  send(100);
+  const auto warm = allocation_count;
+  for (int i = 0; i < 10; ++i) send(100);
+  CHECK(allocation_count - warm <= 10);  // that of to_bytes()
 }

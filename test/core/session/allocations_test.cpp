@@ -1,0 +1,44 @@
+// Memory of sessions: what a large message took is given back.
+
+#include <catch2/catch.hpp>
+
+#include "test/core/session/loopback.hpp"
+#include "test/support/count_allocations.hpp"
+#include "test/support/print.hpp"
+
+using namespace rr;
+using namespace rr::test;
+
+namespace {
+
+constexpr std::size_t read_size = 64 * 1024;  // as a stream's driver reads
+
+Value pose(std::size_t joints) {
+  return Structure{"experimental.loopback.Pose",
+                   {{"x", Value(1.0)}, {"joints", Value(std::vector<double>(joints, 2.0))}}};
+}
+
+/// Carries a pose to the service and another back.
+void exchange(Loopback& pair, std::size_t joints) {
+  pair.client->set_property("arm", "pose", pose(joints), pair.now);
+  pair.pump(read_size);
+  pair.service->reply(pair.next_service<Called>().id, Value{}, pair.now);
+  pair.pump(read_size);
+  REQUIRE(pair.next_client<Completed>().result);
+  pair.client->get_property("arm", "pose", pair.now);
+  pair.pump(read_size);
+  pair.service->reply(pair.next_service<Called>().id, pose(joints), pair.now);
+  pair.pump(read_size);
+  REQUIRE(pair.next_client<Completed>().result);
+}
+
+}  // namespace
+
+TEST_CASE("what a large message took on both sides of a session is given back") {
+  Loopback pair;
+  pair.connect();
+  exchange(pair, 10);
+  const auto before = live_bytes;
+  exchange(pair, 900'000);  // 7.2 MB each way
+  CHECK(live_bytes <= before + 64 * 1024);
+}
