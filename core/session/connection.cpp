@@ -94,6 +94,12 @@ void Connection::release_message() {
 
 Result<std::size_t> Connection::receive(ByteSpan input, Now now) {
   has_message_ = false;
+  // Bytes are a sign of life, whole messages or not: a large one may take minutes. What ends a peer that trickles are
+  // the deadlines of set-up, which count from its beginning.
+  if (!input.empty()) {
+    last_received_ = now.steady;
+    heartbeat_sent_.reset();
+  }
   std::size_t consumed = 0;
   while (consumed < input.size() && !has_message_) {
     if (state_ == ConnectionState::closed) return close_reason_;
@@ -113,8 +119,6 @@ Result<> Connection::handle_message(ByteSpan bytes, Now now) {
   const DecodeOptions options{.string_table = agreed_.string_table, .message_limit = message_limit()};
   if (auto done = decode(bytes, options, incoming_); !done) return done;
   ++stats_.messages_received;
-  last_received_ = now.steady;
-  heartbeat_sent_.reset();
   fill_header();
   if (incoming_.entries.empty()) return {};  // legal, and there is nothing to do
   if (role_ == ConnectionRole::service) state_ = ConnectionState::open;
@@ -351,9 +355,13 @@ Result<> Connection::note_sent(Now now) {
   return {};
 }
 
-void Connection::handle_transmitted(std::size_t bytes, Now) {
+void Connection::handle_transmitted(std::size_t bytes, Now now) {
   stats_.bytes_sent += bytes;
   queue_.consume(bytes);
+  if (!heartbeat_sent_ || bytes == 0 || ahead_of_heartbeat_ == 0) return;
+  // The heartbeat is on its way as long as the stream takes what lies before it; the peer's time begins behind that.
+  ahead_of_heartbeat_ -= std::min(bytes, ahead_of_heartbeat_);
+  heartbeat_sent_ = now.steady;
 }
 
 // --- time ---
@@ -363,7 +371,9 @@ Result<> Connection::send_heartbeat(Now now) {
   reply_.header.receiver_node_id = {};
   reply_.begin_entry(EntryType::connection_test, {}, {});
   heartbeat_sent_ = now.steady;
-  return send(reply_, now, true);
+  auto sent = send(reply_, now, true);
+  ahead_of_heartbeat_ = queue_.size();
+  return sent;
 }
 
 Result<> Connection::handle_timeout(Now now) {

@@ -154,7 +154,8 @@ class Connection {
   TimePoint opened_;
   TimePoint last_sent_;
   TimePoint last_received_;
-  std::optional<TimePoint> heartbeat_sent_;  ///< not answered yet
+  std::optional<TimePoint> heartbeat_sent_;  ///< not answered yet; begins anew while it waits for the stream
+  std::size_t ahead_of_heartbeat_ = 0;       ///< bytes that the stream takes up to the end of it, at most
   ConnectionStats stats_;
 };
 

@@ -31,6 +31,16 @@ Value pose(double x) {
   return Structure{"experimental.loopback.Pose", {{"x", Value(x)}, {"joints", Value(std::vector<double>{1, 2, 3})}}};
 }
 
+/// A request of about 16 kB, which stays queued.
+Bytes encoded_pose(Loopback& pair) {
+  const Structure large{"experimental.loopback.Pose",
+                        {{"x", Value(1.0)}, {"joints", Value(std::vector<double>(2000))}}};
+  pair.client->set_property("arm", "pose", Value(large), pair.now);
+  Bytes bytes;
+  for (const auto slice : pair.client->poll_transmit()) bytes.insert(bytes.end(), slice.begin(), slice.end());
+  return bytes;
+}
+
 }  // namespace
 
 TEST_CASE("a session is set up in every combination of features, fed byte by byte") {
@@ -472,6 +482,47 @@ TEST_CASE("heartbeats keep an idle connection and end a dead one") {
   pair.client->handle_timeout(pair.now);
   CHECK(pair.client->state() == ClientState::closed);
   CHECK(pair.next_client<SessionClosed>().reason.message == "the peer is silent: a heartbeat was not answered");
+}
+
+TEST_CASE("a large message that takes minutes to come is a sign of life all the while") {
+  Loopback pair;
+  pair.connect();
+  const auto bytes = encoded_pose(pair);
+  for (std::size_t at = 0; at < bytes.size(); at += 1000) {
+    pair.advance(std::chrono::seconds(9));
+    pair.service->handle_timeout(pair.now);
+    REQUIRE(pair.service->service() != nullptr);
+    pair.service->handle_bytes(ByteSpan(bytes).subspan(at, std::min<std::size_t>(1000, bytes.size() - at)), pair.now);
+  }
+  CHECK(pair.next_service<Called>().member->name == "pose");
+}
+
+TEST_CASE("a heartbeat behind a large message has time as long as the stream takes bytes") {
+  Loopback pair;
+  pair.connect();
+  encoded_pose(pair);
+  for (int i = 0; i < 12; ++i) {
+    pair.advance(std::chrono::seconds(9));
+    pair.client->handle_timeout(pair.now);
+    REQUIRE(pair.client->state() == ClientState::connected);
+    pair.client->handle_transmitted(1000, pair.now);
+  }
+  pair.advance(std::chrono::seconds(15));
+  pair.client->handle_timeout(pair.now);
+  CHECK(pair.client->state() == ClientState::closed);
+}
+
+TEST_CASE("who sends byte by byte has no longer to set up a connection") {
+  Loopback pair;
+  Bytes bytes;
+  for (const auto slice : pair.client->poll_transmit()) bytes.insert(bytes.end(), slice.begin(), slice.end());
+  for (std::size_t at = 0; at < 5; ++at) {
+    CHECK_FALSE(pair.service->wants_close());
+    pair.service->handle_bytes(ByteSpan(bytes).subspan(at, 1), pair.now);
+    pair.advance(std::chrono::seconds(1));
+    pair.service->handle_timeout(pair.now);
+  }
+  CHECK(pair.service->wants_close());
 }
 
 TEST_CASE("silence during set-up ends in time, on both sides") {
