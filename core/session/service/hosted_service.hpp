@@ -11,6 +11,7 @@
 
 #include "core/session/connection.hpp"
 #include "core/session/service/authenticator.hpp"
+#include "core/session/service/endpoint_numbers.hpp"
 #include "core/session/service/monitor_locks.hpp"
 #include "core/session/service/object_locks.hpp"
 #include "core/types/type_registry.hpp"
@@ -139,12 +140,15 @@ class ServiceDirectory {
   std::vector<KnownNode> detected_nodes(std::string_view base_url) const {
     return detected_ ? detected_(base_url) : std::vector<KnownNode>();
   }
+  /// Of the node's half of its sessions.
+  EndpointNumbers& endpoints() { return endpoints_; }
   /// A definition by name, from any service.
   const ServiceDefinition* find_definition(std::string_view name) const;
 
  private:
   NodeIdentity identity_;
   std::map<std::string, std::shared_ptr<HostedService>, std::less<>> services_;
+  EndpointNumbers endpoints_;
   ListNodes routed_;
   ListNodes detected_;
 };

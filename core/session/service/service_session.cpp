@@ -43,6 +43,7 @@ ServiceSession::ServiceSession(ServiceDirectory& directory, ServiceSessionOption
 
 ServiceSession::~ServiceSession() {
   leave_locks();
+  if (endpoint_ != 0 && !is_gone_) directory_.endpoints().give_back(endpoint_, last_session_message_);
 }
 
 // --- told ---
@@ -109,6 +110,7 @@ std::optional<ServiceEvent> ServiceSession::poll_event() {
 void ServiceSession::leave(Error reason, Now now) {
   if (is_gone_) return;
   is_gone_ = true;
+  if (endpoint_ != 0) directory_.endpoints().give_back(endpoint_, now.steady);
   closing_deadline_ = now.steady + linger;
   leave_locks();
   service_.reset();
@@ -193,6 +195,7 @@ void ServiceSession::release_path(std::string_view path, Now now) {
     wire = is_released(wire->first.path) ? end_wire(wire) : std::next(wire);
   release_pipes(path);
   end_generators(generators_.remove_released(is_released));
+  if (!may_use_service()) return;
   connection_.begin_message(outgoing_);
   outgoing_.begin_entry(EntryType::service_path_released_req, path, {});
   send_outgoing(now);
@@ -200,9 +203,11 @@ void ServiceSession::release_path(std::string_view path, Now now) {
 
 void ServiceSession::close_service(Now now) {
   if (!service_) return;
-  connection_.begin_message(outgoing_);
-  outgoing_.begin_entry(EntryType::service_closed, {}, {});
-  send_outgoing(now);
+  if (may_use_service()) {
+    connection_.begin_message(outgoing_);
+    outgoing_.begin_entry(EntryType::service_closed, {}, {});
+    send_outgoing(now);
+  }
   leave({ErrorCode::none, "the service was closed"}, now);
 }
 
@@ -238,11 +243,7 @@ void ServiceSession::handle_message(const Message& message, Now now) {
     if (is_request(first.type)) handle_special(message, now);
     return;
   }
-  // The endpoint must be this connection's: knowing the number of somebody else's session opens nothing.
-  const auto& header = message.header;
-  const bool is_ours = service_ && header.receiver_endpoint == endpoint_ &&
-                       header.sender_endpoint == connection_.remote_endpoint() &&
-                       (header.receiver_node_id == directory_.identity().id || header.receiver_node_id.is_any());
+  const bool is_ours = is_of_session(message.header);
   if (is_ours) last_session_message_ = now.steady;
   for (const auto& entry : message.entries) {
     if (!is_ours) {
@@ -256,6 +257,14 @@ void ServiceSession::handle_message(const Message& message, Now now) {
       handle_entry(message, entry, now);
     }
   }
+}
+
+/// The endpoints must be this connection's, and the sender the node that connected: knowing the number of somebody
+/// else's session opens nothing.
+bool ServiceSession::is_of_session(const MessageHeader& header) const {
+  return service_ && header.receiver_endpoint == endpoint_ && header.sender_endpoint == connection_.remote_endpoint() &&
+         header.sender_node_id == client_node_ &&
+         (header.receiver_node_id == directory_.identity().id || header.receiver_node_id.is_any());
 }
 
 void ServiceSession::handle_entry(const Message& message, const MessageEntry& entry, Now now) {

@@ -243,7 +243,7 @@ class ServiceSession {
   /// of packing.
   Result<CallbackId> call_callback(std::string_view path, const MemberDefinition& member,
                                    std::span<const Value> arguments, Now now);
-  /// Tells the client to look up `path` again.
+  /// Tells the client to look up `path` again, unless it still has to log in.
   void release_path(std::string_view path, Now now);
   /// Answers ObjectWanted: the service has the object now (HostedService::add_object()), or not.
   void handle_object_found(std::string_view path, const Result<>& found, Now now);
@@ -251,7 +251,7 @@ class ServiceSession {
   void answer_lock(LockRequestId id, const Result<>& result, Now now);
   /// Answers LeaveWanted.
   void answer_leave(Now now);
-  /// Tells the client that its service is gone (ServiceClosed), then closes.
+  /// Tells the client that its service is gone (ServiceClosed), unless it still has to log in, then closes.
   void close_service(Now now);
 
   // --- answers ---
@@ -359,6 +359,7 @@ class ServiceSession {
   using PipeIndices = std::map<std::int32_t, ServicePipe*>;
 
   void handle_message(const Message& message, Now now);
+  bool is_of_session(const MessageHeader& header) const;
   void send_outgoing(Now now, bool is_urgent = false);
   void leave(Error reason, Now now);
   using Wires = std::map<PathMember, WireConnection, PathMemberLess>;
@@ -373,7 +374,7 @@ class ServiceSession {
   Result<> write_root_type(const Message& message, const MessageEntry& entry);
   Result<> write_combined(const Message& message, const MessageEntry& entry, Now now);
   Result<> accept_combined(const OpenLogin& request, std::optional<AuthenticatedUser> user, Now now);
-  Result<> connect(std::shared_ptr<HostedService> service, std::uint32_t client_endpoint,
+  Result<> connect(std::shared_ptr<HostedService> service, const NodeId& client, std::uint32_t client_endpoint,
                    std::optional<AuthenticatedUser> user, Now now);
   Result<> disconnect(const Message& message, const MessageEntry& entry, Now now);
   /// A MapString (service_losses.cpp).
@@ -473,6 +474,7 @@ class ServiceSession {
   Connection connection_;
   std::shared_ptr<HostedService> service_;
   std::uint32_t endpoint_ = 0;
+  NodeId client_node_;  ///< as it called itself when it connected
   TimePoint opened_;
   TimePoint last_session_message_;
   std::optional<TimePoint> closing_deadline_;

@@ -7,7 +7,6 @@
 #include "core/robdef/model/names.hpp"
 #include "core/session/known_definitions.hpp"
 #include "core/session/service/service_session.hpp"
-#include "core/support/random.hpp"
 
 namespace rr {
 
@@ -138,7 +137,8 @@ Result<> ServiceSession::answer_special(const Message& message, const MessageEnt
     case EntryType::object_type_name:
       return write_root_type(message, entry);
     case EntryType::connect_client:
-      return connect(directory_.find(entry.service_path), message.header.sender_endpoint, std::nullopt, now);
+      return connect(directory_.find(entry.service_path), message.header.sender_node_id, message.header.sender_endpoint,
+                     std::nullopt, now);
     case EntryType::connect_client_combined:
       return write_combined(message, entry, now);
     case EntryType::disconnect_client:
@@ -243,7 +243,8 @@ Result<> ServiceSession::write_combined(const Message& message, const MessageEnt
 
 Result<> ServiceSession::accept_combined(const OpenLogin& request, std::optional<AuthenticatedUser> user, Now now) {
   const auto& service = request.service;
-  if (auto connected = connect(service, request.client_endpoint, std::move(user), now); !connected) return connected;
+  if (auto connected = connect(service, request.client.id, request.client_endpoint, std::move(user), now); !connected)
+    return connected;
   outgoing_.add_text("objecttype", request.type_for_client->qualified_name);
   add_implements(outgoing_, *request.type_for_client);
   if (request.wants_definitions) {
@@ -272,12 +273,13 @@ void ServiceSession::finish_combined(const OpenLogin& login, Result<Authenticate
 }
 
 /// `service` may be null.
-Result<> ServiceSession::connect(std::shared_ptr<HostedService> service, std::uint32_t client_endpoint,
-                                 std::optional<AuthenticatedUser> user, Now now) {
+Result<> ServiceSession::connect(std::shared_ptr<HostedService> service, const NodeId& client,
+                                 std::uint32_t client_endpoint, std::optional<AuthenticatedUser> user, Now now) {
   if (!service) return service_not_found();
   if (service_) return has_session_already();
   service_ = std::move(service);
-  endpoint_ = random_endpoint();
+  endpoint_ = directory_.endpoints().take(now.steady);
+  client_node_ = client;
   last_session_message_ = now.steady;
   connection_.set_endpoints(endpoint_, client_endpoint);
   outgoing_.header.sender_endpoint = endpoint_;
@@ -290,8 +292,7 @@ Result<> ServiceSession::connect(std::shared_ptr<HostedService> service, std::ui
 
 Result<> ServiceSession::disconnect(const Message& message, const MessageEntry& entry, Now now) {
   const auto* name = find_text(message, entry, "servicename");
-  if (!service_ || message.header.receiver_endpoint != endpoint_ || !name || name->text() != service_->name())
-    return service_not_found();
+  if (!is_of_session(message.header) || !name || name->text() != service_->name()) return service_not_found();
   if (!service_->is_remote()) {
     leave({ErrorCode::none, "the client disconnected"}, now);
   } else if (!leaving_) {

@@ -219,6 +219,25 @@ TEST_CASE("before the login the small limit for messages also bounds what string
   }
 }
 
+TEST_CASE("notices of the service are for those who have logged in") {
+  Guarded pair(true);
+  pair.start(login("alice", password("secret"), no_combined()));
+  pair.next_service<ClientConnected>();
+  const bool has_logged_in = GENERATE(false, true);
+  if (has_logged_in) {
+    pair.judge();
+    pair.next_client<Connected>();
+  }
+  pair.service->release_path("arm.tool", pair.now);
+  CHECK(pair.service->poll_transmit().empty() == !has_logged_in);
+  pair.pump();
+  pair.service->close_service(pair.now);
+  CHECK(pair.service->poll_transmit().empty() == !has_logged_in);
+  pair.advance(std::chrono::milliseconds(100));
+  pair.service->handle_timeout(pair.now);
+  CHECK(pair.service->wants_close());
+}
+
 TEST_CASE("whoever logs out of a service that requires a user has nothing connected any more") {
   Guarded pair(true);
   pair.start(login("alice", password("secret")));

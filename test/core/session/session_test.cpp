@@ -428,6 +428,28 @@ TEST_CASE("an endpoint is bound to its connection") {
   CHECK(reply.entries.front().error == ErrorCode::invalid_endpoint);
 }
 
+TEST_CASE("only the node that connected speaks in its session") {
+  Loopback pair;
+  pair.connect();
+  const auto answer_to_keep_alive_of = [&](NodeId sender) {
+    Message message;
+    const_cast<Connection&>(pair.client->connection()).begin_message(message);
+    message.header.sender_node_id = sender;
+    message.begin_entry(EntryType::client_keep_alive_req, "arm", {}, 77);
+    EncodedMessage encoded;
+    encode(message, {}, encoded).value();
+    pair.service->handle_bytes(encoded.to_bytes(), pair.now);
+    Bytes bytes;
+    for (const auto slice : pair.service->poll_transmit()) bytes.insert(bytes.end(), slice.begin(), slice.end());
+    pair.service->handle_transmitted(bytes.size(), pair.now);
+    Message reply;
+    decode(bytes, {.string_table = {true, true}}, reply).value();
+    return reply.entries.front().error;
+  };
+  CHECK(answer_to_keep_alive_of(client_id) == ErrorCode::none);
+  CHECK(answer_to_keep_alive_of(NodeId{{9}}) == ErrorCode::invalid_endpoint);
+}
+
 TEST_CASE("an orderly goodbye, and a service that is closed") {
   Loopback pair;
   pair.connect();
