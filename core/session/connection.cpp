@@ -96,10 +96,7 @@ Result<std::size_t> Connection::receive(ByteSpan input, Now now) {
   has_message_ = false;
   // Bytes are a sign of life, whole messages or not: a large one may take minutes. What ends a peer that trickles are
   // the deadlines of set-up, which count from its beginning.
-  if (!input.empty()) {
-    last_received_ = now.steady;
-    heartbeat_sent_.reset();
-  }
+  if (!input.empty()) excuse_silence(now);
   std::size_t consumed = 0;
   while (consumed < input.size() && !has_message_) {
     if (state_ == ConnectionState::closed) return close_reason_;
@@ -374,6 +371,11 @@ Result<> Connection::send_heartbeat(Now now) {
   auto sent = send(reply_, now, true);
   ahead_of_heartbeat_ = queue_.size();
   return sent;
+}
+
+void Connection::excuse_silence(Now now) {
+  last_received_ = now.steady;
+  heartbeat_sent_.reset();
 }
 
 Result<> Connection::handle_timeout(Now now) {

@@ -2,10 +2,9 @@
 // Source: transports spec sections 2 and 3; sessions spec section 2.2.
 //
 // The sans-IO contract of every class in this layer that owns a Connection:
-//   told        handle_bytes(span, now), handle_timeout(now), handle_closed(error, now)
-//   asked       call..., close(...)
-//   answers     poll_transmit(), poll_timeout(), poll_event(): poll in this order after everything told or asked
-//   looked at   state and counters
+//   told        handle_bytes(span, now) (returns what it took; the rest comes again when it is asked for),
+//   handle_timeout(now), handle_closed(error, now) asked       call..., close(...) answers     poll_transmit(),
+//   poll_timeout(), poll_event(): poll in this order after everything told or asked looked at   state and counters
 // Nothing in here knows sockets, threads or clocks: time is a parameter, completion is an event.
 #pragma once
 
@@ -75,6 +74,8 @@ class Connection {
   void release_message();
   /// Sends a due heartbeat, or fails with the reason for which the connection is now closed.
   Result<> handle_timeout(Now now);
+  /// What the peer sends is not read for the moment: it can't be blamed for its silence.
+  void excuse_silence(Now now);
   /// The bytes of poll_transmit() that were written.
   void handle_transmitted(std::size_t bytes, Now now);
 

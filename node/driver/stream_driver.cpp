@@ -1,5 +1,6 @@
 #include "node/driver/stream_driver.hpp"
 
+#include <algorithm>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/error.hpp>
 #include <boost/asio/post.hpp>
@@ -39,7 +40,6 @@ StreamDriver::StreamDriver(std::unique_ptr<ByteStream> stream)
 
 void StreamDriver::start() {
   settle();
-  if (!is_closed_) spawn(read_all(shared_from_this()));
 }
 
 void StreamDriver::spawn(awaitable<void> work) {
@@ -51,16 +51,17 @@ void StreamDriver::spawn(awaitable<void> work) {
 
 awaitable<void> StreamDriver::read_all(std::shared_ptr<StreamDriver> self) {
   auto& driver = *self;
-  while (!driver.is_closed_) {
+  while (!driver.is_closed_ && driver.unread_.empty()) {
     const auto read = co_await driver.stream_->read_some({driver.buffer_.get(), read_size});
     if (driver.is_closed_) break;
     const Now now = read_clocks();
     if (read.error) co_return driver.finish(stream_error(read.error), now);
     if (read.is_end())
       co_return driver.finish(make_error(ErrorCode::connection_error, "the peer closed the connection"), now);
-    driver.handle_bytes({driver.buffer_.get(), read.bytes}, now);
+    driver.unread_ = {driver.buffer_.get(), read.bytes};
     driver.settle(now);
   }
+  driver.is_reading_ = false;
   if (driver.ends_in_good_order_) co_await driver.stream_->end(no_reason);
 }
 
@@ -72,16 +73,29 @@ void StreamDriver::settle(Now now) {
   if (is_settling_) return;
   is_settling_ = true;
   const auto self = shared_from_this();
-  while (handle_event(now)) {  // also behind the end: what is asked of a closed session fails by an event
-  }
+  do {
+    while (handle_event(now)) {  // also behind the end: what is asked of a closed session fails by an event
+    }
+  } while (read_on(now));
   if (!is_closed_) write(now);
   is_settling_ = false;
   if (is_closed_) return;
   if (wants_close()) {
-    ends_in_good_order_ = !is_writing_;
+    ends_in_good_order_ = !is_writing_ && is_reading_;
     return finish(make_error(ErrorCode::connection_error, "connection closed"), now);
   }
   arm_timer();
+  if (is_reading_ || !unread_.empty()) return;
+  is_reading_ = true;
+  spawn(read_all(self));
+}
+
+/// Gives the session what was read and not taken yet. Returns whether it took any of it.
+bool StreamDriver::read_on(Now now) {
+  if (unread_.empty() || is_closed_) return false;
+  const auto taken = handle_bytes(unread_, now);
+  unread_ = unread_.subspan(taken);
+  return taken != 0;
 }
 
 void StreamDriver::write(Now now) {
@@ -108,9 +122,9 @@ awaitable<void> StreamDriver::write_waiting(std::shared_ptr<StreamDriver> self) 
   boost::container::static_vector<ByteSpan, max_slices> slices;
   std::size_t bytes = 0;
   for (const ByteSpan slice : driver.poll_transmit()) {
-    if (slices.size() == slices.capacity()) break;
-    slices.push_back(slice);
-    bytes += slice.size();
+    if (slices.size() == slices.capacity() || bytes == write_size) break;
+    slices.push_back(slice.first(std::min(slice.size(), write_size - bytes)));
+    bytes += slices.back().size();
   }
   const auto error = co_await driver.stream_->write(slices);  // timed_out: the peer took nothing for too long
   driver.is_writing_ = false;

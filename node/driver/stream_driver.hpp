@@ -47,7 +47,8 @@ class StreamDriver : public std::enable_shared_from_this<StreamDriver> {
 
  private:
   // The session's half of the contract.
-  virtual void handle_bytes(ByteSpan input, Now now) = 0;
+  /// Returns bytes consumed; the rest comes again when events were handled or something was asked of the session.
+  virtual std::size_t handle_bytes(ByteSpan input, Now now) = 0;
   virtual void handle_transmitted(std::size_t bytes, Now now) = 0;
   virtual void handle_timeout(Now now) = 0;
   virtual void handle_closed(Error reason, Now now) = 0;
@@ -65,16 +66,20 @@ class StreamDriver : public std::enable_shared_from_this<StreamDriver> {
   void spawn(awaitable<void> work);
   static awaitable<void> read_all(std::shared_ptr<StreamDriver> self);
   static awaitable<void> write_waiting(std::shared_ptr<StreamDriver> self);
+  bool read_on(Now now);
   void write(Now now);
   void arm_timer();
   void finish(Error reason, Now now);
 
   static constexpr std::size_t read_size = 64 * 1024;
+  static constexpr std::size_t write_size = 256 * 1024;  ///< at most at once: the session hears how it goes on
 
   std::unique_ptr<ByteStream> stream_;
   boost::asio::steady_timer timer_;
   TimePoint armed_for_ = TimePoint::max();
   std::unique_ptr<std::uint8_t[]> buffer_;
+  ByteSpan unread_;          ///< of buffer_: the session does not take it yet, and nothing more is read
+  bool is_reading_ = false;  ///< read_all() runs
   bool is_settling_ = false;
   bool is_writing_ = false;  ///< write_waiting() runs
   bool is_closed_ = false;
@@ -92,7 +97,7 @@ class SessionDriver : public StreamDriver {
   Session session_;
 
  private:
-  void handle_bytes(ByteSpan input, Now now) final { session_.handle_bytes(input, now); }
+  std::size_t handle_bytes(ByteSpan input, Now now) final { return session_.handle_bytes(input, now); }
   void handle_transmitted(std::size_t bytes, Now now) final { session_.handle_transmitted(bytes, now); }
   void handle_timeout(Now now) final { session_.handle_timeout(now); }
   void handle_closed(Error reason, Now now) final { session_.handle_closed(std::move(reason), now); }

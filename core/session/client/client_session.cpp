@@ -39,15 +39,20 @@ ClientSession::ClientSession(ClientOptions options, Now now)
 
 // --- told ---
 
-void ClientSession::handle_bytes(ByteSpan input, Now now) {
+std::size_t ClientSession::handle_bytes(ByteSpan input, Now now) {
+  const auto size = input.size();
   while (!input.empty() && state_ != ClientState::closed) {
     const auto consumed = connection_.receive(input, now);
-    if (!consumed) return fail(consumed.error());
+    if (!consumed) {
+      fail(consumed.error());
+      break;
+    }
     input = input.subspan(*consumed);
     if (!has_started_ && connection_.state() == ConnectionState::open) start_session(now);
     if (const auto* message = connection_.message()) handle_message(*message, now);
     connection_.release_message();
   }
+  return size;
 }
 
 void ClientSession::handle_transmitted(std::size_t bytes, Now now) {

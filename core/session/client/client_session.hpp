@@ -127,7 +127,8 @@ class ClientSession {
 
   // --- told ---
 
-  void handle_bytes(ByteSpan input, Now now);
+  /// Returns  bytes consumed: all.
+  std::size_t handle_bytes(ByteSpan input, Now now);
   void handle_transmitted(std::size_t bytes, Now now);
   void handle_timeout(Now now);
   /// The stream is gone.

@@ -48,15 +48,18 @@ ServiceSession::~ServiceSession() {
 
 // --- told ---
 
-void ServiceSession::handle_bytes(ByteSpan input, Now now) {
-  while (!input.empty() && !wants_close()) {
+std::size_t ServiceSession::handle_bytes(ByteSpan input, Now now) {
+  const auto size = input.size();
+  while (!input.empty() && takes_requests()) {
     const auto consumed = connection_.receive(input, now);
-    if (!consumed) return leave(consumed.error(), now);
+    if (!consumed) leave(consumed.error(), now);
+    if (wants_close()) return size;
     input = input.subspan(*consumed);
     // Requests behind a disconnect get no answer.
     if (const auto* message = connection_.message(); message && !closing_deadline_) handle_message(*message, now);
     connection_.release_message();
   }
+  return size - input.size();
 }
 
 void ServiceSession::handle_transmitted(std::size_t bytes, Now now) {
@@ -75,6 +78,7 @@ void ServiceSession::handle_timeout(Now now) {
     if (now.steady >= *closing_deadline_) connection_.close({ErrorCode::connection_error, "session closed"});
     return;
   }
+  if (!takes_requests()) connection_.excuse_silence(now);
   if (auto alive = connection_.handle_timeout(now); !alive) return leave(alive.error(), now);
   end_generators(generators_.remove_idle(now));
   handle_locks_changed(now);

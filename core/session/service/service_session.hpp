@@ -42,7 +42,7 @@ struct ServiceSessionOptions {
   std::chrono::milliseconds endpoint_timeout{600'000};  ///< without a session message
   /// The client's NodeID, where the transport vouches for it (a certificate; the local machine).
   std::optional<NodeId> verified_node_id = {};
-  std::size_t max_open_calls = 1024;               ///< not answered yet; above: out_of_system_resource
+  std::size_t max_open_calls = 1024;               ///< not answered yet; above, what the client sends has to wait
   std::size_t max_generators = 256;                ///< run by one client; above: out_of_system_resource
   std::uint32_t max_memory_transfer = 100 * 1024;  ///< bytes: how clients are told to split; not enforced
   std::size_t max_wires = 4096;                    ///< connected by one client; above: out_of_system_resource
@@ -199,7 +199,9 @@ class ServiceSession {
 
   // --- told ---
 
-  void handle_bytes(ByteSpan input, Now now);
+  /// Returns  bytes consumed: all, unless so many calls wait for their answers that the rest has to wait, too. It is to
+  ///          be given again when events were handled or calls answered.
+  std::size_t handle_bytes(ByteSpan input, Now now);
   void handle_transmitted(std::size_t bytes, Now now);
   void handle_timeout(Now now);
   void handle_closed(Error reason, Now now);
@@ -358,6 +360,7 @@ class ServiceSession {
   };
   using PipeIndices = std::map<std::int32_t, ServicePipe*>;
 
+  bool takes_requests() const { return calls_.size() < options_.max_open_calls; }
   void handle_message(const Message& message, Now now);
   bool is_of_session(const MessageHeader& header) const;
   void send_outgoing(Now now, bool is_urgent = false);

@@ -547,6 +547,33 @@ TEST_CASE("who sends byte by byte has no longer to set up a connection") {
   CHECK(pair.service->wants_close());
 }
 
+TEST_CASE("requests above the limit wait until others are answered, and nobody is to blame for the silence") {
+  Loopback pair;
+  ServiceSessionOptions options;
+  options.max_open_calls = 4;
+  pair.service = std::make_unique<ServiceSession>(pair.directory, options, pair.now);
+  pair.connect();
+  for (int i = 0; i < 10; ++i) pair.client->call_function("arm", "stop", {}, pair.now);
+  Bytes bytes;
+  for (const auto slice : pair.client->poll_transmit()) bytes.insert(bytes.end(), slice.begin(), slice.end());
+  ByteSpan rest = bytes;
+  rest = rest.subspan(pair.service->handle_bytes(rest, pair.now));
+  REQUIRE_FALSE(rest.empty());
+  CHECK(pair.service->handle_bytes(rest, pair.now) == 0);
+  for (int i = 0; i < 10; ++i) {
+    pair.advance(std::chrono::seconds(20));
+    pair.service->handle_timeout(pair.now);
+  }
+  REQUIRE(pair.service->service() != nullptr);
+  for (int i = 0; i < 10; ++i) {
+    pair.service->reply(pair.next_service<Called>().id, Value{}, pair.now);
+    rest = rest.subspan(pair.service->handle_bytes(rest, pair.now));
+  }
+  CHECK(rest.empty());
+  pair.carry(*pair.service, *pair.client, bytes.size());
+  for (int i = 0; i < 10; ++i) CHECK(pair.next_client<Completed>().result);
+}
+
 TEST_CASE("silence during set-up ends in time, on both sides") {
   Loopback pair;
   CHECK(pair.client->poll_timeout() - pair.now.steady == std::chrono::seconds(5));

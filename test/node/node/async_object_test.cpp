@@ -197,6 +197,40 @@ TEST_CASE("futures and callbacks take results as well, on their own executor") {
   thread.join();
 }
 
+TEST_CASE("requests that wait together in front of a busy service are all answered, however many") {
+  constexpr int request_count = 1500;
+  RunningNode node(add_arm);
+  asio::io_context io;
+  std::promise<void> begun, released;
+  std::thread busy;
+  int answered = 0;
+  int refused = 0;
+  asio::co_spawn(
+      io,
+      [&]() -> asio::awaitable<void> {
+        const auto arm = co_await async_connect(io, node.url("Arm"));
+        busy = std::thread([&] {
+          node.ask([&](Node&) {
+            begun.set_value();
+            released.get_future().wait();
+            return 0;
+          });
+        });
+        begun.get_future().wait();
+        for (int i = 0; i < request_count; ++i)
+          arm.get("speed", [&, connection = arm.connection()](std::exception_ptr failure, const Value&) {
+            ++(failure ? refused : answered);
+            if (answered + refused == request_count) connection->disconnect();
+          });
+        released.set_value();
+      },
+      asio::detached);
+  io.run();
+  busy.join();
+  CHECK(answered == request_count);
+  CHECK(refused == 0);
+}
+
 TEST_CASE("what was asked for ends when the connection does") {
   asio::io_context io;
   std::exception_ptr failure;
