@@ -272,10 +272,12 @@ rr::awaitable<rr::OrderedJson> JsonOperations::unlock(RequestPtr, TargetPtr targ
 rr::awaitable<rr::OrderedJson> JsonOperations::login(RequestPtr request, TargetPtr) {
   if (own_ || !open_.empty() || running_ > 1)
     refuse(rr::ErrorCode::invalid_operation, "\"login\" comes first: others are under way, or something is open");
-  place_.key.username = request->text("username", "");
-  place_.key.password = request->text("password", "");
-  const auto session_of_user = session();
+  auto key = place_.key;
+  key.username = request->text("username", "");
+  key.password = request->text("password", "");
+  const auto session_of_user = value_or_throw(gateway_.sessions().open(*place_.device, key));
   value_or_throw(co_await session_of_user->root());
+  place_.key = std::move(key);  // not before: a failed login leaves the one that there was
   co_return nullptr;
 }
 
