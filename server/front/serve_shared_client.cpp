@@ -103,12 +103,14 @@ rr::awaitable<void> serve_shared_client(GatewayState& gateway, Connection& conne
   connection.stop = [session](const rr::EndReason& reason) {
     session->close_service();
     session->close(rr::make_error(rr::ErrorCode::connection_error, reason.text));
+  connection.has_session = true;
   };
   co_await end.wait();
   connection.device = nullptr;
   connection.stop = [](const rr::EndReason&) {};
   log(LogLevel::info, "client disconnected",
       {{"device", name},
+  connection.has_session = false;
        {"peer", connection.client},
        {"reason", session->end_reason().empty() ? session->session().connection().close_reason().message
                                                 : session->end_reason()}});

@@ -268,8 +268,6 @@ void Gateway::stop(std::function<void()> on_stopped) {
   devices_.stop();
   sessions_.stop();
   devices_.on_change(nullptr);
-  shared_.stop();
-  if (own_service_) own_service_->stop();
   files_watch_.cancel();
   asio::co_spawn(io_, drain(), asio::detached);
 }
@@ -282,9 +280,9 @@ void Gateway::close_listeners() {
   }
 }
 
-bool Gateway::has_relay() const {
+bool Gateway::has_session() const {
   return std::any_of(connections_.begin(), connections_.end(),
-                     [](const auto& each) { return each.device != nullptr && !each.ends_with_gateway; });
+                     [](const auto& each) { return each.has_session; });
 }
 
 void Gateway::end_all(const rr::EndReason& reason) {
@@ -297,7 +295,7 @@ void Gateway::end_all(const rr::EndReason& reason) {
 rr::awaitable<void> Gateway::drain() {
   for (auto it = connections_.begin(); it != connections_.end();) {
     auto& connection = *it++;
-    if (!connection.device || connection.ends_with_gateway) connection.stop({1001, "the gateway is stopping"});
+    if (!connection.has_session) connection.stop({1001, "the gateway is stopping"});
   }
   log(LogLevel::info, "stopping", {{"connections", open_connections_}, {"drain_ms", config_.timeouts.drain.count()}});
   const auto wait_until = [this](std::chrono::steady_clock::time_point deadline) -> rr::awaitable<void> {
@@ -305,8 +303,10 @@ rr::awaitable<void> Gateway::drain() {
     co_await drained_.async_wait(asio::as_tuple(asio::use_awaitable));
   };
   auto deadline = std::chrono::steady_clock::now() + config_.timeouts.drain;
-  while (has_relay() && !ends_at_once_ && std::chrono::steady_clock::now() < deadline) co_await wait_until(deadline);
+  while (has_session() && !ends_at_once_ && std::chrono::steady_clock::now() < deadline) co_await wait_until(deadline);
   close_listeners();
+  shared_.stop();
+  if (own_service_) own_service_->stop();
   const rr::EndReason reason{1001, "the gateway is stopping"};
   end_all(reason);
   deadline = std::chrono::steady_clock::now() + last_wait;

@@ -29,7 +29,7 @@ class Gateway : public GatewayState {
   /// Errors   certificates or CAs that can't be used, an address that can't be listened on; then nothing has changed.
   [[nodiscard]] rr::Result<> reconfigure(Config next);
 
-  /// Lets relays end within timeouts.drain, then ends them; calls `on_stopped` when nothing is left. A second call ends
+  /// Lets sessions end within timeouts.drain, then ends them; calls `on_stopped` when nothing is left. A second call ends
   /// them at once. Meanwhile nobody new gets to a device, but who asks for /readyz hears why.
   void stop(std::function<void()> on_stopped);
   /// Reads certificates, keys, CAs, users and rights anew, and opens the audit log anew. What can't be used stays as it
@@ -53,7 +53,7 @@ class Gateway : public GatewayState {
   rr::awaitable<void> watch_files();
   void close_listeners();
   void tell_of_nodes();
-  bool has_relay() const;
+  bool has_session() const;
   void end_all(const rr::EndReason& reason);
 
   boost::asio::io_context& io_;

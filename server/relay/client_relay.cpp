@@ -34,6 +34,7 @@ rr::awaitable<void> relay_client(GatewayState& gateway, Connection& connection, 
   Relay relay(client, *boarding.stream, {limits.max_message_size, limits.outbox_bytes, limits.opaque_rate},
               boarding.device.traffic());
   connection.device = &boarding.device;
+  connection.has_session = true;
   connection.stop = [&relay](rr::EndReason reason) { relay.stop(std::move(reason)); };
   const auto& name = boarding.device.config().name;
   log(LogLevel::info, "client connected", {{"device", name}, {"peer", connection.client}});
@@ -41,6 +42,7 @@ rr::awaitable<void> relay_client(GatewayState& gateway, Connection& connection, 
   const auto reason = co_await relay.run();
 
   connection.device = nullptr;
+  connection.has_session = false;
   connection.stop = [&client](const rr::EndReason&) { client.close(); };
   // A device that ends a connection may be ending altogether: find out now rather than at the next look.
   if (!gateway.is_stopping() && (reason.code == 1011 || reason.text.rfind("device", 0) == 0))

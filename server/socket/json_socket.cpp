@@ -124,7 +124,6 @@ rr::awaitable<void> serve_json_socket(GatewayState& gateway, Connection& connect
   const auto socket = std::make_shared<JsonSocket>(gateway, std::move(stream), *place);
   const auto device = place->device->config().name;
   connection.device = place->device.get();
-  connection.ends_with_gateway = true;
   connection.stop = [socket](rr::EndReason reason) { socket->stop(std::move(reason)); };
   log(LogLevel::info, "client connected", {{"device", device}, {"peer", connection.client}, {"as", "json"}});
 

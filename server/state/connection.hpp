@@ -27,10 +27,10 @@ struct Connection : boost::intrusive::list_base_hook<boost::intrusive::link_mode
 
   /// Ends it soon.
   std::function<void(rr::EndReason)> stop;
-  /// Set while it carries a client's session, which may go on for a while when the gateway stops.
+  /// Set while it is used for one device.
   const Device* device = nullptr;
-  /// It uses a device session of the gateway, and ends as soon as that stops.
-  bool ends_with_gateway = false;
+  /// It carries a Robot Raconteur session, which may go on for a while when the gateway stops.
+  bool has_session = false;
   Peer peer;
   boost::asio::ip::tcp::endpoint local;  ///< where it came in
   Admission::Ticket ticket;

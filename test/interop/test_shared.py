@@ -2,6 +2,7 @@
 members do is test_interop.py's, whose scenarios all run through a shared device as well."""
 import json
 import pathlib
+import signal
 import sys
 import time
 
@@ -10,23 +11,16 @@ import pytest
 import RobotRaconteur as RR
 
 from clients import JS, run_program
-from directions import DIRECTIONS, service_command
 from load import Clients, running
 from news import News
 from processes import BUILD, Background, read_json, start_gateway
 from scenarios import POSE
+from shared_sites import port_of, start_service
 from users import PASSWORDS, RULES, make_users
 from values import Values
 
-
-OURS = next(each for each in DIRECTIONS if each.name == "reference-to-ours")
 SERVICES = {"interop", "guarded", "open", "proven", "RobotRaconteurServiceIndex"}  # of the test service's node
 GATEWAY_ID = "5c0ffee0-1111-4222-8333-944455556666"
-
-
-def start_service(folder, *options):
-    service = Background([*service_command(OURS, "v4", "http://localhost"), *options], folder / "service.log")
-    return service, json.loads(service.next_line())["url"]
 
 
 @pytest.fixture
@@ -37,10 +31,6 @@ def site(tmp_path):
     yield gateway, port, url
     assert gateway.stop() == 0, gateway.description()
     service.stop()
-
-
-def port_of(url):
-    return int(url.split(":")[2].split("/")[0])
 
 
 def connections_to(port):
@@ -252,6 +242,28 @@ def test_clients_stay_when_the_device_goes(node, tmp_path):
         root.publish_poses(Values(root).build(POSE), 2)
         poses.wait_for(lambda px: px == 1.0)
         node.DisconnectService(root)
+    finally:
+        gateway.stop()
+        service.stop()
+
+
+def test_sessions_may_end_by_themselves_when_the_gateway_stops(node, tmp_path):
+    service, url = start_service(tmp_path)
+    gateway, port = start_gateway(tmp_path, url, device={"mode": "shared"}, timeouts={"drain_ms": 60_000})
+    try:
+        at_device = node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop")
+        at_gateway = node.ConnectService(f"rr+ws://127.0.0.1:{port}/?nodename=rrgate&service=interop")
+        state = wire_news(at_device.state.Connect())
+        gateway.process.send_signal(signal.SIGTERM)
+        gateway.wait_until(lambda: "stopping" in (tmp_path / "gateway.log").read_text())
+        assert read_json(f"http://127.0.0.1:{port}/readyz") is None
+        at_gateway.publish_state([6.0])
+        state.wait_for(lambda value: value == [6.0])
+        assert at_device.add(1.0, 2.0) == 3.0
+        node.DisconnectService(at_gateway)
+        assert at_device.version == "1"
+        node.DisconnectService(at_device)
+        assert gateway.process.wait(10) == 0
     finally:
         gateway.stop()
         service.stop()
