@@ -156,7 +156,8 @@ rr::awaitable<void> serve_websocket(GatewayState& gateway, Connection& connectio
     auto socket = std::make_unique<rr::WebSocketStream>(std::move(stream), rr::WebSocketRole::server, takes_close);
     if (hears_in_session) {
       log(LogLevel::info, "client refused", {{"peer", connection.client}, {"error", allowed.error().message}});
-      co_await refuse_in_session(gateway, connection, *destination->device, std::move(socket), allowed.error());
+      auto self = relayed_identity(gateway, *destination->device);
+      co_await refuse_in_session(gateway, connection, std::move(self), std::move(socket), allowed.error());
       co_return;
     }
     auto base_url = node_url(request);

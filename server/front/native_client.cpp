@@ -129,7 +129,8 @@ rr::awaitable<void> serve_native_client(GatewayState& gateway, Connection& conne
   log(LogLevel::info, "native client refused",
       {{"peer", connection.client}, {"wanted", describe_wish(request.header)}, {"error", refusal.message}});
   if (is_denied && !asks_for_tls(request)) {
-    co_await refuse_in_session(gateway, connection, *destination->device, std::move(stream), std::move(refusal));
+    auto self = relayed_identity(gateway, *destination->device);
+    co_await refuse_in_session(gateway, connection, std::move(self), std::move(stream), std::move(refusal));
     co_return;
   }
   const auto reply = make_refusal(request, gateway.node_id(), refusal);

@@ -32,25 +32,23 @@ class RefusedClient final : private EmptyNode, public rr::SessionDriver<rr::Serv
   std::function<void()> ended_;
 };
 
-/// Who the client believes to talk to: else it would not listen.
-rr::NodeIdentity identity_of(GatewayState& gateway, const Device& device) {
+}  // namespace
+
+rr::NodeIdentity relayed_identity(GatewayState& gateway, const Device& device) {
   if (const auto& known = device.identity()) return {known->node_id, known->node_name};
   const auto& url = device.config().url;
   return {url.node_id.value_or(gateway.node_id()), url.node_name};
 }
 
-}  // namespace
-
-rr::awaitable<void> refuse_in_session(GatewayState& gateway, Connection& connection, const Device& device,
+rr::awaitable<void> refuse_in_session(GatewayState& gateway, Connection& connection, rr::NodeIdentity self,
                                       std::unique_ptr<rr::ByteStream> client, rr::Error refusal) {
   rr::ServiceSessionOptions options;
   options.connection.max_message_size = gateway.config().limits.max_message_size;
   options.connection.is_encrypted = connection.peer.is_encrypted;
   options.connection.handshake_timeout = options.connect_timeout = gateway.config().limits.header_timeout;
   options.refusal = std::move(refusal);
-  auto identity = identity_of(gateway, device);
   SessionEnd end(client->executor());
-  const auto session = std::make_shared<RefusedClient>(std::move(identity), std::move(options), std::move(client),
+  const auto session = std::make_shared<RefusedClient>(std::move(self), std::move(options), std::move(client),
                                                        [&end] { end.reach(); });
   connection.stop = [session](const rr::EndReason& reason) {
     session->close(rr::make_error(rr::ErrorCode::connection_error, reason.text));

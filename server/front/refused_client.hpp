@@ -10,10 +10,13 @@
 
 namespace rrgate {
 
-/// Answers the handshake in the device's place, and the first request for a service with `refusal`; nobody connects to
-/// the device. Ends then, and in any case after limits.header_timeout. `client` is at the start of its Robot Raconteur
+/// Who the client of a relayed device believes to talk to: else it would not listen.
+rr::NodeIdentity relayed_identity(GatewayState& gateway, const Device& device);
+
+/// Answers the handshake as the node `self`, and the first request for a service with `refusal`; nobody connects to the
+/// device. Ends then, and in any case after limits.header_timeout. `client` is at the start of its Robot Raconteur
 /// stream.
-rr::awaitable<void> refuse_in_session(GatewayState& gateway, Connection& connection, const Device& device,
+rr::awaitable<void> refuse_in_session(GatewayState& gateway, Connection& connection, rr::NodeIdentity self,
                                       std::unique_ptr<rr::ByteStream> client, rr::Error refusal);
 
 }  // namespace rrgate

@@ -3,6 +3,7 @@
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/use_awaitable.hpp>
 
+#include "server/front/refused_client.hpp"
 #include "server/front/session_end.hpp"
 #include "server/log/log.hpp"
 #include "server/rr/shared_access.hpp"
@@ -79,8 +80,10 @@ rr::awaitable<void> serve_shared_client(GatewayState& gateway, Connection& conne
       seat.emplace(std::move(*taken));
     } else {
       gateway.reject(Rejection::device_full);
-      const rr::EndReason reason{1013, destination.device->full_text()};
-      co_await client->end(reason);
+      auto full = rr::make_error(rr::ErrorCode::connection_error, destination.device->full_text());
+      log(LogLevel::info, "client refused", {{"peer", connection.client}, {"error", full.message}});
+      auto self = destination.node->identity();
+      co_await refuse_in_session(gateway, connection, std::move(self), std::move(client), std::move(full));
       co_return;
     }
   }
@@ -100,17 +103,17 @@ rr::awaitable<void> serve_shared_client(GatewayState& gateway, Connection& conne
   SessionEnd end(client->executor());
   const auto session = destination.node->add(std::move(client), std::move(arrival), [&end] { end.reach(); });
   connection.device = destination.device;
+  connection.has_session = true;
   connection.stop = [session](const rr::EndReason& reason) {
     session->close_service();
     session->close(rr::make_error(rr::ErrorCode::connection_error, reason.text));
-  connection.has_session = true;
   };
   co_await end.wait();
   connection.device = nullptr;
+  connection.has_session = false;
   connection.stop = [](const rr::EndReason&) {};
   log(LogLevel::info, "client disconnected",
       {{"device", name},
-  connection.has_session = false;
        {"peer", connection.client},
        {"reason", session->end_reason().empty() ? session->session().connection().close_reason().message
                                                 : session->end_reason()}});

@@ -269,6 +269,24 @@ def test_sessions_may_end_by_themselves_when_the_gateway_stops(node, tmp_path):
         service.stop()
 
 
+@pytest.mark.parametrize("mode", ["relay", "shared"])
+@pytest.mark.parametrize("scheme", ["rr+tcp", "rr+ws"])
+def test_a_client_too_many_hears_why(node, tmp_path, mode, scheme):
+    service, url = start_service(tmp_path)
+    gateway, port = start_gateway(tmp_path, url, device={"mode": mode, "max_clients": 1})
+    where = f"{scheme}://127.0.0.1:{port}/" + ("devices/interop?" if scheme == "rr+ws" else "?")
+    own_url = where + ("nodename=interop&" if mode == "shared" else "") + "service=interop"
+    try:
+        root = node.ConnectService(own_url)
+        with pytest.raises(RR.ConnectionException, match="all the clients it may have"):
+            node.ConnectService(own_url)
+        assert root.version == "1"
+        node.DisconnectService(root)
+    finally:
+        gateway.stop()
+        service.stop()
+
+
 @pytest.mark.parametrize("answer", ["first", "all"])
 def test_who_answers_callbacks(node, tmp_path, answer):
     service, url = start_service(tmp_path)
