@@ -10,11 +10,14 @@ rr::awaitable<rr::Result<ProbeResult>> probe(rr::ConnectionUrl url, rr::DialOpti
   query.self_id = self_id;
   query.dial = std::move(options);
   query.max_answer_bytes = 12u * 1024 * 1024;  // somebody has named this device: it may have much to say
+  const auto service_of_url = url.service;
   auto answer = co_await rr::query_services(std::move(url), std::move(query));
   if (!answer) co_return answer.error();
   ProbeResult result{answer->node.id, answer->node.name, {}};
   for (const auto& service : answer->services)
     result.services.push_back({service.name, service.root_object_type, service.root_object_implements});
+  // A small device may have no service index: what its URL names is all that is known of it.
+  if (result.services.empty() && !service_of_url.empty()) result.services.push_back({service_of_url, {}, {}});
   co_return result;
 }
 

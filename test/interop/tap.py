@@ -1,19 +1,30 @@
-"""A TCP forwarder that remembers the bytes, to see what two peers have agreed on."""
+"""A TCP forwarder that remembers the bytes, to see what two peers have agreed on, and may change what the client says."""
+import contextlib
 import socket
 import struct
 import threading
 
 
 class Tap:
-    def __init__(self, port):
+    def __init__(self, port, change=bytes):
+        """`change` makes of a piece of what the client sends what the service gets."""
+        self._change = change
         self._target = ("127.0.0.1", port)
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.port = self._listener.getsockname()[1]
         self.streams = []  # one bytearray for each direction of each connection
+        self._sockets = []
         threading.Thread(target=self._accept, daemon=True).start()
 
     def close(self):
         self._listener.close()
+
+    def cut(self):
+        """Ends what is connected; new connections are let through."""
+        for each in self._sockets:
+            with contextlib.suppress(OSError):
+                each.shutdown(socket.SHUT_RDWR)
+        self._sockets.clear()
 
     def _accept(self):
         while True:
@@ -22,10 +33,11 @@ class Tap:
             except OSError:
                 return
             service = socket.create_connection(self._target)
-            for source, sink in ((client, service), (service, client)):
+            self._sockets += [client, service]
+            for source, sink, change in ((client, service, self._change), (service, client, bytes)):
                 stream = bytearray()
                 self.streams.append(stream)
-                threading.Thread(target=forward, args=(source, sink, stream), daemon=True).start()
+                threading.Thread(target=forward, args=(source, sink, stream, change), daemon=True).start()
 
     def level(self):
         """"v2", "v4" or "v4+table": what the messages after the handshake are."""
@@ -33,11 +45,11 @@ class Tap:
         return max(seen, default=None)
 
 
-def forward(source, sink, stream):
+def forward(source, sink, stream, change):
     try:
         while data := source.recv(65536):
             stream += data
-            sink.sendall(data)
+            sink.sendall(change(data))
         sink.shutdown(socket.SHUT_WR)
     except OSError:
         pass

@@ -16,6 +16,7 @@ from news import News
 from processes import BUILD, Background, read_json, start_gateway
 from scenarios import POSE
 from shared_sites import port_of, start_service
+from tap import Tap
 from users import PASSWORDS, RULES, make_users
 from values import Values
 
@@ -284,6 +285,25 @@ def test_a_client_too_many_hears_why(node, tmp_path, mode, scheme):
         node.DisconnectService(root)
     finally:
         gateway.stop()
+        service.stop()
+
+
+def test_a_device_without_a_service_index(node, tmp_path):
+    """What its URL names is a service too."""
+    service, url = start_service(tmp_path)
+    index, nobody = b"RobotRaconteurServiceIndex", b"RobotRaconteurServiceNobody"[:26]
+    tap = Tap(port_of(url), change=lambda data: data.replace(index, nobody))
+    gateway, port = start_gateway(tmp_path, f"rr+tcp://127.0.0.1:{tap.port}/?service=interop", device={"mode": "shared"})
+    try:
+        root = node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop")
+        assert root.version == "1"
+        (device,) = read_json(f"http://127.0.0.1:{port}/api/v1/devices")["devices"]
+        assert [each["name"] for each in device["services"]] == ["interop"]
+        assert read_json(f"http://127.0.0.1:{port}/api/v1/devices/interop/interop/version") == "1"
+        node.DisconnectService(root)
+    finally:
+        gateway.stop()
+        tap.close()
         service.stop()
 
 
