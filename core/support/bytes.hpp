@@ -29,7 +29,7 @@ inline std::string_view as_text(ByteSpan bytes) {
 
 /// Buffers are kept for their memory, but not above this many bytes each: what one large message took is given back
 /// when that is done, and a steady stream of small ones allocates nothing.
-inline constexpr std::size_t max_kept_bytes = 16 * 1024;
+inline constexpr std::size_t max_kept_bytes = 64 * 1024;
 
 /// Empties a buffer that is used again and again.
 template <class T>

@@ -75,7 +75,7 @@ TEST_CASE("Float literals at random are rounded like those of C") {
   const auto below = [&](std::uint32_t limit) { return random() % limit; };
   for (int i = 0; i < 20'000; ++i) {
     std::string text;
-    const auto digits = 1 + below(i % 50 == 0 ? 900 : 25);
+    const std::uint32_t digits = 1 + below(i % 50 == 0 ? 900 : 25);
     text += static_cast<char>('1' + below(9));
     for (std::uint32_t digit = 1; digit < digits; ++digit) text += static_cast<char>('0' + below(10));
     text.insert(1 + below(digits), ".");

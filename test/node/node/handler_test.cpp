@@ -24,36 +24,36 @@ Result<Value> call(Handler& handler, Args... arguments) {
 }  // namespace
 
 TEST_CASE("a handler's types are deduced") {
-  const Handler handler = make_handler(
+  const Handler handler = make_plain_handler(
       [](std::int16_t, const std::string&, std::vector<double>, bool, Color, const Value&) { return 1.5f; });
   std::vector<std::string> texts;
   for (const auto& parameter : handler.parameters) texts.push_back(handler_type_text(parameter));
   CHECK(texts == std::vector<std::string>{"int16", "string", "double[]", "bool", "int32", "any value"});
   CHECK(handler_type_text(handler.result) == "single");
-  CHECK(handler_type_text(make_handler([] {}).result) == "nothing");
+  CHECK(handler_type_text(make_plain_handler([] {}).result) == "nothing");
 }
 
 TEST_CASE("arguments are converted, results become values") {
-  Handler add = make_handler([](std::int32_t a, double b) { return a + b; });
+  Handler add = make_plain_handler([](std::int32_t a, double b) { return a + b; });
   CHECK(call(add, std::int32_t{2}, 0.5).value() == Value(2.5));
 
-  Handler name = make_handler([](std::string_view first, const std::vector<std::uint8_t>& bytes) {
+  Handler name = make_plain_handler([](std::string_view first, const std::vector<std::uint8_t>& bytes) {
     return std::string(first) + std::to_string(bytes.size());
   });
   CHECK(call(name, "x", std::vector<std::uint8_t>{1, 2, 3}).value() == Value("x3"));
 
-  Handler next = make_handler([](Color color) { return color == Color::red ? Color::blue : Color::red; });
+  Handler next = make_plain_handler([](Color color) { return color == Color::red ? Color::blue : Color::red; });
   CHECK(call(next, std::int32_t{1}).value() == Value(std::int32_t{7}));
 
   int calls = 0;
-  Handler count = make_handler([&calls] { ++calls; });
+  Handler count = make_plain_handler([&calls] { ++calls; });
   CHECK(call(count).value().is_null());
   CHECK(calls == 1);
 }
 
 TEST_CASE("wrong arguments are errors and the handler is not called") {
   int calls = 0;
-  Handler handler = make_handler([&calls](std::int16_t) { ++calls; });
+  Handler handler = make_plain_handler([&calls](std::int16_t) { ++calls; });
   CHECK(call(handler, "text").error().code == ErrorCode::data_type_mismatch);
   CHECK(call(handler, std::int32_t{40'000}).error().code == ErrorCode::out_of_range);
   CHECK(call(handler).error().code == ErrorCode::invalid_argument);

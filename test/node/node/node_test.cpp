@@ -258,8 +258,11 @@ TEST_CASE("wires towards the service: sent, poked, answered") {
 
 TEST_CASE("a wire handler that fails is reported, and the client stays") {
   std::promise<std::string> reported;
+  int reports = 0;
   NodeOptions options;
-  options.report = [&](const std::string& problem) { reported.set_value(problem); };
+  options.report = [&](const std::string& problem) {
+    if (++reports == 1) reported.set_value(problem);
+  };
   CounterNode device(std::move(options));
   const auto counter = device.connect();
   counter.connect_wire("both", [](const Value&, TimeSpec) {});
@@ -269,6 +272,7 @@ TEST_CASE("a wire handler that fails is reported, and the client stays") {
   CHECK(problem.get() == "wire 'both': its handler failed: negative");
   CHECK(error_of([&] { counter.poke_out("both", -1.0); }).message == "negative");
   CHECK(counter.call("add", 1) == Value(1));
+  CHECK(device.node.ask([&](Node&) { return reports; }) == 2);
 }
 
 TEST_CASE("objects are found by index and looked up anew when they are replaced") {
