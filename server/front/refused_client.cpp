@@ -48,8 +48,8 @@ rr::awaitable<void> refuse_in_session(GatewayState& gateway, Connection& connect
   options.connection.handshake_timeout = options.connect_timeout = gateway.config().limits.header_timeout;
   options.refusal = std::move(refusal);
   SessionEnd end(client->executor());
-  const auto session = std::make_shared<RefusedClient>(std::move(self), std::move(options), std::move(client),
-                                                       [&end] { end.reach(); });
+  const auto session =
+      std::make_shared<RefusedClient>(std::move(self), std::move(options), std::move(client), [&end] { end.reach(); });
   connection.stop = [session](const rr::EndReason& reason) {
     session->close(rr::make_error(rr::ErrorCode::connection_error, reason.text));
   };

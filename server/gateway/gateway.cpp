@@ -281,8 +281,7 @@ void Gateway::close_listeners() {
 }
 
 bool Gateway::has_session() const {
-  return std::any_of(connections_.begin(), connections_.end(),
-                     [](const auto& each) { return each.has_session; });
+  return std::any_of(connections_.begin(), connections_.end(), [](const auto& each) { return each.has_session; });
 }
 
 void Gateway::end_all(const rr::EndReason& reason) {

@@ -29,8 +29,8 @@ class Gateway : public GatewayState {
   /// Errors   certificates or CAs that can't be used, an address that can't be listened on; then nothing has changed.
   [[nodiscard]] rr::Result<> reconfigure(Config next);
 
-  /// Lets sessions end within timeouts.drain, then ends them; calls `on_stopped` when nothing is left. A second call ends
-  /// them at once. Meanwhile nobody new gets to a device, but who asks for /readyz hears why.
+  /// Lets sessions end within timeouts.drain, then ends them; calls `on_stopped` when nothing is left. A second call
+  /// ends them at once. Meanwhile nobody new gets to a device, but who asks for /readyz hears why.
   void stop(std::function<void()> on_stopped);
   /// Reads certificates, keys, CAs, users and rights anew, and opens the audit log anew. What can't be used stays as it
   /// was, and the log says why. Connections that are open keep what they have.
