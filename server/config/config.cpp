@@ -334,9 +334,25 @@ std::optional<nlohmann::json> parse_json(std::string_view text, std::vector<Find
   }
 }
 
+/// Relative paths count from `folder`.
+void locate_files(Config& config, const std::filesystem::path& folder) {
+  const auto locate = [&folder](std::string& path) {
+    if (!path.empty()) path = (folder / path).string();
+  };
+  locate(config.web_root);
+  for (auto& certificate : config.tls.certificates) {
+    locate(certificate.certificate_file);
+    locate(certificate.key_file);
+  }
+  for (auto& device : config.devices)
+    for (auto& ca : device.tls.ca) locate(ca);
+  for (auto& ca : config.discover.tls.ca) locate(ca);
+  for_each_file(config.access, locate);
+}
+
 }  // namespace
 
-ParsedConfig parse_config(std::string_view text) {
+ParsedConfig parse_config(std::string_view text, const std::filesystem::path& folder) {
   ParsedConfig out;
   const auto document = parse_json(text, out.findings);
   if (!document) return out;
@@ -346,6 +362,7 @@ ParsedConfig parse_config(std::string_view text) {
     read_config(root, out.config);
     root.finish();
     check_whole(out.config, *document, log.findings);
+    locate_files(out.config, folder);
   }
   out.findings.insert(out.findings.end(), log.findings.begin(), log.findings.end());
   return out;
@@ -359,21 +376,7 @@ ParsedConfig load_config(const std::string& file) {
     out.findings.push_back({{}, "can't be read; expected a JSON file"});
     return out;
   }
-  auto parsed = parse_config(text.str());
-  const auto folder = std::filesystem::path(file).parent_path();
-  const auto locate = [&folder](std::string& path) {
-    if (!path.empty()) path = (folder / path).string();
-  };
-  locate(parsed.config.web_root);
-  for (auto& certificate : parsed.config.tls.certificates) {
-    locate(certificate.certificate_file);
-    locate(certificate.key_file);
-  }
-  for (auto& device : parsed.config.devices)
-    for (auto& ca : device.tls.ca) locate(ca);
-  for (auto& ca : parsed.config.discover.tls.ca) locate(ca);
-  for_each_file(parsed.config.access, locate);
-  return parsed;
+  return parse_config(text.str(), std::filesystem::path(file).parent_path());
 }
 
 std::vector<OptionInfo> config_options() {

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -199,15 +200,14 @@ struct Config {
 };
 
 /// Reads a configuration (JSON with comments). Every finding is listed, not only the first; with any of them the config
-/// is not to be used.
+/// is not to be used. Relative paths in it count from `folder`.
 struct ParsedConfig {
   Config config;
   std::vector<Finding> findings;
 };
-ParsedConfig parse_config(std::string_view text);
+ParsedConfig parse_config(std::string_view text, const std::filesystem::path& folder = {});
 
-/// The same for a file; a file that can't be read is a finding with an empty path. Relative paths in it count from its
-/// folder.
+/// The same for a file and its folder; a file that can't be read is a finding with an empty path.
 ParsedConfig load_config(const std::string& file);
 
 /// Every option the parser knows, in its order: what the schema must say too.
