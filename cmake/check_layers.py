@@ -31,9 +31,10 @@ CORE_FORBIDDEN = re.compile(
 
 # First folder of a project include -> folders whose files may include it.
 MAY_INCLUDE = {
-    "core": {"core", "node", "server", "wasm-client", "test", "examples"},
-    "node": {"node", "server", "test", "examples"},
-    "server": {"server", "test"},
+    "core": {"core", "node", "server", "wasm-client", "test", "include"},
+    "node": {"node", "server", "test", "include"},
+    "server": {"server", "test", "include"},
+    "rrgate": {"examples", "test"},
     "examples": {"examples", "test"},
     "wasm-client": {"wasm-client", "test"},
     "test": {"test"},
@@ -75,7 +76,7 @@ def check_typescript(path, line_number, imported):
 
 
 def findings(root):
-    folders = [folder for folder in ("core", "node", "server", "wasm-client", "web", "test", "examples") if (root / folder).is_dir()]
+    folders = [folder for folder in ("core", "node", "server", "include", "wasm-client", "web", "test", "examples") if (root / folder).is_dir()]
     for folder in folders:
         for file in sorted((root / folder).rglob("*")):
             path = file.relative_to(root)

@@ -38,6 +38,11 @@ class CheckLayers(unittest.TestCase):
         self.assertEqual(len(self.report("node/service/a.hpp", '#include "server/log/log.hpp"\n')), 1)
         self.assertEqual(len(self.report("examples/demo/a.cpp", '#include "server/log/log.hpp"\n')), 1)
 
+    def test_examples_see_public_headers_alone(self):
+        self.assertEqual(self.report("examples/demo/a.cpp", '#include "rrgate/device.hpp"\n'), [])
+        for header in ("node/service/node.hpp", "core/session/url.hpp"):
+            self.assertEqual(len(self.report("examples/demo/a.cpp", f'#include "{header}"\n')), 1, header)
+
     def test_core_does_no_input_or_output(self):
         for header in ("<boost/asio/ip/tcp.hpp>", "<openssl/ssl.h>", "<thread>", "<mutex>", "<sys/socket.h>"):
             self.assertEqual(len(self.report("core/session/a.cpp", f"#include {header}\n")), 1, header)

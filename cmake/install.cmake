@@ -2,27 +2,32 @@
 include(CMakePackageConfigHelpers)
 include(GNUInstallDirs)
 
-set_target_properties(rr_node PROPERTIES EXPORT_NAME node)
-set_target_properties(rr_platform PROPERTIES EXPORT_NAME platform)
-set_target_properties(rr_tls PROPERTIES EXPORT_NAME tls)
-set_target_properties(rr_transport PROPERTIES EXPORT_NAME transport)
-set_target_properties(rr_discovery PROPERTIES EXPORT_NAME discovery)
-set_target_properties(rr_http PROPERTIES EXPORT_NAME http)
-set_target_properties(rr_subscribe PROPERTIES EXPORT_NAME subscribe)
+set_target_properties(rrgate_core PROPERTIES EXPORT_NAME core)
+set_target_properties(rrgate_node PROPERTIES EXPORT_NAME node)
+set_target_properties(rrgate_gateway PROPERTIES EXPORT_NAME gateway)
 install(
-  TARGETS rr_options rr_boost rr_support rr_hardware rr_wire rr_robdef rr_types rr_member rr_session rr_discovery_core
-          rr_platform rr_tls rrgate_asio rr_transport rr_http rr_node rr_discovery rr_subscribe rrgate
+  TARGETS rrgate_core rr_options rr_boost rr_support rr_hardware rr_wire rr_robdef rr_types rr_member rr_session rr_discovery_core
+          rrgate_node rr_platform rr_tls rrgate_asio rr_transport rr_http rr_node rr_discovery rr_subscribe rrgate
   EXPORT rrgateTargets
   RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}"
   ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")
+# Apart, since it needs libraries that devices and clients do not.
+install(
+  TARGETS rrgate_gateway rrgate_access rrgate_json rr_generate
+  EXPORT rrgateGatewayTargets
+  ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")
 install(TARGETS rrgate-demo-create rrgate-demo-webcams RUNTIME DESTINATION "${CMAKE_INSTALL_LIBEXECDIR}/rrgate")
 
-set(include_dir "${CMAKE_INSTALL_INCLUDEDIR}/rrgate")
-install(DIRECTORY core node DESTINATION "${include_dir}" FILES_MATCHING PATTERN "*.hpp" PATTERN openssl.hpp EXCLUDE
+# Headers by task are the API. What they include lies in internal/, for templates and inline functions.
+install(DIRECTORY include/rrgate DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" FILES_MATCHING PATTERN "*.hpp")
+set(internal_dir "${CMAKE_INSTALL_INCLUDEDIR}/rrgate/internal")
+install(DIRECTORY core node DESTINATION "${internal_dir}" FILES_MATCHING PATTERN "*.hpp" PATTERN openssl.hpp EXCLUDE
         PATTERN generate EXCLUDE)
+install(FILES server/gateway/embedded_gateway.hpp DESTINATION "${internal_dir}/server/gateway")
 
 set(package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/rrgate")
 install(EXPORT rrgateTargets NAMESPACE rrgate:: DESTINATION "${package_dir}")
+install(EXPORT rrgateGatewayTargets NAMESPACE rrgate:: DESTINATION "${package_dir}")
 configure_package_config_file(cmake/rrgateConfig.cmake.in "${PROJECT_BINARY_DIR}/rrgateConfig.cmake"
                               INSTALL_DESTINATION "${package_dir}")
 write_basic_package_version_file("${PROJECT_BINARY_DIR}/rrgateConfigVersion.cmake" COMPATIBILITY SameMinorVersion)

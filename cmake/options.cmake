@@ -3,10 +3,12 @@ add_library(rr_options INTERFACE)
 add_library(rr::options ALIAS rr_options)
 target_compile_features(rr_options INTERFACE cxx_std_20)
 target_include_directories(rr_options INTERFACE "$<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>"
-                                                "$<INSTALL_INTERFACE:include/rrgate>")
-# Warnings are ours; who uses the installed package has their own.
-target_compile_options(rr_options INTERFACE
-  "$<BUILD_INTERFACE:-Wall;-Wextra;-Wpedantic;-Wshadow;-Wconversion;-Wno-sign-conversion;-Wno-missing-field-initializers>")
+                                                "$<INSTALL_INTERFACE:include/rrgate/internal>")
+# Warnings are ours; who uses the package, installed or in a folder, has their own.
+if(PROJECT_IS_TOP_LEVEL)
+  target_compile_options(rr_options INTERFACE
+    "$<BUILD_INTERFACE:-Wall;-Wextra;-Wpedantic;-Wshadow;-Wconversion;-Wno-sign-conversion;-Wno-missing-field-initializers>")
+endif()
 
 set(RR_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize= (address,undefined or thread)")
 if(RR_SANITIZE)
@@ -25,7 +27,11 @@ set(CMAKE_UNITY_BUILD ${RR_UNITY_BUILD})
 set(CMAKE_UNITY_BUILD_BATCH_SIZE 6)
 if(RR_UNITY_BUILD AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # GCC takes a file that is included for a header, whose types others could see.
-  target_compile_options(rr_options INTERFACE "$<BUILD_INTERFACE:-Wno-subobject-linkage>")
+  if(PROJECT_IS_TOP_LEVEL)
+    target_compile_options(rr_options INTERFACE "$<BUILD_INTERFACE:-Wno-subobject-linkage>")
+  else()
+    add_compile_options(-Wno-subobject-linkage)  # of this folder's targets alone
+  endif()
 endif()
 
 if(EMSCRIPTEN)

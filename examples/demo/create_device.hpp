@@ -6,7 +6,7 @@
 
 #include "examples/demo/robot.hpp"
 #include "examples/demo/sensor_packet.hpp"
-#include "node/service/node.hpp"
+#include "rrgate/device.hpp"
 
 namespace rrgate::demo {
 

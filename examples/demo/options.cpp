@@ -3,7 +3,7 @@
 #include <charconv>
 #include <iostream>
 
-#include "core/session/url.hpp"
+#include "rrgate/client.hpp"
 
 namespace rrgate::demo {
 

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "examples/demo/robot.hpp"
-#include "node/client/client_connection.hpp"
+#include "rrgate/client.hpp"
 
 namespace rrgate::demo {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "examples/demo/camera.hpp"
-#include "node/service/node.hpp"
+#include "rrgate/device.hpp"
 
 namespace rrgate::demo {
 

@@ -2,7 +2,7 @@
 #include <iostream>
 
 #include "example__thermostat.hpp"
-#include "node/service/node.hpp"
+#include "rrgate/device.hpp"
 
 namespace thermostat = example::thermostat;
 

@@ -2,7 +2,7 @@
 #include <iostream>
 
 #include "example__thermostat.hpp"
-#include "node/subscribe/service_subscription.hpp"
+#include "rrgate/subscribe.hpp"
 
 int main(int, char** words) {
   using Room = example::thermostat::ThermostatAsyncClient;

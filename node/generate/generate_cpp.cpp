@@ -25,8 +25,7 @@ CppFiles CppEmitter::emit() {
     header_.line("#include <" + std::string(name) + ">");
   header_.gap();
   for (const auto& import : definition_.imports) header_.line("#include \"" + cpp_file_name(import.name) + ".hpp\"");
-  for (const auto* name : {"client/async_stub", "client/client_stub", "service/service_stub"})
-    header_.line("#include \"node/" + std::string(name) + ".hpp\"");
+  for (const auto* name : {"client", "device"}) header_.line("#include \"rrgate/" + std::string(name) + ".hpp\"");
   header_.gap();
   header_.documentation(definition_.documentation);
   header_.line("namespace " + name_space + " {");

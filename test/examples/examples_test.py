@@ -2,12 +2,16 @@
 
 examples_test.py BUILD_DIR EXAMPLES_DIR GENERATOR CXX BOOST_ROOT
 """
+import json
 import os
 import re
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
+import urllib.error
+import urllib.request
 
 BUILD, EXAMPLES, GENERATOR, CXX, BOOST_ROOT = sys.argv[1:6]
 del sys.argv[1:]
@@ -42,6 +46,7 @@ class Examples(unittest.TestCase):
             finally:
                 self.end(device)
             self.outlives_the_device(build, url)
+            self.is_behind_a_gateway_inside_a_program(build)
 
     def outlives_the_device(self, build, url):
         listen = url.split("/?")[0]
@@ -56,17 +61,46 @@ class Examples(unittest.TestCase):
             finally:
                 subscriber.kill()
 
+    def is_behind_a_gateway_inside_a_program(self, build):
+        device = subprocess.Popen([os.path.join(build, "thermostat_device"), "rr+tcp://127.0.0.1:0"], stdout=subprocess.PIPE, text=True)
+        try:
+            command = [os.path.join(build, "thermostat_gateway"), device.stdout.readline().strip()]
+            with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as gateway:
+                target = gateway.stdout.readline().strip() + "/api/v1/devices/room/Thermostat/target"
+                self.assertEqual(read_json(target), 17)
+                gateway.communicate("\n", timeout=30)
+                self.assertEqual(gateway.returncode, 0)
+        finally:
+            self.end(device)
+
     def end(self, device):
         device.terminate()
         device.stdout.close()
         self.assertEqual(device.wait(timeout=10), 0)
 
 
+class InAFolder(unittest.TestCase):
+    def test_a_project_that_has_rrgate_in_a_folder_gets_the_libraries_and_nothing_else(self):
+        with tempfile.TemporaryDirectory() as build:
+            boost = [f"-DBOOST_ROOT={BOOST_ROOT}"] if BOOST_ROOT else []
+            run("cmake", "-S", os.path.join(os.path.dirname(__file__), "in_a_folder"), "-B", build, "-G", GENERATOR,
+                f"-DCMAKE_CXX_COMPILER={CXX}", f"-DRRGATE_FOLDER={os.path.dirname(EXAMPLES)}", "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON",
+                *boost)
+            self.assertIn("Total Tests: 0", run("ctest", "--test-dir", build, "-N"))
+            with open(os.path.join(build, "compile_commands.json")) as file:
+                (command,) = [each["command"] for each in json.load(file) if each["file"].endswith("core_user.cpp")]
+            self.assertNotIn(" -W", command)
+            run("cmake", "--build", build, "--target", "core_user")
+            self.assertEqual(run(os.path.join(build, "core_user")), "52230\n")
+            run("cmake", "--install", build, "--prefix", os.path.join(build, "installed"))
+            self.assertFalse(os.path.exists(os.path.join(build, "installed")))
+
+
 class Text(unittest.TestCase):
     """The examples say how little it takes: the device 40 lines at most, each file of a client 15."""
 
     def test_examples_are_short(self):
-        limits = {"device.cpp": 40, "client.cpp": 15, "subscriber.cpp": 15, "client.mjs": 15, "site/index.html": 15, "site/client.js": 15}
+        limits = {"device.cpp": 40, "client.cpp": 15, "subscriber.cpp": 15, "gateway.cpp": 20, "client.mjs": 15, "site/index.html": 15, "site/client.js": 15}
         for name, limit in limits.items():
             self.assertLessEqual(len(text_of(name).splitlines()), limit, name)
 
@@ -79,6 +113,18 @@ class Text(unittest.TestCase):
         names = {os.path.relpath(os.path.join(folder, name), THERMOSTAT)
                  for folder, _, files in os.walk(THERMOSTAT) for name in files if not re.search("/(rrgate-client|node_modules)", folder)}
         self.assertEqual(set(shown), names)
+
+
+def read_json(url):
+    """What a gateway answers once it has reached the device."""
+    give_up = time.monotonic() + 30
+    while True:
+        try:
+            with urllib.request.urlopen(url, timeout=30) as answer:
+                return json.load(answer)
+        except urllib.error.HTTPError as error:
+            if error.code != 503 or time.monotonic() > give_up:
+                raise
 
 
 def text_of(name):
