@@ -163,13 +163,19 @@ std::string known_schemes() {
 
 const std::vector<UrlScheme>& url_schemes() {
   static const std::vector<UrlScheme> schemes = {
-      {"rr+tcp", 48653, true, false, false},     {"rrs+tcp", 48653, true, false, true},
-      {"rr+ws", 80, true, true, false},          {"rrs+ws", 80, true, true, true},
-      {"rr+wss", 443, true, true, false},        {"rrs+wss", 443, true, true, true},
-      {"rr+local", 0, false, false, false},      {"rr+intra", 0, false, false, false},
-      {"rr+usb", 0, false, false, false},        {"rr+pci", 0, false, false, false},
-      {"rr+industrial", 0, false, false, false}, {"rr+bluetooth", 0, false, false, false},
-      {"tcp", 48653, true, false, false},
+      {.name = "rr+tcp", .default_port = 48653, .needs_host = true},
+      {.name = "rrs+tcp", .default_port = 48653, .needs_host = true, .is_secure = true},
+      {.name = "rr+ws", .default_port = 80, .needs_host = true, .passes_path = true},
+      {.name = "rrs+ws", .default_port = 80, .needs_host = true, .passes_path = true, .is_secure = true},
+      {.name = "rr+wss", .default_port = 443, .needs_host = true, .passes_path = true},
+      {.name = "rrs+wss", .default_port = 443, .needs_host = true, .passes_path = true, .is_secure = true},
+      {.name = "rr+local"},
+      {.name = "rr+intra"},
+      {.name = "rr+usb"},
+      {.name = "rr+pci"},
+      {.name = "rr+industrial"},
+      {.name = "rr+bluetooth"},
+      {.name = "tcp", .default_port = 48653, .needs_host = true},
   };
   return schemes;
 }

@@ -68,20 +68,20 @@ const JsonOperations::Operation JsonOperations::operations[] = {
     {"set", Verb::write, &JsonOperations::set},
     {"call", Verb::call, &JsonOperations::call},
     {"open", Verb::call, &JsonOperations::open},
-    {"next", Verb::call, &JsonOperations::next, false},
-    {"close", Verb::call, &JsonOperations::close, false, false, false, true},
-    {"abort", Verb::call, &JsonOperations::abort, false, false, false, true},
+    {"next", Verb::call, &JsonOperations::next, {.has_target = false}},
+    {"close", Verb::call, &JsonOperations::close, {.has_target = false, .is_free = true}},
+    {"abort", Verb::call, &JsonOperations::abort, {.has_target = false, .is_free = true}},
     {"subscribe", Verb::subscribe, &JsonOperations::subscribe},
-    {"unsubscribe", Verb::subscribe, &JsonOperations::unsubscribe, false, false, false, true},
-    {"send", Verb::write, &JsonOperations::send, true, true, true, true},
-    {"callback", Verb::subscribe, &JsonOperations::callback, true, true},
-    {"answer", Verb::subscribe, &JsonOperations::answer, false, false, false, true},
+    {"unsubscribe", Verb::subscribe, &JsonOperations::unsubscribe, {.has_target = false, .is_free = true}},
+    {"send", Verb::write, &JsonOperations::send, {.needs_own = true, .keeps_order = true, .is_free = true}},
+    {"callback", Verb::subscribe, &JsonOperations::callback, {.needs_own = true}},
+    {"answer", Verb::subscribe, &JsonOperations::answer, {.has_target = false, .is_free = true}},
     {"shape", Verb::read, &JsonOperations::shape},
     {"read", Verb::read, &JsonOperations::read},
     {"write", Verb::write, &JsonOperations::write},
-    {"lock", Verb::lock, &JsonOperations::lock, true, true},
-    {"unlock", Verb::lock, &JsonOperations::unlock, true, true},
-    {"login", Verb::read, &JsonOperations::login, false, false, true},
+    {"lock", Verb::lock, &JsonOperations::lock, {.needs_own = true}},
+    {"unlock", Verb::lock, &JsonOperations::unlock, {.needs_own = true}},
+    {"login", Verb::read, &JsonOperations::login, {.has_target = false, .keeps_order = true}},
 };
 
 const JsonOperations::Operation* JsonOperations::find_operation(std::string_view name) {
@@ -104,7 +104,7 @@ rr::awaitable<void> JsonOperations::take(const std::string& message) {
   const auto* name = request->find("op");
   const auto* operation = name && name->is_string() ? find_operation(name->get_ref<const std::string&>()) : nullptr;
   Passes passes;
-  if (!operation || !operation->is_free) {
+  if (!operation || !operation->traits.is_free) {
     const std::string user = place_.who.is_proven() ? place_.who.name : "";
     auto entered =
         gateway_.http_access().enter(place_.address, user, place_.device->config().name, gateway_.config().rates);
@@ -115,7 +115,7 @@ rr::awaitable<void> JsonOperations::take(const std::string& message) {
     passes = std::move(*entered);
   }
   ++running_;
-  if (operation && operation->keeps_order)
+  if (operation && operation->traits.keeps_order)
     co_await run(shared_from_this(), request, std::move(passes));
   else
     asio::co_spawn(place_.device->executor(), run(shared_from_this(), request, std::move(passes)), asio::detached);
@@ -143,7 +143,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::perform(RequestPtr request) {
   const auto* operation = find_operation(name);
   if (!operation) refuse(rr::ErrorCode::invalid_argument, "no operation \"op\": " + rr::quoted(name));
   TargetPtr target;
-  if (!operation->has_target) co_return co_await (this->*operation->perform)(request, target);
+  if (!operation->traits.has_target) co_return co_await (this->*operation->perform)(request, target);
   target = co_await find(request, *operation);
   const CallLog logged(place_.trace, place_.device->config().name, operation->name, path_of(*target));
   co_return co_await (this->*operation->perform)(request, target);
@@ -156,7 +156,7 @@ rr::awaitable<JsonOperations::TargetPtr> JsonOperations::find(RequestPtr request
   // Packets to a client come on the endpoint on which it has sent: nobody else's.
   const bool is_two_way = target->member && target->member->kind == rr::MemberKind::pipe &&
                           target->member->direction() == rr::MemberDirection::both;
-  if ((operation.needs_own || (is_two_way && operation.verb == Verb::subscribe)) && target->session != own_) {
+  if ((operation.traits.needs_own || (is_two_way && operation.verb == Verb::subscribe)) && target->session != own_) {
     if (!own_) own_ = std::make_shared<DeviceSession>(place_.device, place_.key);
     target = value_or_throw(co_await find_target(own_, segments));
   }

@@ -40,14 +40,17 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
   using TargetPtr = std::shared_ptr<Target>;
   using RequestPtr = std::shared_ptr<const JsonRequest>;
   using Perform = rr::awaitable<rr::OrderedJson> (JsonOperations::*)(RequestPtr request, TargetPtr target);
-  struct Operation {
-    std::string_view name;
-    Verb verb;
-    Perform perform;
+  struct Traits {
     bool has_target = true;    ///< the request names an object or a member by its path
     bool needs_own = false;    ///< a session that is shared with nobody
     bool keeps_order = false;  ///< the next message waits for it
     bool is_free = false;      ///< of bounds on requests: packets, and what ends something
+  };
+  struct Operation {
+    std::string_view name;
+    Verb verb;
+    Perform perform;
+    Traits traits = {};
   };
   static const Operation operations[];
   static const Operation* find_operation(std::string_view name);
