@@ -50,7 +50,7 @@ exec chroot /host /bin/sh /run/given/guest.sh
 
 GUEST = r"""cd {root}
 echo "MARK junit begin"
-{build}/test/usb/rr-usb-guest-test -w NoTests -w NoAssertions -r junit {pattern}
+{build}/test/usb/rr-usb-guest-test -w NoTests -r junit {pattern}
 status=$?
 echo "MARK junit end $status"
 echo "MARK direct begin"
@@ -69,7 +69,7 @@ echo "MARK log end"
 kill $gateway; wait $gateway
 if [ -x {python} ]; then
 echo "MARK other junit begin"
-{build}/test/usb/rr-usb-guest-test -w NoTests -w NoAssertions -r junit '[interface-0]'
+{build}/test/usb/rr-usb-guest-test -w NoTests -r junit '[interface-0]'
 status=$?
 echo "MARK other junit end $status"
 echo "MARK reference begin"
