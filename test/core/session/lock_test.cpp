@@ -116,15 +116,19 @@ class Clients {
 
  private:
   bool handle(Client& who, const ServiceEvent& event) {
-    if (const auto* called = std::get_if<Called>(&event)) {
-      const bool is_text = called->member->type.type == DataType::string_t;
-      who.service->reply(called->id, is_text ? Value("x") : Value(1), home_.now);
-    }
+    if (const auto* called = std::get_if<Called>(&event)) who.service->reply(called->id, answer_to(*called), home_.now);
     if (const auto* login = std::get_if<LoginRequested>(&event))
       who.service->answer_login(login->id, AuthenticatedUser{login->attempt.username, privileges_, {}}, home_.now);
     if (std::holds_alternative<LocksChanged>(event))
       for (auto& each : clients_) each->service->handle_locks_changed(home_.now);
     return true;
+  }
+
+  /// Memories have eight numbers.
+  static Value answer_to(const Called& called) {
+    if (called.kind == CallKind::memory_dimensions) return Value(MemoryShape{8});
+    if (called.kind == CallKind::memory_read) return Value(std::vector<double>(called.range.count.at(0)));
+    return called.member->type.type == DataType::string_t ? Value("x") : Value(1);
   }
 
   Loopback home_;
@@ -171,6 +175,32 @@ TEST_CASE("a user lock keeps out other users, from the object and all below it")
   CHECK(all.unlock(alice_again));
   CHECK(all.get(bob));
   CHECK(all.unlock(alice));  // not locked is no error
+}
+
+TEST_CASE("a locked object's memories are locked; those with nolockread can still be read") {
+  Clients all;
+  auto& alice = all.add("alice");
+  auto& bob = all.add("bob");
+  const MemoryShape position{0}, count{8};
+  const auto read = [&](Clients::Client& who, std::string_view memory) {
+    return all.ask(who, who.client->read_memory("arm", memory, position, count, all.now()));
+  };
+  const auto measure = [&](Clients::Client& who, std::string_view memory) {
+    return all.ask(who, who.client->get_memory_dimensions("arm", memory, all.now()));
+  };
+  const auto write = [&](Clients::Client& who, std::string_view memory) {
+    return all.ask(who, who.client->write_memory("arm", memory, position, Value(std::vector<double>(8)), all.now()));
+  };
+  CHECK(all.lock(alice));
+  for (const auto* memory : {"data", "archive"}) {
+    CHECK(read(alice, memory));
+    CHECK(write(alice, memory));
+    CHECK(why(write(bob, memory)) == "151 Object locked by alice");
+  }
+  CHECK(read(bob, "archive"));
+  CHECK(measure(bob, "archive"));
+  CHECK(why(read(bob, "data")) == "151 Object locked by alice");
+  CHECK(why(measure(bob, "data")) == "151 Object locked by alice");
 }
 
 TEST_CASE("a lock of a child leaves its parent and its siblings alone") {

@@ -57,6 +57,7 @@ object Arm
   memory int16[*] grid
   memory uint8[] log [readonly]
   memory uint8[] command [writeonly]
+  memory double[] archive [nolockread]
   pipe Pose poses [readonly]
   pipe double orders [writeonly]
   pipe double quick [unreliable]

@@ -186,6 +186,29 @@ TEST_CASE("rights: all of a device is what rules give that name no service, path
             .check_whole_device(who("x", {"a", "b"}), "arm1"));
 }
 
+TEST_CASE("rights: a device is seen by those who may do something with it, and by no one else") {
+  const std::vector<AccessRule> list{
+      AccessRule{
+          .roles = {"viewer"}, .devices = {"arm*"}, .services = {"Arm"}, .paths = {"Arm.tool"}, .may = {Verb::read}},
+      AccessRule{.roles = {"operator"}, .devices = {"create"}, .may = {Verb::call}},
+      AccessRule{.roles = {"watcher"}, .may = {Verb::metrics}}};
+  const AccessRules rules(list, true);
+  const auto viewer = who("vera", {"viewer"}), oper = who("oscar", {"operator"}), watcher = who("wendy", {"watcher"});
+  CHECK(rules.sees(viewer, "arm1"));
+  CHECK_FALSE(rules.sees(viewer, "create"));
+  CHECK(rules.sees(oper, "create"));
+  CHECK_FALSE(rules.sees(oper, "arm1"));
+  CHECK_FALSE(rules.sees(watcher, "arm1"));  // what he may is of no device
+  CHECK_FALSE(rules.sees(who("stranger", {}), "arm1"));
+  CHECK_FALSE(rules.sees(Identity{}, "create"));
+  CHECK(rules.sees(viewer, "arm1", "Arm"));
+  CHECK_FALSE(rules.sees(viewer, "arm1", "Create"));
+  CHECK_FALSE(rules.sees(viewer, "create", "Arm"));
+  CHECK(rules.sees(viewer, "arm1", "Arm", "Arm.tool"));
+  CHECK_FALSE(rules.sees(viewer, "arm1", "Arm", "Arm"));
+  CHECK_FALSE(rules.sees(oper, "arm1", "Arm", "Arm.tool"));
+}
+
 TEST_CASE("verbs by name") {
   for (const auto verb : all_verbs) CHECK(parse_verb(to_string(verb)) == verb);
   CHECK_FALSE(parse_verb("execute"));
