@@ -21,10 +21,10 @@ class Answer:
         return json.loads(self.body)
 
 
-def ask(port, method, path, body=None, headers={}, base="", context=None):
-    """`body`: bytes as they are, or what becomes JSON. `context`: that of TLS, for HTTPS at localhost."""
+def ask(port, method, path, body=None, headers={}, base="", context=None, address="127.0.0.1"):
+    """`body`: bytes as they are, or what becomes JSON. `context`: that of TLS, for HTTPS at localhost. `address`: the own one."""
     connection = http.client.HTTPSConnection("localhost", port, timeout=20, context=context) if context else \
-        http.client.HTTPConnection("127.0.0.1", port, timeout=20)
+        http.client.HTTPConnection("127.0.0.1", port, timeout=20, source_address=(address, 0))
     try:
         if body is not None and not isinstance(body, bytes):
             body, headers = json.dumps(body), {"Content-Type": "application/json", **headers}

@@ -110,6 +110,36 @@ def test_wrong_proofs(guarded):
     assert "wonderlan" not in (guarded.folder / "audit").read_text()
 
 
+def test_who_guesses_passwords_has_to_wait(device, tmp_path):
+    """From one address so many guesses in a row, then one a second; the right password too. Others are not kept out."""
+    make_users(tmp_path)
+    with running(tmp_path, device, {"users_file": "users", "rules": RULES}) as gateway:
+        def log_in(name, password=None, address="127.0.0.3"):
+            answer = ask(gateway.port, "GET", BASE + "/p_double", headers=basic(name, password), address=address)
+            return answer.status, answer.json["detail"] if answer.status != 200 else ""
+
+        def guess(name):
+            """Until that is stopped. Returns how often."""
+            guesses = 0
+            while "too many logins have failed" not in (refused := log_in(name, f"guess {guesses}"))[1]:
+                assert refused == (401, "Invalid username or password")
+                guesses += 1
+                assert guesses < 200, "guessing goes on and on"
+            return guesses
+
+        assert guess("alice") >= 60
+        assert log_in("alice", "a guess from elsewhere", "127.0.0.5") == (401, "Invalid username or password")
+        for name in PASSWORDS:
+            guess(name)
+            if (answer := log_in(name))[0] != 200:  # unless the second is over just now
+                break
+        assert answer[0] == 401 and "too many logins have failed" in answer[1], "the right password had not to wait"
+        deadline = time.monotonic() + 20
+        while log_in(name)[0] != 200:
+            assert time.monotonic() < deadline
+            time.sleep(0.1)
+
+
 def test_api_tokens(guarded):
     answer = ask(guarded.port, "POST", BASE + "/add", {"left": 1, "right": 2}, bearer(guarded.token))
     assert answer.json == {"result": 3.0}

@@ -316,6 +316,38 @@ def test_gateway_and_device_keep_what_their_openapi_says(tmp_path):
         robot.stop()
 
 
+def test_pages_of_other_origins_use_what_is_allowed_to_them(device, tmp_path):
+    process, port = start_gateway(tmp_path, device, "https://page.example")
+    page, stranger = {"Origin": "https://page.example"}, {"Origin": "https://stranger.example"}
+    try:
+        for path, status in (("/p_double", 200), ("/nope", 404)):  # what failed can be read too
+            answer = ask(port, "GET", path, headers=page)
+            assert answer.status == status
+            assert answer.headers["Access-Control-Allow-Origin"] == page["Origin"]
+            assert "Origin" in answer.headers["Vary"]
+        # What a browser asks before it sends anything but plain requests.
+        asks = {"Access-Control-Request-Method": "PUT", "Access-Control-Request-Headers": "authorization, content-type"}
+        leave = ask(port, "OPTIONS", "/p_double", headers={**page, **asks})
+        assert (leave.status, leave.headers["Access-Control-Allow-Origin"]) == (204, page["Origin"])
+        assert {"GET", "HEAD", "PUT", "POST"} <= set(leave.headers["Access-Control-Allow-Methods"].split(", "))
+        allowed = {name.lower() for name in leave.headers["Access-Control-Allow-Headers"].split(", ")}
+        assert {"accept", "authorization", "content-type", "last-event-id", "range"} <= allowed
+        assert int(leave.headers["Access-Control-Max-Age"]) > 0
+        assert ask(port, "PUT", "/p_double", 2.5, page).status == 204
+        stream = Stream(port, "/changed", page)
+        assert stream.response.headers["Access-Control-Allow-Origin"] == page["Origin"]
+        stream.close()
+
+        for method, body in (("GET", None), ("PUT", 7.5), ("OPTIONS", None)):
+            refused = ask(port, method, "/p_double", body, {**stranger, **(asks if method == "OPTIONS" else {})})
+            assert refused.status == 403 and "allowed_origins" in refused.json["detail"], method
+            assert not [name for name in refused.headers if name.lower().startswith("access-control-")]
+        plain = ask(port, "GET", "/p_double")  # of no page
+        assert plain.json == 2.5 and "Access-Control-Allow-Origin" not in plain.headers
+    finally:
+        process.stop()
+
+
 def test_a_trace_goes_into_the_log(tmp_path):
     direction = next(each for each in DIRECTIONS if each.name == "reference-to-ours")
     service = Background(service_command(direction, "v4", "http://localhost"), tmp_path / "service.log")
