@@ -1,0 +1,165 @@
+#include "server/access/access.hpp"
+
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "node/service/password_hash.hpp"
+#include "test/support/print.hpp"
+
+using namespace rrgate;
+
+namespace {
+
+/// Files of users and tokens in a folder of its own.
+struct Files {
+  Files() { std::filesystem::create_directories(folder); }
+  ~Files() { std::filesystem::remove_all(folder); }
+
+  std::string path(const std::string& name) const { return (folder / name).string(); }
+  /// As programs replace files: nobody sees half of one.
+  void write(const std::string& name, const std::string& text) const {
+    std::ofstream(path(name + ".new")) << text;
+    std::filesystem::rename(path(name + ".new"), path(name));
+  }
+  static std::string user(const std::string& name, std::string_view password, const std::string& roles) {
+    return name + " " + rr::PasswordHash::make_scrypt(password, {4, 1, 1}).value().text() + " " + roles + "\n";
+  }
+  std::vector<nlohmann::json> audit() const {
+    std::ifstream in(path("audit"));
+    std::vector<nlohmann::json> out;
+    for (std::string line; std::getline(in, line);) out.push_back(nlohmann::json::parse(line));
+    return out;
+  }
+
+  std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / ("rrgate-access-" + std::to_string(::getpid()));
+};
+
+AccessConfig with_users(const Files& files) {
+  AccessConfig out;
+  out.users_file = files.path("users");
+  out.audit_file = files.path("audit");
+  out.rules = {AccessRule{.roles = {"viewer"}, .may = {Verb::read}},
+               AccessRule{.roles = {"operator"}, .may = {Verb::read, Verb::write}}};
+  return out;
+}
+
+rr::Result<rr::AuthenticatedUser> log_in(const Access& access, std::string name, std::string_view password) {
+  rr::LoginAttempt attempt;
+  attempt.username = std::move(name);
+  attempt.credentials.items.emplace_back("password", rr::Value(password));
+  return access.authenticator()->authenticate(attempt);
+}
+
+const AccessRequest a_write{"arm", "Arm", "Arm", "speed", Verb::write};
+const AccessRequest a_read{"arm", "Arm", "Arm", "speed", Verb::read};
+
+}  // namespace
+
+TEST_CASE("until the files are read, nobody may who would have to show who he is") {
+  Files files;
+  const Access access(with_users(files));
+  CHECK_FALSE(access.is_open());
+  CHECK_FALSE(access.sees(Identity{}, "arm"));
+  CHECK_FALSE(access.authenticator());
+  CHECK(Access(AccessConfig{}).is_open());
+}
+
+TEST_CASE("a file that can't be used is named, and nothing has changed") {
+  Files files;
+  Access access(with_users(files));
+  CHECK_THAT(access.load().error().message, Catch::Contains("users file '" + files.path("users") + "': can't be read"));
+  files.write("users", "alice no-hash _\n");
+  CHECK_THAT(access.load().error().message, Catch::Contains(files.path("users")) && Catch::Contains("line 1"));
+  CHECK_FALSE(access.authenticator());
+  files.write("users", Files::user("alice", "one", "viewer"));
+  CHECK(access.load());
+  CHECK(log_in(access, "alice", "one"));
+  auto config = with_users(files);
+  config.tokens_file = files.path("tokens");
+  CHECK(load_access(config).error().message.find("tokens file") != std::string::npos);
+}
+
+TEST_CASE("users are judged by the file of now, through one authenticator") {
+  Files files;
+  files.write("users", Files::user("alice", "one", "viewer"));
+  Access access(with_users(files));
+  REQUIRE(access.load());
+  const auto authenticator = access.authenticator();
+  CHECK(log_in(access, "alice", "one").value().privileges == std::vector<std::string>{"viewer"});
+  files.write("users", Files::user("alice", "two", "operator") + Files::user("bob", "three", "viewer"));
+  CHECK(log_in(access, "alice", "one"));  // nobody has looked yet
+  access.reload(false);
+  CHECK(access.authenticator() == authenticator);
+  CHECK_FALSE(log_in(access, "alice", "one"));
+  CHECK(log_in(access, "alice", "two").value().privileges == std::vector<std::string>{"operator"});
+  CHECK(log_in(access, "bob", "three"));
+  files.write("users", "broken\n");
+  access.reload(true);
+  CHECK(log_in(access, "bob", "three"));  // what can't be used stays as it was
+}
+
+TEST_CASE("roles are those of the file and those that the configuration adds") {
+  Files files;
+  files.write("users", Files::user("alice", "one", "viewer"));
+  auto config = with_users(files);
+  config.anonymous_role = "guest";
+  config.grants = {RoleGrant{.users = {"al*"}, .roles = {"operator", "viewer"}},
+                   RoleGrant{.users = {"bob"}, .roles = {"admin"}}};
+  Access access(config);
+  REQUIRE(access.load());
+  CHECK(access.anonymous("here:1").roles == std::vector<std::string>{"guest"});
+  CHECK_FALSE(access.anonymous("here:1").is_proven());
+  const auto alice = access.logged_in(log_in(access, "alice", "one").value(), "here:1");
+  CHECK(alice.roles == std::vector<std::string>{"viewer", "operator"});
+  CHECK(alice.proof == Proof::password);
+  CHECK(alice.client == "here:1");
+}
+
+TEST_CASE("the audit log has who logged in, what was done and what was refused, and no reads") {
+  Files files;
+  files.write("users", Files::user("alice", "one", "viewer") + Files::user("otto", "two", "operator"));
+  Access access(with_users(files));
+  REQUIRE(access.load());
+  CHECK_FALSE(log_in(access, "alice", "guess"));
+  const auto alice = access.logged_in(log_in(access, "alice", "one").value(), "here:1");
+  const auto otto = access.logged_in(log_in(access, "otto", "two").value(), "here:2");
+  CHECK(access.check(alice, a_read));
+  CHECK(access.check(alice, a_write).error().code == rr::ErrorCode::permission_denied);
+  CHECK(access.check(otto, a_write));
+  CHECK_FALSE(access.check_whole_device(otto, "arm"));
+  const auto lines = files.audit();
+  std::vector<std::string> told;
+  for (const auto& line : lines)
+    told.push_back(line["event"].get<std::string>() + " " + line["user"].get<std::string>());
+  CHECK(told == std::vector<std::string>{"login_failed alice", "login alice", "login otto", "refused alice",
+                                         "write otto", "refused otto"});
+  CHECK(lines[4]["member"] == "speed");
+  std::filesystem::rename(files.path("audit"), files.path("audit.1"));
+  access.reload(true);
+  CHECK(access.check(otto, a_write));
+  CHECK(files.audit().size() == 1);
+}
+
+TEST_CASE("another configuration holds for the next request; one whose audit file can't be opened for none") {
+  Files files;
+  files.write("users", Files::user("alice", "one", "viewer"));
+  Access access(with_users(files));
+  REQUIRE(access.load());
+  const auto alice = access.logged_in(log_in(access, "alice", "one").value(), "here:1");
+  auto next = with_users(files);
+  next.rules = {AccessRule{.roles = {"viewer"}, .may = {Verb::write}}};
+  next.audit_file = files.path("no such folder/audit");
+  CHECK_FALSE(access.replace(load_access(next).value()));
+  CHECK(access.check(alice, a_read));
+  CHECK_FALSE(access.check(alice, a_write));
+  next.audit_file = files.path("audit");
+  CHECK(access.replace(load_access(next).value()));
+  CHECK_FALSE(access.check(alice, a_read));
+  CHECK(access.check(alice, a_write));
+}
