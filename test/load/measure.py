@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Measures many clients of one device through the gateway: measure.py --report FILE [--mode MODE] [--clients N]
 
-Everything is compared with something of the same run; only these ratios mean something. Builds are those of RR_BUILD,
-build/release where it is not set.
+Everything is compared with something of the same run, and what is promised to users is held to the promise too: that a
+yardstick was as bad is no excuse. Ends with 1 where something is missed. Builds are those of RR_BUILD, build/release where it
+is not set.
 """
 import argparse
 import pathlib
@@ -15,25 +16,27 @@ from dataclasses import dataclass
 from load import Clients, Device, Gateway, running
 
 SECONDS = 10
+OLDEST_MS = 50  # what is promised of a value that a thousand clients follow, at the 99th percentile
 BULK = {"packet_rate": 50, "packet_bytes": 32768}
 
 
 @dataclass
 class Row:
-    """`yardstick` None: `ours` itself is held to the limit."""
+    """Met where ours / yardstick is at most `limit`, and ours at most `promise`; None: there is no such thing."""
     text: str
     ours: float
     yardstick: float | None
     unit: str
-    limit: float
+    limit: float | None = None
+    promise: float | None = None
 
     @property
     def ratio(self):
-        return self.ours if self.yardstick is None else self.ours / max(self.yardstick, 1e-9)
+        return None if self.yardstick is None else self.ours / max(self.yardstick, 1e-9)
 
     @property
     def is_met(self):
-        return self.ratio <= self.limit
+        return (self.limit is None or self.ratio <= self.limit) and (self.promise is None or self.ours <= self.promise)
 
 
 def fan_out(folder, mode, count):
@@ -43,10 +46,12 @@ def fan_out(folder, mode, count):
         with running(Gateway(folder, device.url, mode)) as gateway:
             one = with_clients(folder, device, gateway.url(), 1)
             many = with_clients(folder, device, gateway.url(), count)
-    yield Row(f"connections of the device, {count} clients", many["connections"], None, "", 1)
+    yield Row(f"connections of the device, {count} clients", many["connections"], None, "", promise=1)
     yield Row(f"CPU of the device, {count} clients against one", many["cpu"] * 100, one["cpu"] * 100, "%", 1.5)
     yield Row(f"p99 age of values, {count} clients through the gateway against as many at the device",
-              many["age_ms"]["p99"], direct["age_ms"]["p99"], "ms", 2)
+              many["age_ms"]["p99"], direct["age_ms"]["p99"], "ms", 2, promise=OLDEST_MS)
+    yield Row(f"p50 age of values, {count} clients through the gateway against as many at the device",
+              many["age_ms"]["p50"], direct["age_ms"]["p50"], "ms")
     yield Row("slowest client's share of the values that it would get alone",
               one["rate"]["median"], many["rate"]["min"], "/s", 2)
 
@@ -85,9 +90,9 @@ def one_stalls(folder, mode):
             print(f"the stalled client: {stalled.resume()}; the gateway: {len(ends)} ended, {set(ends)}")
     yield Row("p99 age of the others' values, with one that stops reading against without", disturbed["age_ms"]["p99"],
               alone["age_ms"]["p99"], "ms", 1.5)
-    yield Row("packets that the others missed", disturbed["packet_gaps"], None, "", 0)
-    yield Row("connections that the others lost", sum(disturbed["lost"].values()), None, "", 0)
-    yield Row("memory that the gateway takes for it", (most - before) / 1e6, None, "MB", 16)
+    yield Row("packets that the others missed", disturbed["packet_gaps"], None, "", promise=0)
+    yield Row("connections that the others lost", sum(disturbed["lost"].values()), None, "", promise=0)
+    yield Row("memory that the gateway takes for it", (most - before) / 1e6, None, "MB", promise=16)
 
 
 def storm(folder, mode, count):
@@ -101,7 +106,7 @@ def storm(folder, mode, count):
             again = clients.wait_until_ready()
             report = clients.finish()
     yield Row(f"until {count} clients have values, after kill -9 against at first", again["seconds"], first, "s", 5)
-    yield Row("clients that did not come back", count - report["ready"], None, "", 0)
+    yield Row("clients that did not come back", count - report["ready"], None, "", promise=0)
 
 
 def measure(mode, count):
@@ -112,13 +117,17 @@ def measure(mode, count):
 
 
 def report(mode, rows):
-    lines = ["| load, mode " + mode + " | ours | yardstick | ratio | aim | |", "|---|---|---|---|---|---|"]
+    lines = ["| load, mode " + mode + " | ours | promise | yardstick | ratio | aim | |", "|---|---|---|---|---|---|---|"]
     for row in rows:
         yardstick, ratio = ("", "") if row.yardstick is None else (f"{row.yardstick:.2f} {row.unit}", f"{row.ratio:.2f}")
-        lines.append(f"| {row.text} | {row.ours:.2f} {row.unit} | {yardstick} | {ratio} | <= {row.limit:g} "
-                     f"| {'met' if row.is_met else '**missed**'} |")
+        promise = "" if row.promise is None else f"<= {row.promise:g} {row.unit}"
+        limit = "" if row.limit is None else f"<= {row.limit:g}"
+        verdict = "" if row.limit is None and row.promise is None else "met" if row.is_met else "**missed**"
+        lines.append(f"| {row.text} | {row.ours:.2f} {row.unit} | {promise} | {yardstick} | {ratio} | {limit} "
+                     f"| {verdict} |")
     missed = sum(not row.is_met for row in rows)
-    lines += ["", f"{len(rows) - missed} aims met, {missed} missed; {platform.machine()}, {platform.processor() or 'processor unknown'}"]
+    aims = sum(row.limit is not None or row.promise is not None for row in rows)
+    lines += ["", f"{aims - missed} aims met, {missed} missed; {platform.machine()}, {platform.processor() or 'processor unknown'}"]
     return "\n".join(lines) + "\n"
 
 
@@ -129,11 +138,12 @@ def main():
     parser.add_argument("--clients", type=int, default=1000)
     arguments = parser.parse_args()
     mode = {} if arguments.mode == "relay" else {"mode": arguments.mode}
-    text = report(arguments.mode, list(measure(mode, arguments.clients)))
+    rows = list(measure(mode, arguments.clients))
+    text = report(arguments.mode, rows)
     arguments.report.parent.mkdir(parents=True, exist_ok=True)
     arguments.report.write_text("# Load\n\n" + text, encoding="utf-8")
     print(text)
-    return 0
+    return 0 if all(row.is_met for row in rows) else 1
 
 
 if __name__ == "__main__":
