@@ -76,7 +76,8 @@ class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSe
   void handle(const WireConnected& connected, Now now);
   void handle(const WireReceived& received, Now now);
   void handle(const WireDisconnected&, Now) {}
-  void handle(const ObjectWanted&, Now) {}  // no service of ours is remote
+  void handle(const UserChanged&, Now) {}  // no service of ours is remote
+  void handle(const ObjectWanted&, Now) {}
   void handle(const LockWanted&, Now) {}
   void handle(const LeaveWanted&, Now) {}
   void handle(const PipeConnected& connected, Now now);

@@ -18,10 +18,6 @@ const std::string& path_of(const rr::ServiceObject& object) {
   return static_cast<const SharedObject&>(object).path();
 }
 
-bool is_generator_step(const rr::Called& called) {
-  return called.generator != 0 && called.kind != rr::CallKind::generator_open;
-}
-
 }  // namespace
 
 SharedClient::SharedClient(SharedClientOwner& owner, rr::ServiceDirectory& directory, rr::ServiceSessionOptions options,
@@ -58,10 +54,8 @@ void SharedClient::handle(const rr::ClientConnected& connected) {
 void SharedClient::handle(const rr::ClientGone&) {
   if (!service_) return;
   home_->remove(*this);
-  if (locker_) locker_->remove(*this);
   service_->remove(*this);
   if (login_) login_->close();
-  if (locker_) locker_->close();
   service_.reset();
   wires_.clear();
   pipes_.clear();
@@ -74,7 +68,6 @@ void SharedClient::handle(const rr::ClientGone&) {
 
 void SharedClient::handle(const rr::Called& called) {
   if (!service_) return;
-  if (login_ && !session_.user()) leave_login();
   const std::weak_ptr<StreamDriver> weak = weak_from_this();
   auto done = [this, weak, id = called.id](const rr::Result<rr::Value>& result) {
     const auto self = weak.lock();
@@ -82,13 +75,11 @@ void SharedClient::handle(const rr::Called& called) {
     session_.reply(id, result, rr::read_clocks());
     settle();
   };
-  auto& upstream = is_generator_step(called) && home_->has_generator(*this, called.generator) ? *home_ : requests();
-  upstream.request(*this, called, std::move(done));
+  home_->request(*this, called, std::move(done));
 }
 
 void SharedClient::handle(const rr::GeneratorEnded& ended) {
   if (home_) home_->drop_generator(*this, ended.id);
-  if (locker_) locker_->drop_generator(*this, ended.id);
 }
 
 void SharedClient::handle(const rr::ObjectWanted& wanted) {
@@ -104,7 +95,6 @@ void SharedClient::handle(const rr::ObjectWanted& wanted) {
 
 /// A client that is told that it has left holds no lock any more.
 void SharedClient::handle(const rr::LeaveWanted&) {
-  const auto own = login_ ? login_ : locker_;
   const std::weak_ptr<StreamDriver> weak = weak_from_this();
   auto left = [this, weak] {
     const auto self = weak.lock();
@@ -112,8 +102,10 @@ void SharedClient::handle(const rr::LeaveWanted&) {
     session_.answer_leave(rr::read_clocks());
     settle();
   };
-  if (!own) return left();
-  own->close(std::move(left));
+  if (!service_) return left();
+  if (!login_) return home_->remove(*this, std::move(left));
+  home_->remove(*this);
+  login_->close(std::move(left));  // and with it what its user has locked
 }
 
 // --- wires ---
@@ -281,7 +273,7 @@ void SharedClient::handle(const rr::LoginRequested& login) {
 rr::awaitable<void> SharedClient::log_in_at_device(std::shared_ptr<SharedClient> self,
                                                    std::shared_ptr<SharedService> service, rr::LoginRequested login) {
   const bool is_late = !service->upstream()->requires_user() && self->service_;
-  const auto upstream = service->make_upstream({login.attempt.username, login.attempt.credentials, is_late});
+  const auto upstream = service->make_own_upstream({login.attempt.username, login.attempt.credentials, is_late});
   const auto opened = co_await upstream->open();
   auto& client = *self;
   if (client.is_closed()) {
@@ -337,53 +329,22 @@ void SharedClient::leave_login() {
   left->close();
 }
 
-// --- locks: they are held by a session of this client's own, so that the device keeps all others out ---
+void SharedClient::handle(const rr::UserChanged&) {
+  if (login_ && !session_.user()) return leave_login();
+  if (service_) home_->change_user(*this);
+}
+
+// --- locks ---
 
 void SharedClient::handle(const rr::LockWanted& wanted) {
   if (!service_) return;
-  if (login_ && !session_.user()) leave_login();
-  if (login_) {  // has a session of its own already
-    const std::weak_ptr<StreamDriver> weak = weak_from_this();
-    return login_->lock(wanted, [this, weak, wanted](const rr::Result<rr::Value>& result) {
-      if (weak.lock()) answer_lock(wanted, result ? rr::Result<>() : rr::Result<>(result.error()));
-    });
-  }
-  const auto self = std::static_pointer_cast<SharedClient>(shared_from_this());
-  asio::co_spawn(executor(), take_lock(self, wanted), asio::detached);
-}
-
-rr::awaitable<void> SharedClient::take_lock(std::shared_ptr<SharedClient> self, rr::LockWanted wanted) {
-  auto& client = *self;
-  if (!client.service_) co_return;
-  if (!client.locker_) {
-    const auto upstream = client.service_->make_upstream(client.service_->device()->config().login);
-    const auto opened = co_await upstream->open();
-    if (!client.service_ || client.locker_) upstream->close();
-    if (!client.service_) co_return;
-    if (!opened) co_return client.answer_lock(wanted, opened.error());
-    if (!client.locker_) client.locker_ = upstream;
-  }
-  const auto locker = client.locker_;
-  const auto lock = [self, locker, wanted](const rr::Result<rr::Value>& found) {
-    if (!found) return self->answer_lock(wanted, found.error());
-    locker->lock(wanted, [self, wanted](const rr::Result<rr::Value>& result) {
-      self->answer_lock(wanted, result ? rr::Result<>() : rr::Result<>(result.error()));
-    });
-  };
-  locker->find_object(wanted.path, lock);
-}
-
-void SharedClient::answer_lock(const rr::LockWanted& wanted, const rr::Result<>& result) {
-  if (!service_) return;
-  const bool is_release = wanted.command == rr::LockCommand::unlock || wanted.command == rr::LockCommand::exit_monitor;
-  if (result && is_release) locked_.erase(wanted.path);
-  if (result && !is_release) locked_.insert(wanted.path);
-  if (locker_ && locked_.empty()) {
-    locker_->remove(*this);
-    std::exchange(locker_, nullptr)->close();
-  }
-  session_.answer_lock(wanted.id, result, rr::read_clocks());
-  settle();
+  const std::weak_ptr<StreamDriver> weak = weak_from_this();
+  home_->lock(*this, wanted, [this, weak, id = wanted.id](const rr::Result<>& result) {
+    const auto self = weak.lock();
+    if (!self) return;
+    session_.answer_lock(id, result, rr::read_clocks());
+    settle();
+  });
 }
 
 }  // namespace rrgate

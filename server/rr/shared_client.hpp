@@ -65,6 +65,7 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   void handle(const rr::PipeClosed& closed);
   void handle(const rr::GeneratorEnded& ended);
   void handle(const rr::CallbackCompleted& completed);
+  void handle(const rr::UserChanged& changed);
   void handle(const rr::ObjectWanted& wanted);
   void handle(const rr::LockWanted& wanted);
   void handle(const rr::LeaveWanted& wanted);
@@ -72,6 +73,7 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
 
   // UpstreamClient
   std::weak_ptr<const void> life() const override { return weak_from_this(); }
+  std::string lock_user() const override { return session_.user() ? session_.user()->name : std::string(); }
   void receive_event(const std::string& path, const rr::MemberDefinition& event,
                      std::span<const rr::Value> arguments) override;
   void receive_wire(rr::WirePacket& packet) override;
@@ -90,13 +92,9 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
 
   static rr::awaitable<void> log_in_at_device(std::shared_ptr<SharedClient> self,
                                               std::shared_ptr<SharedService> service, rr::LoginRequested login);
-  static rr::awaitable<void> take_lock(std::shared_ptr<SharedClient> self, rr::LockWanted wanted);
   static rr::awaitable<void> keep_logged_in(std::shared_ptr<SharedClient> self, std::shared_ptr<Upstream> login);
-  void answer_lock(const rr::LockWanted& wanted, const rr::Result<>& result);
   /// From now on all that the client does goes through `upstream`.
   void move_to(std::shared_ptr<Upstream> upstream);
-  /// Where a request goes: to the session that holds the client's locks, while there are any.
-  Upstream& requests() const { return locker_ ? *locker_ : *home_; }
   void leave_login();
   void end_too_slow(const rr::Error& error);
   /// Bytes that wait for the stream: above, the client is behind; below half of them it has caught up.
@@ -108,10 +106,8 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   bool is_behind_ = false;
   bool was_behind_ = false;  ///< and it is in the log
   std::shared_ptr<SharedService> service_;
-  std::shared_ptr<Upstream> home_;    ///< the shared one, or that of the user who has logged in at the device
-  std::shared_ptr<Upstream> login_;   ///< the latter; null: there is none
-  std::shared_ptr<Upstream> locker_;  ///< while locks are held without a login
-  std::set<std::string> locked_;      ///< paths of those locks
+  std::shared_ptr<Upstream> home_;   ///< the shared one, or that of the user who has logged in at the device
+  std::shared_ptr<Upstream> login_;  ///< the latter; null: there is none
   std::set<std::pair<std::string, const rr::MemberDefinition*>> wires_;
   std::unordered_map<rr::PipeId, Endpoint> pipes_;
   std::unordered_map<rr::CallbackId, rr::ClientConnection::CallbackReply> callbacks_;

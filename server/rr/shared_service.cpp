@@ -62,8 +62,8 @@ SharedService::SharedService(std::shared_ptr<Device> device, std::string name, R
       for_device_(std::make_shared<JudgedByDevice>()),
       wake_(device_->executor()) {}
 
-std::shared_ptr<Upstream> SharedService::make_upstream(UpstreamLogin login) const {
-  return std::make_shared<Upstream>(device_, name_, std::move(login));
+std::shared_ptr<Upstream> SharedService::make_own_upstream(UpstreamLogin login) const {
+  return std::make_shared<Upstream>(device_, name_, std::move(login), UpstreamUse::one_client);
 }
 
 void SharedService::start() {

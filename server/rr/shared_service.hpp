@@ -47,7 +47,7 @@ class SharedService : public std::enable_shared_from_this<SharedService> {
   /// The session that all clients share.
   const std::shared_ptr<Upstream>& upstream() const { return upstream_; }
   /// A session for one client alone; not open yet.
-  std::shared_ptr<Upstream> make_upstream(UpstreamLogin login) const;
+  std::shared_ptr<Upstream> make_own_upstream(UpstreamLogin login) const;
   /// Whether a login is for the device to judge.
   bool is_for_device(const rr::Authenticator& authenticator) const { return &authenticator == for_device_.get(); }
 

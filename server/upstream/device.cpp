@@ -13,6 +13,7 @@
 #include "core/support/random.hpp"
 #include "node/transport/race.hpp"
 #include "server/log/log.hpp"
+#include "server/upstream/service_locks.hpp"
 
 namespace rrgate {
 
@@ -143,6 +144,12 @@ rr::awaitable<rr::Result<std::unique_ptr<rr::ByteStream>>> Device::connect_clien
 rr::NodeIdentity Device::client_target() const {
   if (is_shared()) return {};
   return {config_.url.node_id.value_or(rr::NodeId{}), config_.url.node_name};
+}
+
+std::shared_ptr<ServiceLocks> Device::locks_of(const std::string& service) {
+  auto locks = locks_[service].lock();
+  if (!locks) locks_[service] = locks = std::make_shared<ServiceLocks>(executor());
+  return locks;
 }
 
 bool Device::can_become(const DeviceConfig& config) const {

@@ -4,6 +4,7 @@
 #include <boost/asio/steady_timer.hpp>
 #include <functional>
 #include <list>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -18,6 +19,8 @@
 #include "server/upstream/probe.hpp"
 
 namespace rrgate {
+
+class ServiceLocks;
 
 enum class DeviceState { connecting, online, offline };
 std::string_view to_string(DeviceState state);
@@ -65,6 +68,8 @@ class Device : public std::enable_shared_from_this<Device> {
   rr::NodeIdentity client_target() const;
   using OpenShared = std::function<rr::Result<std::unique_ptr<rr::ByteStream>>()>;
   void share_by(OpenShared open) { open_shared_ = std::move(open); }
+  /// Of one service, for all sessions that the gateway has with it.
+  std::shared_ptr<ServiceLocks> locks_of(const std::string& service);
   bool is_shared() const { return config_.mode == DeviceMode::shared; }
   /// Called when state() or identity() has changed.
   void on_change(std::function<void()> handler) { on_change_ = std::move(handler); }
@@ -125,6 +130,7 @@ class Device : public std::enable_shared_from_this<Device> {
   DeviceState state_ = DeviceState::connecting;
   std::string last_error_;
   std::optional<ProbeResult> identity_;
+  std::map<std::string, std::weak_ptr<ServiceLocks>> locks_;  ///< by service
   std::size_t clients_ = 0;
   Traffic traffic_;
   bool is_stopping_ = false;

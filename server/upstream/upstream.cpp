@@ -14,6 +14,24 @@ namespace {
 /// Objects that all clients together have found.
 constexpr std::size_t max_objects = 65'536;
 
+std::uint64_t next_number() {
+  static std::uint64_t last = 0;
+  return ++last;
+}
+
+/// Whether object locks leave a request alone.
+bool is_exempt(const rr::Called& called) {
+  if (called.member->has_modifier("nolock")) return true;
+  const bool is_read = called.kind == rr::CallKind::property_get || called.kind == rr::CallKind::memory_read ||
+                       called.kind == rr::CallKind::memory_dimensions;
+  return is_read && called.member->has_modifier("nolockread");
+}
+
+/// What ends something is nobody's harm.
+bool ends_generator(const rr::Called& called) {
+  return called.kind == rr::CallKind::generator_close || called.kind == rr::CallKind::generator_abort;
+}
+
 /// The object of a call: hosted services of shared devices have no others.
 const std::string& path_of(const rr::Called& called) {
   return static_cast<const SharedObject&>(*called.object).path();
@@ -21,8 +39,13 @@ const std::string& path_of(const rr::Called& called) {
 
 }  // namespace
 
-Upstream::Upstream(std::shared_ptr<Device> device, std::string service, UpstreamLogin login)
-    : device_(std::move(device)), service_(std::move(service)), login_(std::move(login)) {}
+Upstream::Upstream(std::shared_ptr<Device> device, std::string service, UpstreamLogin login, UpstreamUse use)
+    : device_(std::move(device)),
+      service_(std::move(service)),
+      login_(std::move(login)),
+      locks_(device_->locks_of(service_)),
+      use_(use),
+      number_(next_number()) {}
 
 // --- the session ---
 
@@ -77,6 +100,10 @@ void Upstream::close(std::function<void()> closed) {
   connection->disconnect();
 }
 
+void Upstream::break_off() {
+  if (const auto connection = connection_) connection->disconnect();
+}
+
 rr::Error Upstream::lost_error() const {
   return rr::make_error(rr::ErrorCode::connection_error,
                         "connection_lost: device " + rr::quoted(device_->config().name) +
@@ -95,20 +122,30 @@ void Upstream::lost(const rr::Error& reason) {
   const auto clients = clients_;  // they may leave
   for (auto* client : clients)
     if (has(*client)) acknowledge_all(*client);
+  locks_->handle_lost(*this);
   device_->note_trouble();
   if (const auto handler = on_lost_) handler();
 }
 
 void Upstream::add(UpstreamClient& client) {
   clients_.push_back(&client);
+  locks_->add(client, *this);
+}
+
+void Upstream::change_user(UpstreamClient& client) {
+  locks_->remove(client);
+  locks_->add(client, *this);
 }
 
 bool Upstream::has(const UpstreamClient& client) const {
   return std::find(clients_.begin(), clients_.end(), &client) != clients_.end();
 }
 
-void Upstream::remove(UpstreamClient& client) {
-  std::erase(clients_, &client);
+void Upstream::remove(UpstreamClient& client, std::function<void()> left) {
+  if (std::erase(clients_, &client) == 0) {
+    if (left) left();
+    return;
+  }
   std::erase_if(calls_, [&](const OpenCall& call) { return call.client == &client; });
   for (auto it = endpoints_.lower_bound({&client, 0}); it != endpoints_.end() && it->first.first == &client;)
     leave_pipe(client, (it++)->first.second);
@@ -120,6 +157,7 @@ void Upstream::remove(UpstreamClient& client) {
   for (const auto& [key, generator] : generators_)
     if (key.first == &client) generators.push_back(key.second);
   for (const auto id : generators) drop_generator(client, id);
+  locks_->remove(client, std::move(left));
 }
 
 // --- objects ---
@@ -192,6 +230,7 @@ void Upstream::handle_released(const std::string& path) {
     if (rr::is_within(pipe.path, path)) pipes.push_back(number);
   for (const auto number : pipes) drop_pipe(number);
   std::erase_if(generators_, [&](const auto& each) { return rr::is_within(each.second.path, path); });
+  locks_->handle_released(path);
   if (on_released_) on_released_(path);
   const auto clients = clients_;
   for (auto* client : clients)
@@ -209,6 +248,8 @@ void Upstream::request(UpstreamClient& client, const rr::Called& called, Complet
     done(std::move(result));
   };
   const auto& path = path_of(called);
+  if (!ends_generator(called))
+    if (const auto allowed = locks_->check(client, path, is_exempt(called)); !allowed) return done(allowed.error());
   if (!connection_->session().object_type(path)) {  // another session of this service has found it
     return find_object(path, [weak = weak_from_this(), &client, life = client.life(), called,
                               done](const rr::Result<rr::Value>& found) {
@@ -319,19 +360,25 @@ void Upstream::drop_generator(UpstreamClient& client, rr::GeneratorId id) {
   connection_->close_generator(generator.path, generator.function, generator.index, ignore_result);
 }
 
-void Upstream::lock(const rr::LockWanted& wanted, Completion done) {
+void Upstream::lock(UpstreamClient& client, const rr::LockWanted& wanted,
+                    std::function<void(const rr::Result<>&)> done) {
+  locks_->handle_wanted(client, wanted, std::move(done));
+}
+
+void Upstream::ask_for_lock(rr::LockCommand command, const std::string& path, std::chrono::milliseconds timeout,
+                            Completion done) {
   if (!connection_) return done(lost_error());
-  switch (wanted.command) {
+  switch (command) {
     case rr::LockCommand::lock_for_user:
-      return connection_->lock(wanted.path, rr::LockKind::user, std::move(done));
+      return connection_->lock(path, rr::LockKind::user, std::move(done));
     case rr::LockCommand::lock_for_client:
-      return connection_->lock(wanted.path, rr::LockKind::client, std::move(done));
+      return connection_->lock(path, rr::LockKind::client, std::move(done));
     case rr::LockCommand::unlock:
-      return connection_->unlock(wanted.path, std::move(done));
+      return connection_->unlock(path, std::move(done));
     case rr::LockCommand::enter_monitor:
-      return connection_->enter_monitor(wanted.path, wanted.timeout, std::move(done));
+      return connection_->enter_monitor(path, timeout, std::move(done));
     case rr::LockCommand::exit_monitor:
-      return connection_->exit_monitor(wanted.path, std::move(done));
+      return connection_->exit_monitor(path, std::move(done));
   }
 }
 

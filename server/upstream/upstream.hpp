@@ -15,6 +15,7 @@
 #include "core/session/service/service_session.hpp"
 #include "node/client/client_connection.hpp"
 #include "server/upstream/device.hpp"
+#include "server/upstream/service_locks.hpp"
 
 namespace rrgate {
 
@@ -42,6 +43,8 @@ class UpstreamClient {
  public:
   /// Ends when the client does.
   virtual std::weak_ptr<const void> life() const = 0;
+  /// Whose user locks are this client's too; empty: nobody's.
+  virtual std::string lock_user() const { return {}; }
   virtual void receive_event(const std::string& path, const rr::MemberDefinition& event,
                              std::span<const rr::Value> arguments) = 0;
   virtual void receive_wire(rr::WirePacket& packet) = 0;
@@ -67,17 +70,23 @@ class UpstreamClient {
   ~UpstreamClient() = default;
 };
 
+/// Who uses a session with a device.
+enum class UpstreamUse : std::uint8_t { all_clients, one_client };
+
 /// All of it runs on the gateway's thread. Paths are the device's and the clients' alike: the service has one name.
 class Upstream : public std::enable_shared_from_this<Upstream> {
  public:
   using Completion = rr::ClientConnection::Completion;
 
-  Upstream(std::shared_ptr<Device> device, std::string service, UpstreamLogin login);
+  Upstream(std::shared_ptr<Device> device, std::string service, UpstreamLogin login,
+           UpstreamUse use = UpstreamUse::all_clients);
 
   /// Connects, and attaches again what clients had joined. Errors   those of reaching the device and of the login.
   rr::awaitable<rr::Result<>> open();
   /// `closed`  is called once the device knows, or after half a second.
   void close(std::function<void()> closed = nullptr);
+  /// Ends the session with the device as if it were lost.
+  void break_off();
   bool is_open() const { return connection_ != nullptr; }
   /// Whether the service is for users who have logged in, and this session is nobody's.
   bool requires_user() const { return requires_user_; }
@@ -91,17 +100,25 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   void on_released(std::function<void(const std::string& path)> handler) { on_released_ = std::move(handler); }
 
   void add(UpstreamClient& client);
-  /// Ends all that the client has here.
-  void remove(UpstreamClient& client);
+  /// Ends all that the client has here. `left`  is called once the device has its locks back, maybe at once.
+  void remove(UpstreamClient& client, std::function<void()> left = nullptr);
+  /// The client goes on as another user: what it has locked is given back.
+  void change_user(UpstreamClient& client);
 
   /// Completes with the object's type.
   void find_object(const std::string& path, Completion done);
   /// Asks the device; the object of the call is a SharedObject that find_object() has found here.
   void request(UpstreamClient& client, const rr::Called& called, Completion done);
-  bool has_generator(UpstreamClient& client, rr::GeneratorId id) const { return generators_.contains({&client, id}); }
   /// A generator of this client that is over without having been closed.
   void drop_generator(UpstreamClient& client, rr::GeneratorId id);
-  void lock(const rr::LockWanted& wanted, Completion done);
+  /// Of the client, not of the session: other clients are kept out by the gateway.
+  void lock(UpstreamClient& client, const rr::LockWanted& wanted, std::function<void(const rr::Result<>&)> done);
+
+  // For ServiceLocks.
+  std::uint64_t number() const { return number_; }
+  bool is_for_one_client() const { return use_ == UpstreamUse::one_client; }
+  void ask_for_lock(rr::LockCommand command, const std::string& path, std::chrono::milliseconds timeout,
+                    Completion done);
 
   /// Answered with answer_wire(). A client that joins a wire gets the newest value at once.
   void join_wire(UpstreamClient& client, const std::string& path, const rr::MemberDefinition& wire);
@@ -201,6 +218,9 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   std::shared_ptr<Device> device_;
   std::string service_;
   UpstreamLogin login_;
+  std::shared_ptr<ServiceLocks> locks_;  ///< of the service, for all of its upstreams
+  UpstreamUse use_;
+  std::uint64_t number_;  ///< no other upstream has it
   std::shared_ptr<rr::ClientConnection> connection_;
   std::optional<rr::Error> loss_;
   bool requires_user_ = false;

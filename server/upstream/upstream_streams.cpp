@@ -25,6 +25,10 @@ constexpr std::size_t clients_a_turn = 64;
 
 void Upstream::join_wire(UpstreamClient& client, const std::string& path, const rr::MemberDefinition& member) {
   if (!connection_) return client.answer_wire(path, member, lost_error());
+  if (const auto allowed = locks_->check(client, path, member.has_modifier("nolock")); !allowed) {
+    client.answer_wire(path, member, allowed.error());
+    return client.close_wire(path, member);  // where it comes with the wire from another session
+  }
   const MemberKey key(path, member.name);
   auto& known = wires_[key];
   if (!known) known = std::make_shared<Wire>(path, member);
@@ -165,6 +169,10 @@ void Upstream::send_wire(const std::string& path, const rr::MemberDefinition& me
 void Upstream::join_pipe(UpstreamClient& client, rr::PipeId id, const std::string& path,
                          const rr::MemberDefinition& member) {
   if (!connection_) return client.refuse_pipe(id, lost_error());
+  if (const auto allowed = locks_->check(client, path, member.has_modifier("nolock")); !allowed) {
+    client.refuse_pipe(id, allowed.error());
+    return client.close_pipe(id);  // where it comes with the endpoint from another session
+  }
   const EndpointKey endpoint(&client, id);
   const bool is_shared = member.direction() == rr::MemberDirection::readonly;
   const MemberKey key(path, member.name);

@@ -18,6 +18,10 @@ class News:
             self._all.append(item)
             self._changed.notify_all()
 
+    def all(self):
+        with self._changed:
+            return list(self._all)
+
     def wait_for(self, is_it):
         with self._changed:
             assert self._changed.wait_for(lambda: any(is_it(item) for item in self._all), PATIENCE), self._all[-5:]

@@ -84,13 +84,18 @@ void ServiceSession::finish_authenticate(const OpenLogin& login, Result<Authenti
   connection_.begin_message(outgoing_);
   outgoing_.begin_entry(reply_type(login.type), login.path, login.member, login.request_id);
   if (result) {
-    set_user(std::move(*result));
+    change_user(std::move(*result));
     connection_.authorise();
     outgoing_.add_text("return", "OK");
   } else {
     write_error(outgoing_, {ErrorCode::authentication_error, result.error().message});
   }
   send_outgoing(now);
+}
+
+void ServiceSession::change_user(std::optional<AuthenticatedUser> user) {
+  set_user(std::move(user));
+  if (service_->is_remote()) events_.push_back(UserChanged{});
 }
 
 /// ClientSessionOpReq: logins and logouts here, locks and monitors elsewhere.
@@ -107,7 +112,7 @@ Result<> ServiceSession::answer_session_op(const Message& message, const Message
     return make_error(ErrorCode::invalid_operation, "User authentication not activated for this service");
   if (command == "AuthenticateUser") return begin_login(message, entry, service_, now);
   if (command == "LogoutUser") {
-    set_user(std::nullopt);
+    change_user(std::nullopt);
     begin_reply(entry);
     outgoing_.add_text("return", "OK");
     send_outgoing(now);

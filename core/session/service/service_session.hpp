@@ -159,6 +159,8 @@ struct GeneratorEnded {
 struct LocksChanged {
   HostedService* service = nullptr;
 };
+/// Of a remote service: the client has logged in or out within its session.
+struct UserChanged {};
 /// A call of the client's callback ended: with its answer, or because it took too long or the client is gone.
 struct CallbackCompleted {
   CallbackId id = 0;
@@ -187,7 +189,7 @@ struct ClientGone {
 using ServiceEvent =
     std::variant<Called, ClientConnected, LoginRequested, LocksChanged, WireConnected, WireDisconnected, WireReceived,
                  PipeConnected, PipeReceived, PipeAcknowledged, PipeClosed, GeneratorEnded, CallbackCompleted,
-                 ObjectWanted, LockWanted, LeaveWanted, ClientGone>;
+                 UserChanged, ObjectWanted, LockWanted, LeaveWanted, ClientGone>;
 
 /// One client of a node. Node-level requests (definitions, attributes, the service index) are answered in here.
 class ServiceSession {
@@ -410,6 +412,7 @@ class ServiceSession {
   void leave_monitors();
   void leave_locks();
   void set_user(std::optional<AuthenticatedUser> user);
+  void change_user(std::optional<AuthenticatedUser> user);
 
   // requests of the session
   void handle_entry(const Message& message, const MessageEntry& entry, Now now);

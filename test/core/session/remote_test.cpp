@@ -269,6 +269,29 @@ TEST_CASE("whoever leaves a remote service is told so when everything is given u
   CHECK(pair.client->state() == ClientState::closed);
 }
 
+TEST_CASE("a remote service hears that its client is another user") {
+  struct Anybody final : Authenticator {
+    Result<AuthenticatedUser> authenticate(const LoginAttempt& attempt) const override {
+      return AuthenticatedUser{attempt.username};
+    }
+  };
+  Remote pair;
+  SecurityPolicy policy;
+  policy.authenticator = std::make_shared<Anybody>();
+  pair.hosted().set_policy(policy);
+  const auto login = pair.client->authenticate("alice", Value(MapString{}), pair.now);
+  pair.pump();
+  pair.service->answer_login(pair.next_service<LoginRequested>().id, AuthenticatedUser{"alice"}, pair.now);
+  pair.next_service<UserChanged>();
+  CHECK(pair.service->user()->name == "alice");
+  CHECK(pair.completion(login));
+  const auto logout = pair.client->logout(pair.now);
+  pair.pump();
+  pair.next_service<UserChanged>();
+  CHECK_FALSE(pair.service->user());
+  CHECK(pair.completion(logout));
+}
+
 TEST_CASE("what a client may do is asked before it is done") {
   Loopback pair;
   std::vector<std::pair<EntryType, std::string>> asked;

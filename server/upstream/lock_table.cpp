@@ -1,0 +1,477 @@
+#include "server/upstream/lock_table.hpp"
+
+#include <algorithm>
+
+#include "core/session/service_path.hpp"
+
+namespace rrgate {
+
+namespace {
+
+constexpr std::size_t max_locks = 1024;
+constexpr std::size_t max_monitors = 1024;
+constexpr std::size_t max_waiting = 1024;  ///< for one monitor
+/// The device forgets a monitor whose owner was idle for 30 s. A little earlier here: an owner that is refused in vain
+/// is better than two that are not.
+constexpr std::chrono::seconds idle_timeout{25};
+
+rr::Error locked(std::string why) {
+  return {rr::ErrorCode::object_locked_error, std::move(why)};
+}
+
+rr::Error invalid(std::string why) {
+  return {rr::ErrorCode::invalid_operation, std::move(why)};
+}
+
+rr::Error too_late() {
+  return {rr::ErrorCode::operation_timeout, "the monitor lock was not free in time"};
+}
+
+rr::Error already_entering() {
+  return invalid("Already acquiring or acquired monitor lock");
+}
+
+/// Nobody knows whether the device has done it, or will.
+bool is_unknown(const rr::Result<>& result) {
+  return !result && result.error().code == rr::ErrorCode::request_timeout;
+}
+
+/// "01" and "+1" may name the same object as "1". A string key that is such a text is taken for another one, which
+/// keeps out too many, not too few.
+std::string canonical_index(std::string_view index) {
+  const bool has_sign = !index.empty() && (index.front() == '+' || index.front() == '-');
+  auto digits = index.substr(has_sign ? 1 : 0);
+  const auto is_digit = [](char each) { return each >= '0' && each <= '9'; };
+  if (digits.empty() || !std::all_of(digits.begin(), digits.end(), is_digit)) return std::string(index);
+  while (digits.size() > 1 && digits.front() == '0') digits.remove_prefix(1);
+  return (index.front() == '-' && digits != "0" ? "-" : "") + std::string(digits);
+}
+
+}  // namespace
+
+std::string canonical_lock_path(std::string_view path) {
+  const auto segments = rr::parse_service_path(path);
+  if (!segments) return std::string(path);
+  std::string canonical;
+  for (const auto& [name, index] : *segments) {
+    std::optional<std::string> text;
+    if (index) text = canonical_index(*index);
+    canonical = canonical.empty() ? name : rr::child_path(canonical, name, text);
+  }
+  return canonical;
+}
+
+// --- clients ---
+
+void LockTable::add(LockClient client, LockParty party) {
+  parties_.insert_or_assign(client, std::move(party));
+}
+
+void LockTable::remove(LockClient client, rr::TimePoint now) {
+  const auto left = parties_.extract(client);
+  if (!left) return;
+  const auto& party = left.mapped();
+  const auto of_user = std::find_if(parties_.begin(), parties_.end(), [&](const auto& other) {
+    return !party.user.empty() && other.second.user == party.user;
+  });
+  for (auto it = locks_.begin(); it != locks_.end();) {
+    const auto at = it++;
+    auto& lock = at->second;
+    if (lock.owner != client) continue;
+    if (!lock.user.empty() && of_user != parties_.end()) {  // the lock of a user lasts as long as one client of his
+      lock.owner = of_user->first;
+      lock.session = of_user->second.session;
+    } else if (party.has_own_session && lock.asking == Asking::nothing) {  // ends with that
+      locks_.erase(at);
+    } else {
+      take_back_lock(lock, client);
+    }
+  }
+  for (auto it = monitors_.begin(); it != monitors_.end();) {
+    const auto at = it++;
+    auto& monitor = at->second;
+    std::erase_if(monitor.queue, [&](const Waiting& waiting) { return waiting.client == client; });
+    if (monitor.owner != client) continue;
+    if (party.has_own_session && monitor.asking == Asking::nothing) {
+      monitor.owner = 0;
+      hand_on(at, now);
+    } else {
+      take_back_monitor(monitor, client);
+    }
+  }
+  const auto is_his = [client](const auto& lost) { return lost.first.first == client; };
+  std::erase_if(lost_locks_, is_his);
+  std::erase_if(lost_monitors_, is_his);
+  end_leaving(client);
+}
+
+void LockTable::end_leaving(LockClient leaver) {
+  if (leaver == 0) return;
+  const auto waits = [leaver](const auto& item) { return item.second.leaver == leaver; };
+  if (std::any_of(locks_.begin(), locks_.end(), waits) || std::any_of(monitors_.begin(), monitors_.end(), waits))
+    return;
+  events_.push_back(LockClientLeft{leaver});
+}
+
+void LockTable::handle_wanted(LockClient client, const rr::LockWanted& wanted, rr::TimePoint now) {
+  if (!parties_.contains(client)) return;
+  switch (wanted.command) {
+    case rr::LockCommand::lock_for_user:
+    case rr::LockCommand::lock_for_client:
+      return lock(client, wanted);
+    case rr::LockCommand::unlock:
+      return unlock(client, wanted);
+    case rr::LockCommand::enter_monitor:
+      return enter(client, wanted, now);
+    case rr::LockCommand::exit_monitor:
+      return exit(client, wanted, now);
+  }
+}
+
+void LockTable::answer(LockClient client, rr::LockRequestId request, rr::Result<> result) {
+  if (client != 0) events_.push_back(LockAnswered{client, request, std::move(result)});
+}
+
+// --- the device ---
+
+void LockTable::ask(Hold& hold, Asking what, LockSession session, rr::LockCommand command,
+                    std::chrono::milliseconds timeout) {
+  hold.asking = what;
+  hold.ask = ++last_ask_;
+  events_.push_back(LockAsked{hold.ask, session, command, hold.path, timeout});
+}
+
+void LockTable::handle_answer(std::uint64_t id, const rr::Result<>& result, rr::TimePoint now) {
+  const auto is_it = [id](const auto& item) { return item.second.ask == id && item.second.asking != Asking::nothing; };
+  if (const auto lock = std::find_if(locks_.begin(), locks_.end(), is_it); lock != locks_.end())
+    return lock_answered(lock, result);
+  if (const auto monitor = std::find_if(monitors_.begin(), monitors_.end(), is_it); monitor != monitors_.end())
+    return monitor_answered(monitor, result, now);
+}
+
+/// What is asked for is left to its answer, which comes.
+void LockTable::handle_lost(LockSession session, rr::TimePoint now) {
+  const auto party = std::find_if(parties_.begin(), parties_.end(), [session](const auto& each) {
+    return each.second.session == session && each.second.has_own_session;
+  });
+  // Sessions of one user hear of a restart one after the other: the first counts for all.
+  const auto user = party == parties_.end() ? std::string() : party->second.user;
+  const std::string why = "it was lost with the connection to the device";
+  for (auto it = locks_.begin(); it != locks_.end();) {
+    const auto at = it++;
+    auto& lock = at->second;
+    const bool is_of_user = !lock.user.empty() && lock.user == user;
+    const bool is_held = lock.asking == Asking::nothing || lock.asking == Asking::override_it;
+    if (!is_held || lock.owner == 0 || (lock.session != session && !is_of_user)) continue;
+    note_lost_lock(at->first, lock, why);
+    lock.owner = 0;
+    if (lock.asking == Asking::nothing) locks_.erase(at);
+  }
+  for (auto it = monitors_.begin(); it != monitors_.end();) {
+    const auto at = it++;
+    auto& monitor = at->second;
+    if (monitor.session != session || monitor.asking != Asking::nothing) continue;
+    lose_monitor(monitor, why);
+    hand_on(at, now);
+  }
+}
+
+void LockTable::handle_released(std::string_view path, rr::TimePoint) {
+  const auto canonical = canonical_lock_path(path);
+  const std::string why = "its object was replaced";
+  for (auto& [key, lock] : locks_) {
+    if (!rr::is_within(key, canonical) || lock.asking != Asking::nothing) continue;
+    note_lost_lock(key, lock, why);
+    take_back_lock(lock, 0);
+  }
+  for (auto& [key, monitor] : monitors_) {
+    if (!rr::is_within(key, canonical) || monitor.asking != Asking::nothing) continue;
+    const auto session = monitor.session;
+    lose_monitor(monitor, why);
+    ask(monitor, Asking::give_back, session, rr::LockCommand::exit_monitor);
+  }
+}
+
+// --- object locks ---
+
+bool LockTable::owns(LockClient client, const Hold& lock) const {
+  if (lock.owner == client) return true;
+  const auto party = parties_.find(client);
+  return !lock.user.empty() && party != parties_.end() && party->second.user == lock.user;
+}
+
+LockTable::Locks::iterator LockTable::find_covering(std::string_view path) {
+  for (;;) {
+    if (const auto found = locks_.find(path); found != locks_.end()) return found;
+    const auto end = path.rfind('.');
+    if (end == std::string_view::npos) return locks_.end();
+    path = path.substr(0, end);
+  }
+}
+
+void LockTable::lock(LockClient client, const rr::LockWanted& wanted) {
+  const auto key = canonical_lock_path(wanted.path);
+  const auto below = locks_.lower_bound(key + ".");
+  const bool is_below = below != locks_.end() && rr::is_within(below->first, key);
+  if (is_below || find_covering(key) != locks_.end()) return answer(client, wanted.id, locked("Object already locked"));
+  if (locks_.size() >= max_locks)
+    return answer(client, wanted.id,
+                  rr::make_error(rr::ErrorCode::out_of_system_resource,
+                                 std::to_string(max_locks) + " objects of this service are locked already"));
+  const auto& party = parties_.at(client);
+  const bool is_for_user = wanted.command == rr::LockCommand::lock_for_user;
+  auto& lock = locks_[key];
+  lock.owner = lock.asker = client;
+  lock.session = party.session;
+  lock.name = party.user;
+  if (is_for_user) lock.user = party.user;
+  lock.path = wanted.path;
+  lock.request = wanted.id;
+  // To the device, the gateway's session is one client. As its user's, the lock would let in another gateway of the
+  // same account.
+  const auto command = party.has_own_session ? wanted.command : rr::LockCommand::lock_for_client;
+  ask(lock, Asking::take, lock.session, command);
+}
+
+void LockTable::unlock(LockClient client, const rr::LockWanted& wanted) {
+  const auto key = canonical_lock_path(wanted.path);
+  const auto& party = parties_.at(client);
+  const auto found = find_covering(key);
+  if (found == locks_.end()) {
+    // A device that has not gone, but was out of reach, may hold for a while what it gave to the session before.
+    const bool was_lost = lost_locks_.erase({client, key}) > 0;
+    if (!was_lost && !party.has_own_session) return answer(client, wanted.id, {});
+    auto& stale = locks_[key];
+    stale.path = wanted.path;
+    stale.asker = client;
+    stale.request = wanted.id;
+    stale.session = party.session;
+    return ask(stale, was_lost ? Asking::give_back : Asking::override_it, party.session, wanted.command);
+  }
+  auto& lock = found->second;
+  if (found->first != key) return answer(client, wanted.id, locked("Cannot release inherited lock"));
+  if (lock.asking != Asking::nothing)
+    return answer(client, wanted.id, locked("Object lock is being changed by another request"));
+  const bool is_owner = owns(client, lock) || (!lock.name.empty() && lock.name == party.user);
+  if (!is_owner && !party.has_own_session)
+    return answer(client, wanted.id,
+                  locked("Service locked by " + (lock.name.empty() ? "another client" : "user " + lock.name)));
+  lock.asker = client;
+  lock.request = wanted.id;
+  lock.path = wanted.path;
+  // Whether others' locks may be taken from them is for the device to say, which knows this user.
+  ask(lock, is_owner ? Asking::give_back : Asking::override_it, party.session, wanted.command);
+}
+
+/// From one who is gone, or has lost it.
+void LockTable::take_back_lock(Hold& lock, LockClient leaver) {
+  lock.owner = 0;
+  lock.user.clear();
+  lock.leaver = leaver;
+  if (lock.asking == Asking::nothing) ask(lock, Asking::give_back, lock.session, rr::LockCommand::unlock);
+}
+
+void LockTable::note_lost_lock(const std::string& key, const Hold& lock, const std::string& why) {
+  for (const auto& [client, party] : parties_)
+    if (owns(client, lock)) lost_locks_[{client, key}] = why;
+}
+
+void LockTable::lock_answered(Locks::iterator at, const rr::Result<>& result) {
+  auto& lock = at->second;
+  const auto was = std::exchange(lock.asking, Asking::nothing);
+  const auto asker = std::exchange(lock.asker, 0);
+  const auto session = lock.session;
+  const auto leaver = lock.leaver;
+  if (was == Asking::take && result && lock.owner != 0) {
+    std::erase_if(lost_locks_,
+                  [&](const auto& lost) { return lost.first.second == at->first && owns(lost.first.first, lock); });
+    return answer(asker, lock.request, {});
+  }
+  if (was == Asking::take && (result || is_unknown(result))) {  // given to nobody, or maybe given
+    answer(asker, lock.request, result);
+    return take_back_lock(lock, leaver);
+  }
+  if (was == Asking::override_it && !result && lock.owner != 0) return answer(asker, lock.request, result);
+  if (was == Asking::override_it && !result && leaver != 0) {
+    answer(asker, lock.request, result);
+    return take_back_lock(lock, leaver);
+  }
+  if (was == Asking::override_it && lock.owner != 0) note_lost_lock(at->first, lock, "another user has released it");
+  answer(asker, lock.request, result);
+  locks_.erase(at);
+  if (was == Asking::give_back && is_unknown(result)) events_.push_back(LockSessionInDoubt{session});
+  end_leaving(leaver);
+}
+
+// --- monitors ---
+
+void LockTable::enter(LockClient client, const rr::LockWanted& wanted, rr::TimePoint now) {
+  const auto key = canonical_lock_path(wanted.path);
+  handle_timeout(now);
+  const auto never = rr::TimePoint::max();
+  const Waiting waiting{client, wanted.id, wanted.path, wanted.timeout.count() < 0 ? never : now + wanted.timeout};
+  const auto found = monitors_.find(key);
+  if (found == monitors_.end()) {
+    if (monitors_.size() >= max_monitors)
+      return answer(client, wanted.id,
+                    rr::make_error(rr::ErrorCode::out_of_system_resource, "too many objects are monitor locked"));
+    lost_monitors_.erase({client, key});
+    return begin_entering(monitors_[key], waiting, now);
+  }
+  auto& monitor = found->second;
+  const bool is_waiting = std::any_of(monitor.queue.begin(), monitor.queue.end(),
+                                      [client](const Waiting& other) { return other.client == client; });
+  if (monitor.owner == client || is_waiting) return answer(client, wanted.id, already_entering());
+  lost_monitors_.erase({client, key});
+  if (wanted.timeout.count() == 0) return answer(client, wanted.id, too_late());
+  if (monitor.queue.size() >= max_waiting)
+    return answer(client, wanted.id,
+                  rr::make_error(rr::ErrorCode::out_of_system_resource, "too many clients wait for this monitor lock"));
+  monitor.queue.push_back(waiting);
+}
+
+void LockTable::begin_entering(Monitor& monitor, const Waiting& waiting, rr::TimePoint now) {
+  const auto& party = parties_.at(waiting.client);
+  monitor.owner = monitor.asker = waiting.client;
+  monitor.session = party.session;
+  monitor.name = party.user;
+  monitor.path = waiting.path;
+  monitor.request = waiting.request;
+  monitor.leaver = 0;
+  const auto left = waiting.deadline == rr::TimePoint::max()
+                        ? std::chrono::milliseconds(-1)
+                        : std::chrono::ceil<std::chrono::milliseconds>(waiting.deadline - now);
+  ask(monitor, Asking::take, party.session, rr::LockCommand::enter_monitor, left);
+}
+
+void LockTable::exit(LockClient client, const rr::LockWanted& wanted, rr::TimePoint now) {
+  const auto key = canonical_lock_path(wanted.path);
+  handle_timeout(now);
+  if (lost_monitors_.erase({client, key}) > 0) return answer(client, wanted.id, {});
+  const auto found = monitors_.find(key);
+  if (found == monitors_.end()) return answer(client, wanted.id, {});
+  auto& monitor = found->second;
+  const auto is_his = [client](const Waiting& waiting) { return waiting.client == client; };
+  if (const auto waiting = std::find_if(monitor.queue.begin(), monitor.queue.end(), is_his);
+      waiting != monitor.queue.end()) {
+    answer(client, waiting->request, invalid("Not acquiring monitor lock"));
+    monitor.queue.erase(waiting);
+  }
+  if (monitor.owner != client || monitor.asking != Asking::nothing) {
+    answer(client, wanted.id, invalid("Not monitor locked"));
+    if (monitor.owner == client && monitor.asking == Asking::take) {
+      answer(client, monitor.request, invalid("Not acquiring monitor lock"));
+      take_back_monitor(monitor, 0);
+    }
+    return;
+  }
+  monitor.asker = client;
+  monitor.request = wanted.id;
+  ask(monitor, Asking::give_back, monitor.session, wanted.command);
+}
+
+/// From one who is gone, or has had enough.
+void LockTable::take_back_monitor(Monitor& monitor, LockClient leaver) {
+  monitor.owner = monitor.asker = 0;
+  monitor.leaver = leaver;
+  if (monitor.asking == Asking::nothing)
+    ask(monitor, Asking::give_back, monitor.session, rr::LockCommand::exit_monitor);
+}
+
+void LockTable::lose_monitor(Monitor& monitor, const std::string& why) {
+  if (monitor.owner != 0) lost_monitors_[{monitor.owner, canonical_lock_path(monitor.path)}] = why;
+  monitor.owner = 0;
+}
+
+void LockTable::hand_on(Monitors::iterator at, rr::TimePoint now) {
+  auto& queue = at->second.queue;
+  while (!queue.empty()) {
+    const auto next = std::move(queue.front());
+    queue.pop_front();
+    if (now < next.deadline) return begin_entering(at->second, next, now);
+    answer(next.client, next.request, too_late());
+  }
+  monitors_.erase(at);
+}
+
+void LockTable::monitor_answered(Monitors::iterator at, const rr::Result<>& result, rr::TimePoint now) {
+  auto& monitor = at->second;
+  const auto was = std::exchange(monitor.asking, Asking::nothing);
+  const auto asker = std::exchange(monitor.asker, 0);
+  answer(asker, monitor.request, result);
+  if (was == Asking::take && result && monitor.owner != 0) {
+    monitor.idle_deadline = now + idle_timeout;
+    return;
+  }
+  if (was == Asking::take && (result || is_unknown(result))) return take_back_monitor(monitor, monitor.leaver);
+  if (is_unknown(result)) events_.push_back(LockSessionInDoubt{monitor.session});
+  const auto leaver = std::exchange(monitor.leaver, 0);
+  monitor.owner = 0;
+  hand_on(at, now);
+  end_leaving(leaver);
+}
+
+/// Owners that do nothing lose their monitor; who waits is told that it is too late.
+void LockTable::handle_timeout(rr::TimePoint now) {
+  for (auto& [key, monitor] : monitors_) {
+    std::erase_if(monitor.queue, [&](const Waiting& waiting) {
+      const bool is_late = waiting.deadline <= now;
+      if (is_late) answer(waiting.client, waiting.request, too_late());
+      return is_late;
+    });
+    if (monitor.owner == 0 || monitor.asking != Asking::nothing || now < monitor.idle_deadline) continue;
+    lose_monitor(monitor, "its owner was idle");
+    take_back_monitor(monitor, 0);
+  }
+}
+
+rr::TimePoint LockTable::poll_timeout() const {
+  auto next = rr::TimePoint::max();
+  for (const auto& [key, monitor] : monitors_) {
+    for (const auto& waiting : monitor.queue) next = std::min(next, waiting.deadline);
+    if (monitor.owner != 0 && monitor.asking == Asking::nothing) next = std::min(next, monitor.idle_deadline);
+  }
+  return next;
+}
+
+// --- requests of members ---
+
+bool LockTable::is_empty() const {
+  return locks_.empty() && monitors_.empty() && lost_locks_.empty() && lost_monitors_.empty();
+}
+
+rr::Result<> LockTable::check(LockClient client, std::string_view path, bool is_exempt, rr::TimePoint now) {
+  if (is_empty()) return {};
+  const auto key = canonical_lock_path(path);
+  if (!is_exempt) {
+    const auto lock = find_covering(key);
+    if (lock != locks_.end() && lock->second.owner != 0 && !owns(client, lock->second))
+      return locked("Object locked by " + (lock->second.name.empty() ? "another client" : lock->second.name));
+    for (auto lost = lost_locks_.lower_bound({client, ""}); lost != lost_locks_.end() && lost->first.first == client;
+         ++lost)
+      if (rr::is_within(key, lost->first.second))
+        return locked("the lock of " + rr::quoted(lost->first.second) +
+                      " is not this client's any more: " + lost->second + "; unlock it, or lock it again");
+  }
+  const auto found = monitors_.find(key);
+  if (found != monitors_.end()) {
+    auto& monitor = found->second;
+    if (monitor.owner != 0 && monitor.asking == Asking::nothing && now >= monitor.idle_deadline) handle_timeout(now);
+    if (monitor.owner != 0 && monitor.owner != client)
+      return invalid("Object is currently monitor locked. Use MonitorEnter to obtain monitor lock");
+    if (monitor.owner == client) monitor.idle_deadline = now + idle_timeout;
+  }
+  if (const auto lost = lost_monitors_.find({client, key}); lost != lost_monitors_.end())
+    return invalid("the monitor lock of " + rr::quoted(key) + " is not this client's any more: " + lost->second +
+                   "; exit it, or enter it again");
+  return {};
+}
+
+std::optional<LockEvent> LockTable::poll_event() {
+  if (events_.empty()) return std::nullopt;
+  auto event = std::move(events_.front());
+  events_.pop_front();
+  return event;
+}
+
+}  // namespace rrgate

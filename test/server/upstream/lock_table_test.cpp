@@ -1,0 +1,479 @@
+// Locks of a service that many clients share: transcripts of who asks, what the device is asked for, and what it says.
+#include "server/upstream/lock_table.hpp"
+
+#include <catch2/catch.hpp>
+
+using namespace rrgate;
+using rr::ErrorCode;
+using rr::LockCommand;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+namespace {
+
+constexpr LockSession shared = 1;  ///< the gateway's own session with the device
+constexpr LockSession alices = 2;
+constexpr LockSession alices_other = 3;
+constexpr LockSession roots = 4;
+
+struct Transcript {
+  LockTable table;
+  rr::TimePoint now{seconds(1000)};
+  rr::LockRequestId last_request = 0;
+
+  LockClient shares(LockClient client, std::string user = {}) {
+    table.add(client, {std::move(user), shared, false});
+    return client;
+  }
+  LockClient has_own(LockClient client, std::string user, LockSession session) {
+    table.add(client, {std::move(user), session, true});
+    return client;
+  }
+
+  void wants(LockClient client, LockCommand command, std::string path = "s", milliseconds timeout = milliseconds(-1)) {
+    table.handle_wanted(client, {++last_request, command, std::move(path), timeout}, now);
+  }
+  template <class Event>
+  Event next() {
+    auto event = table.poll_event();
+    REQUIRE(event);
+    REQUIRE(std::holds_alternative<Event>(*event));
+    return std::get<Event>(std::move(*event));
+  }
+  std::uint64_t asked(LockCommand command, LockSession session = shared, std::string path = "s") {
+    const auto event = next<LockAsked>();
+    CHECK(event.command == command);
+    CHECK(event.session == session);
+    CHECK(event.path == path);
+    return event.id;
+  }
+  void device_says(std::uint64_t ask, ErrorCode code = ErrorCode::none, std::string why = "the device says no") {
+    table.handle_answer(ask, code == ErrorCode::none ? rr::Result<>() : rr::make_error(code, std::move(why)), now);
+  }
+  void answered(LockClient client, ErrorCode code = ErrorCode::none) {
+    const auto event = next<LockAnswered>();
+    CHECK(event.client == client);
+    CHECK((event.result ? ErrorCode::none : event.result.error().code) == code);
+  }
+  void left(LockClient client) { CHECK(next<LockClientLeft>().client == client); }
+  void nothing_more() { CHECK_FALSE(table.poll_event()); }
+
+  /// The whole way to a lock that is held.
+  void takes(LockClient client, LockCommand command, LockSession session = shared, std::string path = "s") {
+    wants(client, command, path);
+    const bool is_shared = session == shared && command == LockCommand::lock_for_user;
+    device_says(asked(is_shared ? LockCommand::lock_for_client : command, session, path));
+    answered(client);
+  }
+  ErrorCode use(LockClient client, std::string_view path = "s", bool is_exempt = false) {
+    const auto allowed = table.check(client, path, is_exempt, now);
+    return allowed ? ErrorCode::none : allowed.error().code;
+  }
+  bool may(LockClient client, std::string_view path = "s", bool is_exempt = false) {
+    return use(client, path, is_exempt) == ErrorCode::none;
+  }
+};
+
+const std::initializer_list<LockCommand> any_lock = {LockCommand::lock_for_user, LockCommand::lock_for_client};
+
+}  // namespace
+
+TEST_CASE("clients that share a session are kept from an object by the lock of one of them") {
+  for (const auto command : any_lock) {
+    Transcript t;
+    const auto holder = t.shares(1), other = t.shares(2);
+    CHECK(t.may(other));
+    t.takes(holder, command);
+    CHECK(t.may(holder));
+    CHECK(t.may(holder, "s.tool"));
+    CHECK(t.use(other) == ErrorCode::object_locked_error);
+    CHECK(t.use(other, "s.tool") == ErrorCode::object_locked_error);
+    CHECK(t.may(other, "s", true));
+    t.wants(holder, LockCommand::unlock);
+    t.device_says(t.asked(LockCommand::unlock));
+    t.answered(holder);
+    CHECK(t.may(other));
+    t.nothing_more();
+  }
+}
+
+TEST_CASE("others are kept out from the moment in which the device is asked") {
+  Transcript t;
+  const auto holder = t.shares(1), other = t.shares(2);
+  t.wants(holder, LockCommand::lock_for_client);
+  CHECK_FALSE(t.may(other));
+  t.device_says(t.asked(LockCommand::lock_for_client), ErrorCode::object_locked_error);
+  t.answered(holder, ErrorCode::object_locked_error);
+  CHECK(t.may(other));
+  CHECK(t.may(holder));
+}
+
+TEST_CASE("locks do not overlap") {
+  Transcript t;
+  const auto holder = t.shares(1), other = t.shares(2);
+  t.takes(holder, LockCommand::lock_for_client, shared, "s.a");
+  for (const auto client : {holder, other})
+    for (const auto* path : {"s", "s.a", "s.a.b"}) {
+      t.wants(client, LockCommand::lock_for_client, path);
+      t.answered(client, ErrorCode::object_locked_error);
+    }
+  t.takes(other, LockCommand::lock_for_client, shared, "s.ab");
+  CHECK(t.may(other, "s"));
+  t.wants(holder, LockCommand::unlock, "s.a.b");  // inherited
+  t.answered(holder, ErrorCode::object_locked_error);
+}
+
+TEST_CASE("an object has one lock however its path is written") {
+  CHECK(canonical_lock_path("s.tools[1]") == "s.tools[1]");
+  for (const auto* path : {"s.tools[01]", "s.tools[%31]", "s.tools[%2b1]", "s.tools[%2b001]"})
+    CHECK(canonical_lock_path(path) == "s.tools[1]");
+  CHECK(canonical_lock_path("s.tools[-01].x") == canonical_lock_path("s.tools[-1].x"));
+  CHECK(canonical_lock_path("s.tools[10]") != canonical_lock_path("s.tools[1]"));
+  CHECK(canonical_lock_path("s.named[%61%2Eb]") == canonical_lock_path("s.named[a%2eb]"));
+  Transcript t;
+  const auto holder = t.shares(1), other = t.shares(2);
+  t.takes(holder, LockCommand::lock_for_client, shared, "s.tools[%31]");
+  CHECK_FALSE(t.may(other, "s.tools[1]"));
+  CHECK_FALSE(t.may(other, "s.tools[01].tip"));
+  CHECK(t.may(other, "s.tools[10]"));
+}
+
+TEST_CASE("only the holder unlocks, and unlocking nothing is no error") {
+  Transcript t;
+  const auto holder = t.shares(1), other = t.shares(2);
+  t.wants(other, LockCommand::unlock);
+  t.answered(other);
+  t.takes(holder, LockCommand::lock_for_client);
+  t.wants(other, LockCommand::unlock);
+  t.answered(other, ErrorCode::object_locked_error);
+  CHECK_FALSE(t.may(other));
+  t.nothing_more();
+}
+
+TEST_CASE("a user's lock is for all clients of his, and lasts as long as one of them") {
+  Transcript t;
+  const auto alice = t.shares(1, "alice"), again = t.shares(2, "alice"), bob = t.shares(3, "bob"), nobody = t.shares(4);
+  t.takes(alice, LockCommand::lock_for_user);
+  CHECK(t.may(again));
+  CHECK_FALSE(t.may(bob));
+  CHECK_FALSE(t.may(nobody));
+  t.table.remove(alice, t.now);
+  t.left(alice);
+  CHECK(t.may(again));
+  CHECK_FALSE(t.may(bob));
+  t.table.remove(again, t.now);
+  t.device_says(t.asked(LockCommand::unlock));
+  t.left(again);
+  CHECK(t.may(bob));
+}
+
+TEST_CASE("a client's lock is for no other client of its user") {
+  Transcript t;
+  const auto alice = t.shares(1, "alice"), again = t.shares(2, "alice");
+  t.takes(alice, LockCommand::lock_for_client);
+  CHECK_FALSE(t.may(again));
+  t.wants(again, LockCommand::unlock);  // but one user may unlock it
+  t.device_says(t.asked(LockCommand::unlock));
+  t.answered(again);
+  CHECK(t.may(again));
+}
+
+TEST_CASE("a client that leaves is told so once its locks are given back") {
+  Transcript t;
+  const auto holder = t.shares(1), other = t.shares(2);
+  SECTION("held") {
+    t.takes(holder, LockCommand::lock_for_client, shared, "s.a");
+    t.takes(holder, LockCommand::lock_for_client, shared, "s.b");
+    t.table.remove(holder, t.now);
+    const auto first = t.asked(LockCommand::unlock, shared, "s.a");
+    const auto second = t.asked(LockCommand::unlock, shared, "s.b");
+    t.device_says(first);
+    t.nothing_more();
+    t.device_says(second);
+    t.left(holder);
+  }
+  SECTION("asked for") {
+    t.wants(holder, LockCommand::lock_for_client, "s.a");
+    const auto ask = t.asked(LockCommand::lock_for_client, shared, "s.a");
+    t.table.remove(holder, t.now);
+    t.nothing_more();
+    t.device_says(ask);
+    t.answered(holder);
+    t.device_says(t.asked(LockCommand::unlock, shared, "s.a"));
+    t.left(holder);
+  }
+  SECTION("being unlocked") {
+    t.takes(holder, LockCommand::lock_for_client, shared, "s.a");
+    t.wants(holder, LockCommand::unlock, "s.a");
+    const auto ask = t.asked(LockCommand::unlock, shared, "s.a");
+    t.table.remove(holder, t.now);
+    t.nothing_more();
+    t.device_says(ask);
+    t.answered(holder);
+    t.left(holder);
+  }
+  SECTION("nothing") {
+    t.table.remove(holder, t.now);
+    t.left(holder);
+  }
+  t.takes(other, LockCommand::lock_for_client, shared, "s");
+}
+
+TEST_CASE("a holder whose lock was lost with the device is refused until he knows it") {
+  Transcript t;
+  const auto holder = t.shares(1), other = t.shares(2);
+  t.takes(holder, LockCommand::lock_for_client);
+  t.table.handle_lost(shared, t.now);
+  CHECK(t.use(holder) == ErrorCode::object_locked_error);
+  CHECK(t.use(holder, "s.tool") == ErrorCode::object_locked_error);
+  CHECK(t.may(holder, "s", true));
+  CHECK(t.may(other));
+  SECTION("he locks it again") {
+    t.takes(holder, LockCommand::lock_for_client);
+    CHECK(t.may(holder));
+    CHECK_FALSE(t.may(other));
+  }
+  SECTION("he unlocks it, at the device too, which may have kept it") {
+    t.wants(holder, LockCommand::unlock);
+    t.device_says(t.asked(LockCommand::unlock));
+    t.answered(holder);
+    CHECK(t.may(holder));
+    CHECK(t.may(other));
+  }
+  SECTION("another one was quicker") {
+    t.takes(other, LockCommand::lock_for_client);
+    CHECK(t.may(other));
+    t.wants(holder, LockCommand::lock_for_client);
+    t.answered(holder, ErrorCode::object_locked_error);
+    CHECK_FALSE(t.may(holder));
+    t.wants(holder, LockCommand::unlock);
+    t.answered(holder, ErrorCode::object_locked_error);
+    CHECK(t.may(other));
+  }
+}
+
+TEST_CASE("a lock that the device gives while its session ends is nobody's") {
+  Transcript t;
+  const auto holder = t.shares(1), other = t.shares(2);
+  t.wants(holder, LockCommand::lock_for_client);
+  const auto ask = t.asked(LockCommand::lock_for_client);
+  t.table.handle_lost(shared, t.now);
+  t.device_says(ask, ErrorCode::connection_error);
+  t.answered(holder, ErrorCode::connection_error);
+  CHECK(t.may(other));
+  CHECK(t.may(holder));
+}
+
+TEST_CASE("a lock that the device may have given without saying so is taken back") {
+  Transcript t;
+  const auto holder = t.shares(1), other = t.shares(2);
+  t.wants(holder, LockCommand::lock_for_client);
+  t.device_says(t.asked(LockCommand::lock_for_client), ErrorCode::request_timeout);
+  t.answered(holder, ErrorCode::request_timeout);
+  const auto back = t.asked(LockCommand::unlock);
+  t.wants(other, LockCommand::lock_for_client);
+  t.answered(other, ErrorCode::object_locked_error);
+  SECTION("it says that it is free") {
+    t.device_says(back);
+  }
+  SECTION("it says nothing: the session ends") {
+    t.device_says(back, ErrorCode::request_timeout);
+    CHECK(t.next<LockSessionInDoubt>().session == shared);
+  }
+  t.takes(other, LockCommand::lock_for_client);
+}
+
+TEST_CASE("clients with sessions of their own lock as the users that they are at the device") {
+  Transcript t;
+  const auto alice = t.has_own(1, "alice", alices), again = t.has_own(2, "alice", alices_other);
+  const auto root = t.has_own(3, "root", roots), nobody = t.shares(4);
+  SECTION("a user's lock") {
+    t.takes(alice, LockCommand::lock_for_user, alices);
+    CHECK(t.may(again));
+    CHECK_FALSE(t.may(root));
+    CHECK_FALSE(t.may(nobody));
+    t.table.remove(alice, t.now);
+    t.left(alice);  // its session ends, the lock stays with the other
+    CHECK(t.may(again));
+    CHECK_FALSE(t.may(root));
+    t.table.remove(again, t.now);
+    t.left(again);
+    CHECK(t.may(root));
+  }
+  SECTION("a client's lock ends with its session") {
+    t.takes(alice, LockCommand::lock_for_client, alices);
+    CHECK_FALSE(t.may(again));
+    t.table.remove(alice, t.now);
+    t.left(alice);
+    CHECK(t.may(again));
+  }
+  SECTION("a restart of the device is heard of by one session after the other") {
+    t.takes(alice, LockCommand::lock_for_user, alices);
+    t.table.handle_lost(alices_other, t.now);
+    CHECK(t.use(alice) == ErrorCode::object_locked_error);
+    CHECK(t.use(again) == ErrorCode::object_locked_error);
+    CHECK(t.may(nobody));
+  }
+  SECTION("the device says who may release another user's lock") {
+    t.takes(alice, LockCommand::lock_for_client, alices);
+    t.wants(root, LockCommand::unlock);
+    const auto ask = t.asked(LockCommand::unlock, roots);
+    CHECK(t.may(alice));
+    SECTION("not he") {
+      t.device_says(ask, ErrorCode::object_locked_error);
+      t.answered(root, ErrorCode::object_locked_error);
+      CHECK(t.may(alice));
+      CHECK_FALSE(t.may(root));
+    }
+    SECTION("he may: the holder hears of it") {
+      t.device_says(ask);
+      t.answered(root);
+      CHECK(t.use(alice) == ErrorCode::object_locked_error);
+      CHECK(t.may(root));
+      t.takes(alice, LockCommand::lock_for_client, alices);
+      CHECK(t.may(alice));
+    }
+    SECTION("the holder leaves meanwhile") {
+      t.table.remove(alice, t.now);
+      t.device_says(ask, ErrorCode::object_locked_error);
+      t.answered(root, ErrorCode::object_locked_error);
+      t.device_says(t.asked(LockCommand::unlock, alices), ErrorCode::connection_error);
+      t.left(alice);
+      CHECK(t.may(root));
+    }
+    SECTION("the holder's session is lost meanwhile") {
+      t.table.handle_lost(alices, t.now);
+      CHECK_FALSE(t.may(alice));
+      t.device_says(ask, ErrorCode::object_locked_error);
+      t.answered(root, ErrorCode::object_locked_error);
+      CHECK_FALSE(t.may(alice));
+      CHECK(t.may(root));
+    }
+  }
+  SECTION("a lock that nobody here holds is the device's affair") {
+    t.wants(root, LockCommand::unlock);
+    t.device_says(t.asked(LockCommand::unlock, roots), ErrorCode::object_locked_error);
+    t.answered(root, ErrorCode::object_locked_error);
+    CHECK(t.may(root));
+  }
+}
+
+TEST_CASE("a lock ends with its object") {
+  Transcript t;
+  const auto holder = t.shares(1), other = t.shares(2);
+  t.takes(holder, LockCommand::lock_for_client, shared, "s.a.b");
+  t.table.handle_released("s.a", t.now);
+  CHECK_FALSE(t.may(holder, "s.a.b"));
+  CHECK(t.may(other, "s.a.b"));
+  t.device_says(t.asked(LockCommand::unlock, shared, "s.a.b"), ErrorCode::object_not_found);
+  t.nothing_more();
+  t.takes(other, LockCommand::lock_for_client, shared, "s.a.b");
+}
+
+TEST_CASE("clients that share a session take turns in a monitor") {
+  Transcript t;
+  const auto first = t.shares(1), second = t.shares(2), third = t.shares(3);
+  t.takes(first, LockCommand::enter_monitor);
+  CHECK(t.may(first));
+  CHECK(t.use(second) == ErrorCode::invalid_operation);
+  CHECK(t.use(second, "s", true) == ErrorCode::invalid_operation);
+  CHECK(t.may(second, "s.tool"));
+  t.wants(first, LockCommand::enter_monitor);
+  t.answered(first, ErrorCode::invalid_operation);
+  t.wants(second, LockCommand::enter_monitor);
+  t.wants(third, LockCommand::enter_monitor);
+  t.nothing_more();
+  t.wants(first, LockCommand::exit_monitor);
+  t.device_says(t.asked(LockCommand::exit_monitor));
+  t.answered(first);
+  t.device_says(t.asked(LockCommand::enter_monitor));
+  t.answered(second);
+  CHECK_FALSE(t.may(first));
+  CHECK(t.may(second));
+  t.table.remove(second, t.now);
+  t.device_says(t.asked(LockCommand::exit_monitor));
+  t.device_says(t.asked(LockCommand::enter_monitor));
+  t.left(second);
+  t.answered(third);
+  CHECK(t.may(third));
+}
+
+TEST_CASE("who waits for a monitor waits no longer than he wants to") {
+  Transcript t;
+  const auto first = t.shares(1), second = t.shares(2);
+  t.takes(first, LockCommand::enter_monitor);
+  t.wants(second, LockCommand::enter_monitor, "s", milliseconds(0));
+  t.answered(second, ErrorCode::operation_timeout);
+  t.wants(second, LockCommand::enter_monitor, "s", milliseconds(100));
+  CHECK(t.table.poll_timeout() == t.now + milliseconds(100));
+  t.now += milliseconds(100);
+  t.table.handle_timeout(t.now);
+  t.answered(second, ErrorCode::operation_timeout);
+  t.wants(second, LockCommand::enter_monitor);
+  t.wants(second, LockCommand::exit_monitor);
+  t.answered(second, ErrorCode::invalid_operation);  // the wait
+  t.answered(second, ErrorCode::invalid_operation);
+  t.wants(first, LockCommand::exit_monitor);
+  t.device_says(t.asked(LockCommand::exit_monitor));
+  t.answered(first);
+  t.nothing_more();
+}
+
+TEST_CASE("the owner of a monitor who is idle has lost it, and is told") {
+  Transcript t;
+  const auto first = t.shares(1), second = t.shares(2);
+  t.takes(first, LockCommand::enter_monitor);
+  t.now += seconds(20);
+  CHECK(t.may(first));
+  t.wants(second, LockCommand::enter_monitor);
+  CHECK(t.table.poll_timeout() == t.now + seconds(25));
+  t.now += seconds(25);
+  t.table.handle_timeout(t.now);
+  const auto ask = t.asked(LockCommand::exit_monitor);
+  CHECK_FALSE(t.may(first));
+  t.device_says(ask, ErrorCode::invalid_operation);  // the device knows it already
+  t.device_says(t.asked(LockCommand::enter_monitor));
+  t.answered(second);
+  CHECK(t.may(second));
+  CHECK_FALSE(t.may(first));
+  t.wants(second, LockCommand::exit_monitor);
+  t.device_says(t.asked(LockCommand::exit_monitor));
+  t.answered(second);
+  CHECK(t.use(first) == ErrorCode::invalid_operation);  // still: he has not said that he knows
+  t.wants(first, LockCommand::exit_monitor);
+  t.answered(first);
+  CHECK(t.may(first));
+}
+
+TEST_CASE("the owner of a monitor that was lost with the device is told") {
+  Transcript t;
+  const auto first = t.shares(1), second = t.shares(2);
+  t.takes(first, LockCommand::enter_monitor);
+  t.wants(second, LockCommand::enter_monitor);
+  t.table.handle_lost(shared, t.now);
+  CHECK(t.use(first) == ErrorCode::invalid_operation);
+  t.device_says(t.asked(LockCommand::enter_monitor), ErrorCode::connection_error);
+  t.answered(second, ErrorCode::connection_error);
+  CHECK(t.may(second));
+  CHECK(t.use(first) == ErrorCode::invalid_operation);
+  t.takes(first, LockCommand::enter_monitor);
+  CHECK(t.may(first));
+  CHECK_FALSE(t.may(second));
+}
+
+TEST_CASE("a monitor that the device gives to one who has left goes to the next") {
+  Transcript t;
+  const auto first = t.shares(1), second = t.shares(2);
+  t.wants(first, LockCommand::enter_monitor);
+  const auto ask = t.asked(LockCommand::enter_monitor);
+  CHECK_FALSE(t.may(second));
+  t.wants(second, LockCommand::enter_monitor);
+  t.table.remove(first, t.now);
+  t.nothing_more();
+  t.device_says(ask);
+  t.device_says(t.asked(LockCommand::exit_monitor));
+  t.device_says(t.asked(LockCommand::enter_monitor));
+  t.left(first);
+  t.answered(second);
+  CHECK(t.may(second));
+}
