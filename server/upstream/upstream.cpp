@@ -51,19 +51,23 @@ Upstream::Upstream(std::shared_ptr<Device> device, std::string service, Upstream
 
 rr::awaitable<rr::Result<>> Upstream::open() {
   const auto self = shared_from_this();
-  auto opened = co_await open_connection(false);
+  const bool has_login = !login_.username.empty();
+  // One login is for all services of a device, which may want it while they are connected to, later, or not at all:
+  // that is found out without it.
+  const bool is_for_all = has_login && use_ == UpstreamUse::all_clients;
+  auto opened = co_await open_connection(is_for_all || login_.is_late ? std::string() : login_.username, false);
+  const bool wants_user = !opened && opened.error().code == rr::ErrorCode::authentication_error;
   // Whoever has no login may look at the service, and so may his clients; what they do is for the device to refuse.
-  requires_user_ = !opened && login_.username.empty() && opened.error().code == rr::ErrorCode::authentication_error;
-  if (requires_user_) opened = co_await open_connection(true);
+  requires_user_ = wants_user && !has_login;
+  if (requires_user_) opened = co_await open_connection({}, true);
+  if (wants_user && is_for_all) opened = co_await open_connection(login_.username, false);
   if (!opened) co_return opened.error();
-  if (login_.is_late) {
-    const rr::AsyncObject root(*opened, service_);
-    const rr::Value credentials(login_.credentials);
-    try {
-      co_await root.authenticate(login_.username, credentials);
-    } catch (const rr::Exception& exception) {
+  if (login_.is_late || (is_for_all && !wants_user)) {
+    const auto done = co_await log_in(*opened);
+    const bool knows_no_users = !done && done.error().code == rr::ErrorCode::invalid_operation;
+    if (!done && !(is_for_all && knows_no_users)) {
       (*opened)->disconnect();
-      co_return exception.error();
+      co_return done.error();
     }
   }
   connection_ = std::move(*opened);
@@ -80,13 +84,25 @@ rr::awaitable<rr::Result<>> Upstream::open() {
   co_return rr::Result<>();
 }
 
-rr::awaitable<rr::Result<std::shared_ptr<rr::ClientConnection>>> Upstream::open_connection(bool is_stepwise) {
+rr::awaitable<rr::Result<std::shared_ptr<rr::ClientConnection>>> Upstream::open_connection(std::string username,
+                                                                                           bool is_stepwise) {
   auto stream = co_await device_->connect();
   if (!stream) co_return rr::make_error(rr::ErrorCode::connection_error, device_->offline_text(stream.error()));
   const auto& url = device_->config().url;
   const rr::NodeIdentity target{url.node_id.value_or(rr::NodeId{}), url.node_name};
-  const std::string username = login_.is_late ? std::string() : login_.username;
   co_return co_await open_session(std::move(*stream), service_, target, username, login_.credentials, is_stepwise);
+}
+
+/// Errors   also invalid_operation: the service knows no users.
+rr::awaitable<rr::Result<>> Upstream::log_in(std::shared_ptr<rr::ClientConnection> connection) {
+  const rr::AsyncObject root(connection, service_);
+  const rr::Value credentials(login_.credentials);
+  try {
+    co_await root.authenticate(login_.username, credentials);
+  } catch (const rr::Exception& exception) {
+    co_return exception.error();
+  }
+  co_return rr::Result<>();
 }
 
 void Upstream::close(std::function<void()> closed) {

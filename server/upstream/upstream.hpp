@@ -183,7 +183,9 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
     std::uint64_t number = 0;
   };
 
-  rr::awaitable<rr::Result<std::shared_ptr<rr::ClientConnection>>> open_connection(bool is_stepwise);
+  rr::awaitable<rr::Result<std::shared_ptr<rr::ClientConnection>>> open_connection(std::string username,
+                                                                                   bool is_stepwise);
+  rr::awaitable<rr::Result<>> log_in(std::shared_ptr<rr::ClientConnection> connection);
   /// Whether the client is there still: what is told to one may end it.
   bool has(const UpstreamClient& client) const;
   void lost(const rr::Error& reason);

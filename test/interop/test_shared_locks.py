@@ -54,6 +54,14 @@ def site_with_monitors(node, tmp_path):
     made.stop()
 
 
+# --- logins of the gateway ---
+
+
+def test_the_gateways_login_is_for_the_services_that_want_one(site):
+    whose = {"guarded": "gateway", "open": "gateway", "plain": ""}
+    assert {service: site.connect(service).who() for service in whose} == whose
+
+
 # --- locks ---
 
 
