@@ -18,6 +18,7 @@ Verb verb_of(rr::EntryType type) {
     case rr::EntryType::generator_next_req:
       return Verb::call;
     case rr::EntryType::event_req:
+    case rr::EntryType::callback_call_req:
     case rr::EntryType::pipe_connect_req:
     case rr::EntryType::pipe_disconnect_req:
     case rr::EntryType::wire_connect_req:
@@ -30,10 +31,11 @@ Verb verb_of(rr::EntryType type) {
   }
 }
 
-/// Of these there may be thousands a second: they are held to the rules, but their beginning alone is recorded.
+/// Of these there may be thousands a second: they are held to the rules, but their beginning alone is recorded. Nor is
+/// what the device does by itself.
 bool is_part_of_stream(rr::EntryType type) {
   return type == rr::EntryType::wire_packet || type == rr::EntryType::pipe_packet || type == rr::EntryType::event_req ||
-         type == rr::EntryType::generator_next_req;
+         type == rr::EntryType::callback_call_req || type == rr::EntryType::generator_next_req;
 }
 
 }  // namespace
@@ -44,14 +46,16 @@ std::function<rr::Result<>(const rr::MemberAccess&)> make_admission(Access& acce
     if (access.is_open()) return {};
     const auto service = wanted.path.substr(0, wanted.path.find('.'));
     if (service == rr::service_index_name) return {};  // as for nodes: what there is, is no secret
-    AccessRequest request;
     const auto device = node.device_of(service);
+    const auto& asker = wanted.user ? access.logged_in(*wanted.user, who.client) : who;
+    // What makes the device look for an object, which may be on the way to another.
+    if (wanted.type == rr::EntryType::object_type_name && access.sees(asker, device, service)) return {};
+    AccessRequest request;
     request.device = device;
     request.service = service;
     request.path = wanted.path;
     if (wanted.member) request.member = wanted.member->name;
     request.verb = verb_of(wanted.type);
-    const auto& asker = wanted.user ? access.logged_in(*wanted.user, who.client) : who;
     if (is_part_of_stream(wanted.type)) return access.state().rules.check(asker, request);
     return access.check(asker, request);
   };

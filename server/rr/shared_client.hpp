@@ -74,6 +74,9 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   // UpstreamClient
   std::weak_ptr<const void> life() const override { return weak_from_this(); }
   std::string lock_user() const override { return session_.user() ? session_.user()->name : std::string(); }
+  bool may_answer(const std::string& path, const rr::MemberDefinition& callback) const override {
+    return session_.admits(rr::EntryType::callback_call_req, path, callback);
+  }
   void receive_event(const std::string& path, const rr::MemberDefinition& event,
                      std::span<const rr::Value> arguments) override;
   void receive_wire(rr::WirePacket& packet) override;

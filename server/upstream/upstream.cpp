@@ -400,12 +400,17 @@ void Upstream::ask_for_lock(rr::LockCommand command, const std::string& path, st
 
 // --- callbacks ---
 
-UpstreamClient* Upstream::owner_of_callback(const std::string& path) const {
-  const auto here =
-      std::find_if(calls_.rbegin(), calls_.rend(), [&](const OpenCall& call) { return call.path == path; });
-  if (here != calls_.rend()) return here->client;
-  if (!calls_.empty()) return calls_.back().client;
-  return clients_.size() == 1 ? clients_.front() : nullptr;
+/// Null where it could be several clients: it is not guessed who is asked, say, whether the robot may move.
+UpstreamClient* Upstream::owner_of_callback(const std::string& path,
+                                            const std::vector<UpstreamClient*>& candidates) const {
+  if (candidates.size() == 1) return candidates.front();
+  UpstreamClient* owner = nullptr;
+  for (const auto& call : calls_) {
+    if (call.path != path || std::find(candidates.begin(), candidates.end(), call.client) == candidates.end()) continue;
+    if (owner && owner != call.client) return nullptr;
+    owner = call.client;
+  }
+  return owner;
 }
 
 void Upstream::route_callback(const std::string& path, const rr::MemberDefinition& callback,
@@ -417,14 +422,16 @@ void Upstream::route_callback(const std::string& path, const rr::MemberDefinitio
       policy = rule.policy;
       break;
     }
-  if (policy == CallbackPolicy::all && !clients_.empty()) {
+  std::vector<UpstreamClient*> candidates;
+  for (auto* client : clients_)
+    if (client->may_answer(path, callback)) candidates.push_back(client);
+  if (policy == CallbackPolicy::all && !candidates.empty()) {
     struct Votes {
       std::size_t left;
       bool is_answered = false;
     };
-    const auto votes = std::make_shared<Votes>(Votes{clients_.size()});
-    const auto clients = clients_;
-    for (auto* client : clients)
+    const auto votes = std::make_shared<Votes>(Votes{candidates.size()});
+    for (auto* client : candidates)
       client->call_callback(path, callback, arguments, [votes, answer](const rr::Result<rr::Value>& vote) {
         --votes->left;
         if (votes->is_answered || (!vote && votes->left > 0)) return;
@@ -433,11 +440,13 @@ void Upstream::route_callback(const std::string& path, const rr::MemberDefinitio
       });
     return;
   }
-  auto* client = policy == CallbackPolicy::first && !clients_.empty() ? clients_.front() : owner_of_callback(path);
+  const bool is_first = policy == CallbackPolicy::first && !candidates.empty();
+  auto* client = is_first ? candidates.front() : owner_of_callback(path, candidates);
   if (client) return client->call_callback(path, callback, arguments, answer);
-  answer(
-      rr::make_error(rr::ErrorCode::invalid_operation, "Callback function not set: " + std::to_string(clients_.size()) +
-                                                           " clients share this session and none of them is meant"));
+  answer(rr::make_error(
+      rr::ErrorCode::invalid_operation,
+      "Callback function not set: " + std::to_string(clients_.size()) +
+          " clients share this session and none of them is meant; \"callbacks\" of the device says who answers"));
 }
 
 }  // namespace rrgate

@@ -45,6 +45,8 @@ class UpstreamClient {
   virtual std::weak_ptr<const void> life() const = 0;
   /// Whose user locks are this client's too; empty: nobody's.
   virtual std::string lock_user() const { return {}; }
+  /// Whether the device may ask it by this callback.
+  virtual bool may_answer(const std::string& path, const rr::MemberDefinition& callback) const = 0;
   virtual void receive_event(const std::string& path, const rr::MemberDefinition& event,
                              std::span<const rr::Value> arguments) = 0;
   virtual void receive_wire(rr::WirePacket& packet) = 0;
@@ -215,7 +217,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   void pass_back_acks(PipeNumber number, std::span<const std::uint32_t> numbers);
   void route_callback(const std::string& path, const rr::MemberDefinition& callback,
                       std::span<const rr::Value> arguments, const rr::ClientConnection::CallbackReply& answer);
-  UpstreamClient* owner_of_callback(const std::string& path) const;
+  UpstreamClient* owner_of_callback(const std::string& path, const std::vector<UpstreamClient*>& candidates) const;
 
   std::shared_ptr<Device> device_;
   std::string service_;

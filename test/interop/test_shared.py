@@ -388,3 +388,32 @@ def test_rights_member_by_member(node, tmp_path):
     finally:
         gateway.stop()
         service.stop()
+
+
+def test_who_may_do_nothing_answers_no_callback_and_makes_the_device_look_for_nothing(node, tmp_path):
+    service, url = start_service(tmp_path)
+    make_users(tmp_path)
+    device = {"mode": "shared", "callbacks": [{"member": "interop.ask", "answer": "first"}]}
+    gateway, port = start_gateway(tmp_path, url, device=device, access={"users_file": "users", "rules": RULES},
+                                  is_up=lambda: "device online device=interop" in (tmp_path / "gateway.log").read_text())
+    shared_url = f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop"
+    try:
+        nobody = node.ConnectService(shared_url)
+        asked = News()
+
+        def answer(question):
+            asked.add(question)
+            return 1.0
+        nobody.ask.Function = answer
+        with pytest.raises(RR.PermissionDeniedException):
+            nobody.get_parts(7)
+        root = node.ConnectService(shared_url, "root", {"password": RR.VarValue(PASSWORDS["root"], "string")})
+        root.ask.Function = lambda question: 2.0
+        root.start_ask("may it?")
+        gateway.wait_until(lambda: root.answered == 2.0)
+        assert asked.all() == []
+        for each in (nobody, root):
+            node.DisconnectService(each)
+    finally:
+        gateway.stop()
+        service.stop()

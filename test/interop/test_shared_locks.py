@@ -54,6 +54,51 @@ def site_with_monitors(node, tmp_path):
     made.stop()
 
 
+# --- callbacks ---
+
+
+def test_a_callback_that_may_be_for_several_clients_is_for_none(site):
+    """Each of them is in a call of the same object: the gateway can't know whose call the device asks about."""
+    first, second = site.connect("plain"), site.connect("plain")
+    asked = News()
+
+    def confirm(number):
+        def answer(question):
+            asked.add((number, question))
+            return f"from {number}"
+        return answer
+    first.confirm.Function, second.confirm.Function = confirm(1), confirm(2)
+    assert second.ask("are you there?") == "from 2"
+    moving = Call(lambda: first.move(1.0))
+    site.gateway.wait_until(lambda: first.moving == 1)
+    with pytest.raises(RR.InvalidOperationException, match="none of them is meant"):
+        second.ask("may it move?")
+    second.finish()
+    assert moving.result() == 1.0
+    assert second.ask("may it move now?") == "from 2"
+    assert asked.all() == [(2, "are you there?"), (2, "may it move now?")]
+
+
+
+def test_a_callback_is_not_for_a_client_that_calls_another_object(site):
+    holder, second = site.connect("plain"), site.connect("plain")
+    asked = News()
+
+    def confirm(question):
+        asked.add(question)
+        return "yes"
+    holder.confirm.Function = confirm
+    tool = holder.get_tool()
+    holding = Call(tool.hold)
+    site.gateway.wait_until(lambda: second.moving == 1)
+    second.ask_later("may it?")
+    site.gateway.wait_until(lambda: second.answered != "")
+    assert second.answered == "RobotRaconteur.InvalidOperation"
+    assert asked.all() == []
+    second.finish()
+    holding.result()
+
+
 # --- logins of the gateway ---
 
 

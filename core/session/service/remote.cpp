@@ -57,6 +57,7 @@ bool ServiceSession::must_wait_for_object(const MessageEntry& entry) const {
 }
 
 Result<> ServiceSession::park(const Message& message, const MessageEntry& entry) {
+  if (auto admitted = admit(EntryType::object_type_name, entry.service_path, nullptr); !admitted) return admitted;
   const auto path = parse_service_path(entry.service_path);
   if (!path) return path.error();
   if (path->front().name != service_->name())

@@ -280,6 +280,10 @@ class ServiceSession {
   }
   /// Of all wires and pipes that the client ever had connected here.
   Ledgers total_ledgers() const;
+  /// Whether ServiceSessionOptions::admit lets the client have this of a member.
+  bool admits(EntryType type, std::string_view path, const MemberDefinition& member) const {
+    return admit(type, path, &member).has_value();
+  }
   /// Who has logged in; nullptr while nobody has.
   const AuthenticatedUser* user() const { return user_ ? &*user_ : nullptr; }
   /// This side's number of the session; 0 before the client is connected.

@@ -292,6 +292,22 @@ TEST_CASE("a remote service hears that its client is another user") {
   CHECK(pair.completion(logout));
 }
 
+TEST_CASE("whoever may do nothing makes a remote service look for nothing") {
+  Loopback pair;
+  pair.directory.find("arm")->set_remote();
+  ServiceSessionOptions options;
+  options.admit = [](const MemberAccess& access) -> Result<> {
+    CHECK(access.type == EntryType::object_type_name);
+    CHECK(access.path == "arm.tool");
+    return make_error(ErrorCode::permission_denied, "not you");
+  };
+  pair.service = std::make_unique<ServiceSession>(pair.directory, options, pair.now);
+  pair.connect();
+  const auto looked_up = pair.client->find_object("arm.tool", pair.now);
+  CHECK(pair.completion(looked_up).error().code == ErrorCode::permission_denied);
+  CHECK_FALSE(pair.service->poll_event());
+}
+
 TEST_CASE("what a client may do is asked before it is done") {
   Loopback pair;
   std::vector<std::pair<EntryType, std::string>> asked;
