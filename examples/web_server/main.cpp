@@ -8,8 +8,8 @@
 #include <boost/beast/websocket.hpp>
 #include <iostream>
 
-#include "node/service/node.hpp"
-#include "node/transport/beast_stream.hpp"
+#include "rrgate/beast.hpp"
+#include "rrgate/device.hpp"
 
 namespace asio = boost::asio;
 namespace beast = boost::beast;
