@@ -76,8 +76,8 @@ void StreamDriver::settle(Now now) {
   do {
     while (handle_event(now)) {  // also behind the end: what is asked of a closed session fails by an event
     }
+    if (!is_closed_) write(now);  // which may bring more to read, on a stream within the process
   } while (read_on(now));
-  if (!is_closed_) write(now);
   is_settling_ = false;
   if (is_closed_) return;
   if (wants_close()) {
