@@ -7,7 +7,8 @@
 int main(int, char** words) {
   rr::EmbeddedGateway gateway(R"({
     "listen": ["127.0.0.1:0"],
-    "devices": [{"name": "room", "url": ")" + std::string(words[1]) + R"("}],
+    "devices": [{"name": "room", "url": ")" +
+                              std::string(words[1]) + R"("}],
     "log": {"level": "warning"}
   })");
   std::thread serving([&] { gateway.run(); });

@@ -55,12 +55,16 @@ rr::awaitable<rr::Result<>> Upstream::open() {
   // One login is for all services of a device, which may want it while they are connected to, later, or not at all:
   // that is found out without it.
   const bool is_for_all = has_login && use_ == UpstreamUse::all_clients;
-  auto opened = co_await open_connection(is_for_all || login_.is_late ? std::string() : login_.username, false);
+  // Named: g++ 12 destroys twice what is made for a coroutine within the co_await expression.
+  const std::string nobody;
+  const std::string user = login_.username;
+  const auto& first = is_for_all || login_.is_late ? nobody : user;
+  auto opened = co_await open_connection(first, false);
   const bool wants_user = !opened && opened.error().code == rr::ErrorCode::authentication_error;
   // Whoever has no login may look at the service, and so may his clients; what they do is for the device to refuse.
   requires_user_ = wants_user && !has_login;
-  if (requires_user_) opened = co_await open_connection({}, true);
-  if (wants_user && is_for_all) opened = co_await open_connection(login_.username, false);
+  if (requires_user_) opened = co_await open_connection(nobody, true);
+  if (wants_user && is_for_all) opened = co_await open_connection(user, false);
   if (!opened) co_return opened.error();
   if (login_.is_late || (is_for_all && !wants_user)) {
     const auto done = co_await log_in(*opened);
