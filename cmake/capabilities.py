@@ -109,9 +109,13 @@ CAPABILITIES = {"network": network, "packet-loss": packet_loss, "mount-namespace
 
 @functools.cache
 def lacks(name):
-    """Why this machine lacks it, None where it has it."""
+    """Why this machine lacks it, None where it has it: as was written before, where it was."""
     if "RR_MACHINE" in os.environ:
         return json.loads(pathlib.Path(os.environ["RR_MACHINE"]).read_text(encoding="utf-8"))[name]
+    return ask(name)
+
+
+def ask(name):
     try:
         CAPABILITIES[name]()
     except Lacking as reason:
@@ -135,7 +139,7 @@ def main():
         print(reason or "")
         return 0 if reason is not None else 1
     if arguments.write:
-        arguments.write.write_text(json.dumps({name: lacks(name) for name in CAPABILITIES}), encoding="utf-8")
+        arguments.write.write_text(json.dumps({name: ask(name) for name in CAPABILITIES}), encoding="utf-8")
     print(format_list(json.loads((arguments.write or arguments.list).read_text(encoding="utf-8"))), end="")
     return 0
 
