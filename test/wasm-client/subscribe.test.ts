@@ -344,7 +344,11 @@ it("ends a loop over a pipe that is too far behind", async () => {
 function answerDevices(...devices: [name: string, state: string, type: string, ...bases: string[]][]): string[] {
   const asked: string[] = [];
   const list = devices.map(([name, state, type, ...bases]) => ({
-    name, state, node_id: "id", node_name: null, services: [{ name: "test", type, implements: bases }],
+    name,
+    state,
+    node_id: "id",
+    node_name: null,
+    services: [{ name: "test", type, implements: bases }],
   }));
   vi.stubGlobal("fetch", async (url: URL) => {
     asked.push(String(url));
@@ -367,8 +371,18 @@ it("finds services of a type among the devices of a gateway", async () => {
   const found = await findServices({ gateway, type });
   expect(asked).toEqual(["http://gateway:8080/lab/api/v1/devices"]);
   expect(found.map(({ device }) => device)).toEqual(["a b", "c"]);
-  expect(found[0]).toEqual({ url: "http://gateway:8080/lab/devices/a%20b?service=test", device: "a b", service: "test", type, implements: [], nodeId: "id", nodeName: null });
-  expect(await findServices({ gateway: `${gateway}/`, type, filter: ({ device }) => device === "c" })).toEqual([found[1]]);
+  expect(found[0]).toEqual({
+    url: "http://gateway:8080/lab/devices/a%20b?service=test",
+    device: "a b",
+    service: "test",
+    type,
+    implements: [],
+    nodeId: "id",
+    nodeName: null,
+  });
+  expect(await findServices({ gateway: `${gateway}/`, type, filter: ({ device }) => device === "c" })).toEqual([
+    found[1],
+  ]);
   for (const response of [new Response("no", { status: 404 }), new Response("{}"), new Response("<html>")]) {
     vi.stubGlobal("fetch", async () => response);
     const error = await failure(findServices({ gateway, type }));

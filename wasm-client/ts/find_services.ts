@@ -44,7 +44,9 @@ export async function findServices(query: ServiceQuery, signal?: AbortSignal): P
     const gateway = new URL(String(query.gateway).replace(/\/*$/, "/"), globalThis.location?.href);
     const response = await fetch(new URL("api/v1/devices", gateway), { signal: signal ?? null, cache: "no-store" });
     if (!response.ok) throw new Error(`HTTP ${response.status}`);
-    for (const { name, state, node_id: nodeId, node_name: nodeName, services } of ((await response.json()) as { devices: Device[] }).devices)
+    for (const { name, state, node_id: nodeId, node_name: nodeName, services } of (
+      (await response.json()) as { devices: Device[] }
+    ).devices)
       for (const { name: service, type, implements: bases = [] } of state === "online" ? services : [])
         if (type === query.type || bases.includes(query.type)) {
           const url = new URL(`devices/${encodeURIComponent(name)}?service=${encodeURIComponent(service)}`, gateway);

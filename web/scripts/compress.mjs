@@ -7,7 +7,10 @@ import { brotliCompress, constants, gzip } from "node:zlib";
 
 const folder = process.argv[2] ?? fileURLToPath(new URL("../dist/", import.meta.url));
 const ways = [
-  [".br", (plain) => promisify(brotliCompress)(plain, { params: { [constants.BROTLI_PARAM_SIZE_HINT]: plain.length } })],
+  [
+    ".br",
+    (plain) => promisify(brotliCompress)(plain, { params: { [constants.BROTLI_PARAM_SIZE_HINT]: plain.length } }),
+  ],
   [".gz", (plain) => promisify(gzip)(plain, { level: constants.Z_BEST_COMPRESSION })],
 ];
 

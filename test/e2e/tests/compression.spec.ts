@@ -2,6 +2,7 @@
 import { get } from "node:http";
 import type { IncomingMessage } from "node:http";
 import { brotliDecompressSync, gunzipSync } from "node:zlib";
+import type { Page } from "@playwright/test";
 import { expect, test } from "../lab_test";
 
 interface Answer {
@@ -25,7 +26,7 @@ function ask(url: string, headers: Record<string, string>): Promise<Answer> {
 }
 
 /** The page and all that it loads at once, by what its browser asked for. */
-async function files_of_page(page: import("@playwright/test").Page, url: string): Promise<string[]> {
+async function filesOfPage(page: Page, url: string): Promise<string[]> {
   const files = new Set<string>();
   page.on("request", (request) => {
     if (request.url().startsWith(url) && !request.url().includes("/api/")) files.add(request.url());
@@ -36,7 +37,7 @@ async function files_of_page(page: import("@playwright/test").Page, url: string)
 }
 
 test("the page comes compressed, with tags of its own, and in less than half of its bytes", async ({ page, lab }) => {
-  const files = await files_of_page(page, lab.url);
+  const files = await filesOfPage(page, lab.url);
   expect(files.some((file) => file.endsWith(".wasm"))).toBe(true);
   const sizes = { identity: 0, gzip: 0, br: 0 };
   for (const file of files) {
@@ -44,7 +45,10 @@ test("the page comes compressed, with tags of its own, and in less than half of 
     expect(plain.status).toBe(200);
     expect(plain.headers["content-encoding"]).toBeUndefined();
     sizes.identity += plain.body.length;
-    for (const [encoding, unpack] of [["br", brotliDecompressSync], ["gzip", gunzipSync]] as const) {
+    for (const [encoding, unpack] of [
+      ["br", brotliDecompressSync],
+      ["gzip", gunzipSync],
+    ] as const) {
       const packed = await ask(file, { "accept-encoding": encoding });
       sizes[encoding] += packed.body.length;
       expect(packed.headers["vary"]).toBe("Accept-Encoding");

@@ -63,7 +63,10 @@ const endsOfAHeldKey: Readonly<Record<string, (page: Page) => Promise<unknown>>>
   "a field takes the keyboard": (page) => page.getByRole("slider", { name: "Speed" }).focus(),
   "a shortcut begins": (page) => page.keyboard.down("Control"),
   "Escape is pressed": (page) => page.keyboard.press("Escape"),
-  "Space is pressed": (page) => page.keyboard.press("Space"),
+  "Space is pressed": async (page) => {
+    await page.evaluate(() => (document.activeElement as HTMLElement).blur()); // on a button it is the button's
+    await page.keyboard.press("Space");
+  },
   "Stop is pressed": (page) => page.getByRole("button", { name: "Stop" }).click(),
 };
 
