@@ -101,7 +101,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
         claim_(claim_stored_id(name, options_)),
         directory_(make_identity(std::move(name), claim_ ? claim_->id() : options_.id)),
         thread_(std::make_shared<NodeThread>(io_.get_executor())),
-        blocking_pool_(options_.max_blocking),
+        blocking_pool_(std::max<std::size_t>(1, options_.max_blocking)),
         stop_timer_(io_) {}
 
   ~Implementation() {
