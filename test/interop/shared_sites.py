@@ -6,7 +6,7 @@ import pytest
 import RobotRaconteur as RR
 
 from directions import DIRECTIONS, PEERS, service_command
-from processes import Background, port_of, start_gateway
+from processes import Background, start_gateway
 from tap import Tap
 
 OURS = next(each for each in DIRECTIONS if each.name == "reference-to-ours")

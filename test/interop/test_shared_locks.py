@@ -5,10 +5,9 @@ import threading
 import pytest
 import RobotRaconteur as RR
 
-from json_socket import Socket
+from json_sockets import Socket
 from news import News
-from processes import port_of
-from shared_sites import Site, is_refused, start_service
+from shared_sites import Site, is_refused, port_of, start_service
 
 GATEWAY_LOGIN = {"login": {"username": "gateway", "password": "secret"}}
 USER_LOCK = RR.RobotRaconteurObjectLockFlags_USER_LOCK
