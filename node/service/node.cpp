@@ -347,7 +347,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   void welcome(std::unique_ptr<ByteStream> stream, Door door) {
     const auto arrival = std::make_shared<asio::cancellation_signal>();
     arriving_.insert(arrival);
-    const auto keep = [arrival](std::exception_ptr) {};  // the coroutine uses the slot until this is called
+    const auto keep = [arrival](const std::exception_ptr&) {};  // the coroutine uses the slot until this is called
     asio::co_spawn(io_, find_out(std::move(stream), std::move(door), arrival, alive_),
                    asio::bind_cancellation_slot(arrival->slot(), keep));
   }

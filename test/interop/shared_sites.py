@@ -79,8 +79,12 @@ class Site:
         with pytest.raises(RR.ConnectionException, match="connection_lost"):
             while True:
                 root.status
-        self.device, _ = self.start_device(self.folder, f"--robotraconteur-tcp-port={port_of(self.url)}")
+        self.start_again()
         self.wait_until_served(root)
+
+    def start_again(self):
+        self.device, self.url = self.start_device(self.folder)
+        self.line.lead_to(port_of(self.url))
 
     def wait_until_served(self, root):
         self.gateway.wait_until(lambda: not is_refused(RR.ConnectionException, lambda: root.status))

@@ -19,6 +19,10 @@ class Tap:
     def close(self):
         self._listener.close()
 
+    def lead_to(self, port):
+        """Where new connections go: a service of the reference that is started again may not get its port back."""
+        self._target = ("127.0.0.1", port)
+
     def cut(self):
         """Ends what is connected; new connections are let through."""
         for each in self._sockets:
@@ -32,7 +36,11 @@ class Tap:
                 client, _ = self._listener.accept()
             except OSError:
                 return
-            service = socket.create_connection(self._target)
+            try:
+                service = socket.create_connection(self._target)
+            except OSError:  # nobody there
+                client.close()
+                continue
             self._sockets += [client, service]
             for source, sink, change in ((client, service, self._change), (service, client, bytes)):
                 stream = bytearray()

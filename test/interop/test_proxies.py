@@ -104,7 +104,7 @@ def test_sessions(site, client):
     port, prefix = site
     entry = device_of(port, prefix)
     assert entry["websocket_url"] == f"ws://127.0.0.1:{port}{prefix}/devices/interop"
-    run_and_check(client, entry["websocket_url"] + "?service=interop")
+    run_and_check(client, entry["websocket_url"] + "?service=interop", STEPS)
 
 
 def test_who_the_client_is(site, gateway):
@@ -224,7 +224,7 @@ def test_proxy_protocol(device, tmp_path, monkeypatch, version):
     try:
         assert device_of(proxy.root, "")["websocket_url"] == f"ws://127.0.0.1:{proxy.root}/devices/interop"
         assert connected_as(proxy.root, "/devices/interop", log).startswith(CLIENT + ":")
-        run_and_check("node", f"ws://127.0.0.1:{proxy.root}/devices/interop?service=interop")
+        run_and_check("node", f"ws://127.0.0.1:{proxy.root}/devices/interop?service=interop", STEPS)
         steps, native = SCENARIO["functions"].steps, f"rr+tcp://127.0.0.1:{proxy.root}/?nodename=interop.service&service=interop"
         run_and_check("reference", native, steps)
 

@@ -7,7 +7,7 @@ import RobotRaconteur as RR
 
 from json_sockets import Socket
 from news import News
-from shared_sites import Site, is_refused, port_of, start_service
+from shared_sites import Site, is_refused, start_service
 
 GATEWAY_LOGIN = {"login": {"username": "gateway", "password": "secret"}}
 USER_LOCK = RR.RobotRaconteurObjectLockFlags_USER_LOCK
@@ -92,7 +92,8 @@ def test_a_callback_is_not_for_a_client_that_calls_another_object(site):
     site.gateway.wait_until(lambda: second.moving == 1)
     second.ask_later("may it?")
     site.gateway.wait_until(lambda: second.answered != "")
-    assert second.answered == "RobotRaconteur.InvalidOperation"
+    # Refused by the gateway, or, while its own call goes on, by the second client, which has no function for it.
+    assert second.answered in ("RobotRaconteur.InvalidOperation", "RobotRaconteur.OperationFailed")
     assert asked.all() == []
     second.finish()
     holding.result()
@@ -205,6 +206,7 @@ def test_a_holder_who_unlocks_what_it_has_lost_goes_on(site):
     site.node.ReleaseObjectLock(holder)
     holder.speed = 1.0
     other.speed = 2.0
+    assert holder.speed == other.speed == 2.0
 
 
 def test_a_user_of_the_device_hears_that_his_lock_went_with_it(site):
@@ -272,7 +274,7 @@ def test_a_monitor_that_went_with_the_device(site_with_monitors):
     with pytest.raises(RR.ConnectionException, match="connection_lost"):
         while True:
             owner.level
-    site.device, _ = site.start_device(site.folder, f"--robotraconteur-tcp-port={port_of(site.url)}")
+    site.start_again()
     site.gateway.wait_until(lambda: not is_refused(RR.ConnectionException, lambda: other.level))
     with pytest.raises(RR.InvalidOperationException, match="lost"):
         owner.level = 4.0
