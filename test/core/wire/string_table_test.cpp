@@ -13,7 +13,8 @@ constexpr std::uint32_t none = StringCoder::inline_text;
 
 /// The codes that the texts of one message get.
 struct Coded {
-  Coded(bool use_standard, bool use_local, const std::vector<std::string>& texts) : coder(use_standard, use_local) {
+  Coded(bool use_standard, bool use_local, std::vector<std::string> given)
+      : texts(std::move(given)), coder(use_standard, use_local) {
     for (const auto& text : texts) codes.push_back(coder.note(text));
     coder.choose();
     for (auto& code : codes) code = coder.code_of(code);
@@ -26,6 +27,7 @@ struct Coded {
     return out;
   }
 
+  std::vector<std::string> texts;  ///< which the coder borrows
   StringCoder coder;
   Codes codes;
 };
