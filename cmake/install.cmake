@@ -7,7 +7,7 @@ set_target_properties(rrgate_node PROPERTIES EXPORT_NAME node)
 set_target_properties(rrgate_gateway PROPERTIES EXPORT_NAME gateway)
 install(
   TARGETS rrgate_core rr_options rr_boost rr_support rr_hardware rr_wire rr_robdef rr_types rr_member rr_session rr_discovery_core
-          rrgate_node rr_platform rr_tls rrgate_asio rr_transport rr_http rr_node rr_discovery rr_subscribe rrgate
+          rrgate_node rr_passwords rr_platform rr_tls rrgate_asio rr_transport rr_http rr_node rr_discovery rr_subscribe rrgate
   EXPORT rrgateTargets
   RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}"
   ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")

@@ -11,7 +11,7 @@ const service = path.join(path.dirname(rrgate), "../test/interop/cpp/rr-test-ser
 
 const script = `
 import { connect, listUsbDevices, requestUsbDevice } from "./index.js";
-import { open_websocket } from "./websocket.js";
+import { openWebsocket } from "./websocket.js";
 import { FakeUsb, FakeUsbDevice } from "./fake_usb.js";
 
 const relay = new URL("/devices/big?service=interop", location);
@@ -21,24 +21,24 @@ const code = await WebAssembly.compileStreaming(fetch("./test_usb_device.wasm"))
 const device = await FakeUsbDevice.make(code, { name: devices[0].node_name, packetSize: 512 });
 device.accept = () => (_url, listener) =>
   new Promise((resolve) => {
-    const transport = open_websocket(relay, { ...listener, opened: () => resolve(transport) });
+    const transport = openWebsocket(relay, { ...listener, opened: () => resolve(transport) });
   });
 const usb = new FakeUsb();
 Object.defineProperty(navigator, "usb", { value: usb });
 
 /** Whether what speaks to USB devices has been loaded. */
-const is_loaded = () => performance.getEntriesByType("resource").some(({ name }) => name.endsWith("/rrgate-usb.wasm"));
+const isLoaded = () => performance.getEntriesByType("resource").some(({ name }) => name.endsWith("/rrgate-usb.wasm"));
 
-export async function run(is_page) {
-  const said = { loaded_before: is_loaded() };
-  if (is_page) {
+export async function run(isPage) {
+  const said = { loadedBefore: isLoaded() };
+  if (isPage) {
     usb.choice = device;
     said.chosen = (await requestUsbDevice()).nodeName;
   } else {
     usb.plug(device);
   }
   const [node] = await listUsbDevices();
-  said.is_same_node = node.nodeName === devices[0].node_name;
+  said.isSameNode = node.nodeName === devices[0].node_name;
   const robot = await connect("rr+usb:///?service=interop&nodename=" + node.nodeName);
   said.sum = await robot.add(2, 3);
   const ramp = await robot.ramp(20_000);
@@ -50,7 +50,7 @@ export async function run(is_page) {
   usb.unplug(device);
   said.call = await call;
   said.end = (await end).message;
-  said.loaded_after = is_loaded();
+  said.loadedAfter = isLoaded();
   return said;
 }
 `;

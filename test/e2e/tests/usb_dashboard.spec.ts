@@ -10,18 +10,18 @@ const granted = [];
 const usb = new EventTarget();
 usb.getDevices = async () => [...granted];
 usb.requestDevice = async () => {
-  const { open_websocket } = await import("/usb-test/websocket.js");
+  const { openWebsocket } = await import("/usb-test/websocket.js");
   const { FakeUsbDevice } = await import("/usb-test/fake_usb.js");
   const { devices } = await (await fetch("/api/v1/devices")).json();
   const code = await WebAssembly.compile(await (await fetch("/usb-test/test_usb_device.wasm")).arrayBuffer());
   const robot = devices.find(({ name }) => name === "create");
   const device = await FakeUsbDevice.make(code, { name: robot.node_name, packetSize: 512 });
   const id = [...robot.node_id].flatMap((letter) => [letter.charCodeAt(0), 0]);
-  device.replace_string(4, [2 + id.length, 3, ...id]);
+  device.replaceString(4, [2 + id.length, 3, ...id]);
   const relay = "ws://" + location.host + "/devices/create?service=Create";
   device.accept = () => (_url, listener) =>
     new Promise((resolve) => {
-      const transport = open_websocket(new URL(relay), { ...listener, opened: () => resolve(transport) });
+      const transport = openWebsocket(new URL(relay), { ...listener, opened: () => resolve(transport) });
     });
   granted.push(device);
   return device;
