@@ -29,6 +29,16 @@ Bytes sha256(ByteSpan bytes) {
   return digest("SHA256", bytes);
 }
 
+Bytes hmac_sha256(ByteSpan key, ByteSpan bytes) {
+  Bytes out(EVP_MAX_MD_SIZE);
+  std::size_t size = 0;
+  if (!EVP_Q_mac(nullptr, "HMAC", nullptr, "SHA256", nullptr, key.data(), key.size(), bytes.data(), bytes.size(),
+                 out.data(), out.size(), &size))
+    throw std::runtime_error("OpenSSL refused HMAC");
+  out.resize(size);
+  return out;
+}
+
 Bytes random_bytes(std::size_t count) {
   Bytes out(count);
   if (RAND_bytes(out.data(), static_cast<int>(count)) != 1) throw std::runtime_error("OpenSSL has no random bytes");

@@ -6,15 +6,12 @@
 
 #include <algorithm>
 #include <boost/asio/posix/stream_descriptor.hpp>
-#include <boost/asio/use_awaitable.hpp>
-#include <boost/container/static_vector.hpp>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 
 #include "core/support/words.hpp"
-#include "node/transport/await_tuple.hpp"
-#include "node/transport/watchdog.hpp"
+#include "node/transport/descriptor_stream.hpp"
 
 namespace rr {
 
@@ -35,97 +32,18 @@ std::string read_attribute(const std::filesystem::path& path) {
   return std::string(trim(text, blanks));
 }
 
-class DriverStream final : public ByteStream {
+class DriverStream final : public DescriptorStream<asio::posix::stream_descriptor> {
  public:
-  DriverStream(asio::posix::stream_descriptor descriptor, std::string peer, std::chrono::milliseconds send_stall)
-      : descriptor_(std::move(descriptor)),
-        peer_(std::move(peer)),
-        stall_(descriptor_.get_executor(),
-               [this] {
-                 is_stalled_ = true;
-                 close();
-               }),
-        send_stall_(send_stall) {}
-
-  awaitable<ReadResult> read_some(std::span<std::uint8_t> into) override {
-    if (const auto count = take_put_back(into)) co_return ReadResult{{}, count};
-    auto [error, bytes] = co_await descriptor_.async_read_some(asio::buffer(into.data(), into.size()), await_tuple);
-    if (error == asio::error::eof) error = {};
-    co_return ReadResult{error, bytes};
-  }
-
-  std::size_t try_write(std::span<const ByteSpan> slices, error_code& error) override {
-    return write_now(slices, 0, error);
-  }
-
-  awaitable<error_code> write(std::span<const ByteSpan> slices) override {
-    const auto cancel_count = cancel_count_;
-    std::size_t offset = 0;  // bytes of slices.front() that are written
-    while (!slices.empty()) {
-      error_code error;
-      auto written = write_now(slices, offset, error);
-      if (written == 0 && !error && !slices.front().empty()) {
-        if (!stall_.is_armed()) stall_.arm(send_stall_);
-        std::tie(error) = co_await descriptor_.async_wait(asio::posix::stream_descriptor::wait_write, await_tuple);
-        if (is_stalled_) co_return asio::error::timed_out;
-        if (!error && cancel_count != cancel_count_) error = asio::error::operation_aborted;
-      }
-      if (error) {
-        stall_.disarm();
-        co_return error;
-      }
-      if (written > 0) stall_.disarm();
-      while (!slices.empty() && written >= slices.front().size() - offset) {
-        written -= slices.front().size() - offset;
-        slices = slices.subspan(1);
-        offset = 0;
-      }
-      offset += written;
-    }
-    co_return error_code();
-  }
+  using DescriptorStream::DescriptorStream;
 
   /// Devices have no half-closed streams: end() follows.
   void finish_sending() override {}
-
-  void cancel() override {
-    ++cancel_count_;
-    error_code ignored;
-    descriptor_.cancel(ignored);
-  }
 
   /// What was written is the driver's; closing is all that there is to say.
   awaitable<void> end(const EndReason&) override {
     close();
     co_return;
   }
-
-  void close() override {
-    error_code ignored;
-    descriptor_.close(ignored);
-  }
-  std::string peer() const override { return peer_; }
-  asio::any_io_executor executor() override { return descriptor_.get_executor(); }
-
- private:
-  std::size_t write_now(std::span<const ByteSpan> slices, std::size_t offset, error_code& error) {
-    boost::container::static_vector<asio::const_buffer, 64> buffers;
-    for (const auto& slice : slices) {
-      if (buffers.size() == buffers.capacity()) break;
-      const auto rest = buffers.empty() ? slice.subspan(offset) : slice;
-      buffers.emplace_back(rest.data(), rest.size());
-    }
-    const auto written = descriptor_.write_some(buffers, error);
-    if (error == asio::error::would_block) error = {};
-    return written;
-  }
-
-  asio::posix::stream_descriptor descriptor_;
-  std::string peer_;
-  Deadline stall_;
-  std::chrono::milliseconds send_stall_;
-  bool is_stalled_ = false;
-  unsigned cancel_count_ = 0;
 };
 
 }  // namespace
@@ -173,7 +91,6 @@ Result<std::unique_ptr<ByteStream>> open_driver_device(const asio::any_io_execut
     ::close(number);
     return fail(error.value(), "wait for data");
   }
-  descriptor.non_blocking(true, error);
   std::unique_ptr<ByteStream> stream = std::make_unique<DriverStream>(std::move(descriptor), path, send_stall);
   return stream;
 }

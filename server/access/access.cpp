@@ -13,6 +13,8 @@ namespace {
 
 /// How often the log says that the audit log can't be written.
 constexpr std::chrono::seconds complaint_period{60};
+/// Fewer bytes could be guessed from one ticket.
+constexpr std::size_t min_ticket_key = 32;
 
 rr::Result<std::string> read_file(std::string_view what, const std::string& path) {
   auto text = read_text_file(path);
@@ -38,7 +40,8 @@ rr::Result<JwtVerifier> load_jwt(const JwtConfig& config) {
 
 std::map<std::string, std::string> look(const AccessConfig& config) {
   std::map<std::string, std::string> out;
-  for (const auto* file : {&config.users_file, &config.tokens_file, &config.jwt.jwks_file, &config.jwt.secret_file})
+  for (const auto* file : {&config.users_file, &config.tokens_file, &config.jwt.jwks_file, &config.jwt.secret_file,
+                           &config.ticket_key_file})
     if (!file->empty()) out[*file] = rr::file_look(*file);
   return out;
 }
@@ -77,6 +80,15 @@ rr::Result<AccessStatePtr> load_access(const AccessConfig& config) {
     auto jwt = load_jwt(config.jwt);
     if (!jwt) return jwt.error();
     out->jwt = std::move(*jwt);
+  }
+  if (!config.ticket_key_file.empty()) {
+    const auto text = read_file("ticket key", config.ticket_key_file);
+    if (!text) return text.error();
+    if (text->size() < min_ticket_key)
+      return rr::make_error(rr::ErrorCode::invalid_configuration,
+                            "ticket key " + rr::quoted(config.ticket_key_file, 200) + ": has " +
+                                std::to_string(text->size()) + " bytes, expected at least 32");
+    out->ticket_key.assign(text->begin(), text->end());
   }
   return AccessStatePtr(std::move(out));
 }
@@ -132,10 +144,16 @@ rr::Result<> Access::load() {
 
 rr::Result<> Access::replace(AccessStatePtr next) {
   if (auto opened = audit_->open(next->config.audit_file); !opened) return opened;
-  state_ = std::move(next);
+  take(std::move(next));
   seen_ = state_->looks;
-  users_->set(state_->users);
   return {};
+}
+
+void Access::take(AccessStatePtr next) {
+  if (next->ticket_key != state_->ticket_key)
+    tickets_ = next->ticket_key.empty() ? Tickets() : Tickets(next->ticket_key);
+  state_ = std::move(next);
+  users_->set(state_->users);
 }
 
 void Access::reload(bool is_forced) {
@@ -153,8 +171,7 @@ void Access::reload(bool is_forced) {
         {{"error", loaded.error().message}});
     return;
   }
-  state_ = std::move(*loaded);
-  users_->set(state_->users);
+  take(std::move(*loaded));
   if (has_files) log(LogLevel::info, "users and rights read anew", {{"files", seen_.size()}});
 }
 

@@ -13,6 +13,7 @@
 #include "server/access/access_rules.hpp"
 #include "server/access/api_tokens.hpp"
 #include "server/access/audit_log.hpp"
+#include "server/access/tickets.hpp"
 
 namespace rrgate {
 
@@ -24,6 +25,7 @@ struct AccessState {
   std::shared_ptr<const rr::PasswordFileAuthenticator> users = {};  ///< null: no users file
   std::optional<ApiTokens> tokens = {};
   std::optional<JwtVerifier> jwt = {};
+  rr::Bytes ticket_key = {};  ///< empty: the gateway's own
 };
 using AccessStatePtr = std::shared_ptr<const AccessState>;
 
@@ -61,6 +63,8 @@ class Access {
   /// Logins of Robot Raconteur by the users file; follows its changes. Null where there is none.
   std::shared_ptr<const rr::Authenticator> authenticator() const;
 
+  Tickets& tickets() { return tickets_; }
+
   // Identities, with the roles that the configuration adds. `client`: where from, as logs name it.
   Identity anonymous(std::string client) const;
   /// A user who has logged in by authenticator().
@@ -75,10 +79,13 @@ class Access {
  private:
   class Users;
 
+  void take(AccessStatePtr next);
+
   AccessStatePtr state_;
   std::map<std::string, std::string> seen_;
   std::shared_ptr<AuditLog> audit_;
   std::shared_ptr<Users> users_;
+  Tickets tickets_;
   std::chrono::steady_clock::time_point last_complaint_{};
 };
 

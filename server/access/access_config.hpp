@@ -38,6 +38,7 @@ struct AccessConfig {
   std::string users_file = {};
   std::string tokens_file = {};
   JwtConfig jwt = {};
+  std::string ticket_key_file = {};         ///< of gateways that take each other's tickets; empty: a key of its own
   std::vector<std::string> client_ca = {};  ///< PEM files; not empty: TLS clients are asked for a certificate
   IdentityHeaders identity_headers = {};
   std::string anonymous_role = {};  ///< of who has shown nothing; empty: he has none

@@ -112,14 +112,7 @@ Result<SignatureKey> SignatureKey::from_ed25519(ByteSpan key) {
 
 bool SignatureKey::verifies(std::string_view text, ByteSpan signature) const {
   const auto bytes = as_bytes(text);
-  if (algorithm_ == SignatureAlgorithm::hs256) {
-    Bytes made(EVP_MAX_MD_SIZE);
-    std::size_t size = 0;
-    if (!EVP_Q_mac(nullptr, "HMAC", nullptr, "SHA256", nullptr, secret_.data(), secret_.size(), bytes.data(),
-                   bytes.size(), made.data(), made.size(), &size))
-      return false;
-    return equal_secrets(ByteSpan(made).first(size), signature);
-  }
+  if (algorithm_ == SignatureAlgorithm::hs256) return equal_secrets(hmac_sha256(secret_, bytes), signature);
   Bytes der;
   if (algorithm_ == SignatureAlgorithm::es256) {
     der = to_der(signature);

@@ -6,41 +6,34 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 
-#include "node/tls/digest.hpp"
-#include "server/access/base64url.hpp"
+#include "core/support/bytes.hpp"
 #include "server/access/identity.hpp"
 
 namespace rrgate {
 
+/// A ticket says all that it stands for, signed: no gateway keeps one, and gateways with one key take each other's.
 class Tickets {
  public:
-  using Time = std::chrono::steady_clock::time_point;
+  using Time = std::chrono::system_clock::time_point;
   static constexpr std::chrono::seconds lifetime{30};
+  static constexpr std::size_t max_size = 2048;
 
-  /// nullopt: too many are waiting to be used.
-  std::optional<std::string> issue(const Identity& who, Time now) {
-    std::erase_if(waiting_, [now](const auto& item) { return item.second.ends <= now; });
-    if (waiting_.size() >= max_waiting) return std::nullopt;
-    auto ticket = encode_base64url(rr::random_bytes(24));
-    waiting_.emplace(ticket, Entry{who, now + lifetime});
-    return ticket;
-  }
-  /// Works once. nullopt: unknown, used or too late.
-  std::optional<Identity> redeem(const std::string& ticket, Time now) {
-    const auto found = waiting_.extract(ticket);
-    if (!found || found.mapped().ends <= now) return std::nullopt;
-    return found.mapped().who;
-  }
+  /// With a key that nobody else has.
+  Tickets();
+  explicit Tickets(rr::Bytes key) : key_(std::move(key)) {}
+
+  /// nullopt: its roles don't fit into a URL.
+  std::optional<std::string> issue(const Identity& who, Time now) const;
+  /// Works once. nullopt: of another key, used, too late, or too many were used just now.
+  std::optional<Identity> redeem(std::string_view ticket, Time now);
 
  private:
-  struct Entry {
-    Identity who;
-    Time ends;
-  };
-  static constexpr std::size_t max_waiting = 4096;
+  static constexpr std::size_t max_used = 65'536;
 
-  std::map<std::string, Entry> waiting_;
+  rr::Bytes key_;
+  std::map<rr::Bytes, Time> used_;  ///< by signature, until they would be too late
 };
 
 }  // namespace rrgate

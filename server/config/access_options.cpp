@@ -101,6 +101,7 @@ void read_access(ObjectReader& in, AccessConfig& access) {
   in.text("users_file", access.users_file);
   in.text("tokens_file", access.tokens_file);
   in.object("jwt", [&](ObjectReader& part) { read_jwt(part, access.jwt); });
+  in.text("ticket_key_file", access.ticket_key_file);
   in.texts("client_ca", false, read_file(access.client_ca));
   in.object("identity_headers", [&](ObjectReader& part) { read_identity_headers(part, access.identity_headers); });
   in.text("anonymous_role", access.anonymous_role);
@@ -126,8 +127,8 @@ void check_access(const Config& config, std::vector<Finding>& findings) {
 }
 
 void for_each_file(AccessConfig& access, const std::function<void(std::string&)>& locate) {
-  for (auto* file :
-       {&access.users_file, &access.tokens_file, &access.jwt.jwks_file, &access.jwt.secret_file, &access.audit_file})
+  for (auto* file : {&access.users_file, &access.tokens_file, &access.jwt.jwks_file, &access.jwt.secret_file,
+                     &access.ticket_key_file, &access.audit_file})
     locate(*file);
   for (auto& file : access.client_ca) locate(file);
 }

@@ -7,6 +7,7 @@
 #include "core/support/words.hpp"
 #include "node/http/upgrade.hpp"
 #include "node/tls/base64.hpp"
+#include "node/tls/digest.hpp"
 #include "server/json/json.hpp"
 #include "server/state/connection.hpp"
 
@@ -89,7 +90,7 @@ rr::awaitable<rr::Result<Identity>> HttpAccess::identify(const Request& request,
     co_return co_await by_password(std::string(*basic), client, request.arrival.address.to_string());
   if (asks_for_websocket(request))
     if (const auto ticket = rr::query_value(request.query(), "ticket")) {
-      auto identity = tickets_.redeem(*ticket, std::chrono::steady_clock::now());
+      auto identity = access_.tickets().redeem(*ticket, std::chrono::system_clock::now());
       if (!identity) co_return refused("the ticket is unknown, was used, or is older than 30 seconds");
       identity->client = client;
       co_return std::move(*identity);

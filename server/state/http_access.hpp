@@ -11,7 +11,6 @@
 #include "server/access/access.hpp"
 #include "server/access/access_requests.hpp"
 #include "server/access/rate_gate.hpp"
-#include "server/access/tickets.hpp"
 #include "server/config/config.hpp"
 #include "server/http/request.hpp"
 
@@ -57,7 +56,6 @@ class HttpAccess {
   rr::Result<std::shared_ptr<const Passes>> enter(const std::string& address, const std::string& user,
                                                   const std::string& device, const Rates& rates);
 
-  Tickets& tickets() { return tickets_; }
   AccessRequests& requests() { return requests_; }
 
  private:
@@ -73,7 +71,6 @@ class HttpAccess {
 
   boost::asio::any_io_executor executor_;
   Access& access_;
-  Tickets tickets_;
   AccessRequests requests_;
   RateGate clients_;
   RateGate users_;

@@ -34,6 +34,20 @@ def ask(port, method, path, body=None, headers={}, base="", context=None, addres
         connection.close()
 
 
+def upgrade_status(port, path, headers={}):
+    """What an upgrade is answered with."""
+    lines = "".join(f"{name}: {value}\r\n" for name, value in headers.items())
+    with socket.create_connection(("127.0.0.1", port), 10) as link:
+        link.sendall(f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+                     f"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n{lines}\r\n".encode())
+        received = b""
+        while b"\r\n\r\n" not in received:
+            chunk = link.recv(4096)
+            assert chunk, received
+            received += chunk
+        return int(received.split()[1])
+
+
 class Stream:
     """Server-sent events: (id, event, data) as they come."""
 

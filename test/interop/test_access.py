@@ -15,7 +15,7 @@ import websockets.sync.client
 
 from directions import PEERS
 from gateways import RRGATE, Gateway, make_web_certificates, rrgate
-from http_api import BASE, JSON_PROTOCOL, ask, is_alive, open_websocket, schemathesis
+from http_api import BASE, JSON_PROTOCOL, ask, is_alive, open_websocket, schemathesis, upgrade_status
 from news import under_load
 from processes import Background
 from users import PASSWORDS, RULES, basic, bearer, make_users
@@ -46,20 +46,6 @@ def guarded(device, tmp_path_factory):
 
 def audit_of(gateway):
     return [json.loads(line) for line in (gateway.folder / "audit").read_text().splitlines()]
-
-
-def upgrade_status(port, path, headers={}):
-    """What an upgrade is answered with, and the close reason of one that succeeds."""
-    lines = "".join(f"{name}: {value}\r\n" for name, value in headers.items())
-    with socket.create_connection(("127.0.0.1", port), 10) as link:
-        link.sendall(f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-                     f"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n{lines}\r\n".encode())
-        received = b""
-        while b"\r\n\r\n" not in received:
-            chunk = link.recv(4096)
-            assert chunk, received
-            received += chunk
-        return int(received.split()[1])
 
 
 def test_everybody_sees_what_he_may(guarded):

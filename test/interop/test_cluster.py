@@ -8,10 +8,11 @@ import pytest
 
 from clients import run_and_check
 from directions import PEERS
-from http_api import fetch
+from http_api import ask, fetch, upgrade_status
 from processes import Background, read_json, start_gateway
 from reverse_proxies import ReverseProxy
 from scenarios import FUNCTIONS
+from users import RULES, basic, bearer, make_users
 
 DEVICES = [f"robot{number}" for number in range(10)]
 PROXIES = {"nginx": "../cluster/nginx.conf", "haproxy": "../cluster/haproxy.cfg"}
@@ -27,15 +28,15 @@ def device_url(tmp_path_factory):
 class Cluster:
     """Gateways that all know the same devices, and the proxy before them."""
 
-    def __init__(self, proxy, device_url, folder):
-        self._folder, self._device_url = folder, device_url
+    def __init__(self, proxy, device_url, folder, **config):
+        self._folder, self._device_url, self._config = folder, device_url, config
         self.gateways = {}  # {number: (process, port)}
-        self._ports = {}
+        self.ports = {}
         try:
             for number in range(3):
                 (folder / str(number)).mkdir()
                 self.start(number)
-            ports = {8091 + number: port for number, port in self._ports.items()}
+            ports = {8091 + number: port for number, port in self.ports.items()}
             self.proxy = ReverseProxy(proxy, PROXIES[proxy], folder, ports=ports)
         except BaseException:
             self.stop_gateways()
@@ -44,8 +45,9 @@ class Cluster:
     def start(self, number):
         folder = self._folder / str(number)
         devices = [{"name": name, "url": self._device_url} for name in DEVICES]
-        self.gateways[number], self._ports[number] = start_gateway(
-            folder, self._device_url, port=self._ports.get(number), devices=devices, trusted_proxies=["127.0.0.1"])
+        self.gateways[number], self.ports[number] = start_gateway(
+            folder, self._device_url, port=self.ports.get(number), devices=devices, trusted_proxies=["127.0.0.1"],
+            **self._config)
 
     def kill(self, number):
         process = self.gateways.pop(number)
@@ -59,7 +61,7 @@ class Cluster:
 
     def sessions_of(self, number):
         """Devices that this gateway has sessions with now."""
-        devices = read_json(f"http://127.0.0.1:{self._ports[number]}/api/v1/devices")["devices"]
+        devices = read_json(f"http://127.0.0.1:{self.ports[number]}/api/v1/devices")["devices"]
         return {device["name"] for device in devices if device["clients"] > 0}
 
     def url(self, name, scheme="ws"):
@@ -140,6 +142,36 @@ def test_a_gateway_dies(cluster, tmp_path):
         assert cluster.seen_by(dead) == {name for name, number in before.items() if number == dead}
     finally:
         client.stop()
+
+
+@pytest.mark.parametrize("proxy", list(PROXIES))
+def test_who_may_is_known_at_all_gateways(proxy, device_url, tmp_path):
+    """A ticket of one gateway is taken by all; who asks for access and who decides need not come to the same one."""
+    make_users(tmp_path)
+    (tmp_path / "tokens").touch()
+    (tmp_path / "ticket.key").write_bytes(bytes(range(32)))
+    access = {"users_file": str(tmp_path / "users"), "tokens_file": str(tmp_path / "tokens"),
+              "ticket_key_file": str(tmp_path / "ticket.key"), "rules": RULES, "anonymous_role": "viewer"}
+    cluster = Cluster(proxy, device_url, tmp_path, access=access)
+    try:
+        port = cluster.proxy.root
+        for name in DEVICES:
+            ticket = ask(port, "POST", "/api/v1/tickets", headers=basic("root")).json["ticket"]
+            assert upgrade_status(port, f"/devices/{name}?ticket={ticket}") == 101, name
+            assert upgrade_status(port, f"/devices/{name}?ticket={ticket}") == 401, "not just once"
+            assert upgrade_status(port, f"/devices/{name}?ticket=x{ticket}") == 401
+        asked = ask(port, "POST", "/api/v1/access/requests", {"name": "tablet"}, address="127.0.0.2").json
+        requests = f"/api/v1/access/requests/{asked['id']}"
+        for number in range(3, 7):
+            listed = ask(port, "GET", "/api/v1/access/requests", headers=basic("root"), address=f"127.0.0.{number}").json
+            assert [each["id"] for each in listed["requests"]] == [asked["id"]]
+        assert ask(port, "POST", requests + "/approve", {"roles": ["operator"]}, basic("root"), address="127.0.0.7").status == 200
+        token = ask(port, "POST", requests + "/claim", {"secret": asked["secret"]}, address="127.0.0.8").json["token"]
+        for number, gateway_port in cluster.ports.items():
+            cluster.gateways[number].wait_until(
+                lambda: ask(gateway_port, "GET", "/api/v1/access", headers=bearer(token)).json["user"] == "tablet")
+    finally:
+        cluster.stop()
 
 
 def subscribe_to_all(cluster, folder):

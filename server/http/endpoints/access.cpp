@@ -166,8 +166,8 @@ Handler tickets_endpoint(GatewayState& gateway) {
     if (!request.identity.is_proven() && !gateway.access().is_open())
       return http_access.refusal(request.identity, rr::make_error(rr::ErrorCode::authentication_error,
                                                                   "a ticket is for who has shown who he is"));
-    const auto ticket = http_access.tickets().issue(request.identity, std::chrono::steady_clock::now());
-    if (!ticket) return HttpAccess::too_much("for tickets");
+    const auto ticket = gateway.access().tickets().issue(request.identity, Clock::now());
+    if (!ticket) return problem_response(409, "you have more roles than a ticket can name");
     return answer(201, {{"ticket", *ticket}, {"expires_in", Tickets::lifetime.count()}});
   };
 }

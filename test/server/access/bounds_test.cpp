@@ -54,23 +54,40 @@ TEST_CASE("rates: without a bound nothing is kept, and who is gone is forgotten"
   CHECK(gate.keys() < 12'000);
 }
 
-TEST_CASE("tickets: once, and soon") {
+TEST_CASE("tickets: once, soon, and by gateways of one key") {
   Tickets tickets;
   Identity alice;
   alice.name = "alice";
-  const auto ticket = tickets.issue(alice, start);
-  REQUIRE(ticket);
-  CHECK_FALSE(tickets.redeem(*ticket + "x", start));
-  const auto redeemed = tickets.redeem(*ticket, start + seconds(29));
-  REQUIRE(redeemed);
-  CHECK(redeemed->name == "alice");
-  CHECK_FALSE(tickets.redeem(*ticket, start + seconds(29)));
-  const auto late = tickets.issue(alice, start);
-  CHECK_FALSE(tickets.redeem(*late, start + seconds(30)));
-  std::size_t issued = 0;
-  while (tickets.issue(alice, start) && issued < 10'000) ++issued;
-  CHECK(issued == 4096);
-  CHECK(tickets.issue(alice, start + seconds(31)));
+  alice.roles = {"operator", "viewer"};
+  alice.proof = Proof::password;
+  const auto ticket = tickets.issue(alice, day).value();
+  CHECK(tickets.issue(alice, day) != ticket);
+  for (const auto& wrong : {ticket + "x", ticket.substr(1), std::string(), std::string("."), std::string("e30.")})
+    CHECK_FALSE(tickets.redeem(wrong, day));
+  CHECK_FALSE(Tickets().redeem(ticket, day));
+  CHECK(tickets.redeem(ticket, day + seconds(29)) == alice);
+  CHECK_FALSE(tickets.redeem(ticket, day + seconds(29)));
+  const auto late = tickets.issue(alice, day).value();
+  CHECK_FALSE(tickets.redeem(late, day + seconds(30)));
+
+  const rr::Bytes key(32, 7);
+  Tickets here(key);
+  Tickets there(key);
+  CHECK(there.redeem(here.issue(alice, day).value(), day) == alice);
+
+  alice.roles.assign(1000, "operator");
+  CHECK_FALSE(tickets.issue(alice, day));
+}
+
+TEST_CASE("tickets: those that were used are kept until they would be too late, and no more than fit") {
+  Tickets tickets;
+  const auto use = [&](seconds at) {
+    return tickets.redeem(tickets.issue({}, day + at).value(), day + at).has_value();
+  };
+  int used = 0;
+  while (used < 70'000 && use(seconds(0))) ++used;
+  CHECK(used == 65'536);
+  CHECK(use(seconds(31)));
 }
 
 TEST_CASE("requests of access: asked, decided, fetched once") {
