@@ -266,7 +266,7 @@ void Gateway::stop(std::function<void()> on_stopped) {
   if (on_stop_) on_stop_();
   if (found_) found_->stop();
   devices_.stop();
-  sessions_.stop();
+  clients_.stop();
   devices_.on_change(nullptr);
   files_watch_.cancel();
   asio::co_spawn(io_, drain(), asio::detached);

@@ -1,10 +1,7 @@
 #include "server/rr/shared_client.hpp"
 
-#include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
-#include <boost/asio/steady_timer.hpp>
-#include <boost/asio/use_awaitable.hpp>
 
 #include "server/log/log.hpp"
 
@@ -122,7 +119,8 @@ void SharedClient::handle(const rr::WireDisconnected& disconnected) {
 }
 
 void SharedClient::handle(const rr::WireReceived& received) {
-  if (home_) home_->send_wire(path_of(*received.object), *received.member, received.value);
+  // The newest wins: one that can't be sent is replaced.
+  if (home_) (void)home_->send_wire(path_of(*received.object), *received.member, received.value);
 }
 
 void SharedClient::receive_wire(rr::WirePacket& packet) {
@@ -157,7 +155,7 @@ void SharedClient::handle(const rr::PipeConnected& connected) {
 }
 
 void SharedClient::handle(const rr::PipeReceived& received) {
-  if (home_) home_->send_pipe(*this, received.id, received.value, received.wants_ack);
+  if (home_) (void)home_->send_pipe(*this, received.id, received.value, received.wants_ack);
 }
 
 void SharedClient::handle(const rr::PipeClosed& closed) {
@@ -291,26 +289,9 @@ rr::awaitable<void> SharedClient::log_in_at_device(std::shared_ptr<SharedClient>
   if (client.login_) client.leave_login();
   client.login_ = upstream;
   if (client.service_) client.move_to(upstream);
-  asio::co_spawn(client.executor(), keep_logged_in(self, upstream), asio::detached);
+  upstream->keep_open(service->device()->retry());
   client.session_.answer_login(login.id, rr::AuthenticatedUser{login.attempt.username}, rr::read_clocks());
   client.settle();
-}
-
-/// Logs in again when the device comes back.
-rr::awaitable<void> SharedClient::keep_logged_in(std::shared_ptr<SharedClient> self, std::shared_ptr<Upstream> login) {
-  const auto nap = asio::as_tuple(asio::use_awaitable);
-  const auto wake = std::make_shared<asio::steady_timer>(self->executor());
-  const std::weak_ptr<SharedClient> weak = self;
-  self.reset();
-  login->on_lost([wake] { wake->cancel(); });
-  for (;;) {
-    wake->expires_after(std::chrono::seconds(login->is_open() ? 10 : 1));
-    co_await wake->async_wait(nap);
-    const auto client = weak.lock();
-    if (!client || client->is_closed() || client->login_ != login) break;
-    if (!login->is_open()) co_await login->open();
-  }
-  if (!weak.lock()) login->close();
 }
 
 void SharedClient::move_to(std::shared_ptr<Upstream> upstream) {

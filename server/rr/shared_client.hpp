@@ -95,7 +95,6 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
 
   static rr::awaitable<void> log_in_at_device(std::shared_ptr<SharedClient> self,
                                               std::shared_ptr<SharedService> service, rr::LoginRequested login);
-  static rr::awaitable<void> keep_logged_in(std::shared_ptr<SharedClient> self, std::shared_ptr<Upstream> login);
   /// From now on all that the client does goes through `upstream`.
   void move_to(std::shared_ptr<Upstream> upstream);
   void leave_login();

@@ -4,7 +4,6 @@
 #include <boost/uuid/name_generator_sha1.hpp>
 
 #include "core/session/service/service_index.hpp"
-#include "node/transport/socket_stream.hpp"
 
 namespace rrgate {
 
@@ -31,17 +30,14 @@ SharedDevice::SharedDevice(std::shared_ptr<Device> device, SharedNode& gateway_n
                            SharedNode::FindAuthenticator find_authenticator)
     : device_(std::move(device)),
       gateway_node_(gateway_node),
-      config_(config),
       node_({derived_id(gateway_node.identity().id, device_->config().name), node_name_of(device_->config().name)},
             config) {
   node_.set_authenticator(std::move(find_authenticator));
-  device_->share_by([this] { return open_stream(); });
   device_->on_change([this] { refresh(); });
   refresh();
 }
 
 SharedDevice::~SharedDevice() {
-  device_->share_by(nullptr);
   device_->on_change(nullptr);
   for (const auto& [name, service] : services_) service->stop();
   node_.close();
@@ -65,7 +61,7 @@ void SharedDevice::refresh() {
   for (const auto& service : identity->services) {
     if (service.name == rr::service_index_name || services_.contains(service.name)) continue;
     const std::vector<ServiceBoard*> boards{&node_, &gateway_node_};
-    const auto shared = std::make_shared<SharedService>(device_, service.name, config_.retry, boards);
+    const auto shared = std::make_shared<SharedService>(device_, service.name, boards);
     services_.emplace(service.name, shared);
     shared->start();
   }
@@ -75,20 +71,6 @@ bool SharedDevice::is_ready() const {
   if (!device_->identity()) return device_->state() == DeviceState::offline;
   return std::all_of(services_.begin(), services_.end(),
                      [](const auto& service) { return service.second->has_tried(); });
-}
-
-rr::Result<std::unique_ptr<rr::ByteStream>> SharedDevice::open_stream() {
-  const bool is_ready = std::any_of(services_.begin(), services_.end(),
-                                    [](const auto& service) { return service.second->hosted() != nullptr; });
-  if (!is_ready)
-    return rr::make_error(rr::ErrorCode::connection_error,
-                          device_->last_error().empty() ? "no session with it yet" : device_->last_error());
-  auto pair = rr::make_stream_pair(device_->executor(), config_.timeouts.send_stall);
-  if (!pair) return pair.error();
-  SharedArrival arrival;
-  arrival.peer = "the gateway itself";
-  node_.add(std::move(pair->second), std::move(arrival), nullptr);
-  return std::move(pair->first);
 }
 
 SharedDevices::SharedDevices(const rr::NodeId& id, const Config& config,
@@ -105,8 +87,7 @@ void SharedDevices::sync(const DeviceRegistry& devices) {
 }
 
 void SharedDevices::add_own(std::shared_ptr<Device> device, const std::string& service) {
-  own_service_ =
-      std::make_shared<SharedService>(std::move(device), service, config_.retry, std::vector<ServiceBoard*>{&node_});
+  own_service_ = std::make_shared<SharedService>(std::move(device), service, std::vector<ServiceBoard*>{&node_});
   own_service_->start();
 }
 

@@ -23,15 +23,12 @@ class SharedDevice {
   const std::map<std::string, std::shared_ptr<SharedService>>& services() const { return services_; }
   /// Whether clients find what there is: not while the gateway itself is only just connecting.
   bool is_ready() const;
-  /// A client of this process. Errors   connection_error: the device has never answered.
-  rr::Result<std::unique_ptr<rr::ByteStream>> open_stream();
 
  private:
   void refresh();
 
   std::shared_ptr<Device> device_;
   SharedNode& gateway_node_;
-  const Config& config_;
   SharedNode node_;
   std::map<std::string, std::shared_ptr<SharedService>> services_;
 };

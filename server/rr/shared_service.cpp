@@ -1,16 +1,9 @@
 #include "server/rr/shared_service.hpp"
 
-#include <boost/asio/as_tuple.hpp>
-#include <boost/asio/co_spawn.hpp>
-#include <boost/asio/detached.hpp>
-#include <boost/asio/use_awaitable.hpp>
-
 #include "server/log/log.hpp"
 #include "server/rr/shared_client.hpp"
 
 namespace rrgate {
-
-namespace asio = boost::asio;
 
 namespace {
 
@@ -52,71 +45,32 @@ std::vector<std::string> extra_imports(const rr::TypeRegistry& types, const rr::
 
 }  // namespace
 
-SharedService::SharedService(std::shared_ptr<Device> device, std::string name, Retry retry,
-                             std::vector<ServiceBoard*> boards)
+SharedService::SharedService(std::shared_ptr<Device> device, std::string name, std::vector<ServiceBoard*> boards)
     : device_(std::move(device)),
       name_(std::move(name)),
-      retry_(retry),
       boards_(std::move(boards)),
       upstream_(std::make_shared<Upstream>(device_, name_, device_->config().login)),
-      for_device_(std::make_shared<JudgedByDevice>()),
-      wake_(device_->executor()) {}
+      for_device_(std::make_shared<JudgedByDevice>()) {
+  device_->share(name_, upstream_);
+}
 
 std::shared_ptr<Upstream> SharedService::make_own_upstream(UpstreamLogin login) const {
   return std::make_shared<Upstream>(device_, name_, std::move(login), UpstreamUse::one_client);
 }
 
 void SharedService::start() {
-  upstream_->on_lost([weak = weak_from_this()] {
-    if (const auto self = weak.lock()) self->wake_.cancel();
-  });
   upstream_->on_released([weak = weak_from_this()](const std::string& path) {
     if (const auto self = weak.lock(); self && self->hosted_) self->hosted_->forget_path(path);
   });
-  asio::co_spawn(device_->executor(), keep_open(shared_from_this()), asio::detached);
+  upstream_->keep_open(device_->retry(), [weak = weak_from_this()] {
+    const auto self = weak.lock();
+    return self ? self->publish() : rr::Result<>();
+  });
 }
 
 void SharedService::stop() {
-  is_stopped_ = true;
-  wake_.cancel();
   withdraw();
   upstream_->close();
-}
-
-rr::awaitable<void> SharedService::keep_open(std::shared_ptr<SharedService> self) {
-  const auto nap = asio::as_tuple(asio::use_awaitable);
-  auto wait = self->retry_.min;
-  while (!self->is_stopped_) {
-    const auto opened = co_await self->upstream_->open();
-    if (self->is_stopped_) break;
-    rr::Result<> done = opened;
-    if (opened) done = self->publish();
-    self->has_tried_ = true;
-    if (done) {
-      log(LogLevel::info, "shared session open", {{"device", self->device_->config().name}, {"service", self->name_}});
-      wait = self->retry_.min;
-      self->wake_.expires_at(asio::steady_timer::time_point::max());
-      while (self->upstream_->is_open() && !self->is_stopped_) co_await self->wake_.async_wait(nap);
-      log(LogLevel::info, "shared session lost",
-          {{"device", self->device_->config().name}, {"service", self->name_}, {"clients", self->clients_.size()}});
-      if (self->is_stopped_) break;
-    } else {
-      log(LogLevel::warning, "shared session can't be opened",
-          {{"device", self->device_->config().name}, {"service", self->name_}, {"error", done.error().message}});
-    }
-    self->wake_.expires_after(with_jitter(wait));
-    co_await self->wake_.async_wait(nap);
-    wait = std::min(wait * 2, self->retry_.max);
-  }
-  self->upstream_->close();
-}
-
-rr::Result<> SharedService::take_over_definitions(const rr::TypeRegistry& from) {
-  std::vector<std::string> texts;
-  for (const auto& definition : from.definitions())
-    if (!types_->find_service(definition->name)) texts.push_back(definition->text);
-  if (texts.empty()) return {};
-  return types_->add(texts, rr::RobdefMode::compat);
 }
 
 /// Offers the service as it is now. Where it is as it was, clients notice nothing.
@@ -126,21 +80,14 @@ rr::Result<> SharedService::publish() {
   const auto& root_type = session.object_type(name_)->qualified_name;
   const auto attributes = with_mode(session.attributes());
   if (hosted_) {
-    const bool is_same_text = std::all_of(session.types().definitions().begin(), session.types().definitions().end(),
-                                          [&](const auto& definition) {
-                                            const auto* known = types_->find_service(definition->name);
-                                            return !known || known->text == definition->text;
-                                          });
-    const bool has_same_policy = hosted_->policy().require_valid_user == upstream_->requires_user();
-    if (is_same_text && has_same_policy && hosted_->root_type_name() == root_type &&
-        hosted_->attributes() == rr::Value(attributes))
-      return take_over_definitions(session.types());
+    if (types_ == upstream_->types() && hosted_->policy().require_valid_user == upstream_->requires_user() &&
+        hosted_->root_type_name() == root_type && hosted_->attributes() == rr::Value(attributes))
+      return {};
     log(LogLevel::warning, "a shared service has changed: its clients have to connect anew",
         {{"device", device_->config().name}, {"service", name_}, {"clients", clients_.size()}});
     withdraw();
   }
-  types_ = std::make_shared<rr::TypeRegistry>();
-  if (auto taken = take_over_definitions(session.types()); !taken) return taken;
+  types_ = upstream_->types();
   const auto root = std::make_shared<SharedObject>(name_, root_type);
   auto hosted = rr::HostedService::make(name_, root, types_, attributes);
   if (!hosted) return hosted.error();
@@ -177,12 +124,14 @@ void SharedService::add_traffic(Traffic& traffic) const {
 }
 
 void SharedService::find_object(Upstream& by, const std::string& path, std::function<void(rr::Result<>)> done) {
-  by.find_object(path, [weak = weak_from_this(), path, done = std::move(done)](const rr::Result<rr::Value>& found) {
+  by.find_object(path, [weak = weak_from_this(), finder = by.weak_from_this(), path,
+                        done = std::move(done)](const rr::Result<rr::Value>& found) {
     const auto self = weak.lock();
+    const auto found_by = finder.lock();
     if (!self || !self->hosted_) return;  // whoever asked has been told that the service is gone
     if (!found) return done(found.error());
-    if (const auto& connection = self->upstream_->connection())
-      if (auto taken = self->take_over_definitions(connection->session().types()); !taken) return done(taken.error());
+    if (found_by && found_by != self->upstream_)
+      if (auto taken = self->upstream_->take_over_definitions(*found_by->types()); !taken) return done(taken.error());
     done(self->hosted_->add_object(path, std::make_shared<SharedObject>(path, std::string(found->to_text().value()))));
   });
 }

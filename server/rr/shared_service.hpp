@@ -2,7 +2,6 @@
 // server/rr. Source: sessions spec section 2.20.
 #pragma once
 
-#include <boost/asio/steady_timer.hpp>
 #include <functional>
 #include <memory>
 #include <set>
@@ -32,7 +31,7 @@ class ServiceBoard {
 class SharedService : public std::enable_shared_from_this<SharedService> {
  public:
   /// `boards`  outlive it.
-  SharedService(std::shared_ptr<Device> device, std::string name, Retry retry, std::vector<ServiceBoard*> boards);
+  SharedService(std::shared_ptr<Device> device, std::string name, std::vector<ServiceBoard*> boards);
 
   /// Connects, again and again, until stop().
   void start();
@@ -43,7 +42,7 @@ class SharedService : public std::enable_shared_from_this<SharedService> {
   /// Null before the device has answered for the first time.
   const std::shared_ptr<rr::HostedService>& hosted() const { return hosted_; }
   /// Whether the first attempt to connect is over, well or not.
-  bool has_tried() const { return has_tried_; }
+  bool has_tried() const { return upstream_->has_tried(); }
   /// The session that all clients share.
   const std::shared_ptr<Upstream>& upstream() const { return upstream_; }
   /// A session for one client alone; not open yet.
@@ -61,23 +60,17 @@ class SharedService : public std::enable_shared_from_this<SharedService> {
   void add_traffic(Traffic& traffic) const;
 
  private:
-  static rr::awaitable<void> keep_open(std::shared_ptr<SharedService> self);
   rr::Result<> publish();
   void withdraw();
-  rr::Result<> take_over_definitions(const rr::TypeRegistry& from);
 
   std::shared_ptr<Device> device_;
   std::string name_;
-  Retry retry_;
   std::vector<ServiceBoard*> boards_;
   std::shared_ptr<Upstream> upstream_;
   std::shared_ptr<const rr::Authenticator> for_device_;
-  std::shared_ptr<rr::TypeRegistry> types_;
+  std::shared_ptr<rr::TypeRegistry> types_;  ///< of what is hosted
   std::shared_ptr<rr::HostedService> hosted_;
   std::set<SharedClient*> clients_;
-  boost::asio::steady_timer wake_;
-  bool has_tried_ = false;
-  bool is_stopped_ = false;
 };
 
 }  // namespace rrgate

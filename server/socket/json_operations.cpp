@@ -26,7 +26,7 @@ rr::OrderedJson to_json(const Target& target, const rr::Value& value, const rr::
 }
 
 std::string path_of(const Target& target) {
-  return target.member ? target.object.path() + "." + target.member->name : target.object.path();
+  return target.member ? target.path() + "." + target.member->name : target.path();
 }
 
 /// Throws   rr::Exception: the path leads to something else.
@@ -152,13 +152,17 @@ rr::awaitable<rr::OrderedJson> JsonOperations::perform(RequestPtr request) {
 rr::awaitable<JsonOperations::TargetPtr> JsonOperations::find(RequestPtr request, const Operation& operation) {
   auto segments = place_.segments;
   for (auto& segment : value_or_throw(split_path(request->text("path", "")))) segments.push_back(std::move(segment));
-  auto target = value_or_throw(co_await find_target(session(), segments));
+  auto used = co_await client();
+  auto target = value_or_throw(co_await find_target(used, segments));
   // Packets to a client come on the endpoint on which it has sent: nobody else's.
   const bool is_two_way = target->member && target->member->kind == rr::MemberKind::pipe &&
                           target->member->direction() == rr::MemberDirection::both;
-  if ((operation.traits.needs_own || (is_two_way && operation.verb == Verb::subscribe)) && target->session != own_) {
-    if (!own_) own_ = std::make_shared<DeviceSession>(place_.device, place_.key);
-    target = value_or_throw(co_await find_target(own_, segments));
+  if ((operation.traits.needs_own || (is_two_way && operation.verb == Verb::subscribe)) && used != own_) {
+    if (!own_) {
+      auto user = place_.who.is_proven() ? place_.who.name : place_.key.username;
+      own_ = value_or_throw(make_value_client(used->upstream(), std::move(user)));
+    }
+    target->client = own_;
   }
   if (is_stopped_) refuse(rr::ErrorCode::operation_cancelled, "the WebSocket has ended");
   if (const auto allowed = check_access(gateway_, place_.who, place_.key.service, *target, operation.verb); !allowed)
@@ -166,8 +170,13 @@ rr::awaitable<JsonOperations::TargetPtr> JsonOperations::find(RequestPtr request
   co_return target;
 }
 
-std::shared_ptr<DeviceSession> JsonOperations::session() {
-  return own_ ? own_ : value_or_throw(gateway_.sessions().open(*place_.device, place_.key));
+rr::awaitable<std::shared_ptr<ValueClient>> JsonOperations::client() {
+  if (own_) {
+    if (const auto opened = co_await own_->upstream()->opened(); !opened) throw rr::Exception(opened.error());
+    co_return own_;
+  }
+  auto key = place_.key;
+  co_return value_or_throw(co_await gateway_.clients().open(place_.device, std::move(key)));
 }
 
 void JsonOperations::tell_error(const std::string& id, const rr::Error& error) {
@@ -177,14 +186,11 @@ void JsonOperations::tell_error(const std::string& id, const rr::Error& error) {
 void JsonOperations::stop() {
   is_stopped_ = true;
   for (auto& [id, open] : std::exchange(open_, {}))
-    if (const auto* generator = std::get_if<Generator>(&open))
-      generator->target->object.connection()->close_generator(generator->target->object.path(),
-                                                              generator->target->member->name, generator->index,
-                                                              [](const rr::Result<rr::Value>&) {});
+    if (const auto* generator = std::get_if<Generator>(&open)) generator->target->client->drop_generator(generator->id);
   senders_.clear();
   const auto gone = rr::make_error(rr::ErrorCode::operation_aborted, "the client has gone");
   for (const auto& [number, asked] : std::exchange(asks_, {})) asked->reply(gone);
-  if (own_) own_->stop();
+  own_.reset();
 }
 
 // --- what is over with its answer ---
@@ -199,9 +205,9 @@ rr::awaitable<rr::OrderedJson> JsonOperations::get(RequestPtr, TargetPtr target)
   expect_direction(member, rr::MemberDirection::writeonly);
   rr::Value value;
   if (member.kind == rr::MemberKind::property)
-    value = co_await target->object.get(member.name);
+    value = co_await target->ask(rr::CallKind::property_get);
   else
-    value = co_await target->object.peek_in(member.name);
+    value = co_await target->ask(rr::CallKind::peek_in);
   co_return to_json(*target, value, place_.form);
 }
 
@@ -211,9 +217,9 @@ rr::awaitable<rr::OrderedJson> JsonOperations::set(RequestPtr request, TargetPtr
   auto value =
       value_or_throw(rr::value_from_json(request->at("value"), member.type, target->types(), place_.form, member.name));
   if (member.kind == rr::MemberKind::property)
-    co_await target->object.set(member.name, std::move(value));
+    co_await target->ask(rr::CallKind::property_set, std::move(value));
   else
-    co_await target->object.poke_out(member.name, std::move(value));
+    co_await target->ask(rr::CallKind::poke_out, std::move(value));
   co_return nullptr;
 }
 
@@ -223,8 +229,9 @@ rr::awaitable<rr::OrderedJson> JsonOperations::call(RequestPtr request, TargetPt
     refuse(rr::ErrorCode::invalid_operation, rr::quoted(member.name) + " is a generator; use \"open\"");
   static const auto none = rr::Json::object();
   const auto* given = request->find("args");
-  auto arguments = value_or_throw(arguments_from_json(given ? *given : none, member, target->types(), place_.form));
-  const auto value = co_await target->object.call_values(member.name, std::move(arguments));
+  auto called = target->request(rr::CallKind::function);
+  called.arguments = value_or_throw(arguments_from_json(given ? *given : none, member, target->types(), place_.form));
+  const auto value = co_await target->client->ask(std::move(called));
   co_return to_json(*target, value, place_.form);
 }
 
@@ -248,10 +255,11 @@ rr::awaitable<rr::OrderedJson> JsonOperations::write(RequestPtr request, TargetP
   const auto& member = expect_member(*target, "write", {rr::MemberKind::memory});
   expect_direction(member, rr::MemberDirection::readonly);
   const auto sizes = co_await memory_shape(*target);
-  rr::MemoryShape at = request->numbers("offset", sizes.size()).value_or(Shape(sizes.size(), 0));
-  auto items =
-      value_or_throw(rr::value_from_json(request->at("value"), member.type, target->types(), place_.form, member.name));
-  co_await target->object.write_memory(member.name, std::move(at), std::move(items));
+  auto part = target->request(rr::CallKind::memory_write);
+  part.range.position = request->numbers("offset", sizes.size()).value_or(Shape(sizes.size(), 0));
+  part.arguments.push_back(value_or_throw(
+      rr::value_from_json(request->at("value"), member.type, target->types(), place_.form, member.name)));
+  co_await target->client->ask(std::move(part));
   co_return nullptr;
 }
 
@@ -260,12 +268,15 @@ rr::awaitable<rr::OrderedJson> JsonOperations::lock(RequestPtr request, TargetPt
   const auto kind = request->text("kind", "client");
   if (kind != "client" && kind != "user")
     refuse(rr::ErrorCode::invalid_argument, "\"kind\" is " + rr::quoted(kind) + ", expected \"client\" or \"user\"");
-  co_await target->object.lock(kind == "user" ? rr::LockKind::user : rr::LockKind::client);
+  const auto command = kind == "user" ? rr::LockCommand::lock_for_user : rr::LockCommand::lock_for_client;
+  auto path = target->path();
+  co_await target->client->lock(command, std::move(path));
   co_return nullptr;
 }
 
 rr::awaitable<rr::OrderedJson> JsonOperations::unlock(RequestPtr, TargetPtr target) {
-  co_await target->object.unlock();
+  auto path = target->path();
+  co_await target->client->lock(rr::LockCommand::unlock, std::move(path));
   co_return nullptr;
 }
 
@@ -275,8 +286,8 @@ rr::awaitable<rr::OrderedJson> JsonOperations::login(RequestPtr request, TargetP
   auto key = place_.key;
   key.username = request->text("username", "");
   key.password = request->text("password", "");
-  const auto session_of_user = value_or_throw(gateway_.sessions().open(*place_.device, key));
-  value_or_throw(co_await session_of_user->root());
+  auto tried = key;
+  value_or_throw(co_await gateway_.clients().open(place_.device, std::move(tried)));
   place_.key = std::move(key);  // not before: a failed login leaves the one that there was
   co_return nullptr;
 }
@@ -302,11 +313,13 @@ rr::awaitable<rr::OrderedJson> JsonOperations::open(RequestPtr request, TargetPt
   const auto* given = request->find("args");
   auto arguments = value_or_throw(arguments_from_json(given ? *given : none, member, target->types(), place_.form));
   const auto id = reserve(*request);
-  Generator generator{target};
+  Generator generator{target, target->client->next_generator()};
+  auto opening = target->request(rr::CallKind::generator_open);
+  opening.generator = generator.id;
+  opening.arguments = std::move(arguments);
   std::optional<rr::Error> error;
   try {
-    const auto opened = co_await target->object.open_generator(member.name, std::move(arguments));
-    generator.index = opened.to<std::int32_t>().value();
+    co_await target->client->ask(std::move(opening));
   } catch (const rr::Exception& exception) {
     error = exception.error();
   }
@@ -315,8 +328,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::open(RequestPtr request, TargetPt
     throw rr::Exception(*error);
   }
   if (is_stopped_) {  // nobody will close it
-    target->object.connection()->close_generator(target->object.path(), member.name, generator.index,
-                                                 [](const rr::Result<rr::Value>&) {});
+    target->client->drop_generator(generator.id);
     co_return nullptr;
   }
   open_[id] = std::move(generator);
@@ -331,16 +343,18 @@ JsonOperations::Generator& JsonOperations::generator_of(const JsonRequest& reque
 }
 
 rr::awaitable<rr::OrderedJson> JsonOperations::next(RequestPtr request, TargetPtr) {
-  const auto [target, index] = generator_of(*request);
+  const auto [target, generator] = generator_of(*request);
   const auto& member = *target->member;
-  std::optional<rr::Value> parameter;
+  auto step = target->request(rr::CallKind::generator_next);
+  step.generator = generator;
   if (takes_values(member))
-    parameter = value_or_throw(rr::value_from_json(request->at("value"), member.parameters.back().type, target->types(),
-                                                   place_.form, member.parameters.back().name));
+    step.arguments.push_back(
+        value_or_throw(rr::value_from_json(request->at("value"), member.parameters.back().type, target->types(),
+                                           place_.form, member.parameters.back().name)));
   rr::Value value;
   std::optional<rr::Error> error;
   try {
-    value = co_await target->object.next_generator(member.name, index, std::move(parameter));
+    value = co_await target->client->ask(std::move(step));
   } catch (const rr::Exception& exception) {
     error = exception.error();
   }
@@ -357,18 +371,21 @@ rr::awaitable<rr::OrderedJson> JsonOperations::next(RequestPtr request, TargetPt
   co_return out;
 }
 
-rr::awaitable<rr::OrderedJson> JsonOperations::close(RequestPtr request, TargetPtr) {
-  const auto [target, index] = generator_of(*request);
+rr::awaitable<rr::OrderedJson> JsonOperations::end_generator(RequestPtr request, rr::CallKind how) {
+  const auto [target, generator] = generator_of(*request);
   open_.erase(request->at("generator").dump());
-  co_await target->object.close_generator(target->member->name, index);
+  auto end = target->request(how);
+  end.generator = generator;
+  co_await target->client->ask(std::move(end));
   co_return nullptr;
 }
 
+rr::awaitable<rr::OrderedJson> JsonOperations::close(RequestPtr request, TargetPtr) {
+  return end_generator(request, rr::CallKind::generator_close);
+}
+
 rr::awaitable<rr::OrderedJson> JsonOperations::abort(RequestPtr request, TargetPtr) {
-  const auto [target, index] = generator_of(*request);
-  open_.erase(request->at("generator").dump());
-  co_await target->object.abort_generator(target->member->name, index);
-  co_return nullptr;
+  return end_generator(request, rr::CallKind::generator_abort);
 }
 
 namespace {
@@ -401,9 +418,8 @@ rr::awaitable<rr::OrderedJson> JsonOperations::subscribe(RequestPtr request, Tar
   if (after && !after->is_number_unsigned())
     refuse(rr::ErrorCode::invalid_argument, "\"after\" is the number of an event");
   const auto id = reserve(*request);
-  // The target's connection keeps the definitions, which the member is of; its session would keep itself.
   const auto told = std::make_shared<Target>(*target);
-  told->session.reset();
+  told->client.reset();  // it would keep itself
   SampleHandler handler = [outbox = outbox_, id, told, form = place_.form](const SamplePtr& sample,
                                                                            const rr::Error* error) {
     if (!sample) {
@@ -417,9 +433,9 @@ rr::awaitable<rr::OrderedJson> JsonOperations::subscribe(RequestPtr request, Tar
       outbox->add(sample_text(id, *sample, *told, form));
     }
   };
-  TopicKey key(member.kind, target->object.path(), member.name);
-  auto listening =
-      co_await target->session->listen(std::move(key), after ? after->get<std::uint64_t>() : 0, std::move(handler));
+  auto place = target->place();
+  const auto from = after ? after->get<std::uint64_t>() : 0;
+  auto listening = co_await target->client->listen(std::move(place), from, std::move(handler));
   if (!listening || is_stopped_ || !open_.contains(id)) {
     open_.erase(id);
     value_or_throw(std::move(listening));
@@ -443,17 +459,19 @@ rr::awaitable<rr::OrderedJson> JsonOperations::send(RequestPtr request, TargetPt
   expect_direction(member, rr::MemberDirection::readonly);
   auto value =
       value_or_throw(rr::value_from_json(request->at("value"), member.type, target->types(), place_.form, member.name));
-  const TopicKey key(member.kind, target->object.path(), member.name);
+  const std::pair key(target->path(), member.name);
   if (!senders_.contains(key)) {
     if (senders_.size() >= max_open)
       refuse(rr::ErrorCode::out_of_system_resource,
              "this WebSocket sends on " + std::to_string(max_open) + " wires and pipes already");
     SampleHandler nothing = [](const SamplePtr&, const rr::Error*) {};
-    auto listening = value_or_throw(co_await target->session->listen(key, 0, std::move(nothing)));
+    auto place = target->place();
+    auto listening = value_or_throw(co_await target->client->listen(std::move(place), 0, std::move(nothing)));
     if (is_stopped_) co_return nullptr;
     senders_[key] = std::move(listening);
   }
-  const auto sent = co_await target->session->send(key, std::move(value));
+  auto place = target->place();
+  const auto sent = co_await target->client->send(std::move(place), std::move(value));
   if (!sent) throw rr::Exception(sent.error());
   co_return nullptr;
 }
@@ -461,10 +479,10 @@ rr::awaitable<rr::OrderedJson> JsonOperations::send(RequestPtr request, TargetPt
 // --- the device asks ---
 
 rr::awaitable<rr::OrderedJson> JsonOperations::callback(RequestPtr request, TargetPtr target) {
-  const auto& member = expect_member(*target, "callback", {rr::MemberKind::callback});
+  expect_member(*target, "callback", {rr::MemberKind::callback});
   const auto id = reserve(*request);
   const auto asked = std::make_shared<Target>(*target);
-  asked->session.reset();
+  asked->client.reset();
   rr::ClientConnection::LateCallbackHandler handler = [weak = weak_from_this(), id, asked](
                                                           std::span<const rr::Value> arguments, const auto& reply) {
     if (const auto self = weak.lock())
@@ -472,8 +490,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::callback(RequestPtr request, Targ
     else
       reply(rr::make_error(rr::ErrorCode::operation_aborted, "the client has gone"));
   };
-  TopicKey key(member.kind, target->object.path(), member.name);
-  auto answering = co_await target->session->answer_callback(std::move(key), std::move(handler));
+  auto answering = target->client->answer_callback(target->place(), std::move(handler));
   if (!answering || is_stopped_ || !open_.contains(id)) {
     open_.erase(id);
     value_or_throw(std::move(answering));

@@ -42,7 +42,7 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
   using Perform = rr::awaitable<rr::OrderedJson> (JsonOperations::*)(RequestPtr request, TargetPtr target);
   struct Traits {
     bool has_target = true;    ///< the request names an object or a member by its path
-    bool needs_own = false;    ///< a session that is shared with nobody
+    bool needs_own = false;    ///< to be a client of its own
     bool keeps_order = false;  ///< the next message waits for it
     bool is_free = false;      ///< of bounds on requests: packets, and what ends something
   };
@@ -57,11 +57,11 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
 
   /// What a request has opened; named by its id.
   struct Subscription {
-    std::unique_ptr<DeviceSession::Listener> listener;
+    ValueClient::ListenerPtr listener;
   };
   struct Generator {
     TargetPtr target;
-    std::int32_t index = 0;
+    rr::GeneratorId id = 0;
   };
   struct Opening {};
   using Open = std::variant<Opening, Subscription, Generator>;
@@ -72,7 +72,7 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
   static rr::awaitable<void> run(std::shared_ptr<JsonOperations> self, RequestPtr request, Passes passes);
   rr::awaitable<rr::OrderedJson> perform(RequestPtr request);
   rr::awaitable<TargetPtr> find(RequestPtr request, const Operation& operation);
-  std::shared_ptr<DeviceSession> session();
+  rr::awaitable<std::shared_ptr<ValueClient>> client();
   void tell_error(const std::string& id, const rr::Error& error);
 
   rr::awaitable<rr::OrderedJson> describe(RequestPtr request, TargetPtr target);
@@ -98,6 +98,7 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
   /// Takes the request's id for what it opens. Throws   rr::Exception: no id, one that is in use, too many.
   std::string reserve(const JsonRequest& request);
   Generator& generator_of(const JsonRequest& request);
+  rr::awaitable<rr::OrderedJson> end_generator(RequestPtr request, rr::CallKind how);
   /// The device asks.
   void ask(const std::string& id, const TargetPtr& target, std::span<const rr::Value> arguments,
            rr::ClientConnection::CallbackReply reply);
@@ -105,9 +106,9 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
   GatewayState& gateway_;
   JsonSocketPlace place_;
   std::shared_ptr<JsonOutbox> outbox_;
-  std::shared_ptr<DeviceSession> own_;  ///< once something needs it; then everything uses it
+  std::shared_ptr<ValueClient> own_;  ///< once something needs it; then everything uses it
   std::map<std::string, Open> open_;
-  std::map<TopicKey, std::unique_ptr<DeviceSession::Listener>> senders_;  ///< hold what is sent on
+  std::map<std::pair<std::string, std::string>, ValueClient::ListenerPtr> senders_;  ///< hold what is sent on
   std::map<std::int64_t, std::shared_ptr<Ask>> asks_;
   std::int64_t last_ask_ = 0;
   std::size_t running_ = 0;

@@ -16,8 +16,8 @@
 #include "server/state/connection.hpp"
 #include "server/state/http_access.hpp"
 #include "server/upstream/device.hpp"
-#include "server/upstream/device_session.hpp"
 #include "server/upstream/found_devices.hpp"
+#include "server/upstream/value_client.hpp"
 
 namespace rrgate {
 
@@ -29,7 +29,7 @@ class GatewayState {
 
   const Config& config() const { return config_; }
   DeviceRegistry& devices() { return devices_; }
-  DeviceSessions& sessions() { return sessions_; }
+  ValueClients& clients() { return clients_; }
   SharedDevices& shared() { return shared_; }
   /// Null where the configuration has no "discover", and before start().
   FoundDevices* found() { return config_.discover.is_enabled ? found_.get() : nullptr; }
@@ -57,7 +57,7 @@ class GatewayState {
   std::unique_ptr<HttpAccess> http_access_;
   std::unique_ptr<TlsFiles> web_tls_;
   DeviceRegistry devices_;
-  DeviceSessions sessions_;
+  ValueClients clients_;
   std::unique_ptr<FoundDevices> found_;
   Admission admission_;
   SharedDevices shared_;

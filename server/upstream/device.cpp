@@ -135,15 +135,16 @@ rr::awaitable<rr::Result<std::unique_ptr<rr::ByteStream>>> Device::connect(std::
   co_return stream;
 }
 
-rr::awaitable<rr::Result<std::unique_ptr<rr::ByteStream>>> Device::connect_client() {
-  if (!is_shared()) co_return co_await connect();
-  if (!open_shared_) co_return rr::make_error(rr::ErrorCode::connection_error, "the gateway stops");
-  co_return open_shared_();
-}
-
-rr::NodeIdentity Device::client_target() const {
-  if (is_shared()) return {};
-  return {config_.url.node_id.value_or(rr::NodeId{}), config_.url.node_name};
+rr::Result<std::shared_ptr<Upstream>> Device::find_shared(const std::string& service) const {
+  const auto found = shared_.find(service);
+  if (found != shared_.end())
+    if (auto upstream = found->second.lock()) return upstream;
+  if (identity_)
+    return rr::make_error(rr::ErrorCode::service_not_found,
+                          "device " + rr::quoted(config_.name) + " has no service " + rr::quoted(service));
+  const auto error =
+      rr::make_error(rr::ErrorCode::connection_error, last_error_.empty() ? "it has not answered yet" : last_error_);
+  return rr::make_error(error.code, offline_text(error));
 }
 
 std::shared_ptr<ServiceLocks> Device::locks_of(const std::string& service) {

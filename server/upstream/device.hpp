@@ -21,6 +21,7 @@
 namespace rrgate {
 
 class ServiceLocks;
+class Upstream;
 
 enum class DeviceState { connecting, online, offline };
 std::string_view to_string(DeviceState state);
@@ -62,12 +63,11 @@ class Device : public std::enable_shared_from_this<Device> {
   bool is_on_way(std::string_view way) const;
   /// Such a look has come. Until one is answered no client is connected, or each would go round in circles.
   void note_circle();
-  /// The same for one client of it: where the device is shared, a connection to the gateway's session with it.
-  rr::awaitable<rr::Result<std::unique_ptr<rr::ByteStream>>> connect_client();
-  /// Which node answers there: empty where any will do.
-  rr::NodeIdentity client_target() const;
-  using OpenShared = std::function<rr::Result<std::unique_ptr<rr::ByteStream>>()>;
-  void share_by(OpenShared open) { open_shared_ = std::move(open); }
+  /// The session that all clients of a service share, as long as it lives.
+  void share(const std::string& service, std::weak_ptr<Upstream> by) { shared_[service] = std::move(by); }
+  /// Errors   service_not_found; connection_error: the device has not answered yet.
+  rr::Result<std::shared_ptr<Upstream>> find_shared(const std::string& service) const;
+  const Retry& retry() const { return retry_; }
   /// Of one service, for all sessions that the gateway has with it.
   std::shared_ptr<ServiceLocks> locks_of(const std::string& service);
   bool is_shared() const { return config_.mode == DeviceMode::shared; }
@@ -118,7 +118,6 @@ class Device : public std::enable_shared_from_this<Device> {
 
   DeviceConfig config_;
   std::vector<rr::ConnectionUrl> urls_;  ///< of a found device
-  OpenShared open_shared_;
   std::function<void()> on_change_;
   rr::DialOptions dial_options_;
   std::shared_ptr<TlsFiles> tls_;                        ///< null: the URL wants none
@@ -131,6 +130,7 @@ class Device : public std::enable_shared_from_this<Device> {
   std::string last_error_;
   std::optional<ProbeResult> identity_;
   std::map<std::string, std::weak_ptr<ServiceLocks>> locks_;  ///< by service
+  std::map<std::string, std::weak_ptr<Upstream>> shared_;     ///< likewise
   std::size_t clients_ = 0;
   Traffic traffic_;
   bool is_stopping_ = false;

@@ -1,15 +1,23 @@
 #include "server/upstream/upstream.hpp"
 
 #include <algorithm>
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/use_awaitable.hpp>
 
 #include "core/session/service_path.hpp"
 #include "core/support/glob.hpp"
 #include "node/client/async_object.hpp"
-#include "server/upstream/open_session.hpp"
+#include "server/log/log.hpp"
 
 namespace rrgate {
 
+namespace asio = boost::asio;
+
 namespace {
+
+constexpr auto wait_token = asio::as_tuple(asio::use_awaitable);
 
 /// Objects that all clients together have found.
 constexpr std::size_t max_objects = 65'536;
@@ -32,6 +40,19 @@ bool ends_generator(const rr::Called& called) {
   return called.kind == rr::CallKind::generator_close || called.kind == rr::CallKind::generator_abort;
 }
 
+using ConnectionPtr = std::shared_ptr<rr::ClientConnection>;
+
+rr::awaitable<ConnectionPtr> begin_session(std::unique_ptr<rr::ByteStream> stream, rr::ClientOptions options) {
+  const auto executor = stream->executor();
+  constexpr asio::use_awaitable_t<> token;
+  return asio::async_initiate<const asio::use_awaitable_t<>, void(std::exception_ptr, ConnectionPtr)>(
+      [executor, stream = std::move(stream), options = std::move(options)](auto handler) mutable {
+        const rr::detail::CompleteOnce<ConnectionPtr, decltype(handler)> complete(std::move(handler), executor);
+        rr::ClientConnection::open(std::move(stream), std::move(options), complete);
+      },
+      token);
+}
+
 /// The object of a call: hosted services of shared devices have no others.
 const std::string& path_of(const rr::Called& called) {
   return static_cast<const SharedObject&>(*called.object).path();
@@ -45,7 +66,9 @@ Upstream::Upstream(std::shared_ptr<Device> device, std::string service, Upstream
       login_(std::move(login)),
       locks_(device_->locks_of(service_)),
       use_(use),
-      number_(next_number()) {}
+      number_(next_number()),
+      wake_(device_->executor()),
+      attempted_(device_->executor(), asio::steady_timer::time_point::max()) {}
 
 // --- the session ---
 
@@ -74,6 +97,10 @@ rr::awaitable<rr::Result<>> Upstream::open() {
       co_return done.error();
     }
   }
+  if (is_closed_) {
+    (*opened)->disconnect();
+    co_return rr::make_error(rr::ErrorCode::connection_error, "the session is not wanted any more");
+  }
   connection_ = std::move(*opened);
   connection_->on_closed([weak = weak_from_this(), which = connection_.get()](const rr::Error& reason) {
     const auto still_there = weak.lock();
@@ -83,7 +110,11 @@ rr::awaitable<rr::Result<>> Upstream::open() {
     if (const auto still_there = weak.lock()) still_there->handle_released(path);
   });
   loss_.reset();
-  if (const auto* root = connection_->session().object_type(service_)) watch_object(service_, *root);
+  if (auto taken = take_over_definitions(connection_->session().types()); !taken) {
+    break_off();
+    co_return taken;
+  }
+  if (const auto* root = object_type(service_)) watch_object(service_, *root);
   look_up_again();
   co_return rr::Result<>();
 }
@@ -93,8 +124,20 @@ rr::awaitable<rr::Result<std::shared_ptr<rr::ClientConnection>>> Upstream::open_
   auto stream = co_await device_->connect();
   if (!stream) co_return rr::make_error(rr::ErrorCode::connection_error, device_->offline_text(stream.error()));
   const auto& url = device_->config().url;
-  const rr::NodeIdentity target{url.node_id.value_or(rr::NodeId{}), url.node_name};
-  co_return co_await open_session(std::move(*stream), service_, target, username, login_.credentials, is_stepwise);
+  rr::ClientOptions options;
+  options.service = service_;
+  options.connection.self.name = "rrgate";
+  options.connection.target = {url.node_id.value_or(rr::NodeId{}), url.node_name};
+  if (is_stepwise) options.connection.features.combined_v2 = options.connection.features.combined_v4 = false;
+  if (!username.empty()) {
+    options.username = std::move(username);
+    options.credentials = rr::Value(login_.credentials);
+  }
+  try {
+    co_return co_await begin_session(std::move(*stream), std::move(options));
+  } catch (const rr::Exception& exception) {
+    co_return exception.error();
+  }
 }
 
 /// Errors   also invalid_operation: the service knows no users.
@@ -110,7 +153,9 @@ rr::awaitable<rr::Result<>> Upstream::log_in(std::shared_ptr<rr::ClientConnectio
 }
 
 void Upstream::close(std::function<void()> closed) {
-  on_lost_ = nullptr;
+  is_closed_ = true;
+  wake_.cancel();
+  attempted_.cancel();
   const auto connection = std::exchange(connection_, nullptr);
   if (!connection) {
     if (closed) closed();
@@ -118,6 +163,79 @@ void Upstream::close(std::function<void()> closed) {
   }
   if (closed) connection->on_closed([closed = std::move(closed)](const rr::Error&) { closed(); });
   connection->disconnect();
+  tell_lost(lost_error());
+}
+
+void Upstream::keep_open(Retry retry, std::function<rr::Result<>()> is_used) {
+  asio::co_spawn(device_->executor(), run(shared_from_this(), retry, std::move(is_used)), asio::detached);
+}
+
+rr::awaitable<void> Upstream::run(std::shared_ptr<Upstream> self, Retry retry, std::function<rr::Result<>()> is_used) {
+  const std::string device = self->device_->config().name;
+  auto wait = retry.min;
+  while (!self->is_closed_) {
+    rr::Result<> done;
+    self->is_attempting_ = true;
+    if (!self->is_open()) done = co_await self->open();
+    if (done && is_used && !self->is_closed_) done = is_used();
+    self->is_attempting_ = false;
+    if (!done) self->last_error_ = done.error();
+    ++self->attempts_;
+    self->attempted_.cancel();
+    if (self->is_closed_) break;
+    if (done) {
+      log(LogLevel::info, "session open", {{"device", device}, {"service", self->service_}});
+      wait = retry.min;
+      self->wake_.expires_at(asio::steady_timer::time_point::max());
+      while (self->is_open() && !self->is_closed_) co_await self->wake_.async_wait(wait_token);
+      if (self->is_closed_) break;
+      log(LogLevel::info, "session lost",
+          {{"device", device}, {"service", self->service_}, {"clients", self->clients_.size()}});
+    } else {
+      self->break_off();
+      const auto level = self->use_ == UpstreamUse::all_clients ? LogLevel::warning : LogLevel::debug;
+      log(level, "session can't be opened",
+          {{"device", device}, {"service", self->service_}, {"error", done.error().message}});
+    }
+    self->wake_.expires_after(with_jitter(wait));
+    co_await self->wake_.async_wait(wait_token);
+    wait = std::min(wait * 2, retry.max);
+  }
+}
+
+rr::awaitable<rr::Result<>> Upstream::opened() {
+  const auto self = shared_from_this();
+  if (is_open() && !is_attempting_) co_return rr::Result<>();
+  const auto before = attempts_;
+  wake_.cancel();
+  while (attempts_ == before && !is_closed_) co_await attempted_.async_wait(wait_token);
+  if (!connection_) co_return last_error_;
+  co_return rr::Result<>();
+}
+
+/// Whoever has joined something has definitions in hand: they stay, unless the device says something else now.
+rr::Result<> Upstream::take_over_definitions(const rr::TypeRegistry& from) {
+  const auto& now = from.definitions();
+  const auto differs = [&](const auto& definition) {
+    const auto* known = types_->find_service(definition->name);
+    return known && known->text != definition->text;
+  };
+  if (!types_ || std::any_of(now.begin(), now.end(), differs)) {
+    const auto changed = rr::make_error(rr::ErrorCode::invalid_state, "the service has changed");
+    while (!wires_.empty()) drop_wire(MemberKey(wires_.begin()->first), &changed);
+    while (!pipes_.empty()) drop_pipe(pipes_.begin()->first);
+    types_ = std::make_shared<rr::TypeRegistry>();
+  }
+  std::vector<std::string> texts;
+  for (const auto& definition : now)
+    if (!types_->find_service(definition->name)) texts.push_back(definition->text);
+  if (texts.empty()) return {};
+  return types_->add(texts, rr::RobdefMode::compat);
+}
+
+const rr::EntityDefinition* Upstream::object_type(const std::string& path) const {
+  const auto* type = connection_ ? connection_->session().object_type(path) : nullptr;
+  return type ? types_->find_entity(type->qualified_name) : nullptr;
 }
 
 void Upstream::break_off() {
@@ -144,7 +262,15 @@ void Upstream::lost(const rr::Error& reason) {
     if (has(*client)) acknowledge_all(*client);
   locks_->handle_lost(*this);
   device_->note_trouble();
-  if (const auto handler = on_lost_) handler();
+  tell_lost(lost_error());
+  wake_.cancel();
+}
+
+void Upstream::tell_lost(const rr::Error& reason) {
+  const auto self = shared_from_this();
+  const auto clients = clients_;  // they may leave
+  for (auto* client : clients)
+    if (has(*client)) client->connection_lost(reason);
 }
 
 void Upstream::add(UpstreamClient& client) {
@@ -178,6 +304,7 @@ void Upstream::remove(UpstreamClient& client, std::function<void()> left) {
     if (key.first == &client) generators.push_back(key.second);
   for (const auto id : generators) drop_generator(client, id);
   locks_->remove(client, std::move(left));
+  if (closes_unused_ && clients_.empty()) close();
 }
 
 // --- objects ---
@@ -189,8 +316,12 @@ void Upstream::find_object(const std::string& path, Completion done) {
         rr::make_error(rr::ErrorCode::out_of_system_resource,
                        "clients of this device have found " + std::to_string(max_objects) + " objects already"));
   connection_->find_object(path, [weak = weak_from_this(), path, done = std::move(done)](rr::Result<rr::Value> found) {
-    if (const auto self = weak.lock(); self && self->connection_ && found)
-      if (const auto* type = self->connection_->session().object_type(path)) self->watch_object(path, *type);
+    const auto self = weak.lock();
+    if (self && self->connection_ && found) {
+      if (auto taken = self->take_over_definitions(self->connection_->session().types()); !taken)
+        return done(taken.error());
+      if (const auto* type = self->object_type(path)) self->watch_object(path, *type);
+    }
     done(std::move(found));
   });
 }
@@ -235,6 +366,9 @@ void Upstream::look_up_again() {
       for (const auto& [number, pipe] : self->pipes_)
         if (pipe.path == path) pipes.push_back(number);
       for (const auto number : pipes) self->attach_pipe(number);
+      const auto clients = self->clients_;  // they may leave
+      for (auto* client : clients)
+        if (self->has(*client)) client->found_again(path);
     });
   }
 }

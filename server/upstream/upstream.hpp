@@ -67,13 +67,21 @@ class UpstreamClient {
   virtual void release_path(const std::string& path) = 0;
   virtual void call_callback(const std::string& path, const rr::MemberDefinition& callback,
                              std::span<const rr::Value> arguments, rr::ClientConnection::CallbackReply answer) = 0;
+  /// The device is away. Wires and pipes are answered anew once they are joined again.
+  virtual void connection_lost(const rr::Error&) {}
+  /// The device is back, and this object with it.
+  virtual void found_again(const std::string&) {}
 
  protected:
   ~UpstreamClient() = default;
 };
 
 /// Who uses a session with a device.
-enum class UpstreamUse : std::uint8_t { all_clients, one_client };
+enum class UpstreamUse : std::uint8_t {
+  all_clients,  ///< with the login that is for all services of a device
+  one_user,     ///< who has given a login for this service
+  one_client,
+};
 
 /// All of it runs on the gateway's thread. Paths are the device's and the clients' alike: the service has one name.
 class Upstream : public std::enable_shared_from_this<Upstream> {
@@ -85,19 +93,34 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
 
   /// Connects, and attaches again what clients had joined. Errors   those of reaching the device and of the login.
   rr::awaitable<rr::Result<>> open();
+  /// Opens it, again and again, until close(). `is_used`: says whether a session that was opened is of use.
+  void keep_open(Retry retry, std::function<rr::Result<>()> is_used = nullptr);
+  /// Whether its first attempt is over, well or not.
+  bool has_tried() const { return attempts_ > 0; }
+  /// For one that is kept open: waits for an attempt that is under way, or begins one now. Errors   those of open().
+  rr::awaitable<rr::Result<>> opened();
+  /// As soon as the last client has left, close() follows.
+  void close_unused() { closes_unused_ = true; }
   /// `closed`  is called once the device knows, or after half a second.
   void close(std::function<void()> closed = nullptr);
   /// Ends the session with the device as if it were lost.
   void break_off();
   bool is_open() const { return connection_ != nullptr; }
+  Device& device() const { return *device_; }
+  const std::string& service() const { return service_; }
+  /// What the service is made of, and what its objects have brought since: the same as long as the device says the
+  /// same, with or without a session. Null before the first.
+  const std::shared_ptr<rr::TypeRegistry>& types() const { return types_; }
+  /// The type of an object that was found, from types(). Null: it was not, or there is no session.
+  const rr::EntityDefinition* object_type(const std::string& path) const;
+  /// Adds to types() what another session with the service has found.
+  rr::Result<> take_over_definitions(const rr::TypeRegistry& from);
   /// Whether the service is for users who have logged in, and this session is nobody's.
   bool requires_user() const { return requires_user_; }
   /// Null while it is not open.
   const std::shared_ptr<rr::ClientConnection>& connection() const { return connection_; }
   /// What requests fail with while the device is away.
   rr::Error lost_error() const;
-  /// Called when the session ends otherwise than by close().
-  void on_lost(std::function<void()> handler) { on_lost_ = std::move(handler); }
   /// The objects at and below a path were replaced.
   void on_released(std::function<void(const std::string& path)> handler) { on_released_ = std::move(handler); }
 
@@ -125,16 +148,17 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   /// Answered with answer_wire(). A client that joins a wire gets the newest value at once.
   void join_wire(UpstreamClient& client, const std::string& path, const rr::MemberDefinition& wire);
   void leave_wire(UpstreamClient& client, const std::string& path, const rr::MemberDefinition& wire);
-  void send_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::Value& value);
+  /// Errors   those of packing; without a session the newest is sent once there is one.
+  rr::Result<> send_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::Value& value);
 
   /// Clients of a readonly pipe share one endpoint at the device; others have one each. Answered with accept_pipe() or
   /// refuse_pipe().
   void join_pipe(UpstreamClient& client, rr::PipeId id, const std::string& path, const rr::MemberDefinition& pipe);
   void leave_pipe(UpstreamClient& client, rr::PipeId id);
-  /// What the device does not take, or can't because it is away, ends the endpoint.
+  /// What the device does not take, or can't because it is away, ends the endpoint; that is the error, too.
   /// `wants_ack`  the client's number of the packet, for acknowledge_packets(), where it wants to hear of it.
-  void send_pipe(UpstreamClient& client, rr::PipeId id, const rr::Value& packet,
-                 std::optional<std::uint32_t> wants_ack);
+  rr::Result<> send_pipe(UpstreamClient& client, rr::PipeId id, const rr::Value& packet,
+                         std::optional<std::uint32_t> wants_ack);
   /// The client is not behind any more.
   void caught_up(UpstreamClient& client);
   /// Nothing will be heard any more of the client's packets that are on their way: it waits for none of them.
@@ -190,7 +214,9 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   rr::awaitable<rr::Result<>> log_in(std::shared_ptr<rr::ClientConnection> connection);
   /// Whether the client is there still: what is told to one may end it.
   bool has(const UpstreamClient& client) const;
+  static rr::awaitable<void> run(std::shared_ptr<Upstream> self, Retry retry, std::function<rr::Result<>()> is_used);
   void lost(const rr::Error& reason);
+  void tell_lost(const rr::Error& reason);
   void watch_object(const std::string& path, const rr::EntityDefinition& type);
   void look_up_again();
   void handle_released(const std::string& path);
@@ -227,8 +253,15 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   std::uint64_t number_;  ///< no other upstream has it
   std::shared_ptr<rr::ClientConnection> connection_;
   std::optional<rr::Error> loss_;
+  rr::Error last_error_;  ///< of the last attempt to open it
+  std::uint64_t attempts_ = 0;
+  bool is_attempting_ = false;
+  bool is_closed_ = false;
+  bool closes_unused_ = false;
   bool requires_user_ = false;
-  std::function<void()> on_lost_;
+  boost::asio::steady_timer wake_;       ///< what run() waits for
+  boost::asio::steady_timer attempted_;  ///< cancelled when an attempt is over
+  std::shared_ptr<rr::TypeRegistry> types_;
   std::function<void(const std::string&)> on_released_;
   std::vector<UpstreamClient*> clients_;  ///< in the order in which they came
   std::set<std::string> objects_;         ///< paths that were found

@@ -155,13 +155,12 @@ bool Upstream::has_joined(const UpstreamClient& client, const MemberKey& key) co
   return std::ranges::any_of(found->second->followers, is_it);
 }
 
-void Upstream::send_wire(const std::string& path, const rr::MemberDefinition& member, const rr::Value& value) {
+rr::Result<> Upstream::send_wire(const std::string& path, const rr::MemberDefinition& member, const rr::Value& value) {
   const auto found = wires_.find({path, member.name});
-  if (found == wires_.end()) return;
-  if (!connection_ || !found->second->is_attached)
-    found->second->out_value = value;
-  else
-    (void)connection_->send_wire(path, member.name, value);  // the newest wins: one that can't be sent is replaced
+  if (found == wires_.end()) return {};
+  if (connection_ && found->second->is_attached) return connection_->send_wire(path, member.name, value);
+  found->second->out_value = value;
+  return {};
 }
 
 // --- pipes ---
@@ -290,20 +289,21 @@ void Upstream::drop_pipe(PipeNumber number) {
     if (has(*endpoint.first)) endpoint.first->close_pipe(endpoint.second);
 }
 
-void Upstream::send_pipe(UpstreamClient& client, rr::PipeId id, const rr::Value& packet,
-                         std::optional<std::uint32_t> wants_ack) {
+rr::Result<> Upstream::send_pipe(UpstreamClient& client, rr::PipeId id, const rr::Value& packet,
+                                 std::optional<std::uint32_t> wants_ack) {
   const auto known = endpoints_.find({&client, id});
-  if (known == endpoints_.end()) return;
+  if (known == endpoints_.end()) return rr::make_error(rr::ErrorCode::invalid_operation, "the pipe is not connected");
   auto& pipe = pipes_.at(known->second);
   const auto sent = pipe.state == PipeState::attached && connection_ ? pass_on(pipe, known->first, packet, wants_ack)
                                                                      : rr::Result<>(lost_error());
-  if (sent) return;
+  if (sent) return {};
   log(LogLevel::info, "pipe endpoint closed: the device takes no packet",
       {{"device", device_->config().name},
        {"pipe", pipe.path + "." + pipe.member->name},
        {"error", sent.error().message}});
   leave_pipe(client, id);
   client.close_pipe(id);
+  return sent;
 }
 
 rr::Result<> Upstream::pass_on(Pipe& pipe, const EndpointKey& endpoint, const rr::Value& packet,

@@ -280,7 +280,7 @@ def test_streams_outlive_the_device(tmp_path):
         stream = Stream(port, "/state")
         assert stream.next()[2] == [1]
         service.stop()
-        assert stream.next()[1:] == ("state", {"state": "connection_lost", "detail": "connection_lost: the service was closed"})
+        assert stream.next()[1:] == ("state", {"state": "connection_lost", "detail": "connection_lost: device 'interop': the service was closed"})
         number = url.split(":")[2].split("/")[0]
         service = Background([*service_command(direction, "v4", "http://localhost"),
                               f"--robotraconteur-tcp-port={number}"], tmp_path / "again.log")

@@ -56,7 +56,7 @@ def test_metrics(device, tmp_path):
 def test_metrics_of_a_shared_device(device, tmp_path):
     """What a client had stays counted when it has gone."""
     with running(tmp_path, {"devices": [interop(device, mode="shared")]}) as gateway:
-        gateway.wait_for("shared session open")
+        gateway.wait_for("session open")
         url = f"rr+tcp://127.0.0.1:{gateway.port}/?nodename=interop&service=interop"
         assert gateway.metrics()['rrgate_subscription_delivered_total{device="interop",kind="wire"}'] == 0
         run_and_check("reference", url, SCENARIO["wires"].steps)

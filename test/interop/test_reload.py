@@ -80,7 +80,7 @@ class Site:
         command = [sys.executable, "-c", HAND_OVER, self.port, self.port_v6] if is_handed_over else []
         self.gateway = Gateway(folder, config, command=command)
         self.gateway.wait_for("device online", device="relayed")
-        self.gateway.wait_for("shared session open", service="interop")
+        self.gateway.wait_for("session open", service="interop")
 
     def renew(self):
         rrgate("cert", "web", self.folder / "web", "localhost", "127.0.0.1", "::1", "--force")

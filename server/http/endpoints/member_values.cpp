@@ -18,7 +18,7 @@ std::string plain_documentation(std::string_view documentation) {
 
 rr::OrderedJson describe_object(const Target& target) {
   auto out = rr::OrderedJson::object();
-  rr::add_key(out, "path") = target.object.path();
+  rr::add_key(out, "path") = target.path();
   rr::add_key(out, "type") = target.type->qualified_name;
   if (!target.type->documentation.empty())
     rr::add_key(out, "documentation") = plain_documentation(target.type->documentation);
@@ -59,7 +59,7 @@ std::size_t item_bytes_of(const Target& target) {
 }
 
 rr::awaitable<Shape> memory_shape(const Target& target) {
-  const auto value = co_await target.object.memory_dimensions(target.member->name);
+  const auto value = co_await target.ask(rr::CallKind::memory_dimensions);
   const auto items = value_or_throw(value.to_items<std::uint64_t>());
   co_return Shape(items.begin(), items.end());
 }
@@ -77,7 +77,10 @@ rr::awaitable<rr::Value> read_items(const Target& target, const Shape& shape, co
   if (!wanted || *wanted > max_memory_bytes / std::max<std::size_t>(1, item_bytes_of(target)))
     refuse(rr::ErrorCode::buffer_limit_violation,
            "that are more than " + std::to_string(max_memory_bytes) + " bytes; ask for parts with offset and count");
-  co_return co_await target.object.read_memory(target.member->name, std::move(at), std::move(counts));
+  auto part = target.request(rr::CallKind::memory_read);
+  part.range.position = std::move(at);
+  part.range.count = std::move(counts);
+  co_return co_await target.client->ask(std::move(part));
 }
 
 }  // namespace rrgate

@@ -41,13 +41,13 @@ rr::awaitable<Response> answer_property(const ObjectRequest& request, const Targ
   const bool can_read = direction != rr::MemberDirection::writeonly;
   const bool can_write = direction != rr::MemberDirection::readonly;
   if (request.is_read() && can_read) {
-    const auto value = co_await target.object.get(member.name);
+    const auto value = co_await target.ask(rr::CallKind::property_get);
     if (auto image = image_response(request, target, value)) co_return std::move(*image);
     co_return request.value_response(to_json(request, target, value, member.type));
   }
   if (request.method() == http::verb::put && can_write) {
     auto value = body_value(request, target);
-    co_await target.object.set(member.name, std::move(value));
+    co_await target.ask(rr::CallKind::property_set, std::move(value));
     co_return request.written_response();
   }
   co_return request.method_response(!can_write ? "GET, HEAD" : !can_read ? "PUT" : "GET, HEAD, PUT");
@@ -57,7 +57,9 @@ rr::awaitable<Response> answer_function(const ObjectRequest& request, const Targ
   const auto& member = *target.member;
   if (request.method() != http::verb::post) co_return request.method_response("POST");
   auto arguments = value_or_throw(read_arguments(request, member, target.types()));
-  const auto value = co_await target.object.call_values(member.name, std::move(arguments));
+  auto called = target.request(rr::CallKind::function);
+  called.arguments = std::move(arguments);
+  const auto value = co_await target.client->ask(std::move(called));
   if (auto image = image_response(request, target, value)) co_return std::move(*image);
   auto result = rr::OrderedJson::object();
   rr::add_key(result, "result") = to_json(request, target, value, member.type);
@@ -71,13 +73,13 @@ rr::awaitable<Response> answer_wire(const ObjectRequest& request, const Target& 
   const bool has_in = direction != rr::MemberDirection::writeonly;
   const bool has_out = direction != rr::MemberDirection::readonly;
   if (request.is_read() && has_in) {
-    const auto value = co_await target.object.peek_in(member.name);
+    const auto value = co_await target.ask(rr::CallKind::peek_in);
     if (auto image = image_response(request, target, value)) co_return std::move(*image);
     co_return request.value_response(to_json(request, target, value, member.type));
   }
   if (request.method() == http::verb::put && has_out) {
     auto value = body_value(request, target);
-    co_await target.object.poke_out(member.name, std::move(value));
+    co_await target.ask(rr::CallKind::poke_out, std::move(value));
     co_return request.written_response();
   }
   co_return request.method_response(!has_out ? "GET, HEAD" : !has_in ? "PUT" : "GET, HEAD, PUT");
@@ -165,9 +167,10 @@ rr::awaitable<Response> answer_memory_bytes(const ObjectRequest& request, const 
                                                       " with Range");
   rr::Value items;
   if (count > 0) {
-    rr::MemoryShape position{first_item};
-    rr::MemoryShape counts{count};
-    items = co_await target.object.read_memory(target.member->name, std::move(position), std::move(counts));
+    auto part = target.request(rr::CallKind::memory_read);
+    part.range.position = {first_item};
+    part.range.count = {count};
+    items = co_await target.client->ask(std::move(part));
   }
   const auto bytes = count > 0 ? payload_of(items) : rr::ByteSpan();
   const auto skipped = wanted.first - first_item * item_bytes;
@@ -206,8 +209,10 @@ rr::awaitable<Response> answer_memory(const ObjectRequest& request, const Target
     } else {
       items = body_value(request, target);
     }
-    rr::MemoryShape at = position.value_or(Shape(shape.size(), 0));
-    co_await target.object.write_memory(member.name, std::move(at), std::move(items));
+    auto part = target.request(rr::CallKind::memory_write);
+    part.range.position = position.value_or(Shape(shape.size(), 0));
+    part.arguments.push_back(std::move(items));
+    co_await target.client->ask(std::move(part));
     co_return request.written_response();
   }
 

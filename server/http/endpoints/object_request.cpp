@@ -94,8 +94,8 @@ SessionKey session_key(GatewayState& gateway, const Request& request, std::strin
 rr::Result<> check_access(GatewayState& gateway, const Identity& who, std::string_view service, const Target& target,
                           Verb verb) {
   auto& access = gateway.access();
-  const auto& device = target.session->device().config().name;
-  const auto& path = target.object.path();
+  const auto& device = target.client->upstream()->device().config().name;
+  const auto& path = target.path();
   if (!target.member && verb == Verb::read && access.sees(who, device, service, path)) return {};
   return access.check(who, {device, service, path, target.member ? target.member->name : std::string_view(), verb});
 }
@@ -184,22 +184,42 @@ Response ObjectRequest::method_response(std::string_view allowed) const {
   return response;
 }
 
-rr::awaitable<rr::Result<std::shared_ptr<Target>>> find_target(std::shared_ptr<DeviceSession> session,
+rr::Called Target::request(rr::CallKind kind) const {
+  rr::Called out;
+  out.kind = kind;
+  out.object = object;
+  out.member = member;
+  return out;
+}
+
+rr::awaitable<rr::Value> Target::ask(rr::CallKind kind) const {
+  return client->ask(request(kind));
+}
+
+rr::awaitable<rr::Value> Target::ask(rr::CallKind kind, rr::Value value) const {
+  auto wanted = request(kind);
+  wanted.arguments.push_back(std::move(value));
+  return client->ask(std::move(wanted));
+}
+
+rr::awaitable<rr::Result<std::shared_ptr<Target>>> find_target(std::shared_ptr<ValueClient> client,
                                                                std::vector<std::string> segments) {
-  auto root = co_await session->root();
-  if (!root) co_return root.error();
-  auto target = std::make_shared<Target>();
-  target->session = std::move(session);
-  target->object = *root;
-  const auto type_of = [](const rr::AsyncObject& object) {
-    return object.connection()->session().object_type(object.path());
+  const auto upstream = client->upstream();
+  const auto target = std::make_shared<Target>();
+  target->client = client;
+  const auto go_to = [&](const std::string& path) {
+    target->registry = upstream->types();
+    target->type = upstream->object_type(path);
+    if (!target->type) return false;
+    target->object = std::make_shared<SharedObject>(path, target->type->qualified_name);
+    return true;
   };
-  target->type = type_of(*root);
+  if (!go_to(upstream->service())) co_return upstream->lost_error();
   for (std::size_t i = 0; i < segments.size(); ++i) {
     const auto& name = segments[i];
     const auto* member = target->type->find_member(name);
     if (!member)
-      co_return rr::make_error(rr::ErrorCode::member_not_found, "object " + rr::quoted(target->object.path()) + " (" +
+      co_return rr::make_error(rr::ErrorCode::member_not_found, "object " + rr::quoted(target->path()) + " (" +
                                                                     target->type->qualified_name + ") has no member " +
                                                                     rr::quoted(name));
     if (member->kind != rr::MemberKind::objref) {
@@ -217,19 +237,13 @@ rr::awaitable<rr::Result<std::shared_ptr<Target>>> find_target(std::shared_ptr<D
                                  "objref " + rr::quoted(name) + " needs an index: .../" + name + "/INDEX");
       index = segments[i];
     }
+    const auto path = rr::child_path(target->path(), name, index);
     try {
-      const auto child_path = rr::child_path(target->object.path(), name, index);
-      const auto& connection = target->object.connection();
-      if (connection->session().object_type(child_path)) {
-        target->object = rr::AsyncObject(connection, child_path);
-      } else {
-        target->object = co_await target->object.object(name, index);
-      }
+      if (!upstream->object_type(path)) co_await client->find_object(path);
     } catch (const rr::Exception& exception) {
       co_return exception.error();
     }
-    target->type = type_of(target->object);
-    if (!target->type) co_return rr::make_error(rr::ErrorCode::object_not_found, "the object has gone");
+    if (!go_to(path)) co_return rr::make_error(rr::ErrorCode::object_not_found, "the object has gone");
   }
   co_return target;
 }

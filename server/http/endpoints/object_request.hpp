@@ -17,15 +17,23 @@ namespace rrgate {
 
 enum class BodyForm : std::uint8_t { json, cbor, bytes };
 
-/// Where a path leads. `member` null: to the object itself.
+/// Where a path leads, and what can be asked there. `member` null: to the object itself.
 struct Target {
-  std::shared_ptr<DeviceSession> session;
-  rr::AsyncObject object;
+  std::shared_ptr<ValueClient> client;
+  std::shared_ptr<const rr::TypeRegistry> registry;
+  std::shared_ptr<SharedObject> object;
   const rr::EntityDefinition* type = nullptr;
   const rr::MemberDefinition* member = nullptr;
   bool is_shape = false;  ///< ".../MEMORY/shape"
 
-  const rr::TypeRegistry& types() const { return object.connection()->session().types(); }
+  const rr::TypeRegistry& types() const { return *registry; }
+  const std::string& path() const { return object->path(); }
+  MemberPlace place() const { return {path(), member, registry}; }
+
+  /// Asks the device for something of the member. They throw   rr::Exception.
+  rr::Called request(rr::CallKind kind) const;
+  rr::awaitable<rr::Value> ask(rr::CallKind kind) const;
+  rr::awaitable<rr::Value> ask(rr::CallKind kind, rr::Value value) const;
 };
 
 /// Whose session a request uses: user and password of HTTP Basic authentication, where they are not for the gateway.
@@ -79,10 +87,10 @@ class ObjectRequest {
 /// The HTTP status that says best what a Robot Raconteur error says.
 unsigned status_of(rr::ErrorCode code);
 
-/// Walks from the root object along `segments`, percent-decoded: objrefs by name, an index behind those that have one,
-/// at last a member or nothing.
-/// Errors   object_not_found, member_not_found, those of the device.
-rr::awaitable<rr::Result<std::shared_ptr<Target>>> find_target(std::shared_ptr<DeviceSession> session,
+/// Walks, in a session that is open, from the root object along `segments`, percent-decoded: objrefs by name, an index
+/// behind those that have one, at last a member or nothing. Errors   object_not_found, member_not_found, those of the
+/// device.
+rr::awaitable<rr::Result<std::shared_ptr<Target>>> find_target(std::shared_ptr<ValueClient> client,
                                                                std::vector<std::string> segments);
 
 }  // namespace rrgate

@@ -92,8 +92,7 @@ bool is_device_resource(std::string_view name) {
 rr::awaitable<void> serve_document(GatewayState& gateway, Device& device, const ObjectRequest& request,
                                    std::string name) {
   auto& writer = request.writer();
-  std::vector<std::shared_ptr<DeviceSession>> sessions;
-  std::vector<rr::AsyncObject> roots;  // their connections keep the definitions
+  std::vector<std::shared_ptr<const rr::TypeRegistry>> kept;
   std::vector<DescribedService> services;
   std::vector<std::string> unavailable;
   std::vector<std::string> names;
@@ -104,19 +103,16 @@ rr::awaitable<void> serve_document(GatewayState& gateway, Device& device, const 
   const auto device_name = device.config().name;  // a found device may be lost meanwhile
   for (const auto& service : names) {
     auto* still_there = gateway.devices().find(device_name);
-    auto session = still_there ? gateway.sessions().open(*still_there, session_key(gateway, writer.request(), service))
-                               : rr::Result<std::shared_ptr<DeviceSession>>(rr::Error{});
-    if (session) {
-      sessions.push_back(*session);
-      auto root = co_await sessions.back()->root();
-      if (root) {
-        const auto& known = root->connection()->session();
-        services.push_back({service, known.object_type(root->path())->qualified_name, &known.types()});
-        roots.push_back(std::move(*root));
-        continue;
-      }
+    if (!still_there) break;
+    auto key = session_key(gateway, writer.request(), service);
+    const auto client = co_await gateway.clients().open(still_there->shared_from_this(), std::move(key));
+    const auto* root = client ? (*client)->upstream()->object_type(service) : nullptr;
+    if (root) {
+      kept.push_back((*client)->upstream()->types());
+      services.push_back({service, root->qualified_name, kept.back().get()});
+    } else {
+      unavailable.push_back(service);
     }
-    unavailable.push_back(service);
   }
   Response response;
   if (services.empty()) {
@@ -179,18 +175,19 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
   const auto method = writer.request().message.method_string();
   const CallLog logged(std::move(trace), device->config().name, {method.data(), method.size()},
                        std::string(writer.request().path()));
-  auto session = gateway.sessions().open(*device, session_key(gateway, writer.request(), service));
+  auto key = session_key(gateway, writer.request(), service);
+  const auto client = co_await gateway.clients().open(device->shared_from_this(), std::move(key));
   segments.erase(segments.begin(), segments.begin() + 2);
   std::optional<rr::Error> error;
   std::shared_ptr<Target> target;
-  if (session) {
-    auto found = co_await find_target(*session, std::move(segments));
+  if (client) {
+    auto found = co_await find_target(*client, std::move(segments));
     if (found)
       target = *found;
     else
       error = found.error();
   } else {
-    error = session.error();
+    error = client.error();
   }
   if (target)
     if (const auto allowed =

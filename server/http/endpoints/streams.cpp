@@ -77,12 +77,10 @@ rr::awaitable<void> stream_topic(const ObjectRequest& request, const Target& tar
   const auto outbox = std::make_shared<Outbox>(writer.executor());
   const bool is_wire = member.kind == rr::MemberKind::wire;
   const bool is_event = member.kind == rr::MemberKind::event;
-  // Definitions outlive the connection that brought them only with it: keep it.
-  const auto connection = target.object.connection();
-  SampleHandler handler = [outbox, connection, &member, is_wire, is_event, form = request.form()](
+  SampleHandler handler = [outbox, types = target.registry, &member, is_wire, is_event, form = request.form()](
                               const SamplePtr& sample, const rr::Error* error) {
     if (!sample) return outbox->add(state_text(error), false);
-    const auto json = sample_to_json(*sample, member, connection->session().types(), form);
+    const auto json = sample_to_json(*sample, member, *types, form);
     if (json)
       outbox->add(event_text(*json, sample->number, is_event), is_wire);
     else
@@ -91,8 +89,8 @@ rr::awaitable<void> stream_topic(const ObjectRequest& request, const Target& tar
   std::uint64_t after = 0;
   const auto last_id = request.request().header("Last-Event-ID");
   std::from_chars(last_id.data(), last_id.data() + last_id.size(), after);
-  TopicKey key(member.kind, target.object.path(), member.name);
-  auto listening = co_await target.session->listen(std::move(key), after, std::move(handler));
+  auto place = target.place();
+  auto listening = co_await target.client->listen(std::move(place), after, std::move(handler));
   if (!listening) throw rr::Exception(listening.error());
   const auto listener = std::move(*listening);
 
@@ -132,14 +130,13 @@ rr::awaitable<void> stream_images(const ObjectRequest& request, const Target& ta
   auto& writer = request.writer();
   const auto& member = *target.member;
   const auto newest = std::make_shared<Newest>(writer.executor());
-  const auto connection = target.object.connection();  // keeps the definitions
   SampleHandler handler = [newest](const SamplePtr& sample, const rr::Error*) {
     if (!sample) return;
     newest->sample = sample;
     newest->news.cancel();
   };
-  TopicKey key(member.kind, target.object.path(), member.name);
-  auto listening = co_await target.session->listen(std::move(key), 0, std::move(handler));
+  auto place = target.place();
+  auto listening = co_await target.client->listen(std::move(place), 0, std::move(handler));
   if (!listening) throw rr::Exception(listening.error());
   const auto listener = std::move(*listening);
 
@@ -157,7 +154,7 @@ rr::awaitable<void> stream_images(const ObjectRequest& request, const Target& ta
       continue;
     }
     const auto sample = std::exchange(newest->sample, nullptr);
-    const auto jpeg = image_bytes(sample->values.at(0), member.type, connection->session().types(), jpeg_type);
+    const auto jpeg = image_bytes(sample->values.at(0), member.type, target.types(), jpeg_type);
     if (!jpeg) {
       log(LogLevel::debug, "frame left out", {{"member", member.name}, {"error", jpeg.error().message}});
       continue;
@@ -186,8 +183,10 @@ rr::awaitable<void> stream_generator(const ObjectRequest& request, const Target&
   }
   auto arguments = read_arguments(request, member, target.types());
   if (!arguments) throw rr::Exception(arguments.error());
-  const auto opened = co_await target.object.open_generator(member.name, std::move(*arguments));
-  const auto index = opened.to<std::int32_t>().value();
+  auto opening = target.request(rr::CallKind::generator_open);
+  const auto generator = opening.generator = target.client->next_generator();
+  opening.arguments = std::move(*arguments);
+  co_await target.client->ask(std::move(opening));
 
   const bool as_events = request.wants_events();
   const auto gone = std::make_shared<bool>(false);
@@ -198,7 +197,9 @@ rr::awaitable<void> stream_generator(const ObjectRequest& request, const Target&
   while (!failed && !*gone && !has_ended) {
     rr::OrderedJson line;
     try {
-      const auto value = co_await target.object.next_generator(member.name, index);
+      auto step = target.request(rr::CallKind::generator_next);
+      step.generator = generator;
+      const auto value = co_await target.client->ask(std::move(step));
       auto json = rr::value_to_json(value, member.type, target.types(), request.form(), member.name);
       if (!json) throw rr::Exception(json.error());
       line = std::move(*json);
@@ -211,9 +212,7 @@ rr::awaitable<void> stream_generator(const ObjectRequest& request, const Target&
     const auto framed = !as_events ? text + "\n" : (has_ended ? "event: error\n" : "") + ("data: " + text + "\n\n");
     failed = co_await writer.write(framed);
   }
-  if (!has_ended)
-    target.object.connection()->close_generator(target.object.path(), member.name, index,
-                                                [](const rr::Result<rr::Value>&) {});
+  if (!has_ended) target.client->drop_generator(generator);
   if (!failed && !*gone) co_await writer.end();
   co_await writer.unwatch();
 }

@@ -1,0 +1,352 @@
+#include "server/upstream/value_client.hpp"
+
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/use_awaitable.hpp>
+
+#include "core/session/service_path.hpp"
+#include "node/client/async_object.hpp"
+
+namespace rrgate {
+
+namespace asio = boost::asio;
+
+namespace {
+
+constexpr std::size_t kept_events = 256;
+constexpr auto wait_for_news = asio::as_tuple(asio::use_awaitable);
+constexpr asio::use_awaitable_t<> await_result;
+
+/// Calls `begin(complete)` once it is awaited; `complete` takes a Result<Value>, whose error is thrown.
+template <class Begin>
+auto await_completion(asio::any_io_executor executor, Begin begin) {
+  return asio::async_initiate<const asio::use_awaitable_t<>, void(std::exception_ptr, rr::Value)>(
+      [executor = std::move(executor), begin = std::move(begin)](auto handler) mutable {
+        begin(rr::detail::CompleteOnce<rr::Value, decltype(handler)>(std::move(handler), executor));
+      },
+      await_result);
+}
+
+}  // namespace
+
+ValueClient::ValueClient(std::shared_ptr<Upstream> upstream, std::string user, Device::Seat seat)
+    : upstream_(std::move(upstream)),
+      user_(std::move(user)),
+      seat_(std::move(seat)),
+      changed_(upstream_->device().executor(), asio::steady_timer::time_point::max()) {
+  upstream_->add(*this);
+}
+
+ValueClient::~ValueClient() {
+  upstream_->remove(*this);
+}
+
+// --- requests ---
+
+rr::awaitable<rr::Value> ValueClient::find_object(std::string path) {
+  return await_completion(upstream_->device().executor(), [self = shared_from_this(), path = std::move(path)](
+                                                              auto done) { self->upstream_->find_object(path, done); });
+}
+
+rr::awaitable<rr::Value> ValueClient::ask(rr::Called called) {
+  return await_completion(upstream_->device().executor(),
+                          [self = shared_from_this(), called = std::move(called)](auto done) {
+                            self->upstream_->request(*self, called, done);
+                          });
+}
+
+rr::awaitable<rr::Value> ValueClient::lock(rr::LockCommand command, std::string path) {
+  rr::LockWanted wanted;
+  wanted.id = ++last_id_;
+  wanted.command = command;
+  wanted.path = std::move(path);
+  return await_completion(upstream_->device().executor(), [self = shared_from_this(), wanted](auto done) {
+    self->upstream_->lock(*self, wanted, [done](const rr::Result<>& result) {
+      done(result ? rr::Result<rr::Value>(rr::Value()) : result.error());
+    });
+  });
+}
+
+// --- what stays connected ---
+
+rr::awaitable<rr::Result<ValueClient::ListenerPtr>> ValueClient::listen(MemberPlace place, std::uint64_t after,
+                                                                        SampleHandler handler) {
+  const auto self = shared_from_this();
+  const Key key(place.path, place.member->name);
+  const auto id = ++last_id_;
+  auto kept = std::make_shared<SampleHandler>(std::move(handler));
+  auto listener = std::make_unique<Listener>(self, key, id);
+  auto& topic = topics_[key];
+  if (!topic.place.member) topic.place = std::move(place);
+  const bool is_wire = topic.place.member->kind == rr::MemberKind::wire;
+  topic.handlers[id] = kept;
+  const auto recent = topic.recent;  // handlers may leave
+  for (const auto& sample : recent)
+    if (is_wire || (after > 0 && sample->number > after)) (*kept)(sample, nullptr);
+  const auto joined = co_await join(key);
+  if (!joined) co_return joined.error();
+  co_return listener;
+}
+
+rr::Result<ValueClient::ListenerPtr> ValueClient::answer_callback(const MemberPlace& place, CallbackHandler handler) {
+  const Key key(place.path, place.member->name);
+  if (topics_.contains(key))
+    return rr::make_error(rr::ErrorCode::member_busy, rr::quoted(place.member->name) + " is answered already");
+  auto& topic = topics_[key];
+  topic.place = place;
+  topic.callback = std::make_shared<CallbackHandler>(std::move(handler));
+  return std::make_unique<Listener>(shared_from_this(), key, ++last_id_);
+}
+
+rr::awaitable<rr::Result<>> ValueClient::send(MemberPlace place, rr::Value value) {
+  const auto self = shared_from_this();
+  const Key key(place.path, place.member->name);
+  if (topics_.contains(key))
+    if (const auto joined = co_await join(key); !joined) co_return joined.error();
+  const auto found = topics_.find(key);
+  if (found == topics_.end() || found->second.state != TopicState::joined)
+    co_return rr::make_error(rr::ErrorCode::invalid_operation, rr::quoted(key.second) + " is not connected");
+  const auto member = found->second.place;
+  if (member.member->kind == rr::MemberKind::wire) co_return upstream_->send_wire(member.path, *member.member, value);
+  co_return upstream_->send_pipe(*this, found->second.pipe, value, std::nullopt);
+}
+
+rr::awaitable<rr::Result<>> ValueClient::join(Key key) {
+  const auto is_joining = [&] {
+    const auto found = topics_.find(key);
+    return found != topics_.end() && found->second.state == TopicState::joining;
+  };
+  if (const auto found = topics_.find(key); found != topics_.end() && found->second.state == TopicState::idle)
+    begin_joining(found->second);
+  while (is_joining()) co_await changed_.async_wait(wait_for_news);
+  const auto found = topics_.find(key);
+  if (found == topics_.end())
+    co_return rr::make_error(rr::ErrorCode::operation_cancelled, rr::quoted(key.second) + " is not wanted any more");
+  if (found->second.state == TopicState::joined) co_return rr::Result<>();
+  co_return found->second.error;
+}
+
+void ValueClient::begin_joining(Topic& topic) {
+  const auto& member = *topic.place.member;
+  topic.state = TopicState::joining;
+  if (member.kind == rr::MemberKind::event) {
+    topic.state = TopicState::joined;  // events of objects that were found come by themselves
+  } else if (member.kind == rr::MemberKind::wire) {
+    upstream_->join_wire(*this, topic.place.path, member);
+  } else {
+    topic.pipe = ++last_pipe_;
+    pipes_[topic.pipe] = {topic.place.path, member.name};
+    upstream_->join_pipe(*this, topic.pipe, topic.place.path, member);
+  }
+}
+
+void ValueClient::joined(const Key& key, const rr::Result<>& result) {
+  const auto found = topics_.find(key);
+  if (found == topics_.end()) return;
+  auto& topic = found->second;
+  topic.state = result ? TopicState::joined : TopicState::idle;
+  if (!result) topic.error = result.error();
+  changed_.cancel();
+  if (result && std::exchange(topic.is_lost, false)) tell(key, nullptr);
+}
+
+void ValueClient::closed(const Key& key, const rr::Error& reason) {
+  const auto found = topics_.find(key);
+  if (found == topics_.end() || found->second.state != TopicState::joined) return;
+  found->second.state = TopicState::idle;
+  found->second.error = reason;
+  tell(key, &reason);
+}
+
+void ValueClient::tell(const Key& key, const rr::Error* error) {
+  const auto found = topics_.find(key);
+  if (found == topics_.end()) return;
+  const auto handlers = found->second.handlers;  // they may leave
+  for (const auto& [id, handler] : handlers) (*handler)(nullptr, error);
+}
+
+void ValueClient::publish(const Key& key, Sample sample) {
+  const auto found = topics_.find(key);
+  if (found == topics_.end()) return;
+  auto& topic = found->second;
+  const auto kind = topic.place.member->kind;
+  sample.number = ++topic.last_number;
+  const auto shared = std::make_shared<const Sample>(std::move(sample));
+  if (kind == rr::MemberKind::wire) topic.recent.clear();
+  if (kind != rr::MemberKind::pipe) topic.recent.push_back(shared);
+  if (topic.recent.size() > kept_events) topic.recent.erase(topic.recent.begin());
+  const auto handlers = topic.handlers;  // they may leave
+  for (const auto& [id, handler] : handlers) (*handler)(shared, nullptr);
+}
+
+void ValueClient::leave(const Key& key, std::uint64_t id) {
+  const auto found = topics_.find(key);
+  if (found == topics_.end()) return;
+  found->second.handlers.erase(id);
+  found->second.callback.reset();
+  drop_if_unused(key);
+}
+
+void ValueClient::drop_if_unused(const Key& key) {
+  const auto found = topics_.find(key);
+  const auto& topic = found->second;
+  if (!topic.handlers.empty() || topic.callback) return;
+  const auto place = topic.place;
+  const auto pipe = topic.pipe;
+  // An event costs the device nothing, and who comes back wants to know what happened meanwhile.
+  if (place.member->kind == rr::MemberKind::event) return;
+  topics_.erase(found);
+  changed_.cancel();
+  if (place.member->kind == rr::MemberKind::wire) upstream_->leave_wire(*this, place.path, *place.member);
+  if (pipes_.erase(pipe) > 0) upstream_->leave_pipe(*this, pipe);
+}
+
+// --- what the upstream tells ---
+
+bool ValueClient::may_answer(const std::string& path, const rr::MemberDefinition& callback) const {
+  const auto found = topics_.find({path, callback.name});
+  return found != topics_.end() && found->second.callback;
+}
+
+void ValueClient::call_callback(const std::string& path, const rr::MemberDefinition& callback,
+                                std::span<const rr::Value> arguments, rr::ClientConnection::CallbackReply answer) {
+  const auto found = topics_.find({path, callback.name});
+  if (found == topics_.end() || !found->second.callback)
+    return answer(rr::make_error(rr::ErrorCode::invalid_operation, "Callback function not set"));
+  const auto handler = found->second.callback;
+  (*handler)(arguments, std::move(answer));
+}
+
+void ValueClient::receive_event(const std::string& path, const rr::MemberDefinition& event,
+                                std::span<const rr::Value> arguments) {
+  publish({path, event.name}, Sample{0, {}, {arguments.begin(), arguments.end()}});
+}
+
+void ValueClient::receive_wire(rr::WirePacket& packet) {
+  publish({std::string(packet.path()), packet.member().name}, Sample{0, packet.time(), {packet.value()}});
+}
+
+void ValueClient::answer_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::Result<>& result) {
+  joined({path, wire.name}, result);
+}
+
+void ValueClient::close_wire(const std::string& path, const rr::MemberDefinition& wire) {
+  closed({path, wire.name}, rr::make_error(rr::ErrorCode::invalid_state, "the device closed the wire"));
+}
+
+void ValueClient::accept_pipe(rr::PipeId id) {
+  if (const auto found = pipes_.find(id); found != pipes_.end()) joined(Key(found->second), {});
+}
+
+void ValueClient::refuse_pipe(rr::PipeId id, const rr::Error& error) {
+  if (const auto refused = pipes_.extract(id)) joined(refused.mapped(), error);
+}
+
+void ValueClient::receive_packet(rr::PipeId id, const rr::Value& packet) {
+  if (const auto found = pipes_.find(id); found != pipes_.end()) publish(Key(found->second), Sample{0, {}, {packet}});
+}
+
+void ValueClient::close_pipe(rr::PipeId id) {
+  if (const auto ended = pipes_.extract(id))
+    closed(ended.mapped(), rr::make_error(rr::ErrorCode::invalid_state, "the device closed the pipe"));
+}
+
+void ValueClient::release_path(const std::string& path) {
+  std::vector<Key> gone;
+  for (const auto& [key, topic] : topics_)
+    if (rr::is_within(key.first, path)) gone.push_back(key);
+  std::erase_if(pipes_, [&](const auto& pipe) { return rr::is_within(pipe.second.first, path); });
+  for (const auto& key : gone)
+    closed(key, rr::make_error(rr::ErrorCode::invalid_state, "the device has replaced the object"));
+}
+
+void ValueClient::connection_lost(const rr::Error& reason) {
+  std::vector<Key> lost;
+  for (auto& [key, topic] : topics_)
+    if (!std::exchange(topic.is_lost, true)) lost.push_back(key);
+  for (const auto& key : lost) tell(key, &reason);
+}
+
+/// Wires and pipes are joined again by the upstream, and answered one by one.
+void ValueClient::found_again(const std::string& path) {
+  std::vector<Key> back;
+  for (auto& [key, topic] : topics_) {
+    const auto kind = topic.place.member->kind;
+    const bool has_endpoint = kind == rr::MemberKind::wire || kind == rr::MemberKind::pipe;
+    if (key.first == path && !has_endpoint && std::exchange(topic.is_lost, false)) back.push_back(key);
+  }
+  for (const auto& key : back) tell(key, nullptr);
+}
+
+// --- one for all plain requests of a login ---
+
+rr::Result<std::shared_ptr<ValueClient>> make_value_client(std::shared_ptr<Upstream> upstream, std::string user) {
+  auto& device = upstream->device();
+  auto seat = device.take_seat();
+  if (!seat) return rr::make_error(rr::ErrorCode::out_of_system_resource, device.full_text());
+  return std::make_shared<ValueClient>(std::move(upstream), std::move(user), std::move(*seat));
+}
+
+rr::Result<ValueClients::Entries::iterator> ValueClients::find_or_make(const std::shared_ptr<Device>& device,
+                                                                       const SessionKey& key) {
+  std::shared_ptr<Upstream> shared;
+  if (device->is_shared() && key.username.empty()) {
+    auto found = device->find_shared(key.service);
+    if (!found) return found.error();
+    shared = std::move(*found);
+  }
+  const auto found = entries_.find({device->config().name, key});
+  if (found != entries_.end()) {
+    const auto& upstream = found->second.client->upstream();
+    if (&upstream->device() == device.get() && (!shared || shared == upstream)) return found;
+    entries_.erase(found);
+  }
+  if (entries_.size() >= max_clients)
+    return rr::make_error(rr::ErrorCode::out_of_system_resource,
+                          "the gateway has " + std::to_string(max_clients) + " sessions for HTTP already");
+  const bool is_ours = shared == nullptr;
+  if (is_ours) {
+    UpstreamLogin login{key.username, {}};
+    if (!key.username.empty()) login.credentials.items.emplace_back("password", rr::Value(key.password));
+    shared = std::make_shared<Upstream>(device, key.service, std::move(login), UpstreamUse::one_user);
+  }
+  auto client = make_value_client(shared, key.username);
+  if (!client) return client.error();
+  if (is_ours) {
+    shared->close_unused();
+    shared->keep_open(device->retry());
+  }
+  const auto entry = entries_.emplace(std::pair(device->config().name, key), Entry{std::move(*client), {}}).first;
+  return entry;
+}
+
+rr::awaitable<rr::Result<std::shared_ptr<ValueClient>>> ValueClients::open(std::shared_ptr<Device> device,
+                                                                           SessionKey key) {
+  const auto entry = find_or_make(device, key);
+  if (!entry) co_return entry.error();
+  (*entry)->second.last_opened = std::chrono::steady_clock::now();
+  if (!sweep_.is_armed()) sweep_.arm(idle_time / 3);
+  auto client = (*entry)->second.client;
+  auto opened = co_await client->upstream()->opened();
+  if (opened && client->upstream()->requires_user() && key.username.empty())
+    opened = rr::make_error(rr::ErrorCode::authentication_error, "Authentication Failed");
+  if (opened) co_return client;
+  // Who can't get in, for whatever reason, takes nobody's place.
+  const auto found = entries_.find({device->config().name, key});
+  if (found != entries_.end() && found->second.client == client && !client->is_used()) entries_.erase(found);
+  co_return opened.error();
+}
+
+void ValueClients::sweep() {
+  const auto now = std::chrono::steady_clock::now();
+  std::erase_if(entries_, [&](const auto& item) {
+    return item.second.client.use_count() == 1 && now - item.second.last_opened > idle_time;
+  });
+  if (!entries_.empty()) sweep_.arm(idle_time / 3);
+}
+
+void ValueClients::stop() {
+  sweep_.disarm();
+  entries_.clear();
+}
+
+}  // namespace rrgate

@@ -1,0 +1,186 @@
+// Who uses a service of a device by values: HTTP requests, event streams, images, JSON sockets. Layer: server/upstream.
+#pragma once
+
+#include <boost/asio/steady_timer.hpp>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "node/transport/watchdog.hpp"
+#include "server/upstream/upstream.hpp"
+
+namespace rrgate {
+
+/// What a wire, a pipe or an event brought.
+struct Sample {
+  std::uint64_t number = 0;       ///< counts within a member, from 1
+  rr::TimeSpec time;              ///< of a wire's value
+  std::vector<rr::Value> values;  ///< an event's arguments; else one
+};
+using SamplePtr = std::shared_ptr<const Sample>;
+
+/// What listeners hear. The sample is null where the connection to the device was lost, or the device has closed the
+/// member (`error`), or it is back (none).
+using SampleHandler = std::function<void(const SamplePtr& sample, const rr::Error* error)>;
+using CallbackHandler = rr::ClientConnection::LateCallbackHandler;
+
+/// A member of an object that an upstream has found.
+struct MemberPlace {
+  std::string path;
+  const rr::MemberDefinition* member = nullptr;
+  std::shared_ptr<const rr::TypeRegistry> types = {};  ///< which `member` is of
+};
+
+/// Plain requests of one login share one of these; a JSON socket that locks, sends or answers has its own. For the
+/// gateway's thread.
+class ValueClient final : public UpstreamClient, public std::enable_shared_from_this<ValueClient> {
+ public:
+  /// `user`  whose user locks are this client's; empty: nobody's.
+  ValueClient(std::shared_ptr<Upstream> upstream, std::string user, Device::Seat seat);
+  ~ValueClient();
+  ValueClient(const ValueClient&) = delete;
+  ValueClient& operator=(const ValueClient&) = delete;
+
+  const std::shared_ptr<Upstream>& upstream() const { return upstream_; }
+  /// Whether something goes on beyond a request.
+  bool is_used() const { return !topics_.empty(); }
+
+  // Requests; they throw rr::Exception with what the device, a lock or the lost connection says.
+
+  /// The object's type, qualified.
+  rr::awaitable<rr::Value> find_object(std::string path);
+  /// `called.object`  a SharedObject that was found; `called.generator`: for generators, from next_generator().
+  rr::awaitable<rr::Value> ask(rr::Called called);
+  rr::GeneratorId next_generator() { return ++last_generator_; }
+  /// Of a generator that nobody wants to hear of any more.
+  void drop_generator(rr::GeneratorId id) { upstream_->drop_generator(*this, id); }
+  rr::awaitable<rr::Value> lock(rr::LockCommand command, std::string path);
+
+  /// Calls a handler with what a member brings, until it is destroyed.
+  class Listener {
+   public:
+    using Key = std::pair<std::string, std::string>;
+    Listener(std::shared_ptr<ValueClient> client, Key key, std::uint64_t id)
+        : client_(std::move(client)), key_(std::move(key)), id_(id) {}
+    ~Listener() { client_->leave(key_, id_); }
+    Listener(const Listener&) = delete;
+    Listener& operator=(const Listener&) = delete;
+
+   private:
+    std::shared_ptr<ValueClient> client_;
+    Key key_;
+    std::uint64_t id_;
+  };
+  using ListenerPtr = std::unique_ptr<Listener>;
+
+  /// Listens to a wire, a pipe or an event. A wire's newest value comes at once; of an event, samples after number
+  /// `after` as far as they are kept. Errors   those of connecting wire or pipe.
+  rr::awaitable<rr::Result<ListenerPtr>> listen(MemberPlace place, std::uint64_t after, SampleHandler handler);
+  /// Answers a callback until the Listener is destroyed, also across reconnects.
+  /// Errors   member_busy: this client answers it already.
+  rr::Result<ListenerPtr> answer_callback(const MemberPlace& place, CallbackHandler handler);
+  /// A wire's OutValue, or a packet, over the connection that a listener holds; once closed by the device, it is opened
+  /// anew. Errors   invalid_operation: nobody listens; those of connecting and sending.
+  rr::awaitable<rr::Result<>> send(MemberPlace place, rr::Value value);
+
+ private:
+  using Key = Listener::Key;  // path, member
+  enum class TopicState : std::uint8_t { idle, joining, joined };
+  struct Topic {
+    MemberPlace place;
+    std::map<std::uint64_t, std::shared_ptr<SampleHandler>> handlers;
+    std::vector<SamplePtr> recent;  ///< a wire's newest value; an event's last ones
+    std::shared_ptr<CallbackHandler> callback;
+    std::uint64_t last_number = 0;
+    rr::PipeId pipe = 0;
+    TopicState state = TopicState::idle;
+    bool is_lost = false;  ///< with the connection, as listeners know
+    rr::Error error = {};  ///< of the last attempt to join
+  };
+
+  // UpstreamClient
+  std::weak_ptr<const void> life() const override { return weak_from_this(); }
+  std::string lock_user() const override { return user_; }
+  bool may_answer(const std::string& path, const rr::MemberDefinition& callback) const override;
+  void receive_event(const std::string& path, const rr::MemberDefinition& event,
+                     std::span<const rr::Value> arguments) override;
+  void receive_wire(rr::WirePacket& packet) override;
+  void answer_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::Result<>& result) override;
+  void note_conflated(const std::string&, const rr::MemberDefinition&, std::uint64_t) override {}
+  void close_wire(const std::string& path, const rr::MemberDefinition& wire) override;
+  void accept_pipe(rr::PipeId id) override;
+  void refuse_pipe(rr::PipeId id, const rr::Error& error) override;
+  void receive_packet(rr::PipeId id, const rr::Value& packet) override;
+  bool is_behind() const override { return false; }
+  void acknowledge_packets(rr::PipeId, std::span<const std::uint32_t>) override {}
+  void close_pipe(rr::PipeId id) override;
+  void release_path(const std::string& path) override;
+  void call_callback(const std::string& path, const rr::MemberDefinition& callback,
+                     std::span<const rr::Value> arguments, rr::ClientConnection::CallbackReply answer) override;
+  void connection_lost(const rr::Error& reason) override;
+  void found_again(const std::string& path) override;
+
+  rr::awaitable<rr::Result<>> join(Key key);
+  void begin_joining(Topic& topic);
+  void joined(const Key& key, const rr::Result<>& result);
+  /// The device has ended it, not the connection.
+  void closed(const Key& key, const rr::Error& reason);
+  void publish(const Key& key, Sample sample);
+  void tell(const Key& key, const rr::Error* error);
+  void leave(const Key& key, std::uint64_t id);
+  void drop_if_unused(const Key& key);
+
+  std::shared_ptr<Upstream> upstream_;
+  std::string user_;
+  Device::Seat seat_;
+  std::map<Key, Topic> topics_;
+  std::map<rr::PipeId, Key> pipes_;
+  std::uint64_t last_id_ = 0;
+  rr::PipeId last_pipe_ = 0;
+  rr::GeneratorId last_generator_ = 0;
+  boost::asio::steady_timer changed_;  ///< cancelled when a topic has been joined or not
+};
+
+/// Whose session: two users never share one.
+struct SessionKey {
+  std::string service;
+  std::string username = {};  ///< empty: no login
+  std::string password = {};
+  auto operator<=>(const SessionKey&) const = default;
+};
+
+/// Clients for plain requests by device, service and login; made when somebody asks, gone when nobody has for half a
+/// minute. The upstream of a shared device is that of its Robot Raconteur clients.
+class ValueClients {
+ public:
+  explicit ValueClients(const boost::asio::any_io_executor& executor) : sweep_(executor, [this] { sweep(); }) {}
+
+  /// A client of an open session. Errors   those of connecting and of the login; out_of_system_resource: too many at
+  /// once, here or at the device; service_not_found.
+  rr::awaitable<rr::Result<std::shared_ptr<ValueClient>>> open(std::shared_ptr<Device> device, SessionKey key);
+  void stop();
+
+ private:
+  struct Entry {
+    std::shared_ptr<ValueClient> client;
+    std::chrono::steady_clock::time_point last_opened;
+  };
+  using Entries = std::map<std::pair<std::string, SessionKey>, Entry>;
+  rr::Result<Entries::iterator> find_or_make(const std::shared_ptr<Device>& device, const SessionKey& key);
+  void sweep();
+
+  static constexpr std::size_t max_clients = 256;
+  static constexpr std::chrono::seconds idle_time{30};
+
+  Entries entries_;
+  rr::Deadline sweep_;
+};
+
+/// One more client of a session, with a seat of its own. Errors   out_of_system_resource: the device is full.
+rr::Result<std::shared_ptr<ValueClient>> make_value_client(std::shared_ptr<Upstream> upstream, std::string user);
+
+}  // namespace rrgate
