@@ -41,13 +41,19 @@ class Arm:
         self._tool = Tool(self)
         self._tools = {0: Tool(self), 1: Tool(self)}
         self._changed = threading.Condition()
-        self.moving = 0
+        self.moving = self.sessions = 0
         self.answered = ""
         self._finished = 0
 
     def RRServiceObjectInit(self, context, path):
         self.target.InValueChanged += self._follow_target
         self.state.OutValue = 1.0
+
+    def count_sessions(self, context, event, parameter):
+        if event == RR.ServerServiceListenerEventType_ClientConnected:
+            self.sessions += 1
+        elif event == RR.ServerServiceListenerEventType_ClientDisconnected:
+            self.sessions -= 1
 
     def _follow_target(self, value, time, endpoint):
         self.seen_target = value
@@ -93,6 +99,11 @@ class Arm:
         return self._tools[int(index)], TYPE + ".Tool"
 
 
+def serve(name, *policy):
+    arm = Arm()
+    RR.RobotRaconteurNode.s.RegisterService(name, TYPE + ".Arm", arm, *policy).AddServerServiceListener(arm.count_sessions)
+
+
 def main():
     node = RR.RobotRaconteurNode.s
     with RR.ServerNodeSetup("arm.device", 0, argv=quiet_node.arguments(server=True)) as setup:
@@ -100,8 +111,8 @@ def main():
         users = RR.PasswordFileUserAuthenticator(USERS)
         for name, policies in (("guarded", {"requirevaliduser": "true", "allowobjectlock": "true"}),
                                ("open", {"allowobjectlock": "true"})):
-            node.RegisterService(name, TYPE + ".Arm", Arm(), RR.ServiceSecurityPolicy(users, policies))
-        node.RegisterService("plain", TYPE + ".Arm", Arm())
+            serve(name, RR.ServiceSecurityPolicy(users, policies))
+        serve("plain")
         print(json.dumps({"url": f"rr+tcp://127.0.0.1:{setup.tcp_transport.GetListenPort()}/?service=plain"}), flush=True)
         sys.stdin.buffer.read()
 
