@@ -1,6 +1,10 @@
-// The latency of an empty function call over TCP on the loopback, against a raw echo of as many bytes each way.
+// The latency of an empty function call, against a raw TCP echo of as many bytes each way by a process beside the
+// service, and what both sides allocate for it. Who starts it says where it runs.
 //
-//   bench_call PORT     of a test service (test/interop/README.md)
+//   bench_call NAME URL ECHO_PORT     `bench_peer service` and `bench_peer echo`; or a test service
+//   (test/interop/README.md)
+#include <array>
+#include <boost/asio/read.hpp>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -8,46 +12,71 @@
 
 #include "node/client/client.hpp"
 #include "test/bench/comparison.hpp"
-#include "test/bench/raw_echo.hpp"
 #include "test/bench/raw_session.hpp"
+#include "test/support/count_allocations.hpp"
 
 namespace {
 
-void run(std::uint16_t port) {
-  boost::asio::io_context io;
-  rr::bench::RawSession session(io, port);
-  const rr::Bytes request = session.make_call("nothing");
-  const std::size_t reply_size = session.round_trip(request);
-  rr::Message reply;
-  session.decode_reply(reply);
+constexpr int rounds = 20'000;
 
-  const rr::bench::RawEcho echo(request.size(), reply_size);
-  auto socket = rr::bench::connect_to(io, echo.port());
-  std::vector<std::uint8_t> answer(reply_size);
+struct CallSize {
+  std::size_t request = 0;
+  std::size_t reply = 0;
+};
 
-  const auto echo_round_trip = [&] {
-    boost::asio::write(socket, boost::asio::buffer(request));
-    boost::asio::read(socket, boost::asio::buffer(answer));
+/// What one call takes on the socket, with the headers of WebSocket frames where there are any.
+CallSize size_of_call(rr::RemoteObject& robot, bool is_websocket) {
+  const auto& stats = robot.connection().asynchronous().session().connection().stats();
+  const auto before = stats;
+  robot.call("nothing");
+  const auto request = static_cast<std::size_t>(stats.bytes_sent - before.bytes_sent);
+  const auto reply = static_cast<std::size_t>(stats.bytes_received - before.bytes_received);
+  const auto header_of = [](std::size_t payload) { return payload < 126 ? 2u : 4u; };  // RFC 6455, 5.2
+  if (!is_websocket) return {request, reply};
+  return {request + header_of(request) + 4, reply + header_of(reply)};
+}
+
+/// Where the service counts too: how many allocations a call takes on both sides together.
+void count_allocations(const std::string& name, rr::RemoteObject& robot) {
+  const auto count = [&] {
+    return static_cast<double>(robot.get("allocations").to<std::uint64_t>().value() + rr::test::allocation_count);
   };
+  count();
+  const double before = count();
+  for (int i = 0; i < rounds; ++i) robot.call("nothing");
+  std::printf("{\"name\": \"allocations, %s\", \"each\": %.2f}\n", name.c_str(), (count() - before) / rounds);
+}
 
-  rr::bench::compare(
-      "call, empty function, service alone", 20'000, [&] { session.round_trip(request); }, echo_round_trip);
-  session.decode_reply(reply);
+void run(const std::string& name, const std::string& url, std::uint16_t echo_port) {
+  auto robot = rr::connect(url);
+  for (int i = 0; i < 1000; ++i) robot.call("nothing");
+  const auto size = size_of_call(robot, url.starts_with("rr+ws"));
 
-  const auto robot = rr::connect("rr+tcp://127.0.0.1:" + std::to_string(port) + "/?service=interop");
+  boost::asio::io_context io;
+  auto socket = rr::bench::connect_to(io, echo_port);
+  const std::array<std::uint32_t, 2> sizes{static_cast<std::uint32_t>(size.request),
+                                           static_cast<std::uint32_t>(size.reply)};
+  boost::asio::write(socket, boost::asio::buffer(sizes));
+  const std::vector<std::uint8_t> request(size.request);
+  std::vector<std::uint8_t> reply(size.reply);
   rr::bench::compare(
-      "call, empty function, client and service", 20'000, [&] { robot.call("nothing"); }, echo_round_trip);
+      "call, " + name, rounds, [&] { robot.call("nothing"); },
+      [&] {
+        boost::asio::write(socket, boost::asio::buffer(request));
+        boost::asio::read(socket, boost::asio::buffer(reply));
+      });
+  if (name.starts_with("rr+")) count_allocations(name, robot);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 2) {
-    std::fprintf(stderr, "usage: bench_call PORT\n");
+  if (argc != 4) {
+    std::fprintf(stderr, "usage: bench_call NAME URL ECHO_PORT\n");
     return 2;
   }
   try {
-    run(static_cast<std::uint16_t>(std::atoi(argv[1])));
+    run(argv[1], argv[2], static_cast<std::uint16_t>(std::atoi(argv[3])));
   } catch (const std::exception& error) {
     std::fprintf(stderr, "bench_call: %s\n", error.what());
     return 1;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <numeric>
 #include <string>
 #include <vector>
 
@@ -12,15 +13,17 @@ namespace rr::bench {
 struct Samples {
   std::vector<double> nanoseconds = {};
 
-  double minimum() const { return *std::min_element(nanoseconds.begin(), nanoseconds.end()); }
-  /// Of all but the slowest hundredth, which other programs of the machine decide.
-  double mean() const {
+  /// {"min": ..., "p50": ..., "p99": ..., "mean": ...}; the mean of all but the slowest hundredth, which other programs
+  /// of the machine decide.
+  std::string to_json() const {
     auto sorted = nanoseconds;
     std::sort(sorted.begin(), sorted.end());
-    sorted.resize(sorted.size() - sorted.size() / 100);
-    double sum = 0;
-    for (const double sample : sorted) sum += sample;
-    return sum / static_cast<double>(sorted.size());
+    const std::size_t most = sorted.size() - sorted.size() / 100;
+    const double sum = std::accumulate(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(most), 0.0);
+    char text[200];
+    std::snprintf(text, sizeof text, "{\"min\": %.1f, \"p50\": %.1f, \"p99\": %.1f, \"mean\": %.1f}", sorted.front(),
+                  sorted[sorted.size() / 2], sorted[most - 1], sum / static_cast<double>(most));
+    return text;
   }
 };
 
@@ -50,11 +53,8 @@ void compare(const std::string& name, int rounds, Ours&& ours, Yardstick&& yards
     our_samples.nanoseconds.push_back(our_time);
     yardstick_samples.nanoseconds.push_back(yardstick_time);
   }
-  std::printf(
-      "{\"name\": \"%s\", \"rounds\": %d, \"ours\": {\"min\": %.1f, \"mean\": %.1f}, "
-      "\"yardstick\": {\"min\": %.1f, \"mean\": %.1f}}\n",
-      name.c_str(), static_cast<int>(our_samples.nanoseconds.size()), our_samples.minimum(), our_samples.mean(),
-      yardstick_samples.minimum(), yardstick_samples.mean());
+  std::printf("{\"name\": \"%s\", \"rounds\": %zu, \"ours\": %s, \"yardstick\": %s}\n", name.c_str(),
+              our_samples.nanoseconds.size(), our_samples.to_json().c_str(), yardstick_samples.to_json().c_str());
   std::fflush(stdout);
 }
 
