@@ -31,8 +31,10 @@ rr::awaitable<rr::Result<std::unique_ptr<Boarding>>> board(GatewayState& gateway
 rr::awaitable<void> relay_client(GatewayState& gateway, Connection& connection, rr::ByteStream& client,
                                  Boarding& boarding) {
   const auto& limits = gateway.config().limits;
-  Relay relay(client, *boarding.stream, {limits.max_message_size, limits.outbox_bytes, limits.opaque_rate},
-              boarding.device.traffic());
+  const RelayOptions options{.max_message_size = limits.max_message_size,
+                             .outbox_bytes = limits.outbox_bytes,
+                             .opaque_rate = limits.opaque_rate};
+  Relay relay(client, *boarding.stream, options, boarding.device.traffic());
   connection.device = &boarding.device;
   connection.has_session = true;
   connection.stop = [&relay](rr::EndReason reason) { relay.stop(std::move(reason)); };

@@ -150,6 +150,19 @@ TEST_CASE("a configured device is not found a second time, and names stay unique
     if (node["node_name"] == "node.x") CHECK(node["device"] == "x");
 }
 
+TEST_CASE("found devices are relayed or shared, as discovery is configured") {
+  for (const auto mode : {DeviceMode::relay, DeviceMode::shared}) {
+    rr::RunningNode node([](rr::Node& made) { made.add(make_thing()); });
+    TestGateway gateway(0, [&](Config& config) {
+      allowing({{"*", {}, ""}})(config);
+      config.discover.mode = mode;
+    });
+    gateway.announce(at(id_of(node), node.port(), "test.node"));
+    const auto found = wait_for_devices(gateway, [](const json& all) { return all.size() == 1; })[0];
+    CHECK(found["mode"] == (mode == DeviceMode::shared ? "shared" : "relay"));
+  }
+}
+
 TEST_CASE("found nodes with TLS are checked by the CA for found nodes") {
   rr::test::CertificateLab lab;
   rr::NodeOptions options;

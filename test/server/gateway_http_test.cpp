@@ -119,14 +119,31 @@ TEST_CASE("a header of two pieces has the same limit") {
 TEST_CASE("half a header is answered 408 when its time is over") {
   TestGateway gateway(1, short_deadlines);
   CHECK(fetch(gateway, "GET /healthz HTTP/1.1\r\nHost: g").status == 408);
-  TestClient slow(gateway.port());  // a byte now and then doesn't buy time
+}
+
+TEST_CASE("a header that comes byte by byte has no more time for it") {
+  TestGateway gateway(1, short_deadlines);
+  TestClient slow(gateway.port());
+  slow.send("GET /healthz HTTP/1.1\r\nX-Slow: ");
   const auto begin = std::chrono::steady_clock::now();
-  while (slow.send("G") && std::chrono::steady_clock::now() - begin < std::chrono::seconds(5)) {
-    std::this_thread::yield();
-    if (std::chrono::steady_clock::now() - begin > std::chrono::milliseconds(600)) break;
+  std::chrono::steady_clock::duration took{};
+  while (slow.send("x") && took < std::chrono::seconds(5)) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));  // far below the deadline of 200 ms
+    took = std::chrono::steady_clock::now() - begin;
   }
-  slow.receive_all();
-  CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(4));
+  CHECK(took < std::chrono::seconds(3));
+}
+
+TEST_CASE("a body may have as many bytes as are allowed and not one more") {
+  TestGateway gateway(1, [](Config& config) { config.limits.body_bytes = 1024; });
+  const auto put = [&](std::size_t size) {
+    return fetch(gateway, "PUT /api/v1/devices HTTP/1.1\r\nHost: localhost\r\nContent-Length: " + std::to_string(size) +
+                              "\r\n\r\n" + std::string(size, 'x'));
+  };
+  CHECK(put(1024).status == 405);
+  const auto refused = put(1025);
+  CHECK(refused.status == 413);
+  CHECK_THAT(refused.body, Catch::Contains("longer than 1024 bytes"));
 }
 
 TEST_CASE("silent, half-open and idle connections are closed") {

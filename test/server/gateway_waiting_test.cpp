@@ -13,6 +13,7 @@ namespace {
 struct SlowDevice {
   std::promise<void> entered;
   std::promise<void> released;
+  std::atomic<std::int32_t> reads = 0;
   std::shared_future<void> release = released.get_future();
   rr::RunningNode node;
 
@@ -20,7 +21,8 @@ struct SlowDevice {
       : node([this](rr::Node& made) {
           auto service = rr::Service::from_text({"service test.slow\nobject Slow\nfunction int32 block(int32 "
                                                  "number)\nfunction int32 quick(int32 number)\n"
-                                                 "property int32 level [readonly]\nend\n"},
+                                                 "property int32 level [readonly]\n"
+                                                 "property int32 slow_level [readonly]\nend\n"},
                                                 "Slow", "Slow");
           service->function("block", rr::blocking([this](std::int32_t number) {
                               entered.set_value();
@@ -29,8 +31,24 @@ struct SlowDevice {
                             }));
           service->function("quick", [](std::int32_t number) { return number; });
           service->property("level").get([] { return 3; });
+          service->property("slow_level").get(rr::blocking([this] {
+            const auto number = ++reads;
+            release.wait();
+            return number;
+          }));
           made.add(service);
         }) {}
+
+  std::function<void(Config&)> behind(DeviceMode mode, bool shares_reads = false) {
+    return [this, mode, shares_reads](Config& config) {
+      DeviceConfig slow;
+      slow.name = "slow";
+      slow.url = rr::parse_url(node.url("Slow")).value();
+      slow.mode = mode;
+      slow.shares_reads = shares_reads;
+      config.devices.push_back(slow);
+    };
+  }
 };
 
 }  // namespace
@@ -38,13 +56,7 @@ struct SlowDevice {
 TEST_CASE("a handler that blocks delays no other client behind the gateway, relayed or shared") {
   const auto mode = GENERATE(DeviceMode::relay, DeviceMode::shared);
   SlowDevice device;
-  TestGateway gateway(0, [&](Config& config) {
-    DeviceConfig slow;
-    slow.name = "slow";
-    slow.url = rr::parse_url(device.node.url("Slow")).value();
-    slow.mode = mode;
-    config.devices.push_back(slow);
-  });
+  TestGateway gateway(0, device.behind(mode));
   const auto url = "rr+ws://127.0.0.1:" + std::to_string(gateway.port()) + "/devices/slow?service=Slow";
   const auto one = rr::connect(url);
   const auto two = rr::connect(url);
@@ -65,4 +77,26 @@ TEST_CASE("a handler that blocks delays no other client behind the gateway, rela
   REQUIRE(has_entered);
   REQUIRE(one.connection().run_until([&] { return answer.has_value(); }, 10s));
   CHECK(answer->value() == rr::Value(7));
+}
+
+TEST_CASE("clients of a shared device that read a property at once are one read to it, where that is wanted") {
+  const bool shares_reads = GENERATE(true, false);
+  SlowDevice device;
+  TestGateway gateway(0, device.behind(DeviceMode::shared, shares_reads));
+  const auto url = "rr+tcp://127.0.0.1:" + std::to_string(gateway.port()) + "/?service=Slow";
+  std::vector<rr::RemoteObject> clients;
+  std::vector<std::int32_t> values;
+  for (int i = 0; i < 3; ++i) {
+    clients.push_back(rr::connect(url));
+    clients.back().connection().asynchronous().get("Slow", "slow_level", [&](const rr::Result<rr::Value>& value) {
+      values.push_back(value ? value->to<std::int32_t>().value() : 0);
+    });
+    CHECK(clients.back().call("quick", i) == rr::Value(i));  // the read is on its way before it
+  }
+  device.released.set_value();
+  for (auto& client : clients)
+    client.connection().run_until([&, before = values.size()] { return values.size() > before; }, 10s);
+  std::sort(values.begin(), values.end());
+  CHECK(values == (shares_reads ? std::vector{1, 1, 1} : std::vector{1, 2, 3}));
+  CHECK(clients.front().get("slow_level") == rr::Value(shares_reads ? 2 : 4));  // the next one is asked for anew
 }

@@ -80,9 +80,24 @@ class Making(Lab):
         again = run("cert", "node", self.lab, "my.robot", "--force", **environment)
         self.assertEqual(again.stdout, first.stdout)
 
+    def test_a_certificate_is_good_for_as_long_as_was_said_and_goes_where_it_shall(self):
+        days = {}
+        for arguments in [(), ("--days", "7")]:
+            self.assertEqual(run("cert", "web", self.lab, "days.example", "--force", *arguments).returncode, 0)
+            end = ssl._ssl._test_decode_cert(self.path("days.example.pem"))["notAfter"]
+            days[arguments] = round((ssl.cert_time_to_seconds(end) - time.time()) / 86400)
+        self.assertEqual(days, {(): 800, ("--days", "7"): 7})
+        folder, environment = self.config_folder("not-here")
+        node, out = "82301bf1-e1ef-4e89-8d8f-0848291587ad", os.path.join(self.folder, "out")
+        result = run("cert", "node", self.lab, node, "--output", out, **environment)
+        self.assertEqual(result.stdout.strip(), os.path.join(out, "{" + node + "}.p12"), result.stderr)
+        self.assertTrue(os.path.isfile(result.stdout.strip()))
+        self.assertFalse(os.path.exists(folder))
+
     def test_mistakes(self):
         for code, arguments in [(2, ()), (2, ("ca",)), (2, ("cat", "x")), (2, ("web", self.lab)), (2, ("node", self.lab)),
-                                (2, ("ca", "x", "--days", "0")), (1, ("web", self.lab, "a b")),
+                                (2, ("ca", "x", "--days", "0")), (2, ("web", self.lab, "x", "--output", "x")),
+                                (1, ("web", self.lab, "a b")),
                                 (1, ("node", "/nowhere", "my.robot")), (1, ("node", self.lab, "1robot"))]:
             with self.subTest(arguments):
                 result = run("cert", *arguments)

@@ -7,6 +7,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 import urllib.request
 
@@ -15,6 +16,16 @@ RRGATE = sys.argv.pop()
 
 def run(*arguments):
     return subprocess.run([RRGATE, *arguments], capture_output=True, text=True, timeout=30)
+
+
+def wait_for_port(port):
+    until = time.monotonic() + 10
+    while time.monotonic() < until:
+        try:
+            return socket.create_connection(("127.0.0.1", port)).close()
+        except ConnectionRefusedError:
+            time.sleep(0.02)
+    raise AssertionError(f"nobody listens at {port}")
 
 
 class Files(unittest.TestCase):
@@ -70,6 +81,27 @@ class CommandLine(Files):
         for arguments in [("check",), ("fmt", "--in", path), ("generate", "ts"), ("generate", "cobol", path)]:
             self.assertEqual(run(*arguments).returncode, 2)
 
+    def test_code_of_definitions_that_import_others(self):
+        """Those are looked for in the folders that are named, one after the other."""
+        texts = {"a/test.lamp.robdef": "service test.lamp\nimport test.colour\nimport test.more\nobject Lamp\n"
+                                       "property test.colour.Colour colour\nproperty test.more.More more\nend\n",
+                 "b/test.colour.robdef": "service test.colour\nstruct Colour\nfield double red\nend\n",
+                 "c/test.more.robdef": "service test.more\nstruct More\nfield double much\nend\n"}
+        for name, text in texts.items():
+            path = os.path.join(self.folder.name, name)
+            os.makedirs(os.path.dirname(path))
+            with open(path, "w") as out:
+                out.write(text)
+        lamp, out = (os.path.join(self.folder.name, name) for name in ("a/test.lamp.robdef", "out"))
+        folders = [word for name in "bc" for word in ("-I", os.path.join(self.folder.name, name))]
+        result = run("generate", "cpp", *folders, "-o", out, lamp)
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        with open(os.path.join(out, sorted(os.listdir(out))[1])) as header:
+            self.assertIn("Colour", header.read())
+        result = run("generate", "cpp", *folders[:2], "-o", out, lamp)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("test.more", result.stderr)
+
     def test_an_address_in_use_ends_with_1(self):
         with socket.create_server(("127.0.0.1", 0)) as taken:
             port = taken.getsockname()[1]
@@ -78,14 +110,32 @@ class CommandLine(Files):
         self.assertIn(f"127.0.0.1:{port}", result.stderr)
 
 
-class Demo(unittest.TestCase):
-    def test_the_robot_is_relayed_and_the_cameras_are_shared(self):
+class Demo(Files):
+    def start(self):
+        """Returns the URL of its pages."""
         process = subprocess.Popen([RRGATE, "demo", "--port", "0"], stdout=subprocess.PIPE, text=True)
         self.addCleanup(process.stdout.close)
         self.addCleanup(process.wait)
         self.addCleanup(process.terminate)
         ready = next(line for line in process.stdout if line.startswith("rrgate demo: "))  # the devices say theirs first
-        url = ready.split()[-1]
+        return ready.split()[-1]
+
+    def test_code_of_a_service_that_runs(self):
+        pages = self.start()
+        url = pages.replace("http://", "rr+ws://") + "devices/create?service=Create"
+        for language, options in [("cpp", ["-o", self.folder.name]), ("ts", ["-o", os.path.join(self.folder.name, "types.ts")])]:
+            result = run("generate", language, *options, url)
+            self.assertEqual((result.returncode, result.stderr), (0, ""))
+        made = os.listdir(self.folder.name)
+        for ending in (".hpp", ".cpp", ".ts"):
+            texts = [open(os.path.join(self.folder.name, name)).read() for name in made if name.endswith(ending)]
+            self.assertTrue(any("Drive" in text for text in texts), made)
+        result = run("generate", "cpp", "-o", self.folder.name, url.replace("service=Create", "service=Nobody"))
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("Nobody", result.stderr)
+
+    def test_the_robot_is_relayed_and_the_cameras_are_shared(self):
+        url = self.start()
         with urllib.request.urlopen(url + "api/v1/devices", timeout=10) as answer:
             devices = json.load(answer)["devices"]
         self.assertEqual([(each["name"], each["mode"], each["state"]) for each in devices],
@@ -121,6 +171,34 @@ class Serving(Files):
                 self.assertEqual(client.recv(4096), b"")
             events = [json.loads(line)["event"] for line in process.stderr]
             self.assertEqual(events[-1], "stopped")
+
+    def test_a_second_signal_waits_for_nobody(self):
+        """A session may end by itself within the drain time, unless whoever runs the gateway has enough."""
+        with socket.create_server(("127.0.0.1", 0)) as device:
+            url = f"rr+tcp://127.0.0.1:{device.getsockname()[1]}/?service=s"
+            process, port = self.start(devices=[{"name": "d", "url": url}], timeouts={"drain_ms": 60000})
+            with socket.create_connection(("127.0.0.1", port)) as client:
+                client.sendall(b"GET /devices/d?service=s HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\n"
+                               b"Connection: Upgrade\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
+                               b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Protocol: robotraconteur.robotraconteur.com\r\n\r\n")
+                self.assertTrue(client.recv(4096).startswith(b"HTTP/1.1 101 "))
+                process.send_signal(signal.SIGTERM)
+                with self.assertRaises(subprocess.TimeoutExpired):
+                    process.wait(timeout=0.5)
+                process.send_signal(signal.SIGTERM)
+                self.assertEqual(process.wait(timeout=10), 0)
+
+    def test_the_log_says_what_its_level_is_for(self):
+        for level, said in [("info", {"listening", "signal", "stopped"}), ("error", set())]:
+            with socket.create_server(("127.0.0.1", 0)) as taken:  # an address to be known beforehand
+                port = taken.getsockname()[1]
+            path = self.file({"listen": [f"127.0.0.1:{port}"], "devices": [], "log": {"format": "json", "level": level}})
+            with subprocess.Popen([RRGATE, "serve", "--config", path], stderr=subprocess.PIPE, text=True) as process:
+                self.addCleanup(process.kill)
+                wait_for_port(port)
+                process.send_signal(signal.SIGTERM)
+                events = {json.loads(line)["event"] for line in process.stderr}
+            self.assertEqual(events & {"listening", "signal", "stopped"}, said)
 
     def test_web_root_counts_from_the_configuration_file(self):
         with open(os.path.join(self.folder.name, "index.html"), "w") as page:

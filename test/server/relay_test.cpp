@@ -89,3 +89,27 @@ TEST_CASE("a relay that keeps its pace stops at once") {
   CHECK(run.reason.text == "stopped");
   CHECK(run.took < milliseconds(5'000));
 }
+
+TEST_CASE("while one side takes nothing, the relay takes no more from the other than it may hold") {
+  const std::size_t outbox_bytes = GENERATE(1000u, 20'000u);
+  boost::asio::io_context io(1);
+  rr::test::MemoryStreams client(io.get_executor(), 100);
+  rr::test::MemoryStreams device(io.get_executor());
+  Traffic traffic;
+  Relay relay(*client.server, *device.client, {5'000'000, outbox_bytes, 1'000'000'000}, traffic);
+  rr::Bytes message(1'000'000);
+  constexpr std::array<std::uint8_t, 10> start{'R', 'R', 'A', 'C', 0x40, 0x42, 0x0f, 0, 2, 0};  // of as many bytes
+  std::copy(start.begin(), start.end(), message.begin());
+  const rr::ByteSpan slice(message);
+  const std::span<const rr::ByteSpan> slices(&slice, 1);
+  boost::asio::co_spawn(io, device.server->write(slices), boost::asio::detached);
+  boost::asio::co_spawn(io, relay.run(), boost::asio::detached);
+  io.poll();
+  CHECK(device.to_client->carried - device.to_client->bytes.size() == outbox_bytes);
+  CHECK(traffic.to_clients.waiting == outbox_bytes);
+  relay.stop({1001, "stopped"});
+  client.client->close();
+  device.server->close();
+  io.restart();
+  io.run();
+}

@@ -72,7 +72,7 @@ TEST_CASE("Float literals are rounded like those of C") {
 
 TEST_CASE("Float literals at random are rounded like those of C") {
   std::mt19937 random(20240607);
-  const auto below = [&](std::uint32_t limit) { return random() % limit; };
+  const auto below = [&](std::uint32_t limit) { return static_cast<std::uint32_t>(random() % limit); };
   for (int i = 0; i < 20'000; ++i) {
     std::string text;
     const std::uint32_t digits = 1 + below(i % 50 == 0 ? 900 : 25);

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "node/service/password_hash.hpp"
+#include "test/server/access/jwt_signer.hpp"
 #include "test/support/print.hpp"
 
 using namespace rrgate;
@@ -102,6 +103,30 @@ TEST_CASE("users are judged by the file of now, through one authenticator") {
   files.write("users", "broken\n");
   access.reload(true);
   CHECK(log_in(access, "bob", "three"));  // what can't be used stays as it was
+}
+
+TEST_CASE("tokens are checked with the secret of a file, and with its next one when that has changed") {
+  Files files;
+  AccessConfig config;
+  config.jwt.secret_file = files.path("secret");
+  Access access(config);
+  CHECK_THAT(access.load().error().message, Catch::Contains("secret '" + files.path("secret") + "': can't be read"));
+  files.write("secret", "too short");
+  CHECK_THAT(access.load().error().message, Catch::Contains("9 bytes, expected at least 32"));
+  const std::string first(32, 'a'), second(32, 'b');
+  files.write("secret", first + "\n");
+  REQUIRE(access.load());
+  const auto knows = [&](const std::string& secret) {
+    const auto now = std::chrono::system_clock::now();
+    const auto end = std::chrono::duration_cast<std::chrono::seconds>(now.time_since_epoch()).count() + 600;
+    return access.state().jwt->verify(test::JwtSigner("HS256", secret).sign({{"sub", "alice"}, {"exp", end}}), now);
+  };
+  CHECK(knows(first).value().name == "alice");
+  CHECK_FALSE(knows(second));
+  files.write("secret", second);
+  access.reload(false);
+  CHECK(knows(second));
+  CHECK_FALSE(knows(first));
 }
 
 TEST_CASE("roles are those of the file and those that the configuration adds") {

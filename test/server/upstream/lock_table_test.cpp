@@ -419,6 +419,26 @@ TEST_CASE("who waits for a monitor waits no longer than he wants to") {
   t.nothing_more();
 }
 
+TEST_CASE("so many clients can wait for a monitor, and so many objects can be monitor locked") {
+  constexpr LockClient most = 1024;
+  Transcript t;
+  const auto owner = t.shares(1);
+  t.takes(owner, LockCommand::enter_monitor);
+  for (LockClient client = 2; client < most + 2; ++client) t.wants(t.shares(client), LockCommand::enter_monitor);
+  t.nothing_more();
+  const auto late = t.shares(most + 2);
+  t.wants(late, LockCommand::enter_monitor);
+  t.answered(late, ErrorCode::out_of_system_resource);
+  t.table.remove(2, t.now);
+  t.left(2);
+  t.wants(late, LockCommand::enter_monitor);
+  t.nothing_more();  // it waits
+  for (LockClient i = 1; i < most; ++i)
+    t.takes(owner, LockCommand::enter_monitor, shared, "s.parts[" + std::to_string(i) + "]");
+  t.wants(owner, LockCommand::enter_monitor, "s.one_more");
+  t.answered(owner, ErrorCode::out_of_system_resource);
+}
+
 TEST_CASE("the owner of a monitor who is idle has lost it, and is told") {
   Transcript t;
   const auto first = t.shares(1), second = t.shares(2);

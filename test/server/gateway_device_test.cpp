@@ -1,0 +1,123 @@
+// What a device says and what its readers leave waiting, as clients by HTTP see it: statuses of errors, event streams.
+#include <catch2/catch.hpp>
+
+#include "test/node/node/node_fixture.hpp"
+#include "test/server/support/test_gateway.hpp"
+
+using namespace rrgate;
+using namespace rrgate::test;
+using namespace std::chrono_literals;
+
+namespace {
+
+struct Robot {
+  std::shared_ptr<rr::Service> service;
+  rr::RunningNode node;
+
+  Robot()
+      : service(rr::Service::from_text({"service test.robot\nobject Robot\nproperty int32 one [readonly]\n"
+                                        "function void fail(uint16 code)\nevent news(string text)\nend\n"},
+                                       "Robot", "Robot")),
+        node([this](rr::Node& made) {
+          service->property("one").get([] { return 1; });
+          service->function("fail", [](std::uint16_t code) {
+            throw rr::ServiceException("as asked", static_cast<rr::ErrorCode>(code));
+          });
+          made.add(service);
+        }) {}
+
+  void fire(int count, const std::string& text) {
+    node.ask([&](rr::Node&) {
+      for (int i = 0; i < count; ++i) service->fire("news", text);
+      return 0;
+    });
+  }
+};
+
+std::function<void(Config&)> with(Robot& robot) {
+  return [&robot](Config& config) {
+    DeviceConfig device;
+    device.name = "robot";
+    device.url = rr::parse_url(robot.node.url("Robot")).value();
+    config.devices.push_back(device);
+  };
+}
+
+unsigned status_of_failure(TestClient& client, rr::ErrorCode code) {
+  const auto body = nlohmann::json{{"code", static_cast<int>(code)}}.dump();
+  client.send(
+      "POST /api/v1/devices/robot/Robot/fail HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+      "Content-Length: " +
+      std::to_string(body.size()) + "\r\n\r\n" + body);
+  return client.receive_response().status;
+}
+
+void begin_stream(TestClient& client) {
+  client.send("GET /api/v1/devices/robot/Robot/news HTTP/1.1\r\nHost: localhost\r\nAccept: text/event-stream\r\n\r\n");
+  client.receive_until(": connected\n\n");
+}
+
+}  // namespace
+
+TEST_CASE("errors of a device have the status of their kind over HTTP") {
+  Robot robot;
+  TestGateway gateway(0, with(robot));
+  TestClient client(gateway.port());
+  using enum rr::ErrorCode;
+  for (const auto& [status, codes] : std::initializer_list<std::pair<unsigned, std::vector<rr::ErrorCode>>>{
+           {400, {invalid_argument, data_type_mismatch, out_of_range, null_value}},
+           {403, {permission_denied, system_resource_permission_denied}},
+           {404, {object_not_found, member_not_found, key_not_found, resource_not_found}},
+           {405, {read_only_member, write_only_member}},
+           {409, {invalid_operation, invalid_state, member_busy, value_not_set, operation_aborted}},
+           {413, {buffer_limit_violation}},
+           {422, {operation_failed, remote_error}},
+           {423, {object_locked_error}},
+           {501, {not_implemented_error}},
+           {503, {out_of_system_resource}},
+           {504, {request_timeout, operation_timeout}},
+           {502, {internal_error, io_error}}}) {
+    for (const auto code : codes) {
+      INFO(static_cast<int>(code));
+      CHECK(status_of_failure(client, code) == status);
+    }
+  }
+}
+
+TEST_CASE("an event stream without news says that it lives") {
+  Robot robot;
+  TestGateway gateway(0, with(robot));
+  TestClient reader(gateway.port());
+  begin_stream(reader);
+  const auto begin = std::chrono::steady_clock::now();
+  std::string comment;
+  while (comment.empty() && std::chrono::steady_clock::now() - begin < 30s) try {
+      comment = reader.receive_until(": \n\n");
+    } catch (const std::runtime_error&) {  // nothing for 10 s
+    }
+  const auto silence = std::chrono::steady_clock::now() - begin;
+  CHECK_THAT(comment, Catch::EndsWith(": \n\n"));
+  CHECK(silence > 14s);
+  CHECK(silence < 20s);
+  robot.fire(1, "after it");
+  CHECK_THAT(reader.receive_until("\n\n"), Catch::Contains("after it"));
+}
+
+TEST_CASE("a reader of an event stream that falls behind is told, and its stream ends") {
+  constexpr int rounds = 10, events = 16;
+  Robot robot;
+  TestGateway gateway(0, with(robot));
+  TestClient reader(gateway.port());
+  begin_stream(reader);
+  for (int round = 0; round < rounds; ++round) {  // 10 MB: more than may wait, and the sockets between take
+    robot.fire(events, std::string(65536, 'x'));
+    gateway.wait_for("/api/v1/devices/robot/Robot/one", [](const auto&) { return true; });  // they have come there
+  }
+  const auto received = reader.receive_until("\r\n0\r\n\r\n");
+  CHECK(received.size() < 8'000'000);
+  CHECK_THAT(received.substr(received.size() - 200), Catch::Contains("too slow: values were lost, so the stream ends"));
+  TestClient again(gateway.port());
+  begin_stream(again);
+  robot.fire(1, "as ever");
+  CHECK_THAT(again.receive_until("as ever"), Catch::Contains("as ever"));
+}
