@@ -17,11 +17,11 @@ NEVER_MS = 3_600_000  # looks at the device are connections too
 
 
 class Device:
-    """A device with a wire, `rate` values a second, and a pipe, `packet_rate` packets of `packet_bytes` a second."""
+    """A device with a wire, `rate` values a second, a pipe, `packet_rate` packets of `packet_bytes` a second, and an event."""
 
-    def __init__(self, folder, rate=100, packet_rate=0, packet_bytes=16384):
+    def __init__(self, folder, rate=100, packet_rate=0, packet_bytes=16384, event_rate=0):
         self.process = Background([PROGRAMS / "load_device", "--rate", rate, "--packet-rate", packet_rate,
-                                   "--packet-bytes", packet_bytes], folder / "device.log")
+                                   "--packet-bytes", packet_bytes, "--event-rate", event_rate], folder / "device.log")
         ready = json.loads(self.process.next_line())
         self.url, self.port, self.pid = ready["url"], ready["port"], self.process.process.pid
 
@@ -64,6 +64,12 @@ class Gateway(gateways.Gateway):
     def resident_bytes(self):
         return resident_bytes(self.pid)
 
+    def cpu_seconds(self):
+        return cpu_seconds(self.pid)
+
+    def open_files(self):
+        return len(os.listdir(f"/proc/{self.pid}/fd"))
+
     def stop(self):
         self.process.stop()
 
@@ -71,9 +77,10 @@ class Gateway(gateways.Gateway):
 class Clients:
     """A process with many clients; begins at once."""
 
-    def __init__(self, folder, url, clients, *options, name="clients", wire="state", pipe=None):
-        command = [PROGRAMS / "load_clients", "--url", url, "--clients", clients, "--wire", wire, *options]
-        self.process = Background(command + (["--pipe", pipe] if pipe else []), folder / f"{name}.log")
+    def __init__(self, folder, url, clients, *options, name="clients", wire="state", pipe="", event=""):
+        command = [PROGRAMS / "load_clients", "--url", url, "--clients", clients, "--wire", wire, "--pipe", pipe,
+                   "--event", event, *options]
+        self.process = Background(command, folder / f"{name}.log")
 
     def wait_until_ready(self, within=60.0):
         """{"ready": how many, "seconds": since they began, or since the first was lost, "failed": {reason: count}}."""

@@ -61,8 +61,10 @@ asio::awaitable<void> LoadClient::open() {
 void LoadClient::opened(std::shared_ptr<rr::ClientConnection> connection) {
   connection_ = std::move(connection);
   connection_->on_closed([this](const rr::Error& reason) { end(reason); });
-  find(plan_.wire, &LoadClient::listen_to_wire);
+  if (!plan_.wire.member.empty()) find(plan_.wire, &LoadClient::listen_to_wire);
   if (!plan_.pipe.member.empty()) find(plan_.pipe, &LoadClient::listen_to_pipe);
+  if (!plan_.event.member.empty()) find(plan_.event, &LoadClient::listen_to_event);
+  look_whether_ready();
 }
 
 void LoadClient::find(const MemberName& name, void (LoadClient::*use)(const std::string& path)) {
@@ -103,6 +105,13 @@ void LoadClient::listen_to_pipe(const std::string& path) {
                             });
 }
 
+void LoadClient::listen_to_event(const std::string& path) {
+  connection_->on_event(path, plan_.event.member,
+                        [this](std::span<const rr::Value> arguments) { note_packet(arguments.front()); });
+  has_event_ = true;
+  look_whether_ready();
+}
+
 /// Packets of the load device are numbered; those of others count alone.
 void LoadClient::note_packet(const rr::Value& packet) {
   const auto* structure = packet.get_if<rr::Structure>();
@@ -114,7 +123,10 @@ void LoadClient::note_packet(const rr::Value& packet) {
 }
 
 void LoadClient::look_whether_ready() {
-  if (is_ready_ || !has_value_ || (!plan_.pipe.member.empty() && !has_pipe_)) return;
+  const auto waits_for = [](const MemberName& name, bool is_there) { return !name.member.empty() && !is_there; };
+  if (is_ready_ || waits_for(plan_.wire, has_value_) || waits_for(plan_.pipe, has_pipe_) ||
+      waits_for(plan_.event, has_event_))
+    return;
   is_ready_ = true;
   backoff_.reset();
   if (stalls_) stream_->stall();
@@ -124,7 +136,7 @@ void LoadClient::look_whether_ready() {
 void LoadClient::end(const rr::Error& reason) {
   stream_ = nullptr;
   connection_.reset();
-  has_value_ = has_pipe_ = false;
+  has_value_ = has_pipe_ = has_event_ = false;
   last_packet_ = 0;
   owner_.ended(*this, reason);
   is_ready_ = false;

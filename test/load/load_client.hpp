@@ -1,4 +1,5 @@
-// One of many clients: connects, listens to a wire and maybe a pipe, and tells what becomes of it. Test of load.
+// One of many clients: connects, listens to a wire, a pipe, an event, or none of them, and tells what becomes of it.
+// Test of load.
 #pragma once
 
 #include <boost/asio/io_context.hpp>
@@ -19,21 +20,22 @@ struct MemberName {
   static MemberName parse(const std::string& text);
 };
 
-/// What every client does.
+/// What every client does; an empty member: none.
 struct LoadPlan {
   rr::ConnectionUrl url;
-  MemberName wire;
-  MemberName pipe = {};  ///< empty member: none
+  MemberName wire = {};
+  MemberName pipe = {};
+  MemberName event = {};
 };
 
 class LoadClient;
 
 class LoadOwner {
  public:
-  /// The first value is there, and the pipe open where there is one.
+  /// It is connected; the first value is there, and the pipe open, where there are such.
   virtual void became_ready(LoadClient& client) = 0;
   virtual void received_value(LoadClient& client, rr::TimeSpec time) = 0;
-  /// `is_next`  whether the packet follows the one before it.
+  /// Or an event. `is_next`  whether it follows the one before it.
   virtual void received_packet(LoadClient& client, bool is_next) = 0;
   /// Connecting failed, or the connection is lost.
   virtual void ended(LoadClient& client, const rr::Error& reason) = 0;
@@ -63,6 +65,7 @@ class LoadClient {
   void opened(std::shared_ptr<rr::ClientConnection> connection);
   void listen_to_wire(const std::string& path);
   void listen_to_pipe(const std::string& path);
+  void listen_to_event(const std::string& path);
   /// Calls `use` with the path of the member's object once that is known.
   void find(const MemberName& name, void (LoadClient::*use)(const std::string& path));
   void note_packet(const rr::Value& packet);
@@ -77,6 +80,7 @@ class LoadClient {
   std::shared_ptr<rr::ClientConnection> connection_;
   bool has_value_ = false;
   bool has_pipe_ = false;
+  bool has_event_ = false;
   bool is_ready_ = false;
   std::uint64_t last_packet_ = 0;
   rr::Backoff backoff_;

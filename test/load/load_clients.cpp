@@ -1,6 +1,7 @@
-// load_clients: connects many clients in one process, one wire each, and prints as JSON what they noticed.
-//   load_clients --url URL --wire PATH.MEMBER [--pipe PATH.MEMBER] [--clients N] [--seconds S]
+// load_clients: connects many clients in one process, and prints as JSON what they noticed.
+//   load_clients --url URL [--wire PATH.MEMBER] [--pipe PATH.MEMBER] [--event PATH.MEMBER] [--clients N] [--seconds S]
 //                [--stalled K] [--storm]
+// "packets" are those of the pipe, and events.
 // --stalled K  K of them stop reading when they are connected, until SIGUSR1; their values count nowhere.
 // --storm      all connect at once, and whoever is lost comes back by itself, after a wait that grows and is half
 //              chance. Without it 50 at a time connect, once.
@@ -115,7 +116,7 @@ class Swarm final : private LoadOwner {
 
   void received_packet(LoadClient& client, bool is_next) override {
     if (client.stalls()) return;
-    ++packets_;
+    if (measures_since_) ++packets_;
     if (!is_next) ++packet_gaps_;
   }
 
@@ -208,8 +209,9 @@ Options parse_options(int argc, char** argv) {
   const auto url = rr::parse_url(take("--url", ""));
   if (!url) throw std::invalid_argument("--url: " + url.error().message);
   out.plan.url = *url;
-  out.plan.wire = MemberName::parse(take("--wire", "state"));
+  out.plan.wire = MemberName::parse(take("--wire", ""));
   out.plan.pipe = MemberName::parse(take("--pipe", ""));
+  out.plan.event = MemberName::parse(take("--event", ""));
   out.clients = std::stoul(take("--clients", "1"));
   out.stalled = std::stoul(take("--stalled", "0"));
   out.seconds = std::stod(take("--seconds", "inf"));

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Measures many clients of one device through the gateway: measure.py --report FILE [--mode MODE] [--clients N]
+"""Measures many clients of one device through the gateway: measure.py --report FILE [--mode MODE] [--clients N] [PART...]
 
 Everything is compared with something of the same run, and what is promised to users is held to the promise too: that a
 yardstick was as bad is no excuse. Ends with 1 where something is missed. Builds are those of RR_BUILD, build/release where it
@@ -7,36 +7,17 @@ is not set.
 """
 import argparse
 import pathlib
-import platform
 import sys
 import tempfile
 import time
-from dataclasses import dataclass
 
+import costs
 from load import Clients, Device, Gateway, running
+from rows import Row, report
 
 SECONDS = 10
 OLDEST_MS = 50  # what is promised of a value that a thousand clients follow, at the 99th percentile
 BULK = {"packet_rate": 50, "packet_bytes": 32768}
-
-
-@dataclass
-class Row:
-    """Met where ours / yardstick is at most `limit`, and ours at most `promise`; None: there is no such thing."""
-    text: str
-    ours: float
-    yardstick: float | None
-    unit: str
-    limit: float | None = None
-    promise: float | None = None
-
-    @property
-    def ratio(self):
-        return None if self.yardstick is None else self.ours / max(self.yardstick, 1e-9)
-
-    @property
-    def is_met(self):
-        return (self.limit is None or self.ratio <= self.limit) and (self.promise is None or self.ours <= self.promise)
 
 
 def fan_out(folder, mode, count):
@@ -109,26 +90,13 @@ def storm(folder, mode, count):
     yield Row("clients that did not come back", count - report["ready"], None, "", promise=0)
 
 
-def measure(mode, count):
-    for work in (lambda folder: fan_out(folder, mode, count), lambda folder: one_stalls(folder, mode),
-                 lambda folder: storm(folder, mode, count)):
+PARTS = {"age": fan_out, "stall": one_stalls, "storm": storm, "delivery": costs.deliveries, "memory": costs.memory}
+
+
+def measure(mode, count, parts):
+    for name in parts:
         with tempfile.TemporaryDirectory() as scratch:
-            yield from work(pathlib.Path(scratch))
-
-
-def report(mode, rows):
-    lines = ["| load, mode " + mode + " | ours | promise | yardstick | ratio | aim | |", "|---|---|---|---|---|---|---|"]
-    for row in rows:
-        yardstick, ratio = ("", "") if row.yardstick is None else (f"{row.yardstick:.2f} {row.unit}", f"{row.ratio:.2f}")
-        promise = "" if row.promise is None else f"<= {row.promise:g} {row.unit}"
-        limit = "" if row.limit is None else f"<= {row.limit:g}"
-        verdict = "" if row.limit is None and row.promise is None else "met" if row.is_met else "**missed**"
-        lines.append(f"| {row.text} | {row.ours:.2f} {row.unit} | {promise} | {yardstick} | {ratio} | {limit} "
-                     f"| {verdict} |")
-    missed = sum(not row.is_met for row in rows)
-    aims = sum(row.limit is not None or row.promise is not None for row in rows)
-    lines += ["", f"{aims - missed} aims met, {missed} missed; {platform.machine()}, {platform.processor() or 'processor unknown'}"]
-    return "\n".join(lines) + "\n"
+            yield from PARTS[name](pathlib.Path(scratch), mode, *([count] if name in ("age", "storm") else []))
 
 
 def main():
@@ -136,10 +104,11 @@ def main():
     parser.add_argument("--report", type=pathlib.Path, required=True)
     parser.add_argument("--mode", choices=["relay", "shared"], default="shared")
     parser.add_argument("--clients", type=int, default=1000)
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"all, or some of: {' '.join(PARTS)}")
     arguments = parser.parse_args()
     mode = {} if arguments.mode == "relay" else {"mode": arguments.mode}
-    rows = list(measure(mode, arguments.clients))
-    text = report(arguments.mode, rows)
+    rows = list(measure(mode, arguments.clients, arguments.parts or PARTS))
+    text = report(f"load, mode {arguments.mode}", rows)
     arguments.report.parent.mkdir(parents=True, exist_ok=True)
     arguments.report.write_text("# Load\n\n" + text, encoding="utf-8")
     print(text)
