@@ -36,7 +36,7 @@ std::string text_of(const std::exception_ptr& thrown) {
 }  // namespace
 
 StreamDriver::StreamDriver(std::unique_ptr<ByteStream> stream)
-    : stream_(std::move(stream)), timer_(stream_->executor()), buffer_(new std::uint8_t[read_size]) {}
+    : stream_(std::move(stream)), timer_(stream_->executor()), buffer_(read_size) {}
 
 void StreamDriver::start() {
   settle();
@@ -52,13 +52,13 @@ void StreamDriver::spawn(awaitable<void> work) {
 awaitable<void> StreamDriver::read_all(std::shared_ptr<StreamDriver> self) {
   auto& driver = *self;
   while (!driver.is_closed_ && driver.unread_.empty()) {
-    const auto read = co_await driver.stream_->read_some({driver.buffer_.get(), read_size});
+    const auto read = co_await driver.stream_->read_some(driver.buffer_);
     if (driver.is_closed_) break;
     const Now now = read_clocks();
     if (read.error) co_return driver.finish(stream_error(read.error), now);
     if (read.is_end())
       co_return driver.finish(make_error(ErrorCode::connection_error, "the peer closed the connection"), now);
-    driver.unread_ = {driver.buffer_.get(), read.bytes};
+    driver.unread_ = {driver.buffer_.data(), read.bytes};
     driver.settle(now);
   }
   driver.is_reading_ = false;

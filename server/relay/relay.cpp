@@ -11,6 +11,8 @@
 #include <cstring>
 #include <memory>
 
+#include "node/platform/page_buffer.hpp"
+
 namespace rrgate {
 
 namespace asio = boost::asio;
@@ -84,18 +86,17 @@ rr::awaitable<void> Relay::pump_to_device() {
 }
 
 rr::awaitable<void> Relay::pump(Direction& direction) {
-  // Not a vector: its pages are touched, and so become memory, only as far as they are used.
-  const auto buffer = std::make_unique_for_overwrite<std::uint8_t[]>(options_.outbox_bytes);
+  const rr::PageBuffer buffer(options_.outbox_bytes);
   std::size_t held = 0;  // bytes of an incomplete message start, at the front
   while (!end_reason_) {
-    const auto read = co_await direction.from.read_some({buffer.get() + held, options_.outbox_bytes - held});
+    const auto read = co_await direction.from.read_some({buffer.data() + held, buffer.size() - held});
     if (read.error || read.is_end()) {
       end_of(direction, read.error);
       break;
     }
     held += read.bytes;
     const auto messages = direction.gate.messages();
-    const auto passed = direction.gate.pass({buffer.get(), held});
+    const auto passed = direction.gate.pass({buffer.data(), held});
     direction.flow.messages += direction.gate.messages() - messages;
     if (!passed) {
       stop(broken_rule(direction, passed.error()));
@@ -106,7 +107,7 @@ rr::awaitable<void> Relay::pump(Direction& direction) {
       to_client_.gate.make_opaque();
       to_device_.gate.make_opaque();
     }
-    const rr::ByteSpan slice(buffer.get(), *passed);
+    const rr::ByteSpan slice(buffer.data(), *passed);
     direction.flow.waiting += *passed;
     const auto error = co_await direction.to.write({&slice, 1});
     direction.flow.waiting -= *passed;
@@ -117,7 +118,7 @@ rr::awaitable<void> Relay::pump(Direction& direction) {
     direction.bytes += *passed;
     direction.flow.bytes += *passed;
     held -= *passed;
-    if (held > 0) std::memmove(buffer.get(), buffer.get() + *passed, held);
+    if (held > 0) std::memmove(buffer.data(), buffer.data() + *passed, held);
     if (direction.gate.is_opaque()) co_await keep_pace(direction, *passed);
   }
 }
