@@ -193,7 +193,7 @@ def test_the_far_gateway_dies(lab, tmp_path):
         stream = Stream(chain.near_port, "/changed")
         chain.kill_far()
         assert stream.next()[2]["state"] == "connection_lost"
-        chain.processes[-1].wait_until(lambda: "refused" in chain.near_device().get("last_error", ""))
+        chain.processes[-1].wait_until(lambda: "refused" in (chain.near_device().get("last_error") or ""))
         assert chain.near_device()["state"] == "offline"
         chain.restart_far()
         assert stream.next()[2]["state"] == "connected"
