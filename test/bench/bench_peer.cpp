@@ -1,6 +1,6 @@
 // The other side of the call benchmark, each in a process of its own. Prints its port as JSON; runs until it is ended.
 //
-//   bench_peer service    a node with service "interop" of one function that does nothing
+//   bench_peer service    a node with service "interop": a function that does nothing, and one that takes its time
 //   bench_peer echo       the yardstick: answers requests of a known size with replies of a known size; a client begins
 //                         with both sizes (two uint32)
 #include <array>
@@ -12,10 +12,12 @@
 #include <boost/asio/read.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/asio/write.hpp>
+#include <chrono>
 #include <cstdint>
 #include <cstdio>
 #include <exception>
 #include <string_view>
+#include <thread>
 #include <vector>
 
 #include "node/service/node.hpp"
@@ -30,6 +32,7 @@ constexpr const char* definition = R"(service test.bench
 stdver 0.10
 object Bench
     function void nothing()
+    function void wait(double seconds)
     property uint64 allocations [readonly]
 end
 )";
@@ -43,6 +46,9 @@ void serve() {
   rr::Node node("interop.service");
   const auto service = rr::Service::from_text({definition}, "interop", "Bench");
   service->function("nothing", [] {});
+  service->function("wait", rr::blocking([](double seconds) {
+                      std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+                    }));
   service->property("allocations").get([] { return static_cast<std::uint64_t>(rr::test::allocation_count); });
   node.add(service);
   say_port(node.listen("rr+tcp://127.0.0.1:0"));

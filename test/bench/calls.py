@@ -8,10 +8,12 @@ import tempfile
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "interop"))
 
+import relay  # noqa: E402
 from processes import Background  # noqa: E402
 
 HERE = pathlib.Path(__file__).resolve().parent
 ONE, TWO = "one core", "two cores"
+SLOW = "call beside a handler of 5 s"
 CORES = sorted(os.sched_getaffinity(0))[:2]
 REFERENCE = HERE.parent / "interop" / "peers" / "service.py"
 
@@ -42,6 +44,17 @@ def commands(build):
             for whose, port in (("our service", service), ("service of 1.2.8", reference)):
                 yield on(CORES[0], sys.executable, HERE / "reference_call.py", f"client of 1.2.8, {whose}, {name}",
                          url("rr+tcp", port), echo)
+
+
+def slow_handlers(build):
+    """As commands(), for what a client waits while the handler of another takes its time."""
+    bench = build / "test" / "bench"
+    with running(CORES[-1], bench / "bench_peer", "service") as service:
+        yield on(CORES[0], bench / "bench_slow", f"{SLOW}, native", url("rr+tcp", service))
+        for mode in ("relay", "shared"):
+            with relay.gateway(build, service, mode=mode) as gateway:
+                at = f"rr+ws://127.0.0.1:{gateway}/devices/device?service=interop"
+                yield on(CORES[0], bench / "bench_slow", f"{SLOW}, gateway ({mode})", at)
 
 
 def on(core, *command):

@@ -34,8 +34,14 @@ double time_of(Work&& work) {
   return std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// Runs `ours` and `yardstick` in turn after a warm-up, `rounds` times or for ten seconds, and prints one line of JSON
-/// for run.py.
+/// One line of JSON for run.py.
+inline void print(const std::string& name, const Samples& ours, const Samples& yardstick) {
+  std::printf("{\"name\": \"%s\", \"rounds\": %zu, \"ours\": %s, \"yardstick\": %s}\n", name.c_str(),
+              ours.nanoseconds.size(), ours.to_json().c_str(), yardstick.to_json().c_str());
+  std::fflush(stdout);
+}
+
+/// Runs `ours` and `yardstick` in turn after a warm-up, `rounds` times or for ten seconds, and prints the result.
 template <class Ours, class Yardstick>
 void compare(const std::string& name, int rounds, Ours&& ours, Yardstick&& yardstick) {
   Samples our_samples;
@@ -53,9 +59,7 @@ void compare(const std::string& name, int rounds, Ours&& ours, Yardstick&& yards
     our_samples.nanoseconds.push_back(our_time);
     yardstick_samples.nanoseconds.push_back(yardstick_time);
   }
-  std::printf("{\"name\": \"%s\", \"rounds\": %zu, \"ours\": %s, \"yardstick\": %s}\n", name.c_str(),
-              our_samples.nanoseconds.size(), our_samples.to_json().c_str(), yardstick_samples.to_json().c_str());
-  std::fflush(stdout);
+  print(name, our_samples, yardstick_samples);
 }
 
 }  // namespace rr::bench

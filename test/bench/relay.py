@@ -38,23 +38,40 @@ def device(build):
 @contextlib.contextmanager
 def relays(build, device_port):
     """Ports of the gateway and of HAProxy in front of one device."""
-    with tempfile.TemporaryDirectory() as scratch, contextlib.ExitStack() as stack:
-        folder = pathlib.Path(scratch)
+    with gateway(build, device_port) as ours, haproxy(device_port) as yardstick:
+        yield ours, yardstick
 
-        def start(name, port, *command):
-            process = Background(command, folder / f"{name}.log")
-            stack.callback(process.stop)
+
+@contextlib.contextmanager
+def gateway(build, device_port, **options):
+    """Its port; the device, with these options, has the name "device"."""
+    with tempfile.TemporaryDirectory() as scratch:
+        port, config = free_port(), pathlib.Path(scratch) / "gateway.json"
+        device = {"name": "device", "url": f"rr+tcp://127.0.0.1:{device_port}/?service=interop", **options}
+        config.write_text(json.dumps({"listen": [f"127.0.0.1:{port}"], "devices": [device]}))
+        with listening(port, build / "server/rrgate", "serve", "--config", config):
+            yield port
+
+
+@contextlib.contextmanager
+def haproxy(device_port):
+    with tempfile.TemporaryDirectory() as scratch:
+        port, config = free_port(), pathlib.Path(scratch) / "haproxy.cfg"
+        config.write_text(HAPROXY.format(port=port, device=device_port))
+        with listening(port, "haproxy", "-f", config, "-db"):
+            yield port
+
+
+@contextlib.contextmanager
+def listening(port, *command):
+    """A process that has begun to listen."""
+    with tempfile.TemporaryDirectory() as scratch:
+        process = Background(command, pathlib.Path(scratch) / "log")
+        try:
             process.wait_until(lambda: is_open(port))
-            return port
-
-        ours, yardstick = free_port(), free_port()
-        (folder / "gateway.json").write_text(json.dumps({
-            "listen": [f"127.0.0.1:{ours}"],
-            "devices": [{"name": "device", "url": f"rr+tcp://127.0.0.1:{device_port}/?service=interop"}],
-        }))
-        (folder / "haproxy.cfg").write_text(HAPROXY.format(port=yardstick, device=device_port))
-        yield (start("gateway", ours, build / "server/rrgate", "serve", "--config", folder / "gateway.json"),
-               start("haproxy", yardstick, "haproxy", "-f", folder / "haproxy.cfg", "-db"))
+            yield
+        finally:
+            process.stop()
 
 
 def is_open(port):
