@@ -136,13 +136,14 @@ rr::awaitable<void> serve_connection(GatewayState& gateway, std::unique_ptr<rr::
   identity.client = connection.client;
   identity = identity.is_proven() ? gateway.access().with_grants(std::move(identity))
                                   : gateway.access().anonymous(connection.client);
+  rr::awaitable<void> continuation;
   switch (protocol) {
     case Protocol::robot_raconteur:
       if (gateway.is_stopping()) break;
-      co_await serve_native_client(gateway, connection, std::move(stream));
+      continuation = co_await serve_native_client(gateway, connection, std::move(stream));
       break;
     case Protocol::http:
-      co_await serve_http_client(gateway, connection, std::move(stream));
+      continuation = co_await serve_http_client(gateway, connection, std::move(stream));
       break;
     case Protocol::unknown: {
       gateway.reject(Rejection::unknown_protocol);
@@ -156,6 +157,7 @@ rr::awaitable<void> serve_connection(GatewayState& gateway, std::unique_ptr<rr::
     default:
       break;
   }
+  if (continuation.valid()) co_await std::move(continuation);
 }
 
 }  // namespace rrgate

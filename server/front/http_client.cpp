@@ -21,6 +21,9 @@ constexpr std::size_t longest_way = 1024;
 
 constexpr std::string_view devices_prefix = "/devices/";
 
+/// What a connection goes on as when HTTP is done with it; not valid() where it has ended.
+using Continuation = rr::awaitable<void>;
+
 rr::awaitable<rr::error_code> write_text(rr::ByteStream& stream, std::string_view text) {
   const auto slice = rr::as_bytes(text);
   const std::span<const rr::ByteSpan> slices(&slice, 1);
@@ -70,9 +73,9 @@ std::string node_url(const Request& request) {
 }
 
 /// 101, then JSON messages.
-rr::awaitable<void> accept_json_socket(GatewayState& gateway, Connection& connection,
-                                       std::unique_ptr<rr::ByteStream> stream, const Request& request,
-                                       rr::ByteSpan unread) {
+rr::awaitable<Continuation> accept_json_socket(GatewayState& gateway, Connection& connection,
+                                               std::unique_ptr<rr::ByteStream> stream, const Request& request,
+                                               rr::ByteSpan unread) {
   const auto place = find_json_socket(gateway, request);
   if (!place) {
     const bool is_denied = place.error().code == rr::ErrorCode::permission_denied;
@@ -81,18 +84,18 @@ rr::awaitable<void> accept_json_socket(GatewayState& gateway, Connection& connec
                                     : problem_response(404, place.error().message);
     co_await write_refusal(*stream, response);
     co_await stream->end(rr::no_reason);
-    co_return;
+    co_return Continuation();
   }
   const auto accepted = format_upgrade_response(request, json_subprotocol);
-  if (co_await write_text(*stream, accepted)) co_return;
+  if (co_await write_text(*stream, accepted)) co_return Continuation();
   stream->put_back(unread);
-  co_await serve_json_socket(gateway, connection, std::move(stream), *place);
+  co_return serve_json_socket(gateway, connection, std::move(stream), *place);
 }
 
 /// Carries an upgrade through. The stream is used up.
-rr::awaitable<void> serve_websocket(GatewayState& gateway, Connection& connection,
-                                    std::unique_ptr<rr::ByteStream> stream, const Request& request,
-                                    rr::ByteSpan unread) {
+rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& connection,
+                                             std::unique_ptr<rr::ByteStream> stream, const Request& request,
+                                             rr::ByteSpan unread) {
   auto& tcp = *stream;
   connection.client = request.arrival.peer;
   connection.address = request.arrival.address.to_string();
@@ -106,26 +109,24 @@ rr::awaitable<void> serve_websocket(GatewayState& gateway, Connection& connectio
     gateway.reject(Rejection::bad_request);
     log(LogLevel::info, "upgrade refused", {{"peer", connection.client}, {"status", refusal->status}});
     co_await refuse(*refusal);
-    co_return;
+    co_return Continuation();
   }
   if (!connection.ticket.pass_to(request.arrival.address)) {
     gateway.reject(Rejection::too_many);
     log(LogLevel::warning, "connection refused: too many", {{"peer", connection.client}});
     const auto response = problem_response(503, "too many connections from " + request.arrival.address.to_string());
     co_await refuse(response);
-    co_return;
+    co_return Continuation();
   }
-  if (is_json_socket(request)) {
-    co_await accept_json_socket(gateway, connection, std::move(stream), request, unread);
-    co_return;
-  }
+  if (is_json_socket(request))
+    co_return co_await accept_json_socket(gateway, connection, std::move(stream), request, unread);
   const auto destination = find_destination(gateway, request);
   if (!destination) {
     gateway.reject(Rejection::no_such_device);
     const auto& error = destination.error();
     const auto response = problem_response(error.code == rr::ErrorCode::node_not_found ? 404 : 400, error.message);
     co_await refuse(response);
-    co_return;
+    co_return Continuation();
   }
   std::string way(request.header(way_header));
   const bool is_circle = destination->device && destination->device->is_on_way(way);
@@ -133,7 +134,7 @@ rr::awaitable<void> serve_websocket(GatewayState& gateway, Connection& connectio
   if (is_circle || way.size() > longest_way) {
     const auto response = problem_response(508, "the way leads back to the gateway that it began at");
     co_await refuse(response);
-    co_return;
+    co_return Continuation();
   }
   const bool takes_close = takes_close_frames(request);
   // In a session of ours each request is looked at; see shared_access.hpp.
@@ -147,22 +148,21 @@ rr::awaitable<void> serve_websocket(GatewayState& gateway, Connection& connectio
   if (!allowed && !hears_in_session && !(takes_close && has_shown)) {
     const auto response = gateway.http_access().refusal(request.identity, allowed.error());
     co_await refuse(response);
-    co_return;
+    co_return Continuation();
   }
   if (hears_in_session || destination->node) {
     const auto accepted = format_upgrade_response(request);
-    if (co_await write_text(tcp, accepted)) co_return;
+    if (co_await write_text(tcp, accepted)) co_return Continuation();
     tcp.put_back(unread);
     auto socket = std::make_unique<rr::WebSocketStream>(std::move(stream), rr::WebSocketRole::server, takes_close);
     if (hears_in_session) {
       log(LogLevel::info, "client refused", {{"peer", connection.client}, {"error", allowed.error().message}});
       auto self = relayed_identity(gateway, *destination->device);
-      co_await refuse_in_session(gateway, connection, std::move(self), std::move(socket), allowed.error());
-      co_return;
+      auto refusal = allowed.error();
+      co_return refuse_in_session(gateway, connection, std::move(self), std::move(socket), std::move(refusal));
     }
     auto base_url = node_url(request);
-    co_await serve_shared_client(gateway, connection, *destination, std::move(socket), std::move(base_url));
-    co_return;
+    co_return serve_shared_client(gateway, connection, *destination, std::move(socket), std::move(base_url));
   }
   rr::Result<std::unique_ptr<Boarding>> boarding(nullptr);
   if (allowed)
@@ -173,20 +173,20 @@ rr::awaitable<void> serve_websocket(GatewayState& gateway, Connection& connectio
     auto response = problem_response(503, boarding.error().message);
     response.set("Retry-After", "2");
     co_await refuse(response);
-    co_return;
+    co_return Continuation();
   }
   const auto accepted = format_upgrade_response(request);
-  if (co_await write_text(tcp, accepted)) co_return;
+  if (co_await write_text(tcp, accepted)) co_return Continuation();
   tcp.put_back(unread);
-  rr::WebSocketStream socket(std::move(stream), rr::WebSocketRole::server, takes_close);
+  auto socket = std::make_unique<rr::WebSocketStream>(std::move(stream), rr::WebSocketRole::server, takes_close);
   if (!boarding) {  // a page can't read the status of a refused upgrade, but it can read why a WebSocket closes
     log(LogLevel::info, "client refused", {{"peer", connection.client}, {"error", boarding.error().message}});
     const auto code = static_cast<std::uint16_t>(allowed ? 1013 : 1008);
     const rr::EndReason reason{code, boarding.error().message};
-    co_await socket.end(reason);
-    co_return;
+    co_await socket->end(reason);
+    co_return Continuation();
   }
-  co_await relay_client(gateway, connection, socket, **boarding);
+  co_return relay_client(gateway, connection, std::move(socket), std::move(*boarding));
 }
 
 /// Refuses what somebody else's page has a browser send.
@@ -242,8 +242,8 @@ Response to_base_path(const Config& config) {
 
 }  // namespace
 
-rr::awaitable<void> serve_http_client(GatewayState& gateway, Connection& connection,
-                                      std::unique_ptr<rr::ByteStream> stream) {
+rr::awaitable<Continuation> serve_http_client(GatewayState& gateway, Connection& connection,
+                                              std::unique_ptr<rr::ByteStream> stream) {
   const auto& config = gateway.config();
   const RequestLimits limits{config.limits.header_bytes, config.limits.header_timeout, config.timeouts.idle,
                              config.limits.body_bytes};
@@ -279,8 +279,7 @@ rr::awaitable<void> serve_http_client(GatewayState& gateway, Connection& connect
     if (!is_refused && asks_for_websocket(request)) {
       admitted = {};  // connections have bounds of their own
       const rr::Bytes unread(reader.unread().begin(), reader.unread().end());
-      co_await serve_websocket(gateway, connection, std::move(stream), request, unread);
-      break;
+      co_return co_await accept_websocket(gateway, connection, std::move(stream), request, unread);
     }
     std::vector<std::pair<std::string, std::string>> headers;
     if (request.arrival.is_encrypted && config.tls.hsts_seconds > 0)
@@ -300,6 +299,7 @@ rr::awaitable<void> serve_http_client(GatewayState& gateway, Connection& connect
       break;
     }
   }
+  co_return Continuation();
 }
 
 }  // namespace rrgate

@@ -83,8 +83,8 @@ rr::Bytes make_refusal(const rr::Message& request, const rr::NodeId& own_id, con
   return encoded.to_bytes();
 }
 
-rr::awaitable<void> serve_native_client(GatewayState& gateway, Connection& connection,
-                                        std::unique_ptr<rr::ByteStream> stream) {
+rr::awaitable<rr::awaitable<void>> serve_native_client(GatewayState& gateway, Connection& connection,
+                                                       std::unique_ptr<rr::ByteStream> stream) {
   auto& client = *stream;
   rr::Deadline limit(client.executor(), [&client] { client.close(); });
   limit.arm(gateway.config().limits.header_timeout);
@@ -97,7 +97,7 @@ rr::awaitable<void> serve_native_client(GatewayState& gateway, Connection& conne
     gateway.reject(Rejection::bad_request);
     log(LogLevel::info, "native client dropped", {{"peer", connection.client}, {"error", read.error().message}});
     client.close();
-    co_return;
+    co_return rr::awaitable<void>();
   }
 
   const auto destination =
@@ -112,15 +112,12 @@ rr::awaitable<void> serve_native_client(GatewayState& gateway, Connection& conne
     refusal = allowed.error();
     is_denied = true;
   } else if (destination && destination->node) {
-    auto base_url = "rr+tcp://" + rr::format_host_port(connection.local.address().to_string(), connection.local.port());
-    co_await serve_shared_client(gateway, connection, *destination, std::move(stream), base_url + "/");
-    co_return;
+    auto base_url =
+        "rr+tcp://" + rr::format_host_port(connection.local.address().to_string(), connection.local.port()) + "/";
+    co_return serve_shared_client(gateway, connection, *destination, std::move(stream), std::move(base_url));
   } else if (destination) {
     auto boarding = co_await board(gateway, *destination->device);
-    if (boarding) {
-      co_await relay_client(gateway, connection, client, **boarding);
-      co_return;
-    }
+    if (boarding) co_return relay_client(gateway, connection, std::move(stream), std::move(*boarding));
     refusal = boarding.error();
   } else {
     gateway.reject(Rejection::no_such_device);
@@ -130,14 +127,14 @@ rr::awaitable<void> serve_native_client(GatewayState& gateway, Connection& conne
       {{"peer", connection.client}, {"wanted", describe_wish(request.header)}, {"error", refusal.message}});
   if (is_denied && !asks_for_tls(request)) {
     auto self = relayed_identity(gateway, *destination->device);
-    co_await refuse_in_session(gateway, connection, std::move(self), std::move(stream), std::move(refusal));
-    co_return;
+    co_return refuse_in_session(gateway, connection, std::move(self), std::move(stream), std::move(refusal));
   }
   const auto reply = make_refusal(request, gateway.node_id(), refusal);
   const rr::ByteSpan slice(reply);
   const std::span<const rr::ByteSpan> slices(&slice, 1);
   co_await client.write(slices);
   co_await client.end(rr::no_reason);
+  co_return rr::awaitable<void>();
 }
 
 }  // namespace rrgate

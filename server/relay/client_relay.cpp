@@ -28,27 +28,27 @@ rr::awaitable<rr::Result<std::unique_ptr<Boarding>>> board(GatewayState& gateway
   co_return boarding;
 }
 
-rr::awaitable<void> relay_client(GatewayState& gateway, Connection& connection, rr::ByteStream& client,
-                                 Boarding& boarding) {
+rr::awaitable<void> relay_client(GatewayState& gateway, Connection& connection, std::unique_ptr<rr::ByteStream> client,
+                                 std::unique_ptr<Boarding> boarding) {
+  auto& device = boarding->device;
   const auto& limits = gateway.config().limits;
   const RelayOptions options{.max_message_size = limits.max_message_size,
                              .outbox_bytes = limits.outbox_bytes,
                              .opaque_rate = limits.opaque_rate};
-  Relay relay(client, *boarding.stream, options, boarding.device.traffic());
-  connection.device = &boarding.device;
+  Relay relay(*client, *boarding->stream, options, device.traffic());
+  connection.device = &device;
   connection.has_session = true;
   connection.stop = [&relay](rr::EndReason reason) { relay.stop(std::move(reason)); };
-  const auto& name = boarding.device.config().name;
+  const auto& name = device.config().name;
   log(LogLevel::info, "client connected", {{"device", name}, {"peer", connection.client}});
 
   const auto reason = co_await relay.run();
 
   connection.device = nullptr;
   connection.has_session = false;
-  connection.stop = [&client](const rr::EndReason&) { client.close(); };
+  connection.stop = [](const rr::EndReason&) {};
   // A device that ends a connection may be ending altogether: find out now rather than at the next look.
-  if (!gateway.is_stopping() && (reason.code == 1011 || reason.text.rfind("device", 0) == 0))
-    boarding.device.note_trouble();
+  if (!gateway.is_stopping() && (reason.code == 1011 || reason.text.rfind("device", 0) == 0)) device.note_trouble();
   log(LogLevel::info, "client disconnected",
       {{"device", name},
        {"peer", connection.client},

@@ -25,7 +25,7 @@ rr::Result<> may_relay(GatewayState& gateway, const Connection& connection, cons
 rr::awaitable<rr::Result<std::unique_ptr<Boarding>>> board(GatewayState& gateway, Device& device, std::string way = {});
 
 /// Relays until one side ends; ends both. `client` is at the start of its Robot Raconteur stream.
-rr::awaitable<void> relay_client(GatewayState& gateway, Connection& connection, rr::ByteStream& client,
-                                 Boarding& boarding);
+rr::awaitable<void> relay_client(GatewayState& gateway, Connection& connection, std::unique_ptr<rr::ByteStream> client,
+                                 std::unique_ptr<Boarding> boarding);
 
 }  // namespace rrgate
