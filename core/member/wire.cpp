@@ -18,6 +18,12 @@ Result<> write_wire_packet(Message& message, std::string_view path, const Member
   return write_wire_value(message, value, time, member, types);
 }
 
+void WirePacket::set_path(std::string_view path) {
+  path_ = path;
+  message_.forget_encoded();
+  for (auto& entry : message_.message.entries) entry.service_path = path;
+}
+
 Result<SharedMessage*> WirePacket::message(const TypeRegistry& types) {
   auto& message = message_.message;
   if (!message.entries.empty()) return &message_;

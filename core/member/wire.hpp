@@ -37,6 +37,8 @@ class WirePacket {
       : path_(path), member_(member), value_(value), time_(time), arrived_(arrived) {}
 
   std::string_view path() const { return path_; }
+  /// The same value by another path of its object.
+  void set_path(std::string_view path);
   const MemberDefinition& member() const { return member_; }
   const Value& value() const { return value_; }
   TimeSpec time() const { return time_; }

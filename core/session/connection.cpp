@@ -311,11 +311,11 @@ Result<> Connection::send(Message& message, Now now, bool is_urgent) {
   return note_sent(now);
 }
 
-Result<> Connection::send(SharedMessage& message, Now now) {
+Result<> Connection::send(SharedMessage& message, Now now, bool is_urgent) {
   if (state_ == ConnectionState::closed) return close_reason_;
   address(message.message.header);
   complete_header(message.message);
-  if (auto queued = queue_.push(message, encode_options()); !queued) return queued;
+  if (auto queued = queue_.push(message, encode_options(), is_urgent); !queued) return queued;
   return note_sent(now);
 }
 

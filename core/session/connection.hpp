@@ -86,7 +86,7 @@ class Connection {
   /// Errors   connection_error when closed or the queue is full; protocol_error above the size limit.
   Result<> send(Message& message, Now now, bool is_urgent = false);
   /// Sends what other peers are sent as well, addressed to this one's session. Errors   those of send().
-  Result<> send(SharedMessage& message, Now now);
+  Result<> send(SharedMessage& message, Now now, bool is_urgent = false);
   /// Clears `message` and addresses it to the peer's session: endpoints and the next message id.
   void begin_message(Message& message);
   /// The size limit rises from max_unauthorised_message_size to max_message_size.

@@ -18,23 +18,26 @@ EncodedMessage TransmitQueue::take_spare() {
 Result<> TransmitQueue::push(const Message& message, const EncodeOptions& options, bool is_urgent) {
   auto encoded = take_spare();
   if (auto done = encode(message, options, encoded); !done) return done;
-  size_ += encoded.size();
-  if (is_urgent) {
-    const auto place = std::max(in_flight_, urgent_end_);
-    messages_.insert(messages_.begin() + static_cast<std::ptrdiff_t>(first_ + place), std::move(encoded));
-    urgent_end_ = place + 1;
-  } else {
-    messages_.push_back(std::move(encoded));
-  }
+  insert(std::move(encoded), is_urgent);
   return {};
 }
 
-Result<> TransmitQueue::push(SharedMessage& message, const EncodeOptions& options) {
+Result<> TransmitQueue::push(SharedMessage& message, const EncodeOptions& options, bool is_urgent) {
   auto encoded = take_spare();
   if (auto done = message.encode(options, encoded); !done) return done;
-  size_ += encoded.size();
-  messages_.push_back(std::move(encoded));
+  insert(std::move(encoded), is_urgent);
   return {};
+}
+
+void TransmitQueue::insert(EncodedMessage encoded, bool is_urgent) {
+  size_ += encoded.size();
+  if (!is_urgent) {
+    messages_.push_back(std::move(encoded));
+    return;
+  }
+  const auto place = std::max(in_flight_, urgent_end_);
+  messages_.insert(messages_.begin() + static_cast<std::ptrdiff_t>(first_ + place), std::move(encoded));
+  urgent_end_ = place + 1;
 }
 
 std::span<const ByteSpan> TransmitQueue::slices(std::size_t max_slices) {

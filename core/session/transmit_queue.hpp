@@ -15,9 +15,9 @@ namespace rr {
 /// go ahead of all others.
 class TransmitQueue {
  public:
-  /// Encodes `message` behind everything (or, if urgent, behind what is being written).
+  /// Encodes `message` behind everything (or, if urgent, ahead of what is not being written yet).
   Result<> push(const Message& message, const EncodeOptions& options, bool is_urgent = false);
-  Result<> push(SharedMessage& message, const EncodeOptions& options);
+  Result<> push(SharedMessage& message, const EncodeOptions& options, bool is_urgent = false);
 
   bool empty() const { return size_ == 0; }
   /// Bytes not yet consumed.
@@ -32,6 +32,7 @@ class TransmitQueue {
 
  private:
   EncodedMessage take_spare();
+  void insert(EncodedMessage encoded, bool is_urgent);
 
   std::span<EncodedMessage> waiting() { return std::span(messages_).subspan(first_); }
   void pop_front();

@@ -17,6 +17,8 @@ class SharedMessage {
 
   /// The same as encode() of `message`. Its entries and metadata stay as they are from the first call on.
   [[nodiscard]] Result<> encode(const EncodeOptions& options, EncodedMessage& out);
+  /// `message` may be changed again.
+  void forget_encoded() { encoded_ = {}; }
 
  private:
   std::array<EncodedMessage, 4> encoded_;  ///< by string table mode; empty while nobody needs it

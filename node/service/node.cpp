@@ -252,26 +252,23 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
 
   // ServiceHost: from services to clients
 
-  void send_event(const Service& service, const std::string& path, const MemberDefinition& event,
-                  std::span<const Value> arguments) override {
-    for_clients_of(service, [&](ServiceClient& client) { client.send_event(path, event, arguments); });
+  void send_event(const Service& service, EventPacket& packet) override {
+    for_clients_of(service, [&](ServiceClient& client) { client.send_event(packet); });
   }
-  void send_wire(const Service& service, const std::string& path, const MemberDefinition& wire,
-                 const std::shared_ptr<const Value>& newest) override {
+  void send_wire(WirePacket& packet, const std::shared_ptr<const Value>& newest) override {
+    const auto found = followers_.find(PathMemberView{packet.path(), packet.member().name});
+    if (found == followers_.end()) return;
+    // Meanwhile some may leave, others come, who are sent the newest by that, and a handler may set another value.
+    const auto followers = found->second;
     const auto value = newest;
-    const Now now = read_clocks();
-    WirePacket packet(path, wire, *value, now.utc, now.steady);
-    for_clients_of(service, [&](ServiceClient& client) {
-      if (newest == value) client.send_wire(packet);
-    });
+    for (const auto id : followers)
+      if (newest == value) send_wire_to(id, packet);
   }
-  void send_wire_to(const Service& service, ClientId id, const std::string& path, const MemberDefinition& wire,
-                    const Value& value) override {
-    const auto client = clients_.find(id);
-    if (client == clients_.end() || client->second->service() != &service) return;
-    const Now now = read_clocks();
-    WirePacket packet(path, wire, value, now.utc, now.steady);
-    client->second->send_wire(packet);
+  void send_wire_to(ClientId id, WirePacket& packet) override {
+    const auto found = clients_.find(id);
+    if (found == clients_.end()) return;
+    const auto client = found->second;
+    client->send_wire(packet);
   }
   void release_path(const Service& service, const std::string& path) override {
     for_clients_of(service, [&](ServiceClient& client) { client.release_path(path); });
@@ -318,6 +315,12 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   }
   void locks_changed(const Service& service) override {
     for_clients_of(service, [](ServiceClient& client) { client.handle_locks_changed(); });
+  }
+  void follow_wire(ClientId client, const PathMember& wire) override { followers_[wire].push_back(client); }
+  void leave_wire(ClientId client, const PathMember& wire) override {
+    const auto found = followers_.find(wire);
+    std::erase(found->second, client);
+    if (found->second.empty()) followers_.erase(found);
   }
   void client_ended(ServiceClient& client) override {
     clients_.erase(client.id());
@@ -431,6 +434,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   std::vector<ListenUrl> listens_;  ///< of the listeners: addresses with their true ports
   std::vector<std::shared_ptr<Repeat>> repeats_;
   std::map<ClientId, std::shared_ptr<ServiceClient>> clients_;
+  std::map<PathMember, std::vector<ClientId>, PathMemberLess> followers_;  ///< of the wires that anybody has connected
   std::set<Arrival> arriving_;  ///< connections whose first bytes are awaited
   ClientId last_client_id_ = 0;
   ClientId current_client_ = 0;

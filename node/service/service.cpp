@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "core/session/service_path.hpp"
+#include "node/driver/clocks.hpp"
 #include "node/service/refusal.hpp"
 
 namespace rr {
@@ -141,7 +142,10 @@ void Object::fire_values(std::string_view event, std::span<const Value> argument
   const MemberDefinition& member = require_member(event, MemberKind::event);
   check_arguments(member, "fired", arguments);
   if (!service_.host_) return;
-  for (const std::string& path : paths()) service_.host_->send_event(service_, path, member, arguments);
+  for (const std::string& path : paths()) {
+    EventPacket packet(path, member, arguments);
+    service_.host_->send_event(service_, packet);
+  }
 }
 
 void Object::call_callback(ClientId client, std::string_view callback, const std::vector<Value>& arguments,
@@ -154,30 +158,40 @@ void Object::call_callback(ClientId client, std::string_view callback, const std
                                 arguments, std::move(done));
 }
 
-const MemberDefinition& Object::check_in_value(std::string_view wire, const Value& value) const {
+WirePacket Object::pack_in_value(std::string_view wire, const Value& value) const {
   const MemberDefinition& member = require_member(wire, MemberKind::wire);
   if (member.direction() == MemberDirection::writeonly)
     refuse(type_name() + "." + member.name + " is writeonly: the service sends nothing on it");
-  check_value(type_name() + "." + member.name, value, member.type, *service_.types_);
-  return member;
+  const Now now = read_clocks();
+  WirePacket packet({}, member, value, now.utc, now.steady);
+  if (const auto packed = packet.message(*service_.types_); !packed)
+    refuse(type_name() + "." + member.name + ": " + packed.error().message);
+  return packet;
 }
 
 void Object::set_wire(std::string_view wire, Value value) {
-  const MemberDefinition& member = check_in_value(wire, value);
-  Member& mine = members_[&member];
+  auto newest = std::make_shared<const Value>(std::move(value));
+  WirePacket packet = pack_in_value(wire, *newest);
+  Member& mine = members_[&packet.member()];
   mine.own_in_values.clear();
-  auto& in_value = mine.in_value;
-  in_value = std::make_shared<const Value>(std::move(value));
+  mine.in_value = newest;
   if (!service_.host_) return;
-  for (const std::string& path : paths()) service_.host_->send_wire(service_, path, member, in_value);
+  for (const std::string& path : paths()) {
+    if (mine.in_value != newest) return;  // a handler has set another meanwhile
+    packet.set_path(path);
+    service_.host_->send_wire(packet, mine.in_value);
+  }
 }
 
 void Object::set_wire_for(ClientId client, std::string_view wire, Value value) {
-  const MemberDefinition& member = check_in_value(wire, value);
+  WirePacket packet = pack_in_value(wire, value);
   if (service_.find_client(client).id == 0) return;
-  members_[&member].own_in_values.insert_or_assign(client, value);
+  members_[&packet.member()].own_in_values.insert_or_assign(client, value);
   service_.objects_of_clients_[client].insert(weak_from_this());
-  for (const std::string& path : paths()) service_.host_->send_wire_to(service_, client, path, member, value);
+  for (const std::string& path : paths()) {
+    packet.set_path(path);
+    service_.host_->send_wire_to(client, packet);
+  }
 }
 
 void Object::forget_client(ClientId client) {

@@ -236,7 +236,8 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   void connect_pipe(const MemberDefinition& pipe, const PipeEndpoint& endpoint);
   Result<> receive_packet(const MemberDefinition& pipe, const PipeEndpoint& endpoint, const Value& packet);
   void close_pipe(const MemberDefinition& pipe, const PipeEndpoint& endpoint, bool tells_handler);
-  const MemberDefinition& check_in_value(std::string_view wire, const Value& value) const;
+  /// Throws as set_wire().
+  WirePacket pack_in_value(std::string_view wire, const Value& value) const;
   const Value* in_value(const MemberDefinition& wire, ClientId client) const;
   void forget_client(ClientId client);
 
@@ -249,13 +250,11 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
 /// What a node does for the services that were added to it.
 class ServiceHost {
  public:
-  virtual void send_event(const Service& service, const std::string& path, const MemberDefinition& event,
-                          std::span<const Value> arguments) = 0;
-  /// `newest`  where the wire's value is: another one there is sent by a call of its own.
-  virtual void send_wire(const Service& service, const std::string& path, const MemberDefinition& wire,
-                         const std::shared_ptr<const Value>& newest) = 0;
-  virtual void send_wire_to(const Service& service, ClientId client, const std::string& path,
-                            const MemberDefinition& wire, const Value& value) = 0;
+  virtual void send_event(const Service& service, EventPacket& packet) = 0;
+  /// To those who have connected the wire. `newest`  where its value is: another one there is sent by a call of its
+  /// own.
+  virtual void send_wire(WirePacket& packet, const std::shared_ptr<const Value>& newest) = 0;
+  virtual void send_wire_to(ClientId client, WirePacket& packet) = 0;
   virtual void release_path(const Service& service, const std::string& path) = 0;
   virtual void call_callback(const Service& service, ClientId client, const std::string& path,
                              const MemberDefinition& callback, std::span<const Value> arguments, CallbackDone done) = 0;

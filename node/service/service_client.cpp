@@ -9,21 +9,21 @@ ServiceClient::ServiceClient(ClientId id, ServiceClientOwner& owner, ServiceDire
                              ServiceSessionOptions options, std::unique_ptr<ByteStream> stream)
     : SessionDriver(std::move(stream), directory, std::move(options), read_clocks()), id_(id), owner_(&owner) {}
 
-void ServiceClient::send_event(const std::string& path, const MemberDefinition& event,
-                               std::span<const Value> arguments) {
+void ServiceClient::send_event(EventPacket& packet) {
+  const Now now = read_clocks();
   // The values were checked; what fails now is the connection, and its end is heard of by itself.
-  (void)session_.send_event(path, event, arguments, read_clocks());
-  settle();
+  (void)session_.send_event(packet, now);
+  settle(now);
 }
 
 void ServiceClient::send_wire(WirePacket& packet) {
-  if (!session_.has_wire(packet.path(), packet.member().name)) return;
   const Now now = read_clocks();
   (void)session_.send_wire(packet, now);
   settle(now);
 }
 
 void ServiceClient::release_path(const std::string& path) {
+  leave_wires([&](const PathMember& wire) { return is_within(wire.path, path); });
   session_.release_path(path, read_clocks());
   settle();
 }
@@ -219,12 +219,29 @@ void ServiceClient::answer_login(LoginId id, Result<AuthenticatedUser> result) {
 }
 
 void ServiceClient::handle(const WireConnected& connected, Now now) {
+  if (const auto [wire, is_new] = wires_.insert({connected.path, connected.member->name}); is_new)
+    owner_->follow_wire(id_, *wire);
   const Value* value = static_cast<Object&>(*connected.object).in_value(*connected.member, id_);
   if (value) (void)session_.send_wire(connected.path, *connected.member, *value, now);  // checked when it was set
 }
 
 void ServiceClient::handle(const WireReceived& received, Now) {
   notify("wire", received.member->name, [&] { static_cast<Object&>(*received.object).receive_wire(received); });
+}
+
+void ServiceClient::handle(const WireDisconnected& disconnected, Now) {
+  leave_wires([&](const PathMember& wire) {
+    return wire.path == disconnected.path && wire.member == disconnected.member->name;
+  });
+}
+
+template <class Ended>
+void ServiceClient::leave_wires(Ended&& ended) {
+  std::erase_if(wires_, [&](const PathMember& wire) {
+    const bool has_ended = ended(wire);
+    if (has_ended && owner_) owner_->leave_wire(id_, wire);
+    return has_ended;
+  });
 }
 
 // --- pipes ---
@@ -316,6 +333,7 @@ void ServiceClient::handle(const CallbackCompleted& completed, Now) {
 
 void ServiceClient::handle(const ClientGone&, Now) {
   cancel_late_calls();
+  leave_wires([](const PathMember&) { return true; });
   while (owner_ && !pipes_.empty()) end_pipe(pipes_.begin()->first, true);
   for (const auto& [id, running] : std::exchange(generators_, {}))
     if (owner_) abandon_generator(running.generator);

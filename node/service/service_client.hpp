@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <optional>
+#include <set>
 #include <string_view>
 #include <unordered_map>
 
@@ -29,6 +30,9 @@ class ServiceClientOwner {
   /// Has the login judged, away from the node's thread, and answers it with client.answer_login() unless that is gone.
   virtual void judge_login(const LoginRequested& login, const std::shared_ptr<ServiceClient>& client) = 0;
   virtual void locks_changed(const Service& service) = 0;
+  /// The client is sent what the wire's values are from now on, until it leaves.
+  virtual void follow_wire(ClientId client, const PathMember& wire) = 0;
+  virtual void leave_wire(ClientId client, const PathMember& wire) = 0;
   virtual void client_ended(ServiceClient& client) = 0;
 
  protected:
@@ -46,7 +50,7 @@ class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSe
   void answer_login(LoginId id, Result<AuthenticatedUser> result);
   /// Null while the client is in no service of ours.
   Service* service() const { return service_.get(); }
-  void send_event(const std::string& path, const MemberDefinition& event, std::span<const Value> arguments);
+  void send_event(EventPacket& packet);
   void send_wire(WirePacket& packet);
   void release_path(const std::string& path);
   void call_callback(const std::string& path, const MemberDefinition& callback, std::span<const Value> arguments,
@@ -75,7 +79,10 @@ class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSe
   void handle(const LocksChanged& changed, Now now);
   void handle(const WireConnected& connected, Now now);
   void handle(const WireReceived& received, Now now);
-  void handle(const WireDisconnected&, Now) {}
+  void handle(const WireDisconnected& disconnected, Now now);
+  /// Those that `ended` says so of.
+  template <class Ended>
+  void leave_wires(Ended&& ended);
   void handle(const UserChanged&, Now) {}  // no service of ours is remote
   void handle(const ObjectWanted&, Now) {}
   void handle(const LockWanted&, Now) {}
@@ -103,6 +110,7 @@ class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSe
   ClientId id_;
   ServiceClientOwner* owner_;
   std::shared_ptr<Service> service_;
+  std::set<PathMember, PathMemberLess> wires_;  ///< that it follows
   std::unordered_map<PipeId, PipeEndpoint> pipes_;
   struct RunningGenerator {
     Generator generator;

@@ -38,16 +38,4 @@ awaitable<void> SocketStream::end(const EndReason&) {
   close();
 }
 
-Result<std::pair<std::unique_ptr<ByteStream>, std::unique_ptr<ByteStream>>> make_stream_pair(
-    const boost::asio::any_io_executor& executor, std::chrono::milliseconds send_stall) {
-  boost::asio::local::stream_protocol::socket near(executor);
-  boost::asio::local::stream_protocol::socket far(executor);
-  error_code error;
-  boost::asio::local::connect_pair(near, far, error);
-  if (error) return make_error(ErrorCode::system_resource_error, "a pair of sockets: " + error.message());
-  auto first = std::make_unique<SocketStream>(std::move(near), "this process", send_stall);
-  auto second = std::make_unique<SocketStream>(std::move(far), "this process", send_stall);
-  return std::pair<std::unique_ptr<ByteStream>, std::unique_ptr<ByteStream>>(std::move(first), std::move(second));
-}
-
 }  // namespace rr

@@ -27,8 +27,4 @@ class SocketStream final : public DescriptorStream<boost::asio::generic::stream_
   Deadline linger_;
 };
 
-/// Two ends of one connection inside this process. Errors   system_resource_error.
-Result<std::pair<std::unique_ptr<ByteStream>, std::unique_ptr<ByteStream>>> make_stream_pair(
-    const boost::asio::any_io_executor& executor, std::chrono::milliseconds send_stall);
-
 }  // namespace rr

@@ -220,10 +220,10 @@ void SharedClient::end_too_slow(const rr::Error& error) {
 
 // --- events, callbacks ---
 
-void SharedClient::receive_event(const std::string& path, const rr::MemberDefinition& event,
-                                 std::span<const rr::Value> arguments) {
-  (void)session_.send_event(path, event, arguments, rr::read_clocks());
-  settle();
+void SharedClient::receive_event(rr::EventPacket& packet) {
+  const auto now = rr::read_clocks();
+  (void)session_.send_event(packet, now);  // a lost connection is heard of by itself
+  settle(now);
 }
 
 void SharedClient::release_path(const std::string& path) {

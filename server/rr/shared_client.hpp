@@ -77,8 +77,7 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   bool may_answer(const std::string& path, const rr::MemberDefinition& callback) const override {
     return session_.admits(rr::EntryType::callback_call_req, path, callback);
   }
-  void receive_event(const std::string& path, const rr::MemberDefinition& event,
-                     std::span<const rr::Value> arguments) override;
+  void receive_event(rr::EventPacket& packet) override;
   void receive_wire(rr::WirePacket& packet) override;
   void answer_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::Result<>& result) override;
   void note_conflated(const std::string& path, const rr::MemberDefinition& wire, std::uint64_t count) override;

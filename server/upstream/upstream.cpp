@@ -335,9 +335,10 @@ void Upstream::watch_object(const std::string& path, const rr::EntityDefinition&
                             [weak = weak_from_this(), path, &member](std::span<const rr::Value> arguments) {
                               const auto self = weak.lock();
                               if (!self) return;
+                              rr::EventPacket packet(path, member, arguments);
                               const auto clients = self->clients_;  // they may leave
                               for (auto* client : clients)
-                                if (self->has(*client)) client->receive_event(path, member, arguments);
+                                if (self->has(*client)) client->receive_event(packet);
                             });
     } else if (member.kind == rr::MemberKind::callback) {
       connection_->on_callback_later(

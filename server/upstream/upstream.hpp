@@ -47,8 +47,7 @@ class UpstreamClient {
   virtual std::string lock_user() const { return {}; }
   /// Whether the device may ask it by this callback.
   virtual bool may_answer(const std::string& path, const rr::MemberDefinition& callback) const = 0;
-  virtual void receive_event(const std::string& path, const rr::MemberDefinition& event,
-                             std::span<const rr::Value> arguments) = 0;
+  virtual void receive_event(rr::EventPacket& packet) = 0;
   virtual void receive_wire(rr::WirePacket& packet) = 0;
   virtual void answer_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::Result<>& result) = 0;
   /// So many values were replaced by the one that comes next.

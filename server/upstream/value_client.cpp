@@ -216,9 +216,9 @@ void ValueClient::call_callback(const std::string& path, const rr::MemberDefinit
   (*handler)(arguments, std::move(answer));
 }
 
-void ValueClient::receive_event(const std::string& path, const rr::MemberDefinition& event,
-                                std::span<const rr::Value> arguments) {
-  publish({path, event.name}, Sample{0, {}, {arguments.begin(), arguments.end()}});
+void ValueClient::receive_event(rr::EventPacket& packet) {
+  const auto arguments = packet.arguments();
+  publish({std::string(packet.path()), packet.member().name}, Sample{0, {}, {arguments.begin(), arguments.end()}});
 }
 
 void ValueClient::receive_wire(rr::WirePacket& packet) {

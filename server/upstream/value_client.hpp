@@ -106,8 +106,7 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   std::weak_ptr<const void> life() const override { return weak_from_this(); }
   std::string lock_user() const override { return user_; }
   bool may_answer(const std::string& path, const rr::MemberDefinition& callback) const override;
-  void receive_event(const std::string& path, const rr::MemberDefinition& event,
-                     std::span<const rr::Value> arguments) override;
+  void receive_event(rr::EventPacket& packet) override;
   void receive_wire(rr::WirePacket& packet) override;
   void answer_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::Result<>& result) override;
   void note_conflated(const std::string&, const rr::MemberDefinition&, std::uint64_t) override {}

@@ -61,7 +61,7 @@ Result<std::shared_ptr<HostedService>> HostedService::make(std::string name, std
   service->root_type_ = type;
   service->attributes_ = Value(std::move(attributes));
   service->extra_imports_ = std::move(extra_imports);
-  service->objects_.emplace(name, Found{std::move(root), type});
+  service->remember(name, Found{std::move(root), type});
   service->name_ = std::move(name);
   return service;
 }
@@ -114,7 +114,7 @@ Result<HostedService::Found> HostedService::find_object(std::string_view path) {
     if (!found.type || found.type->kind != EntityKind::object)
       return make_error(ErrorCode::internal_error,
                         "object " + quoted(prefix) + " has the unknown type " + quoted(found.object->type_name()));
-    if (objects_.size() < max_cached_objects) objects_.emplace(prefix, found);
+    if (objects_.size() < max_cached_objects) remember(std::string(prefix), found);
   }
   return found;
 }
@@ -128,9 +128,9 @@ Result<> HostedService::add_object(const std::string& path, std::shared_ptr<Serv
     auto victim = objects_.upper_bound(path);
     if (victim == objects_.end()) victim = objects_.begin();
     if (victim->first == name_ && ++victim == objects_.end()) victim = objects_.begin();
-    objects_.erase(victim);
+    forget(victim);
   }
-  objects_.insert_or_assign(path, Found{std::move(object), type});
+  remember(path, Found{std::move(object), type});
   return {};
 }
 
@@ -163,14 +163,31 @@ Result<std::string> HostedService::canonical_path(std::string_view path) {
 
 bool HostedService::forget_path(std::string_view path) {
   if (path == name_) return false;
-  return std::erase_if(objects_, [path](const auto& object) { return is_within(object.first, path); }) > 0;
+  bool was_there = false;
+  for (auto object = objects_.lower_bound(path); object != objects_.end() && object->first.starts_with(path);) {
+    const bool is_gone = is_within(object->first, path);
+    object = is_gone ? forget(object) : std::next(object);
+    was_there |= is_gone;
+  }
+  return was_there;
 }
 
 std::vector<std::string> HostedService::paths_of(const ServiceObject& object) const {
   std::vector<std::string> paths;
-  for (const auto& [path, found] : objects_)
-    if (found.object.get() == &object) paths.push_back(path);
+  for (auto known = paths_.lower_bound({&object, {}}); known != paths_.end() && known->first == &object; ++known)
+    paths.emplace_back(known->second);
   return paths;
+}
+
+void HostedService::remember(std::string path, Found found) {
+  if (const auto known = objects_.find(path); known != objects_.end()) forget(known);
+  const auto object = objects_.emplace(std::move(path), std::move(found)).first;
+  paths_.emplace(object->second.object.get(), object->first);
+}
+
+HostedService::Objects::iterator HostedService::forget(Objects::iterator object) {
+  paths_.erase({object->second.object.get(), object->first});
+  return objects_.erase(object);
 }
 
 ServiceDirectory::ServiceDirectory(NodeIdentity identity) : identity_(std::move(identity)) {

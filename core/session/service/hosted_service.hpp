@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -93,7 +94,11 @@ class HostedService {
   std::vector<std::string> paths_of(const ServiceObject& object) const;
 
  private:
+  using Objects = std::map<std::string, Found, std::less<>>;
+
   HostedService() = default;
+  void remember(std::string path, Found found);
+  Objects::iterator forget(Objects::iterator object);
 
   std::string name_;
   std::shared_ptr<ServiceObject> root_;
@@ -107,7 +112,8 @@ class HostedService {
   ObjectLocks object_locks_;
   MonitorLocks monitor_locks_;
   bool is_remote_ = false;
-  std::map<std::string, Found, std::less<>> objects_;
+  Objects objects_;
+  std::set<std::pair<const ServiceObject*, std::string_view>> paths_;  ///< the same by object; the keys of objects_
   static constexpr std::size_t max_cached_objects = 4096;  ///< hostile paths may not grow it; the root always stays
 };
 

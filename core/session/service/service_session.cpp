@@ -183,13 +183,18 @@ void ServiceSession::reply(CallId id, const Result<Value>& result, Now now) {
 
 Result<> ServiceSession::send_event(std::string_view path, const MemberDefinition& member,
                                     std::span<const Value> arguments, Now now) {
+  EventPacket packet(path, member, arguments);
+  return send_event(packet, now);
+}
+
+Result<> ServiceSession::send_event(EventPacket& packet, Now now) {
   if (!service_) return make_error(ErrorCode::connection_error, "no client is connected");
-  if (!may_use_service() || !admit(EntryType::event_req, path, &member)) return {};
-  connection_.begin_message(outgoing_);
-  outgoing_.begin_entry(EntryType::event_req, path, member.name);
-  if (auto written = write_arguments(outgoing_, arguments, member, service_->types()); !written) return written;
-  send_outgoing(now, member.has_modifier("urgent"));
-  return {};
+  if (!may_use_service() || !admit(EntryType::event_req, packet.path(), &packet.member())) return {};
+  const auto message = packet.message(service_->types());
+  if (!message) return message.error();
+  auto sent = connection_.send(**message, now, packet.member().has_modifier("urgent"));
+  if (!sent && connection_.state() == ConnectionState::closed) leave(sent.error(), now);
+  return sent;
 }
 
 void ServiceSession::release_path(std::string_view path, Now now) {

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "core/member/callback.hpp"
+#include "core/member/event.hpp"
 #include "core/member/generator.hpp"
 #include "core/member/ledger.hpp"
 #include "core/member/memory.hpp"
@@ -220,6 +221,8 @@ class ServiceSession {
   /// Clients that still have to log in are sent nothing.
   /// Errors   those of packing; connection_error.
   Result<> send_event(std::string_view path, const MemberDefinition& member, std::span<const Value> arguments, Now now);
+  /// The same for an event that others are sent as well.
+  Result<> send_event(EventPacket& packet, Now now);
   /// Sends InValue if the client has connected this wire; a value that waits for a slow stream is replaced.
   Result<> send_wire(std::string_view path, const MemberDefinition& member, const Value& value, Now now);
   /// The same for a value that others are sent as well, with its own time.

@@ -237,6 +237,69 @@ TEST_CASE("events reach the client with their arguments") {
   CHECK(event.arguments == arguments);
 }
 
+TEST_CASE("one packet of an event serves all clients, each as it speaks, encoded once") {
+  std::vector<std::unique_ptr<Loopback>> pairs;
+  for (const auto& features :
+       {Features{}, Features{}, Features{.string_table = {.local = false, .standard = false}}, legacy_features})
+    pairs.emplace_back(std::make_unique<Loopback>(features))->connect();
+  CHECK_FALSE(pairs.back()->client->connection().features().v4);
+  const auto& bumped = *pairs.front()->service->service()->root_type().find_member("bumped");
+  const auto fire = [&](std::int32_t then) {
+    std::vector<Value> arguments{Value(std::int32_t{1}), Value("wall")};
+    EventPacket packet("arm", bumped, arguments);
+    for (const auto& pair : pairs) {
+      REQUIRE(pair->service->send_event(packet, pair->now));
+      arguments.front() = Value(then);
+      pair->pump();
+    }
+  };
+  fire(1);
+  for (const auto& pair : pairs)
+    CHECK(pair->next_client<EventReceived>().arguments == std::vector<Value>{Value(std::int32_t{1}), Value("wall")});
+  fire(2);
+  const auto first_of = [](Loopback& pair) {
+    return pair.next_client<EventReceived>().arguments.front().to<std::int32_t>().value();
+  };
+  CHECK(first_of(*pairs[0]) == 1);
+  CHECK(first_of(*pairs[1]) == 1);  // what the first one was sent
+  CHECK(first_of(*pairs[2]) == 2);
+  CHECK(first_of(*pairs[3]) == 2);
+}
+
+TEST_CASE("an event that does not fit its definition goes to nobody") {
+  Loopback pair;
+  pair.connect();
+  const std::vector<Value> arguments{Value("one"), Value("wall")};
+  EventPacket packet("arm", *pair.service->service()->root_type().find_member("bumped"), arguments);
+  for (int i = 0; i < 2; ++i) {
+    const auto sent = pair.service->send_event(packet, pair.now);
+    REQUIRE_FALSE(sent);
+    CHECK(sent.error().code == ErrorCode::data_type_mismatch);
+  }
+  CHECK(pair.service->poll_transmit().empty());
+}
+
+TEST_CASE("a service knows the paths of each object, until they are released or make room for others") {
+  Loopback pair;
+  auto& service = *pair.directory.find("arm");
+  const auto tool = std::make_shared<PlainObject>("experimental.loopback.Tool");
+  const auto other = std::make_shared<PlainObject>("experimental.loopback.Tool");
+  REQUIRE(service.add_object("arm.tools[2]", tool));
+  REQUIRE(service.add_object("arm.tool", tool));
+  REQUIRE(service.add_object("arm.tool.sensor", other));
+  CHECK(service.paths_of(*tool) == std::vector<std::string>{"arm.tool", "arm.tools[2]"});
+  REQUIRE(service.add_object("arm.tool", other));
+  CHECK(service.paths_of(*tool) == std::vector<std::string>{"arm.tools[2]"});
+  CHECK(service.paths_of(*other) == std::vector<std::string>{"arm.tool", "arm.tool.sensor"});
+  CHECK(service.forget_path("arm.tool"));
+  CHECK_FALSE(service.forget_path("arm.tool"));
+  CHECK(service.paths_of(*other).empty());
+  CHECK(service.paths_of(*tool) == std::vector<std::string>{"arm.tools[2]"});
+  for (int i = 0; i < 5000; ++i) REQUIRE(service.add_object("arm.tools[" + std::to_string(i) + "]", other));
+  CHECK(service.paths_of(*tool).empty());
+  CHECK(service.paths_of(*other).size() == 4095);  // the root stays
+}
+
 TEST_CASE("objrefs are looked up once, with their index escaped") {
   Loopback pair;
   pair.connect();

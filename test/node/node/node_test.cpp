@@ -205,6 +205,46 @@ TEST_CASE("wires: the present value at once, newer ones as they come, peeks with
   CHECK(seen.size() == 2);
 }
 
+TEST_CASE("a wire is sent to who follows it now: clients leave, come back and vanish") {
+  CounterNode device;
+  const auto staying = device.connect();
+  auto leaving = device.connect();
+  std::vector<Value> seen_by_staying, seen_by_leaving;
+  staying.connect_wire("newest", [&](const Value& value, TimeSpec) { seen_by_staying.push_back(value); });
+  leaving.connect_wire("newest", [&](const Value& value, TimeSpec) { seen_by_leaving.push_back(value); });
+  const auto add = [&](std::size_t seen) {
+    staying.call("add", 1);
+    REQUIRE(staying.connection().run_until([&] { return seen_by_staying.size() == seen; }, 5s));
+  };
+  add(1);
+  REQUIRE(leaving.connection().run_until([&] { return seen_by_leaving.size() == 1; }, 5s));
+  leaving.disconnect_wire("newest");
+  add(2);
+  leaving.connect_wire("newest", [&](const Value& value, TimeSpec) { seen_by_leaving.push_back(value); });
+  add(3);
+  REQUIRE(leaving.connection().run_until([&] { return seen_by_leaving.size() == 3; }, 5s));
+  CHECK(seen_by_leaving == std::vector<Value>{Value(1), Value(2), Value(3)});
+  leaving.connection().close();
+  add(4);
+  add(5);
+  CHECK(seen_by_staying.back() == Value(5));
+}
+
+TEST_CASE("an object that is looked up anew has its wires connected anew") {
+  CounterNode device;
+  auto counter = device.connect();
+  const auto newest = [&](std::int32_t value) {
+    device.node.ask([&](Node&) { return device.counter->service->set_wire("newest", value), 0; });
+  };
+  std::vector<Value> seen;
+  counter.connect_wire("newest", [&](const Value& value, TimeSpec) { seen.push_back(value); });
+  newest(1);
+  counter.call("replace_first");  // releases another path
+  newest(2);
+  REQUIRE(counter.connection().run_until([&] { return seen.size() == 2; }, 5s));
+  CHECK(seen == std::vector<Value>{Value(1), Value(2)});
+}
+
 TEST_CASE("a wire's value for one client alone: sent, peeked, kept for when it connects, until all have a new one") {
   CounterNode device;
   const auto one = device.connect();
