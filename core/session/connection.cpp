@@ -181,63 +181,64 @@ bool Connection::is_for_us() const {
          (peer_.id.is_any() || header.sender_node_id == peer_.id);
 }
 
-void Connection::begin_stream_reply(const MessageEntry& request) {
-  reply_.clear();
-  reply_.header.receiver_node_id = incoming_.header.sender_node_id;
-  reply_.header.receiver_node_name = incoming_.header.sender_node_name;
-  reply_.header.sender_endpoint = incoming_.header.receiver_endpoint;
-  reply_.header.receiver_endpoint = incoming_.header.sender_endpoint;
-  reply_.begin_entry(reply_type(request.type), request.service_path, request.member_name);
+Message Connection::begin_stream_reply(const MessageEntry& request) const {
+  Message reply;
+  reply.header.receiver_node_id = incoming_.header.sender_node_id;
+  reply.header.receiver_node_name = incoming_.header.sender_node_name;
+  reply.header.sender_endpoint = incoming_.header.receiver_endpoint;
+  reply.header.receiver_endpoint = incoming_.header.sender_endpoint;
+  reply.begin_entry(reply_type(request.type), request.service_path, request.member_name);
+  return reply;
 }
 
 Result<> Connection::answer_stream_op(const MessageEntry& entry, Now now) {
   if (entry.member_name == create_connection) return answer_create_connection(entry, now);
-  begin_stream_reply(entry);
+  auto reply = begin_stream_reply(entry);
   if (entry.member_name == start_tls && !options_.is_encrypted)  // who can do it answers before there is a session
-    write_error(reply_, make_error(ErrorCode::connection_error, "Server certificate not loaded"));
+    write_error(reply, make_error(ErrorCode::connection_error, "Server certificate not loaded"));
   else if (entry.member_name != get_remote_node_id)
-    write_error(reply_, protocol_error("Invalid Stream Operation"));
-  return send(reply_, now);
+    write_error(reply, protocol_error("Invalid Stream Operation"));
+  return send(reply, now);
 }
 
 Result<> Connection::answer_create_connection(const MessageEntry& entry, Now now) {
-  begin_stream_reply(entry);
+  auto reply = begin_stream_reply(entry);
   const bool is_accepted = is_for_us();
   const auto* offered = incoming_.elements_of(entry).find("capabilities");
   Features agreed = legacy_features;
   std::vector<std::uint32_t> words;
   if (!is_accepted) {
-    write_error(reply_, {ErrorCode::node_not_found, "Node not found"});
+    write_error(reply, {ErrorCode::node_not_found, "Node not found"});
   } else if (offered) {
     auto read = read_capabilities(*offered);
     Result<Features> result = read ? negotiate(*read, options_.features) : Result<Features>(read.error());
     if (result) {
       agreed = *result;
       words = format_capabilities(agreed);
-      reply_.add("capabilities", DataType::uint32_t, static_cast<std::uint32_t>(words.size()),
-                 {reinterpret_cast<const std::uint8_t*>(words.data()), words.size() * sizeof(words[0])});
+      reply.add("capabilities", DataType::uint32_t, static_cast<std::uint32_t>(words.size()),
+                {reinterpret_cast<const std::uint8_t*>(words.data()), words.size() * sizeof(words[0])});
     } else {
-      write_error(reply_, protocol_error("Invalid Stream Operation"));
+      write_error(reply, protocol_error("Invalid Stream Operation"));
     }
   }
-  const bool has_failed = reply_.entries.front().error != ErrorCode::none;
+  const bool has_failed = reply.entries.front().error != ErrorCode::none;
   if (!has_failed) peer_ = {incoming_.header.sender_node_id, std::string(incoming_.header.sender_node_name)};
   // CreateConnection is always version 2, in both directions; what was agreed on holds right behind it.
   agreed_ = legacy_features;
-  auto sent = send(reply_, now);
+  auto sent = send(reply, now);
   if (!has_failed) agreed_ = agreed;
   return sent;
 }
 
 Result<> Connection::send_create_connection(Now now) {
-  reply_.clear();
-  reply_.header.receiver_node_id = options_.target.id;
-  reply_.header.receiver_node_name = options_.target.name;
-  reply_.begin_entry(EntryType::stream_op, {}, create_connection);
+  Message request;
+  request.header.receiver_node_id = options_.target.id;
+  request.header.receiver_node_name = options_.target.name;
+  request.begin_entry(EntryType::stream_op, {}, create_connection);
   const auto words = format_capabilities(options_.features);
-  reply_.add("capabilities", DataType::uint32_t, static_cast<std::uint32_t>(words.size()),
-             {reinterpret_cast<const std::uint8_t*>(words.data()), words.size() * sizeof(words[0])});
-  return send(reply_, now);
+  request.add("capabilities", DataType::uint32_t, static_cast<std::uint32_t>(words.size()),
+              {reinterpret_cast<const std::uint8_t*>(words.data()), words.size() * sizeof(words[0])});
+  return send(request, now);
 }
 
 Result<> Connection::handle_stream_op_reply(const MessageEntry& entry, Now) {
@@ -274,18 +275,18 @@ Result<> Connection::handle_stream_op_reply(const MessageEntry& entry, Now) {
 }
 
 Result<> Connection::answer_capability(const MessageEntry& entry, Now now) {
-  begin_stream_reply(entry);
-  reply_.add_scalar("return", DataType::uint32_t, capability_value(entry.member_name));
-  return send(reply_, now);
+  auto reply = begin_stream_reply(entry);
+  reply.add_scalar("return", DataType::uint32_t, capability_value(entry.member_name));
+  return send(reply, now);
 }
 
 Result<> Connection::answer_heartbeat(const MessageEntry& entry, Now now) {
-  begin_stream_reply(entry);
-  reply_.entries.front().request_id = entry.request_id;
+  auto reply = begin_stream_reply(entry);
+  reply.entries.front().request_id = entry.request_id;
   // The reply is the one special entry that carries no addresses in version 4.
-  reply_.header.has_routing = false;
-  reply_.header.has_endpoints = false;
-  return send(reply_, now, true);
+  reply.header.has_routing = false;
+  reply.header.has_endpoints = false;
+  return send(reply, now, true);
 }
 
 // --- sending ---
@@ -364,11 +365,11 @@ void Connection::handle_transmitted(std::size_t bytes, Now now) {
 // --- time ---
 
 Result<> Connection::send_heartbeat(Now now) {
-  reply_.clear();
-  reply_.header.receiver_node_id = {};
-  reply_.begin_entry(EntryType::connection_test, {}, {});
+  Message test;
+  test.header.receiver_node_id = {};
+  test.begin_entry(EntryType::connection_test, {}, {});
   heartbeat_sent_ = now.steady;
-  auto sent = send(reply_, now, true);
+  auto sent = send(test, now, true);
   ahead_of_heartbeat_ = queue_.size();
   return sent;
 }

@@ -122,7 +122,7 @@ class Connection {
   Result<> handle_stream_op_reply(const MessageEntry& entry, Now now);
   Result<> answer_capability(const MessageEntry& entry, Now now);
   Result<> answer_heartbeat(const MessageEntry& entry, Now now);
-  void begin_stream_reply(const MessageEntry& request);
+  Message begin_stream_reply(const MessageEntry& request) const;
   Result<> send_create_connection(Now now);
   Result<> send_heartbeat(Now now);
   void address(MessageHeader& header);
@@ -149,7 +149,6 @@ class Connection {
   FrameScanner scanner_;
   TransmitQueue queue_;
   Message incoming_;
-  Message reply_;
   bool has_message_ = false;
 
   TimePoint opened_;

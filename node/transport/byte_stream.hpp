@@ -84,6 +84,7 @@ class ByteStream {
     const auto count = std::min(into.size(), put_back_.size());
     std::copy_n(put_back_.begin(), count, into.begin());
     put_back_.erase(put_back_.begin(), put_back_.begin() + static_cast<std::ptrdiff_t>(count));
+    if (put_back_.empty()) put_back_ = Bytes();  // nothing comes back later
     return count;
   }
 

@@ -1,11 +1,8 @@
 #include "node/transport/socket_stream.hpp"
 
-#include <boost/asio/local/connect_pair.hpp>
-#include <boost/asio/local/stream_protocol.hpp>
+#include <array>
 
 namespace rr {
-
-namespace asio = boost::asio;
 
 namespace {
 
@@ -28,7 +25,7 @@ awaitable<void> SocketStream::end(const EndReason&) {
   // Closing with unread input resets the connection, and a reset may overtake the last bytes sent: read on for a while.
   finish_sending();
   linger_.arm(linger_time);
-  std::uint8_t scrap[4096];
+  thread_local std::array<std::uint8_t, 4096> scrap;  // for all: nobody looks at it
   for (std::size_t total = 0; total < linger_bytes && linger_.is_armed();) {
     const auto read = co_await read_some(scrap);
     if (read.error || read.is_end()) break;

@@ -70,6 +70,30 @@ auto make_rate_gate(GatewayState& gateway, const SharedNode& node, const Connect
   };
 }
 
+/// Whoever waits for the end of the session is woken by `ended`.
+std::shared_ptr<SharedClient> begin_session(GatewayState& gateway, Connection& connection, Destination destination,
+                                            std::unique_ptr<rr::ByteStream> client, std::string base_url,
+                                            std::function<void()> ended) {
+  SharedArrival arrival;
+  arrival.peer = connection.client;
+  arrival.base_url = std::move(base_url);
+  arrival.is_encrypted = connection.peer.is_encrypted;
+  arrival.admit = make_admission(gateway.access(), *destination.node, connection.identity);
+  arrival.enter = make_rate_gate(gateway, *destination.node, connection);
+  auto session = destination.node->add(std::move(client), std::move(arrival), std::move(ended));
+  connection.device = destination.device;
+  connection.has_session = true;
+  connection.stop = [session](const rr::EndReason& reason) {
+    session->close_service();
+    session->close(rr::make_error(rr::ErrorCode::connection_error, reason.text));
+  };
+  return session;
+}
+
+std::string end_reason(const SharedClient& session) {
+  return session.end_reason().empty() ? session.session().connection().close_reason().message : session.end_reason();
+}
+
 }  // namespace
 
 rr::awaitable<void> serve_shared_client(GatewayState& gateway, Connection& connection, Destination destination,
@@ -94,29 +118,15 @@ rr::awaitable<void> serve_shared_client(GatewayState& gateway, Connection& conne
   }
   const auto name = destination.device ? destination.device->config().name : std::string("the gateway");
   log(LogLevel::info, "client connected", {{"device", name}, {"peer", connection.client}, {"mode", "shared"}});
-  SharedArrival arrival;
-  arrival.peer = connection.client;
-  arrival.base_url = std::move(base_url);
-  arrival.is_encrypted = connection.peer.is_encrypted;
-  arrival.admit = make_admission(gateway.access(), *destination.node, connection.identity);
-  arrival.enter = make_rate_gate(gateway, *destination.node, connection);
-  SessionEnd end(client->executor());
-  const auto session = destination.node->add(std::move(client), std::move(arrival), [&end] { end.reach(); });
-  connection.device = destination.device;
-  connection.has_session = true;
-  connection.stop = [session](const rr::EndReason& reason) {
-    session->close_service();
-    session->close(rr::make_error(rr::ErrorCode::connection_error, reason.text));
-  };
+  SessionEnd end(executor);
+  const auto session =
+      begin_session(gateway, connection, destination, std::move(client), std::move(base_url), [&end] { end.reach(); });
   co_await end.wait();
   connection.device = nullptr;
   connection.has_session = false;
   connection.stop = [](const rr::EndReason&) {};
   log(LogLevel::info, "client disconnected",
-      {{"device", name},
-       {"peer", connection.client},
-       {"reason", session->end_reason().empty() ? session->session().connection().close_reason().message
-                                                : session->end_reason()}});
+      {{"device", name}, {"peer", connection.client}, {"reason", end_reason(*session)}});
 }
 
 }  // namespace rrgate

@@ -23,7 +23,7 @@ void FrameGate::look_for_start_tls() {
     has_seen_start_tls_ = entry.type == rr::EntryType::stream_op_ret && entry.member_name == "STARTTLS" &&
                           entry.error == rr::ErrorCode::none;
   }
-  early_ = {};
+  early_ = rr::Bytes();
 }
 
 rr::Result<std::size_t> FrameGate::pass(rr::ByteSpan bytes) {

@@ -40,18 +40,8 @@ Relay::Relay(rr::ByteStream& client, rr::ByteStream& device, RelayOptions option
     : client_(client),
       device_(device),
       options_(options),
-      to_device_{client,
-                 device,
-                 FrameGate(options.max_message_size),
-                 false,
-                 traffic.to_device,
-                 asio::steady_timer(client.executor())},
-      to_client_{device,
-                 client,
-                 FrameGate(options.max_message_size),
-                 true,
-                 traffic.to_clients,
-                 asio::steady_timer(client.executor())},
+      to_device_{client, device, FrameGate(options.max_message_size), false, traffic.to_device},
+      to_client_{device, client, FrameGate(options.max_message_size), true, traffic.to_clients},
       half_closed_limit_(client.executor(),
                          [this] {
                            stop({1000, "the client has ended"});
@@ -75,8 +65,8 @@ void Relay::stop(rr::EndReason reason) {
   end_reason_ = std::move(reason);
   device_.close();
   client_.cancel();
-  to_device_.pace.cancel();
-  to_client_.pace.cancel();
+  for (auto* direction : {&to_device_, &to_client_})
+    if (direction->pace) direction->pace->cancel();
 }
 
 rr::awaitable<void> Relay::pump_to_device() {
@@ -127,10 +117,11 @@ rr::awaitable<void> Relay::keep_pace(Direction& direction, std::size_t bytes) {
   const auto now = std::chrono::steady_clock::now();
   const std::chrono::nanoseconds cost(
       static_cast<std::int64_t>(1e9 * static_cast<double>(bytes) / static_cast<double>(options_.opaque_rate)));
-  direction.pace.expires_at(std::max(direction.pace.expiry(), now - pace_credit) + cost);
+  auto& pace = direction.pace;
+  if (!pace) pace = std::make_unique<asio::steady_timer>(direction.from.executor(), now);
+  pace->expires_at(std::max(pace->expiry(), now - pace_credit) + cost);
   // Bytes come in bursts: only what is ahead of the rate by more than that waits.
-  if (direction.pace.expiry() > now && !end_reason_)
-    co_await direction.pace.async_wait(asio::as_tuple(asio::use_awaitable));
+  if (pace->expiry() > now && !end_reason_) co_await pace->async_wait(asio::as_tuple(asio::use_awaitable));
 }
 
 void Relay::end_of(Direction& direction, rr::error_code error) {

@@ -4,6 +4,7 @@
 #include <boost/asio/steady_timer.hpp>
 #include <chrono>
 #include <cstdint>
+#include <memory>
 #include <optional>
 
 #include "node/transport/byte_stream.hpp"
@@ -44,8 +45,8 @@ class Relay {
     FrameGate gate;
     bool is_from_device;
     Flow& flow;
-    boost::asio::steady_timer pace;  ///< when what has passed opaquely will have taken its time
     std::uint64_t bytes = 0;
+    std::unique_ptr<boost::asio::steady_timer> pace = {};  ///< when what has passed opaquely will have taken its time
   };
 
   rr::awaitable<void> pump_to_device();

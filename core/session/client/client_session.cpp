@@ -88,9 +88,7 @@ TimePoint ClientSession::poll_timeout() const {
 
 std::optional<ClientEvent> ClientSession::poll_event() {
   if (events_.empty()) return std::nullopt;
-  auto event = std::move(events_.front());
-  events_.pop_front();
-  return event;
+  return events_.take();
 }
 
 void ClientSession::scan_deadlines(Now now) {

@@ -25,6 +25,7 @@
 #include "core/session/known_definitions.hpp"
 #include "core/session/protocol_level.hpp"
 #include "core/session/service_path.hpp"
+#include "core/support/fifo.hpp"
 #include "core/types/pack.hpp"
 
 namespace rr {
@@ -400,7 +401,7 @@ class ClientSession {
   std::vector<std::pair<std::int32_t, std::uint32_t>> pipe_acks_;  ///< index and number, to be sent; reused
   CallbackId last_callback_id_ = 0;
   std::map<CallbackId, OpenCallback> callbacks_;
-  std::deque<ClientEvent> events_;
+  Fifo<ClientEvent> events_;
 };
 
 }  // namespace rr

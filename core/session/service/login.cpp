@@ -50,7 +50,7 @@ Result<> ServiceSession::begin_login(const Message& message, const MessageEntry&
   requested.attempt.service = service->name();
   requested.attempt.peer = connection_.peer();
   requested.attempt.verified_node_id = options_.verified_node_id;
-  login_.emplace(OpenLogin());  // clang 14 with libstdc++ does not find its default constructor in emplace()
+  login_ = std::make_unique<OpenLogin>();
   login_->id = requested.id;
   login_->type = entry.type;
   login_->request_id = entry.request_id;

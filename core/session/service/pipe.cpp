@@ -35,7 +35,7 @@ void ServiceSession::forget_pipe(PipeId id) {
   const auto indices = pipe_indices_.find(*pipe->second.key);
   indices->second.erase(pipe->second.index);
   if (indices->second.empty()) pipe_indices_.erase(indices);
-  ended_.pipes.add(pipe->second.ledger);
+  ended().pipes.add(pipe->second.ledger);
   if (pipe->second.state.state() == PipeState::connecting) release_pass(pipe->second.request_id);
   pipes_.erase(pipe);
 }

@@ -105,9 +105,7 @@ TimePoint ServiceSession::poll_timeout() const {
 
 std::optional<ServiceEvent> ServiceSession::poll_event() {
   if (events_.empty()) return std::nullopt;
-  auto event = std::move(events_.front());
-  events_.pop_front();
-  return event;
+  return events_.take();
 }
 
 /// Ends the session; the connection lingers so that the last reply gets out.
@@ -123,13 +121,18 @@ void ServiceSession::leave(Error reason, Now now) {
   passes_.clear();
   generators_.clear();
   end_all_wires();
-  for (const auto& [id, pipe] : pipes_) ended_.pipes.add(pipe.ledger);
+  for (const auto& [id, pipe] : pipes_) ended().pipes.add(pipe.ledger);
   pipes_.clear();
   pipe_indices_.clear();
   parked_.clear();
   locks_.clear();
   end_callbacks(reason);
   events_.push_back(ClientGone{std::move(reason)});
+}
+
+Ledgers& ServiceSession::ended() {
+  if (!ended_) ended_ = std::make_unique<Ledgers>();
+  return *ended_;
 }
 
 // --- asked ---

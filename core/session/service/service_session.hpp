@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -25,6 +24,7 @@
 #include "core/session/service/authenticator.hpp"
 #include "core/session/service/hosted_service.hpp"
 #include "core/session/service_path.hpp"
+#include "core/support/fifo.hpp"
 
 namespace rr {
 
@@ -377,6 +377,7 @@ class ServiceSession {
   using Wires = std::map<PathMember, WireConnection, PathMemberLess>;
   /// Returns the one behind it.
   Wires::iterator end_wire(Wires::iterator wire);
+  Ledgers& ended();
   void end_all_wires();
 
   // node-level requests (service_special.cpp)
@@ -498,7 +499,7 @@ class ServiceSession {
   SessionId session_id_ = 0;  ///< while service_ is set
   std::vector<OpenEnter> enters_;
   std::optional<AuthenticatedUser> user_;
-  std::optional<OpenLogin> login_;
+  std::unique_ptr<OpenLogin> login_;
   LoginId last_login_id_ = 0;
   std::size_t failed_logins_ = 0;
 
@@ -508,7 +509,7 @@ class ServiceSession {
       passes_;  ///< of requests, until they are answered
   GeneratorTable generators_;
   Wires wires_;
-  Ledgers ended_;  ///< of wires and pipes that are no more
+  std::unique_ptr<Ledgers> ended_;  ///< of wires and pipes that are no more; null: there were none
   /// A DisconnectClient that is not answered yet.
   struct OpenLeave {
     NodeIdentity client;
@@ -517,7 +518,7 @@ class ServiceSession {
     std::string member;
     std::uint32_t request_id = 0;
   };
-  std::optional<OpenLeave> leaving_;
+  std::unique_ptr<OpenLeave> leaving_;
   std::vector<ParkedRequest> parked_;
   LockRequestId last_lock_id_ = 0;
   std::vector<OpenLock> locks_;  ///< at most a handful
@@ -528,7 +529,7 @@ class ServiceSession {
   std::unordered_map<PipeId, ServicePipe> pipes_;
   std::map<PathMember, PipeIndices, PathMemberLess> pipe_indices_;  ///< the same pipes
   std::vector<std::pair<std::int32_t, std::uint32_t>> pipe_acks_;   ///< index and number, to be sent; reused
-  std::deque<ServiceEvent> events_;
+  Fifo<ServiceEvent> events_;
 };
 
 }  // namespace rr

@@ -108,8 +108,8 @@ void ServiceSession::handle_special(const Message& message, Now now) {
   for (const auto& entry : message.entries) {
     if (static_cast<std::uint16_t>(entry.type) % 2 == 0) continue;  // replies are not for a service
     outgoing_.begin_entry(reply_type(entry.type), entry.service_path, entry.member_name, entry.request_id);
-    const bool had_login = login_.has_value();
-    const bool was_leaving = leaving_.has_value();
+    const bool had_login = login_ != nullptr;
+    const bool was_leaving = leaving_ != nullptr;
     const bool is_of_node = entry.type == EntryType::get_node_info || entry.type == EntryType::node_check_capability;
     const bool is_unwanted = options_.refusal && !is_of_node;
     const Result<> done = !is_for_us    ? make_error(ErrorCode::node_not_found, "Could not find route to remote node")
@@ -127,6 +127,7 @@ void ServiceSession::handle_special(const Message& message, Now now) {
     }
   }
   if (!outgoing_.entries.empty()) send_outgoing(now);
+  outgoing_ = {};  // such answers are rare and long: what theirs took is not kept
   if (is_refused) leave(*options_.refusal, now);
 }
 
@@ -296,7 +297,7 @@ Result<> ServiceSession::disconnect(const Message& message, const MessageEntry& 
   if (!service_->is_remote()) {
     leave({ErrorCode::none, "the client disconnected"}, now);
   } else if (!leaving_) {
-    leaving_.emplace(OpenLeave());
+    leaving_ = std::make_unique<OpenLeave>();
     leaving_->client = {message.header.sender_node_id, std::string(message.header.sender_node_name)};
     leaving_->client_endpoint = message.header.sender_endpoint;
     leaving_->path = entry.service_path;

@@ -87,7 +87,7 @@ bool ServiceSession::has_wire(std::string_view path, std::string_view member) co
 }
 
 Ledgers ServiceSession::total_ledgers() const {
-  auto total = ended_;
+  auto total = ended_ ? *ended_ : Ledgers();
   for (const auto& [key, wire] : wires_) total.wires.add(wire.ledger);
   for (const auto& [id, pipe] : pipes_) total.pipes.add(pipe.ledger);
   return total;
@@ -139,7 +139,7 @@ void ServiceSession::handle_wire_packet(const Message& message, const MessageEnt
 // --- ended ---
 
 ServiceSession::Wires::iterator ServiceSession::end_wire(Wires::iterator wire) {
-  ended_.wires.add(wire->second.ledger);
+  ended().wires.add(wire->second.ledger);
   if (wire->second.state == WireState::connecting) release_pass(wire->second.request_id);
   return wires_.erase(wire);
 }
