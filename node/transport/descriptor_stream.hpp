@@ -99,7 +99,9 @@ class DescriptorStream : public ByteStream {
       const auto rest = buffers.empty() ? slice.subspan(offset) : slice;
       buffers.emplace_back(rest.data(), rest.size());
     }
-    const auto written = descriptor_.write_some(buffers, error);
+    // Most writes are one buffer, for which there is a cheaper system call.
+    const auto written =
+        buffers.size() == 1 ? descriptor_.write_some(buffers.front(), error) : descriptor_.write_some(buffers, error);
     if (error == boost::asio::error::would_block) error = {};
     return written;
   }

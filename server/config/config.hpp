@@ -107,10 +107,11 @@ struct Rates {
 };
 
 struct Timeouts {
-  milliseconds connect{5000};      ///< to reach a device
-  milliseconds drain{5000};        ///< for sessions to end after SIGTERM
-  milliseconds send_stall{15000};  ///< a peer that takes no byte for so long is cut
-  milliseconds idle{60000};        ///< a kept-alive HTTP connection without a request
+  milliseconds connect{5000};          ///< to reach a device
+  milliseconds drain{5000};            ///< for sessions to end after SIGTERM
+  milliseconds send_stall{15000};      ///< a peer that takes no byte for so long is cut
+  milliseconds idle{60000};            ///< a kept-alive HTTP connection without a request
+  milliseconds unused_session{60000};  ///< of a shared device, before it ends; 0: it is kept
 
   bool operator==(const Timeouts&) const = default;
 };

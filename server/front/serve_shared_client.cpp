@@ -37,16 +37,18 @@ namespace {
 
 constexpr std::chrono::milliseconds look_period{10};
 
-/// Whoever comes when the gateway has just begun, as clients do that its restart has cut off, waits for what will be
-/// there in a moment. Returns whether there is such a node still.
+/// Whoever comes when the gateway has just begun, as clients do that its restart has cut off, or to a device whose
+/// sessions rest, waits for what will be there in a moment. Returns whether there is such a node still.
 rr::awaitable<bool> wait_until_ready(GatewayState& gateway, const Destination& destination,
                                      asio::any_io_executor executor) {
+  if (!destination.device) gateway.shared().wake();
   asio::steady_timer look(executor);
   const auto deadline = std::chrono::steady_clock::now() + gateway.config().timeouts.connect;
   for (;;) {
     auto& shared = gateway.shared();
-    const auto* device = destination.device ? shared.find(*destination.device) : nullptr;
+    auto* device = destination.device ? shared.find(*destination.device) : nullptr;
     if (destination.device && !device) co_return false;
+    if (device) device->wake();
     const bool is_ready = device ? device->is_ready() : shared.is_ready();
     if (is_ready || gateway.is_stopping() || std::chrono::steady_clock::now() >= deadline) co_return true;
     look.expires_after(look_period);

@@ -30,6 +30,7 @@ SharedDevice::SharedDevice(std::shared_ptr<Device> device, SharedNode& gateway_n
                            SharedNode::FindAuthenticator find_authenticator)
     : device_(std::move(device)),
       gateway_node_(gateway_node),
+      config_(config),
       node_({derived_id(gateway_node.identity().id, device_->config().name), node_name_of(device_->config().name)},
             config) {
   node_.set_authenticator(std::move(find_authenticator));
@@ -63,7 +64,7 @@ void SharedDevice::refresh() {
     const std::vector<ServiceBoard*> boards{&node_, &gateway_node_};
     const auto shared = std::make_shared<SharedService>(device_, service.name, boards);
     services_.emplace(service.name, shared);
-    shared->start();
+    shared->start(config_.timeouts.unused_session);
   }
 }
 
@@ -71,6 +72,10 @@ bool SharedDevice::is_ready() const {
   if (!device_->identity()) return device_->state() == DeviceState::offline;
   return std::all_of(services_.begin(), services_.end(),
                      [](const auto& service) { return service.second->has_tried(); });
+}
+
+void SharedDevice::wake() {
+  for (const auto& [name, service] : services_) service->upstream()->wake();
 }
 
 SharedDevices::SharedDevices(const rr::NodeId& id, const Config& config,
@@ -88,7 +93,7 @@ void SharedDevices::sync(const DeviceRegistry& devices) {
 
 void SharedDevices::add_own(std::shared_ptr<Device> device, const std::string& service) {
   own_service_ = std::make_shared<SharedService>(std::move(device), service, std::vector<ServiceBoard*>{&node_});
-  own_service_->start();
+  own_service_->start(std::chrono::milliseconds(0));
 }
 
 void SharedDevices::stop() {
@@ -100,6 +105,10 @@ void SharedDevices::stop() {
 
 bool SharedDevices::is_ready() const {
   return std::all_of(devices_.begin(), devices_.end(), [](const auto& device) { return device.second->is_ready(); });
+}
+
+void SharedDevices::wake() {
+  for (const auto& [key, device] : devices_) device->wake();
 }
 
 SharedDevice* SharedDevices::find(const Device& device) const {

@@ -23,12 +23,15 @@ class SharedDevice {
   const std::map<std::string, std::shared_ptr<SharedService>>& services() const { return services_; }
   /// Whether clients find what there is: not while the gateway itself is only just connecting.
   bool is_ready() const;
+  /// A client comes: sessions that rest are opened.
+  void wake();
 
  private:
   void refresh();
 
   std::shared_ptr<Device> device_;
   SharedNode& gateway_node_;
+  const Config& config_;
   SharedNode node_;
   std::map<std::string, std::shared_ptr<SharedService>> services_;
 };
@@ -48,6 +51,8 @@ class SharedDevices {
   void stop();
 
   bool is_ready() const;
+  /// Of all devices.
+  void wake();
   /// Null where the device is not shared.
   SharedDevice* find(const Device& device) const;
   /// By the identity of the node that stands for a device.

@@ -58,7 +58,8 @@ std::shared_ptr<Upstream> SharedService::make_own_upstream(UpstreamLogin login) 
   return std::make_shared<Upstream>(device_, name_, std::move(login), UpstreamUse::one_client);
 }
 
-void SharedService::start() {
+void SharedService::start(std::chrono::milliseconds rests_after) {
+  upstream_->rest_unused(rests_after);
   upstream_->on_released([weak = weak_from_this()](const std::string& path) {
     if (const auto self = weak.lock(); self && self->hosted_) self->hosted_->forget_path(path);
   });

@@ -33,8 +33,8 @@ class SharedService : public std::enable_shared_from_this<SharedService> {
   /// `boards`  outlive it.
   SharedService(std::shared_ptr<Device> device, std::string name, std::vector<ServiceBoard*> boards);
 
-  /// Connects, again and again, until stop().
-  void start();
+  /// Connects, again and again, until stop(). `rests_after`  see Upstream::rest_unused().
+  void start(std::chrono::milliseconds rests_after);
   void stop();
 
   const std::string& name() const { return name_; }

@@ -178,7 +178,7 @@ rr::awaitable<void> Upstream::run(std::shared_ptr<Upstream> self, Retry retry, s
     self->is_attempting_ = true;
     if (!self->is_open()) done = co_await self->open();
     if (done && is_used && !self->is_closed_) done = is_used();
-    self->is_attempting_ = false;
+    self->is_attempting_ = self->is_waking_ = false;
     if (!done) self->last_error_ = done.error();
     ++self->attempts_;
     self->attempted_.cancel();
@@ -186,8 +186,11 @@ rr::awaitable<void> Upstream::run(std::shared_ptr<Upstream> self, Retry retry, s
     if (done) {
       log(LogLevel::info, "session open", {{"device", device}, {"service", self->service_}});
       wait = retry.min;
-      self->wake_.expires_at(asio::steady_timer::time_point::max());
-      while (self->is_open() && !self->is_closed_) co_await self->wake_.async_wait(wait_token);
+      if (co_await self->watch_use()) {
+        log(LogLevel::info, "session rests", {{"device", device}, {"service", self->service_}});
+        co_await self->rest();
+        continue;
+      }
       if (self->is_closed_) break;
       log(LogLevel::info, "session lost",
           {{"device", device}, {"service", self->service_}, {"clients", self->clients_.size()}});
@@ -203,10 +206,37 @@ rr::awaitable<void> Upstream::run(std::shared_ptr<Upstream> self, Retry retry, s
   }
 }
 
+rr::awaitable<bool> Upstream::watch_use() {
+  while (is_open() && !is_closed_) {
+    const bool may_rest = clients_.empty() && rests_after_ > rests_after_.zero();
+    wake_.expires_at(may_rest ? std::chrono::steady_clock::now() + rests_after_
+                              : asio::steady_timer::time_point::max());
+    const auto [cancelled] = co_await wake_.async_wait(wait_token);
+    if (may_rest && !cancelled && clients_.empty() && is_open()) co_return true;
+  }
+  co_return false;
+}
+
+rr::awaitable<void> Upstream::rest() {
+  std::exchange(connection_, nullptr)->disconnect();
+  is_resting_ = true;
+  wake_.expires_at(asio::steady_timer::time_point::max());
+  while (is_resting_ && !is_closed_) co_await wake_.async_wait(wait_token);
+  is_resting_ = false;
+}
+
+void Upstream::wake() {
+  if (!is_resting_) return;
+  is_resting_ = false;
+  is_waking_ = true;
+  wake_.cancel();
+}
+
 rr::awaitable<rr::Result<>> Upstream::opened() {
   const auto self = shared_from_this();
   if (is_open() && !is_attempting_) co_return rr::Result<>();
   const auto before = attempts_;
+  wake();
   wake_.cancel();
   while (attempts_ == before && !is_closed_) co_await attempted_.async_wait(wait_token);
   if (!connection_) co_return last_error_;
@@ -275,6 +305,7 @@ void Upstream::tell_lost(const rr::Error& reason) {
 
 void Upstream::add(UpstreamClient& client) {
   clients_.push_back(&client);
+  wake();
   locks_->add(client, *this);
 }
 
@@ -304,7 +335,9 @@ void Upstream::remove(UpstreamClient& client, std::function<void()> left) {
     if (key.first == &client) generators.push_back(key.second);
   for (const auto id : generators) drop_generator(client, id);
   locks_->remove(client, std::move(left));
-  if (closes_unused_ && clients_.empty()) close();
+  if (!clients_.empty()) return;
+  if (closes_unused_) return close();
+  if (is_open()) wake_.cancel();  // it is unused from now on
 }
 
 // --- objects ---

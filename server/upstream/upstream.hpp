@@ -94,8 +94,13 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   rr::awaitable<rr::Result<>> open();
   /// Opens it, again and again, until close(). `is_used`: says whether a session that was opened is of use.
   void keep_open(Retry retry, std::function<rr::Result<>()> is_used = nullptr);
-  /// Whether its first attempt is over, well or not.
-  bool has_tried() const { return attempts_ > 0; }
+  /// The same, but without clients for this time it rests: the device has no session to keep.
+  void rest_unused(std::chrono::milliseconds after) { rests_after_ = after; }
+  bool is_resting() const { return is_resting_; }
+  /// Has it opened again where it rests.
+  void wake();
+  /// Whether the first attempt to open it, or to open it again after a rest, is over, well or not.
+  bool has_tried() const { return attempts_ > 0 && !is_waking_; }
   /// For one that is kept open: waits for an attempt that is under way, or begins one now. Errors   those of open().
   rr::awaitable<rr::Result<>> opened();
   /// As soon as the last client has left, close() follows.
@@ -214,6 +219,9 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   /// Whether the client is there still: what is told to one may end it.
   bool has(const UpstreamClient& client) const;
   static rr::awaitable<void> run(std::shared_ptr<Upstream> self, Retry retry, std::function<rr::Result<>()> is_used);
+  /// Until it is lost or closed; returns whether it has had no clients for too long instead.
+  rr::awaitable<bool> watch_use();
+  rr::awaitable<void> rest();
   void lost(const rr::Error& reason);
   void tell_lost(const rr::Error& reason);
   void watch_object(const std::string& path, const rr::EntityDefinition& type);
@@ -254,7 +262,10 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   std::optional<rr::Error> loss_;
   rr::Error last_error_;  ///< of the last attempt to open it
   std::uint64_t attempts_ = 0;
+  std::chrono::milliseconds rests_after_{0};  ///< without clients; 0: never
   bool is_attempting_ = false;
+  bool is_resting_ = false;
+  bool is_waking_ = false;  ///< has rested, and the attempt to open it again is not over
   bool is_closed_ = false;
   bool closes_unused_ = false;
   bool requires_user_ = false;

@@ -40,7 +40,7 @@ def start_service(folder, *options):
 class Site:
     """A device behind a gateway that shares it; there is a line between them that can be cut."""
 
-    def __init__(self, folder, node, device={}, start_device=start_arm):
+    def __init__(self, folder, node, device={}, start_device=start_arm, **config):
         self.folder = folder
         self.node = node
         self.start_device = start_device
@@ -49,7 +49,7 @@ class Site:
         self.roots = []
         url = self.url.replace(f":{port_of(self.url)}/", f":{self.line.port}/")
         try:
-            self.gateway, self.port = start_gateway(folder, url, device={"mode": "shared", **device}, retry=RETRY)
+            self.gateway, self.port = start_gateway(folder, url, device={"mode": "shared", **device}, retry=RETRY, **config)
         except BaseException:
             self.device.stop()
             raise

@@ -1,5 +1,7 @@
 """Whoever uses a service of a device through the gateway, in whatever way: to the device they are one session. The device is
 one of the real package, and so is the client that speaks Robot Raconteur."""
+import time
+
 import pytest
 import RobotRaconteur as RR
 
@@ -93,3 +95,30 @@ def test_wrong_passwords_keep_nobody_out(relayed):
     for number in range(300):
         assert ask(relayed, "GET", GUARDED + "/status", headers=basic("alice", f"guess {number}")).status == 401
     assert ask(relayed, "GET", GUARDED + "/status", headers=basic("alice", "secret")).json == 0
+
+
+def test_a_session_that_nobody_uses_rests(node, tmp_path):
+    site = Site(tmp_path, node, timeouts={"unused_session_ms": 300})
+    try:
+        beside = site.direct("plain")
+
+        def is_free():
+            return beside.sessions == 1
+
+        site.gateway.wait_until(is_free)
+        for _ in range(2):
+            root = site.connect("plain")
+            assert beside.sessions == 2
+            time.sleep(0.6)
+            assert root.sessions == 2, "it is used"
+            assert root.state.PeekInValue()[0] == 1.0
+            site.leave(root)
+            site.gateway.wait_until(is_free)
+        assert 'rrgate_shared_session_up{device="interop",service="plain"} 1' in ask(site.port, "GET", "/metrics").body.decode()
+        site.leave(beside)
+        site.device.stop()
+        site.start_again()
+        assert ask(site.port, "GET", PLAIN + "/status").json == 0
+        assert site.connect("plain").status == 0
+    finally:
+        site.stop()

@@ -126,11 +126,13 @@ void write_ledgers(Exposition& out, const Devices& devices, const SharedDevices&
              "How long values were in the gateway when they were handed to clients' connections.");
   for (const auto& one : devices)  // packets of pipes are handed on at once
     if (shared.find(*one.device)) out.histogram(one.traffic.ledgers.wires.ages, one.label + ",kind=\"wire\"");
-  out.family("rrgate_shared_session_up", "gauge", "Whether the session with a service of a shared device is open.");
+  out.family("rrgate_shared_session_up", "gauge",
+             "Whether the session with a service of a shared device is open, or rests since no client uses it.");
   for (const auto& one : devices)
     if (const auto* device = shared.find(*one.device))
       for (const auto& [name, service] : device->services())
-        out.sample(service->upstream()->is_open() ? 1 : 0, one.label + ",service=\"" + label(name) + "\"");
+        out.sample(service->upstream()->is_open() || service->upstream()->is_resting() ? 1 : 0,
+                   one.label + ",service=\"" + label(name) + "\"");
 }
 
 std::uint64_t resident_bytes() {
