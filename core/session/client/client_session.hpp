@@ -25,6 +25,8 @@
 #include "core/session/known_definitions.hpp"
 #include "core/session/protocol_level.hpp"
 #include "core/session/service_path.hpp"
+#include "core/support/fifo.hpp"
+#include "core/support/spare_node.hpp"
 #include "core/types/pack.hpp"
 
 namespace rr {
@@ -367,7 +369,12 @@ class ClientSession {
   bool abandon_pipe_request(RequestId id, TimePoint deadline);
   void answer_error(const MessageEntry& entry, const Error& error, Now now);
 
-  void emit(ClientEvent event);
+  template <class Happened>
+  void emit(Happened&& event) {
+    events_.push(std::forward<Happened>(event));
+    if (events_.size() == options_.max_events) fail_unpolled();
+  }
+  void fail_unpolled();
   void fail(Error reason);
   void flush_wires(Now now);
   void scan_deadlines(Now now);
@@ -386,7 +393,9 @@ class ClientSession {
   std::uint32_t endpoint_;
 
   Message outgoing_;
-  std::unordered_map<RequestId, Pending> pending_;
+  using PendingRequests = std::unordered_map<RequestId, Pending>;
+  PendingRequests pending_;
+  SpareNode<PendingRequests> spare_pending_;
   std::unordered_map<RequestId, Fetch> fetches_;
   RequestId last_request_id_ = 0;
   TimePoint earliest_deadline_ = TimePoint::max();  ///< no pending request is due before
@@ -400,7 +409,7 @@ class ClientSession {
   std::vector<std::pair<std::int32_t, std::uint32_t>> pipe_acks_;  ///< index and number, to be sent; reused
   CallbackId last_callback_id_ = 0;
   std::map<CallbackId, OpenCallback> callbacks_;
-  std::deque<ClientEvent> events_;
+  Fifo<ClientEvent> events_;
 };
 
 }  // namespace rr

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -24,6 +23,7 @@
 #include "core/session/service/authenticator.hpp"
 #include "core/session/service/hosted_service.hpp"
 #include "core/session/service_path.hpp"
+#include "core/support/fifo.hpp"
 
 namespace rr {
 
@@ -525,7 +525,7 @@ class ServiceSession {
   std::unordered_map<PipeId, ServicePipe> pipes_;
   std::map<PathMember, PipeIndices, PathMemberLess> pipe_indices_;  ///< the same pipes
   std::vector<std::pair<std::int32_t, std::uint32_t>> pipe_acks_;   ///< index and number, to be sent; reused
-  std::deque<ServiceEvent> events_;
+  Fifo<ServiceEvent> events_;
 };
 
 }  // namespace rr
