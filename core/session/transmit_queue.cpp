@@ -8,8 +8,8 @@ namespace {
 constexpr std::size_t max_spare_messages = 16;
 }
 
-EncodedMessage TransmitQueue::take_spare() {
-  if (spare_.empty()) return {};
+TransmitQueue::Encoded TransmitQueue::take_spare() {
+  if (spare_.empty()) return std::make_unique<EncodedMessage>();
   auto spare = std::move(spare_.back());
   spare_.pop_back();
   return spare;
@@ -17,20 +17,20 @@ EncodedMessage TransmitQueue::take_spare() {
 
 Result<> TransmitQueue::push(const Message& message, const EncodeOptions& options, bool is_urgent) {
   auto encoded = take_spare();
-  if (auto done = encode(message, options, encoded); !done) return done;
+  if (auto done = encode(message, options, *encoded); !done) return done;
   insert(std::move(encoded), is_urgent);
   return {};
 }
 
 Result<> TransmitQueue::push(SharedMessage& message, const EncodeOptions& options, bool is_urgent) {
   auto encoded = take_spare();
-  if (auto done = message.encode(options, encoded); !done) return done;
+  if (auto done = message.encode(options, *encoded); !done) return done;
   insert(std::move(encoded), is_urgent);
   return {};
 }
 
-void TransmitQueue::insert(EncodedMessage encoded, bool is_urgent) {
-  size_ += encoded.size();
+void TransmitQueue::insert(Encoded encoded, bool is_urgent) {
+  size_ += encoded->size();
   if (!is_urgent) {
     messages_.push_back(std::move(encoded));
     return;
@@ -47,7 +47,7 @@ std::span<const ByteSpan> TransmitQueue::slices(std::size_t max_slices) {
   for (const auto& message : waiting()) {
     if (slices_.size() >= max_slices) break;
     ++in_flight_;
-    for (const auto& slice : message.slices()) {
+    for (const auto& slice : message->slices()) {
       if (skip >= slice.size()) {
         skip -= slice.size();
         continue;
@@ -63,8 +63,8 @@ std::span<const ByteSpan> TransmitQueue::slices(std::size_t max_slices) {
 void TransmitQueue::consume(std::size_t bytes) {
   size_ -= bytes;
   front_consumed_ += bytes;
-  while (first_ < messages_.size() && front_consumed_ >= messages_[first_].size()) {
-    front_consumed_ -= messages_[first_].size();
+  while (first_ < messages_.size() && front_consumed_ >= messages_[first_]->size()) {
+    front_consumed_ -= messages_[first_]->size();
     pop_front();
   }
   // A message that is written in part stays in flight: nothing may be put before its rest.
@@ -73,11 +73,9 @@ void TransmitQueue::consume(std::size_t bytes) {
 
 void TransmitQueue::pop_front() {
   auto& front = messages_[first_];
-  front.clear();
-  if (spare_.size() < max_spare_messages)
-    spare_.push_back(std::move(front));
-  else
-    front = {};
+  front->clear();
+  if (spare_.size() < max_spare_messages) spare_.push_back(std::move(front));
+  front.reset();
   if (in_flight_ > 0) --in_flight_;
   if (urgent_end_ > 0) --urgent_end_;
   // Written ones are taken out when they are half of all: nothing is moved twice as often as it is sent.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -31,15 +32,16 @@ class TransmitQueue {
   void clear();
 
  private:
-  EncodedMessage take_spare();
-  void insert(EncodedMessage encoded, bool is_urgent);
+  using Encoded = std::unique_ptr<EncodedMessage>;
 
-  std::span<EncodedMessage> waiting() { return std::span(messages_).subspan(first_); }
+  Encoded take_spare();
+  void insert(Encoded encoded, bool is_urgent);
+  std::span<Encoded> waiting() { return std::span(messages_).subspan(first_); }
   void pop_front();
 
-  std::vector<EncodedMessage> messages_;
-  std::size_t first_ = 0;              ///< of messages_ that is not written yet
-  std::vector<EncodedMessage> spare_;  ///< buffers to reuse
+  std::vector<Encoded> messages_;
+  std::size_t first_ = 0;       ///< of messages_ that is not written yet
+  std::vector<Encoded> spare_;  ///< buffers to reuse
   std::vector<ByteSpan> slices_;
   std::size_t size_ = 0;
   std::size_t front_consumed_ = 0;  ///< bytes of the first message that are written already

@@ -95,12 +95,13 @@ bool BlockingConnection::run_until(const std::function<bool()>& is_done, std::ch
   return true;
 }
 
-Value BlockingConnection::wait_for(const std::function<void(ClientConnection&, ClientConnection::Completion)>& start) {
+Value BlockingConnection::wait_for_completion(
+    const std::function<void(ClientConnection&, ClientConnection::Completion)>& start) {
   if (close_reason_) throw ClientException(*close_reason_);
   std::optional<Result<Value>> result;
   {
     const Serving serving(is_serving_);
-    start(*connection_, [&](Result<Value> completed) { result = std::move(completed); });
+    start(*connection_, [&](Result<Value>&& completed) { result = std::move(completed); });
   }
   while (!result && serve({})) run_handlers();
   run_handlers();  // of what came before the answer

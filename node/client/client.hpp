@@ -50,7 +50,10 @@ class BlockingConnection {
   void run_for(std::chrono::milliseconds duration);
   bool run_until(const std::function<bool()>& is_done, std::chrono::milliseconds timeout);
   /// Starts a request and waits for its completion. Throws ClientException.
-  Value wait_for(const std::function<void(ClientConnection&, ClientConnection::Completion)>& start);
+  template <class Start>
+  Value wait_for(const Start& start) {
+    return wait_for_completion(std::ref(start));  // a function that refers to what it calls allocates nothing
+  }
   /// Logs in to a service that does not require it, or in as another user. Throws ClientException.
   void authenticate(std::string_view username, std::string_view password);
   void logout();
@@ -69,6 +72,7 @@ class BlockingConnection {
     std::function<void()> call;
   };
 
+  Value wait_for_completion(const std::function<void(ClientConnection&, ClientConnection::Completion)>& start);
   /// Has a handler called by whoever waits here.
   void queue(HandlerCall handler);
   void run_handlers();

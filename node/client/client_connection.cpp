@@ -99,85 +99,89 @@ std::shared_ptr<ClientOpening> ClientConnection::open(asio::io_context& io, std:
   return opening;
 }
 
-void ClientConnection::expect(RequestId id, Completion done) {
-  completions_.emplace(id, std::move(done));
-  settle();
+template <class Ask>
+void ClientConnection::expect(Ask&& ask, Completion done) {
+  const Now now = read_clocks();
+  const RequestId id = ask(now);
+  spare_completion_.insert(completions_, id, std::move(done));
+  settle(now);
 }
 
 void ClientConnection::call(std::string_view path, std::string_view function, std::span<const Value> arguments,
                             Completion done) {
-  expect(session_.call_function(path, function, arguments, read_clocks()), std::move(done));
+  expect([&](Now now) { return session_.call_function(path, function, arguments, now); }, std::move(done));
 }
 
 void ClientConnection::open_generator(std::string_view path, std::string_view function,
                                       std::span<const Value> arguments, Completion done) {
-  expect(session_.open_generator(path, function, arguments, read_clocks()), std::move(done));
+  expect([&](Now now) { return session_.open_generator(path, function, arguments, now); }, std::move(done));
 }
 
 void ClientConnection::next_generator(std::string_view path, std::string_view function, std::int32_t index,
                                       const std::optional<Value>& parameter, Completion done) {
-  expect(session_.next_generator(path, function, index, parameter, read_clocks()), std::move(done));
+  expect([&](Now now) { return session_.next_generator(path, function, index, parameter, now); }, std::move(done));
 }
 
 void ClientConnection::close_generator(std::string_view path, std::string_view function, std::int32_t index,
                                        Completion done) {
-  expect(session_.close_generator(path, function, index, read_clocks()), std::move(done));
+  expect([&](Now now) { return session_.close_generator(path, function, index, now); }, std::move(done));
 }
 
 void ClientConnection::abort_generator(std::string_view path, std::string_view function, std::int32_t index,
                                        Completion done) {
-  expect(session_.abort_generator(path, function, index, read_clocks()), std::move(done));
+  expect([&](Now now) { return session_.abort_generator(path, function, index, now); }, std::move(done));
 }
 
 void ClientConnection::get_memory_dimensions(std::string_view path, std::string_view memory, Completion done) {
-  expect(session_.get_memory_dimensions(path, memory, read_clocks()), std::move(done));
+  expect([&](Now now) { return session_.get_memory_dimensions(path, memory, now); }, std::move(done));
 }
 
 void ClientConnection::read_memory(std::string_view path, std::string_view memory, const MemoryRange& range,
                                    Completion done) {
-  expect(session_.read_memory(path, memory, range.position, range.count, read_clocks()), std::move(done));
+  expect([&](Now now) { return session_.read_memory(path, memory, range.position, range.count, now); },
+         std::move(done));
 }
 
 void ClientConnection::write_memory(std::string_view path, std::string_view memory,
                                     std::span<const std::uint64_t> position, const Value& value, Completion done) {
-  expect(session_.write_memory(path, memory, position, value, read_clocks()), std::move(done));
+  expect([&](Now now) { return session_.write_memory(path, memory, position, value, now); }, std::move(done));
 }
 
 void ClientConnection::get(std::string_view path, std::string_view property, Completion done) {
-  expect(session_.get_property(path, property, read_clocks()), std::move(done));
+  expect([&](Now now) { return session_.get_property(path, property, now); }, std::move(done));
 }
 
 void ClientConnection::set(std::string_view path, std::string_view property, const Value& value, Completion done) {
-  expect(session_.set_property(path, property, value, read_clocks()), std::move(done));
+  expect([&](Now now) { return session_.set_property(path, property, value, now); }, std::move(done));
 }
 
 void ClientConnection::find_object(std::string_view path, Completion done) {
-  expect(session_.find_object(path, read_clocks()), std::move(done));
+  expect([&](Now now) { return session_.find_object(path, now); }, std::move(done));
 }
 
 void ClientConnection::peek_in(std::string_view path, std::string_view wire, Completion done) {
-  expect(session_.peek_in_value(path, wire, read_clocks()), std::move(done));
+  expect([&](Now now) { return session_.peek_in_value(path, wire, now); }, std::move(done));
 }
 
 void ClientConnection::peek_out(std::string_view path, std::string_view wire, Completion done) {
-  expect(session_.peek_out_value(path, wire, read_clocks()), std::move(done));
+  expect([&](Now now) { return session_.peek_out_value(path, wire, now); }, std::move(done));
 }
 
 void ClientConnection::poke_out(std::string_view path, std::string_view wire, const Value& value, Completion done) {
-  expect(session_.poke_out_value(path, wire, value, read_clocks()), std::move(done));
+  expect([&](Now now) { return session_.poke_out_value(path, wire, value, now); }, std::move(done));
 }
 
 void ClientConnection::connect_wire(std::string_view path, std::string_view wire, WireHandler handler,
                                     Completion done) {
   wire_handlers_[{std::string(path), std::string(wire)}] = std::make_shared<WireHandler>(std::move(handler));
-  expect(session_.connect_wire(path, wire, read_clocks()), std::move(done));
+  expect([&](Now now) { return session_.connect_wire(path, wire, now); }, std::move(done));
 }
 
 void ClientConnection::disconnect_wire(std::string_view path, std::string_view wire, Completion done) {
   const MemberKey key{std::string(path), std::string(wire)};
   wire_handlers_.erase(key);
   wire_closed_handlers_.erase(key);
-  expect(session_.disconnect_wire(path, wire, read_clocks()), std::move(done));
+  expect([&](Now now) { return session_.disconnect_wire(path, wire, now); }, std::move(done));
 }
 
 void ClientConnection::on_wire_closed(std::string_view path, std::string_view wire, std::function<void()> handler) {
@@ -199,13 +203,13 @@ void ClientConnection::connect_pipe(std::string_view path, std::string_view pipe
     if (result) pipe_handlers_[{path, pipe, result->to<std::int32_t>().value()}] = handlers;
     if (done) done(std::move(result));
   };
-  expect(session_.connect_pipe(path, pipe, index, read_clocks()), std::move(connected));
+  expect([&](Now now) { return session_.connect_pipe(path, pipe, index, now); }, std::move(connected));
 }
 
 void ClientConnection::disconnect_pipe(std::string_view path, std::string_view pipe, std::int32_t index,
                                        Completion done) {
   pipe_handlers_.erase({std::string(path), std::string(pipe), index});
-  expect(session_.disconnect_pipe(path, pipe, index, read_clocks()), std::move(done));
+  expect([&](Now now) { return session_.disconnect_pipe(path, pipe, index, now); }, std::move(done));
 }
 
 Result<> ClientConnection::send_pipe(std::string_view path, std::string_view pipe, std::int32_t index,
@@ -268,31 +272,31 @@ void ClientConnection::on_event(std::string_view path, std::string_view event, E
 }
 
 void ClientConnection::authenticate(std::string_view username, const Value& credentials, Completion done) {
-  expect(session_.authenticate(username, credentials, read_clocks()), std::move(done));
+  expect([&](Now now) { return session_.authenticate(username, credentials, now); }, std::move(done));
 }
 
 void ClientConnection::logout(Completion done) {
-  expect(session_.logout(read_clocks()), std::move(done));
+  expect([&](Now now) { return session_.logout(now); }, std::move(done));
 }
 
 void ClientConnection::get_attributes(Completion done) {
-  expect(session_.get_attributes(read_clocks()), std::move(done));
+  expect([&](Now now) { return session_.get_attributes(now); }, std::move(done));
 }
 
 void ClientConnection::lock(std::string_view path, LockKind kind, Completion done) {
-  expect(session_.lock(path, kind, read_clocks()), std::move(done));
+  expect([&](Now now) { return session_.lock(path, kind, now); }, std::move(done));
 }
 
 void ClientConnection::unlock(std::string_view path, Completion done) {
-  expect(session_.unlock(path, read_clocks()), std::move(done));
+  expect([&](Now now) { return session_.unlock(path, now); }, std::move(done));
 }
 
 void ClientConnection::enter_monitor(std::string_view path, std::chrono::milliseconds timeout, Completion done) {
-  expect(session_.enter_monitor(path, timeout, read_clocks()), std::move(done));
+  expect([&](Now now) { return session_.enter_monitor(path, timeout, now); }, std::move(done));
 }
 
 void ClientConnection::exit_monitor(std::string_view path, Completion done) {
-  expect(session_.exit_monitor(path, read_clocks()), std::move(done));
+  expect([&](Now now) { return session_.exit_monitor(path, now); }, std::move(done));
 }
 
 void ClientConnection::disconnect() {
@@ -335,8 +339,9 @@ void ClientConnection::handle(Connected&&) {
 
 void ClientConnection::handle(Completed&& completed) {
   auto found = completions_.extract(completed.id);
-  if (found.empty() || !found.mapped()) return;
-  run_handler("request to", session_.service(), [&] { found.mapped()(std::move(completed.result)); });
+  if (!found) return;
+  const auto done = spare_completion_.take(std::move(found));
+  if (done) run_handler("request to", session_.service(), [&] { done(std::move(completed.result)); });
 }
 
 void ClientConnection::handle(EventReceived&& received) {

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "core/session/client/client_session.hpp"
+#include "core/support/spare_node.hpp"
 #include "node/driver/stream_driver.hpp"
 #include "node/transport/dial.hpp"
 
@@ -192,7 +193,9 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   void handle(CallbackCalled&& called);
   void handle(PathReleased&& released);
   void handle(SessionClosed&& closed);
-  void expect(RequestId id, Completion done);
+  /// Asks the session by `ask(now)`, whose request completes with `done`.
+  template <class Ask>
+  void expect(Ask&& ask, Completion done);
   /// Runs a handler; what it throws is reported.
   template <class F>
   void run_handler(std::string_view kind, std::string_view name, F&& handler);
@@ -200,7 +203,9 @@ class ClientConnection final : public SessionDriver<ClientSession> {
 
   std::function<void(const std::string&)> report_;
   Opened opened_;
-  std::unordered_map<RequestId, Completion> completions_;
+  using Completions = std::unordered_map<RequestId, Completion>;
+  Completions completions_;
+  SpareNode<Completions> spare_completion_;
   struct EventSubscription {
     EventHandler handler;
     std::shared_ptr<bool> is_removed;

@@ -99,9 +99,9 @@ class DescriptorStream : public ByteStream {
       const auto rest = buffers.empty() ? slice.subspan(offset) : slice;
       buffers.emplace_back(rest.data(), rest.size());
     }
-    // Most writes are one buffer, for which there is a cheaper system call.
-    const auto written =
-        buffers.size() == 1 ? descriptor_.write_some(buffers.front(), error) : descriptor_.write_some(buffers, error);
+    // One slice alone goes by send(), which costs less than sendmsg().
+    const auto written = buffers.size() == 1 ? descriptor_.write_some(boost::asio::buffer(buffers.front()), error)
+                                             : descriptor_.write_some(buffers, error);
     if (error == boost::asio::error::would_block) error = {};
     return written;
   }

@@ -1,10 +1,9 @@
 #include "node/transport/websocket.hpp"
 
-#include <boost/asio/as_tuple.hpp>
 #include <boost/asio/error.hpp>
-#include <boost/asio/this_coro.hpp>
-#include <boost/asio/use_awaitable.hpp>
 #include <boost/system/errc.hpp>
+
+#include "node/transport/await_tuple.hpp"
 
 namespace rr {
 
@@ -39,43 +38,66 @@ awaitable<ReadResult> WebSocketStream::read_some(std::span<std::uint8_t> into) {
       co_return ReadResult{boost::system::errc::make_error_code(boost::system::errc::protocol_error), 0};
     }
     if (auto ping = decoder_.take_ping()) {
-      const auto pong = make_control_frame(role_, WebSocketOpcode::pong, *ping);
-      const ByteSpan slice(pong);
-      const std::span<const ByteSpan> slices(&slice, 1);
-      if (const auto error = co_await write_raw(slices); error) co_return ReadResult{error, 0};
+      auto pong = make_control_frame(role_, WebSocketOpcode::pong, *ping);
+      if (const auto error = co_await write_control(std::move(pong)); error) co_return ReadResult{error, 0};
     }
     if (*payload > 0) co_return ReadResult{{}, *payload};
   }
 }
 
+std::size_t WebSocketStream::try_write(std::span<const ByteSpan> slices, error_code& error) {
+  error = is_broken_ ? error_code(asio::error::broken_pipe) : error_code();
+  if (error || is_writing_) return 0;
+  // One frame at a time: a client masks what it tries to write, and does so again with what the stream did not take.
+  const auto frames = splitter_.split(slices, max_frame_payload);
+  if (frames.empty()) return 0;
+  const auto payload = splitter_.consume(inner_->try_write(frames, error));
+  is_broken_ = static_cast<bool>(error);
+  written_.cancel();
+  return payload;
+}
+
 awaitable<error_code> WebSocketStream::write(std::span<const ByteSpan> slices) {
-  while (is_writing_) co_await written_.async_wait(asio::as_tuple(asio::use_awaitable));
+  while (is_writing_) co_await written_.async_wait(await_tuple);
+  if (is_broken_) co_return asio::error::broken_pipe;
   const auto frames = splitter_.split(slices);
   if (frames.empty()) co_return error_code();  // an empty frame would end a native peer's connection
-  co_return co_await write_raw(frames);
+  const auto error = co_await write_raw(frames);
+  if (!error) splitter_.consume(SIZE_MAX);
+  co_return error;
+}
+
+awaitable<error_code> WebSocketStream::write_control(Bytes frame) {
+  while (!is_broken_ && (is_writing_ || splitter_.is_in_frame())) co_await written_.async_wait(await_tuple);
+  if (is_broken_) co_return asio::error::broken_pipe;
+  const ByteSpan slice(frame);
+  const std::span<const ByteSpan> slices(&slice, 1);
+  co_return co_await write_raw(slices);
 }
 
 awaitable<error_code> WebSocketStream::write_raw(std::span<const ByteSpan> slices) {
-  while (is_writing_) co_await written_.async_wait(asio::as_tuple(asio::use_awaitable));
-  if (is_broken_) co_return asio::error::broken_pipe;
   is_writing_ = true;
   const auto error = co_await inner_->write(slices);
   is_writing_ = false;
-  is_broken_ = static_cast<bool>(error);
+  if (error) is_broken_ = true;
   written_.cancel();
   co_return error;
+}
+
+void WebSocketStream::close() {
+  is_broken_ = true;
+  inner_->close();
+  written_.cancel();
 }
 
 awaitable<void> WebSocketStream::end(const EndReason& given) {
   const auto& reason = violation_ ? *violation_ : given;
   const auto& received = decoder_.received_close();
-  if (!is_broken_ && (takes_close_ || received || decoder_.has_seen_control())) {
-    const auto frame =
+  if (!is_broken_ && !splitter_.is_in_frame() && (takes_close_ || received || decoder_.has_seen_control())) {
+    auto frame =
         received ? make_close_frame(role_, received->code, {}) : make_close_frame(role_, reason.code, reason.text);
-    const ByteSpan slice(frame);
-    const std::span<const ByteSpan> slices(&slice, 1);
     close_limit_.arm(stream_close_time);
-    co_await write_raw(slices);
+    co_await write_control(std::move(frame));
     close_limit_.disarm();
   }
   co_await inner_->end(reason);

@@ -19,16 +19,19 @@ class WebSocketStream final : public ByteStream {
   WebSocketStream(std::unique_ptr<ByteStream> inner, WebSocketRole role, bool takes_close);
 
   awaitable<ReadResult> read_some(std::span<std::uint8_t> into) override;
+  std::size_t try_write(std::span<const ByteSpan> slices, error_code& error) override;
   awaitable<error_code> write(std::span<const ByteSpan> slices) override;
   /// WebSockets have no half-closed state: does nothing, end() follows.
   void finish_sending() override {}
   void cancel() override { inner_->cancel(); }
   awaitable<void> end(const EndReason& reason) override;
-  void close() override { inner_->close(); }
+  void close() override;
   std::string peer() const override { return inner_->peer(); }
   boost::asio::any_io_executor executor() override { return inner_->executor(); }
 
  private:
+  /// Waits until no other frame is in the middle of being written.
+  awaitable<error_code> write_control(Bytes frame);
   awaitable<error_code> write_raw(std::span<const ByteSpan> slices);
 
   std::unique_ptr<ByteStream> inner_;
@@ -39,8 +42,8 @@ class WebSocketStream final : public ByteStream {
   bool takes_close_;
   std::optional<EndReason> violation_;  ///< what the peer did against RFC 6455
   bool is_writing_ = false;
-  bool is_broken_ = false;             ///< a write ended in the middle of a frame: nothing more can be sent
-  boost::asio::steady_timer written_;  ///< cancelled when a write ends
+  bool is_broken_ = false;             ///< closed, or a write ended within a frame: nothing more can be sent
+  boost::asio::steady_timer written_;  ///< cancelled when a write ends, and when the stream is closed
 };
 
 }  // namespace rr

@@ -185,39 +185,72 @@ Bytes make_close_frame(WebSocketRole role, std::uint16_t code, std::string_view 
   return make_control_frame(role, WebSocketOpcode::close, payload);
 }
 
-std::span<const ByteSpan> FrameSplitter::split(std::span<const ByteSpan> payload) {
+FrameSplitter::Frame FrameSplitter::begin_frame(std::size_t payload) const {
+  const bool is_masked = role_ == WebSocketRole::client;
+  Frame frame{{}, 0, payload, is_masked ? make_mask() : WebSocketMask{}, 0};
+  frame.header = make_frame_header(WebSocketOpcode::binary, payload, is_masked ? &frame.mask : nullptr);
+  frame.header_left = frame.header.size;
+  return frame;
+}
+
+std::span<const ByteSpan> FrameSplitter::split(std::span<const ByteSpan> payload, std::size_t limit) {
+  const bool is_masked = role_ == WebSocketRole::client;
   std::size_t left = 0;
   for (const auto& slice : payload) left += slice.size();
-  headers_.clear();
+  left = std::min(left, limit);
+  const std::size_t most_frames = left / max_frame_payload + 2;
+  frames_.clear();
+  frames_.reserve(most_frames);  // slices_ points into it
   slices_.clear();
-  headers_.reserve(left / max_frame_payload + 1);  // slices_ points into it
-  const bool is_masked = role_ == WebSocketRole::client;
-  masked_.resize(is_masked ? left : 0);  // and into this
-  std::size_t at = 0;                    // of masked_
-  WebSocketMask mask{};
-  std::size_t frame = 0;  // payload of the current frame
-  std::size_t room = 0;   // what is still free of it
+  masked_.clear();
+  if (is_masked) masked_.reserve(left + most_frames * sizeof(FrameHeader));
+  std::size_t room = 0;  // what is still free of the last frame
   for (auto slice : payload) {
+    slice = slice.first(std::min(slice.size(), left));
     while (!slice.empty()) {
       if (room == 0) {
-        frame = room = std::min(left, max_frame_payload);
-        if (is_masked) mask = make_mask();
-        headers_.push_back(make_frame_header(WebSocketOpcode::binary, frame, is_masked ? &mask : nullptr));
-        slices_.push_back(headers_.back().span());
+        frames_.push_back(frames_.empty() && open_ ? *open_ : begin_frame(std::min(left, max_frame_payload)));
+        room = frames_.back().payload_left;
+        const auto header = frames_.back().header.span().last(frames_.back().header_left);
+        if (is_masked)
+          masked_.insert(masked_.end(), header.begin(), header.end());
+        else if (!header.empty())
+          slices_.push_back(header);
       }
-      auto part = slice.first(std::min(slice.size(), room));
-      slice = slice.subspan(part.size());
+      const auto& frame = frames_.back();
+      const auto part = slice.first(std::min(slice.size(), room));
       if (is_masked) {
-        unmask(part.data(), masked_.data() + at, part.size(), mask, (frame - room) % 4);
-        part = ByteSpan(masked_).subspan(at, part.size());
-        at += part.size();
+        const auto at = masked_.size();
+        masked_.resize(at + part.size());
+        const auto index = frame.mask_index + (frame.payload_left - room);
+        unmask(part.data(), masked_.data() + at, part.size(), frame.mask, index % 4);
+      } else {
+        slices_.push_back(part);
       }
-      slices_.push_back(part);
+      slice = slice.subspan(part.size());
       room -= part.size();
       left -= part.size();
     }
   }
+  if (!masked_.empty()) slices_.push_back(masked_);
   return slices_;
+}
+
+std::size_t FrameSplitter::consume(std::size_t bytes) {
+  std::size_t payload = 0;
+  for (auto& frame : frames_) {
+    if (bytes == 0) break;
+    const auto of_header = std::min(bytes, frame.header_left);
+    const auto of_payload = std::min(bytes - of_header, frame.payload_left);
+    frame.header_left -= of_header;
+    frame.payload_left -= of_payload;
+    frame.mask_index = (frame.mask_index + of_payload) % 4;
+    bytes -= of_header + of_payload;
+    payload += of_payload;
+    open_.reset();
+    if (frame.payload_left > 0) open_ = frame;
+  }
+  return payload;
 }
 
 std::string websocket_accept(std::string_view key) {

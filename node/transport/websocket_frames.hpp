@@ -95,19 +95,35 @@ Bytes make_control_frame(WebSocketRole role, WebSocketOpcode opcode, ByteSpan pa
 Bytes make_close_frame(WebSocketRole role, std::uint16_t code, std::string_view reason);
 
 /// Lays slices out as binary frames of at most max_frame_payload bytes. A server's payload stays where it is; a
-/// client's is masked into a buffer.
+/// client's frames are made in a buffer, one behind the other. A frame that was written in part goes on with whatever
+/// payload comes next: what its header has announced is only how many bytes follow.
 class FrameSplitter {
  public:
   explicit FrameSplitter(WebSocketRole role) : role_(role) {}
 
-  /// Headers and payload in write order; valid until the next call and as long as the input is.
-  std::span<const ByteSpan> split(std::span<const ByteSpan> payload);
+  /// Headers and payload in write order, of the first `limit` bytes of payload; valid until the next call and as long
+  /// as the input is.
+  std::span<const ByteSpan> split(std::span<const ByteSpan> payload, std::size_t limit = SIZE_MAX);
+  /// `bytes` of what split() returned were written. Returns how many of them are payload.
+  std::size_t consume(std::size_t bytes);
+  /// A frame is written in part: nothing but its rest may be written.
+  bool is_in_frame() const { return open_.has_value(); }
 
  private:
+  struct Frame {
+    FrameHeader header;
+    std::size_t header_left;   ///< bytes to be written
+    std::size_t payload_left;  ///< bytes to be written
+    WebSocketMask mask;
+    std::size_t mask_index;  ///< of the first byte of payload_left
+  };
+  Frame begin_frame(std::size_t payload) const;
+
   WebSocketRole role_;
-  std::vector<FrameHeader> headers_;
+  std::optional<Frame> open_;
+  std::vector<Frame> frames_;
   std::vector<ByteSpan> slices_;
-  Bytes masked_;
+  Bytes masked_;  ///< frames of a client
 };
 
 /// Sec-WebSocket-Accept of a Sec-WebSocket-Key.

@@ -87,8 +87,7 @@ TimePoint ClientSession::poll_timeout() const {
 }
 
 std::optional<ClientEvent> ClientSession::poll_event() {
-  if (events_.empty()) return std::nullopt;
-  return events_.take();
+  return events_.poll();
 }
 
 void ClientSession::scan_deadlines(Now now) {
@@ -168,7 +167,7 @@ void ClientSession::add_pending(RequestId id, EntryType type, const MemberDefini
                                 Now now) {
   const auto deadline = now.steady + options_.request_timeout;
   earliest_deadline_ = std::min(earliest_deadline_, deadline);
-  pending_.emplace(id, Pending{type, member, std::string(path), deadline});
+  spare_pending_.insert(pending_, id, Pending{type, member, std::string(path), deadline});
 }
 
 RequestId ClientSession::fail_request(RequestId id, Error error) {
@@ -383,7 +382,7 @@ void ClientSession::handle_reply(const Message& message, const MessageEntry& ent
   auto node = pending_.extract(entry.request_id);
   if (!node) return;
   const auto id = node.key();
-  auto& pending = node.mapped();
+  auto pending = spare_pending_.take(std::move(node));
   if (auto fetch = fetches_.extract(id)) return handle_fetch_reply(entry, std::move(fetch.mapped()), now);
   if (state_ == ClientState::connecting) return handle_connect_reply(entry, pending.type, now);
   if (pending.type == EntryType::disconnect_client) return fail(connection_error("closed by this side"));
@@ -489,11 +488,9 @@ void ClientSession::handle_path_released(std::string_view path) {
   emit(PathReleased{std::string(path)});
 }
 
-void ClientSession::emit(ClientEvent event) {
-  events_.push_back(std::move(event));
-  if (events_.size() == options_.max_events && state_ != ClientState::closed)
-    fail(make_error(ErrorCode::out_of_system_resource,
-                    std::to_string(options_.max_events) + " events wait and nobody takes them"));
+void ClientSession::fail_unpolled() {
+  fail(make_error(ErrorCode::out_of_system_resource,
+                  std::to_string(options_.max_events) + " events wait and nobody takes them"));
 }
 
 void ClientSession::fail(Error reason) {

@@ -26,6 +26,7 @@
 #include "core/session/protocol_level.hpp"
 #include "core/session/service_path.hpp"
 #include "core/support/fifo.hpp"
+#include "core/support/spare_node.hpp"
 #include "core/types/pack.hpp"
 
 namespace rr {
@@ -368,7 +369,12 @@ class ClientSession {
   bool abandon_pipe_request(RequestId id, TimePoint deadline);
   void answer_error(const MessageEntry& entry, const Error& error, Now now);
 
-  void emit(ClientEvent event);
+  template <class Happened>
+  void emit(Happened&& event) {
+    events_.push(std::forward<Happened>(event));
+    if (events_.size() == options_.max_events) fail_unpolled();
+  }
+  void fail_unpolled();
   void fail(Error reason);
   void flush_wires(Now now);
   void scan_deadlines(Now now);
@@ -387,7 +393,9 @@ class ClientSession {
   std::uint32_t endpoint_;
 
   Message outgoing_;
-  std::unordered_map<RequestId, Pending> pending_;
+  using PendingRequests = std::unordered_map<RequestId, Pending>;
+  PendingRequests pending_;
+  SpareNode<PendingRequests> spare_pending_;
   std::unordered_map<RequestId, Fetch> fetches_;
   RequestId last_request_id_ = 0;
   TimePoint earliest_deadline_ = TimePoint::max();  ///< no pending request is due before

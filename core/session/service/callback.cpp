@@ -41,23 +41,23 @@ void ServiceSession::handle_callback_reply(const Message& message, const Message
   const auto found = callbacks_.extract(last_callback_id_ - behind);
   if (!found) return;  // late, repeated, or never asked for
   const auto& types = service_->types();
-  events_.push_back(CallbackCompleted{found.key(), entry.error == ErrorCode::none
-                                                       ? read_return(message, entry, *found.mapped().member, types)
-                                                       : Result<Value>(read_error(message, entry, types))});
+  events_.push(CallbackCompleted{found.key(), entry.error == ErrorCode::none
+                                                  ? read_return(message, entry, *found.mapped().member, types)
+                                                  : Result<Value>(read_error(message, entry, types))});
 }
 
 void ServiceSession::expire_callbacks(Now now) {
   while (!callbacks_.empty() && callbacks_.begin()->second.deadline <= now.steady) {
     const auto expired = callbacks_.extract(callbacks_.begin());
-    events_.push_back(CallbackCompleted{
-        expired.key(), make_error(ErrorCode::request_timeout, "callback '" + expired.mapped().member->name +
-                                                                  "': the client did not answer in time")});
+    events_.push(CallbackCompleted{expired.key(),
+                                   make_error(ErrorCode::request_timeout, "callback '" + expired.mapped().member->name +
+                                                                              "': the client did not answer in time")});
   }
 }
 
 void ServiceSession::end_callbacks(const Error& reason) {
   for (const auto& [id, call] : std::exchange(callbacks_, {}))
-    events_.push_back(CallbackCompleted{
+    events_.push(CallbackCompleted{
         id, make_error(ErrorCode::connection_error, "callback '" + call.member->name + "': " + reason.message)});
 }
 

@@ -48,7 +48,7 @@ Result<> ServiceSession::step_generator(const Message& message, const MessageEnt
   called.generator = begun->id;
   calls_.push_back(
       {called.id, entry.type, entry.request_id, std::string(entry.service_path), &member, begun->id, step});
-  events_.push_back(std::move(called));
+  events_.push(std::move(called));
   return {};
 }
 
@@ -74,7 +74,7 @@ void ServiceSession::finish_generator_call(const OpenCall& call, bool has_failed
 
 void ServiceSession::end_generators(const std::vector<GeneratorId>& ended) {
   if (is_gone_) return;  // ClientGone is the last event
-  for (const auto id : ended) events_.push_back(GeneratorEnded{id});
+  for (const auto id : ended) events_.push(GeneratorEnded{id});
 }
 
 }  // namespace rr

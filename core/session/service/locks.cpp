@@ -144,7 +144,7 @@ TimePoint ServiceSession::next_enter_deadline() const {
 }
 
 void ServiceSession::tell_others_of_monitors() {
-  if (service_->monitor_locks().has_waiting()) events_.push_back(LocksChanged{service_.get()});
+  if (service_->monitor_locks().has_waiting()) events_.push(LocksChanged{service_.get()});
 }
 
 /// The session may use the service no more.

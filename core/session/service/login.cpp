@@ -57,7 +57,7 @@ Result<> ServiceSession::begin_login(const Message& message, const MessageEntry&
   login_->path = entry.service_path;
   login_->member = entry.member_name;
   login_->service = std::move(service);
-  events_.push_back(std::move(requested));
+  events_.push(std::move(requested));
   return {};
 }
 
@@ -95,7 +95,7 @@ void ServiceSession::finish_authenticate(const OpenLogin& login, Result<Authenti
 
 void ServiceSession::change_user(std::optional<AuthenticatedUser> user) {
   set_user(std::move(user));
-  if (service_->is_remote()) events_.push_back(UserChanged{});
+  if (service_->is_remote()) events_.push(UserChanged{});
 }
 
 /// ClientSessionOpReq: logins and logouts here, locks and monitors elsewhere.

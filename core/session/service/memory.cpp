@@ -47,7 +47,7 @@ Result<> ServiceSession::answer_memory(const Message& message, const MessageEntr
   called.object = std::move(found.object);
   called.member = &member;
   calls_.push_back(std::move(call));
-  events_.push_back(std::move(called));
+  events_.push(std::move(called));
   return {};
 }
 

@@ -119,7 +119,7 @@ void ServiceSession::release_pipes(std::string_view path) {
     if (is_within(pipe.key->path, path)) released.push_back(id);
   for (const auto id : released) {
     forget_pipe(id);
-    events_.push_back(PipeClosed{id});
+    events_.push(PipeClosed{id});
   }
 }
 
@@ -147,7 +147,7 @@ Result<> ServiceSession::connect_pipe(const Message& message, const MessageEntry
   pipe.request_id = entry.request_id;
   pipe.is_unreliable = is_unreliable;
   indices->second.emplace(*index, &pipe);
-  events_.push_back(PipeConnected{id, found.object, &member, *index});
+  events_.push(PipeConnected{id, found.object, &member, *index});
   return {};
 }
 
@@ -166,7 +166,7 @@ Result<> ServiceSession::disconnect_pipe(const Message& message, const MessageEn
   if (!pipe) return make_error(ErrorCode::invalid_argument, "Invalid pipe");
   const auto id = pipe->id;
   forget_pipe(id);
-  events_.push_back(PipeClosed{id});
+  events_.push(PipeClosed{id});
   begin_reply(entry);
   send_outgoing(now);
   return {};
@@ -192,7 +192,7 @@ void ServiceSession::handle_pipe_packets(const Message& message, const MessageEn
   // A packet that is lost, or cannot be read, cannot be made up for: the endpoint ends, and both sides know.
   for (const auto id : broken) {
     if (!find_pipe(id)) continue;
-    events_.push_back(PipeClosed{id});
+    events_.push(PipeClosed{id});
     close_pipe(id, now);
   }
 }
@@ -208,7 +208,7 @@ Result<> ServiceSession::handle_pipe_packet(const Message& message, const Messag
   return pipe.state.receive(std::move(*packet), [&](PipePacket&& due) {
     PipeReceived received{pipe.id, std::move(due.value)};
     if (due.wants_ack && is_for_remote) received.wants_ack = due.number;
-    events_.push_back(std::move(received));
+    events_.push(std::move(received));
   });
 }
 
@@ -226,7 +226,7 @@ void ServiceSession::handle_pipe_acks(const Message& message, const MessageEntry
     const auto index = read_pipe_index(element);
     const auto* pipe = index ? find_pipe(entry, *index) : nullptr;
     if (!pipe) continue;
-    if (auto numbers = read_pipe_ack(element)) events_.push_back(PipeAcknowledged{pipe->id, std::move(*numbers)});
+    if (auto numbers = read_pipe_ack(element)) events_.push(PipeAcknowledged{pipe->id, std::move(*numbers)});
   }
 }
 

@@ -80,7 +80,7 @@ Result<> ServiceSession::park(const Message& message, const MessageEntry& entry)
   const bool is_asked = std::any_of(parked_.begin(), parked_.end(), is_same);
   const auto index = static_cast<std::size_t>(&entry - message.entries.data());
   parked_.push_back({std::string(entry.service_path), encoded.to_bytes(), index});
-  if (!is_asked) events_.push_back(ObjectWanted{std::string(entry.service_path)});
+  if (!is_asked) events_.push(ObjectWanted{std::string(entry.service_path)});
   return {};
 }
 
@@ -157,7 +157,7 @@ Result<> ServiceSession::ask_for_lock(const Message& message, const MessageEntry
   lock.is_monitor_enter = wanted.command == LockCommand::enter_monitor;
   if (lock.is_monitor_enter) lock.answer_by = now.steady + longest_wait;
   locks_.push_back(std::move(lock));
-  events_.push_back(std::move(wanted));
+  events_.push(std::move(wanted));
   return {};
 }
 

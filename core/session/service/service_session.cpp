@@ -104,8 +104,7 @@ TimePoint ServiceSession::poll_timeout() const {
 }
 
 std::optional<ServiceEvent> ServiceSession::poll_event() {
-  if (events_.empty()) return std::nullopt;
-  return events_.take();
+  return events_.poll();
 }
 
 /// Ends the session; the connection lingers so that the last reply gets out.
@@ -127,7 +126,7 @@ void ServiceSession::leave(Error reason, Now now) {
   parked_.clear();
   locks_.clear();
   end_callbacks(reason);
-  events_.push_back(ClientGone{std::move(reason)});
+  events_.push(ClientGone{std::move(reason)});
 }
 
 Ledgers& ServiceSession::ended() {
@@ -401,7 +400,7 @@ Result<> ServiceSession::add_call(const Message& message, const MessageEntry& en
   called.object = std::move(found.object);
   called.member = &member;
   calls_.push_back({called.id, entry.type, entry.request_id, std::string(entry.service_path), &member});
-  events_.push_back(std::move(called));
+  events_.push(std::move(called));
   return {};
 }
 

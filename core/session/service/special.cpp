@@ -287,7 +287,7 @@ Result<> ServiceSession::connect(std::shared_ptr<HostedService> service, const N
   session_id_ = service_->next_session_id();
   set_user(std::move(user));
   if (client_endpoint != 0 && may_use_service()) connection_.authorise();
-  events_.push_back(ClientConnected{service_.get()});
+  events_.push(ClientConnected{service_.get()});
   return {};
 }
 
@@ -303,7 +303,7 @@ Result<> ServiceSession::disconnect(const Message& message, const MessageEntry& 
     leaving_->path = entry.service_path;
     leaving_->member = entry.member_name;
     leaving_->request_id = entry.request_id;
-    events_.push_back(LeaveWanted{});
+    events_.push(LeaveWanted{});
   }
   return {};
 }

@@ -102,7 +102,7 @@ Result<> ServiceSession::answer_wire(const MessageEntry& entry, const HostedServ
     const auto wire = wires_.find(key);
     if (wire == wires_.end()) return make_error(ErrorCode::service_error, "Invalid wire connection");
     end_wire(wire);
-    events_.push_back(WireDisconnected{key.path, &member});
+    events_.push(WireDisconnected{key.path, &member});
     begin_reply(entry);
     send_outgoing(now);
     return {};
@@ -115,12 +115,12 @@ Result<> ServiceSession::answer_wire(const MessageEntry& entry, const HostedServ
   const WireConnection fresh{is_remote ? WireState::connecting : WireState::connected, &member, entry.request_id};
   const bool is_new = wires_.try_emplace(key, fresh).second;
   if (is_new && is_remote) {
-    events_.push_back(WireConnected{key.path, found.object, &member});
+    events_.push(WireConnected{key.path, found.object, &member});
     return {};
   }
   begin_reply(entry);
   send_outgoing(now);
-  if (is_new) events_.push_back(WireConnected{key.path, found.object, &member});
+  if (is_new) events_.push(WireConnected{key.path, found.object, &member});
   return {};
 }
 
@@ -132,8 +132,7 @@ void ServiceSession::handle_wire_packet(const Message& message, const MessageEnt
   if (!packet || !wire->second.accept(packet->time)) return;
   auto found = service_->find_object(entry.service_path);
   if (!found) return;
-  events_.push_back(
-      WireReceived{std::move(found->object), wire->second.member, packet->time, std::move(packet->value)});
+  events_.push(WireReceived{std::move(found->object), wire->second.member, packet->time, std::move(packet->value)});
 }
 
 // --- ended ---

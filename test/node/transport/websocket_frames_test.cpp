@@ -167,6 +167,36 @@ TEST_CASE("a client's frames are masked anew each, and a server reads them") {
   CHECK(decoder.take_ping() == rr::Bytes{'h', 'e', 'l', 'l', 'o'});
 }
 
+TEST_CASE("a frame that was written in part goes on with the payload that comes next") {
+  const auto first = text_of(200);
+  const auto urgent = text_of(70);
+  const auto second = text_of(65600);
+  for (const auto role : {WebSocketRole::client, WebSocketRole::server}) {
+    for (std::size_t step = 1; step < 300; ++step) {
+      FrameSplitter splitter(role);
+      rr::Bytes wire;
+      std::string left = first + second;
+      std::string expected;
+      for (std::size_t round = 0; !left.empty(); ++round) {
+        if (round == 2) left.insert(0, urgent);  // the queue has put something ahead
+        const rr::ByteSpan payload[] = {rr::as_bytes(left).first(left.size() / 2),
+                                        rr::as_bytes(left).subspan(left.size() / 2)};
+        rr::Bytes laid_out;
+        for (const auto& slice : splitter.split(payload, 40'000))
+          laid_out.insert(laid_out.end(), slice.begin(), slice.end());
+        laid_out.resize(std::min(laid_out.size(), round < 4 ? step : laid_out.size()));
+        wire.insert(wire.end(), laid_out.begin(), laid_out.end());
+        const auto written = splitter.consume(laid_out.size());
+        expected += left.substr(0, written);
+        left.erase(0, written);
+      }
+      CHECK_FALSE(splitter.is_in_frame());
+      WebSocketDecoder decoder(role == WebSocketRole::client ? WebSocketRole::server : WebSocketRole::client);
+      REQUIRE(decoded(decoder, wire) == expected);
+    }
+  }
+}
+
 TEST_CASE("a client reads plain frames, and masked ones as the reference does") {
   WebSocketDecoder decoder(WebSocketRole::client);
   CHECK(decoded(decoder, frame(0x82, "plain", 0, false) + frame(0x82, "masked")) == "plainmasked");
