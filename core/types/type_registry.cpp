@@ -139,10 +139,4 @@ const EnumDefinition* TypeRegistry::find_enum(std::string_view qualified_name) c
   return find_in(enums_, qualified_name);
 }
 
-bool TypeRegistry::has_exception(std::string_view qualified_name) const {
-  const auto [service, name] = split_qualified(qualified_name);
-  const auto* definition = find_service(service);
-  return definition && definition->find_exception(name);
-}
-
 }  // namespace rr

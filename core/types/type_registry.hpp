@@ -29,7 +29,6 @@ class TypeRegistry {
   /// Qualified names, "com.x.Pose".
   const EntityDefinition* find_entity(std::string_view qualified_name) const;
   const EnumDefinition* find_enum(std::string_view qualified_name) const;
-  bool has_exception(std::string_view qualified_name) const;
   /// All definitions, imports before importers.
   const Definitions& definitions() const { return definitions_; }
   /// Warnings collected by add().

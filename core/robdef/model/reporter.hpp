@@ -36,7 +36,6 @@ class Reporter {
 
   /// Whether a further finding of this severity would be dropped: saves the work of preparing it.
   bool is_full(Severity severity) const { return count_[index(severity)] > max_diagnostics; }
-  bool has_errors() const { return count_[index(Severity::error)] != 0; }
   /// Hands out everything, stably sorted by line.
   std::vector<Diagnostic> take();
 

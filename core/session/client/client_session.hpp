@@ -284,7 +284,6 @@ class ClientSession {
   // connecting (client_connect.cpp)
   void start_session(Now now);
   void handle_connect_reply(const MessageEntry& entry, EntryType request, Now now);
-  void handle_session_granted(Now now);
   void request_special(EntryType type, std::string_view path, Now now);
   void request_combined(Now now);
   void add_login();

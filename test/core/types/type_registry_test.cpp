@@ -31,7 +31,7 @@ TEST_CASE("definitions are added in any order and kept with imports before impor
   CHECK_FALSE(types.find_service("a"));
 }
 
-TEST_CASE("entities, enums and exceptions are found by qualified name") {
+TEST_CASE("entities and enums are found by qualified name") {
   TypeRegistry types;
   REQUIRE(types.add({user, base}, RobdefMode::strict));
   REQUIRE(types.find_entity("a.base.S"));
@@ -41,9 +41,6 @@ TEST_CASE("entities, enums and exceptions are found by qualified name") {
   CHECK_FALSE(types.find_entity("a.user.S"));
   REQUIRE(types.find_enum("a.base.mode"));
   CHECK_FALSE(types.find_enum("a.base.S"));
-  CHECK(types.has_exception("a.base.Broken"));
-  CHECK_FALSE(types.has_exception("a.base.Whole"));
-  CHECK_FALSE(types.has_exception("Broken"));
   const auto* member = types.find_entity("a.user.O")->find_member("t");
   REQUIRE(member);
   CHECK(member->type.type == DataType::structure_t);
