@@ -82,6 +82,7 @@ std::vector<const ServiceDefinition*> HostedService::definitions_for_client() co
     for (const auto& import : definition->imports) open.push_back(import.name);
   }
   std::vector<const ServiceDefinition*> definitions;
+  definitions.reserve(names.size());
   for (const auto& name : names) definitions.push_back(types_->find_service(name));
   return definitions;
 }
