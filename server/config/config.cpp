@@ -261,6 +261,8 @@ void read_retry(ObjectReader& in, Retry& retry) {
 }
 
 void read_config(ObjectReader& in, Config& config) {
+  std::string schema;  // for editors
+  in.text("$schema", schema);
   in.texts("listen", true, [&](const std::string& text) -> std::string {
     auto address = rr::parse_host_port(text);
     if (!address) return address.error().message;

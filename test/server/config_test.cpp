@@ -165,6 +165,7 @@ TEST_CASE("the smallest configuration works, with the defaults") {
 
 TEST_CASE("every option arrives") {
   const auto parsed = parse_config(R"(/* all of them */ {
+    "$schema": "gateway.schema.json",
     "listen": ["[::1]:1", "localhost:2"],
     "devices": [{"name": "a", "url": "rr+tcp://h:1/?service=s", "max_clients": 3, "mode": "shared", "shares_reads": true,
                  "login": {"username": "u", "password": "p"},
