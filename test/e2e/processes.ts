@@ -95,6 +95,21 @@ export async function startGateway(
   return { program, url };
 }
 
+/** The test service as device "big", and a gateway to it. */
+export async function startTestService(site: string): Promise<{ url: string; stop(): Promise<void> }> {
+  const service = path.join(path.dirname(rrgate), "../test/interop/cpp/rr-test-service");
+  if (!existsSync(service)) throw new Error(`${service} is missing: build the target rr-test-service`);
+  const device = new Program(service, []);
+  device.start();
+  const found = await device.waitForOutput(/"url": *"([^"]+)"/);
+  const gateway = await startGateway("big", found[1] ?? "", site);
+  const stop = async () => {
+    await gateway.program.kill("SIGTERM");
+    await device.kill("SIGTERM");
+  };
+  return { url: gateway.url, stop };
+}
+
 /** The demo robot, its cameras, and a gateway to both, each a process of its own. */
 export class Lab {
   readonly create: Program;

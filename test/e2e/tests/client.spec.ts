@@ -1,11 +1,9 @@
 // The client package in a page and in a worker, without a bundler: through device, gateway and browser.
-import { cpSync, existsSync, mkdtempSync, writeFileSync } from "node:fs";
+import { cpSync, mkdtempSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import path from "node:path";
 import { expect, test } from "@playwright/test";
-import { Program, repositoryRoot, rrgate, startGateway } from "../processes";
-
-const service = path.join(path.dirname(rrgate), "../test/interop/cpp/rr-test-service");
+import { repositoryRoot, startTestService } from "../processes";
 
 const worker = `
 import { connect } from "./index.js";
@@ -25,21 +23,13 @@ function makeSite(): string {
   return site;
 }
 
-let device: Program;
-let gateway: { program: Program; url: string };
+let gateway: Awaited<ReturnType<typeof startTestService>>;
 
 test.beforeAll(async () => {
-  if (!existsSync(service)) throw new Error(`${service} is missing: build the target rr-test-service`);
-  device = new Program(service, []);
-  device.start();
-  const found = await device.waitForOutput(/"url": *"([^"]+)"/);
-  gateway = await startGateway("big", found[1] ?? "", makeSite());
+  gateway = await startTestService(makeSite());
 });
 
-test.afterAll(async () => {
-  await gateway?.program.kill("SIGTERM");
-  await device?.kill("SIGTERM");
-});
+test.afterAll(() => gateway?.stop());
 
 test("10 MiB of doubles cross device, gateway and browser unharmed; more than the limit fails alone", async ({
   page,

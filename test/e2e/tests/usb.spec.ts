@@ -1,13 +1,11 @@
 // A USB device in a page and in a worker of a real browser: its navigator.usb is the one of the client's tests, and behind
 // the device is a service that the gateway leads to.
-import { existsSync, writeFileSync } from "node:fs";
+import { writeFileSync } from "node:fs";
 import path from "node:path";
 import { expect, test } from "@playwright/test";
 import type { Page } from "@playwright/test";
-import { Program, rrgate, startGateway } from "../processes";
+import { startTestService } from "../processes";
 import { makeUsbSite } from "../usb_site";
-
-const service = path.join(path.dirname(rrgate), "../test/interop/cpp/rr-test-service");
 
 const script = `
 import { connect, listUsbDevices, requestUsbDevice } from "./index.js";
@@ -80,21 +78,13 @@ function makeSite(): string {
   return site;
 }
 
-let device: Program;
-let gateway: { program: Program; url: string };
+let gateway: Awaited<ReturnType<typeof startTestService>>;
 
 test.beforeAll(async () => {
-  if (!existsSync(service)) throw new Error(`${service} is missing: build the target rr-test-service`);
-  device = new Program(service, []);
-  device.start();
-  const found = await device.waitForOutput(/"url": *"([^"]+)"/);
-  gateway = await startGateway("big", found[1] ?? "", makeSite());
+  gateway = await startTestService(makeSite());
 });
 
-test.afterAll(async () => {
-  await gateway?.program.kill("SIGTERM");
-  await device?.kill("SIGTERM");
-});
+test.afterAll(() => gateway?.stop());
 
 /** The gateway has to know who its device is. */
 async function open(page: Page): Promise<void> {
