@@ -25,13 +25,8 @@ void WirePacket::set_path(std::string_view path) {
 }
 
 Result<SharedMessage*> WirePacket::message(const TypeRegistry& types) {
-  auto& message = message_.message;
-  if (!message.entries.empty()) return &message_;
-  if (auto written = write_wire_packet(message, path_, member_, value_, time_, types); !written) {
-    message.clear();
-    return written.error();
-  }
-  return &message_;
+  return message_.pack(
+      [&](Message& message) { return write_wire_packet(message, path_, member_, value_, time_, types); });
 }
 
 Result<WireValue> read_wire_value(const Message& message, const MessageEntry& entry, const MemberDefinition& member,

@@ -15,6 +15,16 @@ class SharedMessage {
  public:
   Message message;
 
+  /// Has `write(message)` fill in the message, unless that is done already; where it fails the message stays empty.
+  template <class Write>
+  Result<SharedMessage*> pack(Write&& write) {
+    if (!message.entries.empty()) return this;
+    if (auto written = write(message); !written) {
+      message.clear();
+      return written.error();
+    }
+    return this;
+  }
   /// The same as encode() of `message`. Its entries and metadata stay as they are from the first call on.
   [[nodiscard]] Result<> encode(const EncodeOptions& options, EncodedMessage& out);
   /// `message` may be changed again.
