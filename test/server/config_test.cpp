@@ -245,7 +245,7 @@ TEST_CASE("mistakes are named by path, with what was found and expected") {
   finds(R"({"devices": []})", "gateway.json: /listen: missing; expected an array");
   finds(R"({"listen": ["127.0.0.1:0"]})", "gateway.json: /devices: missing");
   finds(R"({"listen": [], "devices": []})", "gateway.json: /listen: empty");
-  finds(with(R"("listn": 1)"), "gateway.json: /listn: unknown option; known here: listen, devices, discover");
+  finds(with(R"("listn": 1)"), "gateway.json: /listn: unknown option; known here: $schema, listen, devices, discover");
   finds(with(R"("a/b~c": 1)"), "gateway.json: /a~1b~0c: unknown");
   finds(with(R"("limits": {"clents": 1})"), "gateway.json: /limits/clents: unknown option", "clients_per_address");
   finds(with(R"("limits": 3)"), "gateway.json: /limits: found integer 3, expected an object");
