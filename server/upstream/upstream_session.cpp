@@ -1,0 +1,241 @@
+// How a session with a service of a device is opened, kept open, rested and lost. Layer: server/upstream.
+#include <algorithm>
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/use_awaitable.hpp>
+
+#include "node/client/async_object.hpp"
+#include "server/log/log.hpp"
+#include "server/upstream/upstream.hpp"
+
+namespace rrgate {
+
+namespace asio = boost::asio;
+
+namespace {
+
+constexpr auto wait_token = asio::as_tuple(asio::use_awaitable);
+
+using ConnectionPtr = std::shared_ptr<rr::ClientConnection>;
+
+rr::awaitable<ConnectionPtr> begin_session(std::unique_ptr<rr::ByteStream> stream, rr::ClientOptions options) {
+  const auto executor = stream->executor();
+  constexpr asio::use_awaitable_t<> token;
+  return asio::async_initiate<const asio::use_awaitable_t<>, void(std::exception_ptr, ConnectionPtr)>(
+      [executor, stream = std::move(stream), options = std::move(options)](auto handler) mutable {
+        const rr::detail::CompleteOnce<ConnectionPtr, decltype(handler)> complete(std::move(handler), executor);
+        rr::ClientConnection::open(std::move(stream), std::move(options), complete);
+      },
+      token);
+}
+
+}  // namespace
+
+rr::awaitable<rr::Result<>> Upstream::open() {
+  const auto self = shared_from_this();
+  const bool has_login = !login_.username.empty();
+  // One login is for all services of a device, which may want it while they are connected to, later, or not at all:
+  // that is found out without it.
+  const bool is_for_all = has_login && use_ == UpstreamUse::all_clients;
+  // Named: g++ 12 destroys twice what is made for a coroutine within the co_await expression.
+  const std::string nobody;
+  const std::string user = login_.username;
+  const auto& first = is_for_all || login_.is_late ? nobody : user;
+  auto opened = co_await open_connection(first, false);
+  const bool wants_user = !opened && opened.error().code == rr::ErrorCode::authentication_error;
+  // Whoever has no login may look at the service, and so may his clients; what they do is for the device to refuse.
+  requires_user_ = wants_user && !has_login;
+  if (requires_user_) opened = co_await open_connection(nobody, true);
+  if (wants_user && is_for_all) opened = co_await open_connection(user, false);
+  if (!opened) co_return opened.error();
+  if (login_.is_late || (is_for_all && !wants_user)) {
+    const auto done = co_await log_in(*opened);
+    const bool knows_no_users = !done && done.error().code == rr::ErrorCode::invalid_operation;
+    if (!done && !(is_for_all && knows_no_users)) {
+      (*opened)->disconnect();
+      co_return done.error();
+    }
+  }
+  if (is_closed_) {
+    (*opened)->disconnect();
+    co_return rr::make_error(rr::ErrorCode::connection_error, "the session is not wanted any more");
+  }
+  connection_ = std::move(*opened);
+  connection_->on_closed([weak = weak_from_this(), which = connection_.get()](const rr::Error& reason) {
+    const auto still_there = weak.lock();
+    if (still_there && still_there->connection_.get() == which) still_there->lost(reason);
+  });
+  connection_->on_path_released([weak = weak_from_this()](const std::string& path) {
+    if (const auto still_there = weak.lock()) still_there->handle_released(path);
+  });
+  loss_.reset();
+  if (auto taken = take_over_definitions(connection_->session().types()); !taken) {
+    break_off();
+    co_return taken;
+  }
+  if (const auto* root = object_type(service_)) watch_object(service_, *root);
+  look_up_again();
+  co_return rr::Result<>();
+}
+
+rr::awaitable<rr::Result<std::shared_ptr<rr::ClientConnection>>> Upstream::open_connection(std::string username,
+                                                                                           bool is_stepwise) {
+  auto stream = co_await device_->connect();
+  if (!stream) co_return rr::make_error(rr::ErrorCode::connection_error, device_->offline_text(stream.error()));
+  const auto& url = device_->config().url;
+  rr::ClientOptions options;
+  options.service = service_;
+  options.connection.self.name = "rrgate";
+  options.connection.target = {url.node_id.value_or(rr::NodeId{}), url.node_name};
+  if (is_stepwise) options.connection.features.combined_v2 = options.connection.features.combined_v4 = false;
+  if (!username.empty()) {
+    options.username = std::move(username);
+    options.credentials = rr::Value(login_.credentials);
+  }
+  try {
+    co_return co_await begin_session(std::move(*stream), std::move(options));
+  } catch (const rr::Exception& exception) {
+    co_return exception.error();
+  }
+}
+
+/// Errors   also invalid_operation: the service knows no users.
+rr::awaitable<rr::Result<>> Upstream::log_in(std::shared_ptr<rr::ClientConnection> connection) {
+  const rr::AsyncObject root(connection, service_);
+  const rr::Value credentials(login_.credentials);
+  try {
+    co_await root.authenticate(login_.username, credentials);
+  } catch (const rr::Exception& exception) {
+    co_return exception.error();
+  }
+  co_return rr::Result<>();
+}
+
+void Upstream::close(std::function<void()> closed) {
+  is_closed_ = true;
+  wake_.cancel();
+  attempted_.cancel();
+  const auto connection = std::exchange(connection_, nullptr);
+  if (!connection) {
+    if (closed) closed();
+    return;
+  }
+  if (closed) connection->on_closed([closed = std::move(closed)](const rr::Error&) { closed(); });
+  connection->disconnect();
+  tell_lost(lost_error());
+}
+
+void Upstream::keep_open(Retry retry, std::function<rr::Result<>()> is_used) {
+  asio::co_spawn(device_->executor(), run(shared_from_this(), retry, std::move(is_used)), asio::detached);
+}
+
+rr::awaitable<void> Upstream::run(std::shared_ptr<Upstream> self, Retry retry, std::function<rr::Result<>()> is_used) {
+  const std::string device = self->device_->config().name;
+  auto wait = retry.min;
+  while (!self->is_closed_) {
+    rr::Result<> done;
+    self->is_attempting_ = true;
+    if (!self->is_open()) done = co_await self->open();
+    if (done && is_used && !self->is_closed_) done = is_used();
+    self->is_attempting_ = self->is_waking_ = false;
+    if (!done) self->last_error_ = done.error();
+    ++self->attempts_;
+    self->attempted_.cancel();
+    if (self->is_closed_) break;
+    if (done) {
+      log(LogLevel::info, "session open", {{"device", device}, {"service", self->service_}});
+      wait = retry.min;
+      if (co_await self->watch_use()) {
+        log(LogLevel::info, "session rests", {{"device", device}, {"service", self->service_}});
+        co_await self->rest();
+        continue;
+      }
+      if (self->is_closed_) break;
+      log(LogLevel::info, "session lost",
+          {{"device", device}, {"service", self->service_}, {"clients", self->clients_.size()}});
+    } else {
+      self->break_off();
+      const auto level = self->use_ == UpstreamUse::all_clients ? LogLevel::warning : LogLevel::debug;
+      log(level, "session can't be opened",
+          {{"device", device}, {"service", self->service_}, {"error", done.error().message}});
+    }
+    self->wake_.expires_after(with_jitter(wait));
+    co_await self->wake_.async_wait(wait_token);
+    wait = std::min(wait * 2, retry.max);
+  }
+}
+
+rr::awaitable<bool> Upstream::watch_use() {
+  while (is_open() && !is_closed_) {
+    const bool may_rest = clients_.empty() && rests_after_ > rests_after_.zero();
+    wake_.expires_at(may_rest ? std::chrono::steady_clock::now() + rests_after_
+                              : asio::steady_timer::time_point::max());
+    const auto [cancelled] = co_await wake_.async_wait(wait_token);
+    if (may_rest && !cancelled && clients_.empty() && is_open()) co_return true;
+  }
+  co_return false;
+}
+
+rr::awaitable<void> Upstream::rest() {
+  std::exchange(connection_, nullptr)->disconnect();
+  is_resting_ = true;
+  wake_.expires_at(asio::steady_timer::time_point::max());
+  while (is_resting_ && !is_closed_) co_await wake_.async_wait(wait_token);
+  is_resting_ = false;
+}
+
+void Upstream::wake() {
+  if (!is_resting_) return;
+  is_resting_ = false;
+  is_waking_ = true;
+  wake_.cancel();
+}
+
+rr::awaitable<rr::Result<>> Upstream::opened() {
+  const auto self = shared_from_this();
+  if (is_open() && !is_attempting_) co_return rr::Result<>();
+  const auto before = attempts_;
+  wake();
+  wake_.cancel();
+  while (attempts_ == before && !is_closed_) co_await attempted_.async_wait(wait_token);
+  if (!connection_) co_return last_error_;
+  co_return rr::Result<>();
+}
+
+void Upstream::break_off() {
+  if (const auto connection = connection_) connection->disconnect();
+}
+
+rr::Error Upstream::lost_error() const {
+  return rr::make_error(rr::ErrorCode::connection_error,
+                        "connection_lost: device " + rr::quoted(device_->config().name) +
+                            (loss_ ? ": " + loss_->message : std::string(" is not connected")));
+}
+
+void Upstream::lost(const rr::Error& reason) {
+  connection_.reset();
+  loss_ = reason;
+  generators_.clear();
+  for (const auto& [key, wire] : wires_) wire->is_attached = false;
+  for (auto& [number, pipe] : pipes_) {
+    pipe.state = PipeState::detached;
+    pipe.is_held = false;
+  }
+  const auto clients = clients_;  // they may leave
+  for (auto* client : clients)
+    if (has(*client)) acknowledge_all(*client);
+  locks_->handle_lost(*this);
+  device_->note_trouble();
+  tell_lost(lost_error());
+  wake_.cancel();
+}
+
+void Upstream::tell_lost(const rr::Error& reason) {
+  const auto self = shared_from_this();
+  const auto clients = clients_;  // they may leave
+  for (auto* client : clients)
+    if (has(*client)) client->connection_lost(reason);
+}
+
+}  // namespace rrgate
