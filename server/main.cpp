@@ -17,6 +17,19 @@ int main(int count, char** values) {
       {"passwd", "passwd FILE NAME [--roles A,B] [--delete]", "set a user's password and roles", rrgate::run_passwd},
       {"token", "token FILE NAME [--roles A,B] [--days N] [--delete]", "make an API token", rrgate::run_token},
       {"health", "health [--ready] [HOST:PORT]", "ask a running gateway whether it is well", rrgate::run_health},
+      {"ls", "ls [URL] [--type TYPE] [--wait SECONDS] [--json]", "list services: around here, of a node, of a gateway",
+       rrgate::run_ls},
+      {"info", "info URL [OBJECT] [--json]", "say what an object is and has", rrgate::run_info},
+      {"robdef", "robdef URL", "print the service definitions of a service", rrgate::run_robdef},
+      {"get", "get URL MEMBER [--json]", "print a property, a wire's newest value, a memory", rrgate::run_get},
+      {"set", "set URL MEMBER VALUE", "write a property or a wire", rrgate::run_set},
+      {"call", "call URL FUNCTION [ARGUMENT...] [--json]", "call a function and print what it returns",
+       rrgate::run_call},
+      {"watch", "watch URL MEMBER [--count N] [--for SECONDS] [--json | --csv]",
+       "print values of a wire, packets of a pipe, events", rrgate::run_watch},
+      {"ping", "ping URL [--count N] [--json]", "time requests to a service", rrgate::run_ping},
+      {"proxy", "proxy URL [--port N] [--name NAME] [--relay]", "run a gateway for one device, without a file",
+       rrgate::run_proxy},
   };
   const std::vector<std::string_view> arguments(values + 1, values + count);
   return rrgate::run_command_line(commands, arguments);

@@ -1,6 +1,7 @@
 #include "server/cli/command.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cstdio>
 #include <iostream>
 
@@ -57,7 +58,10 @@ ParsedArguments parse_arguments(Arguments arguments, const KnownOptions& known) 
   ParsedArguments out;
   for (std::size_t i = 0; i < arguments.size(); ++i) {
     const auto argument = arguments[i];
-    if (argument.substr(0, 1) != "-" || argument.size() == 1) {
+    // "-" is standard input, "-5" a value.
+    const bool is_operand =
+        !argument.starts_with("-") || argument.size() == 1 || (argument[1] >= '0' && argument[1] <= '9');
+    if (is_operand) {
       out.operands.emplace_back(argument);
       continue;
     }
@@ -89,6 +93,17 @@ ParsedArguments parse_arguments(Arguments arguments, const KnownOptions& known) 
     }
   }
   return out;
+}
+
+std::optional<std::uint64_t> number_option(const ParsedArguments& parsed, std::string_view name, std::uint64_t absent,
+                                           std::uint64_t largest) {
+  const auto found = parsed.options.find(name);
+  if (found == parsed.options.end()) return absent;
+  const auto& text = found->second;
+  std::uint64_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || end != text.data() + text.size() || number > largest) return std::nullopt;
+  return number;
 }
 
 int report_failure(std::string_view command, std::string_view what) {

@@ -42,6 +42,10 @@ struct ParsedArguments {
 };
 ParsedArguments parse_arguments(Arguments arguments, const KnownOptions& known);
 
+/// A whole number of an option; `absent` without it. nullopt: it is none, or above `largest`.
+std::optional<std::uint64_t> number_option(const ParsedArguments& parsed, std::string_view name, std::uint64_t absent,
+                                           std::uint64_t largest);
+
 /// Prints "rrgate NAME: what" and how to get help to stderr; returns exit_usage.
 int usage_error(std::string_view command, std::string_view what);
 /// Prints "rrgate NAME: what" to stderr; returns exit_failed.
@@ -58,5 +62,14 @@ int run_cert(Arguments arguments);
 int run_passwd(Arguments arguments);
 int run_token(Arguments arguments);
 int run_health(Arguments arguments);
+int run_ls(Arguments arguments);
+int run_info(Arguments arguments);
+int run_robdef(Arguments arguments);
+int run_get(Arguments arguments);
+int run_set(Arguments arguments);
+int run_call(Arguments arguments);
+int run_watch(Arguments arguments);
+int run_ping(Arguments arguments);
+int run_proxy(Arguments arguments);
 
 }  // namespace rrgate

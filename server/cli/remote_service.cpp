@@ -1,0 +1,236 @@
+#include "server/cli/remote_service.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cstdlib>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+
+#include "node/tls/base64.hpp"
+#include "server/http/split_path.hpp"
+#include "server/json/value_from_json.hpp"
+
+namespace rrgate {
+
+namespace {
+
+std::string environment(const char* name) {
+  const char* value = std::getenv(name);
+  return value ? value : "";
+}
+
+std::chrono::milliseconds parse_timeout(std::string_view text) {
+  double seconds = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seconds);
+  if (error != std::errc() || end != text.data() + text.size() || !(seconds > 0 && seconds <= 86'400))
+    throw NotUnderstood("--timeout " + rr::quoted(text) + ": expected seconds, 86400 at most");
+  return std::chrono::milliseconds(static_cast<std::int64_t>(seconds * 1000));
+}
+
+/// "http://h:1/devices/arm?service=Arm" as "rr+ws://h:1/devices/arm?service=Arm"; empty for URLs of other schemes.
+std::string gateway_url(std::string_view url) {
+  for (const auto& [web, native] : {std::pair{"http://", "rr+ws://"}, std::pair{"https://", "rr+wss://"}})
+    if (url.starts_with(web)) return native + std::string(url.substr(std::string_view(web).size()));
+  return {};
+}
+
+std::string_view login_header(const std::string& user, const std::string& password, const std::string& token,
+                              std::string& out) {
+  if (!token.empty())
+    out = "Bearer " + token;
+  else if (!user.empty())
+    out = "Basic " + rr::encode_base64(rr::as_bytes(user + ":" + password));
+  return out;
+}
+
+int exit_code_of(rr::ErrorCode code) {
+  using enum rr::ErrorCode;
+  switch (code) {
+    case connection_error:
+    case request_timeout:
+    case node_not_found:
+    case service_not_found:
+    case endpoint_communication_fatal_error:
+      return exit_unreachable;
+    case authentication_error:
+    case permission_denied:
+    case object_locked_error:
+      return exit_refused;
+    case read_only_member:
+    case write_only_member:
+      return exit_usage;
+    default:
+      return exit_device_error;
+  }
+}
+
+/// What a gateway refuses a WebSocket for, it says in HTTP.
+bool is_refusal(std::string_view text) {
+  return text.find("refused with status 401") != std::string_view::npos ||
+         text.find("refused with status 403") != std::string_view::npos;
+}
+
+std::string member_names(const rr::EntityDefinition& type) {
+  std::string out;
+  for (const auto& member : type.members) out += (out.empty() ? "" : ", ") + member.name;
+  return out.empty() ? "none" : out;
+}
+
+std::string read_all(std::istream& in) {
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+}  // namespace
+
+RemoteAddress remote_address(std::string_view url, const ParsedArguments& parsed) {
+  RemoteAddress out;
+  const auto option = [&](std::string_view name) {
+    const auto found = parsed.options.find(name);
+    return found == parsed.options.end() ? std::string() : found->second;
+  };
+  if (const auto timeout = option("--timeout"); !timeout.empty()) out.timeout = parse_timeout(timeout);
+  out.options.request_timeout = out.options.connect_timeout = out.timeout;
+  const auto user = option("--user");
+  const auto password = environment("RRGATE_PASSWORD");
+  if (!user.empty() && password.empty())
+    throw NotUnderstood("--user needs the password in the environment: RRGATE_PASSWORD");
+  out.url = gateway_url(url);
+  if (out.url.empty()) {
+    out.url = url;
+    out.options.username = user;
+    rr::MapString credentials;
+    credentials.items.emplace_back("password", rr::Value(password));
+    if (!user.empty()) out.options.credentials = rr::Value(std::move(credentials));
+  } else {
+    std::string header;
+    if (!login_header(user, password, environment("RRGATE_TOKEN"), header).empty())
+      out.options.dial.headers.emplace_back("Authorization", header);
+  }
+  if (const auto parsed_url = rr::parse_url(out.url, rr::ServiceInUrl::optional); !parsed_url)
+    throw NotUnderstood(parsed_url.error().message);
+  return out;
+}
+
+rr::RemoteObject open_service(const RemoteAddress& address) {
+  if (const auto parsed = rr::parse_url(address.url); !parsed)
+    throw NotUnderstood(parsed.error().message + "; rrgate ls lists services");
+  return rr::connect(address.url, address.options);
+}
+
+RemoteMember find_member(const rr::RemoteObject& root, std::string_view path) {
+  RemoteMember out{root};
+  const auto look_at = [&](const rr::RemoteObject& object) {
+    out.object = object;
+    out.type = out.types().find_entity(object.type_name());
+    if (!out.type) throw NotUnderstood("the type of " + rr::quoted(object.path()) + " is not known");
+  };
+  look_at(root);
+  const auto segments = split_path(path);
+  if (!segments)
+    throw NotUnderstood(rr::quoted(path) + " is no path of a member; expected \"position\" or \"axes/0/position\"");
+  for (std::size_t i = 0; i < segments->size(); ++i) {
+    const auto& name = (*segments)[i];
+    const auto* member = out.type->find_member(name);
+    if (!member)
+      throw NotUnderstood("no member " + rr::quoted(name) + " in " + out.type->qualified_name +
+                          "; it has: " + member_names(*out.type));
+    if (member->kind != rr::MemberKind::objref) {
+      if (i + 1 != segments->size()) throw NotUnderstood(rr::quoted(name) + " is no object: nothing is below it");
+      out.member = member;
+      break;
+    }
+    const bool is_indexed =
+        member->type.array != rr::ArrayKind::none || member->type.container != rr::ContainerKind::none;
+    if (is_indexed && ++i == segments->size())
+      throw NotUnderstood("objref " + rr::quoted(name) + " needs an index: " + name + "/INDEX");
+    look_at(is_indexed ? out.object.object(name, (*segments)[i]) : out.object.object(name));
+  }
+  return out;
+}
+
+std::string_view kind_name(rr::MemberKind kind) {
+  using enum rr::MemberKind;
+  switch (kind) {
+    case property:
+      return "property";
+    case function:
+      return "function";
+    case event:
+      return "event";
+    case objref:
+      return "objref";
+    case pipe:
+      return "pipe";
+    case callback:
+      return "callback";
+    case wire:
+      return "wire";
+    case memory:
+      return "memory";
+    default:
+      return "member";
+  }
+}
+
+void expect_kind(const RemoteMember& found, const std::vector<rr::MemberKind>& kinds, std::string_view verb) {
+  std::string expected;
+  for (const auto kind : kinds) {
+    if (found.member && found.member->kind == kind) return;
+    expected += (expected.empty() ? "" : ", ") + std::string(kind_name(kind));
+  }
+  const auto what = found.member
+                        ? rr::quoted(found.member->name) + " is a " + std::string(kind_name(found.member->kind))
+                        : rr::quoted(found.object.path()) + " is an object";
+  throw NotUnderstood(what + "; " + std::string(verb) + " expects one of: " + expected);
+}
+
+rr::Json read_json_argument(std::string_view text, const rr::TypeDefinition& type) {
+  std::string content(text);
+  if (text == "-") {
+    content = read_all(std::cin);
+  } else if (text.starts_with("@")) {
+    std::ifstream file{std::string(text.substr(1)), std::ios::binary};
+    if (!file) throw NotUnderstood("file " + rr::quoted(text.substr(1)) + " can't be read");
+    content = read_all(file);
+  }
+  const bool takes_text = type.container == rr::ContainerKind::none &&
+                          (type.type == rr::DataType::string_t || type.type == rr::DataType::namedtype_t);
+  auto json = rr::read_json(content);
+  if (json && !(type.type == rr::DataType::string_t && takes_text && !json->is_string())) return std::move(*json);
+  // What a shell makes of "red" is red.
+  if (takes_text && (content.empty() || (content[0] != '{' && content[0] != '['))) return rr::Json(content);
+  throw NotUnderstood(rr::quoted(text) + " is not JSON: " + (json ? "expected a string" : json.error().message));
+}
+
+rr::OrderedJson to_json(const rr::Value& value, const rr::TypeDefinition& type, const rr::TypeRegistry& types) {
+  auto json = rr::value_to_json(value, type, types);
+  if (!json) throw rr::ClientException(json.error());
+  return std::move(*json);
+}
+
+void print_value(const rr::OrderedJson& json, bool is_json) {
+  if (is_json)
+    std::cout << rr::write_json(json);
+  else if (json.is_string())
+    std::cout << json.get_ref<const std::string&>();
+  else
+    std::cout << json.dump(json.is_object() ? 2 : -1);
+  std::cout << std::endl;  // whoever reads a pipe sees each value as it comes
+}
+
+int run_remote(std::string_view command, std::string_view url, const std::function<int()>& run) {
+  const auto tell = [&](std::string_view what, int code) {
+    std::cerr << "rrgate " << command << ": " << url << ": " << what << "\n";
+    return code;
+  };
+  try {
+    return run();
+  } catch (const NotUnderstood& mistake) {
+    return tell(mistake.what(), exit_usage);
+  } catch (const rr::Exception& failure) {
+    return tell(failure.what(), is_refusal(failure.what()) ? exit_refused : exit_code_of(failure.error().code));
+  }
+}
+
+}  // namespace rrgate

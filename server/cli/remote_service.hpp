@@ -1,0 +1,73 @@
+// What the commands share that use a service: opening it, finding its members, JSON in and out. Layer: server/cli.
+#pragma once
+
+#include <chrono>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "node/client/client.hpp"
+#include "server/cli/command.hpp"
+#include "server/json/value_to_json.hpp"
+
+namespace rrgate {
+
+/// Exit codes of commands that use a service, beside those of all commands.
+enum RemoteExitCode {
+  exit_unreachable = 3,   ///< not reached, lost, or no answer in time
+  exit_refused = 4,       ///< login, rights or a lock
+  exit_device_error = 5,  ///< the service answered with an error
+};
+
+/// A request that makes no sense for the service at hand: exit_usage.
+class NotUnderstood : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// What all these commands take: --timeout SECONDS, --user NAME, --json.
+inline constexpr std::string_view remote_options[] = {"--timeout", "--user"};
+inline constexpr std::string_view remote_flags[] = {"--json"};
+
+/// How a service is reached. The password of --user is that of $RRGATE_PASSWORD; a gateway's token that of
+/// $RRGATE_TOKEN.
+struct RemoteAddress {
+  std::string url;  ///< a Robot Raconteur URL
+  rr::ConnectOptions options = {};
+  std::chrono::milliseconds timeout{10'000};
+};
+
+/// `url`  a Robot Raconteur URL, or a gateway's "http(s)://HOST:PORT/devices/NAME?service=SERVICE", where the login is
+/// the
+///        gateway's. Throws   NotUnderstood.
+RemoteAddress remote_address(std::string_view url, const ParsedArguments& parsed);
+rr::RemoteObject open_service(const RemoteAddress& address);
+
+/// A member, or with null the object itself.
+struct RemoteMember {
+  rr::RemoteObject object;
+  const rr::EntityDefinition* type = nullptr;
+  const rr::MemberDefinition* member = nullptr;
+
+  const rr::TypeRegistry& types() const { return object.connection().asynchronous().session().types(); }
+};
+
+/// Walks from the root object along a path as HTTP has it: "axes/0/position". Throws   NotUnderstood: no such member;
+/// ClientException.
+RemoteMember find_member(const rr::RemoteObject& root, std::string_view path);
+/// Throws   NotUnderstood: it is of no kind that is listed.
+void expect_kind(const RemoteMember& found, const std::vector<rr::MemberKind>& kinds, std::string_view verb);
+std::string_view kind_name(rr::MemberKind kind);
+
+/// JSON as it was written, of a file ("@name") or of standard input ("-"); other text where the type takes text.
+/// Throws   NotUnderstood.
+rr::Json read_json_argument(std::string_view text, const rr::TypeDefinition& type);
+/// Throws   rr::Exception: text of the device that is not UTF-8.
+rr::OrderedJson to_json(const rr::Value& value, const rr::TypeDefinition& type, const rr::TypeRegistry& types);
+/// For people: text without quotes, structures over several lines. With --json: one line.
+void print_value(const rr::OrderedJson& json, bool is_json);
+
+/// Runs a command: what it throws becomes one sentence and an exit code.
+int run_remote(std::string_view command, std::string_view url, const std::function<int()>& run);
+
+}  // namespace rrgate

@@ -1,0 +1,158 @@
+// rrgate watch: values of a wire, packets of a pipe, events, one line each. Layer: server/cli.
+#include <charconv>
+#include <csignal>
+#include <ctime>
+#include <iomanip>
+#include <iostream>
+
+#include "server/cli/remote_service.hpp"
+#include "server/json/arguments.hpp"
+
+namespace rrgate {
+
+namespace {
+
+using std::chrono::steady_clock;
+
+volatile std::sig_atomic_t is_interrupted = 0;
+
+void interrupt(int) {
+  is_interrupted = 1;
+}
+
+enum class WatchForm : std::uint8_t { text, json, csv };
+
+std::string time_text(bool is_short) {
+  const auto now = std::chrono::system_clock::now();
+  const auto seconds = std::chrono::system_clock::to_time_t(now);
+  const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(now.time_since_epoch()).count() % 1000;
+  std::tm parts{};
+  if (is_short)
+    ::localtime_r(&seconds, &parts);
+  else
+    ::gmtime_r(&seconds, &parts);
+  char text[40];
+  const auto size = std::strftime(text, sizeof(text), is_short ? "%H:%M:%S" : "%Y-%m-%dT%H:%M:%S", &parts);
+  char fraction[8];
+  std::snprintf(fraction, sizeof(fraction), ".%03d", static_cast<int>(ms));
+  return std::string(text, size) + fraction + (is_short ? "" : "Z");
+}
+
+std::string csv_cell(const rr::Json& value) {
+  if (!value.is_string()) return value.is_null() ? "" : value.dump();
+  const auto& text = value.get_ref<const std::string&>();
+  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
+  std::string out = "\"";
+  for (const char each : text) out += each == '"' ? std::string("\"\"") : std::string(1, each);
+  return out + "\"";
+}
+
+/// Prints what comes, and counts it.
+class ValuePrinter {
+ public:
+  ValuePrinter(WatchForm form, std::uint64_t limit) : form_(form), limit_(limit) {}
+
+  void print(const rr::OrderedJson& value) {
+    if (is_done()) return;
+    ++count_;
+    if (form_ == WatchForm::csv) return print_csv(value);
+    if (form_ == WatchForm::text) {
+      std::cout << time_text(true) << "  " << rr::write_json(value) << std::endl;
+      return;
+    }
+    auto line = rr::OrderedJson::object();
+    line["time"] = time_text(false);
+    line["value"] = value;
+    std::cout << rr::write_json(line) << std::endl;
+  }
+  std::uint64_t count() const { return count_; }
+  bool is_done() const { return limit_ != 0 && count_ >= limit_; }
+
+ private:
+  /// A column for each number of the first value, named by its place: "/position/0".
+  void print_csv(const rr::OrderedJson& value) {
+    const auto cells = rr::Json::parse(rr::write_json(value)).flatten();
+    if (columns_.empty()) {
+      std::cout << "time";
+      for (const auto& [place, cell] : cells.items()) {
+        columns_.push_back(place);
+        std::cout << "," << csv_cell(place.empty() ? "value" : place);
+      }
+      std::cout << "\n";
+    }
+    std::cout << time_text(false);
+    for (const auto& column : columns_) {
+      const auto cell = cells.find(column);
+      std::cout << "," << (cell == cells.end() ? "" : csv_cell(*cell));
+    }
+    std::cout << std::endl;
+  }
+
+  WatchForm form_;
+  std::uint64_t limit_;
+  std::uint64_t count_ = 0;
+  std::vector<std::string> columns_;
+};
+
+void begin_watching(const RemoteMember& found, ValuePrinter& printer) {
+  using enum rr::MemberKind;
+  expect_kind(found, {wire, pipe, event}, "watch");
+  const auto& member = *found.member;
+  const auto print = [&printer, &member, types = &found.types()](const rr::Value& value) {
+    printer.print(to_json(value, member.type, *types));
+  };
+  if (member.kind == wire) {
+    found.object.connect_wire(member.name, [print](const rr::Value& value, rr::TimeSpec) { print(value); });
+  } else if (member.kind == pipe) {
+    found.object.connect_pipe(member.name, print);
+  } else {
+    found.object.on_event(member.name, [&printer, &member, types = &found.types()](std::span<const rr::Value> values) {
+      const auto json = rr::arguments_to_json(values, member, *types, {});
+      if (!json) throw rr::ClientException(json.error());
+      printer.print(*json);
+    });
+  }
+}
+
+int watch(const RemoteMember& found, ValuePrinter& printer, std::optional<steady_clock::time_point> until) {
+  auto& connection = found.object.connection();
+  const auto begin = steady_clock::now();
+  begin_watching(found, printer);
+  is_interrupted = 0;
+  std::signal(SIGINT, interrupt);
+  std::signal(SIGTERM, interrupt);
+  const auto is_over = [&] {
+    return is_interrupted || printer.is_done() || connection.is_closed() || (until && steady_clock::now() >= *until);
+  };
+  while (!is_over()) connection.run_until(is_over, std::chrono::milliseconds(100));
+  const std::chrono::duration<double> seconds = steady_clock::now() - begin;
+  std::cerr << printer.count() << " values in " << std::fixed << std::setprecision(1) << seconds.count() << " s, "
+            << static_cast<double>(printer.count()) / seconds.count() << " /s\n";
+  if (connection.is_closed() && !printer.is_done())
+    throw rr::ClientException(rr::make_error(rr::ErrorCode::connection_error, "the connection was lost"));
+  return exit_ok;
+}
+
+}  // namespace
+
+int run_watch(Arguments arguments) {
+  constexpr std::string_view options[] = {"--timeout", "--user", "--count", "--for"};
+  constexpr std::string_view flags[] = {"--json", "--csv"};
+  const auto parsed = parse_arguments(arguments, {options, flags});
+  if (!parsed.error.empty()) return usage_error("watch", parsed.error);
+  if (parsed.operands.size() != 2) return usage_error("watch", "expected URL MEMBER");
+  const auto count = number_option(parsed, "--count", 0, 1'000'000'000);
+  const auto seconds = number_option(parsed, "--for", 0, 31'536'000);
+  if (!count || !seconds) return usage_error("watch", "--count and --for: expected a number");
+  auto form = parsed.flags.contains("--json") ? WatchForm::json : WatchForm::text;
+  if (parsed.flags.contains("--csv")) form = WatchForm::csv;
+  return run_remote("watch", parsed.operands[0], [&] {
+    ValuePrinter printer(form, *count);
+    const auto found = find_member(open_service(remote_address(parsed.operands[0], parsed)), parsed.operands[1]);
+    std::optional<steady_clock::time_point> until;
+    if (*seconds != 0) until = steady_clock::now() + std::chrono::seconds(*seconds);
+    return watch(found, printer, until);
+  });
+}
+
+}  // namespace rrgate

@@ -1,0 +1,201 @@
+"""The commands of rrgate that use a device, against Reynard the Robot: directly, and through a gateway with users and
+without."""
+import json
+import os
+import socket
+import subprocess
+import sys
+import time
+
+import pytest
+
+from gateways import RRGATE, Gateway
+from processes import BUILD, Background, free_port
+from users import PASSWORDS, make_users
+
+DONE, FAILED, NOT_UNDERSTOOD, UNREACHABLE, REFUSED, DEVICE_ERROR = range(6)
+RULES = [{"roles": ["viewer", "operator"], "may": ["read", "subscribe"]},
+         {"roles": ["operator"], "members": ["say", "color"], "may": ["write", "call"]}]
+
+
+class Ran:
+    def __init__(self, arguments, given="", environment={}):
+        done = subprocess.run([RRGATE, *map(str, arguments)], input=given, capture_output=True, text=True, timeout=30,
+                              env={**os.environ, **environment})
+        self.code, self.out, self.error = done.returncode, done.stdout, done.stderr
+
+    def refused(self, code, *words):
+        """Whether it ended so, with one sentence that has these words."""
+        assert self.code == code, (self.code, self.out, self.error)
+        assert self.out == "" and self.error.count("\n") == 1, (self.out, self.error)
+        assert all(word in self.error for word in words), self.error
+        return True
+
+
+def run(*arguments, **more):
+    ran = Ran(arguments, **more)
+    assert ran.code == DONE, (ran.code, ran.error)
+    return ran.out.strip()
+
+
+@pytest.fixture(scope="module")
+def reynard(tmp_path_factory):
+    log = tmp_path_factory.mktemp("reynard") / "log"
+    port = free_port()
+    device = Background([sys.executable, "-m", "reynard_the_robot", "--quiet", "--disable-ascii-socket",
+                         "--http-port", free_port(), f"--robotraconteur-tcp-port={port}"], log)
+
+    def is_listening():
+        with socket.socket() as probe:
+            return probe.connect_ex(("127.0.0.1", port)) == 0
+
+    device.wait_until(is_listening)
+    yield f"rr+tcp://127.0.0.1:{port}/?service=reynard"
+    device.stop()
+
+
+@pytest.fixture(scope="module", params=["directly", "shared", "relay"])
+def url(request, reynard, tmp_path_factory):
+    if request.param == "directly":
+        yield reynard
+        return
+    gateway = Gateway(tmp_path_factory.mktemp("gateway"),
+                      {"devices": [{"name": "fox", "url": reynard, "mode": request.param}]})
+    gateway.wait_for("device online")
+    yield f"http://127.0.0.1:{gateway.port}/devices/fox?service=reynard"
+    gateway.process.stop()
+
+
+@pytest.fixture(scope="module")
+def guarded(reynard, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("guarded")
+    make_users(folder)
+    gateway = Gateway(folder, {"devices": [{"name": "fox", "url": reynard, "mode": "shared"}],
+                               "access": {"users_file": "users", "rules": RULES}})
+    gateway.wait_for("device online")
+    yield f"http://127.0.0.1:{gateway.port}/devices/fox?service=reynard"
+    gateway.process.stop()
+
+
+def test_values_are_read_written_and_called(url):
+    run("set", url, "color", "[0.25, 0.5, 1]")
+    assert run("get", url, "color") == "[0.25,0.5,1.0]"
+    assert run("set", url, "color", "-", given="[1, 0, 0.5]") == ""
+    assert json.loads(run("get", url, "color", "--json")) == [1.0, 0.0, 0.5]
+    assert run("call", url, "say", "hello there") == ""
+    run("call", url, "setf_arm_position", "q2=-0.5", "q1=0.25", "0.125")
+    assert json.loads(run("call", url, "getf_arm_position")) == pytest.approx([0.25, -0.5, 0.125])
+    assert set(json.loads(run("get", url, "state", "--json"))) >= {"time", "robot_position", "arm_position"}
+
+
+def test_an_argument_may_be_a_file(reynard, tmp_path):
+    file = tmp_path / "color.json"
+    file.write_text("[0.5, 0.25, 0]")
+    run("set", reynard, "color", f"@{file}")
+    assert json.loads(run("get", reynard, "color")) == [0.5, 0.25, 0.0]
+    assert Ran(["set", reynard, "color", "@nowhere"]).refused(NOT_UNDERSTOOD, "'nowhere'")
+
+
+def test_what_a_service_has_is_told(url):
+    text = run("info", url)
+    assert "reynard: experimental.reynard_the_robot.Reynard" in text
+    assert "  function void teleport(double x, double y)" in text
+    assert "  wire ReynardState state [readonly]" in text
+    told = json.loads(run("info", url, "color", "--json"))
+    assert [member["kind"] for member in told["members"]] == ["property"]
+    assert "wire ReynardState state [readonly]" in run("robdef", url)
+
+
+def test_values_are_watched(url):
+    lines = [json.loads(line) for line in run("watch", url, "state", "--count", "3", "--json").splitlines()]
+    times = [line["value"]["time"] for line in lines]
+    assert len(times) == 3 and times == sorted(times)
+    header, *rows = run("watch", url, "state", "--count", "2", "--csv").splitlines()
+    assert header.startswith("time,/arm_position/0,") and len(rows) == 2
+    assert {row.count(",") for row in rows} == {header.count(",")}
+
+
+def test_events_are_watched(node, tmp_path):
+    """The simulated robot drives on until it bumps into something."""
+    port = free_port()
+    robot = Background([BUILD / "examples" / "demo" / "rrgate-demo-create", "--port", port], tmp_path / "log")
+    url = f"rr+tcp://127.0.0.1:{port}/?service=Create"
+    try:
+        robot.wait_until(lambda: Ran(["get", url, "DistanceTraveled"]).code == DONE)
+        watching = subprocess.Popen([RRGATE, "watch", url, "Bump", "--count", "1", "--json"], stdout=subprocess.PIPE,
+                                    text=True)
+        driver = node.ConnectService(url)  # it stops when the client that drives it goes
+        driver.Drive(500, 32767)
+        assert json.loads(watching.communicate(timeout=60)[0])["value"] == {}
+        assert watching.returncode == DONE
+        node.DisconnectService(driver)
+    finally:
+        robot.stop()
+
+
+def test_requests_are_timed(url):
+    times = json.loads(run("ping", url, "--count", "20", "--json"))
+    assert times["count"] == 20
+    assert 0 < times["min_ms"] <= times["p50_ms"] <= times["p99_ms"] <= times["max_ms"]
+    assert run("ping", url, "--count", "20").startswith("20 requests: min ")
+
+
+def test_services_are_listed(reynard, url):
+    if url == reynard:
+        found = json.loads(run("ls", reynard.split("?")[0], "--json"))
+        assert (found["node"], found["service"], found["type"]) == \
+            ("experimental.reynard_the_robot", "reynard", "experimental.reynard_the_robot.Reynard")
+        assert run("get", found["url"], "color").startswith("[")
+    else:
+        found = json.loads(run("ls", url.split("/devices/")[0], "--json"))
+        assert (found["node"], found["service"], found["url"]) == ("fox", "reynard", url)
+
+
+def test_mistakes_are_one_sentence(url):
+    assert Ran(["get", url, "colour"]).refused(NOT_UNDERSTOOD, "no member 'colour'", "it has: ", "color")
+    assert Ran(["get", url, "teleport"]).refused(NOT_UNDERSTOOD, "'teleport' is a function", "property")
+    assert Ran(["call", url, "teleport", "1"]).refused(NOT_UNDERSTOOD, "'y'", "teleport(double x, double y)")
+    assert Ran(["call", url, "teleport", "1", "2", "3"]).refused(NOT_UNDERSTOOD, "3 arguments")
+    assert Ran(["call", url, "teleport", "x=1", "x=2"]).refused(NOT_UNDERSTOOD, "'x' is given twice")
+    assert Ran(["call", url, "teleport", "far", "away"]).refused(NOT_UNDERSTOOD, "'far' is not JSON")
+    assert Ran(["set", url, "color", "red"]).refused(NOT_UNDERSTOOD, "'red' is not JSON")
+    assert Ran(["set", url, "robot_position", "[1, 2]"]).refused(NOT_UNDERSTOOD, "readonly")
+    assert Ran(["call", url, "teleport", "1e6", "0"]).refused(DEVICE_ERROR, "out of range")
+    assert Ran(["watch", url, "color"]).refused(NOT_UNDERSTOOD, "'color' is a property", "wire, pipe, event")
+
+
+def test_what_is_not_there_is_told_in_time():
+    nobody = f"rr+tcp://127.0.0.1:{free_port()}/?service=x"
+    assert Ran(["get", nobody, "a"]).refused(UNREACHABLE, "Connection refused")
+    with socket.create_server(("127.0.0.1", 0)) as silent:  # takes connections and says nothing
+        url = f"rr+tcp://127.0.0.1:{silent.getsockname()[1]}/?service=x"
+        began = time.monotonic()
+        assert Ran(["get", url, "a", "--timeout", "1"]).refused(UNREACHABLE, url)
+        assert time.monotonic() - began < 10
+    assert Ran(["get", "lab", "a"]).refused(NOT_UNDERSTOOD, "URL 'lab'")
+    assert Ran(["get", "rr+tcp://127.0.0.1:1/", "a"]).refused(NOT_UNDERSTOOD, "?service=NAME", "rrgate ls")
+    assert Ran(["get", nobody, "a", "--timeout", "never"]).refused(NOT_UNDERSTOOD, "--timeout 'never'")
+
+
+def test_logins_and_rights_of_a_gateway(guarded):
+    def as_user(name, password=None):
+        return {"given": "", "environment": {"RRGATE_PASSWORD": password or PASSWORDS[name]}}
+
+    assert run("get", guarded, "color", "--user", "vera", **as_user("vera")).startswith("[")
+    assert Ran(["set", guarded, "color", "[1, 1, 1]", "--user", "vera"], **as_user("vera")).refused(REFUSED, "vera")
+    run("set", guarded, "color", "[0, 0, 1]", "--user", "alice", **as_user("alice"))
+    assert Ran(["get", guarded, "color", "--user", "vera"], **as_user("vera", "guess")).refused(REFUSED, "401")
+    assert Ran(["get", guarded, "color"]).refused(REFUSED, "not logged in")
+    assert Ran(["get", guarded, "color", "--user", "vera"]).refused(NOT_UNDERSTOOD, "RRGATE_PASSWORD")
+
+
+def test_a_gateway_for_one_device_needs_no_file(reynard, tmp_path):
+    proxy = Background([RRGATE, "proxy", reynard, "--port", "0", "--name", "fox"], tmp_path / "log")
+    try:
+        base = proxy.next_line().split("rrgate proxy: ")[1].split("/ stands for")[0]
+        found = base + "/devices/fox?service=reynard"
+        proxy.wait_until(lambda: Ran(["get", found, "color"]).code == DONE)
+        assert json.loads(run("ls", base, "--json"))["url"] == found
+    finally:
+        proxy.stop()
+    assert Ran(["proxy", reynard, "--name", "a/b"]).refused(NOT_UNDERSTOOD, "'a/b'")
