@@ -1,5 +1,6 @@
 // rrgate proxy: a gateway for one device, without a file. Layer: server/cli.
 #include <iostream>
+#include <nlohmann/json.hpp>
 
 #include "server/cli/command.hpp"
 #include "server/cli/run_gateway.hpp"

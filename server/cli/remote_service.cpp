@@ -16,7 +16,7 @@ namespace rrgate {
 namespace {
 
 std::string environment(const char* name) {
-  const char* value = std::getenv(name);
+  const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): there is one thread
   return value ? value : "";
 }
 
