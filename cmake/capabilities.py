@@ -91,6 +91,14 @@ def containers():
                  "mount -t overlay o -o lowerdir=/mnt/low,upperdir=/mnt/up,workdir=/mnt/work /mnt/all")
 
 
+def debian_root():
+    """A fresh Debian to install packages into, by root."""
+    need_root()
+    need_programs("chroot", "dpkg", "mknod", "tar")
+    if not (DEPS / "package-base.tar").exists():
+        raise Lacking("there is no build/deps/package-base.tar, which mmdebstrap makes in ./dev test")
+
+
 def guest():
     """A virtual machine with a kernel that knows USB and FUSE: Debian's, in QEMU."""
     need_programs("qemu-system-x86_64", "cpio", "depmod", "modprobe", "busybox")
@@ -104,7 +112,7 @@ def systemd():
 
 
 CAPABILITIES = {"network": network, "packet-loss": packet_loss, "mount-namespaces": mount_namespaces,
-                "containers": containers, "guest": guest, "systemd": systemd}
+                "containers": containers, "debian-root": debian_root, "guest": guest, "systemd": systemd}
 
 
 @functools.cache

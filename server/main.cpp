@@ -7,7 +7,8 @@ int main(int count, char** values) {
   constexpr rrgate::Command commands[] = {
       {"serve", "serve --config FILE", "run the gateway", rrgate::run_serve},
       {"demo", "demo [--port N]", "run two simulated devices and a gateway to them", rrgate::run_demo},
-      {"check-config", "check-config FILE", "say what is wrong with a configuration", rrgate::run_check_config},
+      {"check-config", "check-config FILE [--as-service USER]", "say what is wrong with a configuration",
+       rrgate::run_check_config},
       {"check", "check [--compat] [-I DIR] FILE...", "say what is wrong with service definitions", rrgate::run_check},
       {"fmt", "fmt [--in-place | --check | --compat] FILE...", "print or lay out service definitions", rrgate::run_fmt},
       {"generate", "generate ts|cpp FILE...|URL [-o OUT] [-I DIR]", "write TypeScript types or C++ classes",

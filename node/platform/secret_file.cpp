@@ -8,24 +8,58 @@ namespace rr {
 
 namespace fs = std::filesystem;
 
-Result<> write_secret(const fs::path& path, std::string_view text, bool may_replace) {
+namespace {
+
+/// Whose a new file is to be, and with which mode.
+struct Keeper {
+  uid_t user = ::geteuid();
+  gid_t group = ::getegid();
+  mode_t mode = 0;
+};
+
+/// `alone` for the owner; where root writes into a folder of another group, that of the folder and `with_group`.
+Keeper keeper_in(const fs::path& folder, mode_t alone, mode_t with_group) {
+  Keeper keeper{.mode = alone};
+  struct stat about {};
+  if (::geteuid() != 0 || ::stat(folder.empty() ? "." : folder.c_str(), &about) != 0) return keeper;
+  if (about.st_gid == 0 || (about.st_mode & S_IXGRP) == 0 || (about.st_mode & S_IWOTH) != 0) return keeper;
+  return {about.st_uid, about.st_gid, with_group};
+}
+
+void make_secret_folder(const fs::path& folder) {
   std::error_code error;
-  if (!path.parent_path().empty() && !fs::exists(path.parent_path(), error)) {
-    fs::create_directories(path.parent_path(), error);
-    fs::permissions(path.parent_path(), fs::perms::owner_all, error);
-  }
+  if (folder.empty() || fs::exists(folder, error)) return;
+  const auto keeper = keeper_in(folder.parent_path(), S_IRWXU, S_IRWXU | S_IRGRP | S_IXGRP);
+  fs::create_directories(folder, error);
+  fs::permissions(folder, static_cast<fs::perms>(keeper.mode), error);
+  // Where that fails, so does writing, or the service says what it can't read.
+  if (keeper.group != ::getegid() && ::chown(folder.c_str(), keeper.user, keeper.group) != 0) return;
+}
+
+bool give_away(int file, const Keeper& keeper) {
+  const bool is_own = keeper.user == ::geteuid() && keeper.group == ::getegid();
+  return (is_own || ::fchown(file, keeper.user, keeper.group) == 0) && ::fchmod(file, keeper.mode) == 0;
+}
+
+}  // namespace
+
+Result<> write_secret(const fs::path& path, std::string_view text, bool may_replace, SecretReaders readers) {
+  std::error_code error;
+  make_secret_folder(path.parent_path());
   if (!may_replace && fs::exists(path, error))
     return make_error(ErrorCode::operation_failed, path.string() + ": is there already; --force replaces it");
+  auto keeper = readers == SecretReaders::folder_group
+                    ? keeper_in(path.parent_path(), S_IRUSR | S_IWUSR, S_IRUSR | S_IWUSR | S_IRGRP)
+                    : Keeper{.mode = S_IRUSR | S_IWUSR};
+  if (struct stat before{}; ::stat(path.c_str(), &before) == 0)
+    keeper = {before.st_uid, before.st_gid, S_IRUSR | S_IWUSR | (before.st_mode & S_IRGRP)};
   const auto fresh = path.string() + ".new";
   ::unlink(fresh.c_str());
   const int file = ::open(fresh.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
   bool is_written = file >= 0;
   if (is_written) {
-    struct stat before {};
-    if (::stat(path.c_str(), &before) == 0 && (before.st_uid != ::geteuid() || before.st_gid != ::getegid()))
-      is_written = ::fchown(file, before.st_uid, before.st_gid) == 0;
-    is_written = is_written && ::write(file, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
-                 ::fsync(file) == 0;
+    is_written = give_away(file, keeper) &&
+                 ::write(file, text.data(), text.size()) == static_cast<ssize_t>(text.size()) && ::fsync(file) == 0;
     ::close(file);
   }
   if (is_written) is_written = ::rename(fresh.c_str(), path.c_str()) == 0;

@@ -28,14 +28,17 @@ constexpr std::int64_t clock_slack = 3600;  // of machines in the lab, in second
 constexpr std::string_view node_ca = "node-ca";
 constexpr std::string_view web_ca = "web-ca";
 
-rr::Result<> write_pair(const fs::path& stem, const rr::CertificateAndKey& pair, std::string_view chain, bool force) {
+rr::Result<> write_pair(const fs::path& stem, const rr::CertificateAndKey& pair, std::string_view chain, bool force,
+                        rr::SecretReaders readers) {
   std::error_code error;
   for (const auto* ending : {".pem", ".key"})
     if (!force && fs::exists(stem.string() + ending, error))
       return rr::make_error(rr::ErrorCode::operation_failed,
                             stem.string() + ending + ": is there already; --force replaces it");
-  if (auto done = rr::write_secret(stem.string() + ".key", pair.key, force); !done) return done;
-  return rr::write_secret(stem.string() + ".pem", pair.certificate + std::string(chain), force);
+  if (auto done = rr::write_secret(stem.string() + ".key", pair.key, force, readers); !done) return done;
+  // Certificates are no secrets; the service that answers with one must read it, and so may it a CA's.
+  return rr::write_secret(stem.string() + ".pem", pair.certificate + std::string(chain), force,
+                          rr::SecretReaders::folder_group);
 }
 
 rr::Result<rr::CertificateAndKey> read_ca(const fs::path& folder, std::string_view name) {
@@ -73,7 +76,7 @@ int make_cas(const Wishes& wishes) {
     wish.ends_after_seconds = wishes.days * day;
     const auto made = rr::issue_certificate(wish, nullptr);
     if (!made) return report_failure("cert", made.error().message);
-    if (auto done = write_pair(wishes.folder / kind.file, *made, {}, wishes.force); !done)
+    if (auto done = write_pair(wishes.folder / kind.file, *made, {}, wishes.force, rr::SecretReaders::owner); !done)
       return report_failure("cert", done.error().message);
     std::cout << (wishes.folder / kind.file).string() << ".pem\n";
   }
@@ -143,7 +146,8 @@ int make_web(const Wishes& wishes) {
   for (auto& letter : name)
     if (letter == '*' || letter == ':') letter = '_';
   const auto stem = wishes.folder / name;
-  if (auto done = write_pair(stem, *made, {}, wishes.force); !done) return report_failure("cert", done.error().message);
+  if (auto done = write_pair(stem, *made, {}, wishes.force, rr::SecretReaders::folder_group); !done)
+    return report_failure("cert", done.error().message);
   std::cout << stem.string() << ".pem\n" << stem.string() << ".key\n";
   return exit_ok;
 }

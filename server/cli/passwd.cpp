@@ -114,7 +114,7 @@ int run_passwd(Arguments arguments) {
     if (!made) return report_failure("passwd", made.error().message);
     line = std::move(*made);
   }
-  if (auto done = rr::write_secret(file, with_line(text, name, line), true); !done)
+  if (auto done = rr::write_secret(file, with_line(text, name, line), true, rr::SecretReaders::folder_group); !done)
     return report_failure("passwd", done.error().message);
   std::cout << file << ": user " << rr::quoted(name)
             << (deletes          ? " is deleted"

@@ -57,7 +57,7 @@ int run_token(Arguments arguments) {
                                        rr::quoted(name) + (deletes ? "" : "; --delete takes it out"));
   const auto token = make_api_token();
   const auto line = deletes ? "" : name + " " + hash_api_token(token) + " " + format_roles(*roles) + " " + until;
-  if (auto done = rr::write_secret(file, with_line(text, name, line), true); !done)
+  if (auto done = rr::write_secret(file, with_line(text, name, line), true, rr::SecretReaders::folder_group); !done)
     return report_failure("token", done.error().message);
   if (deletes) {
     std::cout << file << ": token " << rr::quoted(name) << " is deleted\n";

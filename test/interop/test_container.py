@@ -204,9 +204,9 @@ def test_the_dashboard_asks_for_what_there_is(tmp_path):
 def test_the_unit_is_one(tmp_path):
     """As systemd reads it, with a program that is there."""
     need("systemd")
-    for name in ("rrgate.service", "rrgate.socket"):
-        text = (ROOT / "gateway-config" / name).read_text()
-        (tmp_path / name).write_text(text.replace("/usr/bin/rrgate", "/bin/true"))
+    for name, source in (("rrgate.service", "rrgate.service.in"), ("rrgate.socket", "rrgate.socket")):
+        text = (ROOT / "gateway-config" / source).read_text()
+        (tmp_path / name).write_text(text.replace("@RRGATE_BINDIR@/rrgate", "/bin/true"))
     for name in ("rrgate.service", "rrgate.socket"):
         result = subprocess.run(["systemd-analyze", "verify", tmp_path / name], capture_output=True, text=True, timeout=60)
         assert (result.returncode, result.stderr) == (0, "")

@@ -1,0 +1,93 @@
+#!/usr/bin/env python3
+"""make_sbom.py --version V --output FILE PACKAGE.deb... package-lock.json...
+
+What a release is made of, as SPDX 2.3 in JSON: the packages, the shared libraries that dpkg-shlibdeps found they need, what
+they are compiled with (Depends of rrgate-dev), and the npm packages that are in the page or come with the client.
+Source: https://spdx.github.io/spdx-spec/v2.3/
+"""
+import argparse
+import datetime
+import hashlib
+import json
+import os
+import pathlib
+import re
+import subprocess
+
+
+def output_of(*command):
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+
+
+def package(name, version, url=None, checksum=None):
+    entry = {"SPDXID": "SPDXRef-" + re.sub(r"[^A-Za-z0-9.-]", "-", f"{name}-{version}"), "name": name, "versionInfo": version,
+             "downloadLocation": "NOASSERTION", "filesAnalyzed": False, "licenseConcluded": "NOASSERTION",
+             "licenseDeclared": "NOASSERTION", "copyrightText": "NOASSERTION"}
+    if url:
+        entry["externalRefs"] = [{"referenceCategory": "PACKAGE-MANAGER", "referenceType": "purl", "referenceLocator": url}]
+    if checksum:
+        entry["checksums"] = [{"algorithm": "SHA256", "checksumValue": checksum}]
+    return entry
+
+
+def debian_dependencies(deb):
+    """Name and version, as installed here, of what a package depends on."""
+    for each in output_of("dpkg-deb", "-f", deb, "Depends").split(","):
+        name = each.split("|")[0].split("(")[0].strip()
+        if name and not name.startswith("rrgate"):
+            try:
+                version = output_of("dpkg-query", "-W", "-f", "${Version}", name)
+            except subprocess.CalledProcessError:  # Boost may be unpacked beside another one
+                version = "unknown"
+            yield package(name, version, f"pkg:deb/debian/{name}@{version}")
+
+
+def npm_dependencies(lock):
+    for path, about in json.loads(lock.read_text())["packages"].items():
+        if path.startswith("node_modules/") and not about.get("dev") and not about.get("link"):
+            name, version = path.rpartition("node_modules/")[2], about["version"]
+            entry = package(name, version, f"pkg:npm/{name.replace('@', '%40')}@{version}")
+            entry["licenseDeclared"] = about.get("license", "NOASSERTION")
+            yield entry
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--version", required=True)
+    parser.add_argument("--output", required=True, type=pathlib.Path)
+    parser.add_argument("inputs", nargs="+", type=pathlib.Path)
+    arguments = parser.parse_args()
+    packages, relations = {}, set()
+    product = package("rrgate", arguments.version)
+    product["licenseDeclared"] = "Apache-2.0"
+    product["SPDXID"] = "SPDXRef-product"
+    packages[product["SPDXID"]] = product
+    for path in arguments.inputs:
+        if path.suffix == ".deb":
+            owner = package(path.name, arguments.version, checksum=hashlib.sha256(path.read_bytes()).hexdigest())
+            owner["licenseDeclared"] = "Apache-2.0"
+            packages[owner["SPDXID"]] = owner
+            relations.add((product["SPDXID"], "CONTAINS", owner["SPDXID"]))
+            needed = debian_dependencies(path)
+        else:
+            owner, needed = product, npm_dependencies(path)
+        for entry in needed:
+            packages[entry["SPDXID"]] = entry
+            relations.add((owner["SPDXID"], "DEPENDS_ON", entry["SPDXID"]))
+    made = datetime.datetime.fromtimestamp(int(os.environ["SOURCE_DATE_EPOCH"]), datetime.timezone.utc)
+    content = sorted(packages.values(), key=lambda entry: entry["SPDXID"])
+    digest = hashlib.sha256(json.dumps(content).encode()).hexdigest()
+    document = {
+        "spdxVersion": "SPDX-2.3", "dataLicense": "CC0-1.0", "SPDXID": "SPDXRef-DOCUMENT", "name": f"rrgate-{arguments.version}",
+        "documentNamespace": f"https://spdx.org/spdxdocs/rrgate-{arguments.version}-{digest}",
+        "creationInfo": {"created": made.strftime("%Y-%m-%dT%H:%M:%SZ"), "creators": ["Tool: make_sbom.py"]},
+        "packages": content,
+        "relationships": [{"spdxElementId": "SPDXRef-DOCUMENT", "relationshipType": "DESCRIBES",
+                           "relatedSpdxElement": "SPDXRef-product"}] +
+                         [{"spdxElementId": one, "relationshipType": kind, "relatedSpdxElement": other}
+                          for one, kind, other in sorted(relations)]}
+    arguments.output.write_text(json.dumps(document, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

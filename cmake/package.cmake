@@ -1,0 +1,55 @@
+# Debian packages, by CPack: rrgate (the program as a service) and rrgate-dev (the C++ API). ./dev package calls it, since the
+# packages also hold files that it makes in RRGATE_PACKAGE_FILES: the man page and the changelogs.
+set(RRGATE_PACKAGE_FILES "${PROJECT_SOURCE_DIR}/build/package/files" CACHE PATH "What ./dev package makes for packages")
+
+# Two components, "system" and "dev_system", that `cmake --install` leaves out: they have places outside of a prefix.
+install_unit("/lib/systemd/system" system EXCLUDE_FROM_ALL)
+install(FILES cmake/deb/gateway.json DESTINATION /etc/rrgate COMPONENT system EXCLUDE_FROM_ALL)
+install(FILES "${RRGATE_PACKAGE_FILES}/rrgate.1.gz" DESTINATION share/man/man1 COMPONENT system EXCLUDE_FROM_ALL)
+foreach(package rrgate rrgate-dev)
+  string(REPLACE "rrgate-dev" "dev_system" component "${package}")
+  string(REPLACE "rrgate" "system" component "${component}")
+  install(FILES cmake/deb/copyright "${RRGATE_PACKAGE_FILES}/${package}/changelog.gz"
+          DESTINATION share/doc/${package} COMPONENT ${component} EXCLUDE_FROM_ALL)
+endforeach()
+install(FILES "${RRGATE_PACKAGE_FILES}/CHANGELOG.md.gz" gateway-config/example.json DESTINATION share/doc/rrgate
+        COMPONENT system EXCLUDE_FROM_ALL)
+
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_NAME rrgate)
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "gateway for Robot Raconteur")
+set(CPACK_PACKAGE_VENDOR "the rrgate authors")
+set(CPACK_PACKAGE_CONTACT "the rrgate authors <maintainers@rrgate.invalid>")
+set(CPACK_PACKAGE_DIRECTORY "${PROJECT_SOURCE_DIR}/build/package")
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_COMPONENTS_ALL runtime system dev dev_system)
+set(CPACK_COMPONENTS_GROUPING ONE_PER_GROUP)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
+
+set(CPACK_DEBIAN_GATEWAY_DESCRIPTION
+"Serves Robot Raconteur devices to browsers and native clients through one port,
+with users, TLS, a dashboard and an interface for HTTP clients.")
+set(CPACK_DEBIAN_GATEWAY_PACKAGE_NAME rrgate)
+set(CPACK_DEBIAN_GATEWAY_PACKAGE_SECTION net)
+set(CPACK_DEBIAN_GATEWAY_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_GATEWAY_PACKAGE_DEPENDS adduser)
+set(CPACK_DEBIAN_GATEWAY_PACKAGE_CONTROL_EXTRA
+    "${PROJECT_SOURCE_DIR}/cmake/deb/conffiles;${PROJECT_SOURCE_DIR}/cmake/deb/postinst;${PROJECT_SOURCE_DIR}/cmake/deb/prerm;${PROJECT_SOURCE_DIR}/cmake/deb/postrm")
+set(CPACK_DEBIAN_API_DESCRIPTION
+"The C++ API: headers and static libraries for devices and clients in C++20, and
+for programs that have a gateway in them.")
+set(CPACK_DEBIAN_API_PACKAGE_NAME rrgate-dev)
+set(CPACK_DEBIAN_API_PACKAGE_SECTION libdevel)
+set(CPACK_DEBIAN_API_PACKAGE_DEPENDS
+    "rrgate (= ${PROJECT_VERSION}), libboost1.81-dev, libssl-dev, libusb-1.0-0-dev, libspdlog-dev, libjpeg62-turbo-dev, nlohmann-json3-dev, zlib1g-dev")
+
+include(CPack)
+cpack_add_component_group(gateway)
+cpack_add_component_group(api)
+cpack_add_component(runtime GROUP gateway)
+cpack_add_component(system GROUP gateway)
+cpack_add_component(dev GROUP api)
+cpack_add_component(dev_system GROUP api)

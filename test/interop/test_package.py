@@ -1,0 +1,145 @@
+"""The Debian package of the gateway, in a fresh Debian 12: installed by dpkg, run by the user, program and arguments of its unit."""
+import base64
+import json
+import re
+import shutil
+import ssl
+import subprocess
+import time
+
+import pytest
+
+from http_api import ask
+from machine import need
+from processes import BUILD, ROOT, START_DEADLINE, Background, free_port
+
+PACKAGES = ROOT / "build" / "package"
+BASE = ROOT / "build" / "deps" / "package-base.tar"  # a Debian with what the package depends on: ./dev test made it
+DOCUMENT = ROOT / "docs" / "access.md"
+
+
+class Root:
+    """A Debian in a folder."""
+
+    def __init__(self, folder):
+        self.folder = folder
+
+    def run(self, *words, given=None, fails=False):
+        result = subprocess.run(["chroot", self.folder, *words], capture_output=True, text=True, input=given, timeout=60)
+        assert fails or result.returncode == 0, f"{words}\n{result.stdout}{result.stderr}"
+        return result
+
+    def path(self, inside):
+        return self.folder / inside.lstrip("/")
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory):
+    need("debian-root")
+    (deb,) = PACKAGES.glob("rrgate_*_amd64.deb")
+    folder = tmp_path_factory.mktemp("root")
+    folder.chmod(0o755)
+    subprocess.run(["tar", "-x", "-C", folder, "--exclude=./dev/*", "-f", BASE], check=True, timeout=120)
+    subprocess.run(["mknod", "-m", "666", folder / "dev/null", "c", "1", "3"], check=True)
+    subprocess.run(["mknod", "-m", "666", folder / "dev/urandom", "c", "1", "9"], check=True)
+    shutil.copy(deb, folder / "rrgate.deb")
+    root = Root(folder)
+    root.run("dpkg", "-i", "/rrgate.deb")
+    yield root
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def unit(root):
+    """What the unit says, by key; the last of each."""
+    return dict(re.findall(r"^(\w+)=(.*)$", root.path("/lib/systemd/system/rrgate.service").read_text(), re.M))
+
+
+def started(root, log):
+    about = unit(root)
+    words = ["chroot", root.folder, "/usr/bin/setpriv", f"--reuid={about['User']}", f"--regid={about['Group']}", "--init-groups",
+             "--no-new-privs", "/usr/bin/env", "ROBOTRACONTEUR_USER_HOME=/var/lib/rrgate", *about["ExecStart"].split()]
+    return Background(words, log)
+
+
+def answer_of(gateway, port, path, **how):
+    """The answer, once there is one."""
+    deadline = time.monotonic() + START_DEADLINE
+    while True:
+        try:
+            return ask(port, "GET", path, **how)
+        except OSError:
+            assert gateway.process.poll() is None and time.monotonic() < deadline, "the gateway does not run"
+            time.sleep(0.05)
+
+
+def test_what_is_where(root):
+    assert root.run("stat", "-c", "%U:%G %a", "/etc/rrgate", "/etc/rrgate/gateway.json", "/var/lib/rrgate",
+                    "/var/log/rrgate").stdout.split("\n")[:4] == \
+        ["root:rrgate 750", "root:rrgate 640", "rrgate:rrgate 750", "rrgate:rrgate 750"]
+    for path in ("usr/libexec/rrgate/rrgate-demo-create", "usr/share/rrgate/web/index.html.br", "usr/share/man/man1/rrgate.1.gz",
+                 "usr/share/rrgate/gateway.schema.json", "lib/systemd/system/rrgate.socket",
+                 "usr/lib/udev/rules.d/60-robotraconteur-usb.rules", "usr/share/doc/rrgate/copyright"):
+        assert (root.folder / path).is_file(), path
+    assert "good" in root.run("rrgate", "check-config", "--as-service", "rrgate", "/etc/rrgate/gateway.json").stdout
+
+
+def test_a_lab_in_four_commands(root, tmp_path):
+    """The commands and the configuration of the page, as they stand there, run by root in a root's shell."""
+    section = DOCUMENT.read_text().split("## A lab in four commands")[1].split("\n## ")[0]
+    (commands,) = re.findall(r"```sh\n(# in /etc/rrgate.*?)```", section, re.S)
+    (config,) = re.findall(r"```json\n(.*?)```", section, re.S)
+    port = free_port()
+    config = {**json.loads(config), "listen": [f"127.0.0.1:{port}"]}
+    root.path("/etc/rrgate/gateway.json").write_text(json.dumps(config))
+    for line in commands.splitlines():
+        command = line.split("#")[0].strip()
+        if command:
+            root.run("sh", "-c", f"umask 022; cd /etc/rrgate && {command}", given="secret\n")
+    gateway = started(root, tmp_path / "log")
+    try:
+        authority = root.path("/etc/rrgate/lab/web-ca.pem").read_text()
+        trust = {"context": ssl.create_default_context(cadata=authority)}
+        trust["context"].check_hostname = False  # the page's host is gateway.lab
+        assert answer_of(gateway, port, "/api/v1/devices", **trust).status == 401
+        login = {"Authorization": "Basic " + base64.b64encode(b"root:secret").decode()}
+        answer = ask(port, "GET", "/api/v1/devices", headers=login, **trust)
+        assert answer.status == 200 and answer.json["devices"][0]["name"] == "create"
+        assert ask(port, "PUT", "/api/v1/devices/create/Create/x", body=1, **trust).status == 401
+        audit = root.path("/var/log/rrgate/audit.jsonl")
+        assert audit.read_text().strip(), "nothing is in the audit log"
+    finally:
+        gateway.stop()
+
+
+def test_keys_of_cas_are_for_root(root):
+    folder = "/etc/rrgate/keys"
+    root.run("rrgate", "cert", "ca", folder)
+    root.run("rrgate", "cert", "web", folder, "x.lab")
+    modes = root.run("sh", "-c", f"cd {folder} && stat -c '%n %U:%G %a' . web-ca.key web-ca.pem x.lab.key x.lab.pem").stdout
+    assert modes.splitlines() == [". root:rrgate 750", "web-ca.key root:root 600", "web-ca.pem root:rrgate 640",
+                                  "x.lab.key root:rrgate 640", "x.lab.pem root:rrgate 640"]
+
+
+def test_what_the_service_cannot_read_is_said(root):
+    folder = root.path("/etc/rrgate/closed")
+    folder.mkdir(mode=0o700)
+    (folder / "users").write_text("")
+    config = root.path("/etc/rrgate/other.json")
+    config.write_text(json.dumps({"listen": ["127.0.0.1:1"], "devices": [], "access": {
+        "users_file": "closed/users", "audit_file": "audit.jsonl"}}))
+    config.chmod(0o644)
+    assert root.run("rrgate", "check-config", "/etc/rrgate/other.json").returncode == 0
+    result = root.run("rrgate", "check-config", "/etc/rrgate/other.json", "--as-service", "rrgate", fails=True)
+    assert result.returncode == 2
+    assert result.stderr.splitlines() == [
+        'other.json: user \'rrgate\' can\'t read /etc/rrgate/closed/users: /etc/rrgate/closed belongs to root:root with mode 0700',
+        'other.json: user \'rrgate\' can\'t write /etc/rrgate: /etc/rrgate belongs to root:rrgate with mode 0750']
+    result = root.run("rrgate", "check-config", "/etc/rrgate/other.json", "--as-service", "nobody-here", fails=True)
+    assert (result.returncode, result.stderr) == (1, "rrgate check-config: there is no user 'nobody-here' on this machine\n")
+
+
+def test_the_unit_of_another_prefix_names_its_program(tmp_path):
+    subprocess.run(["cmake", "--install", BUILD, "--prefix", tmp_path / "here", "--component", "unit"], check=True,
+                   capture_output=True, timeout=60)
+    text = (tmp_path / "here/share/rrgate/systemd/rrgate.service").read_text()
+    assert f"\nExecStart={tmp_path}/here/bin/rrgate serve " in text
