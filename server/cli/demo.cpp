@@ -84,6 +84,20 @@ pid_t start_program(const std::string& path, const std::vector<std::string>& arg
   ::_exit(127);
 }
 
+/// Until it takes connections, has ended, or five seconds are over: the gateway reaches it at its first attempt then.
+void wait_until_listening(const DemoDevice& device) {
+  asio::io_context io;
+  for (int waited_ms = 0; waited_ms < 5000; waited_ms += 10) {
+    asio::ip::tcp::socket probe(io);
+    rr::error_code error;
+    probe.connect({asio::ip::address_v4::loopback(), device.port}, error);
+    siginfo_t ended{};
+    ::waitid(P_PID, static_cast<id_t>(device.process), &ended, WEXITED | WNOHANG | WNOWAIT);
+    if (!error || ended.si_pid != 0) return;
+    ::usleep(10'000);
+  }
+}
+
 void note_dead_devices(std::vector<DemoDevice>& devices) {
   for (auto& device : devices) {
     if (device.process <= 0 || ::waitpid(device.process, nullptr, WNOHANG) != device.process) continue;
@@ -177,6 +191,7 @@ int run_demo(Arguments arguments) {
   // The cameras ride on the robot: they follow its pose.
   devices[1].arguments.insert(devices[1].arguments.end(), {"--robot", devices[0].url()});
   for (auto& device : devices) device.process = start_program(device.path, device.arguments);
+  for (const auto& device : devices) wait_until_listening(device);
 
   std::optional<asio::signal_set> deaths;
   std::function<void()> wait_for_death = [&] {

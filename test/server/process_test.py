@@ -113,12 +113,18 @@ class CommandLine(Files):
 class Demo(Files):
     def start(self):
         """Returns the URL of its pages."""
-        process = subprocess.Popen([RRGATE, "demo", "--port", "0"], stdout=subprocess.PIPE, text=True)
+        self.log = self.enterContext(tempfile.TemporaryFile("w+"))
+        process = subprocess.Popen([RRGATE, "demo", "--port", "0"], stdout=subprocess.PIPE, stderr=self.log, text=True)
         self.addCleanup(process.stdout.close)
         self.addCleanup(process.wait)
         self.addCleanup(process.terminate)
         ready = next(line for line in process.stdout if line.startswith("rrgate demo: "))  # the devices say theirs first
         return ready.split()[-1]
+
+    def test_its_devices_are_there_when_it_starts(self):
+        self.start()
+        self.log.seek(0)
+        self.assertEqual(self.log.read(), "")  # no device was offline
 
     def test_code_of_a_service_that_runs(self):
         pages = self.start()

@@ -2,6 +2,7 @@
 
 #include "core/session/service_path.hpp"
 #include "node/tls/base64.hpp"
+#include "node/values/exception.hpp"
 #include "server/http/endpoints/image_values.hpp"
 #include "server/state/http_access.hpp"
 
