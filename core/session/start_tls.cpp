@@ -42,7 +42,7 @@ bool says_true(const Message& message, const MessageEntry& entry) {
 }
 
 std::string describe(const NodeIdentity& node) {
-  return (node.id.is_any() ? std::string("any id") : format_node_id(node.id)) + " " + quoted(node.name);
+  return (node.id.is_any() ? std::string("any id") : format_node_id(node.id)) + " " + rr::quoted(node.name);
 }
 
 }  // namespace
