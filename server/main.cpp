@@ -18,6 +18,8 @@ int main(int count, char** values) {
       {"passwd", "passwd FILE NAME [--roles A,B] [--delete]", "set a user's password and roles", rrgate::run_passwd},
       {"token", "token FILE NAME [--roles A,B] [--days N] [--delete]", "make an API token", rrgate::run_token},
       {"health", "health [--ready] [HOST:PORT]", "ask a running gateway whether it is well", rrgate::run_health},
+      {"init", "init [FOLDER] [--user NAME]", "write a configuration with TLS and a user to begin with",
+       rrgate::run_init},
       {"ls", "ls [URL] [--type TYPE] [--wait SECONDS] [--json]", "list services: around here, of a node, of a gateway",
        rrgate::run_ls},
       {"info", "info URL [OBJECT] [--json]", "say what an object is and has", rrgate::run_info},

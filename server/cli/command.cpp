@@ -58,6 +58,10 @@ ParsedArguments parse_arguments(Arguments arguments, const KnownOptions& known) 
   ParsedArguments out;
   for (std::size_t i = 0; i < arguments.size(); ++i) {
     const auto argument = arguments[i];
+    if (argument == "--") {
+      for (const auto operand : arguments.subspan(i + 1)) out.operands.emplace_back(operand);
+      break;
+    }
     // "-" is standard input, "-5" a value.
     const bool is_operand =
         !argument.starts_with("-") || argument.size() == 1 || (argument[1] >= '0' && argument[1] <= '9');

@@ -62,6 +62,7 @@ int run_cert(Arguments arguments);
 int run_passwd(Arguments arguments);
 int run_token(Arguments arguments);
 int run_health(Arguments arguments);
+int run_init(Arguments arguments);
 int run_ls(Arguments arguments);
 int run_info(Arguments arguments);
 int run_robdef(Arguments arguments);

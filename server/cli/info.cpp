@@ -16,7 +16,7 @@ std::string parameters_text(const rr::MemberDefinition& member) {
 
 /// "function double move_to(double[] joints)", as a service definition says it.
 std::string declaration(const rr::MemberDefinition& member) {
-  std::string out(kind_name(member.kind));
+  std::string out(rr::member_kind_name(member.kind));
   if (member.kind != rr::MemberKind::event) out += " " + rr::format_type(member.type);
   out += " " + member.name;
   const bool has_parameters = member.kind == rr::MemberKind::function || member.kind == rr::MemberKind::event ||
@@ -46,7 +46,7 @@ rr::OrderedJson describe(const RemoteMember& object) {
   for (const auto& member : object.type->members) {
     auto each = rr::OrderedJson::object();
     each["name"] = member.name;
-    each["kind"] = kind_name(member.kind);
+    each["kind"] = rr::member_kind_name(member.kind);
     each["declaration"] = declaration(member);
     each["documentation"] = member.documentation;
     members.push_back(std::move(each));

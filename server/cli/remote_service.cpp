@@ -35,13 +35,11 @@ std::string gateway_url(std::string_view url) {
   return {};
 }
 
-std::string_view login_header(const std::string& user, const std::string& password, const std::string& token,
-                              std::string& out) {
-  if (!token.empty())
-    out = "Bearer " + token;
-  else if (!user.empty())
-    out = "Basic " + rr::encode_base64(rr::as_bytes(user + ":" + password));
-  return out;
+/// Empty: no login.
+std::string authorization(const std::string& user, const std::string& password, const std::string& token) {
+  if (!token.empty()) return "Bearer " + token;
+  if (!user.empty()) return "Basic " + rr::encode_base64(rr::as_bytes(user + ":" + password));
+  return {};
 }
 
 int exit_code_of(rr::ErrorCode code) {
@@ -103,9 +101,8 @@ RemoteAddress remote_address(std::string_view url, const ParsedArguments& parsed
     credentials.items.emplace_back("password", rr::Value(password));
     if (!user.empty()) out.options.credentials = rr::Value(std::move(credentials));
   } else {
-    std::string header;
-    if (!login_header(user, password, environment("RRGATE_TOKEN"), header).empty())
-      out.options.dial.headers.emplace_back("Authorization", header);
+    const auto header = authorization(user, password, environment("RRGATE_TOKEN"));
+    if (!header.empty()) out.options.dial.headers.emplace_back("Authorization", header);
   }
   if (const auto parsed_url = rr::parse_url(out.url, rr::ServiceInUrl::optional); !parsed_url)
     throw NotUnderstood(parsed_url.error().message);
@@ -149,39 +146,15 @@ RemoteMember find_member(const rr::RemoteObject& root, std::string_view path) {
   return out;
 }
 
-std::string_view kind_name(rr::MemberKind kind) {
-  using enum rr::MemberKind;
-  switch (kind) {
-    case property:
-      return "property";
-    case function:
-      return "function";
-    case event:
-      return "event";
-    case objref:
-      return "objref";
-    case pipe:
-      return "pipe";
-    case callback:
-      return "callback";
-    case wire:
-      return "wire";
-    case memory:
-      return "memory";
-    default:
-      return "member";
-  }
-}
-
 void expect_kind(const RemoteMember& found, const std::vector<rr::MemberKind>& kinds, std::string_view verb) {
   std::string expected;
   for (const auto kind : kinds) {
     if (found.member && found.member->kind == kind) return;
-    expected += (expected.empty() ? "" : ", ") + std::string(kind_name(kind));
+    expected += (expected.empty() ? "" : ", ") + std::string(rr::member_kind_name(kind));
   }
-  const auto what = found.member
-                        ? rr::quoted(found.member->name) + " is a " + std::string(kind_name(found.member->kind))
-                        : rr::quoted(found.object.path()) + " is an object";
+  const auto what =
+      found.member ? rr::quoted(found.member->name) + " is a " + std::string(rr::member_kind_name(found.member->kind))
+                   : rr::quoted(found.object.path()) + " is an object";
   throw NotUnderstood(what + "; " + std::string(verb) + " expects one of: " + expected);
 }
 
@@ -194,13 +167,15 @@ rr::Json read_json_argument(std::string_view text, const rr::TypeDefinition& typ
     if (!file) throw NotUnderstood("file " + rr::quoted(text.substr(1)) + " can't be read");
     content = read_all(file);
   }
-  const bool takes_text = type.container == rr::ContainerKind::none &&
-                          (type.type == rr::DataType::string_t || type.type == rr::DataType::namedtype_t);
+  const bool is_one = type.container == rr::ContainerKind::none && type.array == rr::ArrayKind::none;
+  const bool takes_text = is_one && type.type == rr::DataType::string_t;
+  const bool takes_word = takes_text || (is_one && type.type == rr::DataType::namedtype_t);
   auto json = rr::read_json(content);
-  if (json && !(type.type == rr::DataType::string_t && takes_text && !json->is_string())) return std::move(*json);
-  // What a shell makes of "red" is red.
-  if (takes_text && (content.empty() || (content[0] != '{' && content[0] != '['))) return rr::Json(content);
-  throw NotUnderstood(rr::quoted(text) + " is not JSON: " + (json ? "expected a string" : json.error().message));
+  if (json && (!takes_text || json->is_string())) return std::move(*json);
+  // What a shell makes of "red" is red, and 5 is text where text is wanted.
+  const bool is_word = !content.starts_with('{') && !content.starts_with('[');
+  if (takes_text || (takes_word && is_word)) return rr::Json(content);
+  throw NotUnderstood(rr::quoted(text) + " is not JSON: " + json.error().message);
 }
 
 rr::OrderedJson to_json(const rr::Value& value, const rr::TypeDefinition& type, const rr::TypeRegistry& types) {

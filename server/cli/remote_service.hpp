@@ -57,7 +57,6 @@ struct RemoteMember {
 RemoteMember find_member(const rr::RemoteObject& root, std::string_view path);
 /// Throws   NotUnderstood: it is of no kind that is listed.
 void expect_kind(const RemoteMember& found, const std::vector<rr::MemberKind>& kinds, std::string_view verb);
-std::string_view kind_name(rr::MemberKind kind);
 
 /// JSON as it was written, of a file ("@name") or of standard input ("-"); other text where the type takes text.
 /// Throws   NotUnderstood.

@@ -98,7 +98,6 @@ int call_function(const RemoteMember& found, const ParsedArguments& parsed, cons
   return exit_ok;
 }
 
-/// "-5" is a value; "--" ends the options.
 int run_with_member(std::string_view command, Arguments arguments, std::size_t min_operands, std::string_view expected,
                     std::size_t max_operands, int (*run)(const RemoteMember& found, const ParsedArguments& parsed)) {
   const auto parsed = parse_arguments(arguments, {remote_options, remote_flags});

@@ -83,6 +83,7 @@ def test_values_are_read_written_and_called(url):
     assert run("set", url, "color", "-", given="[1, 0, 0.5]") == ""
     assert json.loads(run("get", url, "color", "--json")) == [1.0, 0.0, 0.5]
     assert run("call", url, "say", "hello there") == ""
+    assert run("call", url, "say", "--", "-5 degrees") == ""
     run("call", url, "setf_arm_position", "q2=-0.5", "q1=0.25", "0.125")
     assert json.loads(run("call", url, "getf_arm_position")) == pytest.approx([0.25, -0.5, 0.125])
     assert set(json.loads(run("get", url, "state", "--json"))) >= {"time", "robot_position", "arm_position"}

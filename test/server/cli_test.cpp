@@ -29,10 +29,11 @@ TEST_CASE("options are taken in both spellings, unknown ones are named") {
   CHECK_THAT(parse_more({"-I"}).error, Catch::Contains("needs a value"));
 }
 
-TEST_CASE("numbers and '-' are operands, and numbers of options are checked") {
+TEST_CASE("numbers, '-' and what follows '--' are operands, and numbers of options are checked") {
   constexpr std::string_view known[] = {"--count"};
   const auto parse = [&](std::vector<std::string_view> arguments) { return parse_arguments(arguments, {known}); };
   CHECK(parse({"-5", "-", "--count=3"}).operands == std::vector<std::string>{"-5", "-"});
+  CHECK(parse({"a", "--", "--count", "-b"}).operands == std::vector<std::string>{"a", "--count", "-b"});
   CHECK(number_option(parse({"--count=3"}), "--count", 7, 10) == 3u);
   CHECK(number_option(parse({}), "--count", 7, 10) == 7u);
   CHECK_FALSE(number_option(parse({"--count=11"}), "--count", 7, 10));
