@@ -1,7 +1,6 @@
 #include "server/cli/remote_service.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cstdlib>
 #include <fstream>
 #include <iostream>
@@ -18,14 +17,6 @@ namespace {
 std::string environment(const char* name) {
   const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): there is one thread
   return value ? value : "";
-}
-
-std::chrono::milliseconds parse_timeout(std::string_view text) {
-  double seconds = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seconds);
-  if (error != std::errc() || end != text.data() + text.size() || !(seconds > 0 && seconds <= 86'400))
-    throw NotUnderstood("--timeout " + rr::quoted(text) + ": expected seconds, 86400 at most");
-  return std::chrono::milliseconds(static_cast<std::int64_t>(seconds * 1000));
 }
 
 /// "http://h:1/devices/arm?service=Arm" as "rr+ws://h:1/devices/arm?service=Arm"; empty for URLs of other schemes.
@@ -81,15 +72,34 @@ std::string read_all(std::istream& in) {
 
 }  // namespace
 
-RemoteAddress remote_address(std::string_view url, const ParsedArguments& parsed) {
+CLI::Option* add_url(CLI::App& app, RemoteOptions& options) {
+  return app.add_option("URL", options.url, "A service, as \"rrgate ls\" prints it")->option_text(" ");
+}
+
+void add_connection_options(CLI::App& app, RemoteOptions& options) {
+  app.add_option("--user", options.user, "Log in, with the password of $RRGATE_PASSWORD")->option_text("NAME");
+  app.add_option("--timeout", options.timeout, "For connecting and for each request")
+      ->check([](const std::string& text) {
+        double seconds = 0;
+        const bool is_good = CLI::detail::lexical_cast(text, seconds) && seconds > 0 && seconds <= 86'400;
+        return is_good ? std::string() : "found " + rr::quoted(text) + ", expected seconds, 86400 at most";
+      })
+      ->option_text("SECONDS [10]");
+}
+
+CLI::Option* add_json(CLI::App& app, RemoteOptions& options) {
+  return app.add_flag("--json", options.is_json, "One line of JSON for each value");
+}
+
+CLI::Option* add_count(CLI::App& app, const std::string& name, std::uint32_t& count, const std::string& summary) {
+  return app.add_option(name, count, summary)->check(CLI::Range(1, 1'000'000'000))->option_text("N");
+}
+
+RemoteAddress remote_address(const RemoteOptions& options) {
   RemoteAddress out;
-  const auto option = [&](std::string_view name) {
-    const auto found = parsed.options.find(name);
-    return found == parsed.options.end() ? std::string() : found->second;
-  };
-  if (const auto timeout = option("--timeout"); !timeout.empty()) out.timeout = parse_timeout(timeout);
+  const auto& [url, user, timeout, is_json] = options;
+  out.timeout = std::chrono::milliseconds(static_cast<std::int64_t>(timeout * 1000));
   out.options.request_timeout = out.options.connect_timeout = out.timeout;
-  const auto user = option("--user");
   const auto password = environment("RRGATE_PASSWORD");
   if (!user.empty() && password.empty())
     throw NotUnderstood("--user needs the password in the environment: RRGATE_PASSWORD");
@@ -113,6 +123,15 @@ rr::RemoteObject open_service(const RemoteAddress& address) {
   if (const auto parsed = rr::parse_url(address.url); !parsed)
     throw NotUnderstood(parsed.error().message + "; rrgate ls lists services");
   return rr::connect(address.url, address.options);
+}
+
+rr::RemoteObject open_gateway(RemoteAddress address) {
+  auto url = rr::parse_url(address.url, rr::ServiceInUrl::optional).value();
+  url.path = "/";
+  // By its name, since a gateway with one relayed device leads whoever asks for no node to that.
+  url.query = "nodename=rrgate&service=gateway";
+  address.url = rr::format_url(url);
+  return open_service(address);
 }
 
 RemoteMember find_member(const rr::RemoteObject& root, std::string_view path) {
@@ -194,17 +213,20 @@ void print_value(const rr::OrderedJson& json, bool is_json) {
   std::cout << std::endl;  // whoever reads a pipe sees each value as it comes
 }
 
-int run_remote(std::string_view command, std::string_view url, const std::function<int()>& run) {
+int run_remote(std::string_view command, std::string_view url, const std::function<void()>& run) {
   const auto tell = [&](std::string_view what, int code) {
     std::cerr << "rrgate " << command << ": " << url << ": " << what << "\n";
     return code;
   };
   try {
-    return run();
+    run();
+    return exit_ok;
   } catch (const NotUnderstood& mistake) {
     return tell(mistake.what(), exit_usage);
   } catch (const rr::Exception& failure) {
     return tell(failure.what(), is_refusal(failure.what()) ? exit_refused : exit_code_of(failure.error().code));
+  } catch (const std::exception& failure) {
+    return tell(failure.what(), exit_failed);
   }
 }
 
