@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <iostream>
 
+#include "server/config/version.hpp"
+
 namespace rrgate {
 
 namespace {
@@ -17,7 +19,7 @@ std::string path_of(const CLI::App& app) {
 
 Commands::Commands() : app_("A gateway between devices that speak Robot Raconteur and the web.", "rrgate") {
   app_.require_subcommand(0, 1);
-  app_.set_version_flag("--version", "rrgate " RRGATE_VERSION, "Print the version");
+  app_.set_version_flag("--version", "rrgate " + std::string(version), "Print the version");
   app_.get_formatter()->label("SUBCOMMAND", "COMMAND");
   app_.get_formatter()->column_width(36);
 }

@@ -188,7 +188,7 @@ rr::Json read_json_argument(std::string_view text, const rr::TypeDefinition& typ
   }
   const bool is_one = type.container == rr::ContainerKind::none && type.array == rr::ArrayKind::none;
   const bool takes_text = is_one && type.type == rr::DataType::string_t;
-  const bool takes_word = takes_text || (is_one && type.type == rr::DataType::namedtype_t);
+  const bool takes_word = takes_text || (is_one && type.type == rr::DataType::enum_t);
   auto json = rr::read_json(content);
   if (json && (!takes_text || json->is_string())) return std::move(*json);
   // What a shell makes of "red" is red, and 5 is text where text is wanted.

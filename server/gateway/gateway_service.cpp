@@ -1,5 +1,6 @@
 #include "server/gateway/gateway_service.hpp"
 
+#include "server/config/version.hpp"
 #include "server/gateway/robdef_text.hpp"
 #include "server/log/log.hpp"
 #include "server/state/gateway_state.hpp"
@@ -42,7 +43,7 @@ GatewayService::GatewayService(asio::io_context& io, GatewayState& gateway)
 }
 
 void GatewayService::add_members() {
-  service_->property("version").get([] { return std::string(RRGATE_VERSION); });
+  service_->property("version").get([] { return std::string(version); });
   service_->property("uptime").get(
       [this] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun_).count(); });
   service_->property("devices").get([this] { return list_devices(); });

@@ -11,7 +11,7 @@ import pytest
 
 from found_nodes import THEIRS, TYPE
 from gateways import RRGATE, Gateway
-from processes import BUILD, Background, free_port
+from processes import BUILD, ROOT, Background, free_port
 from users import PASSWORDS, make_users
 
 DONE, FAILED, NOT_UNDERSTOOD, UNREACHABLE, REFUSED, DEVICE_ERROR = range(6)
@@ -88,6 +88,54 @@ def test_values_are_read_written_and_called(url):
     run("call", url, "setf_arm_position", "q2=-0.5", "q1=0.25", "0.125")
     assert json.loads(run("call", url, "getf_arm_position")) == pytest.approx([0.25, -0.5, 0.125])
     assert set(json.loads(run("get", url, "state", "--json"))) >= {"time", "robot_position", "arm_position"}
+
+
+@pytest.fixture(scope="module")
+def standard_robot(tmp_path_factory):
+    port = free_port()
+    robot = Background([sys.executable, ROOT / "test" / "interop" / "peers" / "standard_robot.py", port],
+                       tmp_path_factory.mktemp("robot") / "log")
+    robot.next_line()
+    yield f"rr+tcp://127.0.0.1:{port}/?service=robot"
+    robot.stop()
+
+
+@pytest.mark.parametrize("way", ["directly", "gateway"])
+def test_a_robot_of_the_standard_types_is_jogged(standard_robot, way, tmp_path):
+    url, login, gateway = standard_robot, {}, None
+    if way == "gateway":
+        make_users(tmp_path)
+        gateway = Gateway(tmp_path, {"devices": [{"name": "arm", "url": standard_robot, "mode": "shared"}], "access": {
+            "users_file": "users", "rules": [{"roles": ["operator"], "may": ["read", "subscribe", "write", "call"]}]}})
+        gateway.wait_for("device online")
+        url = f"http://127.0.0.1:{gateway.port}/devices/arm?service=robot"
+        login = {"environment": {"RRGATE_PASSWORD": PASSWORDS["alice"]}}
+
+    def rrgate(*arguments):
+        return run(*arguments, *(["--user", "alice"] if login else []), **login)
+
+    def newest_state():  # the first values may be older than what was asked for
+        states = rrgate("watch", url, "robot_state", "--count", "5", "--json").splitlines()
+        return json.loads(states[-1])["value"]
+
+    try:
+        assert "com.robotraconteur.robotics.robot.Robot" in rrgate("info", url)
+        assert "function void halt() [urgent]" in rrgate("info", url, "halt")
+        for mode in "halt", "jog":  # words of an enum
+            rrgate("set", url, "command_mode", mode)
+            assert newest_state()["command_mode"] == mode
+        for target in [0.5, -0.25], [0, 0.125]:
+            rrgate("call", url, "jog_freespace", json.dumps(target), "max_velocity=[9, 9]", "wait=true")
+            assert newest_state()["joint_position"] == pytest.approx(target, abs=0.05)
+        packets = rrgate("watch", url, "robot_state_sensor_data", "--count", "3", "--json").splitlines()
+        assert [json.loads(each)["value"]["robot_state"]["command_mode"] for each in packets] == ["jog"] * 3
+        rrgate("set", url, "command_mode", "halt")
+        refusal = Ran(["call", url, "jog_freespace", "[0, 0]", "[9, 9]", "true", *(["--user", "alice"] if login else [])],
+                      **login)
+        assert refusal.refused(DEVICE_ERROR, "not in jog mode")
+    finally:
+        if gateway:
+            gateway.process.stop()
 
 
 def test_an_argument_may_be_a_file(reynard, tmp_path):

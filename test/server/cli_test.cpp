@@ -1,6 +1,7 @@
 #include <catch2/catch.hpp>
 
 #include "server/cli/command.hpp"
+#include "server/config/version.hpp"
 #include "server/log/log.hpp"
 #include "test/server/support/command_run.hpp"
 
@@ -55,7 +56,7 @@ TEST_CASE("help and mistakes have their exit codes, and mistakes one sentence") 
   CHECK_THAT(run({"go", "--help"}).output, Catch::Contains("Where to"));
   CHECK_THAT(run({"help", "cut", "fine"}).output, Catch::Contains("Cuts"));
   CHECK(run({"go", "--help"}).code == exit_ok);
-  CHECK(run({"--version"}).output == "rrgate " RRGATE_VERSION "\n");
+  CHECK(run({"--version"}).output == "rrgate " + std::string(version) + "\n");
   const auto mistake = [](std::vector<std::string> words) {
     const auto ran = run(std::move(words));
     CHECK(ran.code == exit_usage);

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "server/config/version.hpp"
 #include "server/state/gateway_state.hpp"
 #include "server/state/http_access.hpp"
 
@@ -161,7 +162,7 @@ Handler metrics_endpoint(GatewayState& gateway) {
     const auto& metrics = gateway.metrics();
     Exposition out;
     out.family("rrgate_build_info", "gauge", "Which rrgate this is.");
-    out.sample(1, "version=\"" RRGATE_VERSION "\"");
+    out.sample(1, "version=\"" + std::string(version) + "\"");
     out.single("rrgate_connections", "gauge", "Open connections of all kinds.", gateway.admission().open());
     out.single("rrgate_connections_total", "counter", "Connections that were accepted.", metrics.connections);
     out.single("rrgate_http_requests_total", "counter", "HTTP requests, upgrades to WebSockets among them.",
