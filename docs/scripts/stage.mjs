@@ -2,7 +2,7 @@
 // in the repository, and the reference, which is made from the sources. Links between files of the repository become
 // links between pages; files that are linked, but are no page, become pages that show them.
 import { existsSync, readdirSync, readFileSync, rmSync, statSync } from "node:fs";
-import { mkdir, writeFile } from "node:fs/promises";
+import { cp, mkdir, writeFile } from "node:fs/promises";
 import path from "node:path";
 import { fileURLToPath } from "node:url";
 import { configurationPage } from "./configuration.mjs";
@@ -46,6 +46,7 @@ const shown = new Set(); // files and folders that are shown as they are
 function pageOf(file) {
   const known = elsewhere[file] ?? generated[file]?.[0] ?? aliases[file];
   if (known) return known;
+  if (file.startsWith("docs/images/")) return file.slice("docs/".length);
   return file.startsWith("docs/") && file.endsWith(".md") ? file.slice("docs/".length) : undefined;
 }
 
@@ -97,7 +98,7 @@ function shownText(file) {
 function ownPages(folder = "docs") {
   return readdirSync(path.join(repository, folder), { withFileTypes: true }).flatMap((entry) => {
     const file = `${folder}/${entry.name}`;
-    if (entry.isDirectory()) return /^(node_modules|scripts|public|\..*)$/.test(entry.name) ? [] : ownPages(file);
+    if (entry.isDirectory()) return /^(node_modules|scripts|images|\..*)$/.test(entry.name) ? [] : ownPages(file);
     return file.endsWith(".md") ? [file] : [];
   });
 }
@@ -112,6 +113,7 @@ for (const [name, text] of await clientPages(repository)) pages.set(`reference/r
 for (const file of shown) pages.set(pageOf(file) ?? showPage(file), shownText(file));
 
 rmSync(target, { recursive: true, force: true });
+await cp(path.join(repository, "docs/images"), path.join(target, "images"), { recursive: true });
 for (const [page, text] of pages) {
   const file = path.join(target, page);
   await mkdir(path.dirname(file), { recursive: true });
