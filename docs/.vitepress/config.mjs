@@ -21,9 +21,10 @@ for (const { link, text } of sidebar.flatMap((group) => group.items))
   if (!existsSync(path.join(pages, link === "/" ? "index.md" : `${link.replace(/\/$/, "/index")}.md`)))
     throw new Error(`navigation: "${text}" leads to ${link}, which is no page`);
 
-/** Puts what scripts and styles a page has inside into files of their own, named by their content. */
+/** Puts what scripts and styles a page has inside into files of their own, named by their content. The two styles that the
+ * theme gives to elements are one in theme/style.css, and one that is set again when the page runs. */
 function withoutInline(html) {
-  return html.replace(/<(script|style)([^>]*)>([^<]+(?:<(?!\/\1)[^<]*)*)<\/\1>/g, (whole, tag, attributes, text) => {
+  return html.replace(/ style="(position:relative;|--vp-vh:0px;)"/g, "").replace(/<(script|style)([^>]*)>([^<]+(?:<(?!\/\1)[^<]*)*)<\/\1>/g, (whole, tag, attributes, text) => {
     if (/\bsrc=/.test(attributes)) return whole;
     const name = `assets/inline-${createHash("sha256").update(text).digest("hex").slice(0, 8)}.${tag === "script" ? "js" : "css"}`;
     mkdirSync(path.join(site, "assets"), { recursive: true });
@@ -41,7 +42,11 @@ export default defineConfig({
   outDir: site,
   cacheDir: path.join(build, "docs-cache"),
   metaChunk: true,
-  head: [["link", { rel: "stylesheet", href: `${base}code.css` }]],
+  appearance: { disableTransition: false }, // which takes a style inside of the page
+  head: [
+    ["link", { rel: "icon", href: `${base}icon.svg` }],
+    ["link", { rel: "stylesheet", href: `${base}code.css` }],
+  ],
   markdown: { codeTransformers: [styles.transformer()] },
   themeConfig: {
     sidebar,

@@ -114,6 +114,7 @@ for (const file of shown) pages.set(pageOf(file) ?? showPage(file), shownText(fi
 
 rmSync(target, { recursive: true, force: true });
 await cp(path.join(repository, "docs/images"), path.join(target, "images"), { recursive: true });
+await cp(path.join(repository, "web/public/icon.svg"), path.join(target, "public/icon.svg"));
 for (const [page, text] of pages) {
   const file = path.join(target, page);
   await mkdir(path.dirname(file), { recursive: true });
