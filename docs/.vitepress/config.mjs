@@ -21,6 +21,9 @@ for (const { link, text } of sidebar.flatMap((group) => group.items))
   if (!existsSync(path.join(pages, link === "/" ? "index.md" : `${link.replace(/\/$/, "/index")}.md`)))
     throw new Error(`navigation: "${text}" leads to ${link}, which is no page`);
 
+/** Anchors as GitHub makes them, so that links work in both places. */
+const slugify = (heading) => heading.trim().toLowerCase().replace(/[^\p{L}\p{N}_\- ]/gu, "").replaceAll(" ", "-");
+
 /** Puts what scripts and styles a page has inside into files of their own, named by their content. The two styles that the
  * theme gives to elements are one in theme/style.css, and one that is set again when the page runs. */
 function withoutInline(html) {
@@ -47,12 +50,13 @@ export default defineConfig({
     ["link", { rel: "icon", href: `${base}icon.svg` }],
     ["link", { rel: "stylesheet", href: `${base}code.css` }],
   ],
-  markdown: { codeTransformers: [styles.transformer()] },
+  markdown: { codeTransformers: [styles.transformer()], anchor: { slugify } },
   themeConfig: {
     sidebar,
     outline: [2, 3],
     search: { provider: "local" },
   },
+  vite: { build: { assetsInlineLimit: 0 } },
   transformHtml: withoutInline,
   buildEnd: () => writeFileSync(path.join(site, "code.css"), styles.css()),
 });

@@ -26,5 +26,8 @@ COMMANDS = {
     ("README.md", "docker compose"): "takes a container engine: test/interop/test_container.py reads the file",
 }
 
+# Commands that do not do what their page says.
+WRONG = {("docs/command-line.md", "rrgate call $REYNARD teleport 100"): "this robot's positions go from -1 to 1, and from -0.5 to 0.5"}
+
 # Output in which numbers are those of a run, not of the next.
 NUMBERS_DIFFER = {("docs/command-line.md", "rrgate watch"): "counts what came within a time"}
