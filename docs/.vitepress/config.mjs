@@ -15,25 +15,36 @@ const site = path.join(build, "docs");
 const styles = new StyleClasses();
 
 const titleOf = (page) => /^# (.*)$/m.exec(readFileSync(path.join(pages, page), "utf8"))[1];
-const decisions = readdirSync(path.join(pages, "adr")).sort().map((name) => [titleOf(`adr/${name}`), `/adr/${name.slice(0, -3)}`]);
+const decisions = readdirSync(path.join(pages, "adr"))
+  .sort()
+  .map((name) => [titleOf(`adr/${name}`), `/adr/${name.slice(0, -3)}`]);
 const sidebar = makeSidebar(decisions);
 for (const { link, text } of sidebar.flatMap((group) => group.items))
   if (!existsSync(path.join(pages, link === "/" ? "index.md" : `${link.replace(/\/$/, "/index")}.md`)))
     throw new Error(`navigation: "${text}" leads to ${link}, which is no page`);
 
 /** Anchors as GitHub makes them, so that links work in both places. */
-const slugify = (heading) => heading.trim().toLowerCase().replace(/[^\p{L}\p{N}_\- ]/gu, "").replaceAll(" ", "-");
+const slugify = (heading) =>
+  heading
+    .trim()
+    .toLowerCase()
+    .replace(/[^\p{L}\p{N}_\- ]/gu, "")
+    .replaceAll(" ", "-");
 
 /** Puts what scripts and styles a page has inside into files of their own, named by their content. The two styles that the
  * theme gives to elements are one in theme/style.css, and one that is set again when the page runs. */
 function withoutInline(html) {
-  return html.replace(/ style="(position:relative;|--vp-vh:0px;)"/g, "").replace(/<(script|style)([^>]*)>([^<]+(?:<(?!\/\1)[^<]*)*)<\/\1>/g, (whole, tag, attributes, text) => {
-    if (/\bsrc=/.test(attributes)) return whole;
-    const name = `assets/inline-${createHash("sha256").update(text).digest("hex").slice(0, 8)}.${tag === "script" ? "js" : "css"}`;
-    mkdirSync(path.join(site, "assets"), { recursive: true });
-    writeFileSync(path.join(site, name), text);
-    return tag === "script" ? `<script${attributes} src="${base}${name}"></script>` : `<link rel="stylesheet" href="${base}${name}">`;
-  });
+  return html
+    .replace(/ style="(position:relative;|--vp-vh:0px;)"/g, "")
+    .replace(/<(script|style)([^>]*)>([^<]+(?:<(?!\/\1)[^<]*)*)<\/\1>/g, (whole, tag, attributes, text) => {
+      if (/\bsrc=/.test(attributes)) return whole;
+      const name = `assets/inline-${createHash("sha256").update(text).digest("hex").slice(0, 8)}.${tag === "script" ? "js" : "css"}`;
+      mkdirSync(path.join(site, "assets"), { recursive: true });
+      writeFileSync(path.join(site, name), text);
+      return tag === "script"
+        ? `<script${attributes} src="${base}${name}"></script>`
+        : `<link rel="stylesheet" href="${base}${name}">`;
+    });
 }
 
 export default defineConfig({

@@ -17,7 +17,10 @@ export class StyleClasses {
   }
 
   css() {
-    return [...this.#names].map(([style, name]) => `.${name}{${style}}\n`).sort().join("");
+    return [...this.#names]
+      .map(([style, name]) => `.${name}{${style}}\n`)
+      .sort()
+      .join("");
   }
 
   #add(node, style) {

@@ -5,7 +5,8 @@ import path from "node:path";
 
 export function commandsPage(repository) {
   const program = process.env.RRGATE ?? path.join(repository, "build/release/server/rrgate");
-  const intro = "# Commands\n\nWhat `rrgate` answers to `--help`. [Devices from the command line](../docs/command-line.md) has examples.\n";
+  const intro =
+    "# Commands\n\nWhat `rrgate` answers to `--help`. [Devices from the command line](../docs/command-line.md) has examples.\n";
   if (!existsSync(program)) {
     console.warn(`${program} is not built: the page of commands says no more than that`);
     return `${intro}\nThis site was made without the program: \`rrgate --help\` lists the commands.\n`;

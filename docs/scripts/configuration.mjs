@@ -12,13 +12,20 @@ export function listOptions(schema, above = "", root = schema) {
     const option = resolve(given, root);
     const own = { path: above + name, schema: option, isRequired: (schema.required ?? []).includes(name) };
     const items = option.items && resolve(option.items, root);
-    return [own, ...listOptions(option, `${own.path}.`, root), ...(items ? listOptions(items, `${own.path}[].`, root) : [])];
+    return [
+      own,
+      ...listOptions(option, `${own.path}.`, root),
+      ...(items ? listOptions(items, `${own.path}[].`, root) : []),
+    ];
   });
 }
 
 function resolve(schema, root) {
   if (!schema.$ref) return schema;
-  const found = schema.$ref.replace("#/", "").split("/").reduce((part, key) => part?.[key], root);
+  const found = schema.$ref
+    .replace("#/", "")
+    .split("/")
+    .reduce((part, key) => part?.[key], root);
   if (!found) throw new Error(`the schema has no ${schema.$ref}`);
   return { ...found, ...schema };
 }
@@ -56,7 +63,9 @@ export async function configurationPage(repository) {
 
 function row({ path: name, schema, isRequired }) {
   const examples = (schema.items?.examples ?? schema.examples ?? []).map((each) => code(JSON.stringify(each)));
-  const text = [schema.description ?? "", examples.length > 0 ? `Such as ${examples.join(", ")}.` : ""].join(" ").trim();
+  const text = [schema.description ?? "", examples.length > 0 ? `Such as ${examples.join(", ")}.` : ""]
+    .join(" ")
+    .trim();
   return `| ${code(name)} | ${typeOf(schema)} | ${isRequired ? "required" : defaultOf(schema)} | ${cell(text)} |`;
 }
 
@@ -74,7 +83,8 @@ function defaultOf(schema) {
 }
 
 /** Quotes text so that neither tables nor templates of the site read it as theirs. */
-export const cell = (text) => text.replaceAll("|", "\\|").replaceAll("<", "&lt;").replaceAll("{{", "&#123;{").replaceAll("\n", " ");
+export const cell = (text) =>
+  text.replaceAll("|", "\\|").replaceAll("<", "&lt;").replaceAll("{{", "&#123;{").replaceAll("\n", " ");
 export const code = (text) => `<code v-pre>${cell(text)}</code>`;
 
 // Alone: the options without a description, which is an error of `./dev lint`.

@@ -7,7 +7,12 @@ export async function httpPage(repository) {
   const file = path.join(repository, "server/http/endpoints/gateway_openapi.json");
   const document = JSON.parse(await readFile(file, "utf8"));
   const find = (value) =>
-    value?.$ref ? value.$ref.replace("#/", "").split("/").reduce((part, key) => part[key], document) : value;
+    value?.$ref
+      ? value.$ref
+          .replace("#/", "")
+          .split("/")
+          .reduce((part, key) => part[key], document)
+      : value;
   const operations = Object.entries(document.paths).flatMap(([route, item]) =>
     Object.entries(item)
       .filter(([method]) => method !== "parameters")
@@ -30,11 +35,17 @@ export async function httpPage(repository) {
 function operationText(method, route, operation, shared, find) {
   const parameters = [...shared, ...(operation.parameters ?? [])].map(find);
   const body = find(operation.requestBody)?.content?.["application/json"]?.schema;
-  const lines = [`## <code v-pre>${method.toUpperCase()} ${route}</code> {#${operation.operationId}}`, "", cell(operation.summary), ""];
+  const lines = [
+    `## <code v-pre>${method.toUpperCase()} ${route}</code> {#${operation.operationId}}`,
+    "",
+    cell(operation.summary),
+    "",
+  ];
   if (operation.description) lines.push(cell(operation.description), "");
   if (parameters.length > 0) {
     lines.push("| Parameter | In | |", "|---|---|---|");
-    for (const { name, in: where, description = "" } of parameters) lines.push(`| ${code(name)} | ${where} | ${cell(description)} |`);
+    for (const { name, in: where, description = "" } of parameters)
+      lines.push(`| ${code(name)} | ${where} | ${cell(description)} |`);
     lines.push("");
   }
   if (body) lines.push(`Body: ${formOf(body)}`, "");

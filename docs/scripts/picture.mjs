@@ -5,7 +5,10 @@ import { fileURLToPath } from "node:url";
 
 const packages = process.env.PLAYWRIGHT_PACKAGE ?? new URL("../../test/e2e/package.json", import.meta.url);
 const { chromium } = createRequire(packages)("@playwright/test");
-const browser = await chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: ["--no-sandbox"] });
+const browser = await chromium.launch({
+  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
+  args: ["--no-sandbox"],
+});
 const page = await browser.newPage({ viewport: { width: 1200, height: 760 }, colorScheme: "light" });
 await page.goto(`${process.argv[2] ?? "http://127.0.0.1:8080"}/#/devices/create/Create`);
 const press = async (name, milliseconds) => {

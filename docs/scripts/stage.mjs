@@ -79,7 +79,18 @@ function showPage(file, from) {
   return `source/${file}${statSync(full).isDirectory() ? "/index" : ""}.md`;
 }
 
-const languages = { ".robdef": "txt", ".hpp": "cpp", ".cpp": "cpp", ".mjs": "js", ".conf": "nginx", ".cfg": "ini", ".rules": "ini", ".in": "ini", ".socket": "ini", ".py": "python" };
+const languages = {
+  ".robdef": "txt",
+  ".hpp": "cpp",
+  ".cpp": "cpp",
+  ".mjs": "js",
+  ".conf": "nginx",
+  ".cfg": "ini",
+  ".rules": "ini",
+  ".in": "ini",
+  ".socket": "ini",
+  ".py": "python",
+};
 
 function shownText(file) {
   const full = path.join(repository, file);

@@ -114,7 +114,7 @@ def test_cpp(tmp_path):
         assert frame, f"{block}: what stands around this fragment is to be named in cpp_frames.py"
         text += f"{frame[0]}#line {block.line + 1} \"{block.page}\"\n{block.text}{frame[1]}"
     (tmp_path / "pages.cpp").write_text(text)
-    done = run(*compiler(), "-fsyntax-only", f"-I{tmp_path}", tmp_path / "pages.cpp", env={**os.environ, "LC_ALL": "C"})
+    done = run(*compiler(), "-fsyntax-only", "-w", f"-I{tmp_path}", tmp_path / "pages.cpp", env={**os.environ, "LC_ALL": "C"})
     assert done.returncode == 0, done.stderr[:4000]
 
 

@@ -43,7 +43,8 @@ class Examples(unittest.TestCase):
                                       stdout=subprocess.PIPE, text=True)
             try:
                 url = device.stdout.readline().strip()
-                self.assertEqual(run(os.path.join(build, "thermostat_client"), url), "21 degrees\n")
+                for _ in range(2):  # the room is warm already when the second one comes
+                    self.assertEqual(run(os.path.join(build, "thermostat_client"), url), "21 degrees\n")
             finally:
                 self.end(device)
             self.outlives_the_device(build, url)
