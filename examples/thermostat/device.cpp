@@ -20,6 +20,7 @@ class Room : public thermostat::ThermostatService {
   void set_target(double value) override {
     if (value > 30) throw thermostat::TooHot("target " + std::to_string(value) + ", expected at most 30");
     target_ = value;
+    if (celsius_ >= target_) reached(celsius_);
   }
   void cool(double degrees) override { celsius_ -= degrees; }
 

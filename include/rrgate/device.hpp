@@ -1,5 +1,5 @@
 // To write a device: a node with its services, what generated service classes stand on, users and TLS.
-// docs/definition-tools.md, docs/examples.md. What this includes is internal, and changes.
+// docs/definition-tools.md, docs/device-author.md. What this includes is internal, and changes.
 #pragma once
 
 #include "node/service/node.hpp"

@@ -86,7 +86,8 @@ const StaticFiles::Cached* StaticFiles::load(const fs::path& file) {
 Response StaticFiles::answer(const Request& request, std::string_view path) {
   if (root_.empty())
     return problem_response(404, "no dashboard here: set web_root in the configuration to the folder of its files");
-  const auto decoded = rr::percent_decode(path.empty() ? "index.html" : path);
+  const bool is_folder = path.empty() || path.back() == '/';
+  const auto decoded = rr::percent_decode(std::string(path) + (is_folder ? "index.html" : ""));
   if (!decoded || !is_safe_path(*decoded)) return problem_response(404, "no such file");
   const auto file = root_ / *decoded;
 

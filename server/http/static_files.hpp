@@ -1,4 +1,4 @@
-// The dashboard's files, from one folder. Layer: server/http.
+// Files of a folder: the dashboard, the documentation. Layer: server/http.
 #pragma once
 
 #include <filesystem>
@@ -18,8 +18,8 @@ class StaticFiles {
   /// An empty or missing folder makes every answer a 404 that says how to set one.
   explicit StaticFiles(std::filesystem::path root);
 
-  /// `path` is percent-encoded, without a leading '/'; "" is index.html. Uses FILE.br or FILE.gz if the client takes
-  /// them. Answers 304 to a matching If-None-Match.
+  /// `path` is percent-encoded, without a leading '/'; "" and "folder/" are the index.html there. Uses FILE.br or
+  /// FILE.gz if the client takes them. Answers 304 to a matching If-None-Match.
   Response answer(const Request& request, std::string_view path);
 
  private:

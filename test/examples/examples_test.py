@@ -4,6 +4,7 @@ examples_test.py BUILD_DIR EXAMPLES_DIR GENERATOR CXX BOOST_ROOT
 """
 import json
 import os
+import pathlib
 import re
 import subprocess
 import sys
@@ -42,7 +43,8 @@ class Examples(unittest.TestCase):
                                       stdout=subprocess.PIPE, text=True)
             try:
                 url = device.stdout.readline().strip()
-                self.assertEqual(run(os.path.join(build, "thermostat_client"), url), "21 degrees\n")
+                for _ in range(2):  # the room is warm already when the second one comes
+                    self.assertEqual(run(os.path.join(build, "thermostat_client"), url), "21 degrees\n")
             finally:
                 self.end(device)
             self.outlives_the_device(build, url)
@@ -100,13 +102,15 @@ class Text(unittest.TestCase):
     """The examples say how little it takes: the device 40 lines at most, each file of a client 15."""
 
     def test_examples_are_short(self):
-        limits = {"device.cpp": 40, "client.cpp": 15, "subscriber.cpp": 15, "gateway.cpp": 20, "client.mjs": 15, "site/index.html": 15, "site/client.js": 15}
+        limits = {"device.cpp": 40, "device.py": 60, "client.cpp": 15, "subscriber.cpp": 15, "gateway.cpp": 20, "client.mjs": 15, "site/index.html": 15, "site/client.js": 15}
         for name, limit in limits.items():
             self.assertLessEqual(len(text_of(name).splitlines()), limit, name)
 
     def test_the_documentation_shows_the_files_as_they_are(self):
-        with open(os.path.join(EXAMPLES, "../docs/examples.md")) as page:
-            shown = dict(re.findall(r"^<!-- (\S+) -->\n```\w*\n(.*?)^```$", page.read(), re.MULTILINE | re.DOTALL))
+        shown = {}
+        for page in pathlib.Path(EXAMPLES, "../docs").rglob("*.md"):
+            if "node_modules" not in page.parts and ".vitepress" not in page.parts:
+                shown |= dict(re.findall(r"^<!-- (\S+) -->\n```\w*\n(.*?)^```$", page.read_text(), re.MULTILINE | re.DOTALL))
         for name, text in shown.items():
             self.assertEqual(text, text_of(name), name)
         # What a reader has put there is not ours: rrgate-client, node_modules.

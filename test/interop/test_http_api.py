@@ -238,11 +238,31 @@ def test_documents(gateway):
     assert asynchronous["channels"]["socket_interop"]["address"] == BASE
     assert "callback" in asynchronous["channels"]["socket_interop"]["messages"]["question"]["payload"]["properties"]
     description = ask(gateway, "GET", "/thing-description.json", base=base)
+    assert [dangling(told.json) for told in (answer, description)] == [[], []] and dangling(asynchronous) == []
+    assert "#/schemaDefinitions/experimental.interop.Pose" in references(description.json)
     assert description.json["actions"]["interop_add"]["forms"][0]["href"] == BASE + "/add"
     assert b"interface Interop" in ask(gateway, "GET", "/types.d.ts", base=base).body
     definition = ask(gateway, "GET", "/experimental.interop.robdef", base=base)
     assert definition.body.startswith(b"#") or b"service experimental.interop" in definition.body
     assert ask(gateway, "GET", "/nope.robdef", base=base).status == 404
+
+
+def references(value):
+    inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    own = [value["$ref"]] if isinstance(value, dict) and isinstance(value.get("$ref"), str) else []
+    return own + [reference for each in inner for reference in references(each)]
+
+
+def dangling(document):
+    """References of a document that lead to nothing in it."""
+    def leads_somewhere(reference):
+        part = document
+        for key in reference.removeprefix("#/").split("/"):
+            part = part.get(key.replace("~1", "/").replace("~0", "~")) if isinstance(part, dict) else None
+        return part is not None
+
+    assert references(document)
+    return [reference for reference in references(document) if not leads_somewhere(reference)]
 
 
 def test_a_hundred_readers_are_one_client_of_the_device(gateway):

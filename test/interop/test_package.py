@@ -78,7 +78,7 @@ def test_what_is_where(root):
     assert root.run("stat", "-c", "%U:%G %a", "/etc/rrgate", "/etc/rrgate/gateway.json", "/var/lib/rrgate",
                     "/var/log/rrgate").stdout.split("\n")[:4] == \
         ["root:rrgate 750", "root:rrgate 640", "rrgate:rrgate 750", "rrgate:rrgate 750"]
-    for path in ("usr/libexec/rrgate/rrgate-demo-create", "usr/share/rrgate/web/index.html.br", "usr/share/man/man1/rrgate.1.gz",
+    for path in ("usr/libexec/rrgate/rrgate-demo-create", "usr/share/rrgate/web/index.html.br", "usr/share/rrgate/docs/index.html", "usr/share/man/man1/rrgate.1.gz",
                  "usr/share/rrgate/gateway.schema.json", "lib/systemd/system/rrgate.socket",
                  "usr/lib/udev/rules.d/60-robotraconteur-usb.rules", "usr/share/doc/rrgate/copyright"):
         assert (root.folder / path).is_file(), path

@@ -142,7 +142,7 @@ def test_an_idle_session(proxy):
 
 @pytest.mark.parametrize("name", ["interop", "shared"])
 def test_a_reload_of_the_proxy(proxy, name, tmp_path):
-    """Costs a subscription less than 2 s; docs/deploy.md says what it costs with each. The definitions of a shared
+    """Costs a subscription less than 2 s; docs/reverse-proxy.md says what it costs with each. The definitions of a shared
     device do not cross again; those of a device of the package do, if it is relayed."""
     url = f"ws://127.0.0.1:{proxy.root}/devices/{name}?service=interop"
     client = Background(["node", JS / "reload.mjs", url], tmp_path / "client.log")

@@ -35,7 +35,8 @@ std::vector<std::string> paths_of(const Route& route) {
     for (const auto action : request_actions) out.push_back(request + std::string(action));
   } else if (route.pattern == "/devices/*") {
     out = {"/devices/{device}"};
-  } else if (route.pattern != "/api/*" && route.pattern != "/*") {  // nothing there; the files of the page
+  } else if (route.pattern != "/api/*" && route.pattern != "/*" && !route.pattern.starts_with("/docs")) {
+    // Nothing there; the files of the page, and of the documentation.
     out = {route.pattern};
   }
   return out;

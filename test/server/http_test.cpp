@@ -1,10 +1,13 @@
 // Requests to answers, without sockets: router, upgrade rules, static files.
+#include <boost/asio/io_context.hpp>
 #include <catch2/catch.hpp>
 #include <filesystem>
 #include <fstream>
 
 #include "node/http/upgrade.hpp"
 #include "server/front/front_door.hpp"
+#include "server/gateway/gateway.hpp"
+#include "server/http/endpoints/documentation.hpp"
 #include "server/http/router.hpp"
 #include "server/http/static_files.hpp"
 
@@ -60,7 +63,10 @@ struct WebRoot {
     fs::create_symlink(folder / "secret.txt", folder / "web" / "link.txt");
   }
   ~WebRoot() { fs::remove_all(folder); }
-  void write(const std::string& name, const std::string& text) { std::ofstream(folder / name) << text; }
+  void write(const std::string& name, const std::string& text) {
+    fs::create_directories((folder / name).parent_path());
+    std::ofstream(folder / name) << text;
+  }
 };
 
 }  // namespace
@@ -158,6 +164,45 @@ TEST_CASE("static files carry type, tag and cache rules") {
   CHECK(header(brotli, "Content-Type") == "text/javascript; charset=utf-8");
   CHECK(header(brotli, "ETag") != header(script, "ETag"));
   CHECK(*get("assets/app-Bx81Qz0k.js", {{"Accept-Encoding", "br;q=0, gzip;q=0.5"}}).body == "gzip");
+}
+
+TEST_CASE("a folder is the page in it") {
+  WebRoot root;
+  root.write("web/guide/index.html", "<html>guide");
+  StaticFiles files(root.folder / "web");
+  CHECK(*files.answer(request(http::verb::get, "/"), "guide/").body == "<html>guide");
+  CHECK(files.answer(request(http::verb::get, "/"), "guide").status == 404);
+}
+
+TEST_CASE("the documentation comes with the dashboard, from the program's tree or the operator's") {
+  WebRoot root;
+  const auto bin = root.folder / "bin";
+  root.write("share/rrgate/docs/index.html", "<html>");
+  fs::create_directories(bin);
+  CHECK(fs::equivalent(documentation_folder(root.folder / "web", bin), root.folder / "share/rrgate/docs"));
+  CHECK(documentation_folder("", bin).empty());
+  CHECK(documentation_folder(root.folder / "web", root.folder / "elsewhere/bin").empty());
+  root.write("web/docs/index.html", "<html>mine");
+  CHECK(documentation_folder(root.folder / "web", bin) == root.folder / "web/docs");
+}
+
+TEST_CASE("the documentation is at the root of a host") {
+  boost::asio::io_context io;
+  WebRoot root;
+  root.write("web/docs/index.html", "<html>guide");
+  Config config;
+  config.web_root = (root.folder / "web").string();
+  Gateway gateway(io, std::move(config));
+  const auto get = [&](const std::string& path, const std::string& prefix = "") {
+    auto asked = request(http::verb::get, path);
+    asked.arrival.prefix = prefix;
+    return gateway.router().answer(asked);
+  };
+  CHECK(*get("/docs/").body == "<html>guide");
+  CHECK(header(get("/docs/"), "Content-Security-Policy") == header(get("/"), "Content-Security-Policy"));
+  CHECK(get("/docs").status == 308);
+  CHECK(header(get("/docs"), "Location") == "docs/");
+  CHECK(get("/docs/", "/robots").status == 404);
 }
 
 TEST_CASE("a file that changes is read again") {

@@ -380,6 +380,17 @@ OrderedJson form(const Place& place, std::string_view op, std::string_view metho
   return out;
 }
 
+/// A Thing Description has named types elsewhere than OpenAPI, for which type_schema() refers to them.
+void lead_to_schema_definitions(OrderedJson& value) {
+  constexpr std::string_view there = "#/components/schemas/";
+  if (value.is_object() && value.contains("$ref")) {
+    const auto reference = value["$ref"].get<std::string>();
+    if (reference.starts_with(there)) value["$ref"] = "#/schemaDefinitions/" + reference.substr(there.size());
+  } else if (value.is_structured()) {
+    for (auto& part : value) lead_to_schema_definitions(part);
+  }
+}
+
 OrderedJson thing_description(std::string_view device, const std::vector<Place>& places, OrderedJson schemas) {
   OrderedJson out{{"@context", "https://www.w3.org/2022/wot/td/v1.1"}, {"title", std::string(device)}};
   out["securityDefinitions"] = {{"nosec_sc", {{"scheme", "nosec"}}}, {"device", {{"scheme", "basic"}}}};
@@ -423,6 +434,7 @@ OrderedJson thing_description(std::string_view device, const std::vector<Place>&
   out["properties"] = std::move(properties);
   out["actions"] = std::move(actions);
   out["events"] = std::move(events);
+  lead_to_schema_definitions(out);
   return out;
 }
 

@@ -4,6 +4,7 @@
 #include "server/http/endpoints/dashboard.hpp"
 #include "server/http/endpoints/devices.hpp"
 #include "server/http/endpoints/discovery.hpp"
+#include "server/http/endpoints/documentation.hpp"
 #include "server/http/endpoints/gateway_document.hpp"
 #include "server/http/endpoints/health.hpp"
 #include "server/http/endpoints/metrics.hpp"
@@ -31,6 +32,8 @@ std::vector<Route> list_routes(GatewayState& gateway) {
       {post, "/api/v1/access/requests/*", request_endpoint(gateway)},
       {get, "/api/*", no_such_api_endpoint()},
       {get, "/devices/*", device_endpoint(gateway)},
+      {get, "/docs", to_documentation_endpoint()},
+      {get, "/docs/*", documentation_endpoint(gateway)},
       {get, "/*", dashboard_endpoint(gateway)},
   };
 }

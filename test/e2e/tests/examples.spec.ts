@@ -1,4 +1,4 @@
-// The clients of examples/thermostat in JavaScript, as docs/examples.md tells to run them: package, device, gateway.
+// The clients of examples/thermostat in JavaScript, as docs/tutorials/page.md tells to run them: package, device, gateway.
 import { execFileSync } from "node:child_process";
 import { cpSync, existsSync, mkdirSync, mkdtempSync, rmSync, symlinkSync } from "node:fs";
 import { tmpdir } from "node:os";

@@ -1,0 +1,33 @@
+"""Blocks of the pages that the tests do not run, each with the reason. (page, beginning of the block's first line)."""
+
+COMMANDS = {
+    ("docs/access.md", "# in /etc/rrgate"): "root of a Debian of its own: test/interop/test_package.py runs it",
+    ("docs/access.md", "curl -u vera"): "a host of the lab: test/interop/test_access.py asks the same",
+    ("docs/access.md", "curl -d '{\"name\""): "a gateway with users: test/interop/test_access.py asks the same",
+    ("docs/command-line.md", "pip install"): "downloads a package; the device is started by the test",
+    ("docs/deploy.md", "apt install"): "installs a package: test/interop/test_package.py does",
+    ("docs/deploy.md", "adduser"): "makes a user of this machine",
+    ("docs/deploy.md", "docker build"): "takes a container engine: test/interop/test_container.py does it",
+    ("docs/device-author.md", "build-examples/web_server"): "test/interop/test_web_server.py runs it",
+    ("docs/discovery.md", "install -d"): "makes folders of this machine's users: test/interop/test_local_discovery.py does it",
+    ("docs/embedding.md", "build-examples/thermostat_gateway"): "test/examples/examples_test.py builds and runs it",
+    ("docs/start.md", "apt install"): "installs a package: test/interop/test_package.py does",
+    ("docs/start.md", "docker compose"): "takes a container engine: test/interop/test_container.py reads the file",
+    ("docs/start.md", "./dev demo"): "builds everything; the test starts what came of it",
+    ("docs/start.md", "pip install"): "downloads a package; the device is started by the test",
+    ("docs/tutorials/cpp-device.md", "cmake --install"): "test/examples/examples_test.py builds and runs it",
+    ("docs/tutorials/cpp-device.md", "build-examples/thermostat_client"): "test/examples/examples_test.py builds and runs it",
+    ("docs/tutorials/cpp-device.md", "build-examples/thermostat_subscriber"): "test/examples/examples_test.py builds and runs it",
+    ("docs/tutorials/python-device.md", "pip install"): "downloads a package, which the test has",
+    ("docs/tutorials/page.md", "npm install"): "asks the package registry; the test puts the package where npm would",
+    ("CONTRIBUTING.md", "./dev setup"): "runs the tests that this is one of",
+    ("README.md", "apt install"): "installs a package: test/interop/test_package.py does",
+    ("README.md", "./dev demo"): "builds everything; the test starts what came of it",
+    ("README.md", "docker compose"): "takes a container engine: test/interop/test_container.py reads the file",
+}
+
+# Commands that do not do what their page says.
+WRONG = {("docs/command-line.md", "rrgate call $REYNARD teleport 100"): "this robot's positions go from -1 to 1, and from -0.5 to 0.5"}
+
+# Output in which numbers are those of a run, not of the next.
+NUMBERS_DIFFER = {("docs/command-line.md", "rrgate watch"): "counts what came within a time"}

@@ -1,0 +1,87 @@
+"""The commands of each page, run in their order as they stand there; what they print is what the page says."""
+import pathlib
+import re
+import tempfile
+
+import pytest
+
+import not_run
+from machine import need
+from pages import blocks, find, pages, unknown
+from shell import Shell, commands_of, looks_like, trace
+
+# What a page takes for granted, beside the blocks that are run.
+BEFORE = {
+    "docs/command-line.md": ["python -m reynard_the_robot --quiet", "export REYNARD='rr+tcp://localhost:29200/?service=reynard'"],
+    "README.md": ["rrgate demo"],
+    "docs/http-api.md": ["rrgate demo"],
+    "docs/start.md": ["rrgate demo", "python -m reynard_the_robot --quiet"],
+    "docs/tutorials/page.md": ["build-examples/thermostat_device", "mkdir examples/thermostat/node_modules",
+                               "ln -s $PWD/wasm-client examples/thermostat/node_modules/rrgate-client"],
+    "docs/tutorials/robot.md": ["rrgate demo", "mkdir node_modules", "ln -s $PWD/wasm-client node_modules/rrgate-client"],
+}
+RUNS_JAVASCRIPT = ("docs/tutorials/robot.md",)
+
+
+@pytest.fixture
+def folder():
+    with tempfile.TemporaryDirectory(prefix="rr-docs-") as short:  # it is part of the paths of sockets
+        yield pathlib.Path(short)
+
+
+def is_run(block):
+    return block.language == "sh" and find(not_run.COMMANDS, block) is None or \
+        block.language == "js" and block.page in RUNS_JAVASCRIPT
+
+
+@pytest.mark.parametrize("page", [page for page in pages() if any(is_run(block) for block in blocks() if block.page == page)])
+def test_page(page, folder):
+    need("network")
+    shell = Shell(folder)
+    try:
+        for command in BEFORE.get(page, ()):
+            assert shell.run(command)[1] == 0, command
+        for block in (block for block in blocks() if block.page == page):
+            if block.language == "json" and '"listen"' in block.text and not block.file:
+                (folder / "gateway.json").write_text(block.text)
+            elif is_run(block):
+                follow(shell, block)
+    finally:
+        shell.end()
+
+
+def follow(shell, block):
+    if block.language == "js":
+        (shell.folder / "block.mjs").write_text(block.text)
+        said, code = shell.run("timeout 20 node block.mjs")
+        assert code == 0, f"{block}: node ended with {code}\n{said}"
+        return
+    for command, expected in commands_of(block.text):
+        said, code = shell.run(command)
+        if is_in(not_run.WRONG, block, command):
+            continue
+        if not expected:
+            assert code == 0, f"{block}: {command}\nended with {code}, and said\n{said}{trace(shell.folder)}"
+        if expected is None:
+            continue
+        if is_in(not_run.NUMBERS_DIFFER, block, command):
+            said, expected = (re.sub(r"\d+(\.\d+)?", "0", text) for text in (said, expected))
+        assert looks_like(expected, said), f"{block}: {command}\nsaid\n{said}\nexpected\n{expected}{trace(shell.folder)}"
+
+
+def is_in(listed, block, command):
+    return any(page == block.page and command.startswith(beginning) for page, beginning in listed)
+
+
+def test_what_is_not_run_is_there():
+    assert unknown(not_run.COMMANDS) == []
+
+
+def test_output_is_compared():
+    assert looks_like("", "")
+    assert looks_like('{"x":...,"y":...}', '{"x":1.5,"y":2}')
+    assert looks_like("a\n...\nc", "a\nb\nb\nc")
+    assert not looks_like("a", "a\nb")
+    assert not looks_like("a...", "b")
+    assert commands_of("$ a \\\n  b\none\ntwo\n$ c\n") == [("a \\\n  b", "one\ntwo"), ("c", "")]
+    assert commands_of("# why\na\nb # c\n") == [("a", None), ("b # c", None)]

@@ -1,0 +1,39 @@
+"""Links between pages lead somewhere: files are there, and so are the headings that anchors name."""
+import posixpath
+import re
+
+import pytest
+
+from pages import FENCE, ROOT, pages
+
+
+def anchors(text):
+    """Of a page's headings, as GitHub makes them; the site makes them likewise."""
+    found = {}
+    for heading in re.findall(r"^#{1,6} (.*)$", FENCE.sub("", text), re.MULTILINE):
+        words = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading)
+        slug = re.sub(r"[^\w\- ]", "", words.strip().lower()).replace(" ", "-")
+        found[slug] = found.get(slug, -1) + 1
+    return {slug if number == 0 else f"{slug}-{number}" for slug, count in found.items() for number in range(count + 1)}
+
+
+def links(text):
+    prose = re.sub(r"`[^`\n]*`", "", FENCE.sub("", text))
+    return [link for link in re.findall(r"\]\(([^)\s]+)\)", prose) if not re.match(r"[a-z][a-z+.-]*:", link)]
+
+
+def leads_somewhere(page, link):
+    target, _, anchor = link.partition("#")
+    file = ROOT / posixpath.normpath(posixpath.join(posixpath.dirname(page), target)) if target else ROOT / page
+    return file.exists() and (not anchor or anchor in anchors(file.read_text()))
+
+
+@pytest.mark.parametrize("page", pages())
+def test_links_lead_somewhere(page):
+    assert [link for link in links(pages()[page]) if not leads_somewhere(page, link)] == []
+
+
+def test_anchors_are_those_of_github():
+    text = "# Nodes in C++\n## connect(url, options)\n## `a_b`, c\n## Twice\n## Twice\n```sh\n# none\n```\n"
+    assert anchors(text) == {"nodes-in-c", "connecturl-options", "a_b-c", "twice", "twice-1"}
+    assert links("[a](b.md#c) `[d](e)` [f](https://g) ![h](i.png)") == ["b.md#c", "i.png"]

@@ -1,0 +1,22 @@
+// The documentation that the gateway serves: nothing of it is refused by the gateway's policy, or comes from elsewhere.
+import { expect, test } from "../lab_test";
+
+test("pages and their search work without any other host", async ({ page, lab }) => {
+  const elsewhere: string[] = [];
+  const complaints: string[] = [];
+  page.on("request", (request) => {
+    if (!request.url().startsWith(lab.url)) elsewhere.push(request.url());
+  });
+  page.on("console", (message) => {
+    if (message.type() === "error") complaints.push(message.text());
+  });
+  await page.goto(`${lab.url}docs/`);
+  await expect(page.getByRole("heading", { name: "What rrgate is" })).toBeVisible();
+  await page.keyboard.press("Control+k");
+  await page.getByPlaceholder("Search").fill("allowed_hosts");
+  await page.locator(".VPLocalSearchBox .result").filter({ hasText: "By which name" }).first().click();
+  await expect(page).toHaveURL(/access\.html#by-which-name$/);
+  await expect(page.getByRole("heading", { name: "By which name" })).toBeVisible();
+  expect(elsewhere).toEqual([]);
+  expect(complaints).toEqual([]);
+});
