@@ -30,6 +30,13 @@ std::string ResponseWriter::head_of(const Response& response) const {
   return format_response_head(whole, goes_on(), minor_version());
 }
 
+rr::awaitable<std::optional<Response>> ResponseWriter::read_body(std::size_t limit) {
+  body_failure_ = co_await reader_.read_body(request_, nullptr, limit);
+  if (!body_failure_) co_return std::nullopt;
+  // To a client that is gone it does not matter which.
+  co_return problem_response(body_failure_->status == 0 ? 400 : body_failure_->status, body_failure_->detail);
+}
+
 rr::awaitable<rr::error_code> ResponseWriter::send(const Response& response) {
   if (response.closes) closes_ = true;
   const auto head = head_of(response);

@@ -18,8 +18,6 @@ namespace {
 using Json = rr::OrderedJson;
 using Clock = std::chrono::system_clock;
 
-constexpr std::size_t largest_body = 8 * 1024;
-
 Response answer(unsigned status, const Json& json) {
   return json_response(status, json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n");
 }
@@ -54,7 +52,6 @@ rr::Result<rr::Json> body_of(const Request& request) {
   const auto type = request.header(http::field::content_type);
   if (!equals_ignoring_case(type.substr(0, type.find(';')), "application/json"))
     return bad("Content-Type is " + rr::quoted(type) + ", expected application/json");
-  if (text.size() > largest_body) return bad("the body has more than 8 KiB");
   auto json = rr::read_json(text);
   if (json && !json->is_object()) return bad("expected an object");
   return json;

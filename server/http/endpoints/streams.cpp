@@ -95,7 +95,7 @@ rr::awaitable<void> stream_topic(const ObjectRequest& request, const Target& tar
   const auto listener = std::move(*listening);
 
   const auto head = stream_head("text/event-stream");
-  if (co_await writer.begin(head)) co_return;
+  if (co_await writer.begin(head) || !writer.has_body()) co_return;
   writer.watch([outbox] {
     outbox->is_gone = true;
     outbox->news.cancel();
@@ -141,7 +141,7 @@ rr::awaitable<void> stream_images(const ObjectRequest& request, const Target& ta
   const auto listener = std::move(*listening);
 
   const auto head = stream_head("multipart/x-mixed-replace; boundary=frame");
-  if (co_await writer.begin(head)) co_return;
+  if (co_await writer.begin(head) || !writer.has_body()) co_return;
   writer.watch([newest] {
     newest->is_gone = true;
     newest->news.cancel();
