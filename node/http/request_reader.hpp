@@ -21,7 +21,7 @@ struct RequestLimits {
   std::size_t body_bytes = 64 * 1024;
 };
 
-/// Bytes a second that a body needs at least, on average from its first byte, beside one header_timeout.
+/// Bytes a second that bodies need at least, on average from their first byte, beside one header_timeout.
 inline constexpr std::size_t least_rate = 8 * 1024;
 
 /// Why something could not be read.

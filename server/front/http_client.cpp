@@ -98,7 +98,7 @@ rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& 
                                              rr::ByteSpan unread) {
   auto& tcp = *stream;
   connection.client = request.arrival.peer;
-  connection.address = request.arrival.address.to_string();
+  connection.address = client_network(request.arrival.address).to_string();
   connection.identity = request.identity;
   const auto refuse = [&tcp](const Response& refusal) -> rr::awaitable<void> {
     co_await write_refusal(tcp, refusal);
@@ -289,7 +289,9 @@ rr::awaitable<Continuation> serve_http_client(GatewayState& gateway, Connection&
     std::vector<std::pair<std::string, std::string>> headers;
     if (request.arrival.is_encrypted && config.tls.hsts_seconds > 0)
       headers.emplace_back("Strict-Transport-Security", "max-age=" + std::to_string(config.tls.hsts_seconds));
-    ResponseWriter writer(*stream, reader, request, gateway.is_stopping(), std::move(headers));
+    auto memory = gateway.memory().charge(client_network(request.arrival.address).to_string());
+    ResponseOptions options{gateway.is_stopping(), std::move(headers), config.timeouts.send_stall};
+    ResponseWriter writer(*stream, reader, request, std::move(memory), std::move(options));
     const auto response = admitted.refusal                ? *admitted.refusal
                           : is_refused                    ? stopping_response()
                           : is_base_path(request, config) ? to_base_path(config)

@@ -30,20 +30,41 @@ std::string ResponseWriter::head_of(const Response& response) const {
   return format_response_head(whole, goes_on(), minor_version());
 }
 
+Response no_memory_response() {
+  auto response = problem_response(503, "the gateway has no memory left for this; try again in a moment");
+  response.set("Retry-After", "2");
+  return response;
+}
+
+rr::awaitable<rr::error_code> ResponseWriter::write_slices(std::span<const rr::ByteSpan> slices) {
+  std::size_t bytes = 0;
+  for (const auto& slice : slices) bytes += slice.size();
+  slow_.arm(patience_ + std::chrono::milliseconds(bytes * 1000 / least_rate));
+  const auto error = co_await stream_.write(slices);
+  slow_.disarm();
+  co_return error;
+}
+
 rr::awaitable<std::optional<Response>> ResponseWriter::read_body(std::size_t limit) {
-  body_failure_ = co_await reader_.read_body(request_, nullptr, limit);
+  const RequestReader::HasRoom has_room = [this](std::size_t bytes) { return memory_.resize(bytes); };
+  body_failure_ = co_await reader_.read_body(request_, has_room, limit);
   if (!body_failure_) co_return std::nullopt;
   // To a client that is gone it does not matter which.
   co_return problem_response(body_failure_->status == 0 ? 400 : body_failure_->status, body_failure_->detail);
 }
 
-rr::awaitable<rr::error_code> ResponseWriter::send(const Response& response) {
+rr::awaitable<rr::error_code> ResponseWriter::send(const Response& whole) {
+  // A body that others hold as well costs nothing more.
+  const bool is_own = whole.body && whole.body.use_count() == 1;
+  const bool fits = !is_own || memory_.resize(memory_.bytes() + whole.body->size());
+  const Response no_memory = fits ? Response() : no_memory_response();
+  const Response& response = fits ? whole : no_memory;
   if (response.closes) closes_ = true;
   const auto head = head_of(response);
   const bool sends_body = response.body && has_body();
   const rr::ByteSpan parts[] = {rr::as_bytes(head), sends_body ? rr::as_bytes(*response.body) : rr::ByteSpan()};
   const std::span<const rr::ByteSpan> slices(parts, sends_body ? 2 : 1);
-  co_return co_await stream_.write(slices);
+  co_return co_await write_slices(slices);
 }
 
 rr::awaitable<rr::error_code> ResponseWriter::begin(const Response& head) {
@@ -52,7 +73,7 @@ rr::awaitable<rr::error_code> ResponseWriter::begin(const Response& head) {
   const auto text = head_of(head);
   const auto slice = rr::as_bytes(text);
   const std::span<const rr::ByteSpan> slices(&slice, 1);
-  co_return co_await stream_.write(slices);
+  co_return co_await write_slices(slices);
 }
 
 rr::awaitable<rr::error_code> ResponseWriter::write(std::string_view text) {
@@ -64,14 +85,14 @@ rr::awaitable<rr::error_code> ResponseWriter::write(std::string_view text) {
   const std::string_view line_end = is_chunked ? "\r\n" : "";
   const rr::ByteSpan parts[] = {rr::as_bytes(size_line), rr::as_bytes(text), rr::as_bytes(line_end)};
   const std::span<const rr::ByteSpan> slices(parts, 3);
-  co_return co_await stream_.write(slices);
+  co_return co_await write_slices(slices);
 }
 
 rr::awaitable<rr::error_code> ResponseWriter::end() {
   if (minor_version() == 0 || !has_body()) co_return rr::error_code();
   const auto slice = rr::as_bytes("0\r\n\r\n");
   const std::span<const rr::ByteSpan> slices(&slice, 1);
-  co_return co_await stream_.write(slices);
+  co_return co_await write_slices(slices);
 }
 
 void ResponseWriter::watch(std::function<void()> on_gone) {

@@ -7,6 +7,7 @@
 #include "server/access/access_text.hpp"
 #include "server/access/api_tokens.hpp"
 #include "server/json/json.hpp"
+#include "server/limits/client_network.hpp"
 #include "server/log/log.hpp"
 #include "server/state/gateway_state.hpp"
 #include "server/state/http_access.hpp"
@@ -178,8 +179,8 @@ Handler ask_endpoint(GatewayState& gateway) {
     const auto name = text_of(*body, "name");
     const auto reason = text_of(*body, "reason");
     if (!name || !reason) return error_answer(name ? reason.error() : name.error());
-    const auto asked = gateway.http_access().requests().ask(*name, *reason, request.arrival.peer,
-                                                            request.arrival.address.to_string(), Clock::now());
+    const auto asked = gateway.http_access().requests().ask(
+        *name, *reason, request.arrival.peer, client_network(request.arrival.address).to_string(), Clock::now());
     if (!asked) return error_answer(asked.error());
     log(LogLevel::info, "access asked for", {{"name", *name}, {"peer", request.arrival.peer}, {"reason", *reason}});
     gateway.access().record({"asked", &request.identity, nullptr, *name});
