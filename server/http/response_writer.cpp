@@ -11,11 +11,19 @@ namespace rrgate {
 
 namespace asio = boost::asio;
 
+namespace {
+
+/// Of requests that come while another one is being answered. More waits in the socket, and the client's end behind it.
+constexpr std::size_t max_early_bytes = 16 * 1024;
+
+}  // namespace
+
 struct ResponseWriter::Watch {
   explicit Watch(const asio::any_io_executor& executor) : ended(executor, asio::steady_timer::time_point::max()) {}
 
   std::function<void()> on_gone;
   rr::Bytes early;  ///< what the client sent meanwhile: its next request
+  bool is_over = false;
   bool is_done = false;
   asio::steady_timer ended;
 };
@@ -101,19 +109,26 @@ void ResponseWriter::watch(std::function<void()> on_gone) {
   asio::co_spawn(stream_.executor(), read_while(watch_, stream_), asio::detached);
 }
 
-/// One read: bytes are the next request, which waits; their absence is the client's end.
+/// Bytes are the next request, which waits; their absence is the client's end.
 rr::awaitable<void> ResponseWriter::read_while(std::shared_ptr<Watch> watch, rr::ByteStream& stream) {
   std::array<std::uint8_t, 4096> buffer;
-  const auto read = co_await stream.read_some(buffer);
-  watch->early.assign(buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(read.bytes));
+  bool is_gone = false;
+  while (!is_gone && !watch->is_over && watch->early.size() < max_early_bytes) {
+    const auto read = co_await stream.read_some(buffer);
+    watch->early.insert(watch->early.end(), buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(read.bytes));
+    is_gone = read.bytes == 0;
+  }
   watch->is_done = true;
-  if (read.bytes == 0 && watch->on_gone) watch->on_gone();
+  if (is_gone && !watch->is_over) {
+    watch->on_gone();
+    stream.close();  // what is being written waits for nobody
+  }
   watch->ended.cancel();
 }
 
 rr::awaitable<void> ResponseWriter::unwatch() {
   if (!watch_) co_return;
-  watch_->on_gone = nullptr;
+  watch_->is_over = true;
   if (!watch_->is_done) stream_.cancel();
   while (!watch_->is_done) co_await watch_->ended.async_wait(asio::as_tuple(asio::use_awaitable));
   stream_.put_back(watch_->early);
