@@ -42,6 +42,7 @@ struct ConnectionOptions {
   Features features = {};
   std::size_t max_message_size = 12u * 1024 * 1024;
   std::size_t max_unauthorised_message_size = 512u * 1024;  ///< in force until authorise()
+  std::size_t max_unauthorised_queued_bytes = 64u * 1024;   ///< waiting for the stream: see is_held_back()
   std::size_t max_queued_bytes = 64u * 1024 * 1024;         ///< a peer that reads slower than that is closed
   std::chrono::milliseconds heartbeat_period{10'000};       ///< without sending or receiving anything
   std::chrono::milliseconds receive_timeout{15'000};        ///< after an unanswered heartbeat
@@ -110,6 +111,10 @@ class Connection {
   std::uint32_t local_endpoint() const { return local_endpoint_; }
   std::uint32_t remote_endpoint() const { return remote_endpoint_; }
   std::size_t queued_bytes() const { return queue_.size(); }
+  /// What waits for the stream, and what has come of a message that is not complete.
+  std::size_t held_bytes() const { return queue_.size() + scanner_.held_bytes(); }
+  /// Whether a peer that is not authorised leaves answers unread: it is to get no others before it has read those.
+  bool is_held_back() const { return !is_authorised_ && queue_.size() > options_.max_unauthorised_queued_bytes; }
   const ConnectionStats& stats() const { return stats_; }
 
  private:

@@ -30,7 +30,8 @@ class FrameScanner {
 
   /// Takes effect for the next message.
   void set_max_message_size(std::size_t limit) { limit_ = limit; }
-  /// Whether the stream may end here without cutting a message.
+  /// Bytes of the message that is not complete yet.
+  std::size_t held_bytes() const { return buffer_.size(); }
 
  private:
   void append(ByteSpan bytes);

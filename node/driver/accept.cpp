@@ -31,7 +31,7 @@ awaitable<Result<Accepted>> upgrade(std::unique_ptr<ByteStream> stream, AcceptOp
   const rrgate::RequestLimits limits{max_header_bytes, prologue_time, prologue_time};
   rrgate::RequestReader reader(*stream, limits);
   const auto read = co_await reader.next();
-  std::string why = read.detail;
+  std::string why = read.failure.detail;
   rrgate::Response refusal;
   if (read.request && rrgate::asks_for_websocket(*read.request)) {
     auto refused = rrgate::refuse_foreign_page(*read.request, {.allowed_origins = options.allowed_origins});
@@ -51,8 +51,8 @@ awaitable<Result<Accepted>> upgrade(std::unique_ptr<ByteStream> stream, AcceptOp
   } else if (read.request) {
     refusal = rrgate::problem_response(404, "a Robot Raconteur node; it answers WebSockets and native clients alone");
     why = "an HTTP request that is no WebSocket";
-  } else if (read.refusal != 0) {
-    refusal = rrgate::problem_response(read.refusal, read.detail);
+  } else if (read.failure.status != 0) {
+    refusal = rrgate::problem_response(read.failure.status, read.failure.detail);
   } else {
     co_return dropped(*stream, "it ended within its first request");
   }

@@ -1,23 +1,35 @@
 #include "node/http/request_reader.hpp"
 
+#include <algorithm>
+#include <array>
 #include <boost/asio/buffer.hpp>
 #include <boost/beast/http/error.hpp>
-#include <boost/beast/http/parser.hpp>
 
 namespace rrgate {
 
 namespace {
 
-ReadRequest refuse(unsigned status, std::string detail) {
-  return {std::nullopt, status, std::move(detail)};
+ReadFailure failure_of(const boost::beast::error_code& error, const RequestLimits& limits, std::size_t body_limit) {
+  if (error == http::error::header_limit)
+    return {431, "request header longer than " + std::to_string(limits.header_bytes) + " bytes"};
+  if (error == http::error::body_limit)
+    return {413, "request body longer than " + std::to_string(body_limit) + " bytes"};
+  return {400, "not an HTTP request: " + error.message()};
 }
 
-ReadRequest refuse_for(const boost::beast::error_code& error, const RequestLimits& limits) {
-  if (error == http::error::header_limit)
-    return refuse(431, "request header longer than " + std::to_string(limits.header_bytes) + " bytes");
-  if (error == http::error::body_limit)
-    return refuse(413, "request body longer than " + std::to_string(limits.body_bytes) + " bytes");
-  return refuse(400, "not an HTTP request: " + error.message());
+/// What Beast takes and others may read differently: where a request ends, and whom it is for, must be beyond doubt.
+std::optional<ReadFailure> check_header(const HttpRequest& request) {
+  const auto& message = request.message;
+  const auto codings = message.count(http::field::transfer_encoding);
+  const auto coding = request.header(http::field::transfer_encoding);
+  if (codings > 1 || (codings == 1 && !equals_ignoring_case(coding, "chunked")))
+    return ReadFailure{501, "Transfer-Encoding is " + rr::quoted(coding) + ", expected \"chunked\" alone"};
+  if (codings != 0 && (message.version() < 11 || message.count(http::field::content_length) != 0))
+    return ReadFailure{400, "Transfer-Encoding needs HTTP/1.1, and no Content-Length beside it"};
+  const auto hosts = message.count(http::field::host);
+  if (hosts > 1 || (hosts == 0 && message.version() >= 11))
+    return ReadFailure{400, "the request has " + std::to_string(hosts) + " Host headers, expected one"};
+  return std::nullopt;
 }
 
 }  // namespace
@@ -32,48 +44,98 @@ bool RequestReader::is_header_too_long(std::size_t consumed) const {
   return consumed + (end == std::string_view::npos ? text.size() : end + 4) > limits_.header_bytes;
 }
 
+std::size_t RequestReader::parse(Parser& parser, rr::Bytes& buffer, boost::beast::error_code& error) {
+  const auto used = parser.put(boost::asio::const_buffer(buffer.data(), buffer.size()), error);
+  buffer.erase(buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(used));
+  if (error == http::error::need_more) error = {};
+  return used;
+}
+
+/// Reads more into buffer_, while limit_ is armed.
+rr::awaitable<std::optional<ReadFailure>> RequestReader::read_on() {
+  std::array<std::uint8_t, 4096> chunk;
+  const auto read = co_await stream_.read_some(chunk);
+  if (!read.error && !read.is_end()) {
+    buffer_.insert(buffer_.end(), chunk.begin(), chunk.begin() + static_cast<std::ptrdiff_t>(read.bytes));
+    co_return std::nullopt;
+  }
+  const bool is_late = !limit_.is_armed();
+  limit_.disarm();
+  if (!is_late) co_return ReadFailure();
+  co_return ReadFailure{408, "the request took longer than " + std::to_string(limits_.header_timeout.count()) +
+                                 " ms, or its body came with less than " + std::to_string(least_rate) +
+                                 " bytes a second"};
+}
+
 rr::awaitable<ReadRequest> RequestReader::next() {
-  http::request_parser<http::string_body> parser;
+  if (has_unread_body()) co_return ReadRequest();
+  auto& parser = parser_.emplace();
   parser.header_limit(static_cast<std::uint32_t>(limits_.header_bytes) + 1024);
   parser.body_limit(limits_.body_bytes);
-  parser.eager(true);
-  std::size_t consumed = 0;  // of the header
+  std::size_t consumed = 0;
   // The first request follows the first bytes of the connection, so the short limit holds for it from the start.
   bool is_started = std::exchange(is_first_, false) || !buffer_.empty();
   limit_.arm(is_started ? limits_.header_timeout : limits_.idle_timeout);
-  rr::Bytes chunk(4096);
-  while (!parser.is_done()) {
-    if (!buffer_.empty()) {
-      boost::beast::error_code error;
-      if (!parser.is_header_done() && is_header_too_long(consumed)) error = http::error::header_limit;
-      const auto used = error ? 0 : parser.put(boost::asio::const_buffer(buffer_.data(), buffer_.size()), error);
-      buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(used));
-      consumed += used;
-      if (error && error != http::error::need_more) {
-        limit_.disarm();
-        co_return refuse_for(error, limits_);
-      }
-      if (parser.is_done()) break;
-      if (used > 0 && !buffer_.empty()) continue;
-    }
-    const auto read = co_await stream_.read_some(chunk);
-    if (read.error || read.is_end()) {
-      const bool is_late = is_started && !limit_.is_armed();
+  for (;;) {
+    boost::beast::error_code error;
+    if (is_header_too_long(consumed)) error = http::error::header_limit;
+    if (!error && !buffer_.empty()) consumed += parse(parser, buffer_, error);
+    if (error) {
       limit_.disarm();
-      co_return is_late
-          ? refuse(408, "the request took longer than " + std::to_string(limits_.header_timeout.count()) + " ms")
-          : ReadRequest{};
+      co_return ReadRequest{std::nullopt, failure_of(error, limits_, limits_.body_bytes)};
     }
-    if (!is_started || parser.is_header_done()) {
-      is_started = true;
-      limit_.arm(limits_.header_timeout);
-    }
-    buffer_.insert(buffer_.end(), chunk.begin(), chunk.begin() + static_cast<std::ptrdiff_t>(read.bytes));
+    if (parser.is_header_done()) break;
+    auto failure = co_await read_on();
+    // One that sends nothing is idle, not late.
+    if (failure && !is_started) failure = ReadFailure();
+    if (failure) co_return ReadRequest{std::nullopt, std::move(*failure)};
+    if (!std::exchange(is_started, true)) limit_.arm(limits_.header_timeout);
   }
   limit_.disarm();
   ReadRequest out;
-  out.request.emplace(HttpRequest{parser.release()});
+  out.request.emplace(HttpRequest{std::move(parser.get())});
+  if (auto failure = check_header(*out.request)) {
+    out = ReadRequest{std::nullopt, std::move(*failure)};
+  } else if (parser.is_done()) {
+    parser_.reset();
+  }
   co_return out;
+}
+
+rr::awaitable<std::optional<ReadFailure>> RequestReader::read_body(HttpRequest& request, const HasRoom& has_room,
+                                                                   std::size_t limit) {
+  if (!has_unread_body()) co_return std::nullopt;
+  auto& parser = *parser_;
+  limit = std::min(limit, limits_.body_bytes);
+  parser.body_limit(limit);
+  parser.eager(true);
+  const auto told = parser.content_length().value_or(0);
+  if (told > limit) co_return failure_of(http::error::body_limit, limits_, limit);
+  const auto begin = std::chrono::steady_clock::now();
+  std::size_t received = 0;
+  if (buffer_.empty() && has_token(request.header(http::field::expect), "100-continue")) {
+    const auto go_on = rr::as_bytes("HTTP/1.1 100 Continue\r\n\r\n");
+    const std::span<const rr::ByteSpan> slices(&go_on, 1);
+    if (co_await stream_.write(slices)) co_return ReadFailure();
+  }
+  for (;;) {
+    const auto size = std::max<std::size_t>(told, parser.get().body().size() + buffer_.size());
+    if (has_room && !has_room(size))
+      co_return ReadFailure{503, "the gateway has no memory left for a body of " + std::to_string(size) + " bytes"};
+    boost::beast::error_code error;
+    if (!buffer_.empty()) received += parse(parser, buffer_, error);
+    if (error) co_return failure_of(error, limits_, limit);
+    if (parser.is_done()) break;
+    const auto end = begin + limits_.header_timeout + std::chrono::milliseconds(received * 1000 / least_rate);
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
+    limit_.arm(std::min(limits_.header_timeout, left));
+    auto failure = co_await read_on();
+    limit_.disarm();
+    if (failure) co_return failure;
+  }
+  request.message.body() = std::move(parser.get().body());
+  parser_.reset();
+  co_return std::nullopt;
 }
 
 }  // namespace rrgate

@@ -1,7 +1,11 @@
-// Reads requests from a byte stream, within limits. Layer: node/http. Parsing is Beast's.
+// Reads requests from a byte stream, within limits: the header first, the body when it is asked for. Layer: node/http.
+// Parsing is Beast's. Source: RFC 9112 sections 3.2 and 6; RFC 9110 section 10.1.1 (100-continue).
 #pragma once
 
+#include <boost/beast/http/parser.hpp>
 #include <chrono>
+#include <functional>
+#include <optional>
 
 #include "node/http/message.hpp"
 #include "node/transport/byte_stream.hpp"
@@ -11,16 +15,25 @@ namespace rrgate {
 
 struct RequestLimits {
   std::size_t header_bytes;
-  std::chrono::milliseconds header_timeout;  ///< for a whole header from its first byte, and for each part of a body
-  std::chrono::milliseconds idle_timeout;    ///< until that first byte
+  /// For a whole header from its first byte, and for each part of a body; see also least_rate.
+  std::chrono::milliseconds header_timeout;
+  std::chrono::milliseconds idle_timeout;  ///< until that first byte
   std::size_t body_bytes = 64 * 1024;
 };
 
-/// What reading came to: a request, or a status to refuse with (408, 413, 431, 400), or neither: the peer is gone.
+/// Bytes a second that bodies need at least, on average from their first byte, beside one header_timeout.
+inline constexpr std::size_t least_rate = 8 * 1024;
+
+/// Why something could not be read.
+struct ReadFailure {
+  unsigned status = 0;  ///< to refuse with: 400, 408, 413, 431, 501, 503; 0: the peer is gone
+  std::string detail;
+};
+
+/// What reading came to: a request, or else why there is none.
 struct ReadRequest {
   std::optional<HttpRequest> request;
-  unsigned refusal = 0;
-  std::string detail;
+  ReadFailure failure = {};
 };
 
 /// One for each connection: keeps what was read beyond a request.
@@ -28,16 +41,33 @@ class RequestReader {
  public:
   RequestReader(rr::ByteStream& stream, RequestLimits limits);
 
+  /// The next request up to the end of its header; the body before it was read, or there was none.
   rr::awaitable<ReadRequest> next();
+  /// Whether the last request has a body that was not read. Where it stays so, nothing can follow.
+  bool has_unread_body() const { return parser_ && !parser_->is_done(); }
+
+  /// Asked with the size of the whole body as far as it is known, before memory is taken for it. False: 503.
+  using HasRoom = std::function<bool(std::size_t bytes)>;
+  /// Reads the body of the last request, `request`, into it. At most `limit` bytes, where that is less than
+  /// RequestLimits::body_bytes. Both are borrowed for the wait. Returns why that failed; nullopt: it is there.
+  rr::awaitable<std::optional<ReadFailure>> read_body(HttpRequest& request, const HasRoom& has_room,
+                                                      std::size_t limit = std::size_t(-1));
+
   /// Bytes behind the last request: of the next one, or of the protocol that was upgraded to.
   rr::ByteSpan unread() const { return buffer_; }
 
  private:
+  using Parser = http::request_parser<http::string_body>;
+
   bool is_header_too_long(std::size_t consumed) const;
+  /// Gives the parser what was read. Returns how much of it was taken.
+  static std::size_t parse(Parser& parser, rr::Bytes& buffer, boost::beast::error_code& error);
+  rr::awaitable<std::optional<ReadFailure>> read_on();
 
   rr::ByteStream& stream_;
   RequestLimits limits_;
   rr::Deadline limit_;
+  std::optional<Parser> parser_;  ///< of the last request, where it has a body
   rr::Bytes buffer_;
   bool is_first_ = true;
 };

@@ -231,6 +231,7 @@ void read_limits(ObjectReader& in, Limits& limits) {
   in.size("outbox_bytes", limits.outbox_bytes, {16 * 1024, 64 * 1024 * 1024});
   in.size("clients", limits.clients, {1, 1'000'000});
   in.size("clients_per_address", limits.clients_per_address, {1, 1'000'000});
+  in.size("memory", limits.memory, {0, 1'000'000'000'000});
   in.size("client_queue_bytes", limits.client_queue_bytes, {64 * 1024, 1'000'000'000});
   in.size("opaque_rate", limits.opaque_rate, {1024, 1'000'000'000'000});
 }

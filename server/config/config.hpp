@@ -83,6 +83,7 @@ struct Limits {
   std::size_t outbox_bytes = 256u * 1024;            ///< held for one client and direction before reading pauses
   std::size_t clients = 4000;                        ///< connections at a time, all addresses together
   std::size_t clients_per_address = 1000;
+  std::size_t memory = 0;  ///< bytes that clients may make the gateway hold; 0: a quarter of the machine's
   std::size_t client_queue_bytes = 8u * 1024 * 1024;  ///< a client of a shared device that leaves more waiting is cut
   std::size_t opaque_rate = 128u * 1024 * 1024;       ///< bytes a second and direction of what is encrypted end to end
 

@@ -98,7 +98,7 @@ rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& 
                                              rr::ByteSpan unread) {
   auto& tcp = *stream;
   connection.client = request.arrival.peer;
-  connection.address = request.arrival.address.to_string();
+  connection.address = client_network(request.arrival.address).to_string();
   connection.identity = request.identity;
   const auto refuse = [&tcp](const Response& refusal) -> rr::awaitable<void> {
     co_await write_refusal(tcp, refusal);
@@ -225,6 +225,13 @@ bool is_guarded(const Request& request) {
   return asks_for_websocket(request) || path == "/metrics" || path.substr(0, 5) == "/api/";
 }
 
+void note_unreadable(GatewayState& gateway, const Connection& connection, const ReadFailure& failure) {
+  if (failure.status == 0) return;  // the client is gone
+  gateway.reject(Rejection::bad_request);
+  log(LogLevel::info, "request refused",
+      {{"peer", connection.client}, {"status", failure.status}, {"detail", failure.detail}});
+}
+
 Rejection rejection_of(unsigned status) {
   return status == 429 ? Rejection::rate : status == 401 ? Rejection::unauthorized : Rejection::forbidden;
 }
@@ -250,12 +257,10 @@ rr::awaitable<Continuation> serve_http_client(GatewayState& gateway, Connection&
   RequestReader reader(*stream, limits);
   for (;;) {
     auto read = co_await reader.next();
-    if (!read.request && read.refusal == 0) break;
+    if (!read.request && read.failure.status == 0) break;
     if (!read.request) {
-      gateway.reject(Rejection::bad_request);
-      log(LogLevel::info, "request refused",
-          {{"peer", connection.client}, {"status", read.refusal}, {"detail", read.detail}});
-      const auto response = problem_response(read.refusal, read.detail);
+      note_unreadable(gateway, connection, read.failure);
+      const auto response = problem_response(read.failure.status, read.failure.detail);
       co_await write_refusal(*stream, response);
       co_await stream->end(rr::no_reason);
       break;
@@ -284,13 +289,16 @@ rr::awaitable<Continuation> serve_http_client(GatewayState& gateway, Connection&
     std::vector<std::pair<std::string, std::string>> headers;
     if (request.arrival.is_encrypted && config.tls.hsts_seconds > 0)
       headers.emplace_back("Strict-Transport-Security", "max-age=" + std::to_string(config.tls.hsts_seconds));
-    ResponseWriter writer(*stream, request, gateway.is_stopping(), std::move(headers));
+    auto memory = gateway.memory().charge(client_network(request.arrival.address).to_string());
+    ResponseOptions options{gateway.is_stopping(), std::move(headers), config.timeouts.send_stall};
+    ResponseWriter writer(*stream, reader, request, std::move(memory), std::move(options));
     const auto response = admitted.refusal                ? *admitted.refusal
                           : is_refused                    ? stopping_response()
                           : is_base_path(request, config) ? to_base_path(config)
                                                           : gateway.router().answer(request);
     if (response.answer_later) {
       co_await response.answer_later(writer);
+      if (writer.body_failure()) note_unreadable(gateway, connection, *writer.body_failure());
     } else if (co_await writer.send(response)) {
       break;
     }

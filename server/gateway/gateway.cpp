@@ -201,6 +201,7 @@ rr::Result<> Gateway::reconfigure(Config next) {
   for (const auto& address : bound)
     log(LogLevel::info, "listening", {{"address", rr::format_host_port(address.host, address.port)}});
   admission_.set_limits(config_.limits.clients, config_.limits.clients_per_address);
+  memory_.set_total(memory_total(config_));
   devices_.replace(std::move(*devices));
   shared_.sync(devices_);
   if (found_) {

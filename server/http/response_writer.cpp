@@ -11,11 +11,19 @@ namespace rrgate {
 
 namespace asio = boost::asio;
 
+namespace {
+
+/// Of requests that come while another one is being answered. More waits in the socket, and the client's end behind it.
+constexpr std::size_t max_early_bytes = 16 * 1024;
+
+}  // namespace
+
 struct ResponseWriter::Watch {
   explicit Watch(const asio::any_io_executor& executor) : ended(executor, asio::steady_timer::time_point::max()) {}
 
   std::function<void()> on_gone;
   rr::Bytes early;  ///< what the client sent meanwhile: its next request
+  bool is_over = false;
   bool is_done = false;
   asio::steady_timer ended;
 };
@@ -30,13 +38,41 @@ std::string ResponseWriter::head_of(const Response& response) const {
   return format_response_head(whole, goes_on(), minor_version());
 }
 
-rr::awaitable<rr::error_code> ResponseWriter::send(const Response& response) {
+Response no_memory_response() {
+  auto response = problem_response(503, "the gateway has no memory left for this; try again in a moment");
+  response.set("Retry-After", "2");
+  return response;
+}
+
+rr::awaitable<rr::error_code> ResponseWriter::write_slices(std::span<const rr::ByteSpan> slices) {
+  std::size_t bytes = 0;
+  for (const auto& slice : slices) bytes += slice.size();
+  slow_.arm(patience_ + std::chrono::milliseconds(bytes * 1000 / least_rate));
+  const auto error = co_await stream_.write(slices);
+  slow_.disarm();
+  co_return error;
+}
+
+rr::awaitable<std::optional<Response>> ResponseWriter::read_body(std::size_t limit) {
+  const RequestReader::HasRoom has_room = [this](std::size_t bytes) { return memory_.resize(bytes); };
+  body_failure_ = co_await reader_.read_body(request_, has_room, limit);
+  if (!body_failure_) co_return std::nullopt;
+  // To a client that is gone it does not matter which.
+  co_return problem_response(body_failure_->status == 0 ? 400 : body_failure_->status, body_failure_->detail);
+}
+
+rr::awaitable<rr::error_code> ResponseWriter::send(const Response& whole) {
+  // A body that others hold as well costs nothing more.
+  const bool is_own = whole.body && whole.body.use_count() == 1;
+  const bool fits = !is_own || memory_.resize(memory_.bytes() + whole.body->size());
+  const Response no_memory = fits ? Response() : no_memory_response();
+  const Response& response = fits ? whole : no_memory;
   if (response.closes) closes_ = true;
   const auto head = head_of(response);
   const bool sends_body = response.body && has_body();
   const rr::ByteSpan parts[] = {rr::as_bytes(head), sends_body ? rr::as_bytes(*response.body) : rr::ByteSpan()};
   const std::span<const rr::ByteSpan> slices(parts, sends_body ? 2 : 1);
-  co_return co_await stream_.write(slices);
+  co_return co_await write_slices(slices);
 }
 
 rr::awaitable<rr::error_code> ResponseWriter::begin(const Response& head) {
@@ -45,7 +81,7 @@ rr::awaitable<rr::error_code> ResponseWriter::begin(const Response& head) {
   const auto text = head_of(head);
   const auto slice = rr::as_bytes(text);
   const std::span<const rr::ByteSpan> slices(&slice, 1);
-  co_return co_await stream_.write(slices);
+  co_return co_await write_slices(slices);
 }
 
 rr::awaitable<rr::error_code> ResponseWriter::write(std::string_view text) {
@@ -57,14 +93,14 @@ rr::awaitable<rr::error_code> ResponseWriter::write(std::string_view text) {
   const std::string_view line_end = is_chunked ? "\r\n" : "";
   const rr::ByteSpan parts[] = {rr::as_bytes(size_line), rr::as_bytes(text), rr::as_bytes(line_end)};
   const std::span<const rr::ByteSpan> slices(parts, 3);
-  co_return co_await stream_.write(slices);
+  co_return co_await write_slices(slices);
 }
 
 rr::awaitable<rr::error_code> ResponseWriter::end() {
   if (minor_version() == 0 || !has_body()) co_return rr::error_code();
   const auto slice = rr::as_bytes("0\r\n\r\n");
   const std::span<const rr::ByteSpan> slices(&slice, 1);
-  co_return co_await stream_.write(slices);
+  co_return co_await write_slices(slices);
 }
 
 void ResponseWriter::watch(std::function<void()> on_gone) {
@@ -73,19 +109,26 @@ void ResponseWriter::watch(std::function<void()> on_gone) {
   asio::co_spawn(stream_.executor(), read_while(watch_, stream_), asio::detached);
 }
 
-/// One read: bytes are the next request, which waits; their absence is the client's end.
+/// Bytes are the next request, which waits; their absence is the client's end.
 rr::awaitable<void> ResponseWriter::read_while(std::shared_ptr<Watch> watch, rr::ByteStream& stream) {
   std::array<std::uint8_t, 4096> buffer;
-  const auto read = co_await stream.read_some(buffer);
-  watch->early.assign(buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(read.bytes));
+  bool is_gone = false;
+  while (!is_gone && !watch->is_over && watch->early.size() < max_early_bytes) {
+    const auto read = co_await stream.read_some(buffer);
+    watch->early.insert(watch->early.end(), buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(read.bytes));
+    is_gone = read.bytes == 0;
+  }
   watch->is_done = true;
-  if (read.bytes == 0 && watch->on_gone) watch->on_gone();
+  if (is_gone && !watch->is_over) {
+    watch->on_gone();
+    stream.close();  // what is being written waits for nobody
+  }
   watch->ended.cancel();
 }
 
 rr::awaitable<void> ResponseWriter::unwatch() {
   if (!watch_) co_return;
-  watch_->on_gone = nullptr;
+  watch_->is_over = true;
   if (!watch_->is_done) stream_.cancel();
   while (!watch_->is_done) co_await watch_->ended.async_wait(asio::as_tuple(asio::use_awaitable));
   stream_.put_back(watch_->early);

@@ -2,22 +2,48 @@
 #pragma once
 
 #include <boost/asio/steady_timer.hpp>
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <string_view>
 
+#include "node/http/request_reader.hpp"
 #include "node/transport/byte_stream.hpp"
 #include "server/http/request.hpp"
+#include "server/limits/memory_budget.hpp"
 
 namespace rrgate {
+
+struct ResponseOptions {
+  bool closes = false;                                            ///< the connection, in any case
+  std::vector<std::pair<std::string, std::string>> headers = {};  ///< of every response of this connection
+  /// For each part of a response, beside what least_rate gives for its bytes. Who reads slower is cut.
+  std::chrono::milliseconds patience{15'000};
+};
+
+/// 503: what clients may make the gateway hold is used up.
+Response no_memory_response();
 
 /// For one request; call either send(), or begin(), write() as often as wanted, and end().
 class ResponseWriter {
  public:
-  /// `headers`  go into every response of this connection.
-  ResponseWriter(rr::ByteStream& stream, const Request& request, bool closes,
-                 std::vector<std::pair<std::string, std::string>> headers)
-      : stream_(stream), request_(request), closes_(closes), headers_(std::move(headers)) {}
+  /// `reader`  has read the header of `request` alone. `memory`  is where bodies of requests and responses are counted.
+  ResponseWriter(rr::ByteStream& stream, RequestReader& reader, Request& request, MemoryBudget::Charge memory,
+                 ResponseOptions options)
+      : stream_(stream),
+        reader_(reader),
+        request_(request),
+        memory_(std::move(memory)),
+        closes_(options.closes),
+        headers_(std::move(options.headers)),
+        patience_(options.patience),
+        slow_(stream.executor(), [this] { stream_.close(); }) {}
+
+  /// Reads the body into request(), where there is one: when it is clear that the client may do what it asks for.
+  /// Returns what to answer instead; nullopt: it is there. Without this the connection ends behind the response.
+  rr::awaitable<std::optional<Response>> read_body(std::size_t limit = std::size_t(-1));
+  /// Why the body could not be read, if so.
+  const std::optional<ReadFailure>& body_failure() const { return body_failure_; }
 
   /// Goes into what is sent from now on.
   void add_header(std::string name, std::string value) { headers_.emplace_back(std::move(name), std::move(value)); }
@@ -35,21 +61,30 @@ class ResponseWriter {
   rr::awaitable<void> unwatch();
 
   const Request& request() const { return request_; }
+  /// What this request makes the gateway hold.
+  MemoryBudget::Charge& memory() { return memory_; }
   boost::asio::any_io_executor executor() { return stream_.executor(); }
   /// Whether the connection may carry another request.
-  bool goes_on() const { return request_.message.keep_alive() && !closes_; }
+  bool goes_on() const { return request_.message.keep_alive() && !closes_ && !reader_.has_unread_body(); }
+  /// A response to HEAD has none.
+  bool has_body() const { return request_.message.method() != http::verb::head; }
 
  private:
   struct Watch;
   static rr::awaitable<void> read_while(std::shared_ptr<Watch> watch, rr::ByteStream& stream);
   std::string head_of(const Response& response) const;
+  rr::awaitable<rr::error_code> write_slices(std::span<const rr::ByteSpan> slices);
   unsigned minor_version() const { return request_.message.version() == 10 ? 0 : 1; }
-  bool has_body() const { return request_.message.method() != http::verb::head; }
 
   rr::ByteStream& stream_;
-  const Request& request_;
+  RequestReader& reader_;
+  Request& request_;
+  MemoryBudget::Charge memory_;
+  std::optional<ReadFailure> body_failure_;
   bool closes_;
   std::vector<std::pair<std::string, std::string>> headers_;
+  std::chrono::milliseconds patience_;
+  rr::Deadline slow_;
   bool is_streamed_ = false;
   std::shared_ptr<Watch> watch_;
 };

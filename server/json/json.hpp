@@ -21,6 +21,9 @@ using OrderedJson = nlohmann::ordered_json;
 /// Errors   data_serialization_error: what and at which byte.
 Result<Json> read_json(std::string_view text);
 
+/// Bytes that a document takes for each byte of its text, at most about: "1," becomes 16, twice that while it grows.
+inline constexpr std::size_t json_growth = 16;
+
 /// As read_json(), for CBOR; byte strings become binary values whose subtype is their tag. Only what JSON can say, and
 /// bytes. Errors   data_serialization_error.
 Result<Json> read_cbor(ByteSpan bytes);

@@ -106,7 +106,7 @@ rr::Result<std::shared_ptr<JsonSocketPlace>> find_json_socket(GatewayState& gate
   auto place = std::make_shared<JsonSocketPlace>();
   place->device = device->shared_from_this();
   place->who = request.identity;
-  place->address = request.arrival.address.to_string();
+  place->address = client_network(request.arrival.address).to_string();
   place->key = session_key(gateway, request, (*segments)[1]);
   // What is done to which member is judged when it is asked for.
   if (!gateway.access().sees(place->who, device->config().name, place->key.service)) {

@@ -36,7 +36,7 @@ struct Connection : boost::intrusive::list_base_hook<boost::intrusive::link_mode
   Admission::Ticket ticket;
   /// The client as logs name it: as `peer`, or as a trusted proxy says.
   std::string client;
-  /// Its address alone, by which its requests are counted.
+  /// Its client_network(), by which its requests are counted, and what it makes the gateway hold.
   std::string address;
   /// Who it is, as far as it has shown: by its certificate, by the request that became a WebSocket.
   Identity identity;

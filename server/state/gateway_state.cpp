@@ -8,6 +8,7 @@ namespace rrgate {
 
 GatewayState::GatewayState(boost::asio::io_context& io, Config config)
     : config_(std::move(config)),
+      memory_(memory_total(config_)),
       access_(config_.access),
       http_access_(std::make_unique<HttpAccess>(io.get_executor(), access_)),
       web_tls_(config_.tls.certificates.empty()

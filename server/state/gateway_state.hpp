@@ -10,6 +10,7 @@
 #include "server/config/config.hpp"
 #include "server/config/tls_files.hpp"
 #include "server/http/router.hpp"
+#include "server/limits/memory_budget.hpp"
 #include "server/log/metrics.hpp"
 #include "server/rr/shared_devices.hpp"
 #include "server/state/admission.hpp"
@@ -36,6 +37,8 @@ class GatewayState {
   Metrics& metrics() { return metrics_; }
   void reject(Rejection why) { metrics_.reject(why); }
   Admission& admission() { return admission_; }
+  /// What clients make the gateway hold.
+  MemoryBudget& memory() { return memory_; }
   /// Who may do what.
   Access& access() { return access_; }
   /// How clients of HTTP show who they are, and how much they may ask for.
@@ -52,7 +55,13 @@ class GatewayState {
   GatewayState(boost::asio::io_context& io, Config config);
   ~GatewayState();
 
+  /// As the configuration says.
+  static std::size_t memory_total(const Config& config) {
+    return config.limits.memory == 0 ? machine_memory() / 4 : config.limits.memory;
+  }
+
   Config config_;
+  MemoryBudget memory_;
   Access access_;
   std::unique_ptr<HttpAccess> http_access_;
   std::unique_ptr<TlsFiles> web_tls_;

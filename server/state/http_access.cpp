@@ -9,6 +9,7 @@
 #include "node/tls/base64.hpp"
 #include "node/tls/digest.hpp"
 #include "server/json/json.hpp"
+#include "server/limits/client_network.hpp"
 #include "server/state/connection.hpp"
 
 namespace rrgate {
@@ -18,8 +19,6 @@ namespace asio = boost::asio;
 namespace {
 
 constexpr std::chrono::minutes password_memory{5};
-constexpr std::size_t max_known = 1000;
-constexpr std::size_t max_tries = 10'000;
 constexpr std::size_t max_judged = 64;
 
 using Judged = rr::Result<rr::AuthenticatedUser>;
@@ -87,7 +86,7 @@ rr::awaitable<rr::Result<Identity>> HttpAccess::identify(const Request& request,
   }
   const auto basic = credentials_of(header, "Basic");
   if (basic && state.users)
-    co_return co_await by_password(std::string(*basic), client, request.arrival.address.to_string());
+    co_return co_await by_password(std::string(*basic), client, client_network(request.arrival.address).to_string());
   if (asks_for_websocket(request))
     if (const auto ticket = rr::query_value(request.query(), "ticket")) {
       auto identity = access_.tickets().redeem(*ticket, std::chrono::system_clock::now());
@@ -106,11 +105,12 @@ rr::Result<Identity> HttpAccess::by_token(std::string_view token) const {
   return state.tokens->verify(token, now);
 }
 
-rr::Bytes HttpAccess::remembered_as(std::string_view username, std::string_view password) const {
+std::string HttpAccess::remembered_as(std::string_view username, std::string_view password) const {
   rr::Bytes text = salt_;
   for (const auto part : {username, std::string_view("\0", 1), password})
     text.insert(text.end(), part.begin(), part.end());
-  return rr::sha256(text);
+  const auto digest = rr::sha256(text);
+  return {digest.begin(), digest.end()};
 }
 
 rr::awaitable<rr::Result<Identity>> HttpAccess::by_password(std::string credentials, std::string client,
@@ -123,14 +123,13 @@ rr::awaitable<rr::Result<Identity>> HttpAccess::by_password(std::string credenti
   const auto password = text.substr(colon + 1);
   const auto users = access_.state().users;
   const rr::Now now{std::chrono::steady_clock::now(), {}};
-  if (known_in_ != users || known_.size() >= max_known) known_.clear();
+  if (known_in_ != users) known_.clear();
   known_in_ = users;
   const auto key = remembered_as(username, password);
-  if (const auto found = known_.find(key); found != known_.end() && now.steady < found->second.ends)
-    co_return access_.logged_in(found->second.user, client);
+  if (const auto* known = known_.find(key); known && now.steady < known->ends)
+    co_return access_.logged_in(known->user, client);
 
-  if (tries_.size() >= max_tries) tries_.clear();
-  const auto ticket = tries_[address].begin(now);
+  const auto ticket = tries_.at(address).begin(now);
   if (!ticket) co_return ticket.error();
   if (judged_ >= max_judged)
     co_return rr::make_error(rr::ErrorCode::out_of_system_resource, "too many logins at once; try again later");
@@ -145,11 +144,11 @@ rr::awaitable<rr::Result<Identity>> HttpAccess::by_password(std::string credenti
   who.name = username;
   who.client = client;
   if (!user) {
-    tries_[address].handle_failure(now);
+    tries_.at(address).handle_failure(now);
     access_.record({"login_failed", &who, nullptr, user.error().message});
     co_return user.error();
   }
-  if (known_in_ == users) known_[key] = {*user, now.steady + password_memory};
+  if (known_in_ == users) known_.at(key) = {*user, now.steady + password_memory};
   who = access_.logged_in(*user, client);
   access_.record({"login", &who, nullptr, {}});
   co_return who;
@@ -186,7 +185,7 @@ Response HttpAccess::too_much(std::string_view what) {
 rr::awaitable<HttpAccess::Admitted> HttpAccess::admit(Request& request, const Connection& connection,
                                                       const Config& config) {
   Admitted out;
-  const auto address = request.arrival.address.to_string();
+  const auto address = client_network(request.arrival.address).to_string();
   const auto& of_client = config.rates.client;
   out.client = clients_.enter(address, of_client.per_second, of_client.at_once, std::chrono::steady_clock::now());
   if (!out.client) {

@@ -3,16 +3,16 @@
 
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/thread_pool.hpp>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 
 #include "server/access/access.hpp"
 #include "server/access/access_requests.hpp"
-#include "server/access/rate_gate.hpp"
 #include "server/config/config.hpp"
 #include "server/http/request.hpp"
+#include "server/limits/bounded_table.hpp"
+#include "server/limits/rate_gate.hpp"
 
 namespace rrgate {
 
@@ -67,7 +67,7 @@ class HttpAccess {
 
   rr::Result<Identity> by_token(std::string_view token) const;
   rr::awaitable<rr::Result<Identity>> by_password(std::string credentials, std::string client, std::string address);
-  rr::Bytes remembered_as(std::string_view username, std::string_view password) const;
+  std::string remembered_as(std::string_view username, std::string_view password) const;
 
   boost::asio::any_io_executor executor_;
   Access& access_;
@@ -76,9 +76,11 @@ class HttpAccess {
   RateGate users_;
   RateGate devices_;
   rr::Bytes salt_;
-  std::map<rr::Bytes, Known> known_;
+  static constexpr std::size_t max_known = 1000;
+  static constexpr std::size_t max_tries = 10'000;
+  BoundedTable<std::string, Known> known_{max_known};              ///< by remembered_as()
   std::shared_ptr<const rr::PasswordFileAuthenticator> known_in_;  ///< the users file that they are of
-  std::map<std::string, rr::LoginLimit> tries_;                    ///< by address
+  BoundedTable<std::string, rr::LoginLimit> tries_{max_tries};     ///< by client_network()
   std::size_t judged_ = 0;                                         ///< passwords at this moment
   boost::asio::thread_pool judges_;  ///< hashing a password takes as long as a hundred requests
 };

@@ -25,7 +25,7 @@ void check_head(std::string_view head) {
 
 void check_request(const rrgate::HttpRequest& request) {
   require(request.path().size() + request.query().size() <= request.message.target().size());
-  require(request.message.body().size() <= limits.body_bytes);
+  require(request.message.body().empty());
   const std::vector<std::string> origins = {"https://*.lab.example"};
   const std::vector<std::string> hosts = {"*.lab.example"};
   const rrgate::PageRules rules{origins, hosts};
@@ -41,16 +41,26 @@ void check_request(const rrgate::HttpRequest& request) {
   static_cast<void>(rrgate::takes_close_frames(request));
 }
 
+void check_failure(const rrgate::ReadFailure& failure) {
+  require(failure.status == 0 || (failure.status >= 400 && !failure.detail.empty()));
+}
+
 rr::awaitable<void> read_all(rr::ByteStream& stream, bool& is_done) {
   rrgate::RequestReader reader(stream, limits);
+  const rrgate::RequestReader::HasRoom has_room = [](std::size_t bytes) { return bytes < 400; };
   while (true) {
-    const auto read = co_await reader.next();
+    auto read = co_await reader.next();
     require(reader.unread().size() <= 4096 + limits.header_bytes);
     if (!read.request) {
-      require(read.refusal == 0 || (read.refusal >= 400 && !read.detail.empty()));
+      check_failure(read.failure);
       break;
     }
     check_request(*read.request);
+    if (const auto failure = co_await reader.read_body(*read.request, has_room)) {
+      check_failure(*failure);
+      break;
+    }
+    require(read.request->message.body().size() <= limits.body_bytes && !reader.has_unread_body());
   }
   is_done = true;
 }

@@ -51,6 +51,20 @@ TEST_CASE("a proxy's connection counts in all alone, until its client is known")
   CHECK(admission.admit(there));
 }
 
+TEST_CASE("a network of IPv6 is one address") {
+  Admission admission(10, 1);
+  const auto from = [](const char* address) { return std::optional(boost::asio::ip::make_address(address)); };
+  const auto first = admission.admit(from("2001:db8::1"));
+  CHECK(first);
+  CHECK_FALSE(admission.admit(from("2001:db8::2:3")));
+  CHECK(admission.admit(from("2001:db8:0:1::1")));
+  auto proxied = admission.admit(std::nullopt);
+  CHECK_FALSE(proxied->pass_to(*from("2001:db8::4")));
+  const auto mapped = admission.admit(from("::ffff:192.0.2.1"));
+  CHECK(mapped);
+  CHECK_FALSE(admission.admit(here));
+}
+
 TEST_CASE("limits that change hold for who comes next") {
   Admission admission(1, 1);
   const auto first = admission.admit(here);

@@ -180,7 +180,7 @@ TEST_CASE("every option arrives") {
     "web_root": "web", "allowed_origins": ["https://a.example", "http://*.b.example:81"],
     "allowed_hosts": ["mybox.local", "*.lab.example"],
     "limits": {"max_message_size": 20000, "header_bytes": 2000, "body_bytes": 3000, "header_timeout_ms": 300, "outbox_bytes": 40000,
-               "clients": 5, "clients_per_address": 6, "client_queue_bytes": 70000, "opaque_rate": 7000},
+               "clients": 5, "clients_per_address": 6, "memory": 50000000, "client_queue_bytes": 70000, "opaque_rate": 7000},
     "timeouts": {"connect_ms": 101, "drain_ms": 102, "send_stall_ms": 103, "idle_ms": 104, "unused_session_ms": 105},
     "retry": {"min_ms": 51, "max_ms": 52, "online_ms": 53},
     "log": {"level": "debug", "format": "json"} // the end
@@ -211,7 +211,7 @@ TEST_CASE("every option arrives") {
   CHECK(config.web_root == "web");
   CHECK(config.allowed_origins.size() == 2);
   CHECK(config.allowed_hosts == std::vector<std::string>{"mybox.local", "*.lab.example"});
-  CHECK(config.limits == Limits{20000, 2000, 3000, milliseconds(300), 40000, 5, 6, 70000, 7000});
+  CHECK(config.limits == Limits{20000, 2000, 3000, milliseconds(300), 40000, 5, 6, 50000000, 70000, 7000});
   CHECK(config.timeouts ==
         Timeouts{milliseconds(101), milliseconds(102), milliseconds(103), milliseconds(104), milliseconds(105)});
   CHECK(config.retry == Retry{milliseconds(51), milliseconds(52), milliseconds(53)});

@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
+#include "test/server/support/command_run.hpp"
 #include "test/server/support/test_gateway.hpp"
 
 using namespace rrgate;
@@ -146,6 +147,79 @@ TEST_CASE("a body may have as many bytes as are allowed and not one more") {
   CHECK_THAT(refused.body, Catch::Contains("longer than 1024 bytes"));
 }
 
+TEST_CASE("where a request ends and whom it is for is beyond doubt") {
+  TestGateway gateway;
+  const auto status = [&](const std::string& headers) {
+    return fetch(gateway, "GET /healthz HTTP/1.1\r\n" + headers + "\r\n").status;
+  };
+  CHECK(status("Host: localhost\r\n") == 200);
+  CHECK(status("") == 400);
+  CHECK(status("Host: localhost\r\nHost: localhost\r\n") == 400);
+  for (const auto* coding :
+       {"xchunked", "gzip", "identity", "gzip, chunked", "chunked, gzip", "chunked, chunked", ""}) {
+    INFO(coding);
+    CHECK(status("Host: localhost\r\nTransfer-Encoding: " + std::string(coding) + "\r\n") == 501);
+  }
+  CHECK(status("Host: localhost\r\nTransfer-Encoding: gzip\r\nTransfer-Encoding: chunked\r\n") == 501);
+  CHECK(status("Host: localhost\r\nContent-Length: 3\r\nTransfer-Encoding: chunked\r\n") == 400);
+  CHECK(status("Host: localhost\r\nTransfer-Encoding: chunked\r\nContent-Length: 3\r\n") == 400);
+  CHECK(fetch(gateway, "GET /healthz HTTP/1.0\r\nTransfer-Encoding: chunked\r\n\r\n").status == 400);
+}
+
+TEST_CASE("who may not have what he asks for hears so before his body is read") {
+  TestGateway gateway(1, [](Config& config) {
+    config.access.rules = {AccessRule{.roles = {"operator"}}};
+    config.limits.header_timeout = milliseconds(60'000);
+    config.rates.client.per_second = 5;
+  });
+  const auto post = [&](const std::string& path, const std::string& headers) {
+    TestClient client(gateway.port());
+    client.send("POST " + path + " HTTP/1.1\r\n" + headers + "Content-Type: application/json\r\n\r\n");
+    auto response = client.receive_response();
+    CHECK_THAT(response.head, Catch::Contains("Connection: close\r\n"));
+    CHECK(client.receive_all().empty());
+    return response.status;
+  };
+  const std::string path = "/api/v1/devices/x/service/function";
+  CHECK(post(path, "Host: localhost\r\nContent-Length: 1000\r\n") == 403);
+  CHECK(post(path, "Host: localhost\r\nTransfer-Encoding: chunked\r\n") == 403);
+  CHECK(post(path, "Host: elsewhere.example\r\nContent-Length: 1000\r\n") == 421);
+  CHECK(post("/healthz", "Host: localhost\r\nContent-Length: 1000\r\n") == 405);
+  CHECK(post("/api/v1/access", "Host: localhost\r\nContent-Length: 1000\r\n") == 405);
+  unsigned status = 0;
+  for (int i = 0; i < 50 && status != 429; ++i) status = post(path, "Host: localhost\r\nContent-Length: 1000\r\n");
+  CHECK(status == 429);
+}
+
+TEST_CASE("a body is asked for where the client waits for that, and has no time without end") {
+  const Folder files;
+  TestGateway gateway(1, [&](Config& config) {
+    short_deadlines(config);
+    config.access.tokens_file = files.write("tokens", "");
+  });
+  const std::string head =
+      "POST /api/v1/access/requests HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n";
+  TestClient patient(gateway.port());
+  patient.send(head + "Content-Length: 15\r\nExpect: 100-continue\r\n\r\n");
+  CHECK(patient.receive_until("\r\n\r\n") == "HTTP/1.1 100 Continue\r\n\r\n");
+  patient.send("{\"name\": \"pad\"}");
+  CHECK(patient.receive_response().status == 202);
+  patient.send("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  CHECK(patient.receive_response().status == 200);
+
+  CHECK(fetch(gateway, head + "Content-Length: 15\r\n\r\n{").status == 408);
+  CHECK(fetch(gateway, head + "Content-Length: 9000\r\n\r\n").status == 413);
+  TestClient slow(gateway.port());
+  slow.send(head + "Content-Length: 8000\r\n\r\n{");
+  const auto begin = std::chrono::steady_clock::now();
+  std::chrono::steady_clock::duration took{};
+  while (slow.send(" ") && took < std::chrono::seconds(5)) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));  // far below the deadline of 200 ms
+    took = std::chrono::steady_clock::now() - begin;
+  }
+  CHECK(took < std::chrono::seconds(3));
+}
+
 TEST_CASE("silent, half-open and idle connections are closed") {
   TestGateway gateway(1, short_deadlines);
   TestClient silent(gateway.port());
@@ -177,7 +251,7 @@ TEST_CASE("a flood of requests is answered") {
   std::vector<TestClient> clients;
   for (int i = 0; i < 100; ++i) clients.emplace_back(gateway.port());
   for (auto& client : clients)
-    client.send("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\nGET /nope HTTP/1.1\r\n\r\n");
+    client.send("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\nGET /nope HTTP/1.1\r\nHost: localhost\r\n\r\n");
   for (auto& client : clients) {
     CHECK(client.receive_response().status == 200);
     CHECK(client.receive_response().status == 404);

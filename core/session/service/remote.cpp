@@ -56,6 +56,12 @@ bool ServiceSession::must_wait_for_object(const MessageEntry& entry) const {
   }
 }
 
+std::size_t ServiceSession::held_bytes() const {
+  std::size_t bytes = connection_.held_bytes();
+  for (const auto& parked : parked_) bytes += parked.message.size();
+  return bytes;
+}
+
 Result<> ServiceSession::park(const Message& message, const MessageEntry& entry) {
   if (auto admitted = admit(EntryType::object_type_name, entry.service_path, nullptr); !admitted) return admitted;
   const auto path = parse_service_path(entry.service_path);

@@ -257,6 +257,7 @@ void ServiceSession::handle_message(const Message& message, Now now) {
   const bool is_ours = is_of_session(message.header);
   if (is_ours) last_session_message_ = now.steady;
   for (const auto& entry : message.entries) {
+    if (connection_.is_held_back()) return;
     if (!is_ours) {
       if (is_request(entry.type) && !is_packet(entry.type))
         send_error(entry, {ErrorCode::invalid_endpoint, "Invalid destination endpoint"}, now);

@@ -202,8 +202,9 @@ class ServiceSession {
 
   // --- told ---
 
-  /// Returns  bytes consumed: all, unless so many calls wait for their answers that the rest has to wait, too. It is to
-  ///          be given again when events were handled or calls answered.
+  /// Returns  bytes consumed: all, unless so many calls wait for their answers, or so many answers for who has not
+  ///          logged in, that the rest has to wait, too. It is to be given again when events were handled, calls
+  ///          answered or bytes sent.
   std::size_t handle_bytes(ByteSpan input, Now now);
   void handle_transmitted(std::size_t bytes, Now now);
   void handle_timeout(Now now);
@@ -293,6 +294,9 @@ class ServiceSession {
   std::uint32_t endpoint() const { return endpoint_; }
   /// What waits for the stream: a sender of many pipe packets waits until this is small.
   std::size_t queued_bytes() const { return connection_.queued_bytes(); }
+  /// All that is kept for this client beside its state: what waits for the stream, what has come of a message that is
+  /// not complete, and requests that wait for an object.
+  std::size_t held_bytes() const;
   /// Above these, pipes take no packets.
   std::size_t max_pipe_queued_bytes() const { return options_.max_pipe_queued_bytes; }
 
@@ -369,7 +373,7 @@ class ServiceSession {
   };
   using PipeIndices = std::map<std::int32_t, ServicePipe*>;
 
-  bool takes_requests() const { return calls_.size() < options_.max_open_calls; }
+  bool takes_requests() const { return calls_.size() < options_.max_open_calls && !connection_.is_held_back(); }
   void handle_message(const Message& message, Now now);
   bool is_of_session(const MessageHeader& header) const;
   void send_outgoing(Now now, bool is_urgent = false);

@@ -7,6 +7,7 @@
 #include "server/access/access_text.hpp"
 #include "server/access/api_tokens.hpp"
 #include "server/json/json.hpp"
+#include "server/limits/client_network.hpp"
 #include "server/log/log.hpp"
 #include "server/state/gateway_state.hpp"
 #include "server/state/http_access.hpp"
@@ -17,8 +18,6 @@ namespace {
 
 using Json = rr::OrderedJson;
 using Clock = std::chrono::system_clock;
-
-constexpr std::size_t largest_body = 8 * 1024;
 
 Response answer(unsigned status, const Json& json) {
   return json_response(status, json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n");
@@ -54,7 +53,6 @@ rr::Result<rr::Json> body_of(const Request& request) {
   const auto type = request.header(http::field::content_type);
   if (!equals_ignoring_case(type.substr(0, type.find(';')), "application/json"))
     return bad("Content-Type is " + rr::quoted(type) + ", expected application/json");
-  if (text.size() > largest_body) return bad("the body has more than 8 KiB");
   auto json = rr::read_json(text);
   if (json && !json->is_object()) return bad("expected an object");
   return json;
@@ -181,8 +179,8 @@ Handler ask_endpoint(GatewayState& gateway) {
     const auto name = text_of(*body, "name");
     const auto reason = text_of(*body, "reason");
     if (!name || !reason) return error_answer(name ? reason.error() : name.error());
-    const auto asked = gateway.http_access().requests().ask(*name, *reason, request.arrival.peer,
-                                                            request.arrival.address.to_string(), Clock::now());
+    const auto asked = gateway.http_access().requests().ask(
+        *name, *reason, request.arrival.peer, client_network(request.arrival.address).to_string(), Clock::now());
     if (!asked) return error_answer(asked.error());
     log(LogLevel::info, "access asked for", {{"name", *name}, {"peer", request.arrival.peer}, {"reason", *reason}});
     gateway.access().record({"asked", &request.identity, nullptr, *name});

@@ -170,6 +170,11 @@ Handler metrics_endpoint(GatewayState& gateway) {
     out.family("rrgate_rejected_total", "counter", "Connections and requests that were turned away.");
     for (std::size_t i = 0; i < rejection_names.size(); ++i)
       out.sample(metrics.rejected[i], "reason=\"" + std::string(rejection_names[i]) + "\"");
+    const auto& memory = gateway.memory();
+    out.single("rrgate_memory_budget_bytes", "gauge", "What clients may make the gateway hold.", memory.total());
+    out.single("rrgate_memory_budget_used_bytes", "gauge", "What they make it hold.", memory.used());
+    out.single("rrgate_memory_budget_refusals_total", "counter", "What was refused because that was too much.",
+               memory.refusals());
     const auto devices = look_at(gateway);
     write_devices(out, devices);
     write_ledgers(out, devices, gateway.shared());

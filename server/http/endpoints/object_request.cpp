@@ -136,6 +136,10 @@ bool ObjectRequest::has_bytes_body() const {
 rr::Result<rr::Json> ObjectRequest::body() const {
   const auto type = media_type(request().header(http::field::content_type));
   const auto& text = request().message.body();
+  if (!writer_.memory().has_room(rr::json_growth * text.size()))
+    return rr::make_error(rr::ErrorCode::out_of_system_resource,
+                          "the gateway has no memory left for what a document of " + std::to_string(text.size()) +
+                              " bytes becomes; try again in a moment");
   if (equals_ignoring_case(type, "application/cbor")) return rr::read_cbor(rr::as_bytes(text));
   // A page of another origin can send text/plain without being asked; JSON it can't.
   if (!equals_ignoring_case(type, "application/json"))

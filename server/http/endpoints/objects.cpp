@@ -198,6 +198,11 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
       co_await writer.send(refusal);
       co_return;
     }
+  if (target)
+    if (const auto failed = co_await writer.read_body()) {
+      co_await writer.send(*failed);
+      co_return;
+    }
   try {
     if (target) co_await serve_target(request, *target);
   } catch (const rr::Exception& exception) {

@@ -9,8 +9,33 @@
 #include "server/http/endpoints/health.hpp"
 #include "server/http/endpoints/metrics.hpp"
 #include "server/http/endpoints/objects.hpp"
+#include "server/http/response_writer.hpp"
 
 namespace rrgate {
+
+namespace {
+
+/// Of requests to the gateway itself.
+constexpr std::size_t largest_body = 8 * 1024;
+
+rr::awaitable<void> answer_with_body(Handler handler, ResponseWriter& writer, std::string rest) {
+  auto response = co_await writer.read_body(largest_body);
+  if (!response) response = handler(writer.request(), rest);
+  co_await writer.send(*response);
+}
+
+/// For handlers that look at the body.
+Handler with_body(Handler handler) {
+  return [handler = std::move(handler)](const Request&, std::string_view rest) {
+    Response response;
+    response.answer_later = [handler, rest = std::string(rest)](ResponseWriter& writer) {
+      return answer_with_body(handler, writer, rest);
+    };
+    return response;
+  };
+}
+
+}  // namespace
 
 std::vector<Route> list_routes(GatewayState& gateway) {
   using enum http::verb;
@@ -27,9 +52,9 @@ std::vector<Route> list_routes(GatewayState& gateway) {
       {get, "/api/v1/discovery", discovery_endpoint(gateway)},
       {get, "/api/v1/access", who_endpoint(gateway)},
       {post, "/api/v1/tickets", tickets_endpoint(gateway)},
-      {post, "/api/v1/access/requests", ask_endpoint(gateway)},
+      {post, "/api/v1/access/requests", with_body(ask_endpoint(gateway))},
       {get, "/api/v1/access/requests", requests_endpoint(gateway)},
-      {post, "/api/v1/access/requests/*", request_endpoint(gateway)},
+      {post, "/api/v1/access/requests/*", with_body(request_endpoint(gateway))},
       {get, "/api/*", no_such_api_endpoint()},
       {get, "/devices/*", device_endpoint(gateway)},
       {get, "/docs", to_documentation_endpoint()},

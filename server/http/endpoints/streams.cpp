@@ -21,7 +21,8 @@ constexpr std::size_t max_waiting_bytes = 4u * 1024 * 1024;
 
 /// What goes out next, filled by handlers, emptied by the one coroutine that writes.
 struct Outbox {
-  explicit Outbox(const asio::any_io_executor& executor) : news(executor) {}
+  Outbox(const asio::any_io_executor& executor, MemoryBudget::Charge its_memory)
+      : memory(std::move(its_memory)), news(executor) {}
 
   void add(std::string text, bool replaces) {
     if (is_over) return;
@@ -34,7 +35,7 @@ struct Outbox {
       waiting.push_back(std::move(text));
     }
     is_replaceable = replaces;
-    if (bytes > max_waiting_bytes) {
+    if (bytes > max_waiting_bytes || !memory.resize(in_flight + bytes)) {
       waiting.clear();
       bytes = 0;
       waiting.push_back("event: error\ndata: {\"detail\":\"too slow: values were lost, so the stream ends\"}\n\n");
@@ -43,8 +44,22 @@ struct Outbox {
     news.cancel();
   }
 
+  std::string take() {
+    std::string text;
+    for (const auto& each : waiting) text += each;
+    waiting.clear();
+    in_flight = std::exchange(bytes, 0);
+    return text;
+  }
+  void note_sent() {
+    in_flight = 0;
+    memory.hold(bytes);
+  }
+
+  MemoryBudget::Charge memory;
   std::deque<std::string> waiting;
-  std::size_t bytes = 0;
+  std::size_t bytes = 0;        ///< of those
+  std::size_t in_flight = 0;    ///< of what is being written
   bool is_replaceable = false;  ///< the last one is a wire's value: a newer one takes its place
   bool is_over = false;
   bool is_gone = false;
@@ -74,7 +89,7 @@ Response stream_head(std::string_view content_type) {
 rr::awaitable<void> stream_topic(const ObjectRequest& request, const Target& target) {
   auto& writer = request.writer();
   const auto& member = *target.member;
-  const auto outbox = std::make_shared<Outbox>(writer.executor());
+  const auto outbox = std::make_shared<Outbox>(writer.executor(), writer.memory().sibling());
   const bool is_wire = member.kind == rr::MemberKind::wire;
   const bool is_event = member.kind == rr::MemberKind::event;
   SampleHandler handler = [outbox, types = target.registry, &member, is_wire, is_event, form = request.form()](
@@ -95,7 +110,7 @@ rr::awaitable<void> stream_topic(const ObjectRequest& request, const Target& tar
   const auto listener = std::move(*listening);
 
   const auto head = stream_head("text/event-stream");
-  if (co_await writer.begin(head)) co_return;
+  if (co_await writer.begin(head) || !writer.has_body()) co_return;
   writer.watch([outbox] {
     outbox->is_gone = true;
     outbox->news.cancel();
@@ -110,11 +125,9 @@ rr::awaitable<void> stream_topic(const ObjectRequest& request, const Target& tar
       if (!cancelled && outbox->waiting.empty()) failed = co_await writer.write(": \n\n");
       continue;
     }
-    std::string text;
-    for (const auto& each : outbox->waiting) text += each;
-    outbox->waiting.clear();
-    outbox->bytes = 0;
+    const auto text = outbox->take();
     failed = co_await writer.write(text);
+    outbox->note_sent();
   }
   if (!failed && !outbox->is_gone) co_await writer.end();
   co_await writer.unwatch();
@@ -141,7 +154,7 @@ rr::awaitable<void> stream_images(const ObjectRequest& request, const Target& ta
   const auto listener = std::move(*listening);
 
   const auto head = stream_head("multipart/x-mixed-replace; boundary=frame");
-  if (co_await writer.begin(head)) co_return;
+  if (co_await writer.begin(head) || !writer.has_body()) co_return;
   writer.watch([newest] {
     newest->is_gone = true;
     newest->news.cancel();

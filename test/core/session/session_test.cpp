@@ -637,6 +637,36 @@ TEST_CASE("requests above the limit wait until others are answered, and nobody i
   for (int i = 0; i < 10; ++i) CHECK(pair.next_client<Completed>().result);
 }
 
+TEST_CASE("who has not logged in gets no more answers before the first ones are read") {
+  Loopback pair;
+  pair.lose_requests();
+  for (int i = 0; i < 1000; ++i)
+    pair.forge(*pair.client, [](Message& message) { message.begin_entry(EntryType::get_service_desc, "arm", {}, 1); });
+  Bytes bytes;
+  while (true) {
+    const auto slices = pair.client->poll_transmit();
+    if (slices.empty()) break;
+    const auto before = bytes.size();
+    for (const auto slice : slices) bytes.insert(bytes.end(), slice.begin(), slice.end());
+    pair.client->handle_transmitted(bytes.size() - before, pair.now);
+  }
+  ByteSpan rest = bytes;
+  std::size_t answers = 0;
+  while (!rest.empty()) {
+    const auto taken = pair.service->handle_bytes(rest, pair.now);
+    CHECK(pair.service->queued_bytes() < 70'000);
+    rest = rest.subspan(taken);
+    CHECK(pair.service->held_bytes() == pair.service->queued_bytes());
+    if (!rest.empty()) CHECK(pair.service->handle_bytes(rest, pair.now) == 0);
+    std::size_t size = 0;
+    for (const auto slice : pair.service->poll_transmit()) size += slice.size();
+    answers += size;
+    REQUIRE((taken > 0 || size > 0));
+    pair.service->handle_transmitted(size, pair.now);
+  }
+  CHECK(answers > 1'000'000);
+}
+
 TEST_CASE("silence during set-up ends in time, on both sides") {
   Loopback pair;
   CHECK(pair.client->poll_timeout() - pair.now.steady == std::chrono::seconds(5));

@@ -1,58 +1,18 @@
-// What is bounded in number and time: rates, tickets, requests of access.
+// What is bounded in number and time: tickets, requests of access.
 #include <catch2/catch.hpp>
 
 #include "server/access/access_requests.hpp"
-#include "server/access/rate_gate.hpp"
 #include "server/access/tickets.hpp"
 #include "test/support/print.hpp"
 
 using namespace rrgate;
-using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 namespace {
 
-const auto start = std::chrono::steady_clock::time_point(seconds(1000));
 const auto day = std::chrono::system_clock::time_point(seconds(1'900'000'000));
 
 }  // namespace
-
-TEST_CASE("rates: so many a second, then as they come back") {
-  RateGate gate;
-  const auto passes = [&](milliseconds after) { return gate.enter("a", 10, 0, start + after).has_value(); };
-  for (int i = 0; i < 10; ++i) CHECK(passes(milliseconds(0)));
-  CHECK_FALSE(passes(milliseconds(0)));
-  CHECK(passes(milliseconds(100)));
-  CHECK_FALSE(passes(milliseconds(150)));
-  CHECK(passes(milliseconds(200)));
-  CHECK(gate.enter("b", 10, 0, start));
-  for (int i = 0; i < 10; ++i) CHECK(passes(seconds(60)));
-  CHECK_FALSE(passes(seconds(60)));
-}
-
-TEST_CASE("rates: so many at a time") {
-  RateGate gate;
-  auto first = gate.enter("a", 0, 2, start);
-  auto second = gate.enter("a", 0, 2, start);
-  CHECK(first);
-  CHECK(second);
-  CHECK_FALSE(gate.enter("a", 0, 2, start));
-  first.reset();
-  CHECK(gate.enter("a", 0, 2, start));
-  auto moved = std::move(*second);
-  second.reset();
-  CHECK(gate.enter("a", 0, 2, start));
-  auto third = gate.enter("a", 0, 2, start);
-  CHECK_FALSE(gate.enter("a", 0, 2, start));
-}
-
-TEST_CASE("rates: without a bound nothing is kept, and who is gone is forgotten") {
-  RateGate gate;
-  CHECK(gate.enter("a", 0, 0, start));
-  CHECK(gate.keys() == 0);
-  for (int i = 0; i < 30'000; ++i) CHECK(gate.enter(std::to_string(i), 1, 0, start + milliseconds(i)));
-  CHECK(gate.keys() < 12'000);
-}
 
 TEST_CASE("tickets: once, soon, and by gateways of one key") {
   Tickets tickets;
