@@ -26,7 +26,7 @@ struct IdentityHeaders {
   bool operator==(const IdentityHeaders&) const = default;
 };
 
-/// Roles for everybody of a name, however proven.
+/// Roles for users of a name, however proven. Tokens have theirs in their file: who asks for one chooses its name.
 struct RoleGrant {
   std::vector<std::string> users = {};  ///< patterns with '*' and '?'
   std::vector<std::string> roles = {};

@@ -245,6 +245,24 @@ def test_a_client_asks_and_an_admin_decides(guarded):
     assert statuses == [202, 202, 202, 429]
 
 
+def test_a_token_gets_nothing_by_the_name_that_its_client_has_chosen(device, tmp_path):
+    make_users(tmp_path)
+    (tmp_path / "tokens").touch(0o600)
+    access = {"users_file": "users", "tokens_file": "tokens", "rules": RULES, "audit_file": "audit",
+              "grants": [{"users": ["vera"], "roles": ["operator"]}]}
+    with running(tmp_path, device, access) as gateway:
+        requests = "/api/v1/access/requests"
+        asked = ask(gateway.port, "POST", requests, {"name": "vera"}).json
+        decided = ask(gateway.port, "POST", f"{requests}/{asked['id']}/approve", {"roles": ["viewer"], "days": 7}, basic("root"))
+        assert decided.status == 200, decided.body
+        token = ask(gateway.port, "POST", f"{requests}/{asked['id']}/claim", {"secret": asked["secret"]}).json["token"]
+        assert ask(gateway.port, "GET", BASE + "/p_double", headers=bearer(token)).status == 200
+        assert ask(gateway.port, "PUT", BASE + "/p_double", 1, bearer(token)).status == 403
+        assert ask(gateway.port, "PUT", BASE + "/p_double", 1, basic("vera")).status == 204
+        (approved,) = (line for line in audit_of(gateway) if line["event"] == "approved")
+        assert approved["user"] == "root" and "roles viewer, until 2" in approved["detail"]
+
+
 def test_the_gateways_document_is_kept_with_users_and_rights(device, tmp_path):
     """What nobody, one who may look and an admin are answered is what the document says."""
     make_users(tmp_path)

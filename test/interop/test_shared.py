@@ -391,6 +391,29 @@ def test_rights_member_by_member(node, tmp_path):
         service.stop()
 
 
+def test_a_login_that_the_device_judges_gives_no_rights_of_the_gateways_users(node, tmp_path):
+    """Where the gateway has users, but none with passwords, a login is the device's; alice there is nobody here."""
+    service, url = start_service(tmp_path)
+    (tmp_path / "tokens").touch()
+    rules = [{"roles": ["guest"], "may": ["read", "call"]}, {"roles": ["*", "operator"], "may": ["write"]}]
+    access = {"tokens_file": "tokens", "anonymous_role": "guest", "rules": rules, "audit_file": "audit",
+              "grants": [{"users": ["alice"], "roles": ["operator"]}]}
+    gateway, port = start_gateway(tmp_path, url, device={"mode": "shared"}, access=access)
+    try:
+        root = node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=guarded", "alice",
+                                   {"password": RR.VarValue("secret", "string")})
+        assert root.who() == "alice"
+        with pytest.raises(RR.PermissionDeniedException, match="'alice' of the device, who is no user of the gateway, may not write"):
+            root.level = 2.0
+        node.DisconnectService(root)
+        lines = [json.loads(line) for line in (tmp_path / "audit").read_text().splitlines()]
+        (refused,) = (line for line in lines if line["event"] == "refused")
+        assert (refused["proof"], refused["device_user"]) == ("none", "alice")
+    finally:
+        gateway.stop()
+        service.stop()
+
+
 def test_who_may_do_nothing_answers_no_callback_and_makes_the_device_look_for_nothing(node, tmp_path):
     service, url = start_service(tmp_path)
     make_users(tmp_path)
