@@ -318,6 +318,28 @@ def test_client_certificates(device, tmp_path):
             ask(gateway.port, "GET", BASE + "/p_double", context=context)
 
 
+def test_certificates_that_are_revoked(device, tmp_path):
+    tls = make_web_certificates(tmp_path / "web")
+    people = issuers.People(tmp_path)
+    alice, vera = people.certificate("alice"), people.certificate("vera")
+    access = {"client_ca": [str(people.ca)], "client_crl": [str(people.revoke())]}
+    with running(tmp_path, device, access, tls=tls) as gateway:
+        def status(certificate):
+            context = ssl.create_default_context(cafile=tmp_path / "web" / "web-ca.pem")
+            context.load_cert_chain(*certificate)
+            return ask(gateway.port, "GET", BASE + "/p_double", context=context).status
+
+        assert status(alice) == status(vera) == 200
+        people.revoke(alice[0])
+        gateway.wait_for("TLS files read anew")
+        with pytest.raises((ssl.SSLError, ConnectionError)):
+            status(alice)
+        assert status(vera) == 200
+        (tmp_path / "crl.pem").write_text("nothing")  # changes nothing
+        assert "found none in it" in gateway.wait_for("TLS files can't be used; those from before stay in use")["error"]
+        assert status(vera) == 200
+
+
 def test_what_a_trusted_proxy_says(device, tmp_path):
     access = {"identity_headers": {"user": "X-User", "roles": "X-Roles"}, "rules": RULES}
     says = {"X-User": "alice", "X-Roles": "viewer, operator"}

@@ -414,6 +414,37 @@ def test_a_login_that_the_device_judges_gives_no_rights_of_the_gateways_users(no
         service.stop()
 
 
+def test_users_that_a_reload_brings_are_the_gateways_at_services_that_are_open(node, tmp_path):
+    service, url = start_service(tmp_path)
+    gateway, port = start_gateway(tmp_path, url, device={"mode": "shared"})
+
+    def connect(service, user, password):
+        return node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service={service}", user,
+                                   {"password": RR.VarValue(password, "string")})
+
+    try:
+        before = connect("guarded", "alice", "secret")  # a user of the device
+        assert before.who() == "alice"
+        make_users(tmp_path)
+        config = json.loads((tmp_path / "gateway.json").read_text())
+        (tmp_path / "gateway.json").write_text(json.dumps({**config, "access": {"users_file": "users", "rules": RULES}}))
+        gateway.wait_until(lambda: "configuration read anew" in (tmp_path / "gateway.log").read_text())
+        with pytest.raises(RR.PermissionDeniedException):
+            before.who()
+        for service_name in ("guarded", "interop"):
+            with pytest.raises(RR.AuthenticationException):
+                connect(service_name, "alice", "secret")
+        root = connect("interop", "alice", PASSWORDS["alice"])
+        assert root.version == "1"
+        with pytest.raises(RR.PermissionDeniedException, match="operator"):
+            root.nothing()
+        for each in (before, root):
+            node.DisconnectService(each)
+    finally:
+        gateway.stop()
+        service.stop()
+
+
 def test_who_may_do_nothing_answers_no_callback_and_makes_the_device_look_for_nothing(node, tmp_path):
     service, url = start_service(tmp_path)
     make_users(tmp_path)
