@@ -38,6 +38,7 @@ using Chain = std::unique_ptr<STACK_OF(X509), Free<free_chain>>;
 using Context = std::unique_ptr<SSL_CTX, Free<SSL_CTX_free>>;
 using Key = std::unique_ptr<EVP_PKEY, Free<EVP_PKEY_free>>;
 using Pkcs12 = std::unique_ptr<PKCS12, Free<PKCS12_free>>;
+using RevocationList = std::unique_ptr<X509_CRL, Free<X509_CRL_free>>;
 using Text = std::unique_ptr<unsigned char, Free<free_text>>;
 
 /// Why the last call failed, in OpenSSL's words; clears what it remembers.

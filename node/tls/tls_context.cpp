@@ -169,15 +169,30 @@ Result<> load_web_certificate(SSL_CTX* context, const WebCertificate& files) {
   return {};
 }
 
+Result<> add_revocation_list(X509_STORE* store, const std::string& file) {
+  const openssl::Bio in(BIO_new_file(file.c_str(), "r"));
+  if (!in) return unusable("revocation list " + quoted(file, 200) + ": " + last_error());
+  int added = 0;
+  while (const openssl::RevocationList list{PEM_read_bio_X509_CRL(in.get(), nullptr, nullptr, nullptr)})
+    added += X509_STORE_add_crl(store, list.get());
+  ERR_clear_error();
+  if (added == 0)
+    return unusable("revocation list " + quoted(file, 200) + ": found none in it, expected PEM (X509 CRL)");
+  X509_STORE_set_flags(store, X509_V_FLAG_CRL_CHECK | X509_V_FLAG_CRL_CHECK_ALL);
+  return {};
+}
+
 /// Says whose certificates clients may show.
-Result<> ask_clients(SSL_CTX* context, std::span<const std::string> client_ca) {
-  if (client_ca.empty()) return {};
+Result<> ask_clients(SSL_CTX* context, const ClientTrust& clients) {
+  if (clients.ca.empty()) return {};
   TlsTrust trust;
-  trust.files.assign(client_ca.begin(), client_ca.end());
+  trust.files = clients.ca;
   if (auto done = set_trust(context, trust); !done) return done;
+  for (const auto& file : clients.crl)
+    if (auto done = add_revocation_list(SSL_CTX_get_cert_store(context), file); !done) return done;
   // Of several certificates a browser offers those of these CAs.
   STACK_OF(X509_NAME)* const names = sk_X509_NAME_new_null();
-  for (const auto& file : client_ca) SSL_add_file_cert_subjects_to_stack(names, file.c_str());
+  for (const auto& file : clients.ca) SSL_add_file_cert_subjects_to_stack(names, file.c_str());
   SSL_CTX_set_client_CA_list(context, names);  // takes them over
   SSL_CTX_set_purpose(context, X509_PURPOSE_SSL_CLIENT);
   SSL_CTX_set_verify(context, SSL_VERIFY_PEER, nullptr);  // who shows none may come all the same
@@ -232,11 +247,10 @@ Result<TlsContextPtr> make_web_client_tls(const TlsTrust& trust) {
 }
 
 Result<TlsContextPtr> make_web_tls(std::span<const WebCertificate> certificates) {
-  return make_web_tls(certificates, {});
+  return make_web_tls(certificates, ClientTrust());
 }
 
-Result<TlsContextPtr> make_web_tls(std::span<const WebCertificate> certificates,
-                                   std::span<const std::string> client_ca) {
+Result<TlsContextPtr> make_web_tls(std::span<const WebCertificate> certificates, const ClientTrust& clients) {
   ERR_clear_error();
   if (certificates.empty()) return unusable("TLS without a certificate");
   std::vector<openssl::Context> contexts;
@@ -245,7 +259,7 @@ Result<TlsContextPtr> make_web_tls(std::span<const WebCertificate> certificates,
     SSL_CTX_set_default_passwd_cb(context.get(), no_password);
     if (auto done = load_web_certificate(context.get(), files); !done) return done.error();
     SSL_CTX_set_alpn_select_cb(context.get(), choose_protocol, nullptr);
-    if (auto done = ask_clients(context.get(), client_ca); !done) return done.error();
+    if (auto done = ask_clients(context.get(), clients); !done) return done.error();
     contexts.push_back(std::move(context));
   }
   std::vector<SSL_CTX*> native;

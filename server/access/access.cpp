@@ -46,6 +46,9 @@ std::map<std::string, std::string> look(const AccessConfig& config) {
   return out;
 }
 
+/// Users whom the gateway has judged have this property, so that nobody else is taken for one of them.
+constexpr std::string_view judged_here = "rrgate.judged";
+
 void add_role(std::vector<std::string>& roles, const std::string& role) {
   if (std::find(roles.begin(), roles.end(), role) == roles.end()) roles.push_back(role);
 }
@@ -56,6 +59,10 @@ bool is_recorded(Verb verb) {
 }
 
 }  // namespace
+
+Subject subject_of(const rr::AuthenticatedUser& user) {
+  return {user.properties.find(judged_here) ? Subject::Kind::user : Subject::Kind::device_user, user.name};
+}
 
 rr::Result<AccessStatePtr> load_access(const AccessConfig& config) {
   auto out = std::make_shared<AccessState>();
@@ -111,6 +118,7 @@ class Access::Users final : public rr::Authenticator {
     }
     if (!users) return rr::make_error(rr::ErrorCode::authentication_error, "Invalid username or password");
     auto user = users->authenticate(attempt);
+    if (user) user->properties.items.emplace_back(std::string(judged_here), rr::Value(true));
     Identity who;
     who.name = attempt.username;
     if (user) who.roles = user->privileges;
@@ -211,7 +219,16 @@ Identity Access::logged_in(const rr::AuthenticatedUser& user, std::string client
   return with_grants(std::move(out));
 }
 
+Identity Access::in_session(const Identity& shown, const rr::AuthenticatedUser* user) const {
+  if (!user) return shown;
+  if (subject_of(*user).kind == Subject::Kind::user) return logged_in(*user, shown.client);
+  auto out = shown;
+  out.device_user = user->name;
+  return out;
+}
+
 Identity Access::with_grants(Identity identity) const {
+  if (identity.subject().kind != Subject::Kind::user) return identity;
   for (const auto& grant : state_->config.grants) {
     const auto is_of = [&](const std::string& pattern) { return rr::glob_matches(pattern, identity.name); };
     if (std::any_of(grant.users.begin(), grant.users.end(), is_of))

@@ -29,6 +29,9 @@ struct AccessState {
 };
 using AccessStatePtr = std::shared_ptr<const AccessState>;
 
+/// The user's name among those of the gateway's users, or of the device's, whoever has judged the login.
+Subject subject_of(const rr::AuthenticatedUser& user);
+
 /// Reads the files. Errors   invalid_configuration, io_error: which can't be used, and why.
 [[nodiscard]] rr::Result<AccessStatePtr> load_access(const AccessConfig& config);
 
@@ -67,8 +70,11 @@ class Access {
 
   // Identities, with the roles that the configuration adds. `client`: where from, as logs name it.
   Identity anonymous(std::string client) const;
-  /// A user who has logged in by authenticator().
+  /// A user of the users file, who has logged in.
   Identity logged_in(const rr::AuthenticatedUser& user, std::string client) const;
+  /// Who the client of a session is. `shown`  by its connection. `user`  as whom it has logged in since; null: it has
+  /// not. A user whom authenticator() has not judged is a device's: that changes no right here.
+  Identity in_session(const Identity& shown, const rr::AuthenticatedUser* user) const;
   /// Any other that is proven.
   Identity with_grants(Identity identity) const;
 

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "node/tls/client_certificates.hpp"
 #include "server/access/access_rules.hpp"
 #include "server/access/jwt.hpp"
 
@@ -26,7 +27,7 @@ struct IdentityHeaders {
   bool operator==(const IdentityHeaders&) const = default;
 };
 
-/// Roles for everybody of a name, however proven.
+/// Roles for users of a name, however proven. Tokens have theirs in their file: who asks for one chooses its name.
 struct RoleGrant {
   std::vector<std::string> users = {};  ///< patterns with '*' and '?'
   std::vector<std::string> roles = {};
@@ -38,8 +39,8 @@ struct AccessConfig {
   std::string users_file = {};
   std::string tokens_file = {};
   JwtConfig jwt = {};
-  std::string ticket_key_file = {};         ///< of gateways that take each other's tickets; empty: a key of its own
-  std::vector<std::string> client_ca = {};  ///< PEM files; not empty: TLS clients are asked for a certificate
+  std::string ticket_key_file = {};  ///< of gateways that take each other's tickets; empty: a key of its own
+  rr::ClientTrust clients = {};      ///< TLS clients are asked for a certificate where there are CAs for it
   IdentityHeaders identity_headers = {};
   std::string anonymous_role = {};  ///< of who has shown nothing; empty: he has none
   std::vector<RoleGrant> grants = {};
@@ -48,7 +49,7 @@ struct AccessConfig {
 
   /// Whether there is a way to prove who one is.
   bool has_users() const {
-    return !users_file.empty() || !tokens_file.empty() || jwt.is_used() || !client_ca.empty() ||
+    return !users_file.empty() || !tokens_file.empty() || jwt.is_used() || !clients.ca.empty() ||
            !identity_headers.user.empty();
   }
   bool operator==(const AccessConfig&) const = default;

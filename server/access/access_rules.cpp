@@ -34,6 +34,8 @@ bool gives(const AccessRule& rule, Verb verb) {
 }
 
 std::string describe(const Identity& who) {
+  if (who.name.empty() && !who.device_user.empty())
+    return rr::quoted(who.device_user) + " of the device, who is no user of the gateway,";
   if (who.name.empty()) return "who is not logged in";
   std::string roles;
   for (const auto& role : who.roles) roles += (roles.empty() ? "" : ", ") + role;

@@ -44,6 +44,7 @@ std::string format_audit_line(const AuditEvent& event, std::chrono::system_clock
     if (!event.who->roles.empty()) rr::add_key(out, "roles") = event.who->roles;
     add("proof", to_string(event.who->proof));
     add("client", event.who->client);
+    add("device_user", event.who->device_user);
   }
   if (event.what) {
     add("verb", to_string(event.what->verb));

@@ -11,7 +11,7 @@
 
 namespace rrgate {
 
-/// One line: {"time","event","user","roles","proof","client", and what else there is}.
+/// One line: {"time","event","user","roles","proof","client","device_user", and what else there is}.
 struct AuditEvent {
   std::string_view event = {};  ///< "write", "call", "lock", "login", "login_failed", "refused", ...
   const Identity* who = nullptr;

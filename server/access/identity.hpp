@@ -24,14 +24,33 @@ constexpr std::string_view to_string(Proof proof) {
   return names[static_cast<std::size_t>(proof)];
 }
 
+/// A name and whose it is. The same name of a user, of a token and of a user of a device are three subjects.
+struct Subject {
+  enum class Kind : std::uint8_t { nobody, user, token, device_user };
+  Kind kind = Kind::nobody;
+  std::string name = {};
+
+  bool is_nobody() const { return kind == Kind::nobody; }
+  /// No other subject has it.
+  std::string key() const { return std::to_string(static_cast<int>(kind)) + name; }
+  bool operator==(const Subject&) const = default;
+};
+
 struct Identity {
   std::string name = {};  ///< empty: anonymous
   std::vector<std::string> roles = {};
   Proof proof = Proof::none;
   std::string client = {};  ///< where it comes from, as logs name it: "192.0.2.1:40000"
+  /// As whom a device knows the client, by a login that the device has judged. It gives no right here.
+  std::string device_user = {};
 
   bool is_proven() const { return proof != Proof::none; }
   bool has_role(std::string_view role) const { return std::find(roles.begin(), roles.end(), role) != roles.end(); }
+  /// nobody: has shown nothing.
+  Subject subject() const {
+    if (!is_proven()) return {};
+    return {proof == Proof::token ? Subject::Kind::token : Subject::Kind::user, name};
+  }
   bool operator==(const Identity&) const = default;
 };
 

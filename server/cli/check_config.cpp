@@ -19,7 +19,7 @@ int check_config(const CheckOptions& options) {
   const auto config = load_config(file);
   if (!report_findings(file, config)) return exit_usage;
   if (const auto& certificates = config.config.tls.certificates; !certificates.empty())
-    if (const auto tls = rr::make_web_tls(certificates, config.config.access.client_ca); !tls) {
+    if (const auto tls = rr::make_web_tls(certificates, config.config.access.clients); !tls) {
       std::cerr << short_name(file) << ": /tls/certificates: " << tls.error().message << "\n";
       return exit_usage;
     }

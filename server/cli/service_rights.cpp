@@ -33,7 +33,8 @@ std::vector<WantedFile> wanted_files(const std::string& file, const Config& conf
   for (const auto& device : config.devices)
     for (const auto& ca : device.tls.ca) reads(ca);
   for (const auto& ca : config.discover.tls.ca) reads(ca);
-  for (const auto& ca : config.access.client_ca) reads(ca);
+  for (const auto* files : {&config.access.clients.ca, &config.access.clients.crl})
+    for (const auto& each : *files) reads(each);
   for (const auto* path : {&config.access.users_file, &config.access.tokens_file, &config.access.jwt.jwks_file,
                            &config.access.jwt.secret_file, &config.access.ticket_key_file, &config.web_root})
     reads(*path);

@@ -102,7 +102,8 @@ void read_access(ObjectReader& in, AccessConfig& access) {
   in.text("tokens_file", access.tokens_file);
   in.object("jwt", [&](ObjectReader& part) { read_jwt(part, access.jwt); });
   in.text("ticket_key_file", access.ticket_key_file);
-  in.texts("client_ca", false, read_file(access.client_ca));
+  in.texts("client_ca", false, read_file(access.clients.ca));
+  in.texts("client_crl", false, read_file(access.clients.crl));
   in.object("identity_headers", [&](ObjectReader& part) { read_identity_headers(part, access.identity_headers); });
   in.text("anonymous_role", access.anonymous_role);
   if (!access.anonymous_role.empty())
@@ -117,7 +118,9 @@ void check_access(const Config& config, std::vector<Finding>& findings) {
   const auto& access = config.access;
   if (!access.identity_headers.user.empty() && config.proxy.trust.proxies.empty())
     findings.push_back({"/access/identity_headers", "there is nobody to take them from; expected trusted_proxies"});
-  if (!access.client_ca.empty() && config.tls.certificates.empty())
+  if (!access.clients.crl.empty() && access.clients.ca.empty())
+    findings.push_back({"/access/client_crl", "there is no CA whose certificates it revokes; expected client_ca"});
+  if (!access.clients.ca.empty() && config.tls.certificates.empty())
     findings.push_back({"/access/client_ca", "clients show certificates within TLS; expected tls.certificates"});
   if (!access.anonymous_role.empty() && access.rules.empty())
     findings.push_back({"/access/anonymous_role", "there is no rule that gives it anything; expected rules"});
@@ -130,7 +133,8 @@ void for_each_file(AccessConfig& access, const std::function<void(std::string&)>
   for (auto* file : {&access.users_file, &access.tokens_file, &access.jwt.jwks_file, &access.jwt.secret_file,
                      &access.ticket_key_file, &access.audit_file})
     locate(*file);
-  for (auto& file : access.client_ca) locate(file);
+  for (auto* files : {&access.clients.ca, &access.clients.crl})
+    for (auto& file : *files) locate(file);
 }
 
 std::string exposure(const std::vector<rr::HostPort>& addresses, const Config& config) {

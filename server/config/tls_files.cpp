@@ -2,7 +2,6 @@
 
 #include "node/platform/file_look.hpp"
 #include "node/tls/certificate_files.hpp"
-#include "node/tls/client_certificates.hpp"
 #include "server/log/log.hpp"
 
 namespace rrgate {
@@ -21,7 +20,8 @@ TlsFiles::Looks TlsFiles::look() const {
     add(certificate.certificate_file);
     add(certificate.key_file);
   }
-  for (const auto& file : client_ca_) add(file);
+  for (const auto* files : {&clients_.ca, &clients_.crl})
+    for (const auto& file : *files) add(file);
   if (!certificates_.empty()) return looks;
   const auto trusted = trust();
   for (const auto* files : {&trusted.files, &trusted.directories, &trusted.published_roots})
@@ -33,7 +33,7 @@ rr::Result<> TlsFiles::load() {
   seen_ = look();  // before reading: what changes meanwhile is seen at the next look
   rr::NodeTlsOptions device;
   device.trust = trust();
-  auto made = certificates_.empty() ? rr::make_node_tls(device) : rr::make_web_tls(certificates_, client_ca_);
+  auto made = certificates_.empty() ? rr::make_node_tls(device) : rr::make_web_tls(certificates_, clients_);
   if (!made) return made.error();
   context_ = std::move(*made);
   return {};

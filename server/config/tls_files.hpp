@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "node/tls/tls_context.hpp"
+#include "node/tls/client_certificates.hpp"
 #include "server/config/config.hpp"
 
 namespace rrgate {
@@ -15,9 +15,9 @@ namespace rrgate {
 class TlsFiles {
  public:
   /// For HTTPS.
-  /// `client_ca`  PEM files of the CAs whose certificates clients may show; empty: they are not asked.
-  explicit TlsFiles(std::vector<rr::WebCertificate> certificates, std::vector<std::string> client_ca = {})
-      : certificates_(std::move(certificates)), client_ca_(std::move(client_ca)) {}
+  /// `clients`  whose certificates may be shown.
+  explicit TlsFiles(std::vector<rr::WebCertificate> certificates, rr::ClientTrust clients = {})
+      : certificates_(std::move(certificates)), clients_(std::move(clients)) {}
   /// For connections to a device. Without CAs: default_trust().
   explicit TlsFiles(DeviceTls device) : device_(std::move(device)) {}
 
@@ -37,7 +37,7 @@ class TlsFiles {
   Looks look() const;
 
   std::vector<rr::WebCertificate> certificates_;
-  std::vector<std::string> client_ca_;
+  rr::ClientTrust clients_;
   DeviceTls device_;
   Looks seen_;
   rr::TlsContextPtr context_;

@@ -58,14 +58,14 @@ rr::awaitable<bool> wait_until_ready(GatewayState& gateway, const Destination& d
 
 /// How much a client may ask for, whoever he logs in as meanwhile.
 auto make_rate_gate(GatewayState& gateway, const SharedNode& node, const Connection& connection) {
-  const auto& identity = connection.identity;
-  return [&gateway, &node, address = connection.address, shown = identity.is_proven() ? identity.name : std::string()](
+  return [&gateway, &node, address = connection.address, shown = connection.identity.subject()](
              const rr::MemberAccess& wanted) -> rr::Result<std::shared_ptr<const void>> {
     const auto& rates = gateway.config().rates;
     if (!rates.is_bound()) return std::shared_ptr<const void>();
-    const bool is_ours = wanted.user && gateway.access().authenticator();  // else it is a user of the device's
+    const auto user = wanted.user ? subject_of(*wanted.user) : Subject();
+    const bool is_ours = user.kind == Subject::Kind::user;
     const auto device = node.device_of(wanted.path.substr(0, wanted.path.find('.')));
-    auto passes = gateway.http_access().enter(address, is_ours ? wanted.user->name : shown, device, rates);
+    auto passes = gateway.http_access().enter(address, is_ours ? user : shown, device, rates);
     if (passes) return std::shared_ptr<const void>(std::move(*passes));
     gateway.reject(Rejection::rate);
     return passes.error();

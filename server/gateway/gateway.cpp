@@ -161,9 +161,9 @@ rr::Result<> Gateway::reconfigure(Config next) {
   // All that can fail comes first.
   std::unique_ptr<TlsFiles> web_tls;
   const bool has_other_tls =
-      next.tls.certificates != config_.tls.certificates || next.access.client_ca != config_.access.client_ca;
+      next.tls.certificates != config_.tls.certificates || next.access.clients != config_.access.clients;
   if (has_other_tls && !next.tls.certificates.empty()) {
-    web_tls = std::make_unique<TlsFiles>(next.tls.certificates, next.access.client_ca);
+    web_tls = std::make_unique<TlsFiles>(next.tls.certificates, next.access.clients);
     if (auto loaded = web_tls->load(); !loaded) return loaded;
   }
   std::shared_ptr<TlsFiles> found_tls;
@@ -181,6 +181,14 @@ rr::Result<> Gateway::reconfigure(Config next) {
   };
   std::vector<Listener> opened;
   std::vector<rr::HostPort> bound;
+  for (const auto& acceptor : adopted_) {
+    rr::error_code ignored;
+    const auto local = acceptor->local_endpoint(ignored);
+    bound.push_back({local.address().to_string(), local.port()});
+  }
+  if (const auto problem = exposure(bound, next); !problem.empty() && !next.insecure)
+    return rr::make_error(rr::ErrorCode::invalid_configuration, problem);
+  bound.clear();
   if (adopted_.empty())
     for (const auto& address : next.listen) {
       if (has(config_.listen, address)) continue;
@@ -204,6 +212,7 @@ rr::Result<> Gateway::reconfigure(Config next) {
   memory_.set_total(memory_total(config_));
   devices_.replace(std::move(*devices));
   shared_.sync(devices_);
+  shared_.renew_judges();
   if (found_) {
     found_->note_change(before.discover, std::move(found_tls));
   } else if (config_.discover.is_enabled) {

@@ -47,7 +47,7 @@ std::function<rr::Result<>(const rr::MemberAccess&)> make_admission(Access& acce
     const auto service = wanted.path.substr(0, wanted.path.find('.'));
     if (service == rr::service_index_name) return {};  // as for nodes: what there is, is no secret
     const auto device = node.device_of(service);
-    const auto& asker = wanted.user ? access.logged_in(*wanted.user, who.client) : who;
+    const auto asker = access.in_session(who, wanted.user);
     // What makes the device look for an object, which may be on the way to another.
     if (wanted.type == rr::EntryType::object_type_name && access.sees(asker, device, service)) return {};
     AccessRequest request;

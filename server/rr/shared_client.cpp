@@ -311,7 +311,8 @@ void SharedClient::leave_login() {
 }
 
 void SharedClient::handle(const rr::UserChanged&) {
-  if (login_ && !session_.user()) return leave_login();
+  // Nobody's now, or a user's whom the gateway has judged: not the device's any more.
+  if (login_ && lock_user().kind != Subject::Kind::device_user) return leave_login();
   if (service_) home_->change_user(*this);
 }
 

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "node/driver/stream_driver.hpp"
+#include "server/access/access.hpp"
 #include "server/rr/shared_service.hpp"
 
 namespace rrgate {
@@ -73,7 +74,7 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
 
   // UpstreamClient
   std::weak_ptr<const void> life() const override { return weak_from_this(); }
-  std::string lock_user() const override { return session_.user() ? session_.user()->name : std::string(); }
+  Subject lock_user() const override { return session_.user() ? subject_of(*session_.user()) : Subject(); }
   bool may_answer(const std::string& path, const rr::MemberDefinition& callback) const override {
     return session_.admits(rr::EntryType::callback_call_req, path, callback);
   }

@@ -103,6 +103,12 @@ void SharedDevices::stop() {
   node_.close();
 }
 
+void SharedDevices::renew_judges() {
+  for (const auto& [key, device] : devices_)
+    for (const auto& [name, service] : device->services()) service->renew_judge();
+  if (own_service_) own_service_->renew_judge();
+}
+
 bool SharedDevices::is_ready() const {
   return std::all_of(devices_.begin(), devices_.end(), [](const auto& device) { return device.second->is_ready(); });
 }

@@ -49,6 +49,8 @@ class SharedDevices {
   /// Begins to share those that are to be shared, ends those that are not there any more.
   void sync(const DeviceRegistry& devices);
   void stop();
+  /// Logins are judged by whoever `find_authenticator` finds now, also at services that are offered already.
+  void renew_judges();
 
   bool is_ready() const;
   /// Of all devices.

@@ -96,13 +96,18 @@ rr::Result<> SharedService::publish() {
     hosted = rr::HostedService::make(name_, root, types_, attributes, std::move(more));
   hosted_ = std::move(*hosted);
   hosted_->set_remote();
+  renew_judge();
+  for (auto* board : boards_) board->publish(hosted_, *this);
+  return {};
+}
+
+void SharedService::renew_judge() {
+  if (!hosted_) return;
   rr::SecurityPolicy policy;
   policy.authenticator = boards_.front()->authenticator();
   if (!policy.authenticator) policy.authenticator = for_device_;
   policy.require_valid_user = upstream_->requires_user();
   hosted_->set_policy(policy);
-  for (auto* board : boards_) board->publish(hosted_, *this);
-  return {};
 }
 
 void SharedService::withdraw() {

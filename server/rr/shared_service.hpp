@@ -36,6 +36,8 @@ class SharedService : public std::enable_shared_from_this<SharedService> {
   /// Connects, again and again, until stop(). `rests_after`  see Upstream::rest_unused().
   void start(std::chrono::milliseconds rests_after);
   void stop();
+  /// Has logins judged by whoever the boards name now.
+  void renew_judge();
 
   const std::string& name() const { return name_; }
   const std::shared_ptr<Device>& device() const { return device_; }

@@ -105,9 +105,8 @@ rr::awaitable<void> JsonOperations::take(const std::string& message) {
   const auto* operation = name && name->is_string() ? find_operation(name->get_ref<const std::string&>()) : nullptr;
   Passes passes;
   if (!operation || !operation->traits.is_free) {
-    const std::string user = place_.who.is_proven() ? place_.who.name : "";
-    auto entered =
-        gateway_.http_access().enter(place_.address, user, place_.device->config().name, gateway_.config().rates);
+    auto entered = gateway_.http_access().enter(place_.address, place_.who.subject(), place_.device->config().name,
+                                                gateway_.config().rates);
     if (!entered) {
       gateway_.reject(Rejection::rate);
       co_return outbox_->add(json_refusal(request->id(), entered.error(), 1));
@@ -159,7 +158,7 @@ rr::awaitable<JsonOperations::TargetPtr> JsonOperations::find(RequestPtr request
                           target->member->direction() == rr::MemberDirection::both;
   if ((operation.traits.needs_own || (is_two_way && operation.verb == Verb::subscribe)) && used != own_) {
     if (!own_) {
-      auto user = place_.who.is_proven() ? place_.who.name : place_.key.username;
+      auto user = place_.who.is_proven() ? place_.who.subject() : place_.key.subject();
       own_ = value_or_throw(make_value_client(used->upstream(), std::move(user)));
     }
     target->client = own_;

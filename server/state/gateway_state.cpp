@@ -13,7 +13,7 @@ GatewayState::GatewayState(boost::asio::io_context& io, Config config)
       http_access_(std::make_unique<HttpAccess>(io.get_executor(), access_)),
       web_tls_(config_.tls.certificates.empty()
                    ? nullptr
-                   : std::make_unique<TlsFiles>(config_.tls.certificates, config_.access.client_ca)),
+                   : std::make_unique<TlsFiles>(config_.tls.certificates, config_.access.clients)),
       devices_(io.get_executor(), config_),
       clients_(io.get_executor()),
       admission_(config_.limits.clients, config_.limits.clients_per_address),

@@ -200,9 +200,9 @@ rr::awaitable<HttpAccess::Admitted> HttpAccess::admit(Request& request, const Co
   }
   request.identity = std::move(*identity);
   if (!request.identity.is_proven()) co_return out;
-  const auto& name = request.identity.name;
-  out.user = users_.enter(name, of_user.per_second, of_user.at_once, std::chrono::steady_clock::now());
-  if (!out.user) out.refusal = too_much("of " + rr::quoted(name));
+  out.user = users_.enter(request.identity.subject().key(), of_user.per_second, of_user.at_once,
+                          std::chrono::steady_clock::now());
+  if (!out.user) out.refusal = too_much("of " + rr::quoted(request.identity.name));
   co_return out;
 }
 
@@ -221,8 +221,7 @@ std::string to_text(const RateLimit& limit) {
 
 }  // namespace
 
-rr::Result<std::shared_ptr<const HttpAccess::Passes>> HttpAccess::enter(const std::string& address,
-                                                                        const std::string& user,
+rr::Result<std::shared_ptr<const HttpAccess::Passes>> HttpAccess::enter(const std::string& address, const Subject& user,
                                                                         const std::string& device, const Rates& rates) {
   if (!rates.is_bound()) return std::shared_ptr<const Passes>();
   const auto now = std::chrono::steady_clock::now();
@@ -233,9 +232,9 @@ rr::Result<std::shared_ptr<const HttpAccess::Passes>> HttpAccess::enter(const st
   auto out = std::make_shared<Passes>();
   out->client = clients_.enter(address, rates.client.per_second, rates.client.at_once, now);
   if (!out->client) return refused(rates.client, "from " + address);
-  if (!user.empty()) {
-    out->user = users_.enter(user, rates.user.per_second, rates.user.at_once, now);
-    if (!out->user) return refused(rates.user, "of " + rr::quoted(user));
+  if (!user.is_nobody()) {
+    out->user = users_.enter(user.key(), rates.user.per_second, rates.user.at_once, now);
+    if (!out->user) return refused(rates.user, "of " + rr::quoted(user.name));
   }
   if (!device.empty()) {
     out->device = enter_device(device, rates);

@@ -51,9 +51,9 @@ class HttpAccess {
     std::optional<RateGate::Pass> user = {};
     std::optional<RateGate::Pass> device = {};
   };
-  /// Lets one request pass that is not one of HTTP's, until it is answered. `user`, `device`  empty: none.
+  /// Lets one request pass that is not one of HTTP's, until it is answered. `device`  empty: none.
   /// Errors   out_of_system_resource: too much is asked for; again in a second.
-  rr::Result<std::shared_ptr<const Passes>> enter(const std::string& address, const std::string& user,
+  rr::Result<std::shared_ptr<const Passes>> enter(const std::string& address, const Subject& user,
                                                   const std::string& device, const Rates& rates);
 
   AccessRequests& requests() { return requests_; }

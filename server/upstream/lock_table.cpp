@@ -72,13 +72,13 @@ void LockTable::remove(LockClient client, rr::TimePoint now) {
   if (!left) return;
   const auto& party = left.mapped();
   const auto of_user = std::find_if(parties_.begin(), parties_.end(), [&](const auto& other) {
-    return !party.user.empty() && other.second.user == party.user;
+    return !party.user.is_nobody() && other.second.user == party.user;
   });
   for (auto it = locks_.begin(); it != locks_.end();) {
     const auto at = it++;
     auto& lock = at->second;
     if (lock.owner != client) continue;
-    if (!lock.user.empty() && of_user != parties_.end()) {  // the lock of a user lasts as long as one client of his
+    if (!lock.user.is_nobody() && of_user != parties_.end()) {  // the lock of a user lasts as long as one client of his
       lock.owner = of_user->first;
       lock.session = of_user->second.session;
     } else if (party.has_own_session && lock.asking == Asking::nothing) {  // ends with that
@@ -155,12 +155,12 @@ void LockTable::handle_lost(LockSession session, rr::TimePoint now) {
     return each.second.session == session && each.second.has_own_session;
   });
   // Sessions of one user hear of a restart one after the other: the first counts for all.
-  const auto user = party == parties_.end() ? std::string() : party->second.user;
+  const auto user = party == parties_.end() ? Subject() : party->second.user;
   const std::string why = "it was lost with the connection to the device";
   for (auto it = locks_.begin(); it != locks_.end();) {
     const auto at = it++;
     auto& lock = at->second;
-    const bool is_of_user = !lock.user.empty() && lock.user == user;
+    const bool is_of_user = !lock.user.is_nobody() && lock.user == user;
     const bool is_held = lock.asking == Asking::nothing || lock.asking == Asking::override_it;
     if (!is_held || lock.owner == 0 || (lock.session != session && !is_of_user)) continue;
     note_lost_lock(at->first, lock, why);
@@ -197,7 +197,7 @@ void LockTable::handle_released(std::string_view path, rr::TimePoint) {
 bool LockTable::owns(LockClient client, const Hold& lock) const {
   if (lock.owner == client) return true;
   const auto party = parties_.find(client);
-  return !lock.user.empty() && party != parties_.end() && party->second.user == lock.user;
+  return !lock.user.is_nobody() && party != parties_.end() && party->second.user == lock.user;
 }
 
 LockTable::Locks::iterator LockTable::find_covering(std::string_view path) {
@@ -223,7 +223,7 @@ void LockTable::lock(LockClient client, const rr::LockWanted& wanted) {
   auto& lock = locks_[key];
   lock.owner = lock.asker = client;
   lock.session = party.session;
-  lock.name = party.user;
+  lock.by = party.user;
   if (is_for_user) lock.user = party.user;
   lock.path = wanted.path;
   lock.request = wanted.id;
@@ -252,10 +252,10 @@ void LockTable::unlock(LockClient client, const rr::LockWanted& wanted) {
   if (found->first != key) return answer(client, wanted.id, locked("Cannot release inherited lock"));
   if (lock.asking != Asking::nothing)
     return answer(client, wanted.id, locked("Object lock is being changed by another request"));
-  const bool is_owner = owns(client, lock) || (!lock.name.empty() && lock.name == party.user);
+  const bool is_owner = owns(client, lock) || (!lock.by.is_nobody() && lock.by == party.user);
   if (!is_owner && !party.has_own_session)
     return answer(client, wanted.id,
-                  locked("Service locked by " + (lock.name.empty() ? "another client" : "user " + lock.name)));
+                  locked("Service locked by " + (lock.by.is_nobody() ? "another client" : "user " + lock.by.name)));
   lock.asker = client;
   lock.request = wanted.id;
   lock.path = wanted.path;
@@ -266,7 +266,7 @@ void LockTable::unlock(LockClient client, const rr::LockWanted& wanted) {
 /// From one who is gone, or has lost it.
 void LockTable::take_back_lock(Hold& lock, LockClient leaver) {
   lock.owner = 0;
-  lock.user.clear();
+  lock.user = {};
   lock.leaver = leaver;
   if (lock.asking == Asking::nothing) ask(lock, Asking::give_back, lock.session, rr::LockCommand::unlock);
 }
@@ -334,7 +334,7 @@ void LockTable::begin_entering(Monitor& monitor, const Waiting& waiting, rr::Tim
   const auto& party = parties_.at(waiting.client);
   monitor.owner = monitor.asker = waiting.client;
   monitor.session = party.session;
-  monitor.name = party.user;
+  monitor.by = party.user;
   monitor.path = waiting.path;
   monitor.request = waiting.request;
   monitor.leaver = 0;
@@ -446,7 +446,7 @@ rr::Result<> LockTable::check(LockClient client, std::string_view path, bool is_
   if (!is_exempt) {
     const auto lock = find_covering(key);
     if (lock != locks_.end() && lock->second.owner != 0 && !owns(client, lock->second))
-      return locked("Object locked by " + (lock->second.name.empty() ? "another client" : lock->second.name));
+      return locked("Object locked by " + (lock->second.by.is_nobody() ? "another client" : lock->second.by.name));
     for (auto lost = lost_locks_.lower_bound({client, ""}); lost != lost_locks_.end() && lost->first.first == client;
          ++lost)
       if (rr::is_within(key, lost->first.second))

@@ -18,6 +18,7 @@
 #include <variant>
 
 #include "core/session/service/service_session.hpp"
+#include "server/access/identity.hpp"
 
 namespace rrgate {
 
@@ -28,7 +29,7 @@ using LockSession = std::uint64_t;
 
 /// One who may hold locks.
 struct LockParty {
-  std::string user;  ///< whose user locks are his too; empty: nobody's
+  Subject user;  ///< whose user locks are his too
   LockSession session = 0;
   bool has_own_session = false;  ///< nobody else uses it: the device knows him by his name
 };
@@ -98,8 +99,8 @@ class LockTable {
   struct Hold {
     LockClient owner = 0;  ///< 0: it is nobody's any more
     LockSession session = 0;
-    std::string user;  ///< of a user lock
-    std::string name;  ///< of the owner, for texts
+    Subject user;      ///< of a user lock
+    Subject by;        ///< as whom the owner has taken it
     std::string path;  ///< as the owner spells it
     Asking asking = Asking::nothing;
     std::uint64_t ask = 0;

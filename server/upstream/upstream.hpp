@@ -14,6 +14,7 @@
 
 #include "core/session/service/service_session.hpp"
 #include "node/client/client_connection.hpp"
+#include "server/access/identity.hpp"
 #include "server/upstream/device.hpp"
 #include "server/upstream/service_locks.hpp"
 
@@ -43,8 +44,8 @@ class UpstreamClient {
  public:
   /// Ends when the client does.
   virtual std::weak_ptr<const void> life() const = 0;
-  /// Whose user locks are this client's too; empty: nobody's.
-  virtual std::string lock_user() const { return {}; }
+  /// Whose user locks are this client's too.
+  virtual Subject lock_user() const { return {}; }
   /// Whether the device may ask it by this callback.
   virtual bool may_answer(const std::string& path, const rr::MemberDefinition& callback) const = 0;
   virtual void receive_event(rr::EventPacket& packet) = 0;

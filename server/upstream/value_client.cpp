@@ -28,7 +28,7 @@ auto await_completion(asio::any_io_executor executor, Begin begin) {
 
 }  // namespace
 
-ValueClient::ValueClient(std::shared_ptr<Upstream> upstream, std::string user, Device::Seat seat)
+ValueClient::ValueClient(std::shared_ptr<Upstream> upstream, Subject user, Device::Seat seat)
     : upstream_(std::move(upstream)),
       user_(std::move(user)),
       seat_(std::move(seat)),
@@ -279,7 +279,7 @@ void ValueClient::found_again(const std::string& path) {
 
 // --- one for all plain requests of a login ---
 
-rr::Result<std::shared_ptr<ValueClient>> make_value_client(std::shared_ptr<Upstream> upstream, std::string user) {
+rr::Result<std::shared_ptr<ValueClient>> make_value_client(std::shared_ptr<Upstream> upstream, Subject user) {
   auto& device = upstream->device();
   auto seat = device.take_seat();
   if (!seat) return rr::make_error(rr::ErrorCode::out_of_system_resource, device.full_text());
@@ -309,7 +309,7 @@ rr::Result<ValueClients::Entries::iterator> ValueClients::find_or_make(const std
     if (!key.username.empty()) login.credentials.items.emplace_back("password", rr::Value(key.password));
     shared = std::make_shared<Upstream>(device, key.service, std::move(login), UpstreamUse::one_user);
   }
-  auto client = make_value_client(shared, key.username);
+  auto client = make_value_client(shared, key.subject());
   if (!client) return client.error();
   if (is_ours) {
     shared->close_unused();

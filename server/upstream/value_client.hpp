@@ -39,8 +39,8 @@ struct MemberPlace {
 /// gateway's thread.
 class ValueClient final : public UpstreamClient, public std::enable_shared_from_this<ValueClient> {
  public:
-  /// `user`  whose user locks are this client's; empty: nobody's.
-  ValueClient(std::shared_ptr<Upstream> upstream, std::string user, Device::Seat seat);
+  /// `user`  whose user locks are this client's.
+  ValueClient(std::shared_ptr<Upstream> upstream, Subject user, Device::Seat seat);
   ~ValueClient();
   ValueClient(const ValueClient&) = delete;
   ValueClient& operator=(const ValueClient&) = delete;
@@ -104,7 +104,7 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
 
   // UpstreamClient
   std::weak_ptr<const void> life() const override { return weak_from_this(); }
-  std::string lock_user() const override { return user_; }
+  Subject lock_user() const override { return user_; }
   bool may_answer(const std::string& path, const rr::MemberDefinition& callback) const override;
   void receive_event(rr::EventPacket& packet) override;
   void receive_wire(rr::WirePacket& packet) override;
@@ -134,7 +134,7 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   void drop_if_unused(const Key& key);
 
   std::shared_ptr<Upstream> upstream_;
-  std::string user_;
+  Subject user_;
   Device::Seat seat_;
   std::map<Key, Topic> topics_;
   std::map<rr::PipeId, Key> pipes_;
@@ -149,6 +149,8 @@ struct SessionKey {
   std::string service;
   std::string username = {};  ///< empty: no login
   std::string password = {};
+  /// Whose name that is.
+  Subject subject() const { return username.empty() ? Subject() : Subject{Subject::Kind::device_user, username}; }
   auto operator<=>(const SessionKey&) const = default;
 };
 
@@ -180,6 +182,6 @@ class ValueClients {
 };
 
 /// One more client of a session, with a seat of its own. Errors   out_of_system_resource: the device is full.
-rr::Result<std::shared_ptr<ValueClient>> make_value_client(std::shared_ptr<Upstream> upstream, std::string user);
+rr::Result<std::shared_ptr<ValueClient>> make_value_client(std::shared_ptr<Upstream> upstream, Subject user);
 
 }  // namespace rrgate

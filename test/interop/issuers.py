@@ -82,6 +82,18 @@ class People:
             .not_valid_after(now + datetime.timedelta(days=1)) \
             .add_extension(x509.BasicConstraints(is_ca, None), True).sign(self._key, hashes.SHA256())
 
+    def revoke(self, *certificates):
+        """Writes a list that revokes them; returns its file."""
+        now = datetime.datetime.now(datetime.timezone.utc)
+        made = x509.CertificateRevocationListBuilder().issuer_name(self._name).last_update(now - datetime.timedelta(hours=1)) \
+            .next_update(now + datetime.timedelta(days=1))
+        for file in certificates:
+            serial = x509.load_pem_x509_certificate(file.read_bytes()).serial_number
+            made = made.add_revoked_certificate(x509.RevokedCertificateBuilder().serial_number(serial).revocation_date(now).build())
+        new = self.folder / "crl.new"
+        new.write_bytes(made.sign(self._key, hashes.SHA256()).public_bytes(serialization.Encoding.PEM))
+        return new.rename(self.folder / "crl.pem")
+
     def certificate(self, name):
         """The files of certificate and key."""
         key = ec.generate_private_key(ec.SECP256R1())

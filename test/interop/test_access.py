@@ -245,6 +245,24 @@ def test_a_client_asks_and_an_admin_decides(guarded):
     assert statuses == [202, 202, 202, 429]
 
 
+def test_a_token_gets_nothing_by_the_name_that_its_client_has_chosen(device, tmp_path):
+    make_users(tmp_path)
+    (tmp_path / "tokens").touch(0o600)
+    access = {"users_file": "users", "tokens_file": "tokens", "rules": RULES, "audit_file": "audit",
+              "grants": [{"users": ["vera"], "roles": ["operator"]}]}
+    with running(tmp_path, device, access) as gateway:
+        requests = "/api/v1/access/requests"
+        asked = ask(gateway.port, "POST", requests, {"name": "vera"}).json
+        decided = ask(gateway.port, "POST", f"{requests}/{asked['id']}/approve", {"roles": ["viewer"], "days": 7}, basic("root"))
+        assert decided.status == 200, decided.body
+        token = ask(gateway.port, "POST", f"{requests}/{asked['id']}/claim", {"secret": asked["secret"]}).json["token"]
+        assert ask(gateway.port, "GET", BASE + "/p_double", headers=bearer(token)).status == 200
+        assert ask(gateway.port, "PUT", BASE + "/p_double", 1, bearer(token)).status == 403
+        assert ask(gateway.port, "PUT", BASE + "/p_double", 1, basic("vera")).status == 204
+        (approved,) = (line for line in audit_of(gateway) if line["event"] == "approved")
+        assert approved["user"] == "root" and "roles viewer, until 2" in approved["detail"]
+
+
 def test_the_gateways_document_is_kept_with_users_and_rights(device, tmp_path):
     """What nobody, one who may look and an admin are answered is what the document says."""
     make_users(tmp_path)
@@ -298,6 +316,28 @@ def test_client_certificates(device, tmp_path):
         context.load_cert_chain(*mallory.certificate("alice"))
         with pytest.raises((ssl.SSLError, ConnectionError)):
             ask(gateway.port, "GET", BASE + "/p_double", context=context)
+
+
+def test_certificates_that_are_revoked(device, tmp_path):
+    tls = make_web_certificates(tmp_path / "web")
+    people = issuers.People(tmp_path)
+    alice, vera = people.certificate("alice"), people.certificate("vera")
+    access = {"client_ca": [str(people.ca)], "client_crl": [str(people.revoke())]}
+    with running(tmp_path, device, access, tls=tls) as gateway:
+        def status(certificate):
+            context = ssl.create_default_context(cafile=tmp_path / "web" / "web-ca.pem")
+            context.load_cert_chain(*certificate)
+            return ask(gateway.port, "GET", BASE + "/p_double", context=context).status
+
+        assert status(alice) == status(vera) == 200
+        people.revoke(alice[0])
+        gateway.wait_for("TLS files read anew")
+        with pytest.raises((ssl.SSLError, ConnectionError)):
+            status(alice)
+        assert status(vera) == 200
+        (tmp_path / "crl.pem").write_text("nothing")  # changes nothing
+        assert "found none in it" in gateway.wait_for("TLS files can't be used; those from before stay in use")["error"]
+        assert status(vera) == 200
 
 
 def test_what_a_trusted_proxy_says(device, tmp_path):

@@ -9,7 +9,7 @@ import time
 import pytest
 
 from clients import run_and_check
-from gateways import RRGATE, running
+from gateways import RRGATE, Gateway, running
 from http_api import fetch, is_alive, open_websocket
 from processes import free_port
 from scenarios import SCENARIO
@@ -227,6 +227,22 @@ def test_sockets_that_listen_already(device, tmp_path):
     finally:
         process.kill()
         process.wait()
+
+
+def test_a_reload_looks_at_who_reaches_sockets_that_listen_already(tmp_path):
+    """Whatever addresses the configuration names: the socket is not theirs."""
+    hand_over = "import os, socket, sys; one = socket.create_server(('0.0.0.0', int(sys.argv[1]))); os.dup2(os.dup(one.fileno()), 3); " \
+        "os.environ.update(LISTEN_FDS='1', LISTEN_PID=str(os.getpid())); os.execv(sys.argv[2], sys.argv[2:])"
+    port = free_port()
+    config = {"listen": ["127.0.0.1:1"], "devices": [], "insecure": True}
+    gateway = Gateway(tmp_path, config, command=[sys.executable, "-c", hand_over, port])
+    try:
+        assert fetch(port, "/healthz")[0] == 200
+        gateway.write({**gateway.config, "insecure": False})
+        refused = gateway.wait_for("configuration not used; that from before stays")
+        assert f"0.0.0.0:{port} is reached from other machines without TLS" in refused["error"]
+    finally:
+        gateway.process.stop()
 
 
 def test_a_socket_that_is_none(tmp_path):

@@ -391,6 +391,60 @@ def test_rights_member_by_member(node, tmp_path):
         service.stop()
 
 
+def test_a_login_that_the_device_judges_gives_no_rights_of_the_gateways_users(node, tmp_path):
+    """Where the gateway has users, but none with passwords, a login is the device's; alice there is nobody here."""
+    service, url = start_service(tmp_path)
+    (tmp_path / "tokens").touch()
+    rules = [{"roles": ["guest"], "may": ["read", "call"]}, {"roles": ["*", "operator"], "may": ["write"]}]
+    access = {"tokens_file": "tokens", "anonymous_role": "guest", "rules": rules, "audit_file": "audit",
+              "grants": [{"users": ["alice"], "roles": ["operator"]}]}
+    gateway, port = start_gateway(tmp_path, url, device={"mode": "shared"}, access=access)
+    try:
+        root = node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=guarded", "alice",
+                                   {"password": RR.VarValue("secret", "string")})
+        assert root.who() == "alice"
+        with pytest.raises(RR.PermissionDeniedException, match="'alice' of the device, who is no user of the gateway, may not write"):
+            root.level = 2.0
+        node.DisconnectService(root)
+        lines = [json.loads(line) for line in (tmp_path / "audit").read_text().splitlines()]
+        (refused,) = (line for line in lines if line["event"] == "refused")
+        assert (refused["proof"], refused["device_user"]) == ("none", "alice")
+    finally:
+        gateway.stop()
+        service.stop()
+
+
+def test_users_that_a_reload_brings_are_the_gateways_at_services_that_are_open(node, tmp_path):
+    service, url = start_service(tmp_path)
+    gateway, port = start_gateway(tmp_path, url, device={"mode": "shared"})
+
+    def connect(service, user, password):
+        return node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service={service}", user,
+                                   {"password": RR.VarValue(password, "string")})
+
+    try:
+        before = connect("guarded", "alice", "secret")  # a user of the device
+        assert before.who() == "alice"
+        make_users(tmp_path)
+        config = json.loads((tmp_path / "gateway.json").read_text())
+        (tmp_path / "gateway.json").write_text(json.dumps({**config, "access": {"users_file": "users", "rules": RULES}}))
+        gateway.wait_until(lambda: "configuration read anew" in (tmp_path / "gateway.log").read_text())
+        with pytest.raises(RR.PermissionDeniedException):
+            before.who()
+        for service_name in ("guarded", "interop"):
+            with pytest.raises(RR.AuthenticationException):
+                connect(service_name, "alice", "secret")
+        root = connect("interop", "alice", PASSWORDS["alice"])
+        assert root.version == "1"
+        with pytest.raises(RR.PermissionDeniedException, match="operator"):
+            root.nothing()
+        for each in (before, root):
+            node.DisconnectService(each)
+    finally:
+        gateway.stop()
+        service.stop()
+
+
 def test_who_may_do_nothing_answers_no_callback_and_makes_the_device_look_for_nothing(node, tmp_path):
     service, url = start_service(tmp_path)
     make_users(tmp_path)

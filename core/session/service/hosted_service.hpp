@@ -58,7 +58,7 @@ class HostedService {
   /// A MapString of numbers and texts.
   const Value& attributes() const { return attributes_; }
   const std::vector<std::string>& extra_imports() const { return extra_imports_; }
-  /// Who may do what; to be set before clients come.
+  /// Who may do what. Another authenticator holds for the next login, the rest is to be set before clients come.
   const SecurityPolicy& policy() const { return policy_; }
   void set_policy(SecurityPolicy policy) { policy_ = std::move(policy); }
   LoginLimit& login_limit() { return login_limit_; }

@@ -115,7 +115,9 @@ Response approve(GatewayState& gateway, const Request& request, const std::strin
   auto token = add_token(gateway, pending->name, roles, last_day);
   if (!token) return error_answer(token.error());
   requests.decide(id, std::move(*token));
-  gateway.access().record({"approved", &request.identity, nullptr, pending->name + " of " + pending->client});
+  const auto detail = pending->name + " of " + pending->client + ": roles " + format_roles(roles) + ", until " +
+                      (last_day ? format_day(*last_day) : "it is deleted");
+  gateway.access().record({"approved", &request.identity, nullptr, detail});
   return answer(200, {{"state", "approved"}});
 }
 

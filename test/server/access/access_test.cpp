@@ -146,6 +146,51 @@ TEST_CASE("roles are those of the file and those that the configuration adds") {
   CHECK(alice.client == "here:1");
 }
 
+TEST_CASE("who has logged in at a device is nobody's user here, whatever name he has there") {
+  Files files;
+  files.write("users", Files::user("alice", "one", "viewer"));
+  auto config = with_users(files);
+  config.grants = {RoleGrant{.users = {"alice"}, .roles = {"operator"}}};
+  config.rules.push_back(AccessRule{.roles = {"*"}, .may = {Verb::lock}});
+  Access access(config);
+  REQUIRE(access.load());
+  const rr::AuthenticatedUser devices{"alice", {"operator"}, {}};
+  const auto shown = access.anonymous("here:1");
+  const auto at_device = access.in_session(shown, &devices);
+  CHECK_FALSE(at_device.is_proven());
+  CHECK(at_device.roles.empty());
+  CHECK(at_device.device_user == "alice");
+  CHECK(at_device.client == "here:1");
+  CHECK(access.check(at_device, a_write).error().code == rr::ErrorCode::permission_denied);
+  CHECK_FALSE(access.sees(at_device, "arm"));
+  const auto ours = log_in(access, "alice", "one").value();
+  const auto here = access.in_session(shown, &ours);
+  CHECK(here.roles == std::vector<std::string>{"viewer", "operator"});
+  CHECK(here.device_user.empty());
+  CHECK(access.in_session(here, nullptr) == here);
+  CHECK(access.in_session(here, &devices).roles == here.roles);  // what the connection has shown stays
+  CHECK_FALSE(subject_of(devices) == subject_of(ours));
+  CHECK(subject_of(ours) == here.subject());
+}
+
+TEST_CASE("a token that has a user's name gets nothing by that name") {
+  Files files;
+  files.write("users", Files::user("alice", "one", "viewer"));
+  files.write("tokens", "alice " + hash_api_token("rrg_x") + " viewer _\n");
+  auto config = with_users(files);
+  config.tokens_file = files.path("tokens");
+  config.grants = {RoleGrant{.users = {"*"}, .roles = {"operator"}}};
+  Access access(config);
+  REQUIRE(access.load());
+  const auto token =
+      access.with_grants(access.state().tokens->verify("rrg_x", std::chrono::system_clock::now()).value());
+  CHECK(token.roles == std::vector<std::string>{"viewer"});
+  const auto alice = access.logged_in(log_in(access, "alice", "one").value(), "here:1");
+  CHECK(alice.roles == std::vector<std::string>{"viewer", "operator"});
+  CHECK_FALSE(token.subject() == alice.subject());
+  CHECK(token.subject().key() != alice.subject().key());
+}
+
 TEST_CASE("the audit log has who logged in, what was done and what was refused, and no reads") {
   Files files;
   files.write("users", Files::user("alice", "one", "viewer") + Files::user("otto", "two", "operator"));

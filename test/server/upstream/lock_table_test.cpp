@@ -21,12 +21,12 @@ struct Transcript {
   rr::TimePoint now{seconds(1000)};
   rr::LockRequestId last_request = 0;
 
-  LockClient shares(LockClient client, std::string user = {}) {
-    table.add(client, {std::move(user), shared, false});
+  LockClient shares(LockClient client, const std::string& user = {}) {
+    table.add(client, {user.empty() ? Subject() : Subject{Subject::Kind::user, user}, shared, false});
     return client;
   }
   LockClient has_own(LockClient client, std::string user, LockSession session) {
-    table.add(client, {std::move(user), session, true});
+    table.add(client, {Subject{Subject::Kind::device_user, std::move(user)}, session, true});
     return client;
   }
 
@@ -165,6 +165,14 @@ TEST_CASE("a user's lock is for all clients of his, and lasts as long as one of 
   t.device_says(t.asked(LockCommand::unlock));
   t.left(again);
   CHECK(t.may(bob));
+}
+
+TEST_CASE("a user of the gateway and one of the device share a name, not their locks") {
+  Transcript t;
+  const auto here = t.shares(1, "alice"), there = t.has_own(2, "alice", alices);
+  t.takes(here, LockCommand::lock_for_user);
+  CHECK(t.may(here));
+  CHECK_FALSE(t.may(there));
 }
 
 TEST_CASE("a client's lock is for no other client of its user") {
