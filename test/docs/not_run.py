@@ -12,7 +12,7 @@ COMMANDS = {
     ("docs/discovery.md", "install -d"): "makes folders of this machine's users: test/interop/test_local_discovery.py does it",
     ("docs/embedding.md", "build-examples/thermostat_gateway"): "test/examples/examples_test.py builds and runs it",
     ("docs/start.md", "apt install"): "installs a package: test/interop/test_package.py does",
-    ("docs/start.md", "docker compose"): "takes a container engine: test/interop/test_container.py reads the file",
+    ("docs/start.md", "docker build"): "takes a container engine: test/interop/test_container.py does it",
     ("docs/start.md", "./dev demo"): "builds everything; the test starts what came of it",
     ("docs/start.md", "pip install"): "downloads a package; the device is started by the test",
     ("docs/tutorials/cpp-device.md", "cmake --install"): "test/examples/examples_test.py builds and runs it",
@@ -23,11 +23,8 @@ COMMANDS = {
     ("CONTRIBUTING.md", "./dev setup"): "runs the tests that this is one of",
     ("README.md", "apt install"): "installs a package: test/interop/test_package.py does",
     ("README.md", "./dev demo"): "builds everything; the test starts what came of it",
-    ("README.md", "docker compose"): "takes a container engine: test/interop/test_container.py reads the file",
+    ("README.md", "docker build"): "takes a container engine: test/interop/test_container.py does it",
 }
-
-# Commands that do not do what their page says.
-WRONG = {("docs/command-line.md", "rrgate call $REYNARD teleport 100"): "this robot's positions go from -1 to 1, and from -0.5 to 0.5"}
 
 # Output in which numbers are those of a run, not of the next.
 NUMBERS_DIFFER = {("docs/command-line.md", "rrgate watch"): "counts what came within a time"}

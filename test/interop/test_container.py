@@ -1,4 +1,5 @@
 """The container image: built by podman from programs that were compiled already, run as it is meant to be run."""
+import base64
 import ipaddress
 import json
 import os
@@ -144,6 +145,22 @@ def test_a_container(podman, image, tmp_path):
         assert about["State"]["ExitCode"] == 0
     finally:
         podman("rm", "-f", "gateway", "create", fails=True)
+
+
+def test_the_demo_in_a_container_asks_for_its_password(podman, image):
+    port = free_port()
+    podman("run", "-d", "--name=demo", "--network=host", "--cgroups=disabled", "--no-healthcheck", image, "demo", "--port", port)
+    try:
+        deadline = time.monotonic() + START_DEADLINE
+        while "rrgate demo: http://" not in (said := podman("logs", "demo", fails=True)):
+            assert time.monotonic() < deadline, said
+            time.sleep(0.1)
+        password = re.search(r"user demo, password (\S+)", said)[1]
+        login = base64.b64encode(f"demo:{password}".encode()).decode()
+        assert fetch(port, "/api/v1/devices")[0] == 401
+        assert fetch(port, "/api/v1/devices", headers={"Authorization": f"Basic {login}"})[0] == 200
+    finally:
+        podman("rm", "-f", "demo", fails=True)
 
 
 def test_configurations_of_the_compose_files():
