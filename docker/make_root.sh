@@ -26,7 +26,7 @@ echo 'rrgate:x:10001:' >"$root/etc/group"
 programs="$root/usr/bin/rrgate $root/usr/libexec/rrgate/*"
 if ldd $programs | grep -q 'not found'; then
   apt-get update
-  apt-get install -y --no-install-recommends libjpeg62-turbo libspdlog1.10 libssl3 libusb-1.0-0 zlib1g
+  apt-get install -y --no-install-recommends libjpeg62-turbo libqrencode4 libspdlog1.10 libssl3 libusb-1.0-0 zlib1g
 fi
 ldd $programs | sed -n 's|.*=> \(/[^ ]*\) .*|\1|p; s|^[[:space:]]*\(/[^ ]*ld-linux[^ ]*\) .*|\1|p' | sort -u |
   while read -r library; do

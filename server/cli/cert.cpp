@@ -1,8 +1,8 @@
 // rrgate cert: certificates of one's own, for a lab that has no CA. Layer: server/cli.
 //
 // Nodes and web servers have a CA each: what marks a node's CA is unknown to browsers, and critical.
-#include <charconv>
-#include <filesystem>
+#include "server/cli/cert.hpp"
+
 #include <iostream>
 
 #include "core/session/start_tls.hpp"
@@ -51,40 +51,10 @@ rr::Result<rr::CertificateAndKey> read_ca(const fs::path& folder, std::string_vi
   return rr::CertificateAndKey{*certificate, *key};
 }
 
-struct Wishes {
-  fs::path folder;
-  std::vector<std::string> operands;
-  std::int64_t days;
-  bool force;
+struct NodeCertificateOptions : CertificateOptions {
+  std::string node;
+  std::string output;
 };
-
-int make_cas(const Wishes& wishes) {
-  struct Kind {
-    std::string_view file;
-    std::string_view name;
-    const char* oid;
-  };
-  for (const auto& kind :
-       {Kind{node_ca, "Robot Raconteur Lab Root CA", rr::root_oid}, Kind{web_ca, "Lab Web CA", ""}}) {
-    rr::CertificateWish wish;
-    // With a number of its own: two labs must not look alike to those who sort certificates by name.
-    wish.common_name =
-        std::string(kind.name) + " " + rr::format_node_id(rr::random_node_id(), rr::NodeIdFormat::plain).substr(0, 8);
-    wish.node_level_oid = kind.oid;
-    wish.is_ca = true;
-    wish.begins_after_seconds = -clock_slack;
-    wish.ends_after_seconds = wishes.days * day;
-    const auto made = rr::issue_certificate(wish, nullptr);
-    if (!made) return report_failure("cert", made.error().message);
-    if (auto done = write_pair(wishes.folder / kind.file, *made, {}, wishes.force, rr::SecretReaders::owner); !done)
-      return report_failure("cert", done.error().message);
-    std::cout << (wishes.folder / kind.file).string() << ".pem\n";
-  }
-  std::cout << "The .key files make certificates that are believed: keep them here. Programs that shall believe them "
-               "are told by\n  export ROBOTRACONTEUR_SSL_CERT_FILE="
-            << fs::absolute(wishes.folder / node_ca).string() << ".pem\n";
-  return exit_ok;
-}
 
 /// The id that a node of this name has or, from now on, will have: what the reference keeps in nodeids/NAME.
 rr::Result<rr::NodeId> id_of_name(const std::string& name) {
@@ -104,82 +74,102 @@ rr::Result<rr::NodeId> id_of_name(const std::string& name) {
   return id;
 }
 
-int make_node(const Wishes& wishes, const std::string& output) {
-  if (wishes.operands.size() != 1) return usage_error("cert node", "expected FOLDER and one NODEID or NODENAME");
-  const auto& node = wishes.operands.front();
-  const auto ca = read_ca(wishes.folder, node_ca);
+int make_node_certificate(const NodeCertificateOptions& options) {
+  const auto ca = read_ca(options.folder, node_ca);
   if (!ca) return report_failure("cert", ca.error().message);
-  const auto parsed = rr::parse_node_id(node);
-  const auto id = parsed && !parsed->is_any() ? parsed : id_of_name(node);
+  const auto parsed = rr::parse_node_id(options.node);
+  const auto id = parsed && !parsed->is_any() ? parsed : id_of_name(options.node);
   if (!id) return report_failure("cert", id.error().message);
-  auto path = rr::Result<std::string>((fs::path(output) / (rr::format_node_id(*id) + ".p12")).string());
-  if (output.empty()) path = rr::node_certificate_path(*id);
+  auto path = rr::Result<std::string>((fs::path(options.output) / (rr::format_node_id(*id) + ".p12")).string());
+  if (options.output.empty()) path = rr::node_certificate_path(*id);
   if (!path) return report_failure("cert", path.error().message);
 
   rr::CertificateWish wish;
   wish.common_name = rr::format_certificate_name(*id);
   wish.node_level_oid = rr::node_oid;
   wish.begins_after_seconds = -clock_slack;
-  wish.ends_after_seconds = wishes.days * day;
+  wish.ends_after_seconds = options.days * day;
   const auto made = rr::issue_certificate(wish, &*ca);
   if (!made) return report_failure("cert", made.error().message);
   const auto bundle = rr::make_node_bundle(*made, ca->certificate);
   if (!bundle) return report_failure("cert", bundle.error().message);
-  if (auto done = rr::write_secret(*path, rr::as_text(*bundle), wishes.force); !done)
+  if (auto done = rr::write_secret(*path, rr::as_text(*bundle), options.force); !done)
     return report_failure("cert", done.error().message);
   std::cout << *path << "\n";
   return exit_ok;
 }
 
-int make_web(const Wishes& wishes) {
-  if (wishes.operands.empty()) return usage_error("cert web", "expected FOLDER and at least one HOST");
-  const auto ca = read_ca(wishes.folder, web_ca);
+/// What all kinds take.
+void add_certificate_options(CLI::App& app, CertificateOptions& options) {
+  app.add_option("FOLDER", options.folder, "Where the CAs are")->required()->option_text(" ");
+  app.add_option("--days", options.days, "How long it is good")->check(CLI::Range(1, 36500))->option_text("N");
+  app.add_flag("--force", options.force, "Replace what is there");
+}
+
+}  // namespace
+
+int make_authorities(const CertificateOptions& options) {
+  struct Kind {
+    std::string_view file;
+    std::string_view name;
+    const char* oid;
+  };
+  for (const auto& kind :
+       {Kind{node_ca, "Robot Raconteur Lab Root CA", rr::root_oid}, Kind{web_ca, "Lab Web CA", ""}}) {
+    rr::CertificateWish wish;
+    // With a number of its own: two labs must not look alike to those who sort certificates by name.
+    wish.common_name =
+        std::string(kind.name) + " " + rr::format_node_id(rr::random_node_id(), rr::NodeIdFormat::plain).substr(0, 8);
+    wish.node_level_oid = kind.oid;
+    wish.is_ca = true;
+    wish.begins_after_seconds = -clock_slack;
+    wish.ends_after_seconds = options.days * day;
+    const auto made = rr::issue_certificate(wish, nullptr);
+    if (!made) return report_failure("cert", made.error().message);
+    if (auto done = write_pair(options.folder / kind.file, *made, {}, options.force, rr::SecretReaders::owner); !done)
+      return report_failure("cert", done.error().message);
+    std::cout << (options.folder / kind.file).string() << ".pem\n";
+  }
+  std::cout << "The .key files make certificates that are believed: keep them here. Programs that shall believe them "
+               "are told by\n  export ROBOTRACONTEUR_SSL_CERT_FILE="
+            << fs::absolute(options.folder / node_ca).string() << ".pem\n";
+  return exit_ok;
+}
+
+int make_web_certificate(const WebCertificateOptions& options) {
+  const auto ca = read_ca(options.folder, web_ca);
   if (!ca) return report_failure("cert", ca.error().message);
   rr::CertificateWish wish;
-  wish.common_name = wishes.operands.front().substr(0, 64);
-  wish.hosts = wishes.operands;
+  wish.common_name = options.hosts.front().substr(0, 64);
+  wish.hosts = options.hosts;
   wish.begins_after_seconds = -clock_slack;
-  wish.ends_after_seconds = wishes.days * day;
+  wish.ends_after_seconds = options.days * day;
   const auto made = rr::issue_certificate(wish, &*ca);
   if (!made) return report_failure("cert", made.error().message);
-  auto name = wishes.operands.front();
+  auto name = options.hosts.front();
   for (auto& letter : name)
     if (letter == '*' || letter == ':') letter = '_';
-  const auto stem = wishes.folder / name;
-  if (auto done = write_pair(stem, *made, {}, wishes.force, rr::SecretReaders::folder_group); !done)
+  const auto stem = options.folder / name;
+  if (auto done = write_pair(stem, *made, {}, options.force, rr::SecretReaders::folder_group); !done)
     return report_failure("cert", done.error().message);
   std::cout << stem.string() << ".pem\n" << stem.string() << ".key\n";
   return exit_ok;
 }
 
-}  // namespace
+void add_cert(Commands& commands) {
+  auto& group = commands.add_group("cert", "Make certificates for nodes and for HTTPS");
+  const auto [ca, authorities] = commands.add("ca", "Two CAs, for nodes and for web servers", make_authorities, &group);
+  authorities.days = 3650;
+  add_certificate_options(ca, authorities);
 
-int run_cert(Arguments arguments) {
-  constexpr std::string_view options[] = {"--days", "--output"};
-  constexpr std::string_view flags[] = {"--force"};
-  const auto parsed = parse_arguments(arguments, {options, flags});
-  if (!parsed.error.empty()) return usage_error("cert", parsed.error);
-  if (parsed.operands.size() < 2) return usage_error("cert", "expected ca, node or web, then FOLDER");
-  const auto& kind = parsed.operands[0];
-  const auto option = [&parsed](const char* name) {
-    const auto found = parsed.options.find(name);
-    return found == parsed.options.end() ? std::string() : found->second;
-  };
-  // Browsers refuse certificates of web servers that are good for more than 825 days.
-  Wishes wishes{parsed.operands[1],
-                {parsed.operands.begin() + 2, parsed.operands.end()},
-                kind == "ca" ? 3650 : 800,
-                parsed.flags.contains("--force")};
-  if (const auto days = option("--days"); !days.empty()) {
-    const auto [end, error] = std::from_chars(days.data(), days.data() + days.size(), wishes.days);
-    if (error != std::errc() || end != days.data() + days.size() || wishes.days < 1 || wishes.days > 36500)
-      return usage_error("cert", "--days: found " + rr::quoted(days) + ", expected 1 to 36500");
-  }
-  if (kind != "node" && parsed.options.contains("--output")) return usage_error("cert", "--output is for node alone");
-  if (kind == "ca" && wishes.operands.empty()) return make_cas(wishes);
-  if (kind == "node") return make_node(wishes, option("--output"));
-  if (kind == "web") return make_web(wishes);
-  return usage_error("cert", "expected ca, node or web, then FOLDER");
+  const auto [node, one] = commands.add("node", "For a node, as rrs+tcp asks for", make_node_certificate, &group);
+  add_certificate_options(node, one);
+  node.add_option("NODE", one.node, "Name or id of the node")->required()->option_text(" ");
+  node.add_option("--output", one.output, "Folder for it; without it where nodes look")->option_text("FOLDER");
+
+  const auto [web, server] = commands.add("web", "For a web server", make_web_certificate, &group);
+  add_certificate_options(web, server);
+  web.add_option("HOST", server.hosts, "Names and addresses of the server")->required()->option_text("...");
 }
 
 }  // namespace rrgate

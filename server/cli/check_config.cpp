@@ -7,12 +7,15 @@
 
 namespace rrgate {
 
-int run_check_config(Arguments arguments) {
-  constexpr std::string_view options[] = {"--as-service"};
-  const auto parsed = parse_arguments(arguments, {options});
-  if (!parsed.error.empty()) return usage_error("check-config", parsed.error);
-  if (parsed.operands.size() != 1) return usage_error("check-config", "expected one FILE");
-  const auto& file = parsed.operands.front();
+namespace {
+
+struct CheckOptions {
+  std::string file;
+  std::optional<std::string> service_user;
+};
+
+int check_config(const CheckOptions& options) {
+  const auto& file = options.file;
   const auto config = load_config(file);
   if (!report_findings(file, config)) return exit_usage;
   if (const auto& certificates = config.config.tls.certificates; !certificates.empty())
@@ -24,14 +27,23 @@ int run_check_config(Arguments arguments) {
     std::cerr << short_name(file) << ": /access: " << access.error().message << "\n";
     return exit_usage;
   }
-  if (const auto user = parsed.options.find("--as-service"); user != parsed.options.end()) {
-    const auto missing = find_missing_rights(user->second, file, config.config);
+  if (options.service_user) {
+    const auto missing = find_missing_rights(*options.service_user, file, config.config);
     if (!missing) return report_failure("check-config", missing.error().message);
     for (const auto& sentence : *missing) std::cerr << short_name(file) << ": " << sentence << "\n";
     if (!missing->empty()) return exit_usage;
   }
   std::cout << short_name(file) << ": good; " << config.config.devices.size() << " devices\n";
   return exit_ok;
+}
+
+}  // namespace
+
+void add_check_config(Commands& commands) {
+  const auto [app, options] = commands.add("check-config", "Say what is wrong with a configuration", check_config);
+  app.add_option("FILE", options.file, "Configuration")->required()->option_text(" ");
+  app.add_option("--as-service", options.service_user, "Also say which files this user can't read or write")
+      ->option_text("USER");
 }
 
 }  // namespace rrgate

@@ -1,10 +1,9 @@
-// Subcommands and their options. Layer: server/cli. Each subcommand is one file and one row in main.cpp.
+// The program's commands. Layer: server/cli. Each is one file that adds itself, and one row in command_line.cpp.
 #pragma once
 
-#include <map>
-#include <optional>
-#include <set>
-#include <span>
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -14,62 +13,75 @@ namespace rrgate {
 /// Exit codes: done; failed while running; not understood (arguments or configuration).
 enum ExitCode { exit_ok = 0, exit_failed = 1, exit_usage = 2 };
 
-using Arguments = std::span<const std::string_view>;
-
-struct Command {
-  std::string_view name;
-  std::string_view usage;    ///< "serve --config FILE"
-  std::string_view summary;  ///< one line for --help
-  int (*run)(Arguments arguments);
+/// A command before the program runs it: its options, bound to `values`.
+template <class Options>
+struct NewCommand {
+  CLI::App& app;
+  Options& values;
 };
 
-/// Runs the command that the arguments name, or answers --help and --version.
-int run_command_line(std::span<const Command> commands, Arguments arguments);
+class Commands {
+ public:
+  Commands();
 
-/// What a subcommand takes beside operands.
-struct KnownOptions {
-  std::span<const std::string_view> options = {};   ///< "--name VALUE" or "--name=VALUE", once
-  std::span<const std::string_view> flags = {};     ///< "--name" alone
-  std::span<const std::string_view> repeated = {};  ///< as options, any number of times
+  /// A command that calls `action` with its options as the command line gives them. `below`  the command that it is a
+  /// part of, as "ca" is of "cert".
+  template <class Options>
+  NewCommand<Options> add(const std::string& name, const std::string& summary, int (*action)(const Options&),
+                          CLI::App* below = nullptr) {
+    auto* app = add_app(name, summary, below ? *below : app_);
+    const auto values = std::make_shared<Options>();
+    app->callback([this, values, action] { chosen_ = [values, action] { return action(*values); }; });
+    return {*app, *values};
+  }
+  /// A command that has commands.
+  CLI::App& add_group(const std::string& name, const std::string& summary);
+
+  /// Commands that are added from now on stand under it in the help.
+  void set_heading(const std::string& heading) { heading_ = heading; }
+
+  /// `words`  what follows the program's name. Returns an exit code.
+  int run(std::vector<std::string> words);
+  const CLI::App& app() const { return app_; }
+
+ private:
+  CLI::App* add_app(const std::string& name, const std::string& summary, CLI::App& below);
+
+  CLI::App app_;
+  std::string heading_ = "Commands";
+  std::function<int()> chosen_;
 };
 
-struct ParsedArguments {
-  std::map<std::string, std::string, std::less<>> options;
-  std::set<std::string, std::less<>> flags;
-  std::vector<std::string> repeated;  ///< the values of all repeated options, in order
-  std::vector<std::string> operands;
-  std::string error;  ///< not empty: what wasn't understood
-};
-ParsedArguments parse_arguments(Arguments arguments, const KnownOptions& known);
-
-/// A whole number of an option; `absent` without it. nullopt: it is none, or above `largest`.
-std::optional<std::uint64_t> number_option(const ParsedArguments& parsed, std::string_view name, std::uint64_t absent,
-                                           std::uint64_t largest);
+/// All commands of rrgate.
+int run_command_line(std::vector<std::string> words);
 
 /// Prints "rrgate NAME: what" and how to get help to stderr; returns exit_usage.
 int usage_error(std::string_view command, std::string_view what);
 /// Prints "rrgate NAME: what" to stderr; returns exit_failed.
 int report_failure(std::string_view command, std::string_view what);
 
-// The subcommands.
-int run_serve(Arguments arguments);
-int run_check_config(Arguments arguments);
-int run_demo(Arguments arguments);
-int run_check(Arguments arguments);
-int run_fmt(Arguments arguments);
-int run_generate(Arguments arguments);
-int run_cert(Arguments arguments);
-int run_passwd(Arguments arguments);
-int run_token(Arguments arguments);
-int run_health(Arguments arguments);
-int run_ls(Arguments arguments);
-int run_info(Arguments arguments);
-int run_robdef(Arguments arguments);
-int run_get(Arguments arguments);
-int run_set(Arguments arguments);
-int run_call(Arguments arguments);
-int run_watch(Arguments arguments);
-int run_ping(Arguments arguments);
-int run_proxy(Arguments arguments);
+void add_serve(Commands& commands);
+void add_demo(Commands& commands);
+void add_proxy(Commands& commands);
+void add_init(Commands& commands);
+void add_check_config(Commands& commands);
+void add_health(Commands& commands);
+void add_passwd(Commands& commands);
+void add_token(Commands& commands);
+void add_cert(Commands& commands);
+void add_ls(Commands& commands);
+void add_info(Commands& commands);
+void add_robdef(Commands& commands);
+void add_get(Commands& commands);
+void add_set(Commands& commands);
+void add_call(Commands& commands);
+void add_watch(Commands& commands);
+void add_ping(Commands& commands);
+void add_bench(Commands& commands);
+void add_top(Commands& commands);
+void add_check(Commands& commands);
+void add_fmt(Commands& commands);
+void add_generate(Commands& commands);
+void add_completion(Commands& commands);
 
 }  // namespace rrgate

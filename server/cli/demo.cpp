@@ -1,4 +1,5 @@
 // rrgate demo: two simulated devices and a gateway to them, on free ports. Layer: server/cli.
+#include <qrencode.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -11,8 +12,10 @@
 #include <csignal>
 #include <filesystem>
 #include <iostream>
+#include <memory>
 
 #include "server/cli/command.hpp"
+#include "server/cli/first_login.hpp"
 #include "server/cli/run_gateway.hpp"
 #include "server/log/log.hpp"
 
@@ -121,8 +124,63 @@ void stop_devices(std::vector<DemoDevice>& devices) {
   }
 }
 
+/// Who may come from other machines. Its file goes with this object.
+class DemoLogin {
+ public:
+  DemoLogin() {
+    std::string name = (std::filesystem::temp_directory_path() / "rrgate-demo-XXXXXX").string();
+    if (::mkdtemp(name.data())) folder_ = name;
+    password_ = write_first_user(users_file(), user);
+  }
+  DemoLogin(const DemoLogin&) = delete;
+  DemoLogin& operator=(const DemoLogin&) = delete;
+  ~DemoLogin() {
+    std::error_code error;
+    if (!folder_.empty()) std::filesystem::remove_all(folder_, error);
+  }
+
+  static constexpr const char* user = "demo";
+  std::string users_file() const { return folder_ / "users"; }
+  const rr::Result<std::string>& password() const { return password_; }
+
+ private:
+  std::filesystem::path folder_;
+  rr::Result<std::string> password_ = std::string();
+};
+
+/// For the camera of a phone: two modules a letter, one above the other, black on white.
+void print_qr_code(const std::string& text) {
+  const std::unique_ptr<QRcode, decltype(&QRcode_free)> code(QRcode_encodeString8bit(text.c_str(), 0, QR_ECLEVEL_L),
+                                                             &QRcode_free);
+  if (!code) return;
+  constexpr int margin = 2;
+  const auto is_dark = [&](int x, int y) {
+    const bool is_inside = x >= 0 && y >= 0 && x < code->width && y < code->width;
+    return is_inside && (code->data[y * code->width + x] & 1) != 0;
+  };
+  for (int y = -margin; y < code->width + margin; y += 2) {
+    std::cout << "\x1b[30;107m";
+    for (int x = -margin; x < code->width + margin; ++x) {
+      constexpr const char* letters[] = {" ", "\u2584", "\u2580", "\u2588"};
+      std::cout << letters[(is_dark(x, y) ? 2 : 0) + (is_dark(x, y + 1) ? 1 : 0)];
+    }
+    std::cout << "\x1b[0m\n";
+  }
+}
+
+void print_address(std::uint16_t port, const DemoLogin* login) {
+  const auto url = [port](const std::string& host) { return "http://" + host + ":" + std::to_string(port) + "/"; };
+  if (login) {
+    const auto addresses = addresses_of_machine();
+    if (!addresses.empty() && ::isatty(STDOUT_FILENO)) print_qr_code(url(addresses.front()));
+    for (const auto& address : addresses) std::cout << "rrgate demo: on the network " << url(address) << "\n";
+    std::cout << "rrgate demo: user " << DemoLogin::user << ", password " << login->password().value() << "\n";
+  }
+  std::cout << "rrgate demo: " << url("127.0.0.1") << std::endl;
+}
+
 /// Prints the address once all devices answer; says so if they don't.
-rr::awaitable<void> announce(Gateway& gateway, std::uint16_t port) {
+rr::awaitable<void> announce(Gateway& gateway, std::uint16_t port, const DemoLogin* login) {
   asio::steady_timer pause(co_await asio::this_coro::executor);
   const auto is_online = [](const auto& device) { return device->state() == DeviceState::online; };
   const auto& devices = gateway.devices().all();
@@ -135,18 +193,16 @@ rr::awaitable<void> announce(Gateway& gateway, std::uint16_t port) {
     pause.expires_after(std::chrono::milliseconds(50));
     co_await pause.async_wait(asio::as_tuple(asio::use_awaitable));
   }
-  if (!gateway.is_stopping()) std::cout << "rrgate demo: http://127.0.0.1:" << port << "/" << std::endl;
+  if (!gateway.is_stopping()) print_address(port, login);
 }
 
-std::optional<std::uint16_t> parse_port(const std::string& text) {
-  const auto address = rr::parse_host_port("localhost:" + text);
-  if (!address) return std::nullopt;
-  return address->port;
-}
-
-Config make_config(const std::vector<DemoDevice>& devices, std::uint16_t port) {
+Config make_config(const std::vector<DemoDevice>& devices, std::uint16_t port, const DemoLogin* login) {
   Config config;
-  config.listen.push_back({"127.0.0.1", port});
+  config.listen.push_back({login ? "0.0.0.0" : "127.0.0.1", port});
+  if (login) {
+    config.insecure = true;  // no phone would believe a certificate that is made for a demo
+    config.access.users_file = login->users_file();
+  }
   for (const auto& device : devices) {
     DeviceConfig each{std::string(device.name), rr::parse_url(device.url()).value()};
     each.mode = device.mode;
@@ -160,19 +216,17 @@ Config make_config(const std::vector<DemoDevice>& devices, std::uint16_t port) {
   return config;
 }
 
-}  // namespace
+struct DemoOptions {
+  std::optional<std::uint16_t> port;
+  bool is_lan = false;
+};
 
-int run_demo(Arguments arguments) {
-  constexpr std::string_view options[] = {"--port"};
-  const auto parsed = parse_arguments(arguments, {options});
-  if (!parsed.error.empty()) return usage_error("demo", parsed.error);
-  if (!parsed.operands.empty()) return usage_error("demo", "unexpected " + rr::quoted(parsed.operands.front()));
-  auto port = is_port_free(preferred_port) ? preferred_port : std::uint16_t{0};
-  if (const auto given = parsed.options.find("--port"); given != parsed.options.end()) {
-    const auto number = parse_port(given->second);
-    if (!number) return usage_error("demo", "--port " + rr::quoted(given->second) + ": expected 0 to 65535");
-    port = *number;
-  }
+int demo(const DemoOptions& options) {
+  const auto port = options.port.value_or(is_port_free(preferred_port) ? preferred_port : 0);
+  std::optional<DemoLogin> login;
+  if (options.is_lan) login.emplace();
+  const auto* const user = login ? &*login : nullptr;
+  if (user && !user->password()) return report_failure("demo", user->password().error().message);
 
   // The robot stops when the client that drives it is gone: it must see each client. Frames are the same for all.
   std::vector<DemoDevice> devices = {{"create", "rrgate-demo-create", "Create"},
@@ -180,8 +234,7 @@ int run_demo(Arguments arguments) {
   for (auto& device : devices) {
     device.path = find_program(device.program);
     if (device.path.empty()) {
-      std::cerr << "rrgate demo: " << device.program << " not found beside rrgate\n";
-      return exit_failed;
+      return report_failure("demo", std::string(device.program) + " not found beside rrgate");
     }
   }
   for (auto& device : devices) {
@@ -201,14 +254,26 @@ int run_demo(Arguments arguments) {
       wait_for_death();
     });
   };
-  const auto code = run_gateway(make_config(devices, port), [&](auto& io, Gateway& gateway, const auto& addresses) {
-    deaths.emplace(io, SIGCHLD);
-    gateway.on_stop([&] { deaths->cancel(); });
-    wait_for_death();
-    asio::co_spawn(io, announce(gateway, addresses.front().port), asio::detached);
-  });
+  const auto code =
+      run_gateway(make_config(devices, port, user), [&](auto& io, Gateway& gateway, const auto& addresses) {
+        deaths.emplace(io, SIGCHLD);
+        gateway.on_stop([&] { deaths->cancel(); });
+        wait_for_death();
+        asio::co_spawn(io, announce(gateway, addresses.front().port, user), asio::detached);
+      });
   stop_devices(devices);
   return code;
+}
+
+}  // namespace
+
+void add_demo(Commands& commands) {
+  const auto [app, options] = commands.add("demo", "Run two simulated devices and a gateway to them", demo);
+  app.add_option("--port", options.port, "0 for a free one; without it 8080 where that is free")
+      ->check(CLI::Range(0, 65535))
+      ->option_text("N");
+  app.add_flag("--lan", options.is_lan, "Let other machines come, with a password that it prints")
+      ->envname("RRGATE_DEMO_LAN");
 }
 
 }  // namespace rrgate

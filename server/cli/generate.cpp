@@ -3,8 +3,7 @@
 #include "node/generate/generate_cpp.hpp"
 #include "node/generate/generate_typescript.hpp"
 #include "node/platform/text_file.hpp"
-#include "server/cli/command.hpp"
-#include "server/cli/diagnostics.hpp"
+#include "server/cli/definition_options.hpp"
 
 namespace rrgate {
 
@@ -33,18 +32,19 @@ int write_output(const std::string& file, const std::string& text) {
   return exit_ok;
 }
 
-int generate_ts(const ParsedArguments& parsed, const DefinitionSet& set) {
-  const auto option = parsed.options.find("-o");
-  const auto out = option == parsed.options.end() ? std::string() : option->second;
-  const bool is_module = out.ends_with(".ts") && !out.ends_with(".d.ts");
-  return write_output(
-      out, generate_typescript(set, is_module ? TypeScriptFlavour::module : TypeScriptFlavour::declarations));
+struct GenerateOptions : DefinitionOptions {
+  std::string output;
+};
+
+int generate_ts(const GenerateOptions& options, const DefinitionSet& set) {
+  const bool is_module = options.output.ends_with(".ts") && !options.output.ends_with(".d.ts");
+  return write_output(options.output, generate_typescript(set, is_module ? TypeScriptFlavour::module
+                                                                         : TypeScriptFlavour::declarations));
 }
 
 /// The files that were named, or all that the service has; a header and a source each.
-int generate_cpp_files(const ParsedArguments& parsed, const DefinitionSet& set) {
-  const auto option = parsed.options.find("-o");
-  const auto folder = std::filesystem::path(option == parsed.options.end() ? "." : option->second);
+int generate_cpp_files(const GenerateOptions& options, const DefinitionSet& set) {
+  const auto folder = std::filesystem::path(options.output.empty() ? "." : options.output);
   std::error_code error;
   std::filesystem::create_directories(folder, error);  // where it fails, writing does
   for (const auto* definition : set.requested()) {
@@ -56,30 +56,36 @@ int generate_cpp_files(const ParsedArguments& parsed, const DefinitionSet& set) 
   return exit_ok;
 }
 
+template <int (*generate)(const GenerateOptions&, const DefinitionSet&)>
+int run_generator(const GenerateOptions& options) {
+  const auto urls = std::count_if(options.files.begin(), options.files.end(), is_url);
+  if (urls != 0 && options.files.size() != 1) return usage_error("generate", "expected files, or one URL alone");
+  try {
+    const auto set = urls != 0 ? definitions_of_service(options.files.front())
+                               : DefinitionSet::from_files(options.files, options.folders, options.mode());
+    return report_diagnostics(set) ? generate(options, set) : static_cast<int>(exit_failed);
+  } catch (const rr::ClientException& failure) {
+    return report_failure("generate", options.files.front() + ": " + failure.what());
+  }
+}
+
+void add_generator(const NewCommand<GenerateOptions>& command, const std::string& output) {
+  command.app.add_option("FILE", command.values.files, "Service definitions, or the URL of a service that has them")
+      ->required()
+      ->option_text("... or URL");
+  command.app.add_option("-o", command.values.output, output)->option_text("OUT");
+  add_folders(command.app, command.values);
+  add_compat(command.app, command.values);
+}
+
 }  // namespace
 
-int run_generate(Arguments arguments) {
-  constexpr std::string_view options[] = {"-o"};
-  constexpr std::string_view flags[] = {"--compat"};
-  constexpr std::string_view repeated[] = {"-I"};
-  auto parsed = parse_arguments(arguments, {options, flags, repeated});
-  if (!parsed.error.empty()) return usage_error("generate", parsed.error);
-  if (parsed.operands.size() < 2) return usage_error("generate", "expected a language (ts, cpp) and a FILE or several");
-  const auto language = parsed.operands.front();
-  if (language != "ts" && language != "cpp")
-    return usage_error("generate", "unknown language " + rr::quoted(language) + ", expected ts or cpp");
-  parsed.operands.erase(parsed.operands.begin());
-  const auto urls = std::count_if(parsed.operands.begin(), parsed.operands.end(), is_url);
-  if (urls != 0 && parsed.operands.size() != 1) return usage_error("generate", "expected files, or one URL alone");
-  try {
-    const auto set = urls != 0 ? definitions_of_service(parsed.operands.front())
-                               : DefinitionSet::from_files(parsed.operands, parsed.repeated, mode_of(parsed));
-    if (!report_diagnostics(set)) return exit_failed;
-    return language == "ts" ? generate_ts(parsed, set) : generate_cpp_files(parsed, set);
-  } catch (const rr::ClientException& failure) {
-    std::cerr << "rrgate generate: " << parsed.operands.front() << ": " << failure.what() << "\n";
-    return exit_failed;
-  }
+void add_generate(Commands& commands) {
+  auto& group = commands.add_group("generate", "Write TypeScript types or C++ classes");
+  add_generator(commands.add("ts", "TypeScript types of the objects", run_generator<generate_ts>, &group),
+                "File to write; standard output without it");
+  add_generator(commands.add("cpp", "C++ classes for clients and services", run_generator<generate_cpp_files>, &group),
+                "Folder to write to; this one without it");
 }
 
 }  // namespace rrgate

@@ -15,8 +15,8 @@ namespace rrgate {
 namespace {
 
 struct Address {
-  std::string host = "127.0.0.1";
-  std::string port = "8080";
+  std::string host;
+  std::string port;
 };
 
 /// "HOST:PORT", "[IPv6]:PORT"; nullopt for anything else.
@@ -54,25 +54,30 @@ std::string ask(const Address& address, std::string_view path) {
   return answer;
 }
 
-}  // namespace
+struct HealthOptions {
+  std::string address = "127.0.0.1:8080";
+  bool asks_ready = false;
+};
 
-int run_health(Arguments arguments) {
-  constexpr std::string_view flags[] = {"--ready"};
-  const auto parsed = parse_arguments(arguments, {{}, flags});
-  if (!parsed.error.empty()) return usage_error("health", parsed.error);
-  if (parsed.operands.size() > 1) return usage_error("health", "unexpected " + rr::quoted(parsed.operands[1]));
-  Address address;
-  if (!parsed.operands.empty()) {
-    const auto given = parse_address(parsed.operands.front());
-    if (!given) return usage_error("health", rr::quoted(parsed.operands.front()) + ": expected HOST:PORT");
-    address = *given;
-  }
-  const auto answer = ask(address, parsed.flags.contains("--ready") ? "/readyz" : "/healthz");
+int ask_health(const HealthOptions& options) {
+  const auto address = parse_address(options.address);
+  if (!address) return usage_error("health", rr::quoted(options.address) + ": expected HOST:PORT");
+  const auto answer = ask(*address, options.asks_ready ? "/readyz" : "/healthz");
   const auto line = answer.substr(0, answer.find('\r'));
   const bool is_well = line.find(" 200 ") != std::string::npos;
-  (is_well ? std::cout : std::cerr) << address.host << ":" << address.port << ": "
+  (is_well ? std::cout : std::cerr) << address->host << ":" << address->port << ": "
                                     << (line.empty() ? "no answer" : line) << '\n';
   return is_well ? exit_ok : exit_failed;
+}
+
+}  // namespace
+
+void add_health(Commands& commands) {
+  const auto [app, options] = commands.add("health", "Ask a running gateway whether it is well", ask_health);
+  app.add_option("HOST:PORT", options.address, "Where it listens")
+      ->capture_default_str()
+      ->option_text("[127.0.0.1:8080]");
+  app.add_flag("--ready", options.asks_ready, "Whether it also reaches its devices");
 }
 
 }  // namespace rrgate

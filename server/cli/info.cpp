@@ -16,7 +16,7 @@ std::string parameters_text(const rr::MemberDefinition& member) {
 
 /// "function double move_to(double[] joints)", as a service definition says it.
 std::string declaration(const rr::MemberDefinition& member) {
-  std::string out(kind_name(member.kind));
+  std::string out(rr::member_kind_name(member.kind));
   if (member.kind != rr::MemberKind::event) out += " " + rr::format_type(member.type);
   out += " " + member.name;
   const bool has_parameters = member.kind == rr::MemberKind::function || member.kind == rr::MemberKind::event ||
@@ -42,11 +42,12 @@ rr::OrderedJson describe(const RemoteMember& object) {
   for (const auto& each : object.type->implements) implements.push_back(each.name);
   out["implements"] = std::move(implements);
   out["documentation"] = object.type->documentation;
+  out["attributes"] = rr::OrderedJson::object();
   auto members = rr::OrderedJson::array();
   for (const auto& member : object.type->members) {
     auto each = rr::OrderedJson::object();
     each["name"] = member.name;
-    each["kind"] = kind_name(member.kind);
+    each["kind"] = rr::member_kind_name(member.kind);
     each["declaration"] = declaration(member);
     each["documentation"] = member.documentation;
     members.push_back(std::move(each));
@@ -55,10 +56,20 @@ rr::OrderedJson describe(const RemoteMember& object) {
   return out;
 }
 
+/// What the service says of itself, as "ServiceAttributes" of discovery has it.
+rr::OrderedJson attributes_of(const rr::RemoteObject& root, const rr::TypeRegistry& types) {
+  rr::TypeDefinition type;
+  type.type = rr::DataType::varvalue_t;
+  type.container = rr::ContainerKind::map_string;
+  return to_json(rr::Value(root.connection().attributes()), type, types);
+}
+
 void print_description(const rr::OrderedJson& description) {
   std::cout << description["path"].get<std::string>() << ": " << description["type"].get<std::string>() << "\n";
   if (const auto text = description["documentation"].get<std::string>(); !text.empty())
     std::cout << "  " << first_line(text) << "\n";
+  for (const auto& [name, value] : description["attributes"].items())
+    std::cout << "  attribute " << name << ": " << rr::write_json(value) << "\n";
   for (const auto& member : description["members"]) {
     std::cout << "  " << member["declaration"].get<std::string>() << "\n";
     if (const auto text = member["documentation"].get<std::string>(); !text.empty())
@@ -66,43 +77,55 @@ void print_description(const rr::OrderedJson& description) {
   }
 }
 
-}  // namespace
+struct InfoOptions : RemoteOptions {
+  std::string object;
+};
 
-int run_info(Arguments arguments) {
-  const auto parsed = parse_arguments(arguments, {remote_options, remote_flags});
-  if (!parsed.error.empty()) return usage_error("info", parsed.error);
-  if (parsed.operands.empty() || parsed.operands.size() > 2) return usage_error("info", "expected URL [OBJECT]");
-  return run_remote("info", parsed.operands[0], [&] {
-    const auto root = open_service(remote_address(parsed.operands[0], parsed));
-    const auto found = find_member(root, parsed.operands.size() > 1 ? parsed.operands[1] : "");
+int info(const InfoOptions& options) {
+  return run_remote("info", options.url, [&] {
+    const auto root = open_service(remote_address(options));
+    const auto found = find_member(root, options.object);
     auto description = describe(found);
+    if (options.object.empty()) description["attributes"] = attributes_of(root, found.types());
     if (found.member) {  // one member alone
       auto& members = description["members"];
       const auto is_other = [&](const auto& each) { return each["name"] != found.member->name; };
       members.erase(std::remove_if(members.begin(), members.end(), is_other), members.end());
     }
-    if (parsed.flags.contains("--json"))
+    if (options.is_json)
       print_value(description, true);
     else
       print_description(description);
-    return static_cast<int>(exit_ok);
   });
 }
 
-int run_robdef(Arguments arguments) {
-  const auto parsed = parse_arguments(arguments, {remote_options});
-  if (!parsed.error.empty()) return usage_error("robdef", parsed.error);
-  if (parsed.operands.size() != 1) return usage_error("robdef", "expected URL");
-  return run_remote("robdef", parsed.operands[0], [&] {
-    const auto root = open_service(remote_address(parsed.operands[0], parsed));
+int robdef(const RemoteOptions& options) {
+  return run_remote("robdef", options.url, [&] {
+    const auto root = open_service(remote_address(options));
     std::string separator;
     for (const auto& definition : root.connection().asynchronous().session().types().definitions()) {
       std::cout << separator << definition->text;
       separator = definition->text.ends_with("\n") ? "\n" : "\n\n";
     }
     std::cout << std::endl;
-    return static_cast<int>(exit_ok);
   });
+}
+
+}  // namespace
+
+void add_info(Commands& commands) {
+  const auto [app, options] = commands.add("info", "Say what an object is and has", info);
+  add_url(app, options)->required();
+  app.add_option("OBJECT", options.object, "Path of an object or member; the service's root without it")
+      ->option_text(" ");
+  add_json(app, options);
+  add_connection_options(app, options);
+}
+
+void add_robdef(Commands& commands) {
+  const auto [app, options] = commands.add("robdef", "Print the service definitions of a service", robdef);
+  add_url(app, options)->required();
+  add_connection_options(app, options);
 }
 
 }  // namespace rrgate

@@ -1,11 +1,15 @@
 // rrgate ls: nodes and their services on the network and this machine, of a node, or devices of a gateway.
 // Layer: server/cli.
+#include "server/cli/ls.hpp"
+
+#include <algorithm>
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <iostream>
+#include <thread>
 
 #include "node/discovery/discovery.hpp"
 #include "server/cli/remote_service.hpp"
@@ -22,6 +26,8 @@ struct FoundService {
   std::string type;
   std::string url;
   std::string problem = {};  ///< why the node told nothing
+
+  auto operator<=>(const FoundService&) const = default;  // NOLINT(modernize-use-nullptr): of what it makes
 };
 
 void add_services(std::vector<FoundService>& out, const rr::NodeServices& answer) {
@@ -87,13 +93,8 @@ std::vector<FoundService> services_of_node(const RemoteAddress& address) {
 
 /// Each service of each device, with the URL by which it is reached through the gateway.
 std::vector<FoundService> services_of_gateway(const std::string& web_url, RemoteAddress address) {
-  auto url = rr::parse_url(address.url, rr::ServiceInUrl::optional).value();
   const auto base = web_url.substr(0, web_url.find('/', web_url.find("://") + 3));
-  url.path = "/";
-  // By its name, since a gateway with one relayed device leads whoever asks for no node to that.
-  url.query = "nodename=rrgate&service=gateway";
-  address.url = rr::format_url(url);
-  const auto gateway = open_service(address);
+  const auto gateway = open_gateway(std::move(address));
   const auto found = find_member(gateway, "devices");
   const auto devices = to_json(gateway.get("devices"), found.member->type, found.types());
   std::vector<FoundService> out;
@@ -113,9 +114,27 @@ std::vector<FoundService> services_of_gateway(const std::string& web_url, Remote
   return out;
 }
 
-void print_services(std::vector<FoundService> services, const ParsedArguments& parsed) {
-  const auto by_name = [](const auto& a, const auto& b) { return std::tie(a.node, a.name) < std::tie(b.node, b.name); };
-  std::sort(services.begin(), services.end(), by_name);
+struct ListOptions : RemoteOptions {
+  std::string type;
+  std::uint32_t wait = 2;  ///< in s
+  bool watches = false;
+};
+
+std::vector<FoundService> list_services(const ListOptions& options) {
+  std::vector<FoundService> out;
+  if (options.url.empty()) {
+    out = services_around(std::chrono::seconds(options.wait));
+  } else {
+    const auto address = remote_address(options);
+    out = options.url.starts_with("http") ? services_of_gateway(options.url, address) : services_of_node(address);
+  }
+  if (!options.type.empty()) std::erase_if(out, [&](const auto& each) { return each.type != options.type; });
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+/// `mark`  what each line begins with.
+void print_services(const std::vector<FoundService>& services, std::string_view mark, bool is_json) {
   std::size_t widths[3] = {4, 7, 4};
   for (const auto& each : services) {
     widths[0] = std::max(widths[0], each.node.size());
@@ -126,8 +145,9 @@ void print_services(std::vector<FoundService> services, const ParsedArguments& p
     return text + std::string(widths[column] - text.size() + 2, ' ');
   };
   for (const auto& each : services) {
-    if (parsed.flags.contains("--json")) {
+    if (is_json) {
       auto line = rr::OrderedJson::object();
+      if (!mark.empty()) line["change"] = mark == "+ " ? "found" : "lost";
       line["node"] = each.node;
       line["service"] = each.name;
       line["type"] = each.type;
@@ -135,35 +155,53 @@ void print_services(std::vector<FoundService> services, const ParsedArguments& p
       if (!each.problem.empty()) line["problem"] = each.problem;
       std::cout << line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) << "\n";
     } else {
-      std::cout << padded(each.node, 0) << padded(each.name, 1) << padded(each.type, 2) << each.url
+      std::cout << mark << padded(each.node, 0) << padded(each.name, 1) << padded(each.type, 2) << each.url
                 << (each.problem.empty() ? "" : "  (" + each.problem + ")") << "\n";
     }
   }
+  std::cout << std::flush;
+}
+
+/// What was not there before, and what has gone, until the program is ended.
+void watch_services(const ListOptions& options) {
+  std::vector<FoundService> before;
+  while (true) {
+    const auto now = list_services(options);
+    std::vector<FoundService> lost;
+    std::vector<FoundService> found;
+    std::set_difference(before.begin(), before.end(), now.begin(), now.end(), std::back_inserter(lost));
+    std::set_difference(now.begin(), now.end(), before.begin(), before.end(), std::back_inserter(found));
+    print_services(lost, "- ", options.is_json);
+    print_services(found, "+ ", options.is_json);
+    before = now;
+    if (!options.url.empty()) std::this_thread::sleep_for(std::chrono::seconds(options.wait));
+  }
+}
+
+int ls(const ListOptions& options) {
+  return run_remote("ls", options.url.empty() ? "network" : options.url, [&] {
+    if (options.watches) return watch_services(options);
+    print_services(list_services(options), "", options.is_json);
+  });
 }
 
 }  // namespace
 
-int run_ls(Arguments arguments) {
-  constexpr std::string_view options[] = {"--timeout", "--user", "--wait", "--type"};
-  const auto parsed = parse_arguments(arguments, {options, remote_flags});
-  if (!parsed.error.empty()) return usage_error("ls", parsed.error);
-  if (parsed.operands.size() > 1) return usage_error("ls", "expected no URL, or one");
-  const auto wait = number_option(parsed, "--wait", 2, 3600);
-  if (!wait) return usage_error("ls", "--wait: expected whole seconds, 3600 at most");
-  const auto url = parsed.operands.empty() ? std::string("network") : parsed.operands[0];
-  return run_remote("ls", url, [&] {
-    std::vector<FoundService> services;
-    if (parsed.operands.empty()) {
-      services = services_around(std::chrono::seconds(*wait));
-    } else {
-      const auto address = remote_address(url, parsed);
-      services = url.starts_with("http") ? services_of_gateway(url, address) : services_of_node(address);
-    }
-    if (const auto type = parsed.options.find("--type"); type != parsed.options.end())
-      std::erase_if(services, [&](const auto& each) { return each.type != type->second; });
-    print_services(services, parsed);
-    return static_cast<int>(exit_ok);
-  });
+std::vector<std::string> find_service_urls(std::chrono::milliseconds wait) {
+  std::vector<std::string> out;
+  for (auto& each : services_around(wait))
+    if (each.problem.empty()) out.push_back(std::move(each.url));
+  return out;
+}
+
+void add_ls(Commands& commands) {
+  const auto [app, options] = commands.add("ls", "List services: around here, of a node, of a gateway", ls);
+  app.add_option("URL", options.url, "A node, or a gateway's http(s)://HOST:PORT")->option_text(" ");
+  app.add_option("--type", options.type, "Services of this type alone")->option_text("TYPE");
+  add_count(app, "--wait", options.wait, "How long to listen for nodes, in s")->option_text("SECONDS [2]");
+  app.add_flag("--watch", options.watches, "Go on, and tell what comes and goes");
+  add_json(app, options);
+  add_connection_options(app, options);
 }
 
 }  // namespace rrgate

@@ -84,19 +84,15 @@ rr::Result<std::string> make_line(const std::string& name, std::string_view befo
   return line;
 }
 
-}  // namespace
+struct PasswordOptions {
+  std::string file;
+  std::string name;
+  std::optional<std::string> roles;
+  bool deletes = false;
+};
 
-int run_passwd(Arguments arguments) {
-  constexpr std::string_view options[] = {"--roles"};
-  constexpr std::string_view flags[] = {"--delete"};
-  const auto parsed = parse_arguments(arguments, {options, flags});
-  if (!parsed.error.empty()) return usage_error("passwd", parsed.error);
-  if (parsed.operands.size() != 2) return usage_error("passwd", "expected FILE and NAME");
-  const auto& file = parsed.operands[0];
-  const auto& name = parsed.operands[1];
-  const bool deletes = parsed.flags.contains("--delete");
-  const auto roles = parsed.options.find("--roles");
-  if (deletes && roles != parsed.options.end()) return usage_error("passwd", "--delete leaves no roles");
+int set_password(const PasswordOptions& options) {
+  const auto& [file, name, roles, deletes] = options;
   if (auto checked = check_name("user name", name); !checked) return usage_error("passwd", checked.error().message);
 
   std::error_code error;
@@ -109,8 +105,7 @@ int run_passwd(Arguments arguments) {
   if (deletes && before.empty()) return report_failure("passwd", file + " has no user " + rr::quoted(name));
   std::string line;
   if (!deletes) {
-    auto made = make_line(name, before,
-                          roles == parsed.options.end() ? std::nullopt : std::optional<std::string>(roles->second));
+    auto made = make_line(name, before, roles);
     if (!made) return report_failure("passwd", made.error().message);
     line = std::move(*made);
   }
@@ -122,6 +117,18 @@ int run_passwd(Arguments arguments) {
                                  : " is changed")
             << "\n";
   return exit_ok;
+}
+
+}  // namespace
+
+void add_passwd(Commands& commands) {
+  const auto [app, options] = commands.add("passwd", "Set a user's password and roles", set_password);
+  app.add_option("FILE", options.file, "What \"users_file\" names")->required()->option_text(" ");
+  app.add_option("NAME", options.name, "The user")->required()->option_text(" ");
+  auto* deletes = app.add_flag("--delete", options.deletes, "Take the user out");
+  app.add_option("--roles", options.roles, "Roles, or _ for none; unchanged without it")
+      ->option_text("A,B")
+      ->excludes(deletes);
 }
 
 }  // namespace rrgate

@@ -1,4 +1,4 @@
-// rrgate ping: how long a request to a service and its answer take. Layer: server/cli.
+// rrgate ping, bench: how long requests to a service and their answers take. Layer: server/cli.
 #include <algorithm>
 #include <iomanip>
 #include <iostream>
@@ -11,23 +11,56 @@ namespace {
 
 using Milliseconds = std::chrono::duration<double, std::milli>;
 
+using std::chrono::steady_clock;
+
 /// Asks for the attributes of the service, which every node answers by itself: no code of the device runs.
 Milliseconds time_request(const rr::RemoteObject& root) {
-  const auto begin = std::chrono::steady_clock::now();
+  const auto begin = steady_clock::now();
   root.connection().wait_for([](rr::ClientConnection& connection, rr::ClientConnection::Completion done) {
     connection.get_attributes(std::move(done));
   });
-  return std::chrono::steady_clock::now() - begin;
+  return steady_clock::now() - begin;
 }
 
-void print_times(std::vector<Milliseconds> times, bool is_json) {
+/// So many requests, of which `parallel` are under way at a time. Throws   rr::Exception: one has failed.
+std::vector<Milliseconds> time_requests(const rr::RemoteObject& root, const std::string& property, std::uint32_t count,
+                                        std::uint32_t parallel) {
+  std::vector<Milliseconds> times;
+  std::optional<rr::Error> failure;
+  std::uint32_t begun = 0;
+  auto& connection = root.connection();
+  std::function<void()> begin_one = [&] {
+    if (begun == count || failure) return;
+    ++begun;
+    auto done = [&, begin = steady_clock::now()](const rr::Result<rr::Value>& answer) {
+      times.emplace_back(steady_clock::now() - begin);
+      if (!answer) failure = answer.error();
+      begin_one();
+    };
+    if (property.empty())
+      connection.asynchronous().get_attributes(std::move(done));
+    else
+      connection.asynchronous().get(root.path(), property, std::move(done));
+  };
+  for (std::uint32_t i = 0; i < parallel; ++i) begin_one();
+  // Each request has its own time limit, so that all of them end.
+  const auto is_done = [&] { return times.size() == begun; };
+  while (!is_done()) connection.run_until(is_done, std::chrono::milliseconds(1000));
+  if (failure) throw rr::ClientException(*failure);
+  return times;
+}
+
+void print_times(std::vector<Milliseconds> times, bool is_json, std::optional<Milliseconds> whole = {}) {
   std::sort(times.begin(), times.end());
   const auto at = [&](double part) {
     return times[static_cast<std::size_t>(part * static_cast<double>(times.size() - 1))];
   };
+  std::optional<double> rate;
+  if (whole) rate = 1000 * static_cast<double>(times.size()) / whole->count();
   if (is_json) {
     auto out = rr::OrderedJson::object();
     out["count"] = times.size();
+    if (rate) out["per_second"] = *rate;
     out["min_ms"] = times.front().count();
     out["p50_ms"] = at(0.5).count();
     out["p99_ms"] = at(0.99).count();
@@ -37,6 +70,7 @@ void print_times(std::vector<Milliseconds> times, bool is_json) {
   std::cout << std::fixed << std::setprecision(3) << times.size() << " requests: min " << times.front().count()
             << " ms, p50 " << at(0.5).count() << " ms, p99 " << at(0.99).count() << " ms, max " << times.back().count()
             << " ms\n";
+  if (rate) std::cout << std::setprecision(0) << *rate << " /s\n" << std::setprecision(3);
   // A histogram whose classes double.
   auto next = times.begin();
   for (double limit = 0.0625; next != times.end(); limit *= 2) {
@@ -49,22 +83,54 @@ void print_times(std::vector<Milliseconds> times, bool is_json) {
   }
 }
 
+struct PingOptions : RemoteOptions {
+  std::uint32_t count = 100;
+};
+
+int ping(const PingOptions& options) {
+  return run_remote("ping", options.url, [&] {
+    const auto root = open_service(remote_address(options));
+    std::vector<Milliseconds> times;
+    for (std::uint32_t i = 0; i < options.count; ++i) times.push_back(time_request(root));
+    print_times(std::move(times), options.is_json);
+  });
+}
+
+struct BenchOptions : PingOptions {
+  std::string property;
+  std::uint32_t parallel = 16;
+};
+
+int bench(const BenchOptions& options) {
+  return run_remote("bench", options.url, [&] {
+    auto found = find_member(open_service(remote_address(options)), options.property);
+    if (found.member) expect_kind(found, {rr::MemberKind::property}, "bench");
+    const auto begin = steady_clock::now();
+    auto times = time_requests(found.object, found.member ? found.member->name : "", options.count, options.parallel);
+    print_times(std::move(times), options.is_json, steady_clock::now() - begin);
+  });
+}
+
 }  // namespace
 
-int run_ping(Arguments arguments) {
-  constexpr std::string_view options[] = {"--timeout", "--user", "--count"};
-  const auto parsed = parse_arguments(arguments, {options, remote_flags});
-  if (!parsed.error.empty()) return usage_error("ping", parsed.error);
-  if (parsed.operands.size() != 1) return usage_error("ping", "expected URL");
-  const auto count = number_option(parsed, "--count", 100, 1'000'000);
-  if (!count || *count == 0) return usage_error("ping", "--count: expected 1 to 1000000");
-  return run_remote("ping", parsed.operands[0], [&] {
-    const auto root = open_service(remote_address(parsed.operands[0], parsed));
-    std::vector<Milliseconds> times;
-    for (std::uint64_t i = 0; i < *count; ++i) times.push_back(time_request(root));
-    print_times(std::move(times), parsed.flags.contains("--json"));
-    return static_cast<int>(exit_ok);
-  });
+void add_ping(Commands& commands) {
+  const auto [app, options] = commands.add("ping", "Time requests to a service", ping);
+  add_url(app, options)->required();
+  add_count(app, "--count", options.count, "Requests, one after the other")->option_text("N [100]");
+  add_json(app, options);
+  add_connection_options(app, options);
+}
+
+void add_bench(Commands& commands) {
+  const auto [app, options] = commands.add("bench", "Time many requests to a service side by side", bench);
+  options.count = 10'000;
+  add_url(app, options)->required();
+  app.add_option("PROPERTY", options.property, "Property to read; without it the node alone is asked")
+      ->option_text(" ");
+  add_count(app, "--count", options.count, "Requests")->option_text("N [10000]");
+  add_count(app, "--parallel", options.parallel, "Requests that are under way at a time")->option_text("N [16]");
+  add_json(app, options);
+  add_connection_options(app, options);
 }
 
 }  // namespace rrgate

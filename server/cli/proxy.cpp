@@ -7,30 +7,44 @@
 
 namespace rrgate {
 
-int run_proxy(Arguments arguments) {
-  constexpr std::string_view options[] = {"--port", "--name"};
-  constexpr std::string_view flags[] = {"--relay"};
-  const auto parsed = parse_arguments(arguments, {options, flags});
-  if (!parsed.error.empty()) return usage_error("proxy", parsed.error);
-  if (parsed.operands.size() != 1) return usage_error("proxy", "expected URL");
-  const auto port = number_option(parsed, "--port", 8080, 65535);
-  if (!port) return usage_error("proxy", "--port: expected 0 to 65535");
-  const auto url = rr::parse_url(parsed.operands[0]);
+namespace {
+
+struct ProxyOptions {
+  std::string url;
+  std::optional<std::string> name;
+  std::uint16_t port = 8080;
+  bool is_relay = false;
+};
+
+int run_proxy(const ProxyOptions& options) {
+  const auto url = rr::parse_url(options.url);
   if (!url) return usage_error("proxy", url.error().message);
-  auto name = url->service;
-  if (const auto given = parsed.options.find("--name"); given != parsed.options.end()) name = given->second;
   // As a file would say it: the rules for names and addresses are the same.
   auto text = nlohmann::json::object();
-  text["listen"] = {"127.0.0.1:" + std::to_string(*port)};
-  text["devices"] = {
-      {{"name", name}, {"url", parsed.operands[0]}, {"mode", parsed.flags.contains("--relay") ? "relay" : "shared"}}};
+  text["listen"] = {"127.0.0.1:" + std::to_string(options.port)};
+  text["devices"] = {{{"name", options.name.value_or(url->service)},
+                      {"url", options.url},
+                      {"mode", options.is_relay ? "relay" : "shared"}}};
   text["log"] = {{"level", "warning"}};
   auto read = parse_config(text.dump());
   if (!read.findings.empty()) return usage_error("proxy", format_finding("configuration", read.findings.front()));
   return run_gateway(std::move(read.config), [&](auto&, Gateway&, const auto& addresses) {
-    std::cout << "rrgate proxy: http://127.0.0.1:" << addresses.front().port << "/ stands for " << parsed.operands[0]
+    std::cout << "rrgate proxy: http://127.0.0.1:" << addresses.front().port << "/ stands for " << options.url
               << std::endl;
   });
+}
+
+}  // namespace
+
+void add_proxy(Commands& commands) {
+  const auto [app, options] = commands.add("proxy", "Run a gateway for one device, without a file", run_proxy);
+  app.add_option("URL", options.url, "The device's service")->required()->option_text(" ");
+  app.add_option("--name", options.name, "Of the device at the gateway; the service's without it")->option_text("NAME");
+  app.add_option("--port", options.port, "Port on 127.0.0.1; 0 for a free one")
+      ->check(CLI::Range(0, 65535))
+      ->capture_default_str()
+      ->option_text("N [8080]");
+  app.add_flag("--relay", options.is_relay, "Each client gets a session of its own with the device");
 }
 
 }  // namespace rrgate

@@ -1,7 +1,6 @@
 #include "server/cli/remote_service.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cstdlib>
 #include <fstream>
 #include <iostream>
@@ -20,14 +19,6 @@ std::string environment(const char* name) {
   return value ? value : "";
 }
 
-std::chrono::milliseconds parse_timeout(std::string_view text) {
-  double seconds = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seconds);
-  if (error != std::errc() || end != text.data() + text.size() || !(seconds > 0 && seconds <= 86'400))
-    throw NotUnderstood("--timeout " + rr::quoted(text) + ": expected seconds, 86400 at most");
-  return std::chrono::milliseconds(static_cast<std::int64_t>(seconds * 1000));
-}
-
 /// "http://h:1/devices/arm?service=Arm" as "rr+ws://h:1/devices/arm?service=Arm"; empty for URLs of other schemes.
 std::string gateway_url(std::string_view url) {
   for (const auto& [web, native] : {std::pair{"http://", "rr+ws://"}, std::pair{"https://", "rr+wss://"}})
@@ -35,13 +26,11 @@ std::string gateway_url(std::string_view url) {
   return {};
 }
 
-std::string_view login_header(const std::string& user, const std::string& password, const std::string& token,
-                              std::string& out) {
-  if (!token.empty())
-    out = "Bearer " + token;
-  else if (!user.empty())
-    out = "Basic " + rr::encode_base64(rr::as_bytes(user + ":" + password));
-  return out;
+/// Empty: no login.
+std::string authorization(const std::string& user, const std::string& password, const std::string& token) {
+  if (!token.empty()) return "Bearer " + token;
+  if (!user.empty()) return "Basic " + rr::encode_base64(rr::as_bytes(user + ":" + password));
+  return {};
 }
 
 int exit_code_of(rr::ErrorCode code) {
@@ -83,15 +72,34 @@ std::string read_all(std::istream& in) {
 
 }  // namespace
 
-RemoteAddress remote_address(std::string_view url, const ParsedArguments& parsed) {
+CLI::Option* add_url(CLI::App& app, RemoteOptions& options) {
+  return app.add_option("URL", options.url, "A service, as \"rrgate ls\" prints it")->option_text(" ");
+}
+
+void add_connection_options(CLI::App& app, RemoteOptions& options) {
+  app.add_option("--user", options.user, "Log in, with the password of $RRGATE_PASSWORD")->option_text("NAME");
+  app.add_option("--timeout", options.timeout, "For connecting and for each request")
+      ->check([](const std::string& text) {
+        double seconds = 0;
+        const bool is_good = CLI::detail::lexical_cast(text, seconds) && seconds > 0 && seconds <= 86'400;
+        return is_good ? std::string() : "found " + rr::quoted(text) + ", expected seconds, 86400 at most";
+      })
+      ->option_text("SECONDS [10]");
+}
+
+CLI::Option* add_json(CLI::App& app, RemoteOptions& options) {
+  return app.add_flag("--json", options.is_json, "One line of JSON for each value");
+}
+
+CLI::Option* add_count(CLI::App& app, const std::string& name, std::uint32_t& count, const std::string& summary) {
+  return app.add_option(name, count, summary)->check(CLI::Range(1, 1'000'000'000))->option_text("N");
+}
+
+RemoteAddress remote_address(const RemoteOptions& options) {
   RemoteAddress out;
-  const auto option = [&](std::string_view name) {
-    const auto found = parsed.options.find(name);
-    return found == parsed.options.end() ? std::string() : found->second;
-  };
-  if (const auto timeout = option("--timeout"); !timeout.empty()) out.timeout = parse_timeout(timeout);
+  const auto& [url, user, timeout, is_json] = options;
+  out.timeout = std::chrono::milliseconds(static_cast<std::int64_t>(timeout * 1000));
   out.options.request_timeout = out.options.connect_timeout = out.timeout;
-  const auto user = option("--user");
   const auto password = environment("RRGATE_PASSWORD");
   if (!user.empty() && password.empty())
     throw NotUnderstood("--user needs the password in the environment: RRGATE_PASSWORD");
@@ -103,9 +111,8 @@ RemoteAddress remote_address(std::string_view url, const ParsedArguments& parsed
     credentials.items.emplace_back("password", rr::Value(password));
     if (!user.empty()) out.options.credentials = rr::Value(std::move(credentials));
   } else {
-    std::string header;
-    if (!login_header(user, password, environment("RRGATE_TOKEN"), header).empty())
-      out.options.dial.headers.emplace_back("Authorization", header);
+    const auto header = authorization(user, password, environment("RRGATE_TOKEN"));
+    if (!header.empty()) out.options.dial.headers.emplace_back("Authorization", header);
   }
   if (const auto parsed_url = rr::parse_url(out.url, rr::ServiceInUrl::optional); !parsed_url)
     throw NotUnderstood(parsed_url.error().message);
@@ -116,6 +123,15 @@ rr::RemoteObject open_service(const RemoteAddress& address) {
   if (const auto parsed = rr::parse_url(address.url); !parsed)
     throw NotUnderstood(parsed.error().message + "; rrgate ls lists services");
   return rr::connect(address.url, address.options);
+}
+
+rr::RemoteObject open_gateway(RemoteAddress address) {
+  auto url = rr::parse_url(address.url, rr::ServiceInUrl::optional).value();
+  url.path = "/";
+  // By its name, since a gateway with one relayed device leads whoever asks for no node to that.
+  url.query = "nodename=rrgate&service=gateway";
+  address.url = rr::format_url(url);
+  return open_service(address);
 }
 
 RemoteMember find_member(const rr::RemoteObject& root, std::string_view path) {
@@ -149,39 +165,15 @@ RemoteMember find_member(const rr::RemoteObject& root, std::string_view path) {
   return out;
 }
 
-std::string_view kind_name(rr::MemberKind kind) {
-  using enum rr::MemberKind;
-  switch (kind) {
-    case property:
-      return "property";
-    case function:
-      return "function";
-    case event:
-      return "event";
-    case objref:
-      return "objref";
-    case pipe:
-      return "pipe";
-    case callback:
-      return "callback";
-    case wire:
-      return "wire";
-    case memory:
-      return "memory";
-    default:
-      return "member";
-  }
-}
-
 void expect_kind(const RemoteMember& found, const std::vector<rr::MemberKind>& kinds, std::string_view verb) {
   std::string expected;
   for (const auto kind : kinds) {
     if (found.member && found.member->kind == kind) return;
-    expected += (expected.empty() ? "" : ", ") + std::string(kind_name(kind));
+    expected += (expected.empty() ? "" : ", ") + std::string(rr::member_kind_name(kind));
   }
-  const auto what = found.member
-                        ? rr::quoted(found.member->name) + " is a " + std::string(kind_name(found.member->kind))
-                        : rr::quoted(found.object.path()) + " is an object";
+  const auto what =
+      found.member ? rr::quoted(found.member->name) + " is a " + std::string(rr::member_kind_name(found.member->kind))
+                   : rr::quoted(found.object.path()) + " is an object";
   throw NotUnderstood(what + "; " + std::string(verb) + " expects one of: " + expected);
 }
 
@@ -194,13 +186,15 @@ rr::Json read_json_argument(std::string_view text, const rr::TypeDefinition& typ
     if (!file) throw NotUnderstood("file " + rr::quoted(text.substr(1)) + " can't be read");
     content = read_all(file);
   }
-  const bool takes_text = type.container == rr::ContainerKind::none &&
-                          (type.type == rr::DataType::string_t || type.type == rr::DataType::namedtype_t);
+  const bool is_one = type.container == rr::ContainerKind::none && type.array == rr::ArrayKind::none;
+  const bool takes_text = is_one && type.type == rr::DataType::string_t;
+  const bool takes_word = takes_text || (is_one && type.type == rr::DataType::namedtype_t);
   auto json = rr::read_json(content);
-  if (json && !(type.type == rr::DataType::string_t && takes_text && !json->is_string())) return std::move(*json);
-  // What a shell makes of "red" is red.
-  if (takes_text && (content.empty() || (content[0] != '{' && content[0] != '['))) return rr::Json(content);
-  throw NotUnderstood(rr::quoted(text) + " is not JSON: " + (json ? "expected a string" : json.error().message));
+  if (json && (!takes_text || json->is_string())) return std::move(*json);
+  // What a shell makes of "red" is red, and 5 is text where text is wanted.
+  const bool is_word = !content.starts_with('{') && !content.starts_with('[');
+  if (takes_text || (takes_word && is_word)) return rr::Json(content);
+  throw NotUnderstood(rr::quoted(text) + " is not JSON: " + json.error().message);
 }
 
 rr::OrderedJson to_json(const rr::Value& value, const rr::TypeDefinition& type, const rr::TypeRegistry& types) {
@@ -219,17 +213,20 @@ void print_value(const rr::OrderedJson& json, bool is_json) {
   std::cout << std::endl;  // whoever reads a pipe sees each value as it comes
 }
 
-int run_remote(std::string_view command, std::string_view url, const std::function<int()>& run) {
+int run_remote(std::string_view command, std::string_view url, const std::function<void()>& run) {
   const auto tell = [&](std::string_view what, int code) {
     std::cerr << "rrgate " << command << ": " << url << ": " << what << "\n";
     return code;
   };
   try {
-    return run();
+    run();
+    return exit_ok;
   } catch (const NotUnderstood& mistake) {
     return tell(mistake.what(), exit_usage);
   } catch (const rr::Exception& failure) {
     return tell(failure.what(), is_refusal(failure.what()) ? exit_refused : exit_code_of(failure.error().code));
+  } catch (const std::exception& failure) {
+    return tell(failure.what(), exit_failed);
   }
 }
 

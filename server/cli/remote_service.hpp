@@ -25,9 +25,20 @@ class NotUnderstood : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// What all these commands take: --timeout SECONDS, --user NAME, --json.
-inline constexpr std::string_view remote_options[] = {"--timeout", "--user"};
-inline constexpr std::string_view remote_flags[] = {"--json"};
+/// What all these commands take.
+struct RemoteOptions {
+  std::string url;
+  std::string user;
+  double timeout = 10;  ///< in s
+  bool is_json = false;
+};
+
+CLI::Option* add_url(CLI::App& app, RemoteOptions& options);
+/// --user, --timeout.
+void add_connection_options(CLI::App& app, RemoteOptions& options);
+CLI::Option* add_json(CLI::App& app, RemoteOptions& options);
+/// A whole number from 1 on.
+CLI::Option* add_count(CLI::App& app, const std::string& name, std::uint32_t& count, const std::string& summary);
 
 /// How a service is reached. The password of --user is that of $RRGATE_PASSWORD; a gateway's token that of
 /// $RRGATE_TOKEN.
@@ -37,11 +48,12 @@ struct RemoteAddress {
   std::chrono::milliseconds timeout{10'000};
 };
 
-/// `url`  a Robot Raconteur URL, or a gateway's "http(s)://HOST:PORT/devices/NAME?service=SERVICE", where the login is
-/// the
-///        gateway's. Throws   NotUnderstood.
-RemoteAddress remote_address(std::string_view url, const ParsedArguments& parsed);
+/// Of a Robot Raconteur URL, or of a gateway's "http(s)://HOST:PORT/devices/NAME?service=SERVICE", where the login is
+/// the gateway's. Throws   NotUnderstood.
+RemoteAddress remote_address(const RemoteOptions& options);
 rr::RemoteObject open_service(const RemoteAddress& address);
+/// The gateway's own service (org.rrgate.gateway). `address`  of anything at the gateway.
+rr::RemoteObject open_gateway(RemoteAddress address);
 
 /// A member, or with null the object itself.
 struct RemoteMember {
@@ -57,7 +69,6 @@ struct RemoteMember {
 RemoteMember find_member(const rr::RemoteObject& root, std::string_view path);
 /// Throws   NotUnderstood: it is of no kind that is listed.
 void expect_kind(const RemoteMember& found, const std::vector<rr::MemberKind>& kinds, std::string_view verb);
-std::string_view kind_name(rr::MemberKind kind);
 
 /// JSON as it was written, of a file ("@name") or of standard input ("-"); other text where the type takes text.
 /// Throws   NotUnderstood.
@@ -67,7 +78,7 @@ rr::OrderedJson to_json(const rr::Value& value, const rr::TypeDefinition& type, 
 /// For people: text without quotes, structures over several lines. With --json: one line.
 void print_value(const rr::OrderedJson& json, bool is_json);
 
-/// Runs a command: what it throws becomes one sentence and an exit code.
-int run_remote(std::string_view command, std::string_view url, const std::function<int()>& run);
+/// Runs a command: what it throws becomes one sentence and an exit code. Without `run`'s throwing: exit_ok.
+int run_remote(std::string_view command, std::string_view url, const std::function<void()>& run);
 
 }  // namespace rrgate

@@ -5,17 +5,24 @@
 
 namespace rrgate {
 
-int run_serve(Arguments arguments) {
-  constexpr std::string_view options[] = {"--config"};
-  const auto parsed = parse_arguments(arguments, {options});
-  if (!parsed.error.empty()) return usage_error("serve", parsed.error);
-  if (!parsed.operands.empty()) return usage_error("serve", "unexpected " + rr::quoted(parsed.operands.front()));
-  const auto file = parsed.options.find("--config");
-  if (file == parsed.options.end()) return usage_error("serve", "missing --config FILE");
-  auto config = load_config(file->second);
-  if (!report_findings(file->second, config)) return exit_usage;
+namespace {
+
+struct ServeOptions {
+  std::string config;
+};
+
+int serve(const ServeOptions& options) {
+  auto config = load_config(options.config);
+  if (!report_findings(options.config, config)) return exit_usage;
   return run_gateway(
-      std::move(config.config), [](auto&, auto&, const auto&) {}, file->second);
+      std::move(config.config), [](auto&, auto&, const auto&) {}, options.config);
+}
+
+}  // namespace
+
+void add_serve(Commands& commands) {
+  const auto [app, options] = commands.add("serve", "Run the gateway", serve);
+  app.add_option("--config", options.config, "Configuration")->required()->option_text("FILE");
 }
 
 }  // namespace rrgate

@@ -1,5 +1,4 @@
 // rrgate token: API tokens, in the file that "tokens_file" names. Layer: server/cli.
-#include <charconv>
 #include <iostream>
 
 #include "node/platform/secret_file.hpp"
@@ -12,38 +11,25 @@ namespace rrgate {
 
 namespace {
 
-/// "_" for ever; empty: not understood.
-std::string last_day(const std::string& days) {
-  if (days.empty()) return "_";
-  int count = 0;
-  const auto [end, error] = std::from_chars(days.data(), days.data() + days.size(), count);
-  if (error != std::errc() || end != days.data() + days.size() || count < 1 || count > 36500) return {};
+struct TokenOptions {
+  std::string file;
+  std::string name;
+  std::string roles;
+  int days = 0;
+  bool deletes = false;
+};
+
+/// "_" for ever.
+std::string last_day(int days) {
   const auto today = std::chrono::floor<std::chrono::days>(std::chrono::system_clock::now());
-  return format_day(today + std::chrono::days(count));
+  return days == 0 ? "_" : format_day(today + std::chrono::days(days));
 }
 
-}  // namespace
-
-int run_token(Arguments arguments) {
-  constexpr std::string_view options[] = {"--roles", "--days"};
-  constexpr std::string_view flags[] = {"--delete"};
-  const auto parsed = parse_arguments(arguments, {options, flags});
-  if (!parsed.error.empty()) return usage_error("token", parsed.error);
-  if (parsed.operands.size() != 2) return usage_error("token", "expected FILE and NAME");
-  const auto& file = parsed.operands[0];
-  const auto& name = parsed.operands[1];
-  const bool deletes = parsed.flags.contains("--delete");
-  const auto option = [&parsed](const char* key) {
-    const auto found = parsed.options.find(key);
-    return found == parsed.options.end() ? std::string() : found->second;
-  };
-  if (deletes && !parsed.options.empty()) return usage_error("token", "--delete takes no other option");
+int make_token(const TokenOptions& options) {
+  const auto& [file, name, role_names, days, deletes] = options;
   if (auto checked = check_name("token name", name); !checked) return usage_error("token", checked.error().message);
-  const auto roles = parse_roles(option("--roles"));
+  const auto roles = parse_roles(role_names);
   if (!roles) return usage_error("token", "--roles: " + roles.error().message);
-  const auto until = last_day(option("--days"));
-  if (until.empty())
-    return usage_error("token", "--days: found " + rr::quoted(option("--days")) + ", expected 1 to 36500");
 
   std::error_code error;
   const auto old = read_text_file(file);
@@ -56,7 +42,8 @@ int run_token(Arguments arguments) {
     return report_failure("token", file + (deletes ? " has no token " : " has a token already of the name ") +
                                        rr::quoted(name) + (deletes ? "" : "; --delete takes it out"));
   const auto token = make_api_token();
-  const auto line = deletes ? "" : name + " " + hash_api_token(token) + " " + format_roles(*roles) + " " + until;
+  const auto line =
+      deletes ? "" : name + " " + hash_api_token(token) + " " + format_roles(*roles) + " " + last_day(days);
   if (auto done = rr::write_secret(file, with_line(text, name, line), true, rr::SecretReaders::folder_group); !done)
     return report_failure("token", done.error().message);
   if (deletes) {
@@ -66,6 +53,20 @@ int run_token(Arguments arguments) {
   std::cerr << file << ": token " << rr::quoted(name) << " is added. It is shown this once:\n";
   std::cout << token << "\n";
   return exit_ok;
+}
+
+}  // namespace
+
+void add_token(Commands& commands) {
+  const auto [app, options] = commands.add("token", "Make an API token", make_token);
+  app.add_option("FILE", options.file, "What \"tokens_file\" names")->required()->option_text(" ");
+  app.add_option("NAME", options.name, "Of the token")->required()->option_text(" ");
+  auto* deletes = app.add_flag("--delete", options.deletes, "Take the token out");
+  app.add_option("--roles", options.roles, "Roles")->option_text("A,B")->excludes(deletes);
+  app.add_option("--days", options.days, "How long it is good; for ever without it")
+      ->check(CLI::Range(1, 36500))
+      ->option_text("N")
+      ->excludes(deletes);
 }
 
 }  // namespace rrgate

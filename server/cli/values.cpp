@@ -2,7 +2,9 @@
 #include <fstream>
 #include <iostream>
 
+#include "node/platform/text_file.hpp"
 #include "server/cli/remote_service.hpp"
+#include "server/http/endpoints/image_values.hpp"
 #include "server/json/arguments.hpp"
 #include "server/json/value_from_json.hpp"
 
@@ -12,12 +14,33 @@ namespace {
 
 using enum rr::MemberKind;
 
-bool is_json(const ParsedArguments& parsed) {
-  return parsed.flags.contains("--json");
+struct ValueOptions : RemoteOptions {
+  std::string_view command;
+  std::vector<rr::MemberKind> kinds;  ///< that it is for
+  std::string member;
+  std::string value;                 ///< of set
+  CLI::Option* arguments = nullptr;  ///< of call; their texts as they are
+  std::string output;                ///< of get and call: a file
+};
+
+/// To the terminal, or to the file that --output names.
+void deliver(const rr::Value& value, const rr::TypeDefinition& type, const rr::TypeRegistry& types,
+             const ValueOptions& options) {
+  const auto& file = options.output;
+  if (file.empty()) return print_value(to_json(value, type, types), options.is_json);
+  std::string content;
+  if (file.ends_with(".png") || file.ends_with(".jpg") || file.ends_with(".jpeg")) {
+    if (!is_image_type(type, types)) throw NotUnderstood("its value is no image: " + rr::format_type(type));
+    auto image = image_bytes(value, type, types, file.ends_with(".png") ? png_type : jpeg_type);
+    if (!image) throw rr::ClientException(image.error());
+    content = std::move(*image);
+  } else {
+    content = rr::write_json(to_json(value, type, types)) + "\n";
+  }
+  if (!write_text_file(file, content)) throw std::runtime_error(file + ": can't be written");
 }
 
-int get_value(const RemoteMember& found, const ParsedArguments& parsed) {
-  expect_kind(found, {property, wire, memory}, "get");
+void get_value(const RemoteMember& found, const ValueOptions& options) {
   const auto& name = found.member->name;
   rr::Value value;
   if (found.member->kind == property)
@@ -26,21 +49,18 @@ int get_value(const RemoteMember& found, const ParsedArguments& parsed) {
     value = found.object.peek_in(name);
   else
     value = found.object.memory(name).read();
-  print_value(to_json(value, found.member->type, found.types()), is_json(parsed));
-  return exit_ok;
+  deliver(value, found.member->type, found.types(), options);
 }
 
-int set_value(const RemoteMember& found, std::string_view text) {
-  expect_kind(found, {property, wire}, "set");
+void set_value(const RemoteMember& found, const ValueOptions& options) {
   const auto& member = *found.member;
   const auto value =
-      rr::value_from_json(read_json_argument(text, member.type), member.type, found.types(), {}, member.name);
+      rr::value_from_json(read_json_argument(options.value, member.type), member.type, found.types(), {}, member.name);
   if (!value) throw NotUnderstood(value.error().message);
   if (member.kind == property)
     found.object.set(member.name, *value);
   else
     found.object.poke_out(member.name, *value);
-  return exit_ok;
 }
 
 std::string signature(const rr::MemberDefinition& function) {
@@ -79,53 +99,78 @@ std::vector<rr::Value> read_arguments(const RemoteMember& found, const std::vect
   return std::move(*values);
 }
 
-int call_function(const RemoteMember& found, const ParsedArguments& parsed, const std::vector<std::string>& texts) {
-  expect_kind(found, {function}, "call");
+void call_function(const RemoteMember& found, const ValueOptions& options) {
   const auto& member = *found.member;
   for (const auto& parameter : member.parameters)
     if (parameter.type.container == rr::ContainerKind::generator)
       throw NotUnderstood(rr::quoted(member.name) + " takes values while it runs, which this command can't give");
-  const auto values = read_arguments(found, texts);
+  const auto values = read_arguments(found, options.arguments->results());
   auto type = member.type;
   if (member.is_generator()) {
     type.container = rr::ContainerKind::none;
     auto generator = found.object.generator_values(member.name, values);
-    for (const auto& value : generator) print_value(to_json(value, type, found.types()), is_json(parsed));
-    return exit_ok;
+    for (const auto& value : generator) deliver(value, type, found.types(), options);
+    return;
   }
   const auto result = found.object.call_values(member.name, values);
-  if (type.type != rr::DataType::void_t) print_value(to_json(result, type, found.types()), is_json(parsed));
-  return exit_ok;
+  if (type.type != rr::DataType::void_t) deliver(result, type, found.types(), options);
 }
 
-/// "-5" is a value; "--" ends the options.
-int run_with_member(std::string_view command, Arguments arguments, std::size_t min_operands, std::string_view expected,
-                    std::size_t max_operands, int (*run)(const RemoteMember& found, const ParsedArguments& parsed)) {
-  const auto parsed = parse_arguments(arguments, {remote_options, remote_flags});
-  if (!parsed.error.empty()) return usage_error(command, parsed.error);
-  if (parsed.operands.size() < min_operands || parsed.operands.size() > max_operands)
-    return usage_error(command, "expected " + std::string(expected));
-  return run_remote(command, parsed.operands[0], [&] {
-    return run(find_member(open_service(remote_address(parsed.operands[0], parsed)), parsed.operands[1]), parsed);
+template <void (*use)(const RemoteMember&, const ValueOptions&)>
+int run_with_member(const ValueOptions& options) {
+  return run_remote(options.command, options.url, [&] {
+    const auto found = find_member(open_service(remote_address(options)), options.member);
+    expect_kind(found, options.kinds, options.command);
+    use(found, options);
   });
+}
+
+/// What get, set and call have alike.
+NewCommand<ValueOptions> add_member_command(Commands& commands, const char* name, std::vector<rr::MemberKind> kinds,
+                                            const std::string& summary, int (*run)(const ValueOptions&)) {
+  const auto command = commands.add(name, summary, run);
+  auto& [app, options] = command;
+  options.command = name;
+  options.kinds = std::move(kinds);
+  add_url(app, options)->required();
+  app.add_option("MEMBER", options.member, "\"position\", or through objrefs \"axes/0/position\"")
+      ->required()
+      ->option_text(" ");
+  add_connection_options(app, options);
+  return command;
+}
+
+/// What get and call do with a value.
+void add_output_options(CLI::App& app, ValueOptions& options) {
+  add_json(app, options);
+  app.add_option("--output,-o", options.output, "Write it to a file; as an image where it ends in .png or .jpg")
+      ->option_text("FILE");
 }
 
 }  // namespace
 
-int run_get(Arguments arguments) {
-  return run_with_member("get", arguments, 2, "URL MEMBER", 2, get_value);
+void add_get(Commands& commands) {
+  const auto [app, options] =
+      add_member_command(commands, "get", {property, wire, memory}, "Print a property, a wire's newest value, a memory",
+                         run_with_member<get_value>);
+  add_output_options(app, options);
 }
 
-int run_set(Arguments arguments) {
-  return run_with_member("set", arguments, 3, "URL MEMBER VALUE", 3,
-                         [](const auto& found, const auto& parsed) { return set_value(found, parsed.operands[2]); });
+void add_set(Commands& commands) {
+  const auto [app, options] =
+      add_member_command(commands, "set", {property, wire}, "Write a property or a wire", run_with_member<set_value>);
+  app.add_option("VALUE", options.value, "JSON; @FILE, or - for standard input")->required()->option_text(" ");
 }
 
-int run_call(Arguments arguments) {
-  return run_with_member("call", arguments, 2, "URL FUNCTION [ARGUMENT...]", 1000,
-                         [](const auto& found, const auto& parsed) {
-                           return call_function(found, parsed, {parsed.operands.begin() + 2, parsed.operands.end()});
-                         });
+void add_call(Commands& commands) {
+  const auto [app, options] = add_member_command(
+      commands, "call", {function}, "Call a function and print what it returns", run_with_member<call_function>);
+  // Each argument as it is: a list of words with "extra arguments" would take "[1,2]" for two of them.
+  auto* const arguments = app.add_option("ARGUMENT", "JSON in the order of the parameters, or NAME=JSON; @FILE, -");
+  arguments->allow_extra_args(false)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)->option_text("...");
+  app.preparse_callback([arguments](std::size_t words) { arguments->expected(std::max(1, static_cast<int>(words))); });
+  options.arguments = arguments;
+  add_output_options(app, options);
 }
 
 }  // namespace rrgate

@@ -1,5 +1,4 @@
 // rrgate watch: values of a wire, packets of a pipe, events, one line each. Layer: server/cli.
-#include <charconv>
 #include <csignal>
 #include <ctime>
 #include <iomanip>
@@ -114,7 +113,7 @@ void begin_watching(const RemoteMember& found, ValuePrinter& printer) {
   }
 }
 
-int watch(const RemoteMember& found, ValuePrinter& printer, std::optional<steady_clock::time_point> until) {
+void watch(const RemoteMember& found, ValuePrinter& printer, std::optional<steady_clock::time_point> until) {
   auto& connection = found.object.connection();
   const auto begin = steady_clock::now();
   begin_watching(found, printer);
@@ -130,29 +129,38 @@ int watch(const RemoteMember& found, ValuePrinter& printer, std::optional<steady
             << static_cast<double>(printer.count()) / seconds.count() << " /s\n";
   if (connection.is_closed() && !printer.is_done())
     throw rr::ClientException(rr::make_error(rr::ErrorCode::connection_error, "the connection was lost"));
-  return exit_ok;
+}
+
+struct WatchOptions : RemoteOptions {
+  std::string member;
+  bool is_csv = false;
+  std::uint32_t count = 0;    ///< 0: without end
+  std::uint32_t seconds = 0;  ///< the same
+};
+
+int run_watch(const WatchOptions& options) {
+  return run_remote("watch", options.url, [&] {
+    auto form = options.is_json ? WatchForm::json : WatchForm::text;
+    if (options.is_csv) form = WatchForm::csv;
+    ValuePrinter printer(form, options.count);
+    const auto found = find_member(open_service(remote_address(options)), options.member);
+    std::optional<steady_clock::time_point> until;
+    if (options.seconds != 0) until = steady_clock::now() + std::chrono::seconds(options.seconds);
+    watch(found, printer, until);
+  });
 }
 
 }  // namespace
 
-int run_watch(Arguments arguments) {
-  constexpr std::string_view options[] = {"--timeout", "--user", "--count", "--for"};
-  constexpr std::string_view flags[] = {"--json", "--csv"};
-  const auto parsed = parse_arguments(arguments, {options, flags});
-  if (!parsed.error.empty()) return usage_error("watch", parsed.error);
-  if (parsed.operands.size() != 2) return usage_error("watch", "expected URL MEMBER");
-  const auto count = number_option(parsed, "--count", 0, 1'000'000'000);
-  const auto seconds = number_option(parsed, "--for", 0, 31'536'000);
-  if (!count || !seconds) return usage_error("watch", "--count and --for: expected a number");
-  auto form = parsed.flags.contains("--json") ? WatchForm::json : WatchForm::text;
-  if (parsed.flags.contains("--csv")) form = WatchForm::csv;
-  return run_remote("watch", parsed.operands[0], [&] {
-    ValuePrinter printer(form, *count);
-    const auto found = find_member(open_service(remote_address(parsed.operands[0], parsed)), parsed.operands[1]);
-    std::optional<steady_clock::time_point> until;
-    if (*seconds != 0) until = steady_clock::now() + std::chrono::seconds(*seconds);
-    return watch(found, printer, until);
-  });
+void add_watch(Commands& commands) {
+  const auto [app, options] = commands.add("watch", "Print values of a wire, packets of a pipe, events", run_watch);
+  add_url(app, options)->required();
+  app.add_option("MEMBER", options.member, "As \"get\" has it")->required()->option_text(" ");
+  add_count(app, "--count", options.count, "End after so many values");
+  add_count(app, "--for", options.seconds, "End after so many seconds");
+  auto* json = add_json(app, options);
+  app.add_flag("--csv", options.is_csv, "A line for each value, a column for each number")->excludes(json);
+  add_connection_options(app, options);
 }
 
 }  // namespace rrgate

@@ -9,6 +9,7 @@ import time
 
 import pytest
 
+from found_nodes import THEIRS, TYPE
 from gateways import RRGATE, Gateway
 from processes import BUILD, Background, free_port
 from users import PASSWORDS, make_users
@@ -83,6 +84,7 @@ def test_values_are_read_written_and_called(url):
     assert run("set", url, "color", "-", given="[1, 0, 0.5]") == ""
     assert json.loads(run("get", url, "color", "--json")) == [1.0, 0.0, 0.5]
     assert run("call", url, "say", "hello there") == ""
+    assert run("call", url, "say", "--", "-5 degrees") == ""
     run("call", url, "setf_arm_position", "q2=-0.5", "q1=0.25", "0.125")
     assert json.loads(run("call", url, "getf_arm_position")) == pytest.approx([0.25, -0.5, 0.125])
     assert set(json.loads(run("get", url, "state", "--json"))) >= {"time", "robot_position", "arm_position"}
@@ -140,6 +142,92 @@ def test_requests_are_timed(url):
     assert run("ping", url, "--count", "20").startswith("20 requests: min ")
 
 
+def test_many_requests_are_timed_side_by_side(url):
+    times = json.loads(run("bench", url, "--count", "200", "--parallel", "8", "--json"))
+    assert times["count"] == 200 and times["per_second"] > 0
+    assert json.loads(run("bench", url, "color", "--count", "20", "--json"))["count"] == 20
+    assert Ran(["bench", url, "say", "--count", "20"]).refused(NOT_UNDERSTOOD, "'say' is a function", "property")
+
+
+def test_values_go_to_files(reynard, tmp_path):
+    run("set", reynard, "color", "[0.5, 0.25, 0]")
+    file = tmp_path / "color.json"
+    assert run("get", reynard, "color", "-o", file) == "" and json.loads(file.read_text()) == [0.5, 0.25, 0.0]
+    assert Ran(["get", reynard, "color", "-o", "/nowhere/color"]).refused(FAILED, "/nowhere/color", "written")
+    assert Ran(["get", reynard, "color", "-o", tmp_path / "color.png"]).refused(NOT_UNDERSTOOD, "no image: double[]")
+
+
+def test_images_go_to_files(tmp_path):
+    port = free_port()
+    cameras = Background([BUILD / "examples" / "demo" / "rrgate-demo-webcams", "--port", port], tmp_path / "log")
+    url = f"rr+tcp://127.0.0.1:{port}/?service=Webcam"
+    try:
+        cameras.wait_until(lambda: Ran(["info", url]).code == DONE)
+        for name, magic in ("frame.jpg", b"\xff\xd8"), ("frame.png", b"\x89PNG"):
+            run("call", url, "Webcams/0/CaptureFrame", "-o", tmp_path / name)
+            assert (tmp_path / name).read_bytes().startswith(magic)
+    finally:
+        cameras.stop()
+
+
+def test_a_gateway_is_watched(guarded, tmp_path):
+    admin = {"environment": {"RRGATE_PASSWORD": PASSWORDS["alice"]}}
+    shown = json.loads(run("top", guarded.split("/devices/")[0], "--count", "1", "--json", "--user", "alice", **admin))
+    assert [(each["device"], each["state"]) for each in shown["devices"]] == [("fox", "online")]
+    text = run("top", guarded.split("/devices/")[0], "--count", "1", "--user", "alice", **admin)
+    assert text.startswith("rrgate ") and "fox" in text and "messages/s" in text
+    assert Ran(["top", "rr+tcp://127.0.0.1:1/"]).refused(NOT_UNDERSTOOD, "http")
+
+
+def test_what_comes_and_goes_is_told():
+    name = f"experimental.found.n{free_port()}"
+    watching = subprocess.Popen([RRGATE, "ls", "--watch", "--wait", "1", "--json"], stdout=subprocess.PIPE, text=True)
+    device = subprocess.Popen([*THEIRS, "serve-local", name], stdin=subprocess.PIPE, stdout=subprocess.DEVNULL)
+    told = (json.loads(line) for line in watching.stdout)
+    try:
+        found = next(each for each in told if each["node"] == name)
+        assert (found["change"], found["service"], found["type"]) == ("found", "thing", TYPE)
+        device.communicate()
+        assert next(each for each in told if each["node"] == name)["change"] == "lost"
+    finally:
+        device.kill()
+        device.communicate()
+        watching.kill()
+        watching.communicate()
+
+
+def complete(*words):
+    return run("completion", "words", "--", *words).split()
+
+
+def test_shells_ask_what_may_come(reynard):
+    assert complete("che") == ["check-config", "check"]
+    assert complete("cert", "") == ["ca", "node", "web"]
+    assert "--csv" in complete("watch", reynard, "--c")
+    assert complete("get", reynard, "col") == ["color"]
+    assert complete("get", "--timeout", "5", reynard, "st") == ["state"]
+    assert "teleport" in complete("call", reynard, "") and "color" not in complete("call", reynard, "")
+    assert complete("call", reynard, "teleport", "") == ["x=", "y="]
+    assert complete("serve", "--config", "") == []
+
+
+def test_bash_completes_urls_and_members(reynard):
+    script = """source <(rrgate completion bash)
+COMP_LINE=$1; COMP_POINT=${#1}
+# As bash splits it: ":" and "=" are words by themselves.
+read -ra COMP_WORDS <<<"$(sed 's/[:=]/ & /g' <<<"$1")"; COMP_CWORD=$((${#COMP_WORDS[@]} - 1))
+_rrgate; echo "${COMPREPLY[@]}" """
+    path = f"{os.path.dirname(RRGATE)}:{os.environ['PATH']}"
+
+    def completed(line):
+        return subprocess.run(["bash", "-c", script, "bash", line], capture_output=True, text=True, timeout=30,
+                              env={**os.environ, "PATH": path}).stdout.split()
+
+    assert completed("rrgate che") == ["check-config", "check"]
+    assert completed(f"rrgate get '{reynard}' robot_p") == ["robot_position"]
+    assert completed(f"rrgate call '{reynard}' teleport x") == ["x="]
+
+
 def test_services_are_listed(reynard, url):
     if url == reynard:
         found = json.loads(run("ls", reynard.split("?")[0], "--json"))
@@ -174,7 +262,7 @@ def test_what_is_not_there_is_told_in_time():
         assert time.monotonic() - began < 10
     assert Ran(["get", "lab", "a"]).refused(NOT_UNDERSTOOD, "URL 'lab'")
     assert Ran(["get", "rr+tcp://127.0.0.1:1/", "a"]).refused(NOT_UNDERSTOOD, "?service=NAME", "rrgate ls")
-    assert Ran(["get", nobody, "a", "--timeout", "never"]).refused(NOT_UNDERSTOOD, "--timeout 'never'")
+    assert Ran(["get", nobody, "a", "--timeout", "never"]).refused(NOT_UNDERSTOOD, "--timeout", "'never'")
 
 
 def test_logins_and_rights_of_a_gateway(guarded):

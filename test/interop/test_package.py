@@ -54,10 +54,12 @@ def unit(root):
     return dict(re.findall(r"^(\w+)=(.*)$", root.path("/lib/systemd/system/rrgate.service").read_text(), re.M))
 
 
-def started(root, log):
+def started(root, log, config="/etc/rrgate/gateway.json"):
     about = unit(root)
+    program, *arguments = about["ExecStart"].split()
+    arguments[-1] = config
     words = ["chroot", root.folder, "/usr/bin/setpriv", f"--reuid={about['User']}", f"--regid={about['Group']}", "--init-groups",
-             "--no-new-privs", "/usr/bin/env", "ROBOTRACONTEUR_USER_HOME=/var/lib/rrgate", *about["ExecStart"].split()]
+             "--no-new-privs", "/usr/bin/env", "ROBOTRACONTEUR_USER_HOME=/var/lib/rrgate", program, *arguments]
     return Background(words, log)
 
 
@@ -107,6 +109,28 @@ def test_a_lab_in_four_commands(root, tmp_path):
         assert ask(port, "PUT", "/api/v1/devices/create/Create/x", body=1, **trust).status == 401
         audit = root.path("/var/log/rrgate/audit.jsonl")
         assert audit.read_text().strip(), "nothing is in the audit log"
+    finally:
+        gateway.stop()
+
+
+def test_a_folder_to_begin_with(root, tmp_path):
+    root.run("install", "-d", "-g", "rrgate", "-m", "750", "/srv/lab")
+    text = root.run("rrgate", "init", "/srv/lab", "--user", "root").stdout
+    (password,) = re.findall(r"^user root, password ([a-z2-9]{20}) ", text, re.M)
+    file = root.path("/srv/lab/gateway.json")
+    port = free_port()
+    assert "good" in root.run("rrgate", "check-config", "--as-service", "rrgate", "/srv/lab/gateway.json").stdout
+    again = root.run("rrgate", "init", "/srv/lab", fails=True)
+    assert (again.returncode, again.stderr) == (
+        1, "rrgate init: /srv/lab/gateway.json: is there already, with devices or users of its own; nothing was written\n")
+    file.write_text(file.read_text().replace("0.0.0.0:8443", f"127.0.0.1:{port}"))
+    gateway = started(root, tmp_path / "log", "/srv/lab/gateway.json")
+    try:
+        trust = {"context": ssl.create_default_context(cadata=root.path("/srv/lab/tls/web-ca.pem").read_text())}
+        assert answer_of(gateway, port, "/api/v1/devices", **trust).status == 401
+        for given, status in ((password, 200), ("guess", 401)):
+            login = {"Authorization": "Basic " + base64.b64encode(f"root:{given}".encode()).decode()}
+            assert ask(port, "GET", "/api/v1/devices", headers=login, **trust).status == status
     finally:
         gateway.stop()
 

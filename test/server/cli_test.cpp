@@ -2,59 +2,76 @@
 
 #include "server/cli/command.hpp"
 #include "server/log/log.hpp"
+#include "test/server/support/command_run.hpp"
 
 using namespace rrgate;
 
-TEST_CASE("options are taken in both spellings, unknown ones are named") {
-  constexpr std::string_view known[] = {"--config", "--port"};
-  const auto parse = [&](std::vector<std::string_view> arguments) { return parse_arguments(arguments, {known}); };
-  CHECK(parse({"--config", "a"}).options.at("--config") == "a");
-  CHECK(parse({"--config=a=b"}).options.at("--config") == "a=b");
-  CHECK(parse({"file", "--port=1"}).operands == std::vector<std::string>{"file"});
-  CHECK_THAT(parse({"--confg", "a"}).error, Catch::Contains("unknown option '--confg'"));
-  CHECK_THAT(parse({"--config"}).error, Catch::Contains("needs a value"));
-  CHECK_THAT(parse({"--port=1", "--port=2"}).error, Catch::Contains("twice"));
+namespace {
 
-  constexpr std::string_view flags[] = {"--quiet"};
-  constexpr std::string_view repeated[] = {"-I"};
-  const auto parse_more = [&](std::vector<std::string_view> arguments) {
-    return parse_arguments(arguments, {known, flags, repeated});
+struct Given {
+  std::string file;
+  std::vector<std::string> words;
+  CLI::Option* rest = nullptr;
+  int port = 7;
+};
+Given given;
+
+/// Runs "go" or "cut fine" of a program that has these two.
+test::CommandRun run(std::vector<std::string> words) {
+  Commands commands;
+  const auto keep = [](const Given& values) {
+    given = values;
+    if (values.rest) given.words = values.rest->results();
+    return 9;
   };
-  const auto parsed = parse_more({"-I", "a", "--quiet", "file", "-I=b", "--port", "1"});
-  CHECK(parsed.error.empty());
-  CHECK(parsed.repeated == std::vector<std::string>{"a", "b"});
-  CHECK(parsed.flags.count("--quiet") == 1);
-  CHECK(parsed.operands == std::vector<std::string>{"file"});
-  CHECK_THAT(parse_more({"--quiet=1"}).error, Catch::Contains("takes no value"));
-  CHECK_THAT(parse_more({"-I"}).error, Catch::Contains("needs a value"));
+  const auto [app, values] = commands.add<Given>("go", "Goes", keep);
+  app.add_option("FILE", values.file, "What for")->required();
+  app.add_option("--port", values.port, "Where to")->check(CLI::Range(0, 65535));
+  values.rest = app.add_option("WORD", "How")
+                    ->expected(1000)
+                    ->allow_extra_args(false)
+                    ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  commands.add<Given>("fine", "Cuts", keep, &commands.add_group("cut", "Parts"));
+  return test::run_in_process([&] { return commands.run(std::move(words)); });
 }
 
-TEST_CASE("numbers and '-' are operands, and numbers of options are checked") {
-  constexpr std::string_view known[] = {"--count"};
-  const auto parse = [&](std::vector<std::string_view> arguments) { return parse_arguments(arguments, {known}); };
-  CHECK(parse({"-5", "-", "--count=3"}).operands == std::vector<std::string>{"-5", "-"});
-  CHECK(number_option(parse({"--count=3"}), "--count", 7, 10) == 3u);
-  CHECK(number_option(parse({}), "--count", 7, 10) == 7u);
-  CHECK_FALSE(number_option(parse({"--count=11"}), "--count", 7, 10));
-  CHECK_FALSE(number_option(parse({"--count=3x"}), "--count", 7, 10));
-  CHECK_FALSE(number_option(parse({"--count", ""}), "--count", 7, 10));
+}  // namespace
+
+TEST_CASE("commands take their options, and each word as it is") {
+  CHECK(run({"go", "a", "--port", "1"}).code == 9);
+  CHECK(given.file == "a");
+  CHECK(given.port == 1);
+  CHECK(run({"go", "--port=2", "a", "-5", "-", "[1, 2]", "{}", ""}).code == 9);
+  CHECK(given.port == 2);
+  CHECK(given.words == std::vector<std::string>{"-5", "-", "[1, 2]", "{}", ""});
+  CHECK(run({"go", "a", "--", "--port", "-b", "go"}).code == 9);
+  CHECK(given.words == std::vector<std::string>{"--port", "-b", "go"});
+  CHECK(given.port == 7);
+  CHECK(run({"cut", "fine"}).code == 9);
 }
 
-TEST_CASE("commands are found by name; help and mistakes have their exit codes") {
-  static std::size_t given = 0;
-  constexpr Command commands[] = {{"go", "go FILE", "goes", [](Arguments arguments) {
-                                     given = arguments.size();
-                                     return 7;
-                                   }}};
-  const auto run = [&](std::vector<std::string_view> arguments) { return run_command_line(commands, arguments); };
-  CHECK(run({"go", "a", "b"}) == 7);
-  CHECK(given == 2);
-  CHECK(run({"go", "--help"}) == exit_ok);
-  CHECK(run({"--help"}) == exit_ok);
-  CHECK(run({"--version"}) == exit_ok);
-  CHECK(run({"stop"}) == exit_usage);
-  CHECK(run({"--verbose"}) == exit_usage);
-  CHECK(run({}) == exit_usage);
+TEST_CASE("help and mistakes have their exit codes, and mistakes one sentence") {
+  CHECK_THAT(run({"--help"}).output, Catch::Contains("Goes"));
+  CHECK_THAT(run({"go", "--help"}).output, Catch::Contains("Where to"));
+  CHECK_THAT(run({"help", "cut", "fine"}).output, Catch::Contains("Cuts"));
+  CHECK(run({"go", "--help"}).code == exit_ok);
+  CHECK(run({"--version"}).output == "rrgate " RRGATE_VERSION "\n");
+  const auto mistake = [](std::vector<std::string> words) {
+    const auto ran = run(std::move(words));
+    CHECK(ran.code == exit_usage);
+    CHECK(ran.output.empty());
+    return ran.errors;
+  };
+  CHECK(mistake({"go"}) == "rrgate go: FILE is required; see rrgate go --help\n");
+  CHECK_THAT(mistake({"go", "a", "--prot", "1"}), Catch::Contains("rrgate go: ") && Catch::Contains("--prot"));
+  CHECK_THAT(mistake({"go", "a", "--port"}), Catch::Contains("--port"));
+  CHECK_THAT(mistake({"go", "a", "--port", "x"}), Catch::Contains("--port") && Catch::Contains("x"));
+  CHECK_THAT(mistake({"go", "a", "--port", "65536"}), Catch::Contains("65535"));
+  CHECK_THAT(mistake({"go", "a", "--port=1", "--port=2"}), Catch::Contains("--port"));
+  CHECK(mistake({"cut"}) == "rrgate cut: a command is required; see rrgate cut --help\n");
+  CHECK_THAT(mistake({"stop"}), Catch::Contains("stop"));
+  CHECK_THAT(mistake({"--verbose"}), Catch::Contains("--verbose"));
+  CHECK_THAT(mistake({}), Catch::Contains("Goes"));
 }
 
 TEST_CASE("log lines quote what strangers wrote") {

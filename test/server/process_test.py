@@ -1,6 +1,8 @@
 """rrgate as a process: exit codes, messages, signals. Usage: process_test.py PATH_TO_RRGATE"""
+import base64
 import json
 import os
+import pathlib
 import re
 import signal
 import socket
@@ -9,6 +11,7 @@ import sys
 import tempfile
 import time
 import unittest
+import urllib.error
 import urllib.request
 
 RRGATE = sys.argv.pop()
@@ -46,7 +49,8 @@ class CommandLine(Files):
         self.assertRegex(run("--version").stdout, r"^rrgate \d+\.\d+\.\d+\n$")
         help_text = run("--help")
         self.assertEqual(help_text.returncode, 0)
-        self.assertIn("serve --config FILE", help_text.stdout)
+        self.assertRegex(help_text.stdout, r"serve +Run the gateway")
+        self.assertIn("--config FILE", run("serve", "--help").stdout)
 
     def test_mistakes_end_with_2(self):
         for arguments in [(), ("swerve",), ("serve",), ("serve", "--confg", "x"), ("serve", "--config"), ("demo", "--port", "x")]:
@@ -111,15 +115,19 @@ class CommandLine(Files):
 
 
 class Demo(Files):
-    def start(self):
-        """Returns the URL of its pages."""
+    def start(self, *options):
+        """Returns the URL of its pages; what it said before is in self.said."""
         self.log = self.enterContext(tempfile.TemporaryFile("w+"))
-        process = subprocess.Popen([RRGATE, "demo", "--port", "0"], stdout=subprocess.PIPE, stderr=self.log, text=True)
+        process = subprocess.Popen([RRGATE, "demo", "--port", "0", *options], stdout=subprocess.PIPE, stderr=self.log, text=True)
         self.addCleanup(process.stdout.close)
         self.addCleanup(process.wait)
         self.addCleanup(process.terminate)
-        ready = next(line for line in process.stdout if line.startswith("rrgate demo: "))  # the devices say theirs first
-        return ready.split()[-1]
+        self.said = []
+        for line in process.stdout:  # the devices say theirs first
+            if line.startswith("rrgate demo: http://"):
+                return line.split()[-1]
+            self.said.append(line.rstrip("\n"))
+        self.fail("no address")
 
     def test_its_devices_are_there_when_it_starts(self):
         self.start()
@@ -134,7 +142,7 @@ class Demo(Files):
             self.assertEqual((result.returncode, result.stderr), (0, ""))
         made = os.listdir(self.folder.name)
         for ending in (".hpp", ".cpp", ".ts"):
-            texts = [open(os.path.join(self.folder.name, name)).read() for name in made if name.endswith(ending)]
+            texts = [pathlib.Path(self.folder.name, name).read_text() for name in made if name.endswith(ending)]
             self.assertTrue(any("Drive" in text for text in texts), made)
         result = run("generate", "cpp", "-o", self.folder.name, url.replace("service=Create", "service=Nobody"))
         self.assertEqual(result.returncode, 1)
@@ -146,6 +154,23 @@ class Demo(Files):
             devices = json.load(answer)["devices"]
         self.assertEqual([(each["name"], each["mode"], each["state"]) for each in devices],
                          [("create", "relay", "online"), ("webcams", "shared", "online")])
+
+
+    def test_other_machines_come_with_a_password(self):
+        url = self.start("--lan")
+        password = next(line for line in self.said if line.startswith("rrgate demo: user demo, ")).split()[-1]
+
+        def ask(given):
+            login = base64.b64encode(f"demo:{given}".encode()).decode()
+            headers = {"Authorization": f"Basic {login}"} if given else {}
+            with urllib.request.urlopen(urllib.request.Request(url + "api/v1/devices", headers=headers), timeout=10) as answer:
+                return [each["name"] for each in json.load(answer)["devices"]]
+
+        self.assertEqual(ask(password), ["create", "webcams"])
+        for wrong in ("", password[:-1]):
+            with self.subTest(wrong), self.assertRaises(urllib.error.HTTPError) as refused:
+                ask(wrong)
+            self.assertEqual(refused.exception.code, 401)
 
 
 class Serving(Files):

@@ -3,6 +3,7 @@
 
 #include "test/node/node/node_fixture.hpp"
 #include "test/server/support/command_run.hpp"
+#include "test/support/folder.hpp"
 
 using namespace rrgate;
 using Catch::Matchers::Contains;
@@ -37,12 +38,12 @@ TEST_CASE("generate ts: types of files and their imports, to a file or stdout") 
   const Folder folder;
   folder.write("test.light.robdef", light);
   const auto file = folder.write("lamp.robdef", lamp);
-  CHECK(run_command(run_generate, {"ts", file}).output == lamp_types);
-  CHECK(run_command(run_generate, {"ts", file, "-o", folder.path("lamp.d.ts")}).code == exit_ok);
+  CHECK(run_command("generate", {"ts", file}).output == lamp_types);
+  CHECK(run_command("generate", {"ts", file, "-o", folder.path("lamp.d.ts")}).code == exit_ok);
   CHECK(folder.read("lamp.d.ts") == lamp_types);
-  CHECK(run_command(run_generate, {"ts", file, "-o", folder.path("lamp.ts")}).code == exit_ok);
+  CHECK(run_command("generate", {"ts", file, "-o", folder.path("lamp.ts")}).code == exit_ok);
   CHECK_THAT(folder.read("lamp.ts"), Contains("export const most = 7;\n"));
-  CHECK(run_command(run_generate, {"ts", file, "-o", folder.path("none/lamp.ts")}).code == exit_failed);
+  CHECK(run_command("generate", {"ts", file, "-o", folder.path("none/lamp.ts")}).code == exit_failed);
 }
 
 TEST_CASE("generate ts: types of a live service") {
@@ -51,8 +52,8 @@ TEST_CASE("generate ts: types of a live service") {
     service->property("colour").get([] { return rr::Value(); });
     owner.add(service);
   });
-  CHECK(run_command(run_generate, {"ts", node.url("Lamp")}).output == lamp_types);
-  const auto none = run_command(run_generate, {"ts", node.url("Candle")});
+  CHECK(run_command("generate", {"ts", node.url("Lamp")}).output == lamp_types);
+  const auto none = run_command("generate", {"ts", node.url("Candle")});
   CHECK(none.code == exit_failed);
   CHECK_THAT(none.errors, Contains("Candle"));
 }
@@ -61,13 +62,13 @@ TEST_CASE("generate cpp: a header and a source for each file, none for imports")
   const Folder folder;
   folder.write("test.light.robdef", light);
   const auto file = folder.write("lamp.robdef", lamp);
-  CHECK(run_command(run_generate, {"cpp", file, "-o", folder.path("out/deep")}).code == exit_ok);
+  CHECK(run_command("generate", {"cpp", file, "-o", folder.path("out/deep")}).code == exit_ok);
   const auto header = folder.read("out/deep/test__lamp.hpp");
   CHECK_THAT(header, Contains("#include \"test__light.hpp\"\n") && Contains("\nnamespace test::lamp {\n"));
   CHECK_THAT(header, Contains("  virtual rr::Nullable<::test::light::Colour> get_colour() = 0;\n"));
   CHECK_THAT(folder.read("out/deep/test__lamp.cpp"), Contains("R\"robdef(service test.lamp\n"));
   CHECK(folder.read("out/deep/test__light.hpp") == "(no file)");
-  CHECK(run_command(run_generate, {"cpp", file, "-o", folder.write("taken", "")}).code == exit_failed);
+  CHECK(run_command("generate", {"cpp", file, "-o", folder.write("taken", "")}).code == exit_failed);
 }
 
 TEST_CASE("generate: what only compat mode takes becomes code all the same") {
@@ -75,23 +76,23 @@ TEST_CASE("generate: what only compat mode takes becomes code all the same") {
   const auto file = folder.write("old.robdef",
                                  "service test.class\noption version 0.9\noption constant int16 A.B 1\nobject X\n"
                                  "    function void f(int32 5, varobject in)\nend object\n");
-  CHECK(run_command(run_generate, {"cpp", file, "-o", folder.path("")}).code == exit_failed);
-  CHECK(run_command(run_generate, {"cpp", "--compat", file, "-o", folder.path("")}).code == exit_ok);
+  CHECK(run_command("generate", {"cpp", file, "-o", folder.path("")}).code == exit_failed);
+  CHECK(run_command("generate", {"cpp", "--compat", file, "-o", folder.path("")}).code == exit_ok);
   const auto header = folder.read("test__class.hpp");
   CHECK_THAT(header, Contains("namespace test::class_ {") && Contains("inline constexpr std::int16_t A_B = 1;") &&
                          Contains("virtual void f(std::int32_t p5, rr::Value in) = 0;"));
-  CHECK_THAT(run_command(run_generate, {"ts", "--compat", file}).output,
+  CHECK_THAT(run_command("generate", {"ts", "--compat", file}).output,
              Contains("f: FunctionMember<[p5: number, in_: RrValue | ExactValue], void>;"));
 }
 
 TEST_CASE("generate: mistakes") {
   const Folder folder;
   const auto bad = folder.write("bad.robdef", "service a\nstdver 0.10\nimport b\n");
-  const auto found = run_command(run_generate, {"ts", bad, "-o", folder.path("bad.d.ts")});
+  const auto found = run_command("generate", {"ts", bad, "-o", folder.path("bad.d.ts")});
   CHECK(found.code == exit_failed);
   CHECK_THAT(found.errors, Contains(bad + ":3:8: error: "));
   CHECK(folder.read("bad.d.ts") == "(no file)");
   for (const std::vector<std::string>& words :
        {std::vector<std::string>{}, {"ts"}, {"cobol", bad}, {"ts", "--x", bad}, {"ts", bad, "rr+tcp://h:1/?service=s"}})
-    CHECK(run_command(run_generate, words).code == exit_usage);
+    CHECK(run_command("generate", words).code == exit_usage);
 }

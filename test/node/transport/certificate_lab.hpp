@@ -7,7 +7,7 @@
 #include "node/tls/issue_certificates.hpp"
 #include "node/tls/node_certificate_check.hpp"
 #include "node/tls/tls_context.hpp"
-#include "test/server/support/command_run.hpp"
+#include "test/support/folder.hpp"
 
 namespace rr::test {
 

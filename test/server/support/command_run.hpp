@@ -1,13 +1,12 @@
-// Runs subcommands in this process, on files of its own.
+// Runs commands of rrgate in this process.
 #pragma once
 
-#include <filesystem>
+#include <functional>
 #include <iostream>
 #include <sstream>
 #include <string>
 #include <vector>
 
-#include "node/platform/text_file.hpp"
 #include "server/cli/command.hpp"
 
 namespace rrgate::test {
@@ -18,40 +17,21 @@ struct CommandRun {
   std::string errors;
 };
 
-inline CommandRun run_command(int (*command)(Arguments), const std::vector<std::string>& arguments) {
-  const std::vector<std::string_view> words(arguments.begin(), arguments.end());
+/// What `run` prints, and its exit code.
+inline CommandRun run_in_process(const std::function<int()>& run) {
   std::ostringstream output;
   std::ostringstream errors;
   auto* const old_output = std::cout.rdbuf(output.rdbuf());
   auto* const old_errors = std::cerr.rdbuf(errors.rdbuf());
-  const int code = command(words);
+  const int code = run();
   std::cout.rdbuf(old_output);
   std::cerr.rdbuf(old_errors);
   return {code, output.str(), errors.str()};
 }
 
-/// A folder that goes with this object.
-class Folder {
- public:
-  Folder() {
-    std::string name = (std::filesystem::temp_directory_path() / "rrgate-test-XXXXXX").string();
-    path_ = ::mkdtemp(name.data());
-  }
-  ~Folder() { std::filesystem::remove_all(path_); }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-
-  std::string path(const std::string& name) const { return (path_ / name).string(); }
-  /// Returns the path.
-  std::string write(const std::string& name, std::string_view text) const {
-    std::filesystem::create_directories((path_ / name).parent_path());
-    write_text_file(path(name), text);
-    return path(name);
-  }
-  std::string read(const std::string& name) const { return read_text_file(path(name)).value_or("(no file)"); }
-
- private:
-  std::filesystem::path path_;
-};
+inline CommandRun run_command(const std::string& command, std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), command);
+  return run_in_process([&] { return run_command_line(std::move(arguments)); });
+}
 
 }  // namespace rrgate::test

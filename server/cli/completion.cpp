@@ -1,0 +1,177 @@
+// rrgate completion: what shells ask while a command is typed. Layer: server/cli.
+//
+// The shells' scripts are a few lines: they hand the words to "rrgate completion words", which knows the commands and
+// asks devices for their members.
+#include <algorithm>
+#include <iostream>
+
+#include "server/cli/ls.hpp"
+#include "server/cli/remote_service.hpp"
+
+namespace rrgate {
+
+namespace {
+
+constexpr double patience = 2;  // for a device, in s: somebody waits at a prompt
+
+// What it prints begins with what was typed. Nothing: the shell offers files.
+constexpr std::string_view bash_script = R"(_rrgate() {
+    local line=${COMP_LINE:0:COMP_POINT} words=() before candidate
+    read -ra words <<<"$line"
+    [[ $line == *[[:space:]] ]] && words+=("")
+    words=("${words[@]//[\'\"]/}")
+    # Of words with ":" or "=" in them bash replaces the last part alone.
+    before=${words[-1]%"${COMP_WORDS[COMP_CWORD]//[:=]/}"}
+    COMPREPLY=()
+    while IFS= read -r candidate; do
+        COMPREPLY+=("${candidate#"$before"}")
+    done < <(rrgate completion words -- "${words[@]:1}" 2>/dev/null)
+}
+complete -o default -F _rrgate rrgate
+)";
+constexpr std::string_view zsh_script = R"(#compdef rrgate
+_rrgate() {
+    local -a candidates
+    candidates=("${(@f)$(rrgate completion words -- "${(@Q)words[2,CURRENT]}" 2>/dev/null)}")
+    if [[ -n $candidates[1] ]]; then compadd -Q -- "${(@q)candidates}"; else _files; fi
+}
+if [[ $funcstack[1] == _rrgate ]]; then _rrgate "$@"; else compdef _rrgate rrgate; fi
+)";
+constexpr std::string_view fish_script = R"(function __rrgate_words
+    set -l words (commandline -opc) (commandline -ct)
+    rrgate completion words -- (string unescape -- $words[2..-1]) 2>/dev/null
+end
+complete -c rrgate -a '(__rrgate_words)'
+)";
+
+/// Kinds of member that a command is for; empty: all.
+std::vector<rr::MemberKind> kinds_of(std::string_view command) {
+  using enum rr::MemberKind;
+  if (command == "get") return {property, wire, memory};
+  if (command == "set") return {property, wire};
+  if (command == "call") return {function};
+  if (command == "watch") return {wire, pipe, event};
+  if (command == "bench") return {property};
+  return {};
+}
+
+/// Members of the objects up to the last "/", and objrefs, which lead to others.
+std::vector<std::string> members_of(const std::string& url, std::string_view typed, std::string_view command) {
+  const auto slash = typed.rfind('/');
+  const auto prefix = std::string(typed.substr(0, slash == std::string_view::npos ? 0 : slash + 1));
+  RemoteOptions options;
+  options.url = url;
+  options.timeout = patience;
+  const auto kinds = kinds_of(command);
+  std::vector<std::string> out;
+  const auto found = find_member(open_service(remote_address(options)),
+                                 prefix.empty() ? "" : std::string_view(prefix).substr(0, prefix.size() - 1));
+  for (const auto& member : found.type->members) {
+    const bool is_objref = member.kind == rr::MemberKind::objref;
+    if (is_objref || kinds.empty() || std::find(kinds.begin(), kinds.end(), member.kind) != kinds.end())
+      out.push_back(prefix + member.name + (is_objref ? "/" : ""));
+  }
+  return out;
+}
+
+/// Parameters of a function that are not given yet, as "NAME=".
+std::vector<std::string> parameters_of(const std::string& url, const std::string& function) {
+  RemoteOptions options;
+  options.url = url;
+  options.timeout = patience;
+  const auto found = find_member(open_service(remote_address(options)), function);
+  std::vector<std::string> out;
+  if (found.member)
+    for (const auto& parameter : found.member->parameters) out.push_back(parameter.name + "=");
+  return out;
+}
+
+std::vector<std::string> options_of(const CLI::App& app) {
+  std::vector<std::string> out;
+  for (const auto* option : app.get_options())
+    for (const auto& name : option->get_lnames()) out.push_back("--" + name);
+  return out;
+}
+
+/// Whether the word is an option that takes a value.
+bool takes_value(const CLI::App& app, const std::string& word) {
+  const auto* option = word.starts_with('-') ? app.get_option_no_throw(word) : nullptr;
+  return option && option->get_items_expected_max() > 0;
+}
+
+std::vector<const CLI::App*> commands_below(const CLI::App& app) {
+  return app.get_subcommands([](const CLI::App*) { return true; });
+}
+
+const CLI::App* find_command(const CLI::App& app, const std::string& name) {
+  for (const auto* each : commands_below(app))
+    if (each->get_name() == name) return each;
+  return nullptr;
+}
+
+/// `words`  after the program's name; the last one is being typed.
+std::vector<std::string> candidates(const CLI::App& program, std::vector<std::string> words) {
+  const auto typed = words.back();
+  words.pop_back();
+  const auto* app = &program;
+  std::vector<std::string> operands;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    if (const auto* below = find_command(*app, words[i]); below && operands.empty())
+      app = below;
+    else if (takes_value(*app, words[i]))
+      ++i;
+    else if (!words[i].starts_with('-'))
+      operands.push_back(words[i]);
+  }
+  if (!words.empty() && takes_value(*app, words.back())) return {};
+  if (typed.starts_with('-')) return options_of(*app);
+  std::vector<std::string> names;
+  for (const auto* each : commands_below(*app)) names.push_back(each->get_name());
+  if (!names.empty()) return names;
+  // Which operand comes next is what its name says.
+  for (const auto* option : app->get_options())
+    if (option->get_positional()) names.push_back(option->get_name(true));
+  if (names.empty()) return {};
+  const auto& next = names[std::min(operands.size(), names.size() - 1)];
+  if (next == "ARGUMENT") return parameters_of(operands[0], operands[1]);
+  const bool is_member = next == "MEMBER" || next == "OBJECT" || next == "PROPERTY";
+  if (is_member && !operands.empty()) return members_of(operands[0], typed, app->get_name());
+  if (next == "URL") return find_service_urls(std::chrono::seconds(1));
+  return {};
+}
+
+struct CompletionOptions {
+  const CLI::App* program = nullptr;
+  std::string shell;
+  std::vector<std::string> words;
+};
+
+int complete(const CompletionOptions& options) {
+  if (options.shell == "bash") std::cout << bash_script;
+  if (options.shell == "zsh") std::cout << zsh_script;
+  if (options.shell == "fish") std::cout << fish_script;
+  if (options.words.empty()) return exit_ok;
+  try {
+    for (const auto& each : candidates(*options.program, options.words))
+      if (each.starts_with(options.words.back())) std::cout << each << "\n";
+  } catch (const std::exception&) {
+    return exit_failed;  // whoever types sees no candidates; the command itself will tell why
+  }
+  return exit_ok;
+}
+
+}  // namespace
+
+void add_completion(Commands& commands) {
+  const auto [app, options] =
+      commands.add("completion", "Print a script for a shell, so that it completes commands and members", complete);
+  options.program = &commands.app();
+  app.add_option("SHELL", options.shell, "bash, zsh or fish; \"words\" tells what may stand for the last of WORD")
+      ->required()
+      ->check(CLI::IsMember({"bash", "zsh", "fish", "words"}))
+      ->option_text(" ");
+  app.add_option("WORD", options.words, "Of a command line, behind --")->option_text("...");
+  app.footer("For bash: source <(rrgate completion bash)");
+}
+
+}  // namespace rrgate
