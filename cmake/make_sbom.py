@@ -2,7 +2,8 @@
 """make_sbom.py --version V --output FILE PACKAGE.deb... package-lock.json...
 
 What a release is made of, as SPDX 2.3 in JSON: the packages, the shared libraries that dpkg-shlibdeps found they need, what
-they are compiled with (Depends of rrgate-dev), and the npm packages that are in the page or come with the client.
+they are compiled with (Depends of rrgate-dev), and the npm packages that are in the page or in the documentation, or come
+with the client.
 Source: https://spdx.github.io/spdx-spec/v2.3/
 """
 import argparse

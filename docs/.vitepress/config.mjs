@@ -23,6 +23,13 @@ for (const { link, text } of sidebar.flatMap((group) => group.items))
   if (!existsSync(path.join(pages, link === "/" ? "index.md" : `${link.replace(/\/$/, "/index")}.md`)))
     throw new Error(`navigation: "${text}" leads to ${link}, which is no page`);
 
+const links = new Set(sidebar.flatMap((group) => group.items.map(({ link }) => link)));
+for (const page of readdirSync(pages, { recursive: true }).filter((name) => name.endsWith(".md"))) {
+  const link = `/${page.slice(0, -3).replace(/(^|\/)index$/, "$1")}`;
+  const isBeside = /^\/(source|reference\/rrgate-client)\/|^\/(paper|code-of-conduct)$/.test(link);
+  if (!isBeside && !links.has(link)) throw new Error(`navigation: ${page} is missing in navigation.mjs`);
+}
+
 /** Anchors as GitHub makes them, so that links work in both places. */
 const slugify = (heading) =>
   heading

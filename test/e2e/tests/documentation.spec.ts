@@ -12,8 +12,12 @@ test("pages and their search work without any other host", async ({ page, lab })
   });
   await page.goto(`${lab.url}docs/`);
   await expect(page.getByRole("heading", { name: "What rrgate is" })).toBeVisible();
-  await page.keyboard.press("Control+k");
-  await page.getByPlaceholder("Search").fill("allowed_hosts");
+  const words = page.getByPlaceholder("Search");
+  await expect(async () => {
+    await page.keyboard.press("Control+k"); // nobody hears it before the page's script runs
+    await expect(words).toBeVisible({ timeout: 500 });
+  }).toPass();
+  await words.fill("allowed_hosts");
   await page.locator(".VPLocalSearchBox .result").filter({ hasText: "By which name" }).first().click();
   await expect(page).toHaveURL(/access\.html#by-which-name$/);
   await expect(page.getByRole("heading", { name: "By which name" })).toBeVisible();
