@@ -2,8 +2,8 @@
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
-#include "test/server/support/command_run.hpp"
 #include "test/server/support/test_gateway.hpp"
+#include "test/support/folder.hpp"
 
 using namespace rrgate;
 using namespace rrgate::test;
