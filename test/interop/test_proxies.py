@@ -115,7 +115,7 @@ def test_nobody_says_by_a_header_who_he_is(device, tmp_path, proxy):
     says = {"X-Forwarded-User": "root", "X-Forwarded-Groups": "admin"}
     another = ReverseProxy(proxy.name, PROXIES[proxy.name], tmp_path, port)
     try:
-        assert json.loads(fetch(port, "/api/v1/access", says)[2])["user"] == "root"
+        assert json.loads(fetch(port, "/api/v1/access", says, "127.0.0.1")[2])["user"] == "root"
         for site, prefix in ((another.root, ""), (another.below, "/robots")):
             status, _, body = fetch(site, prefix + "/api/v1/access", says)
             assert (status, json.loads(body)["user"], json.loads(body)["roles"]) == (200, None, [])

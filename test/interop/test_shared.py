@@ -12,13 +12,14 @@ import RobotRaconteur as RR
 
 from clients import JS, run_program
 from gateways import rrgate
+from http_api import ask
 from load import Clients, running
 from news import News
 from processes import BUILD, Background, read_json, start_gateway
 from scenarios import POSE
 from shared_sites import port_of, start_service
 from tap import Tap
-from users import PASSWORDS, RULES, make_users
+from users import PASSWORDS, RULES, basic, make_users
 from values import Values
 
 SERVICES = {"interop", "guarded", "open", "proven", "RobotRaconteurServiceIndex"}  # of the test service's node
@@ -523,6 +524,14 @@ def test_a_user_who_is_deleted_has_no_session_any_more(node, tmp_path):
     try:
         sessions = {user: node.ConnectService(shared_url, *password_of(user)) for user in ("vera", "root")}
         assert all(root.version == "1" for root in sessions.values())
+        # Meanwhile: where from another client comes is for those who manage the gateway.
+        wire = sessions["vera"].state.Connect()
+        clients = {}
+        for user in ("root", "alice"):
+            answer = ask(port, "GET", "/api/v1/devices/interop/subscriptions", headers=basic(user)).json
+            clients[user] = [each["client"] for each in answer["subscriptions"]]
+        assert clients["alice"] == [None] and clients["root"][0].startswith("127.0.0.1:"), clients
+        wire.Close()
         rrgate("passwd", tmp_path / "users", "vera", "--delete")
         began = time.monotonic()
         with pytest.raises(RR.RobotRaconteurException):
