@@ -79,6 +79,12 @@ Result<> PasswordFileAuthenticator::check_node(const LoginAttempt& attempt, cons
   return {};
 }
 
+std::optional<PasswordFileAuthenticator::Entry> PasswordFileAuthenticator::find(std::string_view name) const {
+  const auto found = users_.find(name);
+  if (found == users_.end()) return std::nullopt;
+  return Entry{found->second.hash.text(), found->second.privileges};
+}
+
 Result<AuthenticatedUser> PasswordFileAuthenticator::authenticate(const LoginAttempt& attempt) const {
   const auto* credential = attempt.credentials.find("password");
   const auto password = credential ? credential->to_text() : Result<std::string_view>(refused(""));

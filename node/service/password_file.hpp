@@ -4,6 +4,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -37,6 +38,14 @@ class PasswordFileAuthenticator final : public Authenticator {
 
   Result<AuthenticatedUser> authenticate(const LoginAttempt& attempt) const override;
   std::size_t user_count() const { return users_.size(); }
+
+  /// What the file says of a user.
+  struct Entry {
+    std::string hash;  ///< of his password, as the file has it
+    std::vector<std::string> privileges;
+  };
+  /// nullopt: there is no user of this name.
+  std::optional<Entry> find(std::string_view name) const;
 
  private:
   struct User {

@@ -5,6 +5,8 @@
 #include "core/support/glob.hpp"
 #include "node/platform/file_look.hpp"
 #include "node/platform/text_file.hpp"
+#include "node/tls/digest.hpp"
+#include "server/access/base64url.hpp"
 #include "server/log/log.hpp"
 
 namespace rrgate {
@@ -46,8 +48,15 @@ std::map<std::string, std::string> look(const AccessConfig& config) {
   return out;
 }
 
-/// Users whom the gateway has judged have this property, so that nobody else is taken for one of them.
-constexpr std::string_view judged_here = "rrgate.judged";
+/// Users whom the gateway has judged have this property, so that nobody else is taken for one of them: their
+/// credential.
+constexpr std::string_view judged_here = "rrgate.credential";
+
+/// Changes with the password.
+std::string credential_of(const rr::PasswordFileAuthenticator& users, std::string_view name) {
+  const auto entry = users.find(name);
+  return entry ? encode_base64url(rr::sha256(rr::as_bytes(entry->hash))) : std::string();
+}
 
 void add_role(std::vector<std::string>& roles, const std::string& role) {
   if (std::find(roles.begin(), roles.end(), role) == roles.end()) roles.push_back(role);
@@ -62,6 +71,13 @@ bool is_recorded(Verb verb) {
 
 Subject subject_of(const rr::AuthenticatedUser& user) {
   return {user.properties.find(judged_here) ? Subject::Kind::user : Subject::Kind::device_user, user.name};
+}
+
+rr::Result<rr::AuthenticatedUser> judge_login(const rr::PasswordFileAuthenticator& users,
+                                              const rr::LoginAttempt& attempt) {
+  auto user = users.authenticate(attempt);
+  if (user) user->properties.items.emplace_back(std::string(judged_here), rr::Value(credential_of(users, user->name)));
+  return user;
 }
 
 rr::Result<AccessStatePtr> load_access(const AccessConfig& config) {
@@ -117,8 +133,7 @@ class Access::Users final : public rr::Authenticator {
       users = users_;
     }
     if (!users) return rr::make_error(rr::ErrorCode::authentication_error, "Invalid username or password");
-    auto user = users->authenticate(attempt);
-    if (user) user->properties.items.emplace_back(std::string(judged_here), rr::Value(true));
+    auto user = judge_login(*users, attempt);
     Identity who;
     who.name = attempt.username;
     if (user) who.roles = user->privileges;
@@ -215,6 +230,8 @@ Identity Access::logged_in(const rr::AuthenticatedUser& user, std::string client
   out.name = user.name;
   out.roles = user.privileges;
   out.proof = Proof::password;
+  if (const auto* credential = user.properties.find(judged_here))
+    out.credential = credential->to_text().value();  // as judge_login() has put it there
   out.client = std::move(client);
   return with_grants(std::move(out));
 }
@@ -228,6 +245,7 @@ Identity Access::in_session(const Identity& shown, const rr::AuthenticatedUser* 
 }
 
 Identity Access::with_grants(Identity identity) const {
+  identity.proven_roles = identity.roles;
   if (identity.subject().kind != Subject::Kind::user) return identity;
   for (const auto& grant : state_->config.grants) {
     const auto is_of = [&](const std::string& pattern) { return rr::glob_matches(pattern, identity.name); };
@@ -235,6 +253,42 @@ Identity Access::with_grants(Identity identity) const {
       for (const auto& role : grant.roles) add_role(identity.roles, role);
   }
   return identity;
+}
+
+std::optional<Identity> Access::renew(const Identity& who) const {
+  const auto now = std::chrono::system_clock::now();
+  if (now >= who.ends) return std::nullopt;
+  auto out = who;
+  out.roles = who.proven_roles;
+  switch (who.proof) {
+    case Proof::none:
+      out = anonymous(who.client);
+      out.device_user = who.device_user;
+      return out;
+    case Proof::password: {
+      const auto entry = state_->users ? state_->users->find(who.name) : std::nullopt;
+      if (!entry || credential_of(*state_->users, who.name) != who.credential) return std::nullopt;
+      out.roles = entry->privileges;
+      break;
+    }
+    case Proof::token: {
+      const auto token = state_->tokens ? state_->tokens->find(who.credential, now) : std::nullopt;
+      if (!token || token->name != who.name) return std::nullopt;
+      out.roles = token->roles;
+      out.ends = token->ends;
+      break;
+    }
+    case Proof::jwt:
+      if (!state_->jwt) return std::nullopt;
+      break;
+    case Proof::certificate:
+      if (state_->config.clients.ca.empty()) return std::nullopt;
+      break;
+    case Proof::proxy:
+      if (state_->config.identity_headers.user.empty()) return std::nullopt;
+      break;
+  }
+  return with_grants(std::move(out));
 }
 
 void Access::record(const AuditEvent& event) {

@@ -32,6 +32,11 @@ using AccessStatePtr = std::shared_ptr<const AccessState>;
 /// The user's name among those of the gateway's users, or of the device's, whoever has judged the login.
 Subject subject_of(const rr::AuthenticatedUser& user);
 
+/// Judges a login by a users file, so that subject_of() knows who has. From any thread.
+/// Errors   authentication_error; see rr::Authenticator.
+rr::Result<rr::AuthenticatedUser> judge_login(const rr::PasswordFileAuthenticator& users,
+                                              const rr::LoginAttempt& attempt);
+
 /// Reads the files. Errors   invalid_configuration, io_error: which can't be used, and why.
 [[nodiscard]] rr::Result<AccessStatePtr> load_access(const AccessConfig& config);
 
@@ -62,6 +67,8 @@ class Access {
   /// Everybody may do everything.
   bool is_open() const { return state_->rules.is_open(); }
   const AccessState& state() const { return *state_; }
+  /// Another one whenever users, tokens or rights have changed.
+  const AccessStatePtr& state_ptr() const { return state_; }
 
   /// Logins of Robot Raconteur by the users file; follows its changes. Null where there is none.
   std::shared_ptr<const rr::Authenticator> authenticator() const;
@@ -75,8 +82,10 @@ class Access {
   /// Who the client of a session is. `shown`  by its connection. `user`  as whom it has logged in since; null: it has
   /// not. A user whom authenticator() has not judged is a device's: that changes no right here.
   Identity in_session(const Identity& shown, const rr::AuthenticatedUser* user) const;
-  /// Any other that is proven.
+  /// Any other that is proven; its roles are those of the proof.
   Identity with_grants(Identity identity) const;
+  /// The same client by the users, tokens and rights of now. nullopt: what it has shown was revoked or has expired.
+  std::optional<Identity> renew(const Identity& who) const;
 
   /// Writes into the audit log; a line that can't be written is noted in the gateway's log, not too often.
   void record(const AuditEvent& event);

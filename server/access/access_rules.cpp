@@ -47,7 +47,9 @@ std::string describe(const AccessRequest& what) {
     return what.verb == Verb::metrics ? "read the gateway's metrics" : "manage the gateway";
   std::string out(to_string(what.verb));
   if (!what.member.empty()) out += " " + rr::quoted(what.member) + " of";
-  return out + " " + rr::quoted(what.path.empty() ? what.service : what.path) + " on device " + rr::quoted(what.device);
+  const auto path = what.path.empty() ? what.service : what.path;
+  if (!path.empty()) out += " " + rr::quoted(path) + " on";
+  return out + " device " + rr::quoted(what.device);
 }
 
 rr::Error denied(const Identity& who, const std::string& what) {
@@ -68,6 +70,9 @@ std::optional<Verb> parse_verb(std::string_view text) {
 
 rr::Result<> AccessRules::check(const Identity& who, const AccessRequest& what) const {
   if (is_open() || (!has_rules() && who.is_proven())) return {};
+  const auto given = [](std::string_view text) { return text.empty() ? std::nullopt : std::optional(text); };
+  if (what.verb == Verb::read && what.member.empty())
+    return sees(who, what.device, given(what.service), given(what.path)) ? rr::Result<>() : denied(who, describe(what));
   for (const auto& rule : rules_)
     if (gives(rule, what.verb) && is_for(rule, who) && fits(rule.devices, what.device) &&
         fits(rule.services, what.service) && fits(rule.paths, what.path) && fits(rule.members, what.member))
@@ -87,6 +92,13 @@ rr::Result<> AccessRules::check_whole_device(const Identity& who, std::string_vi
   return denied(who, "do everything to device " + rr::quoted(device) +
                          ", which a connection needs that passes through the gateway unread; with \"mode\": \"shared\" "
                          "of the device rights hold for each member");
+}
+
+bool AccessRules::sees_any(const Identity& who) const {
+  if (is_open() || (!has_rules() && who.is_proven())) return true;
+  return std::any_of(rules_.begin(), rules_.end(), [&](const AccessRule& rule) {
+    return std::any_of(rule.may.begin(), rule.may.end(), is_device_verb) && is_for(rule, who);
+  });
 }
 
 bool AccessRules::sees(const Identity& who, std::string_view device, std::optional<std::string_view> service,

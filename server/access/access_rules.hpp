@@ -30,10 +30,10 @@ constexpr bool is_device_verb(Verb verb) {
 /// What somebody wants. Borrowed for the call.
 struct AccessRequest {
   std::string_view device = {};   ///< its name in the gateway; empty for the gateway itself
-  std::string_view service = {};  ///< "Create"
-  std::string_view path = {};     ///< of the object, as Robot Raconteur says it: "Create", "Create.axes[2]"
-  std::string_view member = {};   ///< empty: the object itself
-  Verb verb = Verb::read;
+  std::string_view service = {};  ///< "Create"; empty: the device as such
+  std::string_view path = {};     ///< of the object, as Robot Raconteur says it: "Create.axes[2]"; empty: the service
+  std::string_view member = {};   ///< empty: the object as such
+  Verb verb = Verb::read;         ///< to read a device, a service or an object as such is to know of it
 };
 
 /// Gives everybody who has one of the roles all of `may` on whatever fits one pattern of each list. Patterns have '*'
@@ -59,6 +59,7 @@ class AccessRules {
   AccessRules(std::vector<AccessRule> rules, bool needs_login)
       : rules_(std::move(rules)), needs_login_(needs_login || !rules_.empty()) {}
 
+  /// Whoever may do anything within a device, a service or an object may read it as such.
   /// Errors   permission_denied: a sentence that says who may not do what, for the client.
   [[nodiscard]] rr::Result<> check(const Identity& who, const AccessRequest& what) const;
   /// Whether somebody may do all of device_verbs to everything of a device: only then can his bytes pass unread.
@@ -68,6 +69,8 @@ class AccessRules {
   /// to.
   bool sees(const Identity& who, std::string_view device, std::optional<std::string_view> service = {},
             std::optional<std::string_view> path = {}) const;
+  /// Whether there is any device at all that somebody may do something to.
+  bool sees_any(const Identity& who) const;
 
   bool is_open() const { return !needs_login_; }
   bool has_rules() const { return !rules_.empty(); }

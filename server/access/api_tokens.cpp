@@ -93,15 +93,24 @@ rr::Result<> ApiTokens::add_line(std::string_view line) {
 }
 
 rr::Result<Identity> ApiTokens::verify(std::string_view token, std::chrono::system_clock::time_point now) const {
-  const auto found = by_hash_.find(hash_api_token(token));
-  if (found == by_hash_.end()) return rr::make_error(rr::ErrorCode::authentication_error, "token refused: unknown");
+  const auto hash = hash_api_token(token);
+  if (!by_hash_.contains(hash)) return rr::make_error(rr::ErrorCode::authentication_error, "token refused: unknown");
+  auto found = find(hash, now);
+  if (!found) return rr::make_error(rr::ErrorCode::authentication_error, "token refused: it has expired");
+  return std::move(*found);
+}
+
+std::optional<Identity> ApiTokens::find(std::string_view credential, std::chrono::system_clock::time_point now) const {
+  const auto found = by_hash_.find(credential);
+  if (found == by_hash_.end()) return std::nullopt;
   const auto& entry = found->second;
-  if (entry.last_day && now >= *entry.last_day + std::chrono::days(1))
-    return rr::make_error(rr::ErrorCode::authentication_error, "token refused: it has expired");
   Identity out;
   out.name = entry.name;
-  out.roles = entry.roles;
+  out.roles = out.proven_roles = entry.roles;
   out.proof = Proof::token;
+  out.credential = credential;
+  if (entry.last_day) out.ends = *entry.last_day + std::chrono::days(1);
+  if (now >= out.ends) return std::nullopt;
   return out;
 }
 

@@ -25,6 +25,8 @@ class ApiTokens {
 
   /// Errors   authentication_error: unknown, or no longer good.
   rr::Result<Identity> verify(std::string_view token, std::chrono::system_clock::time_point now) const;
+  /// By the identity's credential. nullopt: as above.
+  std::optional<Identity> find(std::string_view credential, std::chrono::system_clock::time_point now) const;
   std::size_t size() const { return by_hash_.size(); }
 
  private:

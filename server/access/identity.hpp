@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <chrono>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -37,12 +38,19 @@ struct Subject {
 };
 
 struct Identity {
-  std::string name = {};  ///< empty: anonymous
-  std::vector<std::string> roles = {};
+  using Time = std::chrono::system_clock::time_point;
+  static constexpr Time never = Time::max();
+
+  std::string name = {};                       ///< empty: anonymous
+  std::vector<std::string> roles = {};         ///< those of the proof, and what grants add
+  std::vector<std::string> proven_roles = {};  ///< those of the proof alone
   Proof proof = Proof::none;
   std::string client = {};  ///< where it comes from, as logs name it: "192.0.2.1:40000"
   /// As whom a device knows the client, by a login that the device has judged. It gives no right here.
   std::string device_user = {};
+  /// Tells a password or a token from any other that the name has had. No secret can be had from it.
+  std::string credential = {};
+  Time ends = never;  ///< of the proof
 
   bool is_proven() const { return proof != Proof::none; }
   bool has_role(std::string_view role) const { return std::find(roles.begin(), roles.end(), role) != roles.end(); }

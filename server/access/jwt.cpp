@@ -92,6 +92,14 @@ rr::Result<> check_time(const rr::Json& claims, std::chrono::system_clock::time_
   return {};
 }
 
+/// Of what check_time() has found good.
+Identity::Time end_of(const rr::Json& claims) {
+  const double seconds = claims.at("exp").get<double>() + clock_slack;
+  constexpr double far = 1e9;  // seconds; the clock counts nanoseconds
+  if (seconds > std::chrono::duration<double>(Identity::never.time_since_epoch()).count() - far) return Identity::never;
+  return Identity::Time(std::chrono::duration_cast<Identity::Time::duration>(std::chrono::duration<double>(seconds)));
+}
+
 rr::Result<> check_parties(const rr::Json& claims, const JwtClaims& wanted) {
   if (!wanted.issuer.empty() && text_of(claims, "iss") != wanted.issuer) return refused("it is of another issuer");
   if (wanted.audience.empty()) return {};
@@ -192,8 +200,9 @@ rr::Result<Identity> JwtVerifier::verify(std::string_view token, std::chrono::sy
   const auto* user = find_claim(*claims, claims_.user_claim);
   if (user && user->is_string()) out.name = user->get<std::string>();
   if (out.name.empty()) return refused("it names no user (" + rr::quoted(claims_.user_claim) + ")");
-  out.roles = read_roles(find_claim(*claims, claims_.roles_claim));
+  out.roles = out.proven_roles = read_roles(find_claim(*claims, claims_.roles_claim));
   out.proof = Proof::jwt;
+  out.ends = end_of(*claims);
   return out;
 }
 

@@ -22,8 +22,10 @@ Tickets::Tickets() : Tickets(rr::random_bytes(key_size)) {}
 
 std::optional<std::string> Tickets::issue(const Identity& who, Time now) const {
   const rr::Json content{{"name", who.name},
-                         {"roles", who.roles},
+                         {"roles", who.proven_roles},
                          {"proof", static_cast<int>(who.proof)},
+                         {"credential", who.credential},
+                         {"until", to_milliseconds(who.ends)},
                          {"ends", to_milliseconds(now + lifetime)},
                          {"nonce", encode_base64url(rr::random_bytes(12))}};
   auto out = encode_base64url(rr::as_bytes(content.dump(-1, ' ', false, rr::Json::error_handler_t::replace)));
@@ -45,8 +47,11 @@ std::optional<Identity> Tickets::redeem(std::string_view ticket, Time now) {
   if (used_.size() >= max_used || !used_.emplace(std::move(*signature), ends).second) return std::nullopt;
   Identity out;
   out.name = json->at("name").get<std::string>();
-  out.roles = json->at("roles").get<std::vector<std::string>>();
+  out.roles = out.proven_roles = json->at("roles").get<std::vector<std::string>>();
   out.proof = static_cast<Proof>(json->at("proof").get<int>());
+  out.credential = json->value("credential", "");
+  const auto until = json->value("until", to_milliseconds(Identity::never));
+  if (until < to_milliseconds(Identity::never)) out.ends = Time(std::chrono::milliseconds(until));
   return out;
 }
 

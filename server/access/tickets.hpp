@@ -26,7 +26,8 @@ class Tickets {
 
   /// nullopt: its roles don't fit into a URL.
   std::optional<std::string> issue(const Identity& who, Time now) const;
-  /// Works once. nullopt: of another key, used, too late, or too many were used just now.
+  /// Who it is for, by what had been shown then; for Access::renew(). Works once. nullopt: of another key, used, too
+  /// late, or too many were used just now.
   std::optional<Identity> redeem(std::string_view ticket, Time now);
 
  private:

@@ -4,6 +4,7 @@
 #include "node/http/request_reader.hpp"
 #include "node/http/upgrade.hpp"
 #include "node/transport/websocket.hpp"
+#include "server/access/standing.hpp"
 #include "server/front/refused_client.hpp"
 #include "server/front/serve_shared_client.hpp"
 #include "server/http/response_writer.hpp"
@@ -48,7 +49,10 @@ rr::Result<Destination> find_destination(GatewayState& gateway, const Request& r
     auto name = path.substr(devices_prefix.size());
     if (!name.empty() && name.back() == '/') name.remove_suffix(1);
     auto* device = gateway.devices().find(name);
-    if (!device) return not_found("no device " + rr::quoted(name) + "; /api/v1/devices lists them");
+    if (!device) {  // strangers are not told so
+      if (auto allowed = gateway.access().check(request.identity, {.device = name}); !allowed) return allowed.error();
+      return not_found("no device " + rr::quoted(name) + "; /api/v1/devices lists them");
+    }
     return destination_of(gateway, *device);
   }
   if (path != "/") return not_found("no WebSocket at " + rr::quoted(path) + "; expected /devices/NAME or /");
@@ -122,9 +126,12 @@ rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& 
     co_return co_await accept_json_socket(gateway, connection, std::move(stream), request, unread);
   const auto destination = find_destination(gateway, request);
   if (!destination) {
-    gateway.reject(Rejection::no_such_device);
     const auto& error = destination.error();
-    const auto response = problem_response(error.code == rr::ErrorCode::node_not_found ? 404 : 400, error.message);
+    const bool is_denied = error.code == rr::ErrorCode::permission_denied;
+    gateway.reject(is_denied ? Rejection::forbidden : Rejection::no_such_device);
+    const auto response =
+        is_denied ? gateway.http_access().refusal(request.identity, error)
+                  : problem_response(error.code == rr::ErrorCode::node_not_found ? 404 : 400, error.message);
     co_await refuse(response);
     co_return Continuation();
   }
@@ -222,7 +229,8 @@ Response stopping_response() {
 /// Whether it matters who asks. The page itself and how the gateway is are no secrets.
 bool is_guarded(const Request& request) {
   const auto path = request.path();
-  return asks_for_websocket(request) || path == "/metrics" || path.substr(0, 5) == "/api/";
+  return asks_for_websocket(request) || path == "/metrics" || path.starts_with("/api/") ||
+         path.starts_with(devices_prefix);
 }
 
 void note_unreadable(GatewayState& gateway, const Connection& connection, const ReadFailure& failure) {
@@ -297,7 +305,10 @@ rr::awaitable<Continuation> serve_http_client(GatewayState& gateway, Connection&
                           : is_base_path(request, config) ? to_base_path(config)
                                                           : gateway.router().answer(request);
     if (response.answer_later) {
+      const auto standing = std::make_shared<Standing>(gateway.access(), request.identity);
+      connection.is_good = [standing] { return standing->is_good(); };
       co_await response.answer_later(writer);
+      connection.is_good = nullptr;
       if (writer.body_failure()) note_unreadable(gateway, connection, *writer.body_failure());
     } else if (co_await writer.send(response)) {
       break;

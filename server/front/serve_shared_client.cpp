@@ -3,7 +3,6 @@
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/use_awaitable.hpp>
 
-#include "server/front/refused_client.hpp"
 #include "server/front/session_end.hpp"
 #include "server/log/log.hpp"
 #include "server/rr/shared_access.hpp"
@@ -38,17 +37,19 @@ namespace {
 constexpr std::chrono::milliseconds look_period{10};
 
 /// Whoever comes when the gateway has just begun, as clients do that its restart has cut off, or to a device whose
-/// sessions rest, waits for what will be there in a moment. Returns whether there is such a node still.
-rr::awaitable<bool> wait_until_ready(GatewayState& gateway, const Destination& destination,
+/// sessions rest, waits for what will be there in a moment. Who may use nothing of a device wakes nothing; a login may.
+/// Returns whether there is such a node still.
+rr::awaitable<bool> wait_until_ready(GatewayState& gateway, const Destination& destination, const Identity& who,
                                      asio::any_io_executor executor) {
-  if (!destination.device) gateway.shared().wake();
+  const auto sees = [&](const Device& device) { return gateway.access().sees(who, device.config().name); };
+  if (!destination.device) gateway.shared().wake(sees);
   asio::steady_timer look(executor);
   const auto deadline = std::chrono::steady_clock::now() + gateway.config().timeouts.connect;
   for (;;) {
     auto& shared = gateway.shared();
     auto* device = destination.device ? shared.find(*destination.device) : nullptr;
     if (destination.device && !device) co_return false;
-    if (device) device->wake();
+    if (device && sees(*destination.device)) device->wake();
     const bool is_ready = device ? device->is_ready() : shared.is_ready();
     if (is_ready || gateway.is_stopping() || std::chrono::steady_clock::now() >= deadline) co_return true;
     look.expires_after(look_period);
@@ -72,19 +73,64 @@ auto make_rate_gate(GatewayState& gateway, const SharedNode& node, const Connect
   };
 }
 
+/// A session takes its seat at a device when it connects to a service.
+class Seating {
+ public:
+  explicit Seating(GatewayState& gateway) : gateway_(gateway) {}
+
+  /// Errors   connection_error: the device is full.
+  rr::Result<> sit_down(const std::string& device_name) {
+    auto* device = gateway_.devices().find(device_name);
+    if (seat_ || !device) return {};
+    if (auto taken = device->take_seat()) {
+      seat_.emplace(std::move(*taken));
+      return {};
+    }
+    gateway_.reject(Rejection::device_full);
+    return rr::make_error(rr::ErrorCode::connection_error, device->full_text());
+  }
+  void get_up() { seat_.reset(); }
+
+ private:
+  GatewayState& gateway_;
+  std::optional<Device::Seat> seat_;
+};
+
+/// What a session asks before it does anything, or tells of anything.
+auto make_admission(GatewayState& gateway, const SharedNode& node, std::string peer,
+                    std::shared_ptr<SessionRights> rights, std::shared_ptr<Seating> seating) {
+  return [&gateway, &node, peer = std::move(peer), rights = std::move(rights),
+          seating = std::move(seating)](const rr::MemberAccess& wanted) -> rr::Result<> {
+    const bool connects =
+        wanted.type == rr::EntryType::connect_client || wanted.type == rr::EntryType::connect_client_combined;
+    auto allowed = rights->admit(wanted);
+    if (!connects) return allowed;
+    if (!allowed)
+      gateway.reject(Rejection::forbidden);
+    else
+      allowed = seating->sit_down(node.device_of(wanted.path));
+    if (!allowed) log(LogLevel::info, "client refused", {{"peer", peer}, {"error", allowed.error().message}});
+    return allowed;
+  };
+}
+
 /// Whoever waits for the end of the session is woken by `ended`.
 std::shared_ptr<SharedClient> begin_session(GatewayState& gateway, Connection& connection, Destination destination,
                                             std::unique_ptr<rr::ByteStream> client, std::string base_url,
-                                            std::function<void()> ended) {
+                                            std::shared_ptr<Seating> seating, std::function<void()> ended) {
+  const auto device = destination.device ? destination.device->config().name : std::string();
+  const auto shown = std::make_shared<Standing>(gateway.access(), connection.identity);
+  const auto rights = std::make_shared<SessionRights>(gateway.access(), *destination.node, device, shown);
   SharedArrival arrival;
   arrival.peer = connection.client;
   arrival.base_url = std::move(base_url);
   arrival.is_encrypted = connection.peer.is_encrypted;
-  arrival.admit = make_admission(gateway.access(), *destination.node, connection.identity);
+  arrival.admit = make_admission(gateway, *destination.node, connection.client, rights, std::move(seating));
   arrival.enter = make_rate_gate(gateway, *destination.node, connection);
   auto session = destination.node->add(std::move(client), std::move(arrival), std::move(ended));
   connection.device = destination.device;
   connection.has_session = true;
+  connection.is_good = [rights] { return rights->is_good(); };
   connection.stop = [session](const rr::EndReason& reason) {
     session->close_service();
     session->close(rr::make_error(rr::ErrorCode::connection_error, reason.text));
@@ -100,32 +146,22 @@ std::string end_reason(const SharedClient& session) {
 
 rr::awaitable<void> serve_shared_client(GatewayState& gateway, Connection& connection, Destination destination,
                                         std::unique_ptr<rr::ByteStream> client, std::string base_url) {
-  std::optional<Device::Seat> seat;
-  if (destination.device) {
-    if (auto taken = destination.device->take_seat()) {
-      seat.emplace(std::move(*taken));
-    } else {
-      gateway.reject(Rejection::device_full);
-      auto full = rr::make_error(rr::ErrorCode::connection_error, destination.device->full_text());
-      log(LogLevel::info, "client refused", {{"peer", connection.client}, {"error", full.message}});
-      auto self = destination.node->identity();
-      co_await refuse_in_session(gateway, connection, std::move(self), std::move(client), std::move(full));
-      co_return;
-    }
-  }
   const auto executor = client->executor();
-  if (!co_await wait_until_ready(gateway, destination, executor)) {
+  if (!co_await wait_until_ready(gateway, destination, connection.identity, executor)) {
     client->close();
     co_return;
   }
   const auto name = destination.device ? destination.device->config().name : std::string("the gateway");
   log(LogLevel::info, "client connected", {{"device", name}, {"peer", connection.client}, {"mode", "shared"}});
   SessionEnd end(executor);
-  const auto session =
-      begin_session(gateway, connection, destination, std::move(client), std::move(base_url), [&end] { end.reach(); });
+  const auto seating = std::make_shared<Seating>(gateway);
+  const auto session = begin_session(gateway, connection, destination, std::move(client), std::move(base_url), seating,
+                                     [&end] { end.reach(); });
   co_await end.wait();
+  seating->get_up();
   connection.device = nullptr;
   connection.has_session = false;
+  connection.is_good = nullptr;
   connection.stop = [](const rr::EndReason&) {};
   log(LogLevel::info, "client disconnected",
       {{"device", name}, {"peer", connection.client}, {"reason", end_reason(*session)}});

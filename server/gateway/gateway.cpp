@@ -26,7 +26,7 @@ namespace {
 constexpr std::chrono::milliseconds last_wait{2000};
 
 /// How often the files of certificates, CAs, users and rights are looked at.
-constexpr std::chrono::seconds files_watch_period{2};
+constexpr std::chrono::milliseconds files_watch_period{500};
 
 }  // namespace
 
@@ -126,7 +126,7 @@ void Gateway::tell_of_nodes() {
       const auto& identity = device->identity();
       if (!shared && !identity) continue;
       const auto node = shared ? shared->node().identity() : rr::NodeIdentity{identity->node_id, identity->node_name};
-      out.push_back({node, {}});
+      out.push_back({node, {}, device->config().name});
       if (!base_url.empty()) out.back().index_urls.push_back(index_url(base_url, node));
     }
     return out;
@@ -137,7 +137,7 @@ void Gateway::tell_of_nodes() {
     if (!found()) return out;
     for (const auto& entry : found()->list()) {
       if (entry.device) continue;
-      rr::KnownNode node{{entry.node.node_id, entry.node.node_name}, {}};
+      rr::KnownNode node{{entry.node.node_id, entry.node.node_name}, {}, {}};
       for (const auto& each : entry.node.urls) node.index_urls.push_back(each.url);
       out.push_back(std::move(node));
     }
@@ -151,6 +151,7 @@ rr::awaitable<void> Gateway::watch_files() {
     co_await files_watch_.async_wait(asio::as_tuple(asio::use_awaitable));
     if (is_stopping_) break;
     access_.reload(false);
+    end_those_not_good();
     if (web_tls_ && web_tls_->has_changed()) web_tls_->reload();
     devices_.reload_tls(false);
     if (found_) found_->reload_tls(false);
@@ -226,7 +227,17 @@ rr::Result<> Gateway::reconfigure(Config next) {
     if (connection.device && !connection.device->config().is_found && !devices_.has(*connection.device))
       connection.stop({1001, "the device has left the configuration, or is another one there"});
   }
+  end_those_not_good();
   return {};
+}
+
+void Gateway::end_those_not_good() {
+  for (auto it = connections_.begin(); it != connections_.end();) {
+    auto& connection = *it++;
+    if (!connection.is_good || connection.is_good()) continue;
+    log(LogLevel::info, "client ended: what it has shown was revoked or has expired", {{"peer", connection.client}});
+    connection.stop({1008, "what you have shown was revoked or has expired"});
+  }
 }
 
 void Gateway::reload_files() {

@@ -51,6 +51,8 @@ class Gateway : public GatewayState {
   void accept(boost::asio::ip::tcp::socket socket);
   rr::awaitable<void> drain();
   rr::awaitable<void> watch_files();
+  /// Ends what goes on for clients whose proof was revoked or has expired.
+  void end_those_not_good();
   void close_listeners();
   void tell_of_nodes();
   bool has_session() const;

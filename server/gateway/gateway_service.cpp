@@ -123,12 +123,13 @@ rr::Value GatewayService::list_statistics() const {
 
 rr::Value GatewayService::list_subscriptions() const {
   rr::List out;
+  const bool shows_clients = gateway_.access().is_open();  // nobody knows here who asks
   gateway_.shared().visit_ledgers([&](const SharedDevice& device, const SharedClient& client, const std::string& path,
                                       const rr::MemberDefinition& member, const rr::Ledger& ledger) {
     out.items.push_back(rr::Structure{"org.rrgate.gateway.Subscription",
                                       {{"device", device.device()->config().name},
                                        {"service_name", client.service() ? client.service()->name() : std::string()},
-                                       {"client", client.peer()},
+                                       {"client", shows_clients ? client.peer() : std::string()},
                                        {"path", path},
                                        {"member", member.name},
                                        {"kind", member.kind == rr::MemberKind::wire ? "wire" : "pipe"},

@@ -1,5 +1,6 @@
 #include "server/relay/client_relay.hpp"
 
+#include "server/access/standing.hpp"
 #include "server/log/log.hpp"
 #include "server/relay/relay.hpp"
 
@@ -39,6 +40,8 @@ rr::awaitable<void> relay_client(GatewayState& gateway, Connection& connection, 
   connection.device = &device;
   connection.has_session = true;
   connection.stop = [&relay](rr::EndReason reason) { relay.stop(std::move(reason)); };
+  const auto standing = std::make_shared<Standing>(gateway.access(), connection.identity);
+  connection.is_good = [standing] { return standing->is_good(); };
   const auto& name = device.config().name;
   log(LogLevel::info, "client connected", {{"device", name}, {"peer", connection.client}});
 
@@ -46,6 +49,7 @@ rr::awaitable<void> relay_client(GatewayState& gateway, Connection& connection, 
 
   connection.device = nullptr;
   connection.has_session = false;
+  connection.is_good = nullptr;
   connection.stop = [](const rr::EndReason&) {};
   // A device that ends a connection may be ending altogether: find out now rather than at the next look.
   if (!gateway.is_stopping() && (reason.code == 1011 || reason.text.rfind("device", 0) == 0)) device.note_trouble();

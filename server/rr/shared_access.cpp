@@ -31,34 +31,82 @@ Verb verb_of(rr::EntryType type) {
   }
 }
 
-/// Of these there may be thousands a second: they are held to the rules, but their beginning alone is recorded. Nor is
-/// what the device does by itself.
-bool is_part_of_stream(rr::EntryType type) {
-  return type == rr::EntryType::wire_packet || type == rr::EntryType::pipe_packet || type == rr::EntryType::event_req ||
-         type == rr::EntryType::callback_call_req || type == rr::EntryType::generator_next_req;
+Recorded recorded_of(rr::EntryType type) {
+  switch (type) {
+    case rr::EntryType::wire_packet:
+    case rr::EntryType::pipe_packet:
+      return Recorded::first_time;
+    case rr::EntryType::event_req:
+    case rr::EntryType::callback_call_req:
+    case rr::EntryType::generator_next_req:
+      return Recorded::never;
+    default:
+      return Recorded::each_time;
+  }
+}
+
+/// What is not about a member, but about a service as such. An object that is looked for may be on the way to another.
+bool is_about_service(rr::EntryType type) {
+  switch (type) {
+    case rr::EntryType::null:
+    case rr::EntryType::get_service_desc:
+    case rr::EntryType::object_type_name:
+    case rr::EntryType::connect_client:
+    case rr::EntryType::connect_client_combined:
+    case rr::EntryType::get_service_attributes:
+      return true;
+    default:
+      return false;
+  }
 }
 
 }  // namespace
 
-std::function<rr::Result<>(const rr::MemberAccess&)> make_admission(Access& access, const SharedNode& node,
-                                                                    Identity who) {
-  return [&access, &node, who = std::move(who)](const rr::MemberAccess& wanted) -> rr::Result<> {
-    if (access.is_open()) return {};
-    const auto service = wanted.path.substr(0, wanted.path.find('.'));
-    if (service == rr::service_index_name) return {};  // as for nodes: what there is, is no secret
-    const auto device = node.device_of(service);
-    const auto asker = access.in_session(who, wanted.user);
-    // What makes the device look for an object, which may be on the way to another.
-    if (wanted.type == rr::EntryType::object_type_name && access.sees(asker, device, service)) return {};
-    AccessRequest request;
-    request.device = device;
-    request.service = service;
-    request.path = wanted.path;
-    if (wanted.member) request.member = wanted.member->name;
-    request.verb = verb_of(wanted.type);
-    if (is_part_of_stream(wanted.type)) return access.state().rules.check(asker, request);
-    return access.check(asker, request);
-  };
+Standing& SessionRights::standing_of(const rr::AuthenticatedUser* user) {
+  if (!user) {
+    user_.reset();
+    return *shown_;
+  }
+  const auto subject = subject_of(*user);
+  if (!user_ || user_is_ != subject) {
+    user_ = std::make_shared<Standing>(access_, access_.in_session(shown_->identity(), user));
+    user_is_ = subject;
+  }
+  return *user_;
+}
+
+rr::Result<> SessionRights::admit_to_service(Standing& asker, const rr::MemberAccess& wanted,
+                                             std::string_view service) {
+  const auto of_service = node_.device_of(service);
+  // A service that is not there: who may use anything of the node may hear so.
+  const auto& device = of_service.empty() ? device_ : of_service;
+  const auto& rules = access_.state().rules;
+  if (device.empty() && rules.sees_any(asker.identity())) return {};
+  const bool is_told = wanted.type != rr::EntryType::null;
+  auto allowed = asker.check({.device = device, .service = service}, is_told ? Recorded::each_time : Recorded::never);
+  if (allowed || wanted.user || asker.identity().is_proven() || !access_.authenticator()) return allowed;
+  // The same for a service that is not there.
+  return rr::make_error(rr::ErrorCode::authentication_error,
+                        "who is not logged in may not use service " + rr::quoted(service));
+}
+
+rr::Result<> SessionRights::admit(const rr::MemberAccess& wanted) {
+  if (access_.is_open()) return {};
+  auto& asker = standing_of(wanted.user);
+  if (wanted.type == rr::EntryType::get_node_info)
+    return wanted.path.empty() ? asker.check({.verb = Verb::admin}, Recorded::never)
+                               : asker.check({.device = wanted.path}, Recorded::never);
+  const auto service = wanted.path.substr(0, wanted.path.find('.'));
+  if (service == rr::service_index_name) return {};  // it tells each client what that may know
+  if (!wanted.member && is_about_service(wanted.type)) return admit_to_service(asker, wanted, service);
+  AccessRequest request;
+  const auto device = node_.device_of(service);
+  request.device = device;
+  request.service = service;
+  request.path = wanted.path;
+  if (wanted.member) request.member = wanted.member->name;
+  request.verb = verb_of(wanted.type);
+  return asker.check(request, recorded_of(wanted.type));
 }
 
 }  // namespace rrgate

@@ -1,17 +1,37 @@
-// Rights of clients of shared devices, member by member. Layer: server/rr.
+// Rights of clients of shared devices: which services they get to, and member by member. Layer: server/rr.
 #pragma once
 
-#include <functional>
+#include <memory>
 
 #include "core/session/service/service_session.hpp"
-#include "server/access/access.hpp"
+#include "server/access/standing.hpp"
 #include "server/rr/shared_node.hpp"
 
 namespace rrgate {
 
-/// What a session of `who` asks before anything is done with a member. A user who logs in is asked about from then on.
-/// `access` and `node` outlive the session.
-std::function<rr::Result<>(const rr::MemberAccess&)> make_admission(Access& access, const SharedNode& node,
-                                                                    Identity who);
+/// Of one session: what its connection has shown counts, or, once it has logged in at the gateway, as whom.
+class SessionRights {
+ public:
+  /// `access` and `node` outlive it. `device`  the one that the node stands for; empty: the gateway's own node.
+  SessionRights(Access& access, const SharedNode& node, std::string device, StandingPtr shown)
+      : access_(access), node_(node), device_(std::move(device)), shown_(std::move(shown)) {}
+
+  /// For ServiceSessionOptions::admit. Errors   permission_denied; authentication_error: a login may help.
+  [[nodiscard]] rr::Result<> admit(const rr::MemberAccess& wanted);
+  /// Whether all that was shown is still good; see Standing.
+  bool is_good() { return shown_->is_good() && (!user_ || user_->is_good()); }
+
+ private:
+  /// Whose rights count. `user`  null: has not logged in.
+  Standing& standing_of(const rr::AuthenticatedUser* user);
+  rr::Result<> admit_to_service(Standing& asker, const rr::MemberAccess& wanted, std::string_view service);
+
+  Access& access_;
+  const SharedNode& node_;
+  std::string device_;
+  StandingPtr shown_;
+  StandingPtr user_;  ///< as whom it has logged in; null: it has not
+  Subject user_is_;
+};
 
 }  // namespace rrgate

@@ -251,9 +251,25 @@ void SharedClient::handle(const rr::CallbackCompleted& completed) {
   if (found) found.mapped()(completed.result);
 }
 
-void SharedClient::answer_login(rr::LoginId id, rr::Result<rr::AuthenticatedUser> result) {
-  session_.answer_login(id, std::move(result), rr::read_clocks());
+void SharedClient::answer_login(const rr::LoginRequested& login, rr::Result<rr::AuthenticatedUser> result) {
+  const auto service = result ? owner_->find_service(login.attempt.service) : nullptr;
+  if (service && service->upstream()->is_resting()) {
+    const auto self = std::static_pointer_cast<SharedClient>(shared_from_this());
+    asio::co_spawn(executor(), answer_when_open(self, service->upstream(), login.id, std::move(*result)),
+                   asio::detached);
+    return;
+  }
+  session_.answer_login(login.id, std::move(result), rr::read_clocks());
   settle();
+}
+
+/// Before it had logged in, the client could wake nothing.
+rr::awaitable<void> SharedClient::answer_when_open(std::shared_ptr<SharedClient> self,
+                                                   std::shared_ptr<Upstream> upstream, rr::LoginId login,
+                                                   rr::AuthenticatedUser user) {
+  (void)co_await upstream->opened();  // where the device is away, the client hears so later, as others do
+  self->session_.answer_login(login, std::move(user), rr::read_clocks());
+  self->settle();
 }
 
 // --- logins: where the gateway has no users, the device judges them, by a session of this client's own ---
@@ -265,6 +281,10 @@ void SharedClient::handle(const rr::LoginRequested& login) {
                                  rr::read_clocks());
   const auto self = std::static_pointer_cast<SharedClient>(shared_from_this());
   if (!service->is_for_device(*login.authenticator)) return owner_->judge_login(login, self);
+  // A login at the device adds no right here: who has none does not even get to try.
+  if (!session_.admits(rr::EntryType::object_type_name, login.attempt.service, nullptr))
+    return session_.answer_login(login.id, rr::make_error(rr::ErrorCode::authentication_error, "Authentication Failed"),
+                                 rr::read_clocks());
   asio::co_spawn(executor(), log_in_at_device(self, service, login), asio::detached);
 }
 

@@ -37,7 +37,7 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   const std::string& peer() const { return peer_; }
   /// Null while it has not connected to a service.
   const std::shared_ptr<SharedService>& service() const { return service_; }
-  void answer_login(rr::LoginId id, rr::Result<rr::AuthenticatedUser> result);
+  void answer_login(const rr::LoginRequested& login, rr::Result<rr::AuthenticatedUser> result);
   /// Tells the client that its service ends, then closes.
   void close_service();
   /// Why the gateway has closed it; empty where it has not.
@@ -76,7 +76,7 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   std::weak_ptr<const void> life() const override { return weak_from_this(); }
   Subject lock_user() const override { return session_.user() ? subject_of(*session_.user()) : Subject(); }
   bool may_answer(const std::string& path, const rr::MemberDefinition& callback) const override {
-    return session_.admits(rr::EntryType::callback_call_req, path, callback);
+    return session_.admits(rr::EntryType::callback_call_req, path, &callback);
   }
   void receive_event(rr::EventPacket& packet) override;
   void receive_wire(rr::WirePacket& packet) override;
@@ -95,6 +95,8 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
 
   static rr::awaitable<void> log_in_at_device(std::shared_ptr<SharedClient> self,
                                               std::shared_ptr<SharedService> service, rr::LoginRequested login);
+  static rr::awaitable<void> answer_when_open(std::shared_ptr<SharedClient> self, std::shared_ptr<Upstream> upstream,
+                                              rr::LoginId login, rr::AuthenticatedUser user);
   /// From now on all that the client does goes through `upstream`.
   void move_to(std::shared_ptr<Upstream> upstream);
   void leave_login();

@@ -113,8 +113,9 @@ bool SharedDevices::is_ready() const {
   return std::all_of(devices_.begin(), devices_.end(), [](const auto& device) { return device.second->is_ready(); });
 }
 
-void SharedDevices::wake() {
-  for (const auto& [key, device] : devices_) device->wake();
+void SharedDevices::wake(const std::function<bool(const Device&)>& wanted) {
+  for (const auto& [key, device] : devices_)
+    if (wanted(*key)) device->wake();
 }
 
 SharedDevice* SharedDevices::find(const Device& device) const {

@@ -2,6 +2,7 @@
 // Source: sessions spec sections 2.16 and 2.20.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -53,8 +54,8 @@ class SharedDevices {
   void renew_judges();
 
   bool is_ready() const;
-  /// Of all devices.
-  void wake();
+  /// Of all devices that are `wanted`.
+  void wake(const std::function<bool(const Device&)>& wanted);
   /// Null where the device is not shared.
   SharedDevice* find(const Device& device) const;
   /// By the identity of the node that stands for a device.

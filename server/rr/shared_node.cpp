@@ -53,8 +53,8 @@ std::string SharedNode::device_of(std::string_view service) const {
 }
 
 void SharedNode::judge_login(const rr::LoginRequested& login, const std::shared_ptr<SharedClient>& client) {
-  judge_.judge(login, client->executor(), [id = login.id, weak = std::weak_ptr(client)](const auto& result) {
-    if (const auto still_there = weak.lock()) still_there->answer_login(id, result);
+  judge_.judge(login, client->executor(), [login, weak = std::weak_ptr(client)](const auto& result) {
+    if (const auto still_there = weak.lock()) still_there->answer_login(login, result);
   });
 }
 

@@ -73,7 +73,10 @@ const JsonOperations::Operation JsonOperations::operations[] = {
     {"abort", Verb::call, &JsonOperations::abort, {.has_target = false, .is_free = true}},
     {"subscribe", Verb::subscribe, &JsonOperations::subscribe},
     {"unsubscribe", Verb::subscribe, &JsonOperations::unsubscribe, {.has_target = false, .is_free = true}},
-    {"send", Verb::write, &JsonOperations::send, {.needs_own = true, .keeps_order = true, .is_free = true}},
+    {"send",
+     Verb::write,
+     &JsonOperations::send,
+     {.needs_own = true, .keeps_order = true, .is_free = true, .recorded = Recorded::first_time}},
     {"callback", Verb::subscribe, &JsonOperations::callback, {.needs_own = true}},
     {"answer", Verb::subscribe, &JsonOperations::answer, {.has_target = false, .is_free = true}},
     {"shape", Verb::read, &JsonOperations::shape},
@@ -105,8 +108,8 @@ rr::awaitable<void> JsonOperations::take(const std::string& message) {
   const auto* operation = name && name->is_string() ? find_operation(name->get_ref<const std::string&>()) : nullptr;
   Passes passes;
   if (!operation || !operation->traits.is_free) {
-    auto entered = gateway_.http_access().enter(place_.address, place_.who.subject(), place_.device->config().name,
-                                                gateway_.config().rates);
+    auto entered = gateway_.http_access().enter(place_.address, place_.standing->identity().subject(),
+                                                place_.device->config().name, gateway_.config().rates);
     if (!entered) {
       gateway_.reject(Rejection::rate);
       co_return outbox_->add(json_refusal(request->id(), entered.error(), 1));
@@ -158,13 +161,15 @@ rr::awaitable<JsonOperations::TargetPtr> JsonOperations::find(RequestPtr request
                           target->member->direction() == rr::MemberDirection::both;
   if ((operation.traits.needs_own || (is_two_way && operation.verb == Verb::subscribe)) && used != own_) {
     if (!own_) {
-      auto user = place_.who.is_proven() ? place_.who.subject() : place_.key.subject();
+      const auto& who = place_.standing->identity();
+      auto user = who.is_proven() ? who.subject() : place_.key.subject();
       own_ = value_or_throw(make_value_client(used->upstream(), std::move(user)));
     }
     target->client = own_;
   }
   if (is_stopped_) refuse(rr::ErrorCode::operation_cancelled, "the WebSocket has ended");
-  if (const auto allowed = check_access(gateway_, place_.who, place_.key.service, *target, operation.verb); !allowed)
+  const auto wanted = access_request(*target, operation.verb);
+  if (const auto allowed = place_.standing->check(wanted, operation.traits.recorded); !allowed)
     throw rr::Exception(allowed.error());
   co_return target;
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "node/transport/watchdog.hpp"
+#include "server/access/standing.hpp"
 #include "server/http/endpoints/object_request.hpp"
 #include "server/socket/json_outbox.hpp"
 #include "server/socket/json_request.hpp"
@@ -18,7 +19,7 @@ namespace rrgate {
 /// Which object a socket is about, in which form.
 struct JsonSocketPlace {
   std::shared_ptr<Device> device;
-  Identity who;  ///< of the gateway's users
+  StandingPtr standing;  ///< of the gateway's users
   std::string address;
   SessionKey key;
   std::vector<std::string> segments;  ///< below the service's root
@@ -45,6 +46,7 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
     bool needs_own = false;    ///< to be a client of its own
     bool keeps_order = false;  ///< the next message waits for it
     bool is_free = false;      ///< of bounds on requests: packets, and what ends something
+    Recorded recorded = Recorded::each_time;
   };
   struct Operation {
     std::string_view name;

@@ -99,20 +99,18 @@ rr::Result<std::shared_ptr<JsonSocketPlace>> find_json_socket(GatewayState& gate
   if (!segments) return segments.error();
   if (segments->size() < 2)
     return rr::make_error(rr::ErrorCode::object_not_found, "expected /api/v1/devices/DEVICE/SERVICE");
+  // What is done to which member is judged when it is asked for.
+  const AccessRequest wanted{.device = segments->front(), .service = (*segments)[1]};
+  if (const auto allowed = gateway.access().check(request.identity, wanted); !allowed) return allowed.error();
   auto* device = gateway.devices().find(segments->front());
   if (!device)
     return rr::make_error(rr::ErrorCode::node_not_found,
                           "no device " + rr::quoted(segments->front()) + "; /api/v1/devices lists them");
   auto place = std::make_shared<JsonSocketPlace>();
   place->device = device->shared_from_this();
-  place->who = request.identity;
+  place->standing = std::make_shared<Standing>(gateway.access(), request.identity);
   place->address = client_network(request.arrival.address).to_string();
   place->key = session_key(gateway, request, (*segments)[1]);
-  // What is done to which member is judged when it is asked for.
-  if (!gateway.access().sees(place->who, device->config().name, place->key.service)) {
-    const AccessRequest all{device->config().name, place->key.service, place->key.service, {}, Verb::read};
-    if (const auto allowed = gateway.access().check(place->who, all); !allowed) return allowed.error();
-  }
   place->segments.assign(segments->begin() + 2, segments->end());
   place->form = json_form(request);
   place->trace = trace_id_of(request.header("traceparent"));
@@ -125,11 +123,13 @@ rr::awaitable<void> serve_json_socket(GatewayState& gateway, Connection& connect
   const auto device = place->device->config().name;
   connection.device = place->device.get();
   connection.stop = [socket](rr::EndReason reason) { socket->stop(std::move(reason)); };
+  connection.is_good = [standing = place->standing] { return standing->is_good(); };
   log(LogLevel::info, "client connected", {{"device", device}, {"peer", connection.client}, {"as", "json"}});
 
   const auto reason = co_await socket->run();
 
   connection.device = nullptr;
+  connection.is_good = nullptr;
   connection.stop = [](const rr::EndReason&) {};
   log(LogLevel::info, "client disconnected", {{"device", device}, {"peer", connection.client}, {"reason", reason}});
 }

@@ -27,6 +27,8 @@ struct Connection : boost::intrusive::list_base_hook<boost::intrusive::link_mode
 
   /// Ends it soon.
   std::function<void(rr::EndReason)> stop;
+  /// Whether what its client has shown is still good (Standing); none: nothing goes on that would have to end.
+  std::function<bool()> is_good;
   /// Set while it is used for one device.
   const Device* device = nullptr;
   /// It carries a Robot Raconteur session, which may go on for a while when the gateway stops.

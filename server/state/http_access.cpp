@@ -25,7 +25,7 @@ using Judged = rr::Result<rr::AuthenticatedUser>;
 
 rr::awaitable<Judged> judge(std::shared_ptr<const rr::PasswordFileAuthenticator> users,
                             std::shared_ptr<const rr::LoginAttempt> attempt) {
-  co_return users->authenticate(*attempt);
+  co_return judge_login(*users, *attempt);
 }
 
 rr::Error refused(std::string why) {
@@ -41,12 +41,19 @@ std::optional<std::string_view> credentials_of(std::string_view header, std::str
   return header.substr(std::min(header.find_first_not_of(' '), header.size()));
 }
 
-std::optional<Identity> by_proxy(const Request& request, const Connection& connection, const Config& config) {
+/// Anonymous where no proxy that is trusted says more.
+/// Errors   invalid_argument: a header that came twice. One may be the client's, and nobody knows which.
+rr::Result<Identity> by_proxy(const Request& request, const Connection& connection, const Config& config) {
   const auto& headers = config.access.identity_headers;
-  if (headers.user.empty() || !config.proxy.trust.trusts(connection.peer.endpoint.address())) return std::nullopt;
   Identity out;
+  if (headers.user.empty() || !config.proxy.trust.trusts(connection.peer.endpoint.address())) return out;
+  for (const auto* name : {&headers.user, &headers.roles})
+    if (const auto count = name->empty() ? 0 : request.message.count(*name); count > 1)
+      return rr::make_error(rr::ErrorCode::invalid_argument,
+                            "header " + rr::quoted(*name) + " came " + std::to_string(count) +
+                                " times, expected it once: the proxy has to take away what clients put there");
   out.name = request.header(headers.user);
-  if (out.name.empty()) return std::nullopt;
+  if (out.name.empty()) return out;
   if (!headers.roles.empty())
     for (const auto role : rr::split_words(request.header(headers.roles), ", |\t")) out.roles.emplace_back(role);
   out.proof = Proof::proxy;
@@ -71,7 +78,9 @@ rr::awaitable<rr::Result<Identity>> HttpAccess::identify(const Request& request,
     return access_.with_grants(std::move(identity));
   };
   if (access_.is_open()) co_return access_.anonymous(client);
-  if (auto identity = by_proxy(request, connection, config)) co_return proven(std::move(*identity));
+  auto told = by_proxy(request, connection, config);
+  if (!told) co_return told.error();
+  if (told->is_proven()) co_return proven(std::move(*told));
   const auto header = request.header(http::field::authorization);
   const auto& state = access_.state();
   const auto bearer = credentials_of(header, "Bearer");
@@ -92,6 +101,8 @@ rr::awaitable<rr::Result<Identity>> HttpAccess::identify(const Request& request,
       auto identity = access_.tickets().redeem(*ticket, std::chrono::system_clock::now());
       if (!identity) co_return refused("the ticket is unknown, was used, or is older than 30 seconds");
       identity->client = client;
+      identity = access_.renew(*identity);
+      if (!identity) co_return refused("what the ticket was given for was revoked or has expired");
       co_return std::move(*identity);
     }
   if (connection.identity.proof == Proof::certificate) co_return proven(connection.identity);
@@ -160,6 +171,7 @@ Response HttpAccess::refusal(const Identity& who, const rr::Error& error) const 
   const bool helps = error.code == rr::ErrorCode::authentication_error || !who.is_proven();
   unsigned status = has_challenge && helps ? 401 : 403;
   if (error.code == rr::ErrorCode::out_of_system_resource) status = 503;
+  if (error.code == rr::ErrorCode::invalid_argument) status = 400;
   auto problem = rr::OrderedJson::object();
   const auto name = std::string(error_code_name(error.code));
   rr::add_key(problem, "type") = "about:blank";

@@ -27,13 +27,14 @@ class HttpAccess {
 
   /// What the request shows, in this order: the headers of a trusted proxy, Authorization, a ticket where it becomes a
   /// WebSocket, the certificate of the connection. All are borrowed until the answer.
-  /// Errors   authentication_error: what it shows is wrong; out_of_system_resource: too many tries.
+  /// Errors   authentication_error: what it shows is wrong; out_of_system_resource: too many tries; invalid_argument:
+  /// two proxies in one, see IdentityHeaders.
   rr::awaitable<rr::Result<Identity>> identify(const Request& request, const Connection& connection,
                                                const Config& config);
   /// Whether Basic credentials are for the gateway; else they are for the device.
   bool takes_basic() const { return access_.state().users != nullptr; }
 
-  /// 401 where showing who one is may help, 403, or 503. As application/problem+json.
+  /// 401 where showing who one is may help, 403, 503, or 400. As application/problem+json.
   Response refusal(const Identity& who, const rr::Error& error) const;
 
   /// What lets one request pass, as long as it is answered; or what it is refused with.

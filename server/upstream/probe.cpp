@@ -1,5 +1,8 @@
 #include "server/upstream/probe.hpp"
 
+#include <algorithm>
+
+#include "core/session/service/service_index.hpp"
 #include "node/discovery/service_query.hpp"
 
 namespace rrgate {
@@ -16,8 +19,11 @@ rr::awaitable<rr::Result<ProbeResult>> probe(rr::ConnectionUrl url, rr::DialOpti
   ProbeResult result{answer->node.id, answer->node.name, {}};
   for (const auto& service : answer->services)
     result.services.push_back({service.name, service.root_object_type, service.root_object_implements});
-  // A small device may have no service index: what its URL names is all that is known of it.
-  if (result.services.empty() && !service_of_url.empty()) result.services.push_back({service_of_url, {}, {}});
+  // A small device may have no service index, another gateway tells strangers of no service: what the URL names is all
+  // that is known.
+  const auto is_index = [](const DeviceService& service) { return service.name == rr::service_index_name; };
+  if (!service_of_url.empty() && std::all_of(result.services.begin(), result.services.end(), is_index))
+    result.services.push_back({service_of_url, {}, {}});
   co_return result;
 }
 

@@ -15,7 +15,7 @@ import websockets.sync.client
 
 from directions import PEERS
 from gateways import RRGATE, Gateway, make_web_certificates, rrgate
-from http_api import BASE, JSON_PROTOCOL, ask, is_alive, open_websocket, schemathesis, upgrade_status
+from http_api import BASE, JSON_PROTOCOL, Stream, ask, is_alive, open_websocket, schemathesis, upgrade_status
 from news import under_load
 from processes import Background
 from users import PASSWORDS, RULES, basic, bearer, make_users
@@ -354,6 +354,104 @@ def test_what_a_trusted_proxy_says(device, tmp_path):
         assert status("127.0.0.2", {**says, "X-Roles": "viewer"}) == 403
         assert status("127.0.0.1", says) == 403
         assert status("127.0.0.2", {}) == 403
+        # A proxy that adds its header behind the client's: nobody knows which is whose.
+        for name, theirs in says.items():
+            made = http.client.HTTPConnection("127.0.0.1", gateway.port, timeout=20, source_address=("127.0.0.2", 0))
+            made.putrequest("GET", BASE + "/p_double")
+            for header, value in [(name, "mallory"), *says.items()]:
+                made.putheader(header, value)
+            made.endheaders()
+            with contextlib.closing(made):
+                answer = made.getresponse()
+                assert answer.status == 400 and f"header '{name}' came 2 times" in json.loads(answer.read())["detail"]
+
+
+def ends(link):
+    """Waits for the end of a connection, however it comes. Returns after how many seconds."""
+    began = time.monotonic()
+    link.settimeout(10)
+    with contextlib.suppress(ConnectionError):
+        while link.recv(4096):
+            pass
+    return time.monotonic() - began
+
+
+@contextlib.contextmanager
+def sessions_of_all_kinds(port, proof, protocol="Sec-WebSocket-Protocol: robotraconteur.robotraconteur.com\r\n"):
+    """{name: socket} of what stays open for somebody: relayed, shared and JSON sessions, streams; and one that is let in
+    by a ticket for the same proof."""
+    header = f"Authorization: {proof['Authorization']}\r\n"
+    ticket = ask(port, "POST", "/api/v1/tickets", headers=proof).json["ticket"]
+    links = {
+        "relay": open_websocket(port, "/devices/relayed", header),
+        "shared": open_websocket(port, "/devices/interop", header + protocol),
+        "json": open_websocket(port, BASE, header + f"Sec-WebSocket-Protocol: {JSON_PROTOCOL}\r\n"),
+        "ticket": open_websocket(port, f"/devices/interop?ticket={ticket}", protocol),
+    }
+    stream = Stream(port, BASE + "/cleared", proof)
+    links["stream"] = stream.connection.sock or stream.response.fp.raw._sock
+    try:
+        yield links
+    finally:
+        stream.close()
+        for link in links.values():
+            link.close()
+
+
+@pytest.mark.parametrize("how", ["deleted", "expired"])
+def test_a_token_that_is_no_longer_good_ends_what_goes_on_by_it(device, tmp_path, how):
+    issuer = issuers.Issuer("https://id.example", "rrgate")
+    (tmp_path / "keys.json").write_text(json.dumps(issuer.key_set()))
+    devices = [{"name": "interop", "url": device, "mode": "shared"}, {"name": "relayed", "url": device}]
+    rrgate("token", tmp_path / "tokens", "stays", "--roles", "admin")
+    token = rrgate("token", tmp_path / "tokens", "goes", "--roles", "admin")
+    access = {"tokens_file": "tokens", "jwt": {"jwks_file": "keys.json"}, "rules": RULES}
+    with running(tmp_path, device, access, devices=devices) as gateway:
+        gateway.wait_for("device online", device="relayed")
+        gateway.wait_for("session open", service="interop")
+        proof = bearer(token) if how == "deleted" else bearer(issuer.token("root", ["admin"], "ES256", seconds=-26))
+        with sessions_of_all_kinds(gateway.port, proof) as links:
+            for name in ("relay", "json", "ticket"):
+                assert is_alive(links[name]), name
+            if how == "deleted":
+                rrgate("token", tmp_path / "tokens", "goes", "--delete")
+            seconds = {}
+            for name, link in links.items():  # the first waits longest: for the file to be looked at, or the end to come
+                seconds[name] = ends(link)
+            assert seconds.pop("relay") < (1.5 if how == "deleted" else 6), seconds
+            assert all(each < 0.5 for each in seconds.values()), seconds
+        assert ask(gateway.port, "GET", BASE + "/p_double", headers=proof).status == 401
+
+
+def test_roles_that_change_hold_in_open_sessions(device, tmp_path):
+    make_users(tmp_path)
+    with running(tmp_path, device, {"users_file": "users", "rules": RULES}) as gateway:
+        with json_socket(gateway.port, basic("alice")) as link:
+            def may_write():
+                link.send(json.dumps({"id": 1, "op": "set", "path": "p_double", "value": 1.5}))
+                return "result" in json.loads(link.recv(10))
+
+            assert may_write()
+            lines = (tmp_path / "users").read_text().splitlines()
+            changed = [line.replace(" operator", " viewer") for line in lines]
+            (tmp_path / "users.new").write_text("\n".join(changed) + "\n")
+            (tmp_path / "users.new").rename(tmp_path / "users")
+            gateway.wait_for("users and rights read anew")
+            assert not may_write()
+
+
+def test_strangers_are_not_told_what_there_is(guarded):
+    """What is there is refused to them in the same words as what is not; who may see it hears 404."""
+    for pattern in ("/devices/{}", "/api/v1/devices/{}", "/api/v1/devices/{}/thing/speed", "/api/v1/devices/{}/openapi.json"):
+        answers = [ask(guarded.port, "GET", pattern.format(name)) for name in ("interop", "nothing")]
+        assert [answer.status for answer in answers] == [401, 401], pattern
+        there, missing = (answer.json["detail"].replace(name, "X") for answer, name in zip(answers, ("interop", "nothing")))
+        assert there == missing
+        assert ask(guarded.port, "GET", pattern.format("nothing"), headers=basic("root")).status == 404
+    for path in ("/devices/{}", "/api/v1/devices/{}/interop"):
+        for name in ("interop", "nothing"):
+            protocol = {"Sec-WebSocket-Protocol": JSON_PROTOCOL} if "api" in path else {}
+            assert upgrade_status(guarded.port, path.format(name), protocol) == 401, (path, name)
 
 
 def test_an_anonymous_role(device, tmp_path):
@@ -481,6 +579,7 @@ def test_users_and_rights_are_read_anew_and_sessions_go_on(device, tmp_path):
     access = {"users_file": "users", "rules": RULES}
     with running(tmp_path, device, access) as gateway:
         link = open_websocket(gateway.port, "/devices/interop", "Authorization: " + basic("root")["Authorization"] + "\r\n")
+        of_root = next(line for line in (tmp_path / "users").read_text().splitlines(True) if line.startswith("root "))
 
         def read():
             answer = ask(gateway.port, "GET", BASE + "/p_double", headers=basic("vera"))
@@ -504,6 +603,8 @@ def test_users_and_rights_are_read_anew_and_sessions_go_on(device, tmp_path):
             make_users_again = tmp_path / "fresh"
             make_users_again.mkdir()
             rrgate("passwd", make_users_again / "users", "vera", "--roles", "viewer", given=PASSWORDS["vera"] + "\n")
+            with open(make_users_again / "users", "a") as users:
+                users.write(of_root)
             (make_users_again / "users").replace(tmp_path / "users")
             gateway.wait_for("users and rights read anew", 2)
             assert ask(gateway.port, "GET", BASE + "/p_double", headers=basic("carol", "new")).status == 401

@@ -107,6 +107,23 @@ def test_sessions(site, client):
     run_and_check(client, entry["websocket_url"] + "?service=interop", STEPS)
 
 
+def test_nobody_says_by_a_header_who_he_is(device, tmp_path, proxy):
+    """The gateway believes the proxy, and the proxy takes away what clients put there."""
+    access = {"identity_headers": {"user": "X-Forwarded-User", "roles": "X-Forwarded-Groups"}}
+    gateway, port = start_gateway(tmp_path, device, trusted_proxies=["127.0.0.1"], access=access,
+                                  is_up=lambda: "device online" in (tmp_path / "gateway.log").read_text())
+    says = {"X-Forwarded-User": "root", "X-Forwarded-Groups": "admin"}
+    another = ReverseProxy(proxy.name, PROXIES[proxy.name], tmp_path, port)
+    try:
+        assert json.loads(fetch(port, "/api/v1/access", says, "127.0.0.1")[2])["user"] == "root"
+        for site, prefix in ((another.root, ""), (another.below, "/robots")):
+            status, _, body = fetch(site, prefix + "/api/v1/access", says)
+            assert (status, json.loads(body)["user"], json.loads(body)["roles"]) == (200, None, [])
+    finally:
+        another.stop()
+        gateway.stop()
+
+
 def test_who_the_client_is(site, gateway):
     port, prefix = site
     forged = "X-Forwarded-For: 6.6.6.6\r\nForwarded: for=6.6.6.6;proto=https\r\n"

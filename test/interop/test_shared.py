@@ -11,13 +11,15 @@ import pytest
 import RobotRaconteur as RR
 
 from clients import JS, run_program
+from gateways import rrgate
+from http_api import ask
 from load import Clients, running
 from news import News
 from processes import BUILD, Background, read_json, start_gateway
 from scenarios import POSE
 from shared_sites import port_of, start_service
 from tap import Tap
-from users import PASSWORDS, RULES, make_users
+from users import PASSWORDS, RULES, basic, make_users
 from values import Values
 
 SERVICES = {"interop", "guarded", "open", "proven", "RobotRaconteurServiceIndex"}  # of the test service's node
@@ -366,13 +368,12 @@ def test_rights_member_by_member(node, tmp_path):
         "lock": lambda root: node.RequestObjectLock(root, RR.RobotRaconteurObjectLockFlags_CLIENT_LOCK),
     }
     looks = {"read", "peek", "subscribe", "pipe", "below"}
-    may = {None: set(), "vera": looks, "alice": looks | {"write", "call"}, "root": set(attempts)}
+    may = {"vera": looks, "alice": looks | {"write", "call"}, "root": set(attempts)}
     try:
         with pytest.raises(RR.AuthenticationException):
             node.ConnectService(shared_url, "alice", {"password": RR.VarValue("wrong", "string")})
         for user, allowed in may.items():
-            login = (user, {"password": RR.VarValue(PASSWORDS[user], "string")}) if user else ()
-            root = node.ConnectService(shared_url, *login)
+            root = node.ConnectService(shared_url, user, {"password": RR.VarValue(PASSWORDS[user], "string")})
             for what, attempt in attempts.items():
                 try:
                     attempt(root)
@@ -445,30 +446,100 @@ def test_users_that_a_reload_brings_are_the_gateways_at_services_that_are_open(n
         service.stop()
 
 
-def test_who_may_do_nothing_answers_no_callback_and_makes_the_device_look_for_nothing(node, tmp_path):
+def password_of(user, password=None):
+    return user, {"password": RR.VarValue(password or PASSWORDS[user], "string")}
+
+
+def test_who_may_do_nothing_gets_to_no_service(node, tmp_path):
+    """Refused as he connects: he takes no place, is asked nothing, and is told of nothing."""
     service, url = start_service(tmp_path)
     make_users(tmp_path)
-    device = {"mode": "shared", "callbacks": [{"member": "interop.ask", "answer": "first"}]}
-    gateway, port = start_gateway(tmp_path, url, device=device, access={"users_file": "users", "rules": RULES},
-                                  is_up=lambda: "device online device=interop" in (tmp_path / "gateway.log").read_text())
-    shared_url = f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop"
+    rrgate("passwd", tmp_path / "users", "nora", "--roles", "none", given="nothing\n")
+    device = {"mode": "shared", "max_clients": 1, "callbacks": [{"member": "interop.ask", "answer": "first"}]}
+    access = {"users_file": "users", "rules": RULES, "audit_file": "audit"}
+    gateway, port = start_gateway(tmp_path, url, device=device, access=access, node={"name": "lab.gateway"},
+                                  is_up=lambda: "session open device=interop service=interop" in (tmp_path / "gateway.log").read_text())
+    of_device, of_gateway = (f"rr+tcp://127.0.0.1:{port}/?nodename={name}&service=" for name in ("interop", "lab.gateway"))
+    strangers = []
     try:
-        nobody = node.ConnectService(shared_url)
-        asked = News()
-
-        def answer(question):
-            asked.add(question)
-            return 1.0
-        nobody.ask.Function = answer
-        with pytest.raises(RR.PermissionDeniedException):
-            nobody.get_parts(7)
-        root = node.ConnectService(shared_url, "root", {"password": RR.VarValue(PASSWORDS["root"], "string")})
+        for where in (of_device, of_gateway):
+            for name in ("interop", "guarded", "nothing"):
+                with pytest.raises(RR.AuthenticationException, match=f"who is not logged in may not use service '{name}'"):
+                    node.ConnectService(where + name)
+                with pytest.raises(RR.AuthenticationException, match="Authentication Failed"):
+                    node.ConnectService(where + name, *password_of("vera", "wrong"))
+            with pytest.raises(RR.PermissionDeniedException, match="'nora' .* may not"):
+                node.ConnectService(where + "interop", *password_of("nora", "nothing"))
+            index = node.ConnectService(where + "RobotRaconteurServiceIndex")
+            strangers.append(index)
+            assert {each.Name for each in index.GetLocalNodeServices().values()} == {"RobotRaconteurServiceIndex"}
+            assert index.GetRoutedNodes() == {} and index.GetDetectedNodes() == {}
+        root = node.ConnectService(of_device + "interop", *password_of("root"))  # on the one seat there is
         root.ask.Function = lambda question: 2.0
         root.start_ask("may it?")
         gateway.wait_until(lambda: root.answered == 2.0)
-        assert asked.all() == []
-        for each in (nobody, root):
+        with pytest.raises(RR.ConnectionException, match="all the clients it may have"):
+            node.ConnectService(of_gateway + "interop", *password_of("vera"))
+        node.DisconnectService(root)
+        lines = [json.loads(line) for line in (tmp_path / "audit").read_text().splitlines()]
+        assert any((line["event"], line["device"], line.get("user")) == ("refused", "interop", "nora") for line in lines
+                   if "device" in line)
+        for each in strangers:
             node.DisconnectService(each)
+    finally:
+        gateway.stop()
+        service.stop()
+
+
+def test_a_stranger_wakes_no_session_that_rests(node, tmp_path):
+    """Nor does his wrong password; a login that is right does, and finds what it needs."""
+    service, url = start_service(tmp_path)
+    make_users(tmp_path)
+    log = tmp_path / "gateway.log"
+    gateway, port = start_gateway(tmp_path, url, device={"mode": "shared"}, access={"users_file": "users", "rules": RULES},
+                                  timeouts={"unused_session_ms": 300},
+                                  is_up=lambda: "session rests device=interop service=interop" in log.read_text())
+    shared_url = f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop"
+    try:
+        opened = log.read_text().count("session open device=interop service=interop")
+        for login in ((), password_of("vera", "wrong")):
+            with pytest.raises(RR.AuthenticationException):
+                node.ConnectService(shared_url, *login)
+        assert log.read_text().count("session open device=interop service=interop") == opened
+        vera = node.ConnectService(shared_url, *password_of("vera"))
+        assert vera.version == "1"
+        assert log.read_text().count("session open device=interop service=interop") == opened + 1
+        node.DisconnectService(vera)
+    finally:
+        gateway.stop()
+        service.stop()
+
+
+def test_a_user_who_is_deleted_has_no_session_any_more(node, tmp_path):
+    service, url = start_service(tmp_path)
+    make_users(tmp_path)
+    gateway, port = start_gateway(tmp_path, url, device={"mode": "shared"}, access={"users_file": "users", "rules": RULES},
+                                  is_up=lambda: "session open device=interop service=interop" in (tmp_path / "gateway.log").read_text())
+    shared_url = f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop"
+    try:
+        sessions = {user: node.ConnectService(shared_url, *password_of(user)) for user in ("vera", "root")}
+        assert all(root.version == "1" for root in sessions.values())
+        # Meanwhile: where from another client comes is for those who manage the gateway.
+        wire = sessions["vera"].state.Connect()
+        clients = {}
+        for user in ("root", "alice"):
+            answer = ask(port, "GET", "/api/v1/devices/interop/subscriptions", headers=basic(user)).json
+            clients[user] = [each["client"] for each in answer["subscriptions"]]
+        assert clients["alice"] == [None] and clients["root"][0].startswith("127.0.0.1:"), clients
+        wire.Close()
+        rrgate("passwd", tmp_path / "users", "vera", "--delete")
+        began = time.monotonic()
+        with pytest.raises(RR.RobotRaconteurException):
+            while time.monotonic() - began < 10:
+                sessions["vera"].version
+        assert time.monotonic() - began < 1.5
+        assert sessions["root"].version == "1"
+        node.DisconnectService(sessions["root"])
     finally:
         gateway.stop()
         service.stop()

@@ -215,10 +215,4 @@ std::shared_ptr<HostedService> ServiceDirectory::find(std::string_view name) con
   return found == services_.end() ? nullptr : found->second;
 }
 
-const ServiceDefinition* ServiceDirectory::find_definition(std::string_view name) const {
-  for (const auto& [service_name, service] : services_)
-    if (const auto* definition = service->types().find_service(name)) return definition;
-  return nullptr;
-}
-
 }  // namespace rr

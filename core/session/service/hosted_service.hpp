@@ -121,6 +121,7 @@ class HostedService {
 struct KnownNode {
   NodeIdentity node;
   std::vector<std::string> index_urls;  ///< of its service index
+  std::string known_as = {};            ///< as what ServiceSessionOptions::admit is asked about it
 };
 
 /// Identity and services of one node; outlives its sessions.
@@ -148,8 +149,6 @@ class ServiceDirectory {
   }
   /// Of the node's half of its sessions.
   EndpointNumbers& endpoints() { return endpoints_; }
-  /// A definition by name, from any service.
-  const ServiceDefinition* find_definition(std::string_view name) const;
 
  private:
   NodeIdentity identity_;

@@ -20,9 +20,10 @@ bool names_no_object(std::string_view command) {
 
 }  // namespace
 
-Result<> ServiceSession::admit(EntryType type, std::string_view path, const MemberDefinition* member) const {
+Result<> ServiceSession::admit(EntryType type, std::string_view path, const MemberDefinition* member,
+                               const AuthenticatedUser* user) const {
   if (!options_.admit) return {};
-  return options_.admit(MemberAccess{type, path, member, user()});
+  return options_.admit(MemberAccess{type, path, member, user});
 }
 
 Result<> ServiceSession::enter(const MessageEntry& entry, const MemberDefinition& member) {

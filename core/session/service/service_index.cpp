@@ -56,9 +56,10 @@ Value describe(const HostedService& service, const NodeIdentity& node, std::stri
                     {"Attributes", service.attributes()}}};
 }
 
-Value describe(const std::vector<KnownNode>& nodes) {
+Value describe(const std::vector<KnownNode>& nodes, const std::function<bool(EntryType, std::string_view)>& may_know) {
   MapInt32 out;
-  for (const auto& [node, index_urls] : nodes) {
+  for (const auto& [node, index_urls, known_as] : nodes) {
+    if (!may_know(EntryType::get_node_info, known_as)) continue;
     MapInt32 urls;
     for (const auto& url : index_urls)
       urls.items.emplace_back(static_cast<std::int32_t>(urls.items.size()), Value(url));
@@ -83,10 +84,11 @@ std::shared_ptr<HostedService> make_service_index() {
 }
 
 Result<Value> answer_service_index_call(std::string_view function, const ServiceDirectory& directory,
-                                        std::string_view base_url) {
+                                        std::string_view base_url,
+                                        const std::function<bool(EntryType, std::string_view)>& may_know) {
   MapInt32 answer;
-  if (function == "GetRoutedNodes") return describe(directory.routed_nodes(base_url));
-  if (function == "GetDetectedNodes") return describe(directory.detected_nodes(base_url));
+  if (function == "GetRoutedNodes") return describe(directory.routed_nodes(base_url), may_know);
+  if (function == "GetDetectedNodes") return describe(directory.detected_nodes(base_url), may_know);
   if (function != "GetLocalNodeServices")
     return make_error(ErrorCode::member_not_found, "the service index has no function " + quoted(function));
   if (base_url.empty()) return make_error(ErrorCode::service_error, "this transport has no URL");
@@ -95,7 +97,7 @@ Result<Value> answer_service_index_call(std::string_view function, const Service
                               describe(service, directory.identity(), base_url));
   };
   for (const auto& [name, service] : directory.services())
-    if (name != service_index_name) add(*service);
+    if (name != service_index_name && may_know(EntryType::null, name)) add(*service);
   add(*directory.find(service_index_name));  // last, as the reference has it
   return Value(std::move(answer));
 }

@@ -406,7 +406,9 @@ Result<> ServiceSession::add_call(const Message& message, const MessageEntry& en
 }
 
 Result<> ServiceSession::answer_service_index(const MessageEntry& entry, const MemberDefinition& member, Now now) {
-  const auto answer = answer_service_index_call(member.name, directory_, options_.base_url);
+  const auto answer =
+      answer_service_index_call(member.name, directory_, options_.base_url,
+                                [this](EntryType type, std::string_view name) { return admits(type, name, nullptr); });
   if (!answer) return answer.error();
   begin_reply(entry);
   if (auto written = write_return(outgoing_, *answer, member, service_->types()); !written) return written;

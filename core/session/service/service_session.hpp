@@ -28,9 +28,12 @@
 
 namespace rr {
 
-/// What a client is about to do with a member, or (no member) with the locks of an object.
+/// What a client is about to do with a member; without a member, with the locks of an object, or with a service: to
+/// look at it, or to connect.
 struct MemberAccess {
-  EntryType type;  ///< of the request or packet
+  /// Of the request or packet. null: the service index tells of a service (`path`); get_node_info: of another node
+  /// (`path` is KnownNode::known_as). Nobody hears of these two whether they were refused.
+  EntryType type;
   std::string_view path;
   const MemberDefinition* member;
   const AuthenticatedUser* user;  ///< null: has not logged in
@@ -52,7 +55,8 @@ struct ServiceSessionOptions {
   std::size_t max_pipe_endpoints = 4096;                  ///< of one client; above: out_of_system_resource
   std::size_t max_pipe_queued_bytes = 32u * 1024 * 1024;  ///< waiting for the stream; above, pipes take no packets
   std::size_t max_parked_requests = 64;                   ///< for objects of a remote service that are looked for
-  /// Asked before anything is done with a member; what it refuses with is what the client gets. None: all is allowed.
+  /// Asked before anything is done with a member or a service is told of; what it refuses with is what the client gets.
+  /// None: all is allowed.
   std::function<Result<>(const MemberAccess&)> admit = {};
   /// Asked behind `admit` for each request to a member, unless it ends something; packets are none. What it returns is
   /// kept until the request is answered; what it refuses with is what the client gets, and nothing is lost by it. None:
@@ -284,9 +288,9 @@ class ServiceSession {
   }
   /// Of all wires and pipes that the client ever had connected here.
   Ledgers total_ledgers() const;
-  /// Whether ServiceSessionOptions::admit lets the client have this of a member.
-  bool admits(EntryType type, std::string_view path, const MemberDefinition& member) const {
-    return admit(type, path, &member).has_value();
+  /// Whether ServiceSessionOptions::admit lets the client have this of a member, or of a service (null).
+  bool admits(EntryType type, std::string_view path, const MemberDefinition* member) const {
+    return admit(type, path, member).has_value();
   }
   /// Who has logged in; nullptr while nobody has.
   const AuthenticatedUser* user() const { return user_ ? &*user_ : nullptr; }
@@ -445,7 +449,13 @@ class ServiceSession {
   Result<> continue_entering(const MessageEntry& entry, Now now);
   void continue_late_locks(Now now);
 
-  Result<> admit(EntryType type, std::string_view path, const MemberDefinition* member) const;
+  Result<> admit(EntryType type, std::string_view path, const MemberDefinition* member) const {
+    return admit(type, path, member, user());
+  }
+  Result<> admit(EntryType type, std::string_view path, const MemberDefinition* member,
+                 const AuthenticatedUser* user) const;
+  Result<> admit_special(const Message& message, const MessageEntry& entry) const;
+  const ServiceDefinition* find_definition(std::string_view service, std::string_view name) const;
   Result<> enter(const MessageEntry& entry, const MemberDefinition& member);
   void release_pass(std::uint32_t request_id);
 

@@ -39,6 +39,15 @@ std::optional<std::string> read_known_tag(const Message& message, const MessageE
   return element ? std::optional<std::string>(element->text()) : std::nullopt;
 }
 
+bool has_login(const Message& message, const MessageEntry& entry) {
+  const auto elements = message.elements_of(entry);
+  return elements.find("username") && elements.find("credentials");
+}
+
+std::string_view service_name_of(const MessageEntry& entry) {
+  return entry.service_path.substr(0, entry.service_path.find('.'));
+}
+
 /// Writes the tag of `texts` where the client has asked for it by saying what it has. Returns whether it has just
 /// those.
 bool write_tag(Message& message, const std::optional<std::string>& known_tag,
@@ -131,7 +140,25 @@ void ServiceSession::handle_special(const Message& message, Now now) {
   if (is_refused) leave(*options_.refusal, now);
 }
 
+/// Whoever logs in as he connects is asked about as whom he has logged in.
+Result<> ServiceSession::admit_special(const Message& message, const MessageEntry& entry) const {
+  switch (entry.type) {
+    case EntryType::connect_client_combined:
+      if (has_login(message, entry)) return {};
+      break;
+    case EntryType::get_service_desc:
+    case EntryType::object_type_name:
+    case EntryType::connect_client:
+    case EntryType::get_service_attributes:
+      break;
+    default:
+      return {};
+  }
+  return admit(entry.type, service_name_of(entry), nullptr);
+}
+
 Result<> ServiceSession::answer_special(const Message& message, const MessageEntry& entry, Now now) {
+  if (auto admitted = admit_special(message, entry); !admitted) return admitted;
   switch (entry.type) {
     case EntryType::get_service_desc:
       return write_service_desc(message, entry);
@@ -169,9 +196,7 @@ Result<> ServiceSession::write_service_desc(const Message& message, const Messag
   if (!type) type = find_text(message, entry, "servicetype");
   if (type) {
     // Services of a node may have definitions of one name and two texts: the one that the client asks counts.
-    const auto asked = directory_.find(entry.service_path);
-    const auto* definition = asked ? asked->types().find_service(type->text()) : nullptr;
-    if (!definition) definition = directory_.find_definition(type->text());
+    const auto* definition = find_definition(entry.service_path, type->text());
     if (!definition) return service_not_found();
     if (!write_tag(outgoing_, read_known_tag(message, entry), {definition->text}))
       outgoing_.add_text("servicedef", definition->text);
@@ -187,11 +212,21 @@ Result<> ServiceSession::write_service_desc(const Message& message, const Messag
   return {};
 }
 
+/// Of one service, else of any other that the client may know of.
+const ServiceDefinition* ServiceSession::find_definition(std::string_view service, std::string_view name) const {
+  if (const auto asked = directory_.find(service))
+    if (const auto* definition = asked->types().find_service(name)) return definition;
+  for (const auto& [service_name, other] : directory_.services())
+    if (const auto* definition = other->types().find_service(name))
+      if (admits(EntryType::null, service_name, nullptr)) return definition;
+  return nullptr;
+}
+
 /// ObjectTypeName without a session: every failure is "Object not found".
 Result<> ServiceSession::write_root_type(const Message& message, const MessageEntry& entry) {
   const auto version = read_client_version(message, entry);
   if (!version) return version.error();
-  const auto service = directory_.find(entry.service_path.substr(0, entry.service_path.find('.')));
+  const auto service = directory_.find(service_name_of(entry));
   if (!service) return object_not_found();
   if (service->policy().require_valid_user && entry.service_path != service->name()) return object_not_found();
   const auto found = service->find_object(entry.service_path);
@@ -209,6 +244,9 @@ Result<> ServiceSession::write_combined(const Message& message, const MessageEnt
   const auto version = read_client_version(message, entry);
   if (!version) return version.error();
   const auto service = directory_.find(entry.service_path);
+  const bool logs_in = has_login(message, entry);
+  // Who may not connect without a login does not hear by it either what there is.
+  if (!service && logs_in && !admits(entry.type, entry.service_path, nullptr)) return login_failed();
   if (!service) return service_not_found();
   const auto type_name = type_for_client(*service, *version);
   const auto* type = service->types().find_entity(type_name);
@@ -224,14 +262,12 @@ Result<> ServiceSession::write_combined(const Message& message, const MessageEnt
 
   request.known_tag = read_known_tag(message, entry);
 
-  const auto elements = message.elements_of(entry);
-  const bool has_login = elements.find("username") && elements.find("credentials");
   const auto& policy = service->policy();
   // As the reference does: where no user is required, a login in this request fails; AuthenticateUser is for that. In
   // front of a remote service nobody knows what that one requires.
   const bool may_log_in = policy.authenticator && (policy.require_valid_user || service->is_remote());
-  if (has_login ? !may_log_in : policy.require_valid_user) return login_failed();
-  if (!has_login) return accept_combined(request, std::nullopt, now);
+  if (logs_in ? !may_log_in : policy.require_valid_user) return login_failed();
+  if (!logs_in) return accept_combined(request, std::nullopt, now);
   if (service_) return has_session_already();
   if (auto begun = begin_login(message, entry, service, now); !begun) return begun;
   login_->client = std::move(request.client);
@@ -244,6 +280,8 @@ Result<> ServiceSession::write_combined(const Message& message, const MessageEnt
 
 Result<> ServiceSession::accept_combined(const OpenLogin& request, std::optional<AuthenticatedUser> user, Now now) {
   const auto& service = request.service;
+  if (user)
+    if (auto admitted = admit(request.type, service->name(), nullptr, &*user); !admitted) return admitted;
   if (auto connected = connect(service, request.client.id, request.client_endpoint, std::move(user), now); !connected)
     return connected;
   outgoing_.add_text("objecttype", request.type_for_client->qualified_name);

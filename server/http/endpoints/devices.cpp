@@ -60,18 +60,24 @@ Handler devices_endpoint(GatewayState& gateway) {
   };
 }
 
+Response no_such_device(std::string_view name) {
+  return problem_response(404, "no device " + rr::quoted(name) + "; /api/v1/devices lists them");
+}
+
 Response describe_device(const Device& device, const Request& request, const Access& access) {
   return json_response(
       200, describe(device, request, access).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
 }
 
-Response list_subscriptions(GatewayState& gateway, const Device& device) {
+Response list_subscriptions(GatewayState& gateway, const Identity& asker, const Device& device) {
+  const auto& rules = gateway.access().state().rules;
+  const bool shows_clients = rules.check(asker, {.verb = Verb::admin}).has_value();
   nlohmann::ordered_json out;
   auto& list = out["subscriptions"] = nlohmann::ordered_json::array();
   gateway.shared().visit_ledgers([&](const SharedDevice& shared, const SharedClient& client, const std::string& path,
                                      const rr::MemberDefinition& member, const rr::Ledger& ledger) {
     if (shared.device().get() != &device) return;
-    list.push_back({{"client", client.peer()},
+    list.push_back({{"client", shows_clients ? nlohmann::ordered_json(client.peer()) : nullptr},
                     {"service", client.service() ? client.service()->name() : std::string()},
                     {"path", path},
                     {"member", member.name},
@@ -92,9 +98,13 @@ Handler no_such_api_endpoint() {
 }
 
 Handler device_endpoint(GatewayState& gateway) {
-  return [&gateway](const Request&, std::string_view name) {
-    if (!gateway.devices().find(name))
-      return problem_response(404, "no device " + rr::quoted(name) + "; /api/v1/devices lists them");
+  return [&gateway](const Request& request, std::string_view name) {
+    // Strangers are not told what there is.
+    if (const auto allowed = gateway.access().check(request.identity, {.device = name}); !allowed) {
+      gateway.reject(Rejection::forbidden);
+      return gateway.http_access().refusal(request.identity, allowed.error());
+    }
+    if (!gateway.devices().find(name)) return no_such_device(name);
     return upgrade_required("this is a WebSocket for Robot Raconteur clients; connect with a ws:// or rr+ws:// URL");
   };
 }

@@ -92,13 +92,10 @@ SessionKey session_key(GatewayState& gateway, const Request& request, std::strin
   return key;
 }
 
-rr::Result<> check_access(GatewayState& gateway, const Identity& who, std::string_view service, const Target& target,
-                          Verb verb) {
-  auto& access = gateway.access();
-  const auto& device = target.client->upstream()->device().config().name;
-  const auto& path = target.path();
-  if (!target.member && verb == Verb::read && access.sees(who, device, service, path)) return {};
-  return access.check(who, {device, service, path, target.member ? target.member->name : std::string_view(), verb});
+AccessRequest access_request(const Target& target, Verb verb) {
+  const auto& upstream = *target.client->upstream();
+  const auto member = target.member ? std::string_view(target.member->name) : std::string_view();
+  return {upstream.device().config().name, upstream.service(), target.path(), member, verb};
 }
 
 rr::JsonForm json_form(const Request& request) {

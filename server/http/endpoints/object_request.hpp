@@ -38,10 +38,8 @@ struct Target {
 
 /// Whose session a request uses: user and password of HTTP Basic authentication, where they are not for the gateway.
 SessionKey session_key(GatewayState& gateway, const Request& request, std::string service);
-/// Whether somebody may do something to what a path leads to. To look at an object as such is for whoever may do
-/// anything within it. Errors   permission_denied.
-rr::Result<> check_access(GatewayState& gateway, const Identity& who, std::string_view service, const Target& target,
-                          Verb verb);
+/// To do something to what a path leads to. Borrows the target.
+AccessRequest access_request(const Target& target, Verb verb);
 /// What the query says of the form of values.
 rr::JsonForm json_form(const Request& request);
 

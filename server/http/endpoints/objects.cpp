@@ -58,24 +58,20 @@ rr::awaitable<void> serve_target(const ObjectRequest& request, const Target& tar
   }
 }
 
-/// Why a request for a device, or a service of it, goes no further: there is no right to anything of it, or it is asked
-/// for too much. nullopt: go on, with the pass.
-std::optional<Response> refuse_device(GatewayState& gateway, const Request& request, const Device& device,
-                                      std::optional<std::string_view> service, std::optional<RateGate::Pass>& pass) {
-  auto& access = gateway.access();
-  const auto& name = device.config().name;
-  if (!access.sees(request.identity, name, service)) {
-    const auto denied =
-        access.check(request.identity, {name, service.value_or(""), service.value_or(""), {}, Verb::read});
-    if (!denied) {
-      gateway.reject(Rejection::forbidden);
-      return gateway.http_access().refusal(request.identity, denied.error());
-    }
+/// Why a request for a device, or a service of it, goes no further: there is no right to anything of it, it is not
+/// there, or it is asked for too much. Rights come first: strangers are not told what there is. nullopt: go on, with
+/// the pass.
+std::optional<Response> refuse_device(GatewayState& gateway, const Request& request, const std::string& device,
+                                      const std::string& service, std::optional<RateGate::Pass>& pass) {
+  if (const auto allowed = gateway.access().check(request.identity, {.device = device, .service = service}); !allowed) {
+    gateway.reject(Rejection::forbidden);
+    return gateway.http_access().refusal(request.identity, allowed.error());
   }
-  pass = gateway.http_access().enter_device(name, gateway.config().rates);
+  if (!gateway.devices().find(device)) return no_such_device(device);
+  pass = gateway.http_access().enter_device(device, gateway.config().rates);
   if (pass) return std::nullopt;
   gateway.reject(Rejection::rate);
-  return HttpAccess::too_much("to device " + rr::quoted(name));
+  return HttpAccess::too_much("to device " + rr::quoted(device));
 }
 
 constexpr std::string_view definition_suffix = ".robdef";
@@ -133,21 +129,15 @@ rr::awaitable<void> serve_document(GatewayState& gateway, Device& device, const 
 
 rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::vector<std::string> segments) {
   const ObjectRequest request(writer);
-  auto* device = gateway.devices().find(segments.front());
-  if (!device) {
-    auto response = problem_response(404, "no device " + rr::quoted(segments.front()) + "; /api/v1/devices lists them");
-    co_await writer.send(response);
-    co_return;
-  }
   const bool is_about_all = segments.size() == 2 && (is_device_resource(segments[1]) || is_definition(segments[1]));
   const bool is_object = segments.size() > 1 && !is_about_all;
   const auto service = is_object ? segments[1] : std::string();
   std::optional<RateGate::Pass> pass;
-  const auto wanted = is_object ? std::optional<std::string_view>(service) : std::nullopt;
-  if (const auto refusal = refuse_device(gateway, writer.request(), *device, wanted, pass)) {
+  if (const auto refusal = refuse_device(gateway, writer.request(), segments.front(), service, pass)) {
     co_await writer.send(*refusal);
     co_return;
   }
+  auto* device = gateway.devices().find(segments.front());
   if (segments.size() == 1) {
     auto response = request.is_read() ? describe_device(*device, writer.request(), gateway.access())
                                       : request.method_response("GET, HEAD");
@@ -155,8 +145,8 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
     co_return;
   }
   if (segments.size() == 2 && segments[1] == "subscriptions") {
-    const auto response =
-        request.is_read() ? list_subscriptions(gateway, *device) : request.method_response("GET, HEAD");
+    const auto response = request.is_read() ? list_subscriptions(gateway, writer.request().identity, *device)
+                                            : request.method_response("GET, HEAD");
     co_await writer.send(response);
     co_return;
   }
@@ -191,7 +181,7 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
   }
   if (target)
     if (const auto allowed =
-            check_access(gateway, writer.request().identity, service, *target, verb_of(request, *target));
+            gateway.access().check(writer.request().identity, access_request(*target, verb_of(request, *target)));
         !allowed) {
       gateway.reject(Rejection::forbidden);
       const auto refusal = gateway.http_access().refusal(writer.request().identity, allowed.error());

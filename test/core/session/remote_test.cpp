@@ -297,6 +297,7 @@ TEST_CASE("whoever may do nothing makes a remote service look for nothing") {
   pair.directory.find("arm")->set_remote();
   ServiceSessionOptions options;
   options.admit = [](const MemberAccess& access) -> Result<> {
+    if (access.type == EntryType::connect_client_combined) return {};
     CHECK(access.type == EntryType::object_type_name);
     CHECK(access.path == "arm.tool");
     return make_error(ErrorCode::permission_denied, "not you");
@@ -308,11 +309,31 @@ TEST_CASE("whoever may do nothing makes a remote service look for nothing") {
   CHECK_FALSE(pair.service->poll_event());
 }
 
+TEST_CASE("whoever may not use a service is refused as he connects") {
+  Loopback pair;
+  std::vector<std::string> asked;
+  ServiceSessionOptions options;
+  options.admit = [&](const MemberAccess& access) -> Result<> {
+    CHECK(access.type == EntryType::connect_client_combined);
+    CHECK_FALSE(access.member);
+    asked.emplace_back(std::string(access.path) + " " + (access.user ? access.user->name : "nobody"));
+    if (access.user && access.user->name == "alice") return {};
+    return make_error(ErrorCode::permission_denied, "not you");
+  };
+  const auto begin = [&] { pair.service = std::make_unique<ServiceSession>(pair.directory, options, pair.now); };
+  begin();
+  CHECK_THROWS_WITH(pair.connect(), Catch::Contains("not you"));
+  CHECK_FALSE(pair.service->service());
+  CHECK_FALSE(pair.service->poll_event());
+  CHECK(asked == std::vector<std::string>{"arm nobody"});
+}
+
 TEST_CASE("what a client may do is asked before it is done") {
   Loopback pair;
   std::vector<std::pair<EntryType, std::string>> asked;
   ServiceSessionOptions options;
   options.admit = [&](const MemberAccess& access) -> Result<> {
+    if (access.type == EntryType::connect_client_combined) return {};
     asked.emplace_back(access.type, access.member ? access.member->name : "-");
     if (!access.member || access.member->name != "speed") return make_error(ErrorCode::permission_denied, "not you");
     return {};

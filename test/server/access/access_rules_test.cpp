@@ -1,5 +1,6 @@
 #include "server/access/access_rules.hpp"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <map>
 #include <random>
@@ -53,9 +54,13 @@ bool model_allows(const std::vector<AccessRule>& rules, const Identity& identity
     for (const auto& role : rule.roles)
       is_for = is_for || (role == "*" && identity.is_proven()) ||
                std::set<std::string>(identity.roles.begin(), identity.roles.end()).contains(role);
-    if (is_for && std::set<Verb>(rule.may.begin(), rule.may.end()).contains(verb) &&
-        means(device_meanings, rule.devices, device) && means(service_meanings, rule.services, service) &&
-        means(path_meanings, rule.paths, path) && means(member_meanings, rule.members, member))
+    if (!is_for || !means(device_meanings, rule.devices, device) || !means(service_meanings, rule.services, service) ||
+        !means(path_meanings, rule.paths, path))
+      continue;
+    // Whoever may do anything to an object may look at it.
+    if (verb == Verb::read && member.empty() && std::any_of(rule.may.begin(), rule.may.end(), is_device_verb))
+      return true;
+    if (std::set<Verb>(rule.may.begin(), rule.may.end()).contains(verb) && means(member_meanings, rule.members, member))
       return true;
   }
   return false;

@@ -18,7 +18,7 @@ TEST_CASE("tickets: once, soon, and by gateways of one key") {
   Tickets tickets;
   Identity alice;
   alice.name = "alice";
-  alice.roles = {"operator", "viewer"};
+  alice.roles = alice.proven_roles = {"operator", "viewer"};
   alice.proof = Proof::password;
   const auto ticket = tickets.issue(alice, day).value();
   CHECK(tickets.issue(alice, day) != ticket);
@@ -35,7 +35,11 @@ TEST_CASE("tickets: once, soon, and by gateways of one key") {
   Tickets there(key);
   CHECK(there.redeem(here.issue(alice, day).value(), day) == alice);
 
-  alice.roles.assign(1000, "operator");
+  alice.credential = "abc";
+  alice.ends = day + std::chrono::hours(1);
+  CHECK(there.redeem(here.issue(alice, day).value(), day) == alice);
+
+  alice.proven_roles.assign(1000, "operator");
   CHECK_FALSE(tickets.issue(alice, day));
 }
 

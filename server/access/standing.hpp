@@ -1,0 +1,45 @@
+// What a client may do for as long as it is there. Layer: server/access.
+#pragma once
+
+#include <memory>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "server/access/access.hpp"
+
+namespace rrgate {
+
+/// What the audit log has of a thing that is done.
+enum class Recorded : std::uint8_t {
+  each_time,
+  first_time,  ///< packets of a wire or a pipe: there may be thousands a second
+  never,       ///< part of something whose beginning is recorded, or done by the device
+};
+
+/// A client and what it has shown, looked at anew whenever users, tokens or rights have changed. Who keeps a connection
+/// open keeps one of these. For the gateway's thread; the Access outlives it.
+class Standing {
+ public:
+  Standing(Access& access, Identity identity)
+      : access_(access), judged_by_(access.state_ptr()), identity_(std::move(identity)) {}
+
+  /// Whether what the client has shown is still good: it was not revoked, and has not expired. Once false, for ever.
+  bool is_good();
+  /// As of now; who is not good any more is nobody.
+  const Identity& identity();
+  /// See Access::check(). Errors   also authentication_error: not good any more.
+  [[nodiscard]] rr::Result<> check(const AccessRequest& what, Recorded recorded = Recorded::each_time);
+
+ private:
+  static constexpr std::size_t max_noted = 4096;
+
+  Access& access_;
+  AccessStatePtr judged_by_;
+  Identity identity_;
+  bool is_good_ = true;
+  std::set<std::pair<std::string, std::string>> noted_;  ///< path and member of what was recorded for the first time
+};
+using StandingPtr = std::shared_ptr<Standing>;
+
+}  // namespace rrgate
