@@ -21,7 +21,8 @@ export class GuardedLab {
       ["vera", "viewer"],
     ] as const)
       execFileSync(rrgate, ["passwd", file("users"), name, "--roles", roles], { input: `${password}\n` });
-    this.token = execFileSync(rrgate, ["token", file("tokens"), "page", "--roles", "admin"], { encoding: "utf8" }).trim();
+    const made = execFileSync(rrgate, ["token", file("tokens"), "page", "--roles", "admin"], { encoding: "utf8" });
+    this.token = made.trim();
     const all = ["read", "write", "call", "subscribe", "lock", "admin"];
     const access = {
       ["users_file"]: "users",

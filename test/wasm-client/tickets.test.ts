@@ -3,7 +3,11 @@ import { connect, ErrorCode } from "../../wasm-client/dist/index.js";
 import type { RobotRaconteurError } from "../../wasm-client/dist/index.js";
 
 /** Not that of service.ts: it loads node.ts, whose ways take the place of a page's. */
-const failure = (promise: Promise<unknown>) => promise.then(() => expect.unreachable(), (error: RobotRaconteurError) => error);
+const failure = (promise: Promise<unknown>) =>
+  promise.then(
+    () => expect.unreachable(),
+    (error: RobotRaconteurError) => error,
+  );
 
 const url = "wss://gateway.lab/cell/devices/create?service=Create";
 let asked: [string, RequestInit][];

@@ -39,7 +39,10 @@ export const platform: Platform = {
 
   async findWebsocket(url, proof) {
     if (proof.headers)
-      throw makeError("InvalidArgument", "headers: a page can't add any to a WebSocket; use token, or a ticket in the URL");
+      throw makeError(
+        "InvalidArgument",
+        "headers: a page can't add any to a WebSocket; use token, or a ticket in the URL",
+      );
     if (proof.token !== undefined) url.searchParams.set("ticket", await fetchTicket(url, proof));
     return WebSocket;
   },

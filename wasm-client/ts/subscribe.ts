@@ -33,8 +33,8 @@ type Client<T> = T & { readonly $: ObjectInfo };
 /**
  * Stays connected to a service: connects, and connects again after each loss, until close().
  * @param urls  one service, or several ways to it; each attempt tries them in order. As for connect(): a function is asked
- *              for its URL at each attempt. Or the services of a type behind a gateway, as its devices come and go: the first one that can be connected to, and after a
- *              loss the first again; each attempt asks the gateway anew.
+ *              for its URL at each attempt. Or the services of a type behind a gateway, as its devices come and go: the
+ *              first one that can be connected to, and after a loss the first again; each attempt asks the gateway anew.
  * @throws      RobotRaconteurError InvalidArgument (URLs that name different services, no URL, signal). What fails later is told
  *              to onFailed() and tried again.
  */
