@@ -14,7 +14,7 @@ export const repositoryRoot = repository;
 export const webRoot = process.env["RRGATE_WEB_ROOT"] ?? path.join(repository, "web/dist");
 
 /** A device's program: beside the gateway (installed) or in the build tree. */
-function deviceProgram(name: string): string {
+export function deviceProgram(name: string): string {
   const folder = path.dirname(rrgate);
   const found = [".", "../examples/demo", "../libexec/rrgate"]
     .map((at) => path.join(folder, at, name))

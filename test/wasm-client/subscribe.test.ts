@@ -94,6 +94,30 @@ it("connects, and again after a loss; what was under way rejects as lost", async
   await subscription.close();
 });
 
+it("asks a function for the URL at each attempt, and tells what it throws", async () => {
+  const opened: string[] = [];
+  const transport: OpenTransport = (to) => {
+    opened.push(to.search);
+    throw new Error("nobody is there");
+  };
+  let tickets = 0;
+  const source = () => {
+    if (++tickets === 2) throw new Error("no ticket today");
+    return Promise.resolve(`${url}&ticket=${tickets}`);
+  };
+  const subscription = subscribe(source, { transport, clock });
+  const failures: [string, string][] = [];
+  subscription.onFailed((error, of) => failures.push([(error as Error).message, of]));
+  await settle();
+  clock.fire();
+  await settle();
+  clock.fire();
+  await settle();
+  expect(opened).toEqual(["?service=test&ticket=1", "?service=test&ticket=3"]);
+  expect(failures).toEqual(["nobody is there", "no ticket today", "nobody is there"].map((why) => [why, ""]));
+  await subscription.close();
+});
+
 it("is not sent again what it knows of the service, unless that has changed", async () => {
   const withForce = definition.replace("property double speed", "property double speed\n  property double force");
   const begin = (text: string) => TestService.start({ definitions: [text], root: "test.subscribe.Root" });

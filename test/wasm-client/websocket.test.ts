@@ -53,6 +53,42 @@ it("asks for the subprotocol, sends no Origin, keeps path and query, and begins 
   await connecting;
 });
 
+it("shows a token and further headers in the upgrade", async () => {
+  greet = (socket) => socket.close(1000);
+  await failure(connect(url, { token: "rrg_secret", headers: { "X-Cell": "3" } }));
+  expect(upgrade.headers["authorization"]).toBe("Bearer rrg_secret");
+  expect(upgrade.headers["x-cell"]).toBe("3");
+});
+
+it("uses Node's own WebSocket where there is one, with the same headers", async () => {
+  const made: unknown[][] = [];
+  class Native {
+    constructor(...given: unknown[]) {
+      made.push(given);
+      throw new Error("not today");
+    }
+  }
+  vi.stubGlobal("WebSocket", Native);
+  try {
+    expect((await failure(connect(url, { token: "rrg_secret" }))).message).toContain("not today");
+  } finally {
+    vi.unstubAllGlobals();
+  }
+  const protocols = ["robotraconteur.robotraconteur.com"];
+  expect(made).toEqual([[url, { protocols, headers: { ["Authorization"]: "Bearer rrg_secret" } }]]);
+});
+
+it("asks a function for the URL", async () => {
+  greet = (socket) => socket.close(1000);
+  await failure(connect(() => Promise.resolve(`${url}&ticket=t1`)));
+  expect(upgrade.url).toBe("/devices/create?service=Create&ticket=t1");
+  const refusal = new Error("no ticket today");
+  expect(await failure(connect(() => Promise.reject(refusal)))).toBe(refusal);
+  const slow = await failure(connect(() => new Promise(() => undefined), { timeout: 20 }));
+  expect(slow.code).toBe(ErrorCode.RequestTimeout);
+  expect(slow.message).toContain("the function that gives the URL: no session within 20 ms");
+});
+
 it("says why the server closed", async () => {
   greet = (socket) => socket.close(1013, "device offline: create: connection refused");
   const error = await failure(connect(url));

@@ -1,15 +1,31 @@
 import { formatRoute, parseRoute } from "../../web/src/app/router";
-import { readRequests, readWho } from "../../web/src/gateway/access";
+import { readRequests } from "../../web/src/gateway/access";
 import { readDevices, relayUrl } from "../../web/src/gateway/devices";
+import { formatProof, mustSignIn, readWho } from "../../web/src/gateway/session";
 import { readFrame } from "../../web/src/camera/frame";
 import { fit, gridStep, include, START, toCanvas } from "../../web/src/chart/view";
 import { sentence, span, staleAge } from "../../web/src/ui/words";
 
 describe("access", () => {
   it("reads who the gateway takes the page for", () => {
-    const who = { user: "root", login: true, requests: true, admin: true };
-    expect(readWho({ ...who, roles: ["admin"], proof: "password" })).toEqual(who);
-    expect(readWho(null)).toEqual({ user: null, login: false, requests: false, admin: false });
+    const who = { user: "root", roles: ["admin"], login: true, requests: true, admin: true };
+    expect(readWho({ ...who, proof: "password" })).toEqual(who);
+    expect(readWho(null)).toEqual({ user: null, roles: [], login: false, requests: false, admin: false });
+  });
+
+  it("asks for a sign-in where there is nothing to see without", () => {
+    const nobody = readWho({ login: true });
+    expect(mustSignIn(nobody)).toBe(true);
+    expect(mustSignIn({ ...nobody, roles: ["guest"] })).toBe(false);
+    expect(mustSignIn({ ...nobody, user: "root" })).toBe(false);
+    expect(mustSignIn(readWho({}))).toBe(false);
+    expect(mustSignIn(null)).toBe(false);
+  });
+
+  it("shows a name and a password, or a token", () => {
+    expect(formatProof("vera", "größer: als")).toBe("Basic dmVyYTpncsO2w59lcjogYWxz");
+    expect(formatProof("", " rrg_secret\n")).toBe("Bearer rrg_secret");
+    expect(() => formatProof("a:b", "c")).toThrow("A name has no colon.");
   });
 
   it("lists the requests that are to be decided on", () => {

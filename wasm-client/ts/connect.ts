@@ -2,6 +2,7 @@
 import { makeError } from "./errors.js";
 import { ObjectTree } from "./object.js";
 import { checkTimeout, Session } from "./session.js";
+import type { Proof } from "./platform.js";
 import type { OpenTransport, Transport } from "./transport.js";
 import type { ObjectInfo, RemoteObject } from "./types.js";
 import { parseServiceUrl } from "./url.js";
@@ -11,7 +12,10 @@ import type { KnownDefinitions } from "./wasm_module.js";
 import { openWebsocket } from "./websocket.js";
 import { checkSignal } from "./within.js";
 
-export interface ConnectOptions {
+/** Asked for the URL at each attempt, so that each can have a ticket of its own. */
+export type UrlSource = () => string | URL | Promise<string | URL>;
+
+export interface ConnectOptions extends Proof {
   /** Gives up connecting. Once connected it has no effect; use `$.close()`. */
   signal?: AbortSignal | undefined;
   /** Milliseconds for everything until the session is up; 30,000. */
@@ -48,13 +52,14 @@ export interface Memory {
  * Connects to a service.
  * @param url "wss://host/devices/create?service=Create"; schemes ws, wss, http, https, rr+ws, rr+wss, rr+tcp (the port
  *            of a node takes WebSockets too); in a page also relative to it. "rr+usb:///?nodename=robot&service=Create" for
- *            a USB device that the page may use (see requestUsbDevice()), where the browser has WebUSB.
+ *            a USB device that the page may use (see requestUsbDevice()), where the browser has WebUSB. Or a function
+ *            that gives it.
  * @returns   the service's root object, once the session is up.
  * @throws    RobotRaconteurError InvalidArgument (URL, options), ConnectionError, ServiceNotFound, NodeNotFound,
- *            AuthenticationError, RequestTimeout, ...; the reason of `signal`.
+ *            AuthenticationError, RequestTimeout, ...; the reason of `signal`; what the function throws.
  */
 export function connect<T = RemoteObject>(
-  url: string | URL,
+  url: string | URL | UrlSource,
   options: ConnectOptions = {},
 ): Promise<T & { readonly $: ObjectInfo }> {
   return connectWith<T>(url, options);
@@ -62,14 +67,13 @@ export function connect<T = RemoteObject>(
 
 /** As connect(). A service that has the definitions in `memory` does not send them again; in the end others are there. */
 export async function connectWith<T>(
-  url: string | URL,
+  url: string | URL | UrlSource,
   options: ConnectOptions,
   memory?: Memory,
 ): Promise<T & { readonly $: ObjectInfo }> {
   const { signal } = options;
   checkSignal(signal);
   signal?.throwIfAborted();
-  const { address, service, nodeId, nodeName } = parseServiceUrl(url);
   const timeout = checkTimeout(options.timeout ?? defaultConnectTimeout);
   const requestTimeout = checkTimeout(options.requestTimeout ?? defaultRequestTimeout, "requestTimeout");
   if (options.username === undefined && (options.password ?? options.credentials) !== undefined) {
@@ -80,12 +84,17 @@ export async function connectWith<T>(
   const attempt = new Attempt();
   const abort = () => attempt.fail(signal?.reason);
   signal?.addEventListener("abort", abort, { once: true });
+  let where = "the function that gives the URL";
   const timer = setTimeout(
-    () => attempt.fail(makeError("RequestTimeout", `${address.host || address.href}: no session within ${timeout} ms`)),
+    () => attempt.fail(makeError("RequestTimeout", `${where}: no session within ${timeout} ms`)),
     Math.min(timeout, 2 ** 31 - 1),
   );
   try {
-    await attempt.open(address, options.transport ?? (address.protocol === "rr+usb:" ? openUsb : openWebsocket));
+    const given = typeof url === "function" ? await attempt.unlessFailed(Promise.resolve().then(url)) : url;
+    const { address, service, nodeId, nodeName } = parseServiceUrl(given);
+    where = address.host || address.href;
+    const openSocket: OpenTransport = (to, listener) => openWebsocket(to, listener, options);
+    await attempt.open(address, options.transport ?? (address.protocol === "rr+usb:" ? openUsb : openSocket));
     const core = await attempt.unlessFailed(
       Core.create({
         service,

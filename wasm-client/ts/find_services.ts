@@ -1,5 +1,7 @@
 // Services of a type, among the devices of a gateway. Layer: wasm-client/ts. Source: GET /api/v1/devices.
 import { makeError, textOf } from "./errors.js";
+import { headersOf } from "./platform.js";
+import type { Proof } from "./platform.js";
 
 /** A service of a device of a gateway. */
 export interface FoundService {
@@ -15,7 +17,7 @@ export interface FoundService {
   nodeName: string | null;
 }
 
-export interface ServiceQuery {
+export interface ServiceQuery extends Proof {
   /** Where the gateway is: "https://gateway.example". In a page, relative to it. */
   gateway: string | URL;
   /** Of the root object, or one that it implements; qualified: "experimental.create2.Create". */
@@ -42,7 +44,9 @@ export async function findServices(query: ServiceQuery, signal?: AbortSignal): P
   const found: FoundService[] = [];
   try {
     const gateway = new URL(String(query.gateway).replace(/\/*$/, "/"), globalThis.location?.href);
-    const response = await fetch(new URL("api/v1/devices", gateway), { signal: signal ?? null, cache: "no-store" });
+    const headers = headersOf(query);
+    const request = { headers, signal: signal ?? null, cache: "no-store" } as const;
+    const response = await fetch(new URL("api/v1/devices", gateway), request);
     if (!response.ok) throw new Error(`HTTP ${response.status}`);
     for (const { name, state, node_id: nodeId, node_name: nodeName, services } of (
       (await response.json()) as { devices: Device[] }

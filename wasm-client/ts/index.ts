@@ -4,7 +4,7 @@
  */
 export type { Clock } from "./clock.js";
 export { connect } from "./connect.js";
-export type { ConnectOptions } from "./connect.js";
+export type { ConnectOptions, UrlSource } from "./connect.js";
 export { ErrorCode, RobotRaconteurError } from "./errors.js";
 export type { ErrorFields } from "./errors.js";
 export type {

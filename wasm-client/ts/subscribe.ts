@@ -3,7 +3,7 @@
 import { Backoff, systemClock } from "./clock.js";
 import type { Clock } from "./clock.js";
 import { connectWith } from "./connect.js";
-import type { ConnectOptions, Memory } from "./connect.js";
+import type { ConnectOptions, Memory, UrlSource } from "./connect.js";
 import { callSafely, makeError } from "./errors.js";
 import type { RobotRaconteurError } from "./errors.js";
 import { findServices } from "./find_services.js";
@@ -27,25 +27,28 @@ export interface SubscribeOptions extends ConnectOptions {
   random?: (() => number) | undefined;
 }
 
+type Way = string | URL | UrlSource;
 type Client<T> = T & { readonly $: ObjectInfo };
 
 /**
  * Stays connected to a service: connects, and connects again after each loss, until close().
- * @param urls  one service, or several ways to it; each attempt tries them in order. As for connect(). Or the services of
- *              a type behind a gateway, as its devices come and go: the first one that can be connected to, and after a
- *              loss the first again; each attempt asks the gateway anew.
+ * @param urls  one service, or several ways to it; each attempt tries them in order. As for connect(): a function is asked
+ *              for its URL at each attempt. Or the services of a type behind a gateway, as its devices come and go: the
+ *              first one that can be connected to, and after a loss the first again; each attempt asks the gateway anew.
  * @throws      RobotRaconteurError InvalidArgument (URLs that name different services, no URL, signal). What fails later is told
  *              to onFailed() and tried again.
  */
 export function subscribe<T = RemoteObject>(
-  urls: string | URL | readonly (string | URL)[] | ServiceQuery,
+  urls: Way | readonly Way[] | ServiceQuery,
   options: SubscribeOptions = {},
 ): Subscription<T> {
   checkSignal(options.signal);
   if (typeof urls === "object" && "gateway" in urls) return new Subscription<T>(urls, options);
-  const list: (string | URL)[] = [urls].flat();
-  const services = new Set(list.map((url) => parseServiceUrl(url).service));
-  if (services.size !== 1) {
+  const list: Way[] = [urls].flat();
+  // What functions give is known later.
+  const fixed = list.filter((way) => typeof way !== "function");
+  const services = new Set(fixed.map((url) => parseServiceUrl(url).service));
+  if (list.length === 0 || services.size > 1) {
     const found = services.size === 0 ? "no URL" : `the services ${[...services].join(", ")}`;
     throw makeError("InvalidArgument", `subscribe: found ${found}, expected URLs of one service`);
   }
@@ -54,7 +57,7 @@ export function subscribe<T = RemoteObject>(
 
 /** One service that is wanted. Calls that are under way when a connection is lost reject: they are not repeated. */
 export class Subscription<T = RemoteObject> {
-  readonly #urls: readonly (string | URL)[] | ServiceQuery;
+  readonly #urls: readonly Way[] | ServiceQuery;
   readonly #options: SubscribeOptions;
   readonly #clock: Clock;
   readonly #backoff: Backoff;
@@ -71,7 +74,7 @@ export class Subscription<T = RemoteObject> {
   readonly #ended = new Set<() => void>();
 
   /** Use subscribe(). */
-  constructor(urls: readonly (string | URL)[] | ServiceQuery, options: SubscribeOptions) {
+  constructor(urls: readonly Way[] | ServiceQuery, options: SubscribeOptions) {
     this.#urls = urls;
     this.#options = options;
     this.#clock = options.clock ?? systemClock;
@@ -139,7 +142,10 @@ export class Subscription<T = RemoteObject> {
     return this.#on(this.#lost, lost);
   }
 
-  /** Calls `failed` for each URL that an attempt could not connect to, or the gateway's where it found no service. */
+  /**
+   * Calls `failed` for each URL that an attempt could not connect to, or the gateway's where it found no service; "" for
+   * one that a function gives: it may hold a ticket.
+   */
   onFailed(failed: (error: unknown, url: string) => void): () => void {
     return this.#on(this.#failed, failed);
   }
@@ -204,11 +210,12 @@ export class Subscription<T = RemoteObject> {
     this.#retry();
   }
 
-  async #ways(): Promise<readonly (string | URL)[]> {
+  async #ways(): Promise<readonly Way[]> {
     const query = this.#urls;
     if (!("gateway" in query)) return query;
+    const { token, headers } = this.#options;
     try {
-      const found = await findServices(query, this.#ending.signal);
+      const found = await findServices({ token, headers, ...query }, this.#ending.signal);
       if (found.length > 0) return found.map(({ url }) => url);
       throw makeError("ServiceNotFound", `no service of type ${query.type} at the gateway ${query.gateway}`);
     } catch (error) {
@@ -217,9 +224,10 @@ export class Subscription<T = RemoteObject> {
     }
   }
 
-  #tellFailed(error: unknown, url: string | URL): void {
+  #tellFailed(error: unknown, way: Way): void {
     if (this.isClosed) return;
-    for (const failed of [...this.#failed]) callSafely(() => failed(error, String(url)));
+    const url = typeof way === "function" ? "" : String(way);
+    for (const failed of [...this.#failed]) callSafely(() => failed(error, url));
   }
 
   #take(client: Client<T>): void {

@@ -1,6 +1,7 @@
 // Robot Raconteur over WebSocket. Layer: wasm-client/ts. Source: transports spec section 4.
 import { makeError, textOf } from "./errors.js";
 import { platform } from "./platform.js";
+import type { Proof } from "./platform.js";
 import type { Transport, TransportListener } from "./transport.js";
 
 export const subprotocol = "robotraconteur.robotraconteur.com";
@@ -10,11 +11,12 @@ const page = globalThis.location?.origin;
 const inPage = page && `nobody answers there, or does not let pages of ${page} in (a gateway: allowed_origins)`;
 
 /**
- * @throws RobotRaconteurError SystemResourceError: this engine has no WebSocket; ConnectionError: it refuses this URL.
+ * @throws RobotRaconteurError SystemResourceError: this engine has no WebSocket; ConnectionError: it refuses this URL;
+ *         what platform.findWebsocket() says of `proof`.
  *         Everything later is told to `listener`.
  */
-export async function openWebsocket(url: URL, listener: TransportListener): Promise<Transport> {
-  const WebSocketClass = await platform.findWebsocket();
+export async function openWebsocket(url: URL, listener: TransportListener, proof: Proof = {}): Promise<Transport> {
+  const WebSocketClass = await platform.findWebsocket(url, proof);
   const where = `${url.protocol}//${url.host}${url.pathname}`;
   let socket: WebSocket;
   try {

@@ -6,6 +6,7 @@ import { App } from "./app/app";
 import { watchRoute } from "./app/router";
 import { AccessDesk } from "./gateway/access";
 import { DeviceList } from "./gateway/devices";
+import { mustSignIn, session } from "./gateway/session";
 import { UsbDeviceList } from "./gateway/usb_devices";
 import "./styles/tokens.css";
 import "./styles/base.css";
@@ -15,12 +16,23 @@ import "./styles/members.css";
 import "./styles/robot.css";
 
 const list = new DeviceList();
-list.start();
+let isAsking = false;
+const askIfAllowed = (): void => {
+  const next = !mustSignIn(session.who.value);
+  if (next === isAsking) return;
+  isAsking = next;
+  if (next) list.start();
+  else list.stop();
+};
+void session.start().then(() => {
+  askIfAllowed();
+  session.who.watch(askIfAllowed);
+});
 const usb = new UsbDeviceList();
 usb.start();
-const access = new AccessDesk();
+const access = new AccessDesk(session);
 access.start();
 
 const place = document.getElementById("app");
 if (!place) throw new Error("index.html has no element #app");
-render(<App route={watchRoute()} list={list} usb={usb} access={access} />, place);
+render(<App route={watchRoute()} list={list} usb={usb} access={access} session={session} />, place);

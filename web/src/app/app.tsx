@@ -1,7 +1,7 @@
 // The frame around every page: head line, the news about the gateway, and the page that the address names.
 // Layer: web/app.
 
-import { useEffect, useRef } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import { useStore } from "./store";
 import type { Store } from "./store";
 import { formatRoute, formatStep } from "./router";
@@ -11,8 +11,11 @@ import type { Theme } from "./theme";
 import type { DeviceList } from "../gateway/devices";
 import type { UsbDeviceList } from "../gateway/usb_devices";
 import type { AccessDesk } from "../gateway/access";
+import { mustSignIn } from "../gateway/session";
+import type { Session } from "../gateway/session";
 import { DevicesPage } from "../pages/devices_page";
 import { ServicePage } from "../pages/service_page";
+import { Account, SignInPage } from "../pages/sign_in_page";
 import { Mark, SunMoonIcon } from "../ui/icons";
 
 interface AppParts {
@@ -20,17 +23,21 @@ interface AppParts {
   list: DeviceList;
   usb: UsbDeviceList;
   access: AccessDesk;
+  session: Session;
 }
 
-export function App({ route, list, usb, access }: AppParts) {
+export function App({ route, list, usb, access, session }: AppParts) {
   const where = useStore(route);
   const main = useRef<HTMLElement>(null);
-  const title = titleOf(where);
+  const who = useStore(session.who);
+  const [asked, setAsked] = useState(false);
+  const isForm = mustSignIn(who) || (asked && who?.user === null);
+  const title = isForm ? "Sign in" : titleOf(where);
   const first = useRef(true);
   useEffect(() => {
     document.title = title === "" ? "rrgate" : `${title} · rrgate`;
-    // A new page is a new place for the keyboard and the screen reader, but not on arrival.
-    if (!first.current) main.current?.focus({ preventScroll: true });
+    // A new page is a new place for the keyboard and the screen reader, but not on arrival. The form has its own.
+    if (!first.current && !isForm) main.current?.focus({ preventScroll: true });
     first.current = false;
   }, [title]);
   return (
@@ -44,13 +51,23 @@ export function App({ route, list, usb, access }: AppParts) {
           <span>rrgate</span>
         </a>
         <Crumbs route={where} />
+        <Account session={session} ask={() => setAsked(true)} />
         <ThemeButton />
       </header>
       <main id="main" ref={main} tabIndex={-1}>
-        {where.page === "devices" && <DevicesPage list={list} usb={usb} access={access} />}
-        {where.page === "service" && <ServicePage key={`${where.device}/${where.service}`} route={where} list={list} />}
-        {where.page === "unknown" && <UnknownPage address={where.address} />}
+        {isForm && <SignInPage session={session} done={() => setAsked(false)} />}
+        {!isForm && <Page route={where} list={list} usb={usb} access={access} />}
       </main>
+    </>
+  );
+}
+
+function Page({ route: where, list, usb, access }: Omit<AppParts, "route" | "session"> & { route: Route }) {
+  return (
+    <>
+      {where.page === "devices" && <DevicesPage list={list} usb={usb} access={access} />}
+      {where.page === "service" && <ServicePage key={`${where.device}/${where.service}`} route={where} list={list} />}
+      {where.page === "unknown" && <UnknownPage address={where.address} />}
     </>
   );
 }

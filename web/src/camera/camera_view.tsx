@@ -5,6 +5,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { useStore } from "../app/store";
 import { devicesOf, relayUrl } from "../gateway/devices";
+import { session } from "../gateway/session";
 import type { DeviceList, GatewayState } from "../gateway/devices";
 import { Link } from "../robot/link";
 import { explain } from "../robot/remote";
@@ -69,7 +70,7 @@ function Camera({ place, shown }: { place: Place; shown: boolean }) {
   const [link, setLink] = useState<Link | null>(null);
   useEffect(() => {
     const url = relayUrl(place.device, place.service);
-    const made = new Link(url);
+    const made = new Link(() => session.withTicket(url));
     setLink(made);
     return () => made.dispose();
   }, [place.device, place.service]);

@@ -4,6 +4,7 @@
 import { Store } from "../app/store";
 import { isRecord, text } from "./fields";
 import { Poller, reasonOf } from "./poller";
+import { session } from "./session";
 
 export type DeviceState = "online" | "offline" | "connecting";
 
@@ -61,7 +62,9 @@ export class DeviceList {
     this.#poller.start();
   }
 
+  /** Forgets what it knows: it is not for everybody. */
   stop(): void {
+    this.state.value = { kind: "loading" };
     this.#poller.stop();
   }
 
@@ -76,7 +79,7 @@ export function devicesOf(state: GatewayState): Device[] | null {
 }
 
 async function fetchDevices(signal: AbortSignal): Promise<Device[]> {
-  const response = await fetch(new URL("api/v1/devices", document.baseURI), { signal, cache: "no-store" });
+  const response = await session.fetch("api/v1/devices", { signal });
   if (!response.ok) throw new Error(`the gateway answered ${response.status} ${response.statusText}`.trim());
   return readDevices(await response.json());
 }

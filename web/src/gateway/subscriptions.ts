@@ -4,6 +4,7 @@
 import { Store } from "../app/store";
 import { isRecord, text } from "./fields";
 import { Poller, reasonOf } from "./poller";
+import { problemOf, session } from "./session";
 
 export interface Subscription {
   client: string;
@@ -54,11 +55,10 @@ export class SubscriptionList {
   }
 
   async #fetch(signal: AbortSignal): Promise<SubscriptionsState> {
-    const url = new URL(`api/v1/devices/${encodeURIComponent(this.#device)}/subscriptions`, document.baseURI);
-    const response = await fetch(url, { signal, cache: "no-store" });
+    const path = `api/v1/devices/${encodeURIComponent(this.#device)}/subscriptions`;
+    const response = await session.fetch(path, { signal });
     if (response.ok) return { kind: "known", subscriptions: readSubscriptions(await response.json()) };
-    const problem = (await response.json().catch(() => null)) as { detail?: unknown } | null;
-    const reason = typeof problem?.detail === "string" ? problem.detail : `the gateway answered ${response.status}`;
+    const reason = await problemOf(response);
     if (response.status === 401 || response.status === 403) return { kind: "denied", reason };
     throw new Error(reason);
   }

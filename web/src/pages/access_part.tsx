@@ -7,10 +7,9 @@ import type { AccessDesk, AccessRequest } from "../gateway/access";
 import { sentence } from "../ui/words";
 
 export function AccessPart({ access }: { access: AccessDesk }) {
-  const who = useStore(access.who);
   const pending = useStore(access.pending);
   const trouble = useStore(access.trouble);
-  if (!who?.login || (pending.length === 0 && trouble === null)) return null;
+  if (pending.length === 0 && trouble === null) return null;
   return (
     <section class="access-part" aria-label="Requests of access">
       <h2 class="place-name">Access</h2>

@@ -7,6 +7,7 @@ import type { PathStep, Route } from "../app/router";
 import { useStore } from "../app/store";
 import { devicesOf, relayUrl } from "../gateway/devices";
 import type { DeviceList } from "../gateway/devices";
+import { session } from "../gateway/session";
 import { isUsb, usbUrl } from "../gateway/usb_devices";
 import { Link } from "../robot/link";
 import { explain } from "../robot/remote";
@@ -70,8 +71,8 @@ function useLink(device: string, service: string, list: DeviceList, isWanted: bo
   const [link, setLink] = useState<Link | null>(null);
   useEffect(() => {
     if (!isWanted) return setLink(null);
-    const url = isUsb(device) ? usbUrl(device, service) : relayUrl(device, service);
-    const made = new Link(url);
+    const url = relayUrl(device, service);
+    const made = new Link(isUsb(device) ? usbUrl(device, service) : () => session.withTicket(url));
     setLink(made);
     let wasOnline = true;
     const unwatch = list.state.watch((gateway) => {

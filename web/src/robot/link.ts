@@ -2,6 +2,7 @@
 // Layer: web/robot.
 
 import { subscribe } from "rrgate-client";
+import type { UrlSource } from "rrgate-client";
 import { Store } from "../app/store";
 import { explain, remoteOf } from "./remote";
 import type { Remote } from "./remote";
@@ -19,7 +20,7 @@ export class Link {
   readonly #subscription;
 
   /** Starts connecting at once. `follow`: for tests. */
-  constructor(url: string, follow: typeof subscribe = subscribe) {
+  constructor(url: string | UrlSource, follow: typeof subscribe = subscribe) {
     this.#subscription = follow(url, LIMITS);
     this.#subscription.onConnected((client) => {
       this.state.value = { kind: "online", since: Date.now(), remote: remoteOf(client) };

@@ -1,0 +1,69 @@
+// A gateway that asks who one is, in front of the demo robot; it can be stopped and started again on its port.
+import { execFileSync } from "node:child_process";
+import { mkdtempSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import path from "node:path";
+import { deviceProgram, freePort, Program, rrgate } from "./processes";
+
+export const password = "of it all";
+
+export class GuardedLab {
+  readonly create: Program;
+  readonly gateway: Program;
+  readonly url: string;
+  readonly token: string;
+
+  private constructor(createPort: number, port: number, site: string) {
+    const folder = mkdtempSync(path.join(tmpdir(), "rrgate-e2e-"));
+    const file = (name: string): string => path.join(folder, name);
+    for (const [name, roles] of [
+      ["root", "admin"],
+      ["vera", "viewer"],
+    ] as const)
+      execFileSync(rrgate, ["passwd", file("users"), name, "--roles", roles], { input: `${password}\n` });
+    const made = execFileSync(rrgate, ["token", file("tokens"), "page", "--roles", "admin"], { encoding: "utf8" });
+    this.token = made.trim();
+    const all = ["read", "write", "call", "subscribe", "lock", "admin"];
+    const access = {
+      ["users_file"]: "users",
+      ["tokens_file"]: "tokens",
+      rules: [
+        { roles: ["admin"], may: all },
+        { roles: ["viewer"], may: ["read"] },
+      ],
+    };
+    const devices = [{ name: "create", url: `rr+tcp://127.0.0.1:${createPort}/?service=Create` }];
+    writeFileSync(
+      file("gateway.json"),
+      JSON.stringify({ listen: [`127.0.0.1:${port}`], ["web_root"]: site, devices, access }),
+    );
+    this.url = `http://127.0.0.1:${port}/`;
+    this.create = new Program(deviceProgram("rrgate-demo-create"), ["--port", String(createPort)]);
+    this.gateway = new Program(rrgate, ["serve", "--config", file("gateway.json")]);
+  }
+
+  static async start(site: string): Promise<GuardedLab> {
+    const lab = new GuardedLab(await freePort(), await freePort(), site);
+    lab.create.start();
+    lab.gateway.start();
+    await lab.waitUntilOnline();
+    return lab;
+  }
+
+  /** Until the gateway has reached its device. */
+  async waitUntilOnline(withinMs = 30_000): Promise<void> {
+    const headers = { ["Authorization"]: `Bearer ${this.token}` };
+    const giveUp = Date.now() + withinMs;
+    for (;;) {
+      const answer = await fetch(`${this.url}api/v1/devices`, { headers }).catch(() => null);
+      const text = await answer?.text();
+      if (text?.includes('"online"')) return;
+      if (Date.now() > giveUp) throw new Error(`create is not online: ${text}\n${this.gateway.output}`);
+      await new Promise((resolve) => setTimeout(resolve, 100));
+    }
+  }
+
+  async stop(): Promise<void> {
+    await Promise.all([this.gateway.kill("SIGTERM"), this.create.kill("SIGTERM")]);
+  }
+}

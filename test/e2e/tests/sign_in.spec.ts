@@ -1,0 +1,105 @@
+// Signing in at the dashboard of a gateway that asks who one is.
+import { expect, test } from "@playwright/test";
+import type { Page } from "@playwright/test";
+import { GuardedLab, password } from "../guarded_lab";
+import { webRoot } from "../processes";
+
+let lab: GuardedLab;
+
+test.beforeAll(async () => {
+  lab = await GuardedLab.start(webRoot);
+});
+
+test.afterAll(() => lab?.stop());
+
+const form = (page: Page) => page.getByRole("form", { name: "Sign in" });
+const signOut = (page: Page) => page.getByRole("button", { name: "Sign out" });
+
+/** @returns the URLs for which the browser would open its own dialog. */
+async function watchDialogs(page: Page): Promise<string[]> {
+  const dialogs: string[] = [];
+  const browser = await page.context().newCDPSession(page);
+  browser.on("Fetch.requestPaused", ({ requestId }) => void browser.send("Fetch.continueRequest", { requestId }));
+  browser.on("Fetch.authRequired", ({ requestId, request }) => {
+    dialogs.push(request.url);
+    void browser.send("Fetch.continueWithAuth", { requestId, authChallengeResponse: { response: "CancelAuth" } });
+  });
+  await browser.send("Fetch.enable", { handleAuthRequests: true });
+  return dialogs;
+}
+
+async function signIn(page: Page, name: string, secret: string): Promise<void> {
+  await page.getByLabel("Name").fill(name);
+  await page.getByLabel("Password or token").fill(secret);
+  await page.keyboard.press("Enter");
+}
+
+test("a wrong password is told; the right one shows the devices, in this tab alone and until signing out", async ({
+  page,
+  context,
+}) => {
+  const dialogs = await watchDialogs(page);
+  const refused: string[] = [];
+  page.on("response", (answer) => void (answer.status() === 401 && refused.push(new URL(answer.url()).pathname)));
+  await page.goto(lab.url);
+  await expect(form(page)).toBeVisible();
+  await expect(page.getByLabel("Name")).toBeFocused();
+  await page.getByLabel("Name").fill("vera");
+  await page.waitForResponse(/\/api\/v1\/access$/); // the page looks again: what is typed stays
+  await expect(page.getByLabel("Name")).toBeFocused();
+  await expect(page.getByLabel("Name")).toHaveValue("vera");
+  await signIn(page, "root", "wrong");
+  await expect(page.getByRole("alert")).toHaveText("Wrong name or password.");
+  await expect(page.getByLabel("Name")).toHaveValue("root");
+  expect(refused).toEqual(["/api/v1/access"]);
+
+  await signIn(page, "root", password);
+  await expect(page.getByRole("heading", { name: "Devices" })).toBeVisible();
+  await expect(page.getByText("create", { exact: true })).toBeVisible();
+  await expect(page.getByRole("group", { name: "You" })).toContainText("root admin");
+
+  await page.reload();
+  await expect(page.getByText("create", { exact: true })).toBeVisible();
+  const other = await context.newPage();
+  await other.goto(lab.url);
+  await expect(form(other)).toBeVisible();
+  await other.close();
+
+  await signOut(page).click();
+  await expect(form(page)).toBeVisible();
+  await expect(page.getByText("create", { exact: true })).toBeHidden();
+  await page.reload();
+  await expect(form(page)).toBeVisible();
+  expect(dialogs).toEqual([]);
+});
+
+test("a device is connected with tickets, again after a restart of the gateway; a token does too", async ({ page }) => {
+  await page.goto(`${lab.url}#/devices/create/Create`);
+  await signIn(page, "", lab.token);
+  await expect(page.locator('[data-link="online"]')).toBeVisible();
+  await lab.gateway.kill();
+  await expect(page.locator('[data-link="lost"]')).toBeVisible();
+  lab.gateway.start();
+  await lab.waitUntilOnline();
+  await expect(page.locator('[data-link="online"]')).toBeVisible();
+  await signOut(page).click();
+  await expect(form(page)).toBeVisible();
+});
+
+test("the form fits a phone and is used with the keyboard", async ({ page }) => {
+  await page.setViewportSize({ width: 320, height: 568 });
+  await page.goto(lab.url);
+  await page.getByLabel("Name").fill("vera");
+  await page.keyboard.press("Tab");
+  await page.keyboard.type(password);
+  await page.keyboard.press("Tab");
+  await expect(page.getByRole("button", { name: "Sign in" })).toBeFocused();
+  const overflow = () =>
+    page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+  expect(await overflow()).toBeLessThanOrEqual(0);
+  await page.keyboard.press("Enter");
+  await expect(signOut(page)).toBeVisible();
+  expect(await overflow()).toBeLessThanOrEqual(0);
+  const box = await signOut(page).boundingBox();
+  expect((box?.x ?? 999) + (box?.width ?? 999)).toBeLessThanOrEqual(320);
+});
