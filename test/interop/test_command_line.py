@@ -114,19 +114,20 @@ def test_a_robot_of_the_standard_types_is_jogged(standard_robot, way, tmp_path):
     def rrgate(*arguments):
         return run(*arguments, *(["--user", "alice"] if login else []), **login)
 
-    def newest_state():  # the first values may be older than what was asked for
-        states = rrgate("watch", url, "robot_state", "--count", "5", "--json").splitlines()
-        return json.loads(states[-1])["value"]
+    def wait_for_state(is_wanted):  # the driver's answer comes before its last step
+        deadline = time.monotonic() + 10
+        while not is_wanted(state := json.loads(rrgate("watch", url, "robot_state", "--count", "1", "--json"))["value"]):
+            assert time.monotonic() < deadline, state
 
     try:
         assert "com.robotraconteur.robotics.robot.Robot" in rrgate("info", url)
         assert "function void halt() [urgent]" in rrgate("info", url, "halt")
         for mode in "halt", "jog":  # words of an enum
             rrgate("set", url, "command_mode", mode)
-            assert newest_state()["command_mode"] == mode
+            wait_for_state(lambda state, mode=mode: state["command_mode"] == mode)
         for target in [0.5, -0.25], [0, 0.125]:
             rrgate("call", url, "jog_freespace", json.dumps(target), "max_velocity=[9, 9]", "wait=true")
-            assert newest_state()["joint_position"] == pytest.approx(target, abs=0.05)
+            wait_for_state(lambda state, target=target: state["joint_position"] == pytest.approx(target, abs=0.05))
         packets = rrgate("watch", url, "robot_state_sensor_data", "--count", "3", "--json").splitlines()
         assert [json.loads(each)["value"]["robot_state"]["command_mode"] for each in packets] == ["jog"] * 3
         rrgate("set", url, "command_mode", "halt")
