@@ -115,6 +115,9 @@ describe("shown values", () => {
       `[\n  {\n    x: 1\n    note: "${"n".repeat(80)}"\n  }\n]`,
     );
     expect(formatValue(Uint8Array.of(1, 2))).toBe("[1, 2]");
+    const uuid = { ["uuid_bytes"]: Uint8Array.from({ length: 16 }, (_, i) => i * 17) };
+    expect(formatValue({ id: uuid })).toBe("id: 00112233-4455-6677-8899-aabbccddeeff");
+    expect(formatValue({ ["uuid_bytes"]: Uint8Array.of(1) })).toBe("uuid_bytes: [1]");
     expect(formatValue(new Map([[0, "front"]]))).toBe('0: "front"');
     expect(formatValue({ dims: [2, 1], data: Float64Array.of(1, 2) })).toBe("2 × 1 [1, 2]");
     expect(formatValue(new Uint8Array(1_000_000))).toMatch(/… 999984 more\]$/);

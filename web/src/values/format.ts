@@ -70,7 +70,13 @@ function formatObject(object: Record<string, unknown>, depth: number): string {
   if (Array.isArray(dims) && ArrayBuffer.isView(data) && Object.keys(object).length === 2) {
     return `${dims.join(" × ")} ${formatValue(data, depth)}`;
   }
+  const bytes = object["uuid_bytes"]; // com.robotraconteur.uuid.UUID
+  if (bytes instanceof Uint8Array && bytes.length === 16 && Object.keys(object).length === 1) return formatUuid(bytes);
   return formatFields(Object.entries(object), depth);
+}
+
+function formatUuid(bytes: Uint8Array): string {
+  return formatHex(bytes).replaceAll(" ", "").replace(/^(.{8})(.{4})(.{4})(.{4})/, "$1-$2-$3-$4-");
 }
 
 function formatFields(fields: readonly (readonly [unknown, unknown])[], depth: number): string {
