@@ -29,8 +29,11 @@ rr::Result<> Standing::check(const AccessRequest& what, Recorded recorded) {
   if (!is_good())
     return rr::make_error(rr::ErrorCode::authentication_error, "what you have shown was revoked or has expired");
   if (recorded == Recorded::first_time) {
-    if (noted_.size() >= max_noted) noted_.clear();
-    if (noted_.emplace(what.path, what.member).second) recorded = Recorded::each_time;
+    if (!noted_.contains(std::pair(what.path, what.member))) {
+      if (noted_.size() >= max_noted) noted_.clear();
+      noted_.emplace(what.path, what.member);
+      recorded = Recorded::each_time;
+    }
   }
   if (recorded == Recorded::each_time) return access_.check(identity_, what);
   return access_.state().rules.check(identity_, what);

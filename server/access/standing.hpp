@@ -4,6 +4,7 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include "server/access/access.hpp"
@@ -32,13 +33,23 @@ class Standing {
   [[nodiscard]] rr::Result<> check(const AccessRequest& what, Recorded recorded = Recorded::each_time);
 
  private:
+  using Place = std::pair<std::string, std::string>;  ///< path and member
+  /// Also compares views, so that each packet is looked up without a copy.
+  struct ByPlace {
+    using is_transparent = void;
+    template <class A, class B>
+    bool operator()(const A& a, const B& b) const {
+      return std::tie(a.first, a.second) < std::tie(b.first, b.second);
+    }
+  };
+
   static constexpr std::size_t max_noted = 4096;
 
   Access& access_;
   AccessStatePtr judged_by_;
   Identity identity_;
   bool is_good_ = true;
-  std::set<std::pair<std::string, std::string>> noted_;  ///< path and member of what was recorded for the first time
+  std::set<Place, ByPlace> noted_;  ///< what was recorded for the first time
 };
 using StandingPtr = std::shared_ptr<Standing>;
 

@@ -76,7 +76,9 @@ function formatObject(object: Record<string, unknown>, depth: number): string {
 }
 
 function formatUuid(bytes: Uint8Array): string {
-  return formatHex(bytes).replaceAll(" ", "").replace(/^(.{8})(.{4})(.{4})(.{4})/, "$1-$2-$3-$4-");
+  return formatHex(bytes)
+    .replaceAll(" ", "")
+    .replace(/^(.{8})(.{4})(.{4})(.{4})/, "$1-$2-$3-$4-");
 }
 
 function formatFields(fields: readonly (readonly [unknown, unknown])[], depth: number): string {
