@@ -59,8 +59,12 @@ rr::awaitable<bool> wait_until_ready(GatewayState& gateway, const Destination& d
 /// How much a client may ask for, whoever he logs in as meanwhile.
 auto make_rate_gate(GatewayState& gateway, const SharedNode& node, const Connection& connection) {
   const auto& identity = connection.identity;
-  return [&gateway, &node, address = connection.address, shown = identity.is_proven() ? identity.name : std::string()](
+  const auto memory = std::make_shared<const MemoryBudget::Charge>(gateway.memory().charge(connection.address));
+  return [&gateway, &node, memory, address = connection.address,
+          shown = identity.is_proven() ? identity.name : std::string()](
              const rr::MemberAccess& wanted) -> rr::Result<std::shared_ptr<const void>> {
+    if (!memory->has_room(least_room))
+      return rr::make_error(rr::ErrorCode::service_error, "the gateway has no memory left; try again in a moment");
     const auto& rates = gateway.config().rates;
     if (!rates.is_bound()) return std::shared_ptr<const void>();
     const bool is_ours = wanted.user && gateway.access().authenticator();  // else it is a user of the device's
@@ -76,12 +80,12 @@ auto make_rate_gate(GatewayState& gateway, const SharedNode& node, const Connect
 std::shared_ptr<SharedClient> begin_session(GatewayState& gateway, Connection& connection, Destination destination,
                                             std::unique_ptr<rr::ByteStream> client, std::string base_url,
                                             std::function<void()> ended) {
-  SharedArrival arrival;
-  arrival.peer = connection.client;
-  arrival.base_url = std::move(base_url);
-  arrival.is_encrypted = connection.peer.is_encrypted;
-  arrival.admit = make_admission(gateway.access(), *destination.node, connection.identity);
-  arrival.enter = make_rate_gate(gateway, *destination.node, connection);
+  SharedArrival arrival{.peer = connection.client,
+                        .base_url = std::move(base_url),
+                        .admit = make_admission(gateway.access(), *destination.node, connection.identity),
+                        .enter = make_rate_gate(gateway, *destination.node, connection),
+                        .is_encrypted = connection.peer.is_encrypted,
+                        .memory = gateway.memory().charge(connection.address)};
   auto session = destination.node->add(std::move(client), std::move(arrival), std::move(ended));
   connection.device = destination.device;
   connection.has_session = true;
