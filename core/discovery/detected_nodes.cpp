@@ -4,21 +4,23 @@
 
 namespace rr {
 
-void DetectedNodes::handle_announcement(const Announcement& announcement, Now now) {
+void DetectedNodes::handle_announcement(const Announcement& announcement, Now now, std::string_view sender) {
   const NodeDiscoveryUrl heard{announcement.url, now.steady, now.utc};
   const auto expiry = now.steady + options_.expiry;
   next_expiry_ = std::min(next_expiry_.value_or(expiry), expiry);
 
   const auto found = nodes_.find(announcement.node_id);
   if (found == nodes_.end()) {
-    if (nodes_.size() >= options_.max_nodes) return;
+    if (!make_room(std::string(sender))) return;
     const NodeDiscoveryInfo info{
         announcement.node_id, announcement.node_name, {heard}, announcement.service_state_nonce};
     nodes_.emplace(announcement.node_id, info);
+    if (!sender.empty()) claim(announcement.node_id, std::string(sender));
     events_.push_back({NodeEvent::Kind::found, info});
     return;
   }
 
+  if (const auto owner = end_claim(announcement.node_id); owner && !sender.empty()) claim(announcement.node_id, *owner);
   auto& node = found->second;
   NodeEvent event{NodeEvent::Kind::changed, {}};
   const auto known =
@@ -41,6 +43,45 @@ void DetectedNodes::handle_announcement(const Announcement& announcement, Now no
   events_.push_back(std::move(event));
 }
 
+bool DetectedNodes::make_room(const std::string& sender) {
+  if (const auto own = claims_by_sender_.find(sender);
+      own != claims_by_sender_.end() && own->second.size() >= options_.max_nodes_of_sender) {
+    give_up(own->second.begin()->second);
+  } else if (nodes_.size() >= options_.max_nodes) {
+    if (claims_by_turn_.empty()) return false;
+    give_up(claims_by_turn_.begin()->second);
+  }
+  return true;
+}
+
+void DetectedNodes::give_up(const NodeId& node_id) {
+  const auto node = nodes_.extract(node_id);
+  end_claim(node.key());
+  events_.push_back({NodeEvent::Kind::lost, node.mapped()});
+}
+
+void DetectedNodes::claim(const NodeId& node_id, const std::string& sender) {
+  const auto turn = ++last_turn_;
+  claims_[node_id] = {turn, sender};
+  claims_by_turn_[turn] = node_id;
+  claims_by_sender_[sender][turn] = node_id;
+}
+
+std::optional<std::string> DetectedNodes::end_claim(const NodeId& node_id) {
+  const auto ended = claims_.extract(node_id);
+  if (!ended) return std::nullopt;
+  const auto& [turn, sender] = ended.mapped();
+  claims_by_turn_.erase(turn);
+  const auto own = claims_by_sender_.find(sender);
+  own->second.erase(turn);
+  if (own->second.empty()) claims_by_sender_.erase(own);
+  return sender;
+}
+
+void DetectedNodes::confirm(const NodeId& node_id) {
+  end_claim(node_id);
+}
+
 template <class F>
 DetectedNodes::Nodes::iterator DetectedNodes::drop_urls(Nodes::iterator node, F&& is_gone) {
   auto& info = node->second;
@@ -48,6 +89,7 @@ DetectedNodes::Nodes::iterator DetectedNodes::drop_urls(Nodes::iterator node, F&
   info.urls.erase(std::remove_if(info.urls.begin(), info.urls.end(), is_gone), info.urls.end());
   if (info.urls.empty()) {
     events_.push_back({NodeEvent::Kind::lost, last});
+    end_claim(node->first);
     return nodes_.erase(node);
   }
   if (info.urls.size() != last.urls.size()) {

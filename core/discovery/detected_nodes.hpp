@@ -42,8 +42,10 @@ struct NodeEvent {
 
 struct DetectedNodesOptions {
   std::chrono::milliseconds expiry{60'000};  ///< of a URL after its last announcement; the node goes with its last URL
-  std::size_t max_nodes = 4096;              ///< more are passed over until others expire
-  std::size_t max_urls = 32;                 ///< of one node; above, the one not heard for longest is replaced
+  /// Above, the node gives way that was not heard of for longest, unless it is confirmed.
+  std::size_t max_nodes = 4096;
+  std::size_t max_urls = 32;              ///< of one node; above, the one not heard for longest is replaced
+  std::size_t max_nodes_of_sender = 512;  ///< that are not confirmed; above, the oldest of this sender gives way
 };
 
 /// A cache of announcements, sans-IO: told of them by any number of sources, asked by its owner. After each handle_*()
@@ -54,7 +56,10 @@ class DetectedNodes {
 
   // --- told ---
 
-  void handle_announcement(const Announcement& announcement, Now now);
+  /// `sender`  where it came from, as far as that is known; empty: this machine, whose word is good.
+  void handle_announcement(const Announcement& announcement, Now now, std::string_view sender = {});
+  /// The node has answered for itself, so it is there: it does not give way to nodes that nobody has seen.
+  void confirm(const NodeId& node_id);
   /// The node is known to have left this URL; for sources that see a node go.
   void handle_withdrawn(const NodeId& node_id, std::string_view url);
   void handle_timeout(Now now);
@@ -76,8 +81,24 @@ class DetectedNodes {
   template <class F>
   Nodes::iterator drop_urls(Nodes::iterator node, F&& is_gone);
 
+  bool make_room(const std::string& sender);
+  void give_up(const NodeId& node_id);
+
+  /// A node that is not confirmed. Anybody can claim to be any number of them.
+  struct Claim {
+    std::uint64_t turn;  ///< counts announcements
+    std::string sender;  ///< of the first one
+  };
+  void claim(const NodeId& node_id, const std::string& sender);
+  /// It is confirmed, or gone. Returns whose claim it was.
+  std::optional<std::string> end_claim(const NodeId& node_id);
+
   DetectedNodesOptions options_;
   Nodes nodes_;
+  std::map<NodeId, Claim> claims_;
+  std::map<std::uint64_t, NodeId> claims_by_turn_;                           ///< the oldest one first
+  std::map<std::string, std::map<std::uint64_t, NodeId>> claims_by_sender_;  ///< likewise
+  std::uint64_t last_turn_ = 0;
   std::deque<NodeEvent> events_;
   std::optional<TimePoint> next_expiry_;
 };

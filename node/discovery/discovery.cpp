@@ -33,6 +33,12 @@ bool has_scheme(const NodeDiscoveryInfo& node, const std::vector<std::string>& s
          });
 }
 
+/// By which announcements are told apart whose sender claims to be many nodes.
+std::string sender_of(const PacketSource& source) {
+  const auto& bytes = source.address.bytes;
+  return std::string(bytes.begin(), source.address.is_v6 ? bytes.end() : bytes.begin() + 4) + source.zone;
+}
+
 /// One search for services over many nodes. Shared by its queries, since they end a little after it.
 struct TypeSearch {
   explicit TypeSearch(const asio::any_io_executor& executor) : changed(executor) {}
@@ -199,10 +205,11 @@ class Discovery::Implementation : public std::enable_shared_from_this<Implementa
 
   void withdraw(const NodeId& node_id) { own_.erase(node_id); }
 
-  void handle_announcement(const Announcement& announcement) {
-    nodes_.handle_announcement(announcement, read_clocks());
+  void handle_announcement(const Announcement& announcement, std::string_view sender = {}) {
+    nodes_.handle_announcement(announcement, read_clocks(), sender);
     tell();
   }
+  void confirm(const NodeId& node_id) { nodes_.confirm(node_id); }
   void handle_withdrawn(const NodeId& node_id, std::string_view url) {
     nodes_.handle_withdrawn(node_id, url);
     tell();
@@ -243,7 +250,8 @@ class Discovery::Implementation : public std::enable_shared_from_this<Implementa
   void received(std::string_view packet, const PacketSource& source) {
     std::vector<NodeId> own;
     for (const auto& [id, node] : own_) own.push_back(id);
-    if (const auto announcement = parse_announcement(packet, source, own)) return handle_announcement(*announcement);
+    if (const auto announcement = parse_announcement(packet, source, own))
+      return handle_announcement(*announcement, sender_of(source));
     const auto listener = parse_discovery_request(packet);
     // What is neither is somebody's mistake, and not worth a line for each.
     if (!listener || *listener == listener_id_) return;
@@ -390,6 +398,10 @@ void Discovery::services_changed(const NodeId& node_id) {
 void Discovery::withdraw(const NodeId& node_id) {
   implementation_->withdraw(node_id);
 }
+void Discovery::confirm(const NodeId& node_id) {
+  implementation_->confirm(node_id);
+}
+
 void Discovery::handle_announcement(const Announcement& announcement) {
   implementation_->handle_announcement(announcement);
 }

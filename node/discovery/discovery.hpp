@@ -95,6 +95,8 @@ class Discovery {
   // --- other sources of detections ---
 
   void handle_announcement(const Announcement& announcement);
+  /// The node has answered: in a flood of announcements it is not given up for others.
+  void confirm(const NodeId& node_id);
   void handle_withdrawn(const NodeId& node_id, std::string_view url);
 
  private:

@@ -80,6 +80,7 @@ void StreamDriver::settle(Now now) {
   } while (read_on(now));
   is_settling_ = false;
   if (is_closed_) return;
+  has_settled();
   if (wants_close()) {
     ends_in_good_order_ = !is_writing_ && is_reading_;
     return finish(make_error(ErrorCode::connection_error, "connection closed"), now);

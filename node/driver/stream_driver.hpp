@@ -58,6 +58,8 @@ class StreamDriver : public std::enable_shared_from_this<StreamDriver> {
   virtual TimePoint poll_timeout() const = 0;
   /// After handle_transmitted(): fewer bytes wait. Whatever else is due has to be posted.
   virtual void has_written() {}
+  /// After whatever was told or asked: what could be written is written.
+  virtual void has_settled() {}
   /// Polls one event and handles it. Returns whether there was one.
   virtual bool handle_event(Now now) = 0;
   /// The stream is closed and all events are handled; called once, last.

@@ -126,6 +126,7 @@ class TypeFollower : public std::enable_shared_from_this<TypeFollower> {
     const auto now = std::chrono::steady_clock::now();
     if (!answer) co_return node.refresh.handle_failure(now);
     node.refresh.handle_success(now);
+    if (self->core_) self->discovery_.confirm(id);
     node.services = std::move(answer->services);
     std::erase_if(node.services, [&](const ServiceInfo& service) { return !self->wants(service); });
     self->offer(node);

@@ -136,8 +136,9 @@ std::optional<Bytes> WebSocketMessageDecoder::take_ping() {
 
 // --- the socket ---
 
-WebSocketMessages::WebSocketMessages(ByteStream& stream, std::size_t max_message_bytes)
+WebSocketMessages::WebSocketMessages(ByteStream& stream, std::size_t max_message_bytes, HasRoom has_room)
     : stream_(stream),
+      has_room_(std::move(has_room)),
       decoder_(max_message_bytes),
       buffer_(read_bytes),
       close_limit_(stream.executor(), [this] { stream_.close(); }),
@@ -163,7 +164,13 @@ awaitable<std::optional<std::string>> WebSocketMessages::read() {
     unread_ = unread_.subspan(*taken);
     if (const auto ping = decoder_.take_ping())
       if (co_await write_control(WebSocketOpcode::pong, *ping)) co_return std::nullopt;
-    if (auto message = decoder_.take_message()) co_return message;
+    auto message = decoder_.take_message();
+    const auto size = message ? message->size() : decoder_.held_bytes();
+    if (has_room_ && !has_room_(size)) {
+      violation_ = EndReason{1013, "no memory left for a message of " + std::to_string(size) + " bytes"};
+      co_return std::nullopt;
+    }
+    if (message) co_return message;
   }
 }
 

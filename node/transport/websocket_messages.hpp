@@ -4,6 +4,7 @@
 
 #include <boost/asio/steady_timer.hpp>
 #include <chrono>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -26,6 +27,8 @@ class WebSocketMessageDecoder {
   [[nodiscard]] Result<std::size_t> feed(ByteSpan bytes);
 
   std::optional<std::string> take_message();
+  /// Bytes of the message that is not whole yet.
+  std::size_t held_bytes() const { return text_.size(); }
   std::optional<Bytes> take_ping();
   const std::optional<CloseFrame>& received_close() const { return close_; }
   std::uint16_t close_code() const { return close_code_; }
@@ -53,8 +56,10 @@ class WebSocketMessageDecoder {
 
 class WebSocketMessages {
  public:
-  /// `stream` has just carried the 101 response, and is borrowed.
-  WebSocketMessages(ByteStream& stream, std::size_t max_message_bytes);
+  /// Asked with the size of a message as far as it has come. False: the connection is closed with 1013.
+  using HasRoom = std::function<bool(std::size_t bytes)>;
+  /// `stream` has just carried the 101 response, and is borrowed. `has_room`  null: there always is.
+  WebSocketMessages(ByteStream& stream, std::size_t max_message_bytes, HasRoom has_room = nullptr);
 
   /// The next message. Answers pings meanwhile. nullopt: the peer has ended it, or has gone, or cancel() was called.
   awaitable<std::optional<std::string>> read();
@@ -73,6 +78,7 @@ class WebSocketMessages {
   awaitable<error_code> write_control(WebSocketOpcode opcode, ByteSpan payload);
 
   ByteStream& stream_;
+  HasRoom has_room_;
   WebSocketMessageDecoder decoder_;
   Bytes buffer_;
   ByteSpan unread_;  ///< of buffer_

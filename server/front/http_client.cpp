@@ -233,6 +233,11 @@ bool is_guarded(const Request& request) {
          path.starts_with(devices_prefix);
 }
 
+/// What is refused when there is no memory left; how the gateway is can be asked all the same.
+bool makes_work(const Request& request) {
+  return is_guarded(request) && request.path() != "/metrics";
+}
+
 void note_unreadable(GatewayState& gateway, const Connection& connection, const ReadFailure& failure) {
   if (failure.status == 0) return;  // the client is gone
   gateway.reject(Rejection::bad_request);
@@ -284,6 +289,9 @@ rr::awaitable<Continuation> serve_http_client(GatewayState& gateway, Connection&
       admitted = co_await gateway.http_access().admit(request, connection, config);
       if (admitted.refusal) gateway.reject(rejection_of(admitted.refusal->status));
     }
+    auto memory = gateway.memory().charge(client_network(request.arrival.address).to_string());
+    if (!admitted.refusal && !is_refused && makes_work(request) && !memory.has_room(least_room))
+      admitted.refusal = no_memory_response();
     if (admitted.refusal && asks_for_websocket(request)) {
       co_await write_refusal(*stream, *admitted.refusal);
       co_await stream->end(rr::no_reason);
@@ -297,8 +305,8 @@ rr::awaitable<Continuation> serve_http_client(GatewayState& gateway, Connection&
     std::vector<std::pair<std::string, std::string>> headers;
     if (request.arrival.is_encrypted && config.tls.hsts_seconds > 0)
       headers.emplace_back("Strict-Transport-Security", "max-age=" + std::to_string(config.tls.hsts_seconds));
-    auto memory = gateway.memory().charge(client_network(request.arrival.address).to_string());
-    ResponseOptions options{gateway.is_stopping(), std::move(headers), config.timeouts.send_stall};
+    ResponseOptions options{gateway.is_stopping(), std::move(headers), config.timeouts.send_stall,
+                            !makes_work(request)};
     ResponseWriter writer(*stream, reader, request, std::move(memory), std::move(options));
     const auto response = admitted.refusal                ? *admitted.refusal
                           : is_refused                    ? stopping_response()

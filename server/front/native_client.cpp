@@ -18,7 +18,8 @@ namespace {
 constexpr std::size_t largest_first_message = 512 * 1024;
 
 /// Reads one message and puts all that was read back, for the relay. Errors: as FrameScanner, or the connection ended.
-rr::awaitable<rr::Result<rr::Bytes>> read_first_message(rr::ByteStream& stream, std::size_t limit) {
+rr::awaitable<rr::Result<rr::Bytes>> read_first_message(rr::ByteStream& stream, std::size_t limit,
+                                                        MemoryBudget::Charge& memory) {
   rr::FrameScanner scanner(limit);
   rr::Bytes seen;
   rr::Bytes buffer(4096);
@@ -28,6 +29,8 @@ rr::awaitable<rr::Result<rr::Bytes>> read_first_message(rr::ByteStream& stream, 
       co_return rr::make_error(rr::ErrorCode::connection_error, "ended before its first message was complete");
     const rr::ByteSpan bytes(buffer.data(), read.bytes);
     seen.insert(seen.end(), bytes.begin(), bytes.end());
+    if (!memory.resize(2 * seen.size()))  // the scanner has them, too
+      co_return rr::make_error(rr::ErrorCode::out_of_system_resource, "the gateway has no memory left for its message");
     const auto consumed = scanner.feed(bytes);
     if (!consumed) co_return consumed.error();
     if (!scanner.message()) continue;
@@ -88,8 +91,9 @@ rr::awaitable<rr::awaitable<void>> serve_native_client(GatewayState& gateway, Co
   auto& client = *stream;
   rr::Deadline limit(client.executor(), [&client] { client.close(); });
   limit.arm(gateway.config().limits.header_timeout);
-  const auto bytes =
-      co_await read_first_message(client, std::min(largest_first_message, gateway.config().limits.max_message_size));
+  auto memory = gateway.memory().charge(connection.address);
+  const auto largest = std::min(largest_first_message, gateway.config().limits.max_message_size);
+  const auto bytes = co_await read_first_message(client, largest, memory);
   limit.disarm();
   rr::Message request;
   rr::Result<> read = bytes ? rr::decode(*bytes, {}, request) : rr::Result<>(bytes.error());

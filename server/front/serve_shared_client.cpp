@@ -59,8 +59,11 @@ rr::awaitable<bool> wait_until_ready(GatewayState& gateway, const Destination& d
 
 /// How much a client may ask for, whoever he logs in as meanwhile.
 auto make_rate_gate(GatewayState& gateway, const SharedNode& node, const Connection& connection) {
-  return [&gateway, &node, address = connection.address, shown = connection.identity.subject()](
+  const auto memory = std::make_shared<const MemoryBudget::Charge>(gateway.memory().charge(connection.address));
+  return [&gateway, &node, memory, address = connection.address, shown = connection.identity.subject()](
              const rr::MemberAccess& wanted) -> rr::Result<std::shared_ptr<const void>> {
+    if (!memory->has_room(least_room))
+      return rr::make_error(rr::ErrorCode::service_error, "the gateway has no memory left; try again in a moment");
     const auto& rates = gateway.config().rates;
     if (!rates.is_bound()) return std::shared_ptr<const void>();
     const auto user = wanted.user ? subject_of(*wanted.user) : Subject();
@@ -121,12 +124,13 @@ std::shared_ptr<SharedClient> begin_session(GatewayState& gateway, Connection& c
   const auto device = destination.device ? destination.device->config().name : std::string();
   const auto shown = std::make_shared<Standing>(gateway.access(), connection.identity);
   const auto rights = std::make_shared<SessionRights>(gateway.access(), *destination.node, device, shown);
-  SharedArrival arrival;
-  arrival.peer = connection.client;
-  arrival.base_url = std::move(base_url);
-  arrival.is_encrypted = connection.peer.is_encrypted;
-  arrival.admit = make_admission(gateway, *destination.node, connection.client, rights, std::move(seating));
-  arrival.enter = make_rate_gate(gateway, *destination.node, connection);
+  SharedArrival arrival{
+      .peer = connection.client,
+      .base_url = std::move(base_url),
+      .admit = make_admission(gateway, *destination.node, connection.client, rights, std::move(seating)),
+      .enter = make_rate_gate(gateway, *destination.node, connection),
+      .is_encrypted = connection.peer.is_encrypted,
+      .memory = gateway.memory().charge(connection.address)};
   auto session = destination.node->add(std::move(client), std::move(arrival), std::move(ended));
   connection.device = destination.device;
   connection.has_session = true;

@@ -61,10 +61,14 @@ rr::awaitable<std::optional<Response>> ResponseWriter::read_body(std::size_t lim
   co_return problem_response(body_failure_->status == 0 ? 400 : body_failure_->status, body_failure_->detail);
 }
 
+bool ResponseWriter::make_room(const std::shared_ptr<const std::string>& body) {
+  // What others hold as well costs nothing more. For so little there was room when the request came.
+  if (!body || body.use_count() > 1 || body->size() <= least_room) return true;
+  return memory_.resize(memory_.bytes() + body->size());
+}
+
 rr::awaitable<rr::error_code> ResponseWriter::send(const Response& whole) {
-  // A body that others hold as well costs nothing more.
-  const bool is_own = whole.body && whole.body.use_count() == 1;
-  const bool fits = !is_own || memory_.resize(memory_.bytes() + whole.body->size());
+  const bool fits = is_vital_ || make_room(whole.body);
   const Response no_memory = fits ? Response() : no_memory_response();
   const Response& response = fits ? whole : no_memory;
   if (response.closes) closes_ = true;

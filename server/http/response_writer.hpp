@@ -19,6 +19,7 @@ struct ResponseOptions {
   std::vector<std::pair<std::string, std::string>> headers = {};  ///< of every response of this connection
   /// For each part of a response, beside what least_rate gives for its bytes. Who reads slower is cut.
   std::chrono::milliseconds patience{15'000};
+  bool is_vital = false;  ///< answered also when there is no memory left
 };
 
 /// 503: what clients may make the gateway hold is used up.
@@ -35,6 +36,7 @@ class ResponseWriter {
         request_(request),
         memory_(std::move(memory)),
         closes_(options.closes),
+        is_vital_(options.is_vital),
         headers_(std::move(options.headers)),
         patience_(options.patience),
         slow_(stream.executor(), [this] { stream_.close(); }) {}
@@ -73,6 +75,7 @@ class ResponseWriter {
   struct Watch;
   static rr::awaitable<void> read_while(std::shared_ptr<Watch> watch, rr::ByteStream& stream);
   std::string head_of(const Response& response) const;
+  bool make_room(const std::shared_ptr<const std::string>& body);
   rr::awaitable<rr::error_code> write_slices(std::span<const rr::ByteSpan> slices);
   unsigned minor_version() const { return request_.message.version() == 10 ? 0 : 1; }
 
@@ -82,6 +85,7 @@ class ResponseWriter {
   MemoryBudget::Charge memory_;
   std::optional<ReadFailure> body_failure_;
   bool closes_;
+  bool is_vital_;
   std::vector<std::pair<std::string, std::string>> headers_;
   std::chrono::milliseconds patience_;
   rr::Deadline slow_;

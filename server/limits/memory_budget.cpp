@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <map>
 
 namespace rrgate {
 
@@ -28,13 +29,38 @@ std::size_t machine_memory() {
   return bytes;
 }
 
+struct MemoryBudget::State {
+  std::size_t total;
+  std::size_t used = 0;
+  std::uint64_t refusals = 0;
+  std::map<std::string, std::weak_ptr<Account>> accounts = {};
+};
+
+/// Of one client; goes with its last charge.
+struct MemoryBudget::Account {
+  Account(std::shared_ptr<State> its_state, std::string its_client)
+      : state(std::move(its_state)), client(std::move(its_client)) {}
+  ~Account() { state->accounts.erase(client); }
+  Account(const Account&) = delete;
+  Account& operator=(const Account&) = delete;
+
+  std::shared_ptr<State> state;
+  std::string client;
+  std::size_t bytes = 0;
+};
+
+MemoryBudget::Charge::Charge(Charge&& other) noexcept
+    : account_(std::move(other.account_)), bytes_(std::exchange(other.bytes_, 0)) {}
+
+MemoryBudget::Charge::~Charge() {
+  hold(0);
+}
+
 bool MemoryBudget::Charge::has_room(std::size_t more) const {
-  const auto& state = *state_;
-  const auto found = state.by_client.find(client_);
-  const auto own = found == state.by_client.end() ? 0 : found->second;
+  auto& state = *account_->state;
   const auto left = state.total - std::min(state.total, state.used);
-  if (more <= left && own + more <= left - more) return true;
-  ++state_->refusals;
+  if (more <= left && account_->bytes + more <= left - more) return true;
+  ++state.refusals;
   return false;
 }
 
@@ -46,11 +72,38 @@ bool MemoryBudget::Charge::resize(std::size_t bytes) {
 
 void MemoryBudget::Charge::hold(std::size_t bytes) {
   if (bytes == bytes_) return;
-  auto& own = state_->by_client[client_];
-  own += bytes - bytes_;  // wraps around, and back
-  state_->used += bytes - bytes_;
+  account_->bytes = account_->bytes - bytes_ + bytes;
+  account_->state->used = account_->state->used - bytes_ + bytes;
   bytes_ = bytes;
-  if (own == 0) state_->by_client.erase(client_);
+}
+
+MemoryBudget::MemoryBudget(std::size_t total) : state_(std::make_shared<State>(State{total})) {}
+
+MemoryBudget::Charge MemoryBudget::charge(const std::string& client) {
+  auto& known = state_->accounts[client];
+  auto account = known.lock();
+  if (!account) known = account = std::make_shared<Account>(state_, client);
+  return Charge(std::move(account));
+}
+
+void MemoryBudget::set_total(std::size_t total) {
+  state_->total = total;
+}
+
+std::size_t MemoryBudget::total() const {
+  return state_->total;
+}
+
+std::size_t MemoryBudget::used() const {
+  return state_->used;
+}
+
+std::uint64_t MemoryBudget::refusals() const {
+  return state_->refusals;
+}
+
+std::size_t MemoryBudget::clients() const {
+  return state_->accounts.size();
 }
 
 }  // namespace rrgate

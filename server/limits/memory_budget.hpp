@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <string>
 #include <utility>
@@ -16,22 +15,16 @@ std::size_t machine_memory();
 /// Nobody may hold more than is left for all others. So one client alone gets half of it, two get a third each, and
 /// there is always something left for whoever comes next.
 class MemoryBudget {
-  struct State {
-    std::size_t total;
-    std::size_t used = 0;
-    std::uint64_t refusals = 0;
-    std::map<std::string, std::size_t> by_client = {};
-  };
+  struct State;
+  struct Account;
 
  public:
   /// Bytes that are held for one client; given back when it goes. May outlive the budget.
   class Charge {
    public:
-    Charge(Charge&& other) noexcept : state_(std::move(other.state_)), client_(std::move(other.client_)) {
-      bytes_ = std::exchange(other.bytes_, 0);
-    }
+    Charge(Charge&& other) noexcept;
     Charge& operator=(Charge&&) = delete;
-    ~Charge() { hold(0); }
+    ~Charge();
 
     /// From now on so many bytes are held. False: that is too much, and nothing has changed; less is never too much.
     [[nodiscard]] bool resize(std::size_t bytes);
@@ -41,30 +34,33 @@ class MemoryBudget {
     [[nodiscard]] bool has_room(std::size_t more) const;
     std::size_t bytes() const { return bytes_; }
     /// Another one of the same client, of nothing yet.
-    Charge sibling() const { return Charge(state_, client_); }
+    Charge sibling() const { return Charge(account_); }
 
    private:
     friend class MemoryBudget;
-    Charge(std::shared_ptr<State> state, std::string client) : state_(std::move(state)), client_(std::move(client)) {}
+    explicit Charge(std::shared_ptr<Account> account) : account_(std::move(account)) {}
 
-    std::shared_ptr<State> state_;
-    std::string client_;
+    std::shared_ptr<Account> account_;
     std::size_t bytes_ = 0;
   };
 
-  explicit MemoryBudget(std::size_t total) : state_(std::make_shared<State>(State{total})) {}
+  explicit MemoryBudget(std::size_t total);
 
   /// Of nothing yet. `client`  by its network; empty: the gateway itself.
-  Charge charge(std::string client) { return Charge(state_, std::move(client)); }
+  Charge charge(const std::string& client);
 
-  void set_total(std::size_t total) { state_->total = total; }
-  std::size_t total() const { return state_->total; }
-  std::size_t used() const { return state_->used; }
-  std::uint64_t refusals() const { return state_->refusals; }
-  std::size_t clients() const { return state_->by_client.size(); }
+  void set_total(std::size_t total);
+  std::size_t total() const;
+  std::size_t used() const;
+  std::uint64_t refusals() const;
+  /// With charges, of nothing as well.
+  std::size_t clients() const;
 
  private:
   std::shared_ptr<State> state_;
 };
+
+/// Who asks for something new should have room for so much: else it is refused.
+inline constexpr std::size_t least_room = 64 * 1024;
 
 }  // namespace rrgate

@@ -36,10 +36,12 @@ rr::EndReason lost_device(const rr::error_code& error) {
 
 }  // namespace
 
-Relay::Relay(rr::ByteStream& client, rr::ByteStream& device, RelayOptions options, Traffic& traffic)
+Relay::Relay(rr::ByteStream& client, rr::ByteStream& device, RelayOptions options, Traffic& traffic,
+             MemoryBudget::Charge memory)
     : client_(client),
       device_(device),
       options_(options),
+      memory_(std::move(memory)),
       to_device_{client, device, FrameGate(options.max_message_size), false, traffic.to_device},
       to_client_{device, client, FrameGate(options.max_message_size), true, traffic.to_clients},
       half_closed_limit_(client.executor(),
@@ -99,8 +101,10 @@ rr::awaitable<void> Relay::pump(Direction& direction) {
     }
     const rr::ByteSpan slice(buffer.data(), *passed);
     direction.flow.waiting += *passed;
+    memory_.hold(memory_.bytes() + *passed);  // bounded for each client: it waits, and nobody is refused
     const auto error = co_await direction.to.write({&slice, 1});
     direction.flow.waiting -= *passed;
+    memory_.hold(memory_.bytes() - *passed);
     if (error) {
       stop(direction.is_from_device ? lost_client(1013, error) : lost_device(error));
       break;

@@ -9,6 +9,7 @@
 
 #include "node/transport/byte_stream.hpp"
 #include "node/transport/watchdog.hpp"
+#include "server/limits/memory_budget.hpp"
 #include "server/log/metrics.hpp"
 #include "server/relay/frame_gate.hpp"
 
@@ -27,7 +28,9 @@ struct RelayOptions {
 class Relay {
  public:
   /// `traffic`  is counted up, and outlives the relay too.
-  Relay(rr::ByteStream& client, rr::ByteStream& device, RelayOptions options, Traffic& traffic);
+  /// `memory`  is where the bytes that wait are counted.
+  Relay(rr::ByteStream& client, rr::ByteStream& device, RelayOptions options, Traffic& traffic,
+        MemoryBudget::Charge memory);
 
   /// Forwards until one side ends, fails, or breaks the rules. Ends both streams and says why.
   rr::awaitable<rr::EndReason> run();
@@ -58,6 +61,7 @@ class Relay {
   rr::ByteStream& client_;
   rr::ByteStream& device_;
   RelayOptions options_;
+  MemoryBudget::Charge memory_;
   Direction to_device_;
   Direction to_client_;
   rr::Deadline half_closed_limit_;

@@ -11,6 +11,9 @@ namespace asio = boost::asio;
 
 namespace {
 
+/// So little is not worth an entry: what answers and values leave behind before the stream takes them.
+constexpr std::size_t uncounted_bytes = 16 * 1024;
+
 const std::string& path_of(const rr::ServiceObject& object) {
   return static_cast<const SharedObject&>(object).path();
 }
@@ -18,10 +21,11 @@ const std::string& path_of(const rr::ServiceObject& object) {
 }  // namespace
 
 SharedClient::SharedClient(SharedClientOwner& owner, rr::ServiceDirectory& directory, rr::ServiceSessionOptions options,
-                           std::unique_ptr<rr::ByteStream> stream, std::string peer)
+                           std::unique_ptr<rr::ByteStream> stream, std::string peer, MemoryBudget::Charge memory)
     : SessionDriver(std::move(stream), directory, std::move(options), rr::read_clocks()),
       owner_(&owner),
-      peer_(std::move(peer)) {}
+      peer_(std::move(peer)),
+      memory_(std::move(memory)) {}
 
 void SharedClient::close_service() {
   session_.close_service(rr::read_clocks());
@@ -193,6 +197,17 @@ void SharedClient::has_written() {
     const auto self = weak.lock();
     if (self && service_ && !is_behind_) home_->caught_up(*this);
   });
+}
+
+/// What waits for the client, and of what it sends, is drawn from the account. A client for whom nothing is left there
+/// goes.
+void SharedClient::has_settled() {
+  const auto held = session_.held_bytes();
+  const auto counted = held < uncounted_bytes ? 0 : held;
+  if (memory_.resize(counted)) return;
+  memory_.hold(counted);
+  end_too_slow(rr::make_error(rr::ErrorCode::out_of_system_resource,
+                              "the gateway has no memory left, and " + std::to_string(held) + " bytes wait"));
 }
 
 void SharedClient::acknowledge_packets(rr::PipeId id, std::span<const std::uint32_t> numbers) {

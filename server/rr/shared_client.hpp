@@ -11,6 +11,7 @@
 
 #include "node/driver/stream_driver.hpp"
 #include "server/access/access.hpp"
+#include "server/limits/memory_budget.hpp"
 #include "server/rr/shared_service.hpp"
 
 namespace rrgate {
@@ -31,7 +32,7 @@ class SharedClientOwner {
 class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private UpstreamClient {
  public:
   SharedClient(SharedClientOwner& owner, rr::ServiceDirectory& directory, rr::ServiceSessionOptions options,
-               std::unique_ptr<rr::ByteStream> stream, std::string peer);
+               std::unique_ptr<rr::ByteStream> stream, std::string peer, MemoryBudget::Charge memory);
 
   const rr::ServiceSession& session() const { return session_; }
   const std::string& peer() const { return peer_; }
@@ -52,6 +53,7 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   bool handle_event(rr::Now now) override;
   void ended() override;
   void has_written() override;
+  void has_settled() override;
 
   void handle(const rr::Called& called);
   void handle(const rr::ClientConnected& connected);
@@ -106,6 +108,7 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
 
   SharedClientOwner* owner_;
   std::string peer_;
+  MemoryBudget::Charge memory_;
   std::string end_reason_;
   bool is_behind_ = false;
   bool was_behind_ = false;  ///< and it is in the log

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "node/service/login_judge.hpp"
+#include "server/limits/memory_budget.hpp"
 #include "server/rr/shared_client.hpp"
 
 namespace rrgate {
@@ -19,6 +20,7 @@ struct SharedArrival {
   /// See ServiceSessionOptions.
   std::function<rr::Result<std::shared_ptr<const void>>(const rr::MemberAccess&)> enter;
   bool is_encrypted = false;
+  MemoryBudget::Charge memory;  ///< what is held for it
 };
 
 class SharedNode final : public ServiceBoard, public SharedClientOwner {

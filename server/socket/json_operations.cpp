@@ -97,6 +97,11 @@ JsonOperations::JsonOperations(GatewayState& gateway, JsonSocketPlace place, std
     : gateway_(gateway), place_(std::move(place)), outbox_(std::move(outbox)) {}
 
 rr::awaitable<void> JsonOperations::take(const std::string& message) {
+  auto memory = gateway_.memory().charge(place_.address);
+  if (!memory.has_room(least_room) || !memory.resize(rr::json_growth * message.size()))
+    co_return tell_error("null", rr::make_error(rr::ErrorCode::out_of_system_resource,
+                                                "the gateway has no memory left for a message of " +
+                                                    std::to_string(message.size()) + " bytes; try again in a moment"));
   auto read = JsonRequest::from_text(message);
   if (!read) co_return tell_error("null", read.error());
   const auto request = std::make_shared<const JsonRequest>(std::move(*read));
@@ -118,13 +123,14 @@ rr::awaitable<void> JsonOperations::take(const std::string& message) {
   }
   ++running_;
   if (operation && operation->traits.keeps_order)
-    co_await run(shared_from_this(), request, std::move(passes));
+    co_await run(shared_from_this(), request, std::move(passes), std::move(memory));
   else
-    asio::co_spawn(place_.device->executor(), run(shared_from_this(), request, std::move(passes)), asio::detached);
+    asio::co_spawn(place_.device->executor(), run(shared_from_this(), request, std::move(passes), std::move(memory)),
+                   asio::detached);
 }
 
 rr::awaitable<void> JsonOperations::run(std::shared_ptr<JsonOperations> self, RequestPtr request,
-                                        [[maybe_unused]] Passes passes) {
+                                        [[maybe_unused]] Passes passes, [[maybe_unused]] MemoryBudget::Charge memory) {
   std::optional<rr::Error> error;
   rr::OrderedJson result;
   try {
@@ -163,7 +169,7 @@ rr::awaitable<JsonOperations::TargetPtr> JsonOperations::find(RequestPtr request
     if (!own_) {
       const auto& who = place_.standing->identity();
       auto user = who.is_proven() ? who.subject() : place_.key.subject();
-      own_ = value_or_throw(make_value_client(used->upstream(), std::move(user)));
+      own_ = value_or_throw(gateway_.clients().make_another(used->upstream(), std::move(user)));
     }
     target->client = own_;
   }

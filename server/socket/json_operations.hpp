@@ -71,7 +71,8 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
   struct Ask;
 
   using Passes = std::shared_ptr<const HttpAccess::Passes>;
-  static rr::awaitable<void> run(std::shared_ptr<JsonOperations> self, RequestPtr request, Passes passes);
+  static rr::awaitable<void> run(std::shared_ptr<JsonOperations> self, RequestPtr request, Passes passes,
+                                 MemoryBudget::Charge memory);
   rr::awaitable<rr::OrderedJson> perform(RequestPtr request);
   rr::awaitable<TargetPtr> find(RequestPtr request, const Operation& operation);
   rr::awaitable<std::shared_ptr<ValueClient>> client();

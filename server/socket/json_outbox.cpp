@@ -14,7 +14,9 @@ constexpr std::size_t write_bytes = 64u * 1024;
 
 void JsonOutbox::add(std::string text) {
   if (is_closed_) return;
-  const bool is_full = bytes_ + text.size() > max_outbox_bytes || waiting_.size() >= max_waiting_messages;
+  const auto bytes = bytes_ + text.size();
+  const bool is_full =
+      bytes > max_outbox_bytes || waiting_.size() >= max_waiting_messages || !memory_.resize(in_flight_ + bytes);
   if (is_full && !waiting_.empty()) {
     waiting_.clear();
     newest_.clear();
@@ -24,6 +26,7 @@ void JsonOutbox::add(std::string text) {
     bytes_ = 0;
   }
   bytes_ += text.size();
+  memory_.hold(in_flight_ + bytes_);
   waiting_.push_back({std::move(text), {}});
   news_.cancel();
 }
@@ -41,6 +44,7 @@ void JsonOutbox::close() {
   waiting_.clear();
   newest_.clear();
   bytes_ = 0;
+  memory_.hold(in_flight_);
   news_.cancel();
 }
 
@@ -59,7 +63,14 @@ std::vector<std::string> JsonOutbox::take() {
     }
     taken += out.back().size();
   }
+  in_flight_ = taken;
+  memory_.hold(in_flight_ + bytes_);
   return out;
+}
+
+void JsonOutbox::note_sent() {
+  in_flight_ = 0;
+  memory_.hold(bytes_);
 }
 
 }  // namespace rrgate

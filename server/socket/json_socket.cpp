@@ -19,14 +19,18 @@ constexpr std::string_view objects_prefix = "/api/v1/devices/";
 /// A socket without news for so long is pinged; who is silent for several of these is gone.
 constexpr std::chrono::seconds ping_period{15};
 constexpr auto silence_limit = ping_period * 3;
+/// Of a message that comes in parts: so little is not worth an entry in the account of memory.
+constexpr std::size_t uncounted_bytes = 16 * 1024;
 
 /// One socket: reads in one coroutine, writes in another.
 class JsonSocket : public std::enable_shared_from_this<JsonSocket> {
  public:
   JsonSocket(GatewayState& gateway, std::unique_ptr<rr::ByteStream> stream, const JsonSocketPlace& place)
       : stream_(std::move(stream)),
-        messages_(*stream_, gateway.config().limits.body_bytes),
-        outbox_(std::make_shared<JsonOutbox>(stream_->executor())),
+        memory_(gateway.memory().charge(place.address)),
+        messages_(*stream_, gateway.config().limits.body_bytes,
+                  [this](std::size_t bytes) { return memory_.resize(bytes < uncounted_bytes ? 0 : bytes); }),
+        outbox_(std::make_shared<JsonOutbox>(stream_->executor(), memory_.sibling())),
         operations_(std::make_shared<JsonOperations>(gateway, place, outbox_)),
         written_(stream_->executor(), asio::steady_timer::time_point::max()) {}
 
@@ -69,6 +73,7 @@ class JsonSocket : public std::enable_shared_from_this<JsonSocket> {
       } else {
         const auto batch = self->outbox_->take();
         failed = co_await self->messages_.write(batch);
+        self->outbox_->note_sent();
       }
       if (failed) self->stop({1001, "the client has gone, or takes nothing"});
       if (self->outbox_->is_empty() && self->outbox_->has_overflown())
@@ -79,6 +84,7 @@ class JsonSocket : public std::enable_shared_from_this<JsonSocket> {
   }
 
   std::unique_ptr<rr::ByteStream> stream_;
+  MemoryBudget::Charge memory_;  ///< of the message that comes
   rr::WebSocketMessages messages_;
   std::shared_ptr<JsonOutbox> outbox_;
   std::shared_ptr<JsonOperations> operations_;

@@ -15,7 +15,7 @@ GatewayState::GatewayState(boost::asio::io_context& io, Config config)
                    ? nullptr
                    : std::make_unique<TlsFiles>(config_.tls.certificates, config_.access.clients)),
       devices_(io.get_executor(), config_),
-      clients_(io.get_executor()),
+      clients_(io.get_executor(), memory_.charge("")),
       admission_(config_.limits.clients, config_.limits.clients_per_address),
       shared_(config_.node.id.is_any() ? rr::random_node_id() : config_.node.id, config_,
               [this] { return access_.authenticator(); }) {}

@@ -113,7 +113,10 @@ void FoundDevices::review(Node& node) {
   node.verdict = judge(config_.discover.allow, node.info, node.services ? &*node.services : nullptr);
   auto& urls = node.verdict.device_urls;
   if (urls.empty() || devices_.find_configured(node.info.node_id)) return drop_device(node);
-  if (const auto device = node.device.lock()) return device->set_urls(urls);
+  if (const auto device = node.device.lock()) {
+    if (device->state() == DeviceState::online && discovery_) discovery_->confirm(node.info.node_id);
+    return device->set_urls(urls);
+  }
   if (device_count_ >= config_.discover.max_devices) {
     if (!std::exchange(is_full_, true))
       log(LogLevel::warning, "found devices: too many", {{"max_devices", config_.discover.max_devices}});
@@ -201,6 +204,7 @@ rr::awaitable<void> FoundDevices::ask(rr::NodeId id, std::vector<rr::ConnectionU
   auto& node = asked->second;
   const auto now = std::chrono::steady_clock::now();
   if (answer) {
+    if (discovery_) discovery_->confirm(id);
     node.services = std::move(answer->services);
     node.refresh.handle_success(now);
   } else {

@@ -4,6 +4,7 @@
 #include <boost/asio/use_awaitable.hpp>
 
 #include "core/session/service_path.hpp"
+#include "core/types/value_size.hpp"
 #include "node/client/async_object.hpp"
 
 namespace rrgate {
@@ -12,7 +13,9 @@ namespace asio = boost::asio;
 
 namespace {
 
+/// Of one member, for who comes back: so many events, which take so many bytes together.
 constexpr std::size_t kept_events = 256;
+constexpr std::size_t kept_event_bytes = 4u * 1024 * 1024;
 constexpr auto wait_for_news = asio::as_tuple(asio::use_awaitable);
 constexpr asio::use_awaitable_t<> await_result;
 
@@ -28,10 +31,12 @@ auto await_completion(asio::any_io_executor executor, Begin begin) {
 
 }  // namespace
 
-ValueClient::ValueClient(std::shared_ptr<Upstream> upstream, Subject user, Device::Seat seat)
+ValueClient::ValueClient(std::shared_ptr<Upstream> upstream, Subject user, Device::Seat seat,
+                         MemoryBudget::Charge memory)
     : upstream_(std::move(upstream)),
       user_(std::move(user)),
       seat_(std::move(seat)),
+      memory_(std::move(memory)),
       changed_(upstream_->device().executor(), asio::steady_timer::time_point::max()) {
   upstream_->add(*this);
 }
@@ -170,12 +175,34 @@ void ValueClient::publish(const Key& key, Sample sample) {
   auto& topic = found->second;
   const auto kind = topic.place.member->kind;
   sample.number = ++topic.last_number;
+  for (const auto& value : sample.values) sample.bytes += rr::held_bytes(value);
   const auto shared = std::make_shared<const Sample>(std::move(sample));
-  if (kind == rr::MemberKind::wire) topic.recent.clear();
-  if (kind != rr::MemberKind::pipe) topic.recent.push_back(shared);
-  if (topic.recent.size() > kept_events) topic.recent.erase(topic.recent.begin());
+  if (kind != rr::MemberKind::pipe) keep(topic, shared);
   const auto handlers = topic.handlers;  // they may leave
   for (const auto& [id, handler] : handlers) (*handler)(shared, nullptr);
+}
+
+/// A wire's newest value in any case; events as long as there is room for them.
+void ValueClient::keep(Topic& topic, const SamplePtr& sample) {
+  const bool is_wire = topic.place.member->kind == rr::MemberKind::wire;
+  const auto most = is_wire ? 1 : kept_events;
+  while (topic.recent.size() >= most ||
+         (!topic.recent.empty() && topic.recent_bytes + sample->bytes > kept_event_bytes))
+    forget_oldest(topic);
+  while (!is_wire && !memory_.resize(memory_.bytes() + sample->bytes)) {
+    if (topic.recent.empty()) return;
+    forget_oldest(topic);
+  }
+  if (is_wire) memory_.hold(memory_.bytes() + sample->bytes);
+  topic.recent.push_back(sample);
+  topic.recent_bytes += sample->bytes;
+}
+
+void ValueClient::forget_oldest(Topic& topic) {
+  const auto bytes = topic.recent.front()->bytes;
+  topic.recent.pop_front();
+  topic.recent_bytes -= bytes;
+  memory_.hold(memory_.bytes() - bytes);
 }
 
 void ValueClient::leave(const Key& key, std::uint64_t id) {
@@ -194,6 +221,7 @@ void ValueClient::drop_if_unused(const Key& key) {
   const auto pipe = topic.pipe;
   // An event costs the device nothing, and who comes back wants to know what happened meanwhile.
   if (place.member->kind == rr::MemberKind::event) return;
+  while (!topic.recent.empty()) forget_oldest(found->second);
   topics_.erase(found);
   changed_.cancel();
   if (place.member->kind == rr::MemberKind::wire) upstream_->leave_wire(*this, place.path, *place.member);
@@ -279,11 +307,11 @@ void ValueClient::found_again(const std::string& path) {
 
 // --- one for all plain requests of a login ---
 
-rr::Result<std::shared_ptr<ValueClient>> make_value_client(std::shared_ptr<Upstream> upstream, Subject user) {
+rr::Result<std::shared_ptr<ValueClient>> ValueClients::make_another(std::shared_ptr<Upstream> upstream, Subject user) {
   auto& device = upstream->device();
   auto seat = device.take_seat();
   if (!seat) return rr::make_error(rr::ErrorCode::out_of_system_resource, device.full_text());
-  return std::make_shared<ValueClient>(std::move(upstream), std::move(user), std::move(*seat));
+  return std::make_shared<ValueClient>(std::move(upstream), std::move(user), std::move(*seat), memory_.sibling());
 }
 
 rr::Result<ValueClients::Entries::iterator> ValueClients::find_or_make(const std::shared_ptr<Device>& device,
@@ -309,7 +337,7 @@ rr::Result<ValueClients::Entries::iterator> ValueClients::find_or_make(const std
     if (!key.username.empty()) login.credentials.items.emplace_back("password", rr::Value(key.password));
     shared = std::make_shared<Upstream>(device, key.service, std::move(login), UpstreamUse::one_user);
   }
-  auto client = make_value_client(shared, key.subject());
+  auto client = make_another(shared, key.subject());
   if (!client) return client.error();
   if (is_ours) {
     shared->close_unused();

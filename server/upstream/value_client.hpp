@@ -2,6 +2,7 @@
 #pragma once
 
 #include <boost/asio/steady_timer.hpp>
+#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "node/transport/watchdog.hpp"
+#include "server/limits/memory_budget.hpp"
 #include "server/upstream/upstream.hpp"
 
 namespace rrgate {
@@ -20,6 +22,7 @@ struct Sample {
   std::uint64_t number = 0;       ///< counts within a member, from 1
   rr::TimeSpec time;              ///< of a wire's value
   std::vector<rr::Value> values;  ///< an event's arguments; else one
+  std::size_t bytes = 0;          ///< that it takes, about
 };
 using SamplePtr = std::shared_ptr<const Sample>;
 
@@ -40,7 +43,8 @@ struct MemberPlace {
 class ValueClient final : public UpstreamClient, public std::enable_shared_from_this<ValueClient> {
  public:
   /// `user`  whose user locks are this client's.
-  ValueClient(std::shared_ptr<Upstream> upstream, Subject user, Device::Seat seat);
+  /// `memory`  is where the samples are counted that it keeps.
+  ValueClient(std::shared_ptr<Upstream> upstream, Subject user, Device::Seat seat, MemoryBudget::Charge memory);
   ~ValueClient();
   ValueClient(const ValueClient&) = delete;
   ValueClient& operator=(const ValueClient&) = delete;
@@ -93,7 +97,8 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   struct Topic {
     MemberPlace place;
     std::map<std::uint64_t, std::shared_ptr<SampleHandler>> handlers;
-    std::vector<SamplePtr> recent;  ///< a wire's newest value; an event's last ones
+    std::deque<SamplePtr> recent;  ///< a wire's newest value; an event's last ones
+    std::size_t recent_bytes = 0;
     std::shared_ptr<CallbackHandler> callback;
     std::uint64_t last_number = 0;
     rr::PipeId pipe = 0;
@@ -129,6 +134,8 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   /// The device has ended it, not the connection.
   void closed(const Key& key, const rr::Error& reason);
   void publish(const Key& key, Sample sample);
+  void keep(Topic& topic, const SamplePtr& sample);
+  void forget_oldest(Topic& topic);
   void tell(const Key& key, const rr::Error* error);
   void leave(const Key& key, std::uint64_t id);
   void drop_if_unused(const Key& key);
@@ -136,6 +143,7 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   std::shared_ptr<Upstream> upstream_;
   Subject user_;
   Device::Seat seat_;
+  MemoryBudget::Charge memory_;
   std::map<Key, Topic> topics_;
   std::map<rr::PipeId, Key> pipes_;
   std::uint64_t last_id_ = 0;
@@ -158,11 +166,15 @@ struct SessionKey {
 /// minute. The upstream of a shared device is that of its Robot Raconteur clients.
 class ValueClients {
  public:
-  explicit ValueClients(const boost::asio::any_io_executor& executor) : sweep_(executor, [this] { sweep(); }) {}
+  /// `memory`  see ValueClient.
+  ValueClients(const boost::asio::any_io_executor& executor, MemoryBudget::Charge memory)
+      : memory_(std::move(memory)), sweep_(executor, [this] { sweep(); }) {}
 
   /// A client of an open session. Errors   those of connecting and of the login; out_of_system_resource: too many at
   /// once, here or at the device; service_not_found.
   rr::awaitable<rr::Result<std::shared_ptr<ValueClient>>> open(std::shared_ptr<Device> device, SessionKey key);
+  /// One more client of a session, with a seat of its own. Errors   out_of_system_resource: the device is full.
+  rr::Result<std::shared_ptr<ValueClient>> make_another(std::shared_ptr<Upstream> upstream, Subject user);
   void stop();
 
  private:
@@ -177,11 +189,9 @@ class ValueClients {
   static constexpr std::size_t max_clients = 256;
   static constexpr std::chrono::seconds idle_time{30};
 
+  MemoryBudget::Charge memory_;  ///< of nothing: those of the clients are its siblings
   Entries entries_;
   rr::Deadline sweep_;
 };
-
-/// One more client of a session, with a seat of its own. Errors   out_of_system_resource: the device is full.
-rr::Result<std::shared_ptr<ValueClient>> make_value_client(std::shared_ptr<Upstream> upstream, Subject user);
 
 }  // namespace rrgate

@@ -59,7 +59,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       // What was accepted, written by us, is accepted again.
       const auto again = rr::parse_announcement(rr::format_announcement(*read), source);
       require(again.has_value() && *again == *read);
-      nodes.handle_announcement(*read, now);
+      const std::string senders[] = {"", "a", "b", "c"};
+      nodes.handle_announcement(*read, now, senders[choice >> 3 & 3]);
+      if (choice & 1) nodes.confirm(read->node_id);
       check(nodes, told);
       if (choice & 32) nodes.handle_withdrawn(read->node_id, read->url);
       check(nodes, told);

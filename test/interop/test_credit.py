@@ -40,9 +40,9 @@ class Reader(Background):
 class Site:
     """The device behind a gateway, with one client that reads and one that can be stopped."""
 
-    def __init__(self, folder, node, url, send_stall_ms):
+    def __init__(self, folder, node, url, send_stall_ms, memory=0):
         self._log = folder / "gateway.log"
-        self.gateway, port = start_gateway(folder, url, device={"mode": "shared"}, limits={"client_queue_bytes": QUEUE},
+        self.gateway, port = start_gateway(folder, url, device={"mode": "shared"}, limits={"client_queue_bytes": QUEUE, "memory": memory},
                                            timeouts={"send_stall_ms": send_stall_ms})
         self._url = f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=credit"
         self.slow = Reader(folder, self._url)
@@ -117,6 +117,20 @@ def test_the_device_goes_on_without_the_slow_one(tmp_path, node, device):
     try:
         site.publish_until_held()
         site.gateway.wait_until(lambda: site.has_logged("peer too slow"))
+        before = len(site.frames)
+        site.gateway.wait_until(lambda: site.publish() and len(site.frames) >= before + 2 * BACKLOG)
+    finally:
+        site.close(node)
+
+
+def test_memory_that_is_used_up_ends_the_one_who_does_not_read(tmp_path, node, device):
+    """Both come from one address, which gets half: less than a client may leave unread by itself."""
+    site = Site(tmp_path, node, device[1], send_stall_ms=60_000, memory=3_000_000)
+    try:
+        site.publish_until(lambda: len(site.frames) == 3)
+        site.slow.pause()
+        site.publish_until(lambda: site.has_logged("client too slow: the gateway has no memory left"))
+        assert not site.has_logged(SLOW)
         before = len(site.frames)
         site.gateway.wait_until(lambda: site.publish() and len(site.frames) >= before + 2 * BACKLOG)
     finally:

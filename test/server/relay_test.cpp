@@ -48,7 +48,8 @@ struct OpaqueRun {
     rr::test::MemoryStreams client(io.get_executor());
     rr::test::MemoryStreams device(io.get_executor());
     Traffic traffic;
-    Relay relay(*client.server, *device.client, {5'000'000, 65'536, rate}, traffic);
+    MemoryBudget budget(1'000'000'000);
+    Relay relay(*client.server, *device.client, {5'000'000, 65'536, rate}, traffic, budget.charge("client"));
     const rr::NodeIdentity self{rr::NodeId{{1}}, "device"};
     auto out = rr::answer_first_request(rr::make_start_tls({}, true), self, true).value().reply;
     sent = out.size() + bytes;
@@ -96,7 +97,9 @@ TEST_CASE("while one side takes nothing, the relay takes no more from the other 
   rr::test::MemoryStreams client(io.get_executor(), 100);
   rr::test::MemoryStreams device(io.get_executor());
   Traffic traffic;
-  Relay relay(*client.server, *device.client, {5'000'000, outbox_bytes, 1'000'000'000}, traffic);
+  MemoryBudget budget(1'000'000'000);
+  Relay relay(*client.server, *device.client, {5'000'000, outbox_bytes, 1'000'000'000}, traffic,
+              budget.charge("client"));
   rr::Bytes message(1'000'000);
   constexpr std::array<std::uint8_t, 10> start{'R', 'R', 'A', 'C', 0x40, 0x42, 0x0f, 0, 2, 0};  // of as many bytes
   std::copy(start.begin(), start.end(), message.begin());
@@ -107,6 +110,7 @@ TEST_CASE("while one side takes nothing, the relay takes no more from the other 
   io.poll();
   CHECK(device.to_client->carried - device.to_client->bytes.size() == outbox_bytes);
   CHECK(traffic.to_clients.waiting == outbox_bytes);
+  CHECK(budget.used() == outbox_bytes);
   relay.stop({1001, "stopped"});
   client.client->close();
   device.server->close();

@@ -115,9 +115,9 @@ TEST_CASE("a client that takes its response too slowly is cut") {
 }
 
 TEST_CASE("a response that there is no memory for becomes 503; one that others hold as well costs nothing") {
-  Exchange exchange(10'000);
+  Exchange exchange(300'000);
   exchange.run([&]() -> rr::awaitable<void> {
-    const auto large = text_response(200, "text/plain", std::string(5'001, 'x'));
+    const auto large = text_response(200, "text/plain", std::string(150'001, 'x'));
     co_await exchange.writer.send(large);
   });
   CHECK_THAT(exchange.client.received, Catch::StartsWith("HTTP/1.1 503 ") && Catch::Contains("no memory left") &&
@@ -125,14 +125,14 @@ TEST_CASE("a response that there is no memory for becomes 503; one that others h
   CHECK(exchange.budget.refusals() == 1);
   exchange.client.received.clear();
   exchange.run([&]() -> rr::awaitable<void> {
-    const auto fits = text_response(200, "text/plain", std::string(4'000, 'x'));
+    const auto fits = text_response(200, "text/plain", std::string(100'000, 'x'));
     co_await exchange.writer.send(fits);
-    CHECK(exchange.budget.used() == 4'000);
-    auto shared = text_response(200, "text/plain", std::string(9'000, 'x'));
+    CHECK(exchange.budget.used() == 100'000);
+    auto shared = text_response(200, "text/plain", std::string(200'000, 'x'));
     const auto other = shared.body;
     co_await exchange.writer.send(shared);
   });
-  CHECK(exchange.client.received.size() > 13'000);
+  CHECK(exchange.client.received.size() > 300'000);
 }
 
 TEST_CASE("a client that leaves is noticed at once, whatever it has sent and does not take") {

@@ -15,6 +15,10 @@ struct Cache {
             const std::string& name = "robot") {
     nodes.handle_announcement({id(node), name, url, nonce}, now);
   }
+  void hear_from(const std::string& sender, std::uint8_t node) {
+    nodes.handle_announcement({id(node), "robot", "a", "n"}, now, sender);
+  }
+  bool has(std::uint8_t node) const { return nodes.nodes().contains(id(node)); }
   void pass(seconds time) {
     now.steady += time;
     nodes.handle_timeout(now);
@@ -113,6 +117,55 @@ TEST_CASE("a flood of nodes is bounded; those that are known stay") {
   cache.events();
   cache.hear(9, "a");
   CHECK(cache.events() == "found 9");
+}
+
+TEST_CASE("nodes that nobody has seen give way, the oldest first; one that has answered stays") {
+  Cache cache({.max_nodes = 4});
+  cache.hear(1, "a");  // of this machine
+  cache.hear_from("one", 2);
+  cache.hear_from("one", 3);
+  cache.hear_from("two", 4);
+  cache.nodes.confirm(Cache::id(2));
+  cache.hear_from("one", 3);  // heard of anew
+  cache.events();
+  cache.hear_from("three", 5);
+  CHECK(cache.events() == "lost 4, found 5");
+  cache.hear_from("four", 6);
+  CHECK(cache.events() == "lost 3, found 6");
+  for (int node = 7; node < 200; ++node) cache.hear_from(std::to_string(node), static_cast<std::uint8_t>(node));
+  CHECK(cache.has(1));
+  CHECK(cache.has(2));
+  CHECK(cache.has(199));
+  CHECK(cache.nodes.nodes().size() == 4);
+  // A node that was pushed out comes back with its next announcement.
+  cache.hear_from("two", 4);
+  CHECK(cache.has(4));
+  cache.nodes.confirm(Cache::id(199));
+  cache.nodes.confirm(Cache::id(4));
+  cache.hear_from("five", 200);
+  CHECK_FALSE(cache.has(200));  // all others have answered
+  cache.pass(seconds(60));
+  CHECK(cache.nodes.nodes().empty());
+  cache.hear_from("five", 200);
+  CHECK(cache.has(200));
+}
+
+TEST_CASE("a sender who claims to be many pushes out his own alone") {
+  Cache cache({.max_nodes = 100, .max_nodes_of_sender = 3});
+  cache.hear_from("honest", 1);
+  for (int node = 2; node < 200; ++node) cache.hear_from("flood", static_cast<std::uint8_t>(node));
+  CHECK(cache.has(1));
+  CHECK_FALSE(cache.has(2));
+  CHECK(cache.has(199));
+  CHECK(cache.nodes.nodes().size() == 4);
+  cache.hear_from("flood", 1);  // a claim to be somebody else's node does not make it his
+  cache.hear_from("flood", 200);
+  CHECK(cache.has(1));
+  cache.nodes.handle_withdrawn(Cache::id(200), "a");
+  cache.nodes.confirm(Cache::id(199));
+  for (int node = 201; node < 204; ++node) cache.hear_from("flood", static_cast<std::uint8_t>(node));
+  CHECK(cache.has(198) == false);
+  CHECK(cache.nodes.nodes().size() == 5);
 }
 
 TEST_CASE("a flood of URLs is bounded: the one not heard for longest gives way") {

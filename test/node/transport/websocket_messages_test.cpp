@@ -1,8 +1,13 @@
 #include "node/transport/websocket_messages.hpp"
 
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/io_context.hpp>
 #include <catch2/catch.hpp>
 #include <string>
 #include <vector>
+
+#include "test/node/transport/memory_stream.hpp"
 
 using namespace rr;
 
@@ -86,4 +91,36 @@ TEST_CASE("what no client may send has a code to close with") {
   CHECK(refusal(frame(0x81, std::string(11, 'x')), 10) == 1009);
   CHECK(refusal(frame(0x01, "123456") + frame(0x80, "78901"), 10) == 1009);
   CHECK(refusal(frame(0x01, "12345") + frame(0x80, "67890"), 10) == 0);
+}
+
+TEST_CASE("a message that there is no room for ends the connection as far as it has come, with a code that says so") {
+  boost::asio::io_context io(1);
+  rr::test::MemoryStreams streams(io.get_executor());
+  std::vector<std::size_t> asked;
+  WebSocketMessages messages(*streams.server, 1000, [&](std::size_t bytes) {
+    asked.push_back(bytes);
+    return bytes <= 20;
+  });
+  std::vector<std::string> received;
+  const auto serve = [&]() -> awaitable<void> {
+    while (auto message = co_await messages.read()) received.push_back(std::move(*message));
+    co_await messages.end(no_reason);
+  };
+  const auto send = [&](const Bytes& bytes) {
+    streams.to_server->bytes.insert(streams.to_server->bytes.end(), bytes.begin(), bytes.end());
+    streams.to_server->changed.cancel();
+    io.restart();
+    io.poll();
+  };
+  boost::asio::co_spawn(io, serve(), boost::asio::detached);
+  send(frame(0x81, "a message of 20 byte"));
+  send(frame(0x01, "the first ten"));
+  CHECK(received == std::vector<std::string>{"a message of 20 byte"});
+  CHECK(asked == std::vector<std::size_t>{20, 13});
+  send(frame(0x00, "and more"));
+  CHECK(asked.back() == 21);
+  const auto& sent = streams.to_client->bytes;
+  REQUIRE(sent.size() > 4);
+  CHECK(sent[0] == 0x88);
+  CHECK((sent[2] << 8 | sent[3]) == 1013);
 }

@@ -1,0 +1,181 @@
+"""Strangers who make the gateway hold what they send and do not read, while others go on: memory is counted, and bounded."""
+import concurrent.futures
+import json
+import socket
+import time
+
+import pytest
+import RobotRaconteur as RR
+
+from gateways import running
+from http_api import BASE, Stream, ask
+from json_sockets import Socket
+from shared_sites import is_refused, start_service
+
+MEMORY = 64_000_000
+BODY = 8_000_000
+SLACK = 60_000_000  # of the process beside the account: sockets, a document while it is read, what malloc() keeps
+
+
+@pytest.fixture
+def gateway(tmp_path):
+    device, url = start_service(tmp_path)
+    config = {"devices": [{"name": "interop", "url": url, "mode": "shared"}],
+              "limits": {"memory": MEMORY, "header_timeout_ms": 60_000}}  # of bodies, too
+    with running(tmp_path, config) as gateway:
+        gateway.wait_for("device online", device="interop")
+        assert add(gateway, 1, 2) == 3
+        yield gateway
+    device.stop()
+
+
+def add(gateway, left, right):
+    answer = ask(gateway.port, "POST", "/add", {"left": left, "right": right}, base=BASE)
+    assert answer.status == 200, answer.body
+    return answer.json["result"]
+
+
+class Stranger:
+    """Comes from an address of his own."""
+
+    def __init__(self, gateway, number=2):
+        self.link = socket.create_connection(("127.0.0.1", gateway.port), 20, (f"127.0.0.{number}", 0))
+
+    def post(self, told, sent, path="/echo"):
+        """A body of `told` bytes, of which so many come."""
+        self.link.sendall(f"POST {BASE}{path} HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+                          f"Content-Length: {told}\r\n\r\n".encode())
+        try:
+            self.link.sendall(b" " * sent)
+        except OSError:
+            pass  # refused already
+
+    def is_refused(self):
+        """Whether he has been answered, with 503."""
+        self.link.settimeout(0.05)
+        try:
+            return self.link.recv(100).startswith(b"HTTP/1.1 503 ")
+        except TimeoutError:
+            return False
+        except OSError:
+            return True
+        finally:
+            self.link.settimeout(20)
+
+    def close(self):
+        self.link.close()
+
+
+def crowd(gateway, count, act, number=2):
+    """So many strangers who do the same, at once."""
+    strangers = [Stranger(gateway, number) for _ in range(count)]
+    with concurrent.futures.ThreadPoolExecutor(16) as pool:
+        list(pool.map(act, strangers))
+    return strangers
+
+
+def use_up(gateway):
+    """Strangers at many addresses take all that each of them gets, until next to nothing is left."""
+    strangers = []
+    for number in range(2, 40):
+        while True:
+            stranger = Stranger(gateway, number)
+            left = MEMORY - gateway.metrics()["rrgate_memory_budget_used_bytes"]
+            if left < 60_000:
+                return strangers
+            stranger.post(max(1, min(BODY, left // 2)), 1)
+            strangers.append(stranger)
+            if stranger.is_refused():
+                break
+    return strangers
+
+
+def test_bodies_that_nobody_finishes_are_counted_and_bounded(gateway):
+    before = gateway.metrics()["process_resident_memory_bytes"]
+    strangers = crowd(gateway, 60, lambda stranger: stranger.post(BODY, BODY - 1))
+    metrics = gateway.metrics()
+    assert metrics["rrgate_memory_budget_bytes"] == MEMORY
+    assert 2 * BODY < metrics["rrgate_memory_budget_used_bytes"] <= MEMORY // 2  # one address gets no more
+    assert metrics["rrgate_memory_budget_refusals_total"] >= 50
+    assert metrics["process_resident_memory_bytes"] - before < MEMORY // 2 + SLACK
+    assert [stranger.is_refused() for stranger in strangers].count(True) >= 50
+    assert ask(gateway.port, "POST", "/sum", {"values": [1] * 100_000}, base=BASE).json == {"result": 100_000}
+    for stranger in strangers:
+        stranger.close()
+    deadline = time.monotonic() + 10
+    while gateway.metrics()["rrgate_memory_budget_used_bytes"] > 0:
+        assert time.monotonic() < deadline
+
+
+def test_answers_that_nobody_reads_are_counted_and_bounded(gateway):
+    """Nine megabytes of text each, more than sockets hold."""
+    body = json.dumps({"count": 1_000_000}).encode()
+    before = gateway.metrics()
+    strangers = []
+    for count in range(1, 7):
+        strangers.append(Stranger(gateway))
+        strangers[-1].link.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        strangers[-1].link.sendall(f"POST {BASE}/ramp HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+                                   f"Content-Length: {len(body)}\r\n\r\n".encode() + body)
+        deadline = time.monotonic() + 20
+        while True:
+            now = gateway.metrics()
+            held = now["rrgate_memory_budget_used_bytes"] // 8_800_000
+            if held + now["rrgate_memory_budget_refusals_total"] >= count:
+                break
+            assert time.monotonic() < deadline, now
+    assert (held, now["rrgate_memory_budget_refusals_total"]) == (3, 3)  # one address gets half
+    assert now["process_resident_memory_bytes"] - before["process_resident_memory_bytes"] < MEMORY + SLACK
+    assert add(gateway, 3, 4) == 7
+    for stranger in strangers:
+        stranger.close()
+
+
+def test_at_its_end_what_is_new_is_refused_and_what_runs_goes_on(gateway, node):
+    stream = Stream(gateway.port, "/changed", base=BASE)
+    root = node.ConnectService(f"rr+tcp://127.0.0.1:{gateway.port}/?nodename=interop&service=interop")
+    with Socket(gateway.port) as page:
+        assert page.ask("call", "add", args={"left": 1, "right": 1}) == 2
+        strangers = use_up(gateway)
+        refused = ask(gateway.port, "POST", "/add", {"left": 1, "right": 2}, base=BASE)
+        assert refused.status == 503 and "no memory left" in refused.json["detail"]
+        assert refused.headers["Retry-After"] == "2"
+        assert is_refused(RR.ServiceException, lambda: root.add(1, 2))
+        page.socket.send(json.dumps({"id": 1, "op": "get", "path": "version"}))
+        assert "no memory left" in page.next(id=None)["error"]["message"]
+        assert ask(gateway.port, "GET", "/healthz").status == 200
+        for stranger in strangers:
+            stranger.close()
+        deadline = time.monotonic() + 10
+        while ask(gateway.port, "POST", "/fire", {"count": 1}, base=BASE).status == 503:
+            assert time.monotonic() < deadline
+        assert stream.next()[2] is not None
+        assert root.add(1, 2) == 3
+        assert page.ask("call", "add", args={"left": 1, "right": 1}) == 2
+    node.DisconnectService(root)
+    stream.close()
+
+
+def test_documents_of_json_sockets_count_as_what_they_become(gateway):
+    """Three megabytes of text become more than half of the account."""
+    with Socket(gateway.port) as page:
+        page.socket.send(json.dumps({"id": 1, "op": "call", "path": "sum", "args": {"values": [1] * 1_000_000}}))
+        error = page.next(id=None)["error"]
+        assert error["name"] == "RobotRaconteur.OutOfSystemResource" and "no memory left" in error["message"], error
+        assert page.ask("call", "sum", args={"values": [1] * 100_000}) == 100_000
+    refused = ask(gateway.port, "POST", "/sum", {"values": [1] * 1_000_000}, base=BASE)
+    assert refused.status == 503 and "no memory left" in refused.json["detail"]
+
+
+def test_events_that_are_kept_count(gateway):
+    stream = Stream(gateway.port, "/changed", base=BASE)
+    assert gateway.metrics()["rrgate_memory_budget_used_bytes"] == 0
+    assert ask(gateway.port, "POST", "/fire", {"count": 300}, base=BASE).status == 200
+    for _ in range(300):
+        stream.next()
+    kept = gateway.metrics()["rrgate_memory_budget_used_bytes"]
+    assert ask(gateway.port, "POST", "/fire", {"count": 300}, base=BASE).status == 200
+    for _ in range(300):
+        stream.next()
+    assert 0 < kept == gateway.metrics()["rrgate_memory_budget_used_bytes"]  # 256 of them
+    stream.close()
