@@ -126,7 +126,7 @@ def test_a_robot_of_the_standard_types_is_jogged(standard_robot, way, tmp_path):
             rrgate("set", url, "command_mode", mode)
             wait_for_state(lambda state, mode=mode: state["command_mode"] == mode)
         for target in [0.5, -0.25], [0, 0.125]:
-            rrgate("call", url, "jog_freespace", json.dumps(target), "max_velocity=[9, 9]", "wait=true")
+            rrgate("call", url, "jog_freespace", json.dumps(target), "max_velocity=[2, 2]", "wait=true")
             wait_for_state(lambda state, target=target: state["joint_position"] == pytest.approx(target, abs=0.05))
         packets = rrgate("watch", url, "robot_state_sensor_data", "--count", "3", "--json").splitlines()
         assert [json.loads(each)["value"]["robot_state"]["command_mode"] for each in packets] == ["jog"] * 3

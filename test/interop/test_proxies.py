@@ -268,7 +268,7 @@ def test_proxy_protocol(device, tmp_path, monkeypatch, version):
 TRAEFIK = {  # of what the file uses: the reference of Traefik's dynamic configuration
     "routers": {"rule", "service", "middlewares"},
     "services": {"loadBalancer": {"servers"}},
-    "middlewares": {"redirectRegex": {"regex", "replacement"}, "stripPrefix": {"prefixes"}},
+    "middlewares": {"redirectRegex": {"regex", "replacement"}, "stripPrefix": {"prefixes"}, "headers": {"customRequestHeaders"}},
 }
 
 

@@ -15,8 +15,8 @@ from robotraconteur_abstract_robot import AbstractRobot
 JOINT = """
   - joint_identifier: {name: joint_%(number)d, uuid: %(uuid)s}
     joint_type: revolute
-    joint_limits: {upper: 3.0, lower: -3.0, velocity: 10.0, reduced_velocity: 10.0,
-                   acceleration: 500.0, reduced_acceleration: 500.0}
+    joint_limits: {upper: 3.0, lower: -3.0, velocity: 2.0, reduced_velocity: 2.0,
+                   acceleration: 5.0, reduced_acceleration: 5.0}
     default_units: radian
     default_effort_units: newton_meter
     passive: false
