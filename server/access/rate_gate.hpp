@@ -4,22 +4,23 @@
 #include <algorithm>
 #include <chrono>
 #include <cstddef>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <utility>
+
+#include "server/access/recent_map.hpp"
 
 namespace rrgate {
 
 /// Counts by key: an address, a user, a device.
 class RateGate {
   struct Count {
-    std::size_t open;
+    std::size_t open = 0;
     double left;  ///< requests that may come at once
     std::chrono::steady_clock::time_point last;
   };
-  using Counts = std::map<std::string, Count>;
+  using Counts = RecentMap<Count>;
 
  public:
   using Time = std::chrono::steady_clock::time_point;
@@ -35,7 +36,7 @@ class RateGate {
     }
     ~Pass() {
       if (!counts_) return;
-      if (const auto found = counts_->find(key_); found != counts_->end()) --found->second.open;
+      if (auto* count = counts_->find(key_)) --count->open;
     }
 
    private:
@@ -48,8 +49,8 @@ class RateGate {
   /// nullopt: too much. Bounds of 0 are none.
   std::optional<Pass> enter(const std::string& key, std::size_t per_second, std::size_t at_once, Time now) {
     if (per_second == 0 && at_once == 0) return Pass(nullptr, {});
-    if (counts_->size() >= max_keys) forget_idle(now);
-    auto& count = counts_->try_emplace(key, Count{0, static_cast<double>(per_second), now}).first->second;
+    const auto is_idle = [](const Count& count) { return count.open == 0; };
+    auto& count = counts_->use_unless(is_idle, key, Count{0, static_cast<double>(per_second), now});
     const auto most = static_cast<double>(per_second);
     const std::chrono::duration<double> passed = now - count.last;
     count.last = now;
@@ -62,16 +63,9 @@ class RateGate {
   std::size_t keys() const { return counts_->size(); }
 
  private:
-  /// Above it, who has asked nothing for a second is forgotten: he could ask for as much anew anyway.
   static constexpr std::size_t max_keys = 10'000;
 
-  void forget_idle(Time now) {
-    std::erase_if(*counts_, [now](const auto& item) {
-      return item.second.open == 0 && now - item.second.last > std::chrono::seconds(1);
-    });
-  }
-
-  std::shared_ptr<Counts> counts_ = std::make_shared<Counts>();
+  std::shared_ptr<Counts> counts_ = std::make_shared<Counts>(max_keys);
 };
 
 }  // namespace rrgate

@@ -102,7 +102,7 @@ rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& 
                                              rr::ByteSpan unread) {
   auto& tcp = *stream;
   connection.client = request.arrival.peer;
-  connection.address = request.arrival.address.to_string();
+  connection.network = network_name(request.arrival.address);
   connection.identity = request.identity;
   const auto refuse = [&tcp](const Response& refusal) -> rr::awaitable<void> {
     co_await write_refusal(tcp, refusal);
@@ -118,7 +118,7 @@ rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& 
   if (!connection.ticket.pass_to(request.arrival.address)) {
     gateway.reject(Rejection::too_many);
     log(LogLevel::warning, "connection refused: too many", {{"peer", connection.client}});
-    const auto response = problem_response(503, "too many connections from " + request.arrival.address.to_string());
+    const auto response = problem_response(503, "too many connections from " + connection.network);
     co_await refuse(response);
     co_return Continuation();
   }

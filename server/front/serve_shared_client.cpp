@@ -59,14 +59,14 @@ rr::awaitable<bool> wait_until_ready(GatewayState& gateway, const Destination& d
 
 /// How much a client may ask for, whoever he logs in as meanwhile.
 auto make_rate_gate(GatewayState& gateway, const SharedNode& node, const Connection& connection) {
-  return [&gateway, &node, address = connection.address, shown = connection.identity.subject()](
+  return [&gateway, &node, network = connection.network, shown = connection.identity.subject()](
              const rr::MemberAccess& wanted) -> rr::Result<std::shared_ptr<const void>> {
     const auto& rates = gateway.config().rates;
     if (!rates.is_bound()) return std::shared_ptr<const void>();
     const auto user = wanted.user ? subject_of(*wanted.user) : Subject();
     const bool is_ours = user.kind == Subject::Kind::user;
     const auto device = node.device_of(wanted.path.substr(0, wanted.path.find('.')));
-    auto passes = gateway.http_access().enter(address, is_ours ? user : shown, device, rates);
+    auto passes = gateway.http_access().enter(network, is_ours ? user : shown, device, rates);
     if (passes) return std::shared_ptr<const void>(std::move(*passes));
     gateway.reject(Rejection::rate);
     return passes.error();
@@ -122,7 +122,7 @@ std::shared_ptr<SharedClient> begin_session(GatewayState& gateway, Connection& c
   const auto shown = std::make_shared<Standing>(gateway.access(), connection.identity);
   const auto rights = std::make_shared<SessionRights>(gateway.access(), *destination.node, device, shown);
   SharedArrival arrival;
-  arrival.peer = connection.client;
+  arrival.from = {connection.client, connection.network};
   arrival.base_url = std::move(base_url);
   arrival.is_encrypted = connection.peer.is_encrypted;
   arrival.admit = make_admission(gateway, *destination.node, connection.client, rights, std::move(seating));

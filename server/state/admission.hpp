@@ -6,9 +6,11 @@
 #include <optional>
 #include <utility>
 
+#include "server/access/network.hpp"
+
 namespace rrgate {
 
-/// Counts open connections, in all and by address. Outlives its tickets.
+/// Counts open connections, in all and by address (of IPv6, by network). Outlives its tickets.
 class Admission {
  public:
   using Address = boost::asio::ip::address;
@@ -26,7 +28,8 @@ class Admission {
     }
 
     /// A proxy has told who its client is, who counts from now on. False when that one has too many already.
-    bool pass_to(const Address& address) {
+    bool pass_to(const Address& client) {
+      const auto address = network_of(client);
       if (address_ == address) return true;
       if (owner_->is_full(address)) return false;
       owner_->uncount(address_);
@@ -44,7 +47,8 @@ class Admission {
 
   /// nullopt when there are too many already. Without an address (a proxy: its clients are not told apart yet) the
   /// connection counts in all only.
-  std::optional<Ticket> admit(const std::optional<Address>& address) {
+  std::optional<Ticket> admit(const std::optional<Address>& client) {
+    const auto address = client ? std::optional(network_of(*client)) : std::nullopt;
     if (open_ >= total_ || (address && is_full(*address))) return std::nullopt;
     ++open_;
     count(address);

@@ -97,33 +97,90 @@ def test_wrong_proofs(guarded):
 
 
 def test_who_guesses_passwords_has_to_wait(device, tmp_path):
-    """From one address so many guesses in a row, then one a second; the right password too. Others are not kept out."""
+    """Of one user so many guesses in a row, of one address more, then one a second; the right password too. It keeps out
+    neither others of that address nor the same user elsewhere."""
     make_users(tmp_path)
     with running(tmp_path, device, {"users_file": "users", "rules": RULES}) as gateway:
         def log_in(name, password=None, address="127.0.0.3"):
             answer = ask(gateway.port, "GET", BASE + "/p_double", headers=basic(name, password), address=address)
             return answer.status, answer.json["detail"] if answer.status != 200 else ""
 
-        def guess(name):
+        def guess(names):
             """Until that is stopped. Returns how often."""
-            guesses = 0
-            while "too many logins have failed" not in (refused := log_in(name, f"guess {guesses}"))[1]:
+            for guesses, name in enumerate(names):
+                refused = log_in(name, f"guess {guesses}")
+                if "too many logins have failed" in refused[1]:
+                    return guesses
                 assert refused == (401, "Invalid username or password")
-                guesses += 1
-                assert guesses < 200, "guessing goes on and on"
-            return guesses
+            raise AssertionError("guessing goes on and on")
 
-        assert guess("alice") >= 60
-        assert log_in("alice", "a guess from elsewhere", "127.0.0.5") == (401, "Invalid username or password")
-        for name in PASSWORDS:
-            guess(name)
-            if (answer := log_in(name))[0] != 200:  # unless the second is over just now
+        assert 20 <= guess(["alice"] * 200) < 60
+        assert log_in("root") == (200, "")
+        assert log_in("alice", address="127.0.0.5") == (200, "")
+        guess(f"user{number}" for number in range(200))
+        assert log_in("vera", address="127.0.0.5") == (200, "")
+        for name in ("vera 2", "vera 3"):
+            rrgate("passwd", tmp_path / "users", name.replace(" ", ""), "--roles", "viewer", given="right\n")
+        gateway.wait_for("users and rights read anew")
+        for name in ("vera2", "vera3"):
+            guess(f"user{number}" for number in range(200))
+            if (answer := log_in(name, "right"))[0] != 200:  # unless the second is over just now
                 break
         assert answer[0] == 401 and "too many logins have failed" in answer[1], "the right password had not to wait"
         deadline = time.monotonic() + 20
-        while log_in(name)[0] != 200:
+        while log_in(name, "right")[0] != 200:
             assert time.monotonic() < deadline
             time.sleep(0.1)
+
+
+def test_a_right_password_gets_in_during_a_flood_of_wrong_ones(device, tmp_path):
+    make_users(tmp_path)
+    for number in range(3):
+        rrgate("passwd", tmp_path / "users", f"user{number}", "--roles", "viewer", given="right\n")
+    with running(tmp_path, device, {"users_file": "users", "rules": RULES}) as gateway:
+        numbers = itertools.count()
+
+        def flood(address):
+            def guess():
+                number = next(numbers)
+                name = f"user{number % 3}" if number % 2 else f"nobody{number}"
+                assert ask(gateway.port, "GET", BASE + "/p_double", headers=basic(name, f"guess {number}"), address=address).status == 401
+            return guess
+
+        with contextlib.ExitStack() as floods:
+            for number in range(6):
+                floods.enter_context(under_load(flood(f"127.0.1.{number + 1}")))
+            for number in range(3):
+                began = time.monotonic()
+                answer = ask(gateway.port, "GET", BASE + "/p_double", headers=basic(f"user{number}", "right"), address="127.0.2.1")
+                assert answer.status == 200, answer.body
+                assert time.monotonic() - began < 10
+
+
+def test_logins_that_a_device_has_not_judged_take_nobodys_place(device, own_service, tmp_path):
+    service, stuck = own_service
+    devices = [{"name": "interop", "url": device}, {"name": "stuck", "url": stuck, "max_clients": 1}]
+    with running(tmp_path, device, {}, devices=devices) as gateway:
+        gateway.wait_for("device online", device="stuck")
+        service.pause()
+        path = BASE.replace("devices/interop", "devices/stuck") + "/p_double"
+        links = []
+        try:
+            for number in range(260):
+                link = socket.create_connection(("127.0.0.1", gateway.port), 10, source_address=(f"127.0.1.{number % 13 + 1}", 0))
+                proof = basic(f"user{number}", "guess")["Authorization"]
+                link.sendall(f"GET {path} HTTP/1.1\r\nHost: localhost\r\nAuthorization: {proof}\r\n\r\n".encode())
+                links.append(link)
+            assert ask(gateway.port, "GET", BASE + "/p_double").status == 200
+            assert read_clients(gateway.port)["stuck"] == 0
+        finally:
+            for link in links:
+                link.close()
+            service.resume()
+
+
+def read_clients(port):
+    return {each["name"]: each["clients"] for each in ask(port, "GET", "/api/v1/devices").json["devices"]}
 
 
 def test_api_tokens(guarded):
@@ -196,6 +253,25 @@ def test_the_audit_log_tells_who_did_what(guarded):
     assert (refused["user"], refused["verb"], refused["member"]) == ("vera", "write", "p_int32")
     assert wrote["client"].startswith("127.0.0.1:") and wrote["time"].endswith("Z")
     assert {"login", "write", "call", "refused"} <= {line["event"] for line in lines}
+
+
+def test_strangers_fill_no_disk(device, tmp_path):
+    """Each of their refusals is counted; one of an address a minute is written."""
+    make_users(tmp_path)
+    access = {"users_file": "users", "tokens_file": "tokens", "rules": RULES, "audit_file": "audit"}
+    (tmp_path / "tokens").touch(0o600)
+    with running(tmp_path, device, access) as gateway:
+        for number in range(50):
+            proof = bearer("rrg_" + "A" * 43) if number % 2 else {}
+            assert ask(gateway.port, "PUT", BASE + "/p_double", 1.5, proof).status == 401
+        assert ask(gateway.port, "PUT", BASE + "/p_double", 1.5, address="127.0.0.7").status == 401
+        assert ask(gateway.port, "PUT", BASE + "/p_int32", 1, basic("vera")).status == 403
+        lines = audit_of(gateway)
+        assert [(line["event"], line["proof"], line["client"].split(":")[0]) for line in lines] == [
+            ("refused", "none", "127.0.0.1"), ("refused", "none", "127.0.0.7"), ("login", "password", "127.0.0.1"),
+            ("refused", "password", "127.0.0.1")]
+    (summed,) = (line for line in map(json.loads, (tmp_path / "audit").read_text().splitlines()) if line["event"] == "refusals")
+    assert (summed["client"], summed["detail"]) == ("127.0.0.1", "49 more within a minute")
 
 
 def test_a_new_audit_file_after_a_hang_up(guarded):
