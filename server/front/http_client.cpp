@@ -213,6 +213,29 @@ std::optional<Response> refuse_page(GatewayState& gateway, const Request& reques
   return refusal;
 }
 
+/// Where TLS is required: what in clear is sent there, or refused. A client that has shown something in clear has given
+/// it away, and hears so. Whether the gateway works is no secret.
+std::optional<Response> require_tls(GatewayState& gateway, const Request& request) {
+  const auto path = request.path();
+  if (!gateway.config().tls.is_required || request.arrival.is_encrypted || path == "/healthz" || path == "/readyz")
+    return std::nullopt;
+  const auto method = request.message.method();
+  const bool shows =
+      request.message.count(http::field::authorization) != 0 || rr::query_value(request.query(), "ticket");
+  const bool is_look = method == http::verb::get || method == http::verb::head;
+  if (is_look && !shows && !asks_for_websocket(request) && !request.arrival.host.empty()) {
+    auto response = problem_response(308, "the gateway is reached by https:// alone");
+    const auto target = request.message.target();
+    response.set("Location", "https://" + request.arrival.host + request.arrival.prefix +
+                                 std::string(target.data(), target.size()));
+    return response;
+  }
+  gateway.reject(Rejection::forbidden);
+  log(LogLevel::info, "request in clear refused", {{"peer", request.arrival.peer}, {"path", path}});
+  return problem_response(403, std::string("the gateway is reached by TLS alone: https://, wss://") +
+                                   (shows ? "; what you have shown in clear may be known to others by now" : ""));
+}
+
 /// While the gateway stops, it says so, and nothing else.
 bool is_answered_while_stopping(const Request& request) {
   const auto path = request.path();
@@ -275,6 +298,7 @@ rr::awaitable<Continuation> serve_http_client(GatewayState& gateway, Connection&
     const bool is_refused = gateway.is_stopping() && !is_answered_while_stopping(request);
     HttpAccess::Admitted admitted;
     admitted.refusal = refuse_page(gateway, request);
+    if (!admitted.refusal) admitted.refusal = require_tls(gateway, request);
     if (!admitted.refusal && !is_refused && is_guarded(request)) {
       admitted = co_await gateway.http_access().admit(request, connection, config);
       if (admitted.refusal) gateway.reject(rejection_of(admitted.refusal->status));

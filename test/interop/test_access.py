@@ -416,6 +416,54 @@ def test_certificates_that_are_revoked(device, tmp_path):
         assert status(vera) == 200
 
 
+def test_tls_alone(device, tmp_path):
+    """What comes in clear is sent to HTTPS where nothing was shown, and refused where something was: it is not even looked at."""
+    make_users(tmp_path)
+    tls = {**make_web_certificates(tmp_path / "web"), "required": True}
+    devices = [{"name": "interop", "url": device}, {"name": "shared", "url": device, "mode": "shared"}]
+    access = {"users_file": "users", "rules": RULES, "audit_file": "audit"}
+    with running(tmp_path, device, access, tls=tls, devices=devices, trusted_proxies=["127.0.0.2"]) as gateway:
+        context = ssl.create_default_context(cafile=tmp_path / "web" / "web-ca.pem")
+        assert ask(gateway.port, "GET", "/healthz").status == ask(gateway.port, "GET", "/readyz").status == 200
+        for path in ("/", "/api/v1/devices?x=1", "/metrics"):
+            sent = ask(gateway.port, "GET", path)
+            assert (sent.status, sent.headers["Location"]) == (308, f"https://127.0.0.1:{gateway.port}{path}")
+        for method, path, headers in (("GET", BASE + "/p_double", basic("root")), ("GET", "/", bearer("rrg_x")),
+                                      ("GET", "/api/v1/devices?ticket=x", {}), ("PUT", BASE + "/p_double", {})):
+            refused = ask(gateway.port, method, path, headers=headers)
+            assert refused.status == 403 and "TLS alone" in refused.json["detail"], path
+            assert ("known to others" in refused.json["detail"]) == (method == "GET")
+        for path in ("/devices/interop", "/devices/shared", "/"):
+            assert upgrade_status(gateway.port, path, basic("root")) == 403
+        assert (tmp_path / "audit").read_text() == ""
+        for name in ("interop", "shared"):
+            url = f"rr+tcp://127.0.0.1:{gateway.port}/?{'nodename=shared&' if name == 'shared' else ''}service=interop"
+            done = subprocess.run([sys.executable, "-c", NATIVE_CLIENT, url], capture_output=True, text=True, timeout=60)
+            assert done.stdout.startswith("PermissionDeniedException") and "TLS alone" in done.stdout, (url, done)
+        assert ask(gateway.port, "GET", BASE + "/p_double", headers=basic("root"), context=context).status == 200
+        through = ask(gateway.port, "GET", BASE + "/p_double", headers={**basic("root"), "X-Forwarded-Proto": "https"}, address="127.0.0.2")
+        assert through.status == 200
+        for scheme, status in (("https", 200), ("http", 403)):
+            origin = {"Origin": f"{scheme}://localhost:{gateway.port}", **basic("root")}
+            assert ask(gateway.port, "GET", BASE + "/p_double", headers=origin, context=context).status == status
+
+
+def test_check_config_warns_of_what_may_not_be_meant(tmp_path):
+    make_users(tmp_path)
+    issuer = issuers.Issuer("https://id.example", "rrgate")
+    (tmp_path / "keys.json").write_text(json.dumps(issuer.key_set()))
+    config = tmp_path / "gateway.json"
+    config.write_text(json.dumps({
+        "listen": ["127.0.0.1:0"], "devices": [{"name": "arm", "url": "rrs+tcp://127.0.0.1:1/?nodename=arm"}],
+        "trusted_proxies": ["127.0.0.1"], "tls": make_web_certificates(tmp_path / "web"),
+        "access": {"users_file": "users", "jwt": {"jwks_file": "keys.json"}}}))
+    done = subprocess.run([RRGATE, "check-config", config], capture_output=True, text=True, timeout=30)
+    assert done.returncode == 0 and "good; 1 devices" in done.stdout
+    warned = [line.split(": ")[1:3] for line in done.stderr.splitlines()]
+    assert warned == [["/access/jwt/issuer", "warning"], ["/access/jwt/audience", "warning"], ["/devices/0/url", "warning"],
+                      ["/access/rules", "warning"], ["/tls/required", "warning"]]
+
+
 def test_what_a_trusted_proxy_says(device, tmp_path):
     access = {"identity_headers": {"user": "X-User", "roles": "X-Roles"}, "rules": RULES}
     says = {"X-User": "alice", "X-Roles": "viewer, operator"}
