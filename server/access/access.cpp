@@ -22,12 +22,12 @@ constexpr std::size_t min_ticket_key = 32;
 rr::Result<std::string> read_file(std::string_view what, const std::string& path) {
   auto text = read_text_file(path);
   if (!text)
-    return rr::make_error(rr::ErrorCode::io_error, std::string(what) + " " + rr::quoted(path, 200) + ": can't be read");
+    return rr::make_error(rr::ErrorCode::io_error, std::string(what) + " " + rr::quote(path, 200) + ": can't be read");
   return std::move(*text);
 }
 
 rr::Error in_file(std::string_view what, const std::string& path, const rr::Error& error) {
-  return rr::make_error(error.code, std::string(what) + " " + rr::quoted(path, 200) + ": " + error.message);
+  return rr::make_error(error.code, std::string(what) + " " + rr::quote(path, 200) + ": " + error.message);
 }
 
 rr::Result<JwtVerifier> load_jwt(const JwtConfig& config) {
@@ -110,7 +110,7 @@ rr::Result<AccessStatePtr> load_access(const AccessConfig& config) {
     if (!text) return text.error();
     if (text->size() < min_ticket_key)
       return rr::make_error(rr::ErrorCode::invalid_configuration,
-                            "ticket key " + rr::quoted(config.ticket_key_file, 200) + ": has " +
+                            "ticket key " + rr::quote(config.ticket_key_file, 200) + ": has " +
                                 std::to_string(text->size()) + " bytes, expected at least 32");
     out->ticket_key.assign(text->begin(), text->end());
   }

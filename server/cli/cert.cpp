@@ -89,7 +89,7 @@ int make_cas(const Wishes& wishes) {
 /// The id that a node of this name has or, from now on, will have: what the reference keeps in nodeids/NAME.
 rr::Result<rr::NodeId> id_of_name(const std::string& name) {
   if (!rr::is_valid_node_name(name))
-    return rr::make_error(rr::ErrorCode::invalid_argument, rr::quoted(name) + " is neither a node id nor a node name");
+    return rr::make_error(rr::ErrorCode::invalid_argument, rr::quote(name) + " is neither a node id nor a node name");
   const auto folder = rr::user_config_folder();
   if (!folder) return folder.error();
   const auto path = fs::path(*folder) / "nodeids" / name;
@@ -173,7 +173,7 @@ int run_cert(Arguments arguments) {
   if (const auto days = option("--days"); !days.empty()) {
     const auto [end, error] = std::from_chars(days.data(), days.data() + days.size(), wishes.days);
     if (error != std::errc() || end != days.data() + days.size() || wishes.days < 1 || wishes.days > 36500)
-      return usage_error("cert", "--days: found " + rr::quoted(days) + ", expected 1 to 36500");
+      return usage_error("cert", "--days: found " + rr::quote(days) + ", expected 1 to 36500");
   }
   if (kind != "node" && parsed.options.contains("--output")) return usage_error("cert", "--output is for node alone");
   if (kind == "ca" && wishes.operands.empty()) return make_cas(wishes);

@@ -46,7 +46,7 @@ int run_command_line(std::span<const Command> commands, Arguments arguments) {
     }
     return command.run(rest);
   }
-  std::cerr << "rrgate: unknown command or option " << rr::quoted(name) << "\n\n";
+  std::cerr << "rrgate: unknown command or option " << rr::quote(name) << "\n\n";
   print_help(commands, std::cerr);
   return exit_usage;
 }
@@ -77,7 +77,7 @@ ParsedArguments parse_arguments(Arguments arguments, const KnownOptions& known) 
     }
     const bool is_repeated = is_one_of(name, known.repeated);
     if (!is_repeated && !is_one_of(name, known.options)) {
-      out.error = "unknown option " + rr::quoted(name);
+      out.error = "unknown option " + rr::quote(name);
       return out;
     }
     if (equals == std::string_view::npos && i + 1 == arguments.size()) {

@@ -166,11 +166,11 @@ int run_demo(Arguments arguments) {
   constexpr std::string_view options[] = {"--port"};
   const auto parsed = parse_arguments(arguments, {options});
   if (!parsed.error.empty()) return usage_error("demo", parsed.error);
-  if (!parsed.operands.empty()) return usage_error("demo", "unexpected " + rr::quoted(parsed.operands.front()));
+  if (!parsed.operands.empty()) return usage_error("demo", "unexpected " + rr::quote(parsed.operands.front()));
   auto port = is_port_free(preferred_port) ? preferred_port : std::uint16_t{0};
   if (const auto given = parsed.options.find("--port"); given != parsed.options.end()) {
     const auto number = parse_port(given->second);
-    if (!number) return usage_error("demo", "--port " + rr::quoted(given->second) + ": expected 0 to 65535");
+    if (!number) return usage_error("demo", "--port " + rr::quote(given->second) + ": expected 0 to 65535");
     port = *number;
   }
 

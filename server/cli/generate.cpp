@@ -67,7 +67,7 @@ int run_generate(Arguments arguments) {
   if (parsed.operands.size() < 2) return usage_error("generate", "expected a language (ts, cpp) and a FILE or several");
   const auto language = parsed.operands.front();
   if (language != "ts" && language != "cpp")
-    return usage_error("generate", "unknown language " + rr::quoted(language) + ", expected ts or cpp");
+    return usage_error("generate", "unknown language " + rr::quote(language) + ", expected ts or cpp");
   parsed.operands.erase(parsed.operands.begin());
   const auto urls = std::count_if(parsed.operands.begin(), parsed.operands.end(), is_url);
   if (urls != 0 && parsed.operands.size() != 1) return usage_error("generate", "expected files, or one URL alone");

@@ -60,11 +60,11 @@ int run_health(Arguments arguments) {
   constexpr std::string_view flags[] = {"--ready"};
   const auto parsed = parse_arguments(arguments, {{}, flags});
   if (!parsed.error.empty()) return usage_error("health", parsed.error);
-  if (parsed.operands.size() > 1) return usage_error("health", "unexpected " + rr::quoted(parsed.operands[1]));
+  if (parsed.operands.size() > 1) return usage_error("health", "unexpected " + rr::quote(parsed.operands[1]));
   Address address;
   if (!parsed.operands.empty()) {
     const auto given = parse_address(parsed.operands.front());
-    if (!given) return usage_error("health", rr::quoted(parsed.operands.front()) + ": expected HOST:PORT");
+    if (!given) return usage_error("health", rr::quote(parsed.operands.front()) + ": expected HOST:PORT");
     address = *given;
   }
   const auto answer = ask(address, parsed.flags.contains("--ready") ? "/readyz" : "/healthz");

@@ -9,7 +9,7 @@ int run_serve(Arguments arguments) {
   constexpr std::string_view options[] = {"--config"};
   const auto parsed = parse_arguments(arguments, {options});
   if (!parsed.error.empty()) return usage_error("serve", parsed.error);
-  if (!parsed.operands.empty()) return usage_error("serve", "unexpected " + rr::quoted(parsed.operands.front()));
+  if (!parsed.operands.empty()) return usage_error("serve", "unexpected " + rr::quote(parsed.operands.front()));
   const auto file = parsed.options.find("--config");
   if (file == parsed.options.end()) return usage_error("serve", "missing --config FILE");
   auto config = load_config(file->second);

@@ -43,7 +43,7 @@ int run_token(Arguments arguments) {
   if (!roles) return usage_error("token", "--roles: " + roles.error().message);
   const auto until = last_day(option("--days"));
   if (until.empty())
-    return usage_error("token", "--days: found " + rr::quoted(option("--days")) + ", expected 1 to 36500");
+    return usage_error("token", "--days: found " + rr::quote(option("--days")) + ", expected 1 to 36500");
 
   std::error_code error;
   const auto old = read_text_file(file);
@@ -54,16 +54,16 @@ int run_token(Arguments arguments) {
   const bool is_there = !find_line(text, name).empty();
   if (is_there != deletes)
     return report_failure("token", file + (deletes ? " has no token " : " has a token already of the name ") +
-                                       rr::quoted(name) + (deletes ? "" : "; --delete takes it out"));
+                                       rr::quote(name) + (deletes ? "" : "; --delete takes it out"));
   const auto token = make_api_token();
   const auto line = deletes ? "" : name + " " + hash_api_token(token) + " " + format_roles(*roles) + " " + until;
   if (auto done = rr::write_secret(file, with_line(text, name, line), true, rr::SecretReaders::folder_group); !done)
     return report_failure("token", done.error().message);
   if (deletes) {
-    std::cout << file << ": token " << rr::quoted(name) << " is deleted\n";
+    std::cout << file << ": token " << rr::quote(name) << " is deleted\n";
     return exit_ok;
   }
-  std::cerr << file << ": token " << rr::quoted(name) << " is added. It is shown this once:\n";
+  std::cerr << file << ": token " << rr::quote(name) << " is added. It is shown this once:\n";
   std::cout << token << "\n";
   return exit_ok;
 }

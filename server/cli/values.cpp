@@ -65,7 +65,7 @@ std::vector<rr::Value> read_arguments(const RemoteMember& found, const std::vect
       unnamed.push_back(text);
       continue;
     }
-    if (json.contains(name)) throw NotUnderstood("argument " + rr::quoted(name) + " is given twice");
+    if (json.contains(name)) throw NotUnderstood("argument " + rr::quote(name) + " is given twice");
     json[name] = read_json_argument(std::string_view(text).substr(name.size() + 1), parameter->type);
   }
   auto next = unnamed.begin();
@@ -84,7 +84,7 @@ int call_function(const RemoteMember& found, const ParsedArguments& parsed, cons
   const auto& member = *found.member;
   for (const auto& parameter : member.parameters)
     if (parameter.type.container == rr::ContainerKind::generator)
-      throw NotUnderstood(rr::quoted(member.name) + " takes values while it runs, which this command can't give");
+      throw NotUnderstood(rr::quote(member.name) + " takes values while it runs, which this command can't give");
   const auto values = read_arguments(found, texts);
   auto type = member.type;
   if (member.is_generator()) {

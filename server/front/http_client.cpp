@@ -51,11 +51,11 @@ rr::Result<Destination> find_destination(GatewayState& gateway, const Request& r
     auto* device = gateway.devices().find(name);
     if (!device) {  // strangers are not told so
       if (auto allowed = gateway.access().check(request.identity, {.device = name}); !allowed) return allowed.error();
-      return not_found("no device " + rr::quoted(name) + "; /api/v1/devices lists them");
+      return not_found("no device " + rr::quote(name) + "; /api/v1/devices lists them");
     }
     return destination_of(gateway, *device);
   }
-  if (path != "/") return not_found("no WebSocket at " + rr::quoted(path) + "; expected /devices/NAME or /");
+  if (path != "/") return not_found("no WebSocket at " + rr::quote(path) + "; expected /devices/NAME or /");
   rr::NodeId node_id;
   if (const auto text = rr::query_value(request.query(), "nodeid")) {
     auto parsed = rr::parse_node_id(*text);

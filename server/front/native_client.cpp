@@ -57,7 +57,7 @@ std::string describe_wish(const rr::MessageHeader& header) {
   std::string out;
   if (!header.receiver_node_id.is_any()) out += "node id " + rr::format_node_id(header.receiver_node_id);
   if (!header.receiver_node_name.empty())
-    out += (out.empty() ? "" : ", ") + ("node name " + rr::quoted(header.receiver_node_name));
+    out += (out.empty() ? "" : ", ") + ("node name " + rr::quote(header.receiver_node_name));
   return out.empty() ? "no node in particular, and there is more than one" : out;
 }
 

@@ -34,7 +34,7 @@ const rr::MemberDefinition& expect_member(const Target& target, std::string_view
                                           std::initializer_list<rr::MemberKind> kinds) {
   const auto* member = target.member;
   if (member && std::find(kinds.begin(), kinds.end(), member->kind) != kinds.end()) return *member;
-  refuse(rr::ErrorCode::invalid_operation, rr::quoted(path_of(target)) + " is a " +
+  refuse(rr::ErrorCode::invalid_operation, rr::quote(path_of(target)) + " is a " +
                                                (member ? std::string(member_kind_name(member->kind)) : "object") +
                                                "; \"" + std::string(operation) + "\" is not for that");
 }
@@ -43,7 +43,7 @@ void expect_direction(const rr::MemberDefinition& member, rr::MemberDirection ne
   if (member.direction() != never) return;
   const bool is_read_only = never == rr::MemberDirection::readonly;
   refuse(is_read_only ? rr::ErrorCode::read_only_member : rr::ErrorCode::write_only_member,
-         rr::quoted(member.name) + (is_read_only ? " can only be read" : " can only be written"));
+         rr::quote(member.name) + (is_read_only ? " can only be read" : " can only be written"));
 }
 
 bool takes_values(const rr::MemberDefinition& function) {
@@ -143,7 +143,7 @@ rr::awaitable<void> JsonOperations::run(std::shared_ptr<JsonOperations> self, Re
 rr::awaitable<rr::OrderedJson> JsonOperations::perform(RequestPtr request) {
   const auto name = request->text("op", "");
   const auto* operation = find_operation(name);
-  if (!operation) refuse(rr::ErrorCode::invalid_argument, "no operation \"op\": " + rr::quoted(name));
+  if (!operation) refuse(rr::ErrorCode::invalid_argument, "no operation \"op\": " + rr::quote(name));
   TargetPtr target;
   if (!operation->traits.has_target) co_return co_await (this->*operation->perform)(request, target);
   target = co_await find(request, *operation);
@@ -201,7 +201,7 @@ void JsonOperations::stop() {
 // --- what is over with its answer ---
 
 rr::awaitable<rr::OrderedJson> JsonOperations::describe(RequestPtr, TargetPtr target) {
-  if (target->member) refuse(rr::ErrorCode::invalid_operation, rr::quoted(path_of(*target)) + " is no object");
+  if (target->member) refuse(rr::ErrorCode::invalid_operation, rr::quote(path_of(*target)) + " is no object");
   co_return describe_object(*target);
 }
 
@@ -231,7 +231,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::set(RequestPtr request, TargetPtr
 rr::awaitable<rr::OrderedJson> JsonOperations::call(RequestPtr request, TargetPtr target) {
   const auto& member = expect_member(*target, "call", {rr::MemberKind::function});
   if (member.is_generator())
-    refuse(rr::ErrorCode::invalid_operation, rr::quoted(member.name) + " is a generator; use \"open\"");
+    refuse(rr::ErrorCode::invalid_operation, rr::quote(member.name) + " is a generator; use \"open\"");
   static const auto none = rr::Json::object();
   const auto* given = request->find("args");
   auto called = target->request(rr::CallKind::function);
@@ -272,7 +272,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::lock(RequestPtr request, TargetPt
   if (target->member) refuse(rr::ErrorCode::invalid_operation, "objects are locked, not their members");
   const auto kind = request->text("kind", "client");
   if (kind != "client" && kind != "user")
-    refuse(rr::ErrorCode::invalid_argument, "\"kind\" is " + rr::quoted(kind) + ", expected \"client\" or \"user\"");
+    refuse(rr::ErrorCode::invalid_argument, "\"kind\" is " + rr::quote(kind) + ", expected \"client\" or \"user\"");
   const auto command = kind == "user" ? rr::LockCommand::lock_for_user : rr::LockCommand::lock_for_client;
   auto path = target->path();
   co_await target->client->lock(command, std::move(path));
@@ -314,7 +314,7 @@ std::string JsonOperations::reserve(const JsonRequest& request) {
 rr::awaitable<rr::OrderedJson> JsonOperations::open(RequestPtr request, TargetPtr target) {
   const auto& member = expect_member(*target, "open", {rr::MemberKind::function});
   if (!member.is_generator())
-    refuse(rr::ErrorCode::invalid_operation, rr::quoted(member.name) + " is no generator; use \"call\"");
+    refuse(rr::ErrorCode::invalid_operation, rr::quote(member.name) + " is no generator; use \"call\"");
   static const auto none = rr::Json::object();
   const auto* given = request->find("args");
   auto arguments = value_or_throw(arguments_from_json(given ? *given : none, member, target->types(), place_.form));

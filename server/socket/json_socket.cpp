@@ -105,7 +105,7 @@ rr::Result<std::shared_ptr<JsonSocketPlace>> find_json_socket(GatewayState& gate
   auto* device = gateway.devices().find(segments->front());
   if (!device)
     return rr::make_error(rr::ErrorCode::node_not_found,
-                          "no device " + rr::quoted(segments->front()) + "; /api/v1/devices lists them");
+                          "no device " + rr::quote(segments->front()) + "; /api/v1/devices lists them");
   auto place = std::make_shared<JsonSocketPlace>();
   place->device = device->shared_from_this();
   place->standing = std::make_shared<Standing>(gateway.access(), request.identity);

@@ -34,7 +34,7 @@ rr::Result<Identity> by_proxy(const Request& request, const Connection& connecti
   for (const auto* name : {&headers.user, &headers.roles})
     if (const auto count = name->empty() ? 0 : request.message.count(*name); count > 1)
       return rr::make_error(rr::ErrorCode::invalid_argument,
-                            "header " + rr::quoted(*name) + " came " + std::to_string(count) +
+                            "header " + rr::quote(*name) + " came " + std::to_string(count) +
                                 " times, expected it once: the proxy has to take away what clients put there");
   out.name = request.header(headers.user);
   if (out.name.empty()) return out;
@@ -158,7 +158,7 @@ rr::awaitable<HttpAccess::Admitted> HttpAccess::admit(Request& request, const Co
   if (!request.identity.is_proven()) co_return out;
   out.user = users_.enter(request.identity.subject().key(), of_user.per_second, of_user.at_once,
                           std::chrono::steady_clock::now());
-  if (!out.user) out.refusal = too_much("of " + rr::quoted(request.identity.name));
+  if (!out.user) out.refusal = too_much("of " + rr::quote(request.identity.name));
   co_return out;
 }
 
@@ -190,11 +190,11 @@ rr::Result<std::shared_ptr<const HttpAccess::Passes>> HttpAccess::enter(const st
   if (!out->client) return refused(rates.client, "from " + network);
   if (!user.is_nobody()) {
     out->user = users_.enter(user.key(), rates.user.per_second, rates.user.at_once, now);
-    if (!out->user) return refused(rates.user, "of " + rr::quoted(user.name));
+    if (!out->user) return refused(rates.user, "of " + rr::quote(user.name));
   }
   if (!device.empty()) {
     out->device = enter_device(device, rates);
-    if (!out->device) return refused(rates.device, "to device " + rr::quoted(device));
+    if (!out->device) return refused(rates.device, "to device " + rr::quote(device));
   }
   return std::shared_ptr<const Passes>(std::move(out));
 }

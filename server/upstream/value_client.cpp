@@ -90,7 +90,7 @@ rr::awaitable<rr::Result<ValueClient::ListenerPtr>> ValueClient::listen(MemberPl
 rr::Result<ValueClient::ListenerPtr> ValueClient::answer_callback(const MemberPlace& place, CallbackHandler handler) {
   const Key key(place.path, place.member->name);
   if (topics_.contains(key))
-    return rr::make_error(rr::ErrorCode::member_busy, rr::quoted(place.member->name) + " is answered already");
+    return rr::make_error(rr::ErrorCode::member_busy, rr::quote(place.member->name) + " is answered already");
   auto& topic = topics_[key];
   topic.place = place;
   topic.callback = std::make_shared<CallbackHandler>(std::move(handler));
@@ -104,7 +104,7 @@ rr::awaitable<rr::Result<>> ValueClient::send(MemberPlace place, rr::Value value
     if (const auto joined = co_await join(key); !joined) co_return joined.error();
   const auto found = topics_.find(key);
   if (found == topics_.end() || found->second.state != TopicState::joined)
-    co_return rr::make_error(rr::ErrorCode::invalid_operation, rr::quoted(key.second) + " is not connected");
+    co_return rr::make_error(rr::ErrorCode::invalid_operation, rr::quote(key.second) + " is not connected");
   const auto member = found->second.place;
   if (member.member->kind == rr::MemberKind::wire) co_return upstream_->send_wire(member.path, *member.member, value);
   co_return upstream_->send_pipe(*this, found->second.pipe, value, std::nullopt);
@@ -120,7 +120,7 @@ rr::awaitable<rr::Result<>> ValueClient::join(Key key) {
   while (is_joining()) co_await changed_.async_wait(wait_for_news);
   const auto found = topics_.find(key);
   if (found == topics_.end())
-    co_return rr::make_error(rr::ErrorCode::operation_cancelled, rr::quoted(key.second) + " is not wanted any more");
+    co_return rr::make_error(rr::ErrorCode::operation_cancelled, rr::quote(key.second) + " is not wanted any more");
   if (found->second.state == TopicState::joined) co_return rr::Result<>();
   co_return found->second.error;
 }

@@ -53,7 +53,7 @@ rr::Result<rr::Json> body_of(const Request& request) {
   if (text.empty()) return {boost::system::in_place_value, rr::Json::object()};
   const auto type = request.header(http::field::content_type);
   if (!equals_ignoring_case(type.substr(0, type.find(';')), "application/json"))
-    return bad("Content-Type is " + rr::quoted(type) + ", expected application/json");
+    return bad("Content-Type is " + rr::quote(type) + ", expected application/json");
   if (text.size() > largest_body) return bad("the body has more than 8 KiB");
   auto json = rr::read_json(text);
   if (json && !json->is_object()) return bad("expected an object");
@@ -84,8 +84,7 @@ rr::Result<std::string> add_token(GatewayState& gateway, const std::string& name
   const auto text = read_text_file(file);
   if (!text) return rr::make_error(rr::ErrorCode::io_error, "the tokens file can't be read");
   if (!find_line(*text, name).empty())
-    return rr::make_error(rr::ErrorCode::invalid_state,
-                          "there is a token of the name " + rr::quoted(name) + " already");
+    return rr::make_error(rr::ErrorCode::invalid_state, "there is a token of the name " + rr::quote(name) + " already");
   auto token = make_api_token();
   const auto line =
       name + " " + hash_api_token(token) + " " + format_roles(roles) + " " + (last_day ? format_day(*last_day) : "_");

@@ -123,7 +123,7 @@ rr::Result<std::string> image_bytes(const rr::Value& value, const rr::TypeDefini
                                                                     : "";
     if (found == media_type) return std::string(text);
     if (!found.empty()) return no_image("is " + std::string(found) + "; ask for that");
-    if (!encoding.empty()) return no_image("is encoded as " + rr::quoted(encoding) + ", which is not known here");
+    if (!encoding.empty()) return no_image("is encoded as " + rr::quote(encoding) + ", which is not known here");
   }
   const auto number = [&](const char* name) -> std::uint64_t {
     const auto* field = info->find(name);

@@ -105,7 +105,7 @@ std::optional<Shape> read_shape(const ObjectRequest& request, std::string_view n
     }
     at = read.ptr + 1;
   }
-  refuse(rr::ErrorCode::invalid_argument, std::string(name) + " is " + rr::quoted(*text) + ", expected " +
+  refuse(rr::ErrorCode::invalid_argument, std::string(name) + " is " + rr::quote(*text) + ", expected " +
                                               std::to_string(dimensions) + " whole numbers, separated by commas");
 }
 

@@ -150,7 +150,7 @@ rr::Result<rr::Json> ObjectRequest::body() const {
   // A page of another origin can send text/plain without being asked; JSON it can't.
   if (!equals_ignoring_case(type, "application/json"))
     return rr::make_error(rr::ErrorCode::invalid_argument,
-                          "Content-Type is " + rr::quoted(type) + ", expected application/json or application/cbor");
+                          "Content-Type is " + rr::quote(type) + ", expected application/json or application/cbor");
   return rr::read_json(text);
 }
 
@@ -230,22 +230,21 @@ rr::awaitable<rr::Result<std::shared_ptr<Target>>> find_target(std::shared_ptr<V
     const auto& name = segments[i];
     const auto* member = target->type->find_member(name);
     if (!member)
-      co_return rr::make_error(rr::ErrorCode::member_not_found, "object " + rr::quoted(target->path()) + " (" +
+      co_return rr::make_error(rr::ErrorCode::member_not_found, "object " + rr::quote(target->path()) + " (" +
                                                                     target->type->qualified_name + ") has no member " +
-                                                                    rr::quoted(name));
+                                                                    rr::quote(name));
     if (member->kind != rr::MemberKind::objref) {
       target->member = member;
       target->is_shape =
           member->kind == rr::MemberKind::memory && i + 2 == segments.size() && segments[i + 1] == "shape";
       if (i + 1 == segments.size() || target->is_shape) break;
-      co_return rr::make_error(rr::ErrorCode::object_not_found,
-                               rr::quoted(name) + " is no object; nothing is below it");
+      co_return rr::make_error(rr::ErrorCode::object_not_found, rr::quote(name) + " is no object; nothing is below it");
     }
     std::optional<std::string> index;
     if (member->type.array != rr::ArrayKind::none || member->type.container != rr::ContainerKind::none) {
       if (++i == segments.size())
         co_return rr::make_error(rr::ErrorCode::object_not_found,
-                                 "objref " + rr::quoted(name) + " needs an index: .../" + name + "/INDEX");
+                                 "objref " + rr::quote(name) + " needs an index: .../" + name + "/INDEX");
       index = segments[i];
     }
     const auto path = rr::child_path(target->path(), name, index);

@@ -71,7 +71,7 @@ std::optional<Response> refuse_device(GatewayState& gateway, const Request& requ
   pass = gateway.http_access().enter_device(device, gateway.config().rates);
   if (pass) return std::nullopt;
   gateway.reject(Rejection::rate);
-  return HttpAccess::too_much("to device " + rr::quoted(device));
+  return HttpAccess::too_much("to device " + rr::quote(device));
 }
 
 constexpr std::string_view definition_suffix = ".robdef";
@@ -114,11 +114,11 @@ rr::awaitable<void> serve_document(GatewayState& gateway, Device& device, const 
   }
   Response response;
   if (services.empty()) {
-    response = problem_response(503, "device " + rr::quoted(device_name) + " has no service that answers");
+    response = problem_response(503, "device " + rr::quote(device_name) + " has no service that answers");
     response.set("Retry-After", "2");
   } else if (is_definition(name)) {
     const auto wanted = name.substr(0, name.size() - definition_suffix.size());
-    response = problem_response(404, "the device has no definition " + rr::quoted(wanted));
+    response = problem_response(404, "the device has no definition " + rr::quote(wanted));
     for (const auto& service : services)
       if (const auto* definition = service.types->find_service(wanted))
         response = with_etag(text_response(200, "text/plain; charset=utf-8", definition->text), writer.request());
