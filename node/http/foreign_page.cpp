@@ -44,7 +44,8 @@ std::optional<Response> refuse_foreign_page(const HttpRequest& request, const Pa
   if (const auto origins = message.count(http::field::origin); origins != 0) {
     const auto origin = request.header(http::field::origin);
     const auto host = host_of(request);
-    if (origins == 1 && is_same_origin(origin, host) && is_own_host(host, rules)) return std::nullopt;
+    if (origins == 1 && is_same_origin(origin, host, request.arrival.is_encrypted) && is_own_host(host, rules))
+      return std::nullopt;
     return problem_response(403, "pages of origin " + rr::quote(origin) +
                                      " may not connect; allowed_origins in the configuration lists those that may");
   }

@@ -157,6 +157,7 @@ void read_tls(ObjectReader& in, TlsConfig& tls) {
     item.required_text("key", read_file_name(certificate.key_file));
     tls.certificates.push_back(std::move(certificate));
   });
+  in.flag("required", tls.is_required);
   in.size("hsts_seconds", tls.hsts_seconds, {0, 100'000'000});
 }
 

@@ -102,7 +102,7 @@ rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& 
                                              rr::ByteSpan unread) {
   auto& tcp = *stream;
   connection.client = request.arrival.peer;
-  connection.address = client_network(request.arrival.address).to_string();
+  connection.network = network_name(request.arrival.address);
   connection.identity = request.identity;
   const auto refuse = [&tcp](const Response& refusal) -> rr::awaitable<void> {
     co_await write_refusal(tcp, refusal);
@@ -118,7 +118,7 @@ rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& 
   if (!connection.ticket.pass_to(request.arrival.address)) {
     gateway.reject(Rejection::too_many);
     log(LogLevel::warning, "connection refused: too many", {{"peer", connection.client}});
-    const auto response = problem_response(503, "too many connections from " + request.arrival.address.to_string());
+    const auto response = problem_response(503, "too many connections from " + connection.network);
     co_await refuse(response);
     co_return Continuation();
   }
@@ -213,6 +213,29 @@ std::optional<Response> refuse_page(GatewayState& gateway, const Request& reques
   return refusal;
 }
 
+/// Where TLS is required: what in clear is sent there, or refused. A client that has shown something in clear has given
+/// it away, and hears so. Whether the gateway works is no secret.
+std::optional<Response> require_tls(GatewayState& gateway, const Request& request) {
+  const auto path = request.path();
+  if (!gateway.config().tls.is_required || request.arrival.is_encrypted || path == "/healthz" || path == "/readyz")
+    return std::nullopt;
+  const auto method = request.message.method();
+  const bool shows =
+      request.message.count(http::field::authorization) != 0 || rr::query_value(request.query(), "ticket");
+  const bool is_look = method == http::verb::get || method == http::verb::head;
+  if (is_look && !shows && !asks_for_websocket(request) && !request.arrival.host.empty()) {
+    auto response = problem_response(308, "the gateway is reached by https:// alone");
+    const auto target = request.message.target();
+    response.set("Location", "https://" + request.arrival.host + request.arrival.prefix +
+                                 std::string(target.data(), target.size()));
+    return response;
+  }
+  gateway.reject(Rejection::forbidden);
+  log(LogLevel::info, "request in clear refused", {{"peer", request.arrival.peer}, {"path", path}});
+  return problem_response(403, std::string("the gateway is reached by TLS alone: https://, wss://") +
+                                   (shows ? "; what you have shown in clear may be known to others by now" : ""));
+}
+
 /// While the gateway stops, it says so, and nothing else.
 bool is_answered_while_stopping(const Request& request) {
   const auto path = request.path();
@@ -285,11 +308,12 @@ rr::awaitable<Continuation> serve_http_client(GatewayState& gateway, Connection&
     const bool is_refused = gateway.is_stopping() && !is_answered_while_stopping(request);
     HttpAccess::Admitted admitted;
     admitted.refusal = refuse_page(gateway, request);
+    if (!admitted.refusal) admitted.refusal = require_tls(gateway, request);
     if (!admitted.refusal && !is_refused && is_guarded(request)) {
       admitted = co_await gateway.http_access().admit(request, connection, config);
       if (admitted.refusal) gateway.reject(rejection_of(admitted.refusal->status));
     }
-    auto memory = gateway.memory().charge(client_network(request.arrival.address).to_string());
+    auto memory = gateway.memory().charge(network_name(request.arrival.address));
     if (!admitted.refusal && !is_refused && makes_work(request) && !memory.has_room(least_room))
       admitted.refusal = no_memory_response();
     if (admitted.refusal && asks_for_websocket(request)) {
@@ -314,7 +338,8 @@ rr::awaitable<Continuation> serve_http_client(GatewayState& gateway, Connection&
                                                           : gateway.router().answer(request);
     if (response.answer_later) {
       const auto standing = std::make_shared<Standing>(gateway.access(), request.identity);
-      connection.is_good = [standing] { return standing->is_good(); };
+      // A stream of events or of images ends with what its client has shown; a single request goes on to its answer.
+      connection.is_good = [standing, &writer] { return !writer.is_streamed() || standing->is_good(); };
       co_await response.answer_later(writer);
       connection.is_good = nullptr;
       if (writer.body_failure()) note_unreadable(gateway, connection, *writer.body_failure());

@@ -97,7 +97,7 @@ JsonOperations::JsonOperations(GatewayState& gateway, JsonSocketPlace place, std
     : gateway_(gateway), place_(std::move(place)), outbox_(std::move(outbox)) {}
 
 rr::awaitable<void> JsonOperations::take(const std::string& message) {
-  auto memory = gateway_.memory().charge(place_.address);
+  auto memory = gateway_.memory().charge(place_.from.network);
   if (!memory.has_room(least_room) || !memory.resize(rr::json_growth * message.size()))
     co_return tell_error("null", rr::make_error(rr::ErrorCode::out_of_system_resource,
                                                 "the gateway has no memory left for a message of " +
@@ -113,7 +113,7 @@ rr::awaitable<void> JsonOperations::take(const std::string& message) {
   const auto* operation = name && name->is_string() ? find_operation(name->get_ref<const std::string&>()) : nullptr;
   Passes passes;
   if (!operation || !operation->traits.is_free) {
-    auto entered = gateway_.http_access().enter(place_.address, place_.standing->identity().subject(),
+    auto entered = gateway_.http_access().enter(place_.from.network, place_.standing->identity().subject(),
                                                 place_.device->config().name, gateway_.config().rates);
     if (!entered) {
       gateway_.reject(Rejection::rate);
@@ -186,7 +186,8 @@ rr::awaitable<std::shared_ptr<ValueClient>> JsonOperations::client() {
     co_return own_;
   }
   auto key = place_.key;
-  co_return value_or_throw(co_await gateway_.clients().open(place_.device, std::move(key)));
+  auto from = place_.from;
+  co_return value_or_throw(co_await open_session(gateway_, place_.device, std::move(key), std::move(from)));
 }
 
 void JsonOperations::tell_error(const std::string& id, const rr::Error& error) {
@@ -297,7 +298,8 @@ rr::awaitable<rr::OrderedJson> JsonOperations::login(RequestPtr request, TargetP
   key.username = request->text("username", "");
   key.password = request->text("password", "");
   auto tried = key;
-  value_or_throw(co_await gateway_.clients().open(place_.device, std::move(tried)));
+  auto from = place_.from;
+  value_or_throw(co_await open_session(gateway_, place_.device, std::move(tried), std::move(from)));
   place_.key = std::move(key);  // not before: a failed login leaves the one that there was
   co_return nullptr;
 }

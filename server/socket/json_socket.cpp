@@ -115,7 +115,7 @@ rr::Result<std::shared_ptr<JsonSocketPlace>> find_json_socket(GatewayState& gate
   auto place = std::make_shared<JsonSocketPlace>();
   place->device = device->shared_from_this();
   place->standing = std::make_shared<Standing>(gateway.access(), request.identity);
-  place->address = client_network(request.arrival.address).to_string();
+  place->from = request.origin();
   place->key = session_key(gateway, request, (*segments)[1]);
   place->segments.assign(segments->begin() + 2, segments->end());
   place->form = json_form(request);

@@ -7,6 +7,7 @@
 
 #include "node/tls/tls_context.hpp"
 #include "server/access/access.hpp"
+#include "server/access/logins.hpp"
 #include "server/config/config.hpp"
 #include "server/config/tls_files.hpp"
 #include "server/http/router.hpp"
@@ -41,8 +42,10 @@ class GatewayState {
   MemoryBudget& memory() { return memory_; }
   /// Who may do what.
   Access& access() { return access_; }
+  /// Who is judged for what he logs in as.
+  Logins& logins() { return logins_; }
   /// How clients of HTTP show who they are, and how much they may ask for.
-  HttpAccess& http_access() { return *http_access_; }
+  HttpAccess& http_access() { return http_access_; }
   const Router& router() const { return router_; }
   /// What new connections are encrypted with; null: TLS is not served.
   rr::TlsContextPtr tls() const { return web_tls_ ? web_tls_->context() : nullptr; }
@@ -63,7 +66,8 @@ class GatewayState {
   Config config_;
   MemoryBudget memory_;
   Access access_;
-  std::unique_ptr<HttpAccess> http_access_;
+  Logins logins_;
+  HttpAccess http_access_;
   std::unique_ptr<TlsFiles> web_tls_;
   DeviceRegistry devices_;
   ValueClients clients_;

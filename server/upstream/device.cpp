@@ -171,7 +171,7 @@ void Device::become(const DeviceConfig& config, const Config& whole) {
 }
 
 std::optional<Device::Seat> Device::take_seat() {
-  if (config_.max_clients != 0 && clients_ >= config_.max_clients) return std::nullopt;
+  if (is_full()) return std::nullopt;
   ++traffic_.sessions;
   return Seat(*this);
 }

@@ -180,8 +180,8 @@ Handler ask_endpoint(GatewayState& gateway) {
     const auto name = text_of(*body, "name");
     const auto reason = text_of(*body, "reason");
     if (!name || !reason) return error_answer(name ? reason.error() : name.error());
-    const auto asked = gateway.http_access().requests().ask(
-        *name, *reason, request.arrival.peer, client_network(request.arrival.address).to_string(), Clock::now());
+    const auto asked = gateway.http_access().requests().ask(*name, *reason, request.arrival.peer,
+                                                            network_name(request.arrival.address), Clock::now());
     if (!asked) return error_answer(asked.error());
     log(LogLevel::info, "access asked for", {{"name", *name}, {"peer", request.arrival.peer}, {"reason", *reason}});
     gateway.access().record({"asked", &request.identity, nullptr, *name});

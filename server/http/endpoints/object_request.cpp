@@ -92,6 +92,19 @@ SessionKey session_key(GatewayState& gateway, const Request& request, std::strin
   return key;
 }
 
+rr::awaitable<rr::Result<std::shared_ptr<ValueClient>>> open_session(GatewayState& gateway,
+                                                                     std::shared_ptr<Device> device, SessionKey key,
+                                                                     ClientOrigin from) {
+  if (key.username.empty() || gateway.clients().has(*device, key))
+    co_return co_await gateway.clients().open(std::move(device), std::move(key));
+  const DeviceLogin login{key.username, device->config().name, key.service, std::move(from)};
+  const auto ticket = gateway.logins().begin_at_device(login);
+  if (!ticket) co_return ticket.error();
+  const auto opened = co_await gateway.clients().open(std::move(device), std::move(key));
+  gateway.logins().finish_at_device(login, opened ? rr::Result<>() : opened.error());
+  co_return opened;
+}
+
 AccessRequest access_request(const Target& target, Verb verb) {
   const auto& upstream = *target.client->upstream();
   const auto member = target.member ? std::string_view(target.member->name) : std::string_view();

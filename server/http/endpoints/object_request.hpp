@@ -38,6 +38,11 @@ struct Target {
 
 /// Whose session a request uses: user and password of HTTP Basic authentication, where they are not for the gateway.
 SessionKey session_key(GatewayState& gateway, const Request& request, std::string service);
+/// A client of that session, for somebody from there. Where a login has to be judged by the device first, that is
+/// bounded and recorded. Errors   those of ValueClients::open() and Logins::begin_at_device().
+rr::awaitable<rr::Result<std::shared_ptr<ValueClient>>> open_session(GatewayState& gateway,
+                                                                     std::shared_ptr<Device> device, SessionKey key,
+                                                                     ClientOrigin from);
 /// To do something to what a path leads to. Borrows the target.
 AccessRequest access_request(const Target& target, Verb verb);
 /// What the query says of the form of values.

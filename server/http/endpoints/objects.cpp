@@ -101,7 +101,9 @@ rr::awaitable<void> serve_document(GatewayState& gateway, Device& device, const 
     auto* still_there = gateway.devices().find(device_name);
     if (!still_there) break;
     auto key = session_key(gateway, writer.request(), service);
-    const auto client = co_await gateway.clients().open(still_there->shared_from_this(), std::move(key));
+    auto from = writer.request().origin();
+    auto asked = still_there->shared_from_this();
+    const auto client = co_await open_session(gateway, std::move(asked), std::move(key), std::move(from));
     const auto* root = client ? (*client)->upstream()->object_type(service) : nullptr;
     if (root) {
       kept.push_back((*client)->upstream()->types());
@@ -166,7 +168,9 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
   const CallLog logged(std::move(trace), device->config().name, {method.data(), method.size()},
                        std::string(writer.request().path()));
   auto key = session_key(gateway, writer.request(), service);
-  const auto client = co_await gateway.clients().open(device->shared_from_this(), std::move(key));
+  auto from = writer.request().origin();
+  auto asked = device->shared_from_this();
+  const auto client = co_await open_session(gateway, std::move(asked), std::move(key), std::move(from));
   segments.erase(segments.begin(), segments.begin() + 2);
   std::optional<rr::Error> error;
   std::shared_ptr<Target> target;
