@@ -25,14 +25,17 @@ constexpr std::string_view devices_prefix = "/devices/";
 /// What a connection goes on as when HTTP is done with it; not valid() where it has ended.
 using Continuation = rr::awaitable<void>;
 
-rr::awaitable<rr::error_code> write_text(rr::ByteStream& stream, std::string_view text) {
+/// 101: what follows is a WebSocket.
+rr::awaitable<rr::error_code> write_acceptance(GatewayState& gateway, rr::ByteStream& stream, std::string_view text) {
+  gateway.metrics().respond(101);
   const auto slice = rr::as_bytes(text);
   const std::span<const rr::ByteSpan> slices(&slice, 1);
   co_return co_await stream.write(slices);
 }
 
 /// Refuses what is not a request, or not one that goes on.
-rr::awaitable<rr::error_code> write_refusal(rr::ByteStream& stream, const Response& response) {
+rr::awaitable<rr::error_code> write_refusal(GatewayState& gateway, rr::ByteStream& stream, const Response& response) {
+  gateway.metrics().respond(response.status);
   const auto head = format_response_head(response, false, 1);
   const rr::ByteSpan parts[] = {rr::as_bytes(head), response.body ? rr::as_bytes(*response.body) : rr::ByteSpan()};
   const std::span<const rr::ByteSpan> slices(parts, 2);
@@ -86,12 +89,12 @@ rr::awaitable<Continuation> accept_json_socket(GatewayState& gateway, Connection
     gateway.reject(is_denied ? Rejection::forbidden : Rejection::no_such_device);
     const auto response = is_denied ? gateway.http_access().refusal(request.identity, place.error())
                                     : problem_response(404, place.error().message);
-    co_await write_refusal(*stream, response);
+    co_await write_refusal(gateway, *stream, response);
     co_await stream->end(rr::no_reason);
     co_return Continuation();
   }
   const auto accepted = format_upgrade_response(request, json_subprotocol);
-  if (co_await write_text(*stream, accepted)) co_return Continuation();
+  if (co_await write_acceptance(gateway, *stream, accepted)) co_return Continuation();
   stream->put_back(unread);
   co_return serve_json_socket(gateway, connection, std::move(stream), *place);
 }
@@ -104,8 +107,8 @@ rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& 
   connection.client = request.arrival.peer;
   connection.network = network_name(request.arrival.address);
   connection.identity = request.identity;
-  const auto refuse = [&tcp](const Response& refusal) -> rr::awaitable<void> {
-    co_await write_refusal(tcp, refusal);
+  const auto refuse = [&gateway, &tcp](const Response& refusal) -> rr::awaitable<void> {
+    co_await write_refusal(gateway, tcp, refusal);
     co_await tcp.end(rr::no_reason);
   };
   const auto subprotocol = is_json_socket(request) ? json_subprotocol : rr::websocket_subprotocol;
@@ -159,7 +162,7 @@ rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& 
   }
   if (hears_in_session || destination->node) {
     const auto accepted = format_upgrade_response(request);
-    if (co_await write_text(tcp, accepted)) co_return Continuation();
+    if (co_await write_acceptance(gateway, tcp, accepted)) co_return Continuation();
     tcp.put_back(unread);
     auto socket = std::make_unique<rr::WebSocketStream>(std::move(stream), rr::WebSocketRole::server, takes_close);
     if (hears_in_session) {
@@ -183,7 +186,7 @@ rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& 
     co_return Continuation();
   }
   const auto accepted = format_upgrade_response(request);
-  if (co_await write_text(tcp, accepted)) co_return Continuation();
+  if (co_await write_acceptance(gateway, tcp, accepted)) co_return Continuation();
   tcp.put_back(unread);
   auto socket = std::make_unique<rr::WebSocketStream>(std::move(stream), rr::WebSocketRole::server, takes_close);
   if (!boarding) {  // a page can't read the status of a refused upgrade, but it can read why a WebSocket closes
@@ -297,7 +300,7 @@ rr::awaitable<Continuation> serve_http_client(GatewayState& gateway, Connection&
     if (!read.request) {
       note_unreadable(gateway, connection, read.failure);
       const auto response = problem_response(read.failure.status, read.failure.detail);
-      co_await write_refusal(*stream, response);
+      co_await write_refusal(gateway, *stream, response);
       co_await stream->end(rr::no_reason);
       break;
     }
@@ -317,7 +320,7 @@ rr::awaitable<Continuation> serve_http_client(GatewayState& gateway, Connection&
     if (!admitted.refusal && !is_refused && makes_work(request) && !memory.has_room(least_room))
       admitted.refusal = no_memory_response();
     if (admitted.refusal && asks_for_websocket(request)) {
-      co_await write_refusal(*stream, *admitted.refusal);
+      co_await write_refusal(gateway, *stream, *admitted.refusal);
       co_await stream->end(rr::no_reason);
       break;
     }
@@ -329,8 +332,8 @@ rr::awaitable<Continuation> serve_http_client(GatewayState& gateway, Connection&
     std::vector<std::pair<std::string, std::string>> headers;
     if (request.arrival.is_encrypted && config.tls.hsts_seconds > 0)
       headers.emplace_back("Strict-Transport-Security", "max-age=" + std::to_string(config.tls.hsts_seconds));
-    ResponseOptions options{gateway.is_stopping(), std::move(headers), config.timeouts.send_stall,
-                            !makes_work(request)};
+    ResponseOptions options{gateway.is_stopping(), std::move(headers), config.timeouts.send_stall, !makes_work(request),
+                            &gateway.metrics()};
     ResponseWriter writer(*stream, reader, request, std::move(memory), std::move(options));
     const auto response = admitted.refusal                ? *admitted.refusal
                           : is_refused                    ? stopping_response()

@@ -6,6 +6,7 @@
 #include <boost/asio/post.hpp>
 
 #include "server/http/endpoints/call_log.hpp"
+#include "server/http/endpoints/large_json.hpp"
 #include "server/http/endpoints/member_values.hpp"
 
 namespace rrgate {
@@ -102,7 +103,12 @@ rr::awaitable<void> JsonOperations::take(const std::string& message) {
     co_return tell_error("null", rr::make_error(rr::ErrorCode::out_of_system_resource,
                                                 "the gateway has no memory left for a message of " +
                                                     std::to_string(message.size()) + " bytes; try again in a moment"));
-  auto read = JsonRequest::from_text(message);
+  const auto parse = [&message] { return JsonRequest::from_text(message); };
+  rr::Result<JsonRequest> read = rr::Error();
+  if (message.size() <= large_json_bytes)
+    read = parse();
+  else
+    read = co_await gateway_.workers().run(parse);
   if (!read) co_return tell_error("null", read.error());
   const auto request = std::make_shared<const JsonRequest>(std::move(*read));
   if (running_ >= max_running)
@@ -142,7 +148,13 @@ rr::awaitable<void> JsonOperations::run(std::shared_ptr<JsonOperations> self, Re
   if (error) {
     self->tell_error(request->id(), *error);
   } else if (request->id() != "null") {
-    self->outbox_->add(json_answer(request->id(), result));
+    const auto write = [&request, &result] { return json_answer(request->id(), result); };
+    std::string answer;
+    if (held_bytes(result) <= large_json_bytes)
+      answer = write();
+    else
+      answer = co_await self->gateway_.workers().run(write);
+    self->outbox_->add(std::move(answer));
   }
 }
 

@@ -17,12 +17,15 @@
 
 namespace rrgate {
 
+struct SampleJpeg;
+
 /// What a wire, a pipe or an event brought.
 struct Sample {
-  std::uint64_t number = 0;       ///< counts within a member, from 1
-  rr::TimeSpec time;              ///< of a wire's value
-  std::vector<rr::Value> values;  ///< an event's arguments; else one
-  std::size_t bytes = 0;          ///< that it takes, about
+  std::uint64_t number = 0;                       ///< counts within a member, from 1
+  rr::TimeSpec time;                              ///< of a wire's value
+  std::vector<rr::Value> values;                  ///< an event's arguments; else one
+  std::size_t bytes = 0;                          ///< that it takes, about
+  mutable std::shared_ptr<SampleJpeg> jpeg = {};  ///< of a camera's frame, once somebody wants it (sample_jpeg.hpp)
 };
 using SamplePtr = std::shared_ptr<const Sample>;
 

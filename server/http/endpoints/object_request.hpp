@@ -51,9 +51,10 @@ rr::JsonForm json_form(const Request& request);
 /// Borrows the request.
 class ObjectRequest {
  public:
-  explicit ObjectRequest(ResponseWriter& writer);
+  ObjectRequest(ResponseWriter& writer, GatewayState& gateway);
 
   ResponseWriter& writer() const { return writer_; }
+  GatewayState& gateway() const { return gateway_; }
   const Request& request() const { return writer_.request(); }
   http::verb method() const { return request().message.method(); }
   bool is_read() const { return method() == http::verb::get || method() == http::verb::head; }
@@ -68,11 +69,13 @@ class ObjectRequest {
   const rr::JsonForm& form() const { return form_; }
   std::optional<std::string> option(std::string_view name) const;
 
-  /// The body by Content-Type. Errors   data_serialization_error; invalid_argument: another type.
-  rr::Result<rr::Json> body() const;
+  /// The body by Content-Type. Errors   data_serialization_error; invalid_argument: another type;
+  /// out_of_system_resource: there is no memory left for it.
+  rr::awaitable<rr::Result<rr::Json>> body() const;
   bool has_bytes_body() const;
 
-  Response value_response(const rr::OrderedJson& json) const;
+  /// `json`  is borrowed for the wait.
+  rr::awaitable<Response> value_response(const rr::OrderedJson& json) const;
   Response written_response() const;  ///< 204
   Response error_response(const rr::Error& error, const rr::TypeRegistry* types) const;
   /// 405 with what is possible.
@@ -80,6 +83,7 @@ class ObjectRequest {
 
  private:
   ResponseWriter& writer_;
+  GatewayState& gateway_;
   BodyForm wanted_ = BodyForm::json;
   bool wants_events_ = false;
   std::string_view wanted_image_;
