@@ -27,7 +27,7 @@ class JsonSocket : public std::enable_shared_from_this<JsonSocket> {
  public:
   JsonSocket(GatewayState& gateway, std::unique_ptr<rr::ByteStream> stream, const JsonSocketPlace& place)
       : stream_(std::move(stream)),
-        memory_(gateway.memory().charge(place.address)),
+        memory_(gateway.memory().charge(place.from.network)),
         messages_(*stream_, gateway.config().limits.body_bytes,
                   [this](std::size_t bytes) { return memory_.resize(bytes < uncounted_bytes ? 0 : bytes); }),
         outbox_(std::make_shared<JsonOutbox>(stream_->executor(), memory_.sibling())),
