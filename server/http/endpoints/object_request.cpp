@@ -151,7 +151,7 @@ rr::awaitable<rr::Result<rr::Json>> ObjectRequest::body() const {
   // A page of another origin can send text/plain without being asked; JSON it can't.
   if (!is_cbor && !equals_ignoring_case(type, "application/json"))
     co_return rr::make_error(rr::ErrorCode::invalid_argument,
-                             "Content-Type is " + rr::quoted(type) + ", expected application/json or application/cbor");
+                             "Content-Type is " + rr::quote(type) + ", expected application/json or application/cbor");
   auto room = writer_.memory().sibling();
   if (!room.resize(rr::json_growth * text.size()))
     co_return rr::make_error(rr::ErrorCode::out_of_system_resource,
