@@ -275,6 +275,12 @@ Rejection rejection_of(unsigned status) {
   return status == 429 ? Rejection::rate : status == 401 ? Rejection::unauthorized : Rejection::forbidden;
 }
 
+/// At its end a connection is not judged any more.
+struct Unjudged {
+  Connection& connection;
+  ~Unjudged() { connection.is_good = nullptr; }
+};
+
 /// The page's own links are relative: they need the '/' at the end.
 bool is_base_path(const Request& request, const Config& config) {
   return !config.base_path.empty() && request.path() == config.base_path;
@@ -341,10 +347,10 @@ rr::awaitable<Continuation> serve_http_client(GatewayState& gateway, Connection&
                                                           : gateway.router().answer(request);
     if (response.answer_later) {
       const auto standing = std::make_shared<Standing>(gateway.access(), request.identity);
-      // A stream of events or of images ends with what its client has shown; a single request goes on to its answer.
-      connection.is_good = [standing, &writer] { return !writer.is_streamed() || standing->is_good(); };
+      // Streams, and requests that are not whole yet, end with what the client has shown; what is at work is answered.
+      connection.is_good = [standing, &writer] { return writer.is_at_work() || standing->is_good(); };
+      const Unjudged after{connection};
       co_await response.answer_later(writer);
-      connection.is_good = nullptr;
       if (writer.body_failure()) note_unreadable(gateway, connection, *writer.body_failure());
     } else if (co_await writer.send(response)) {
       break;

@@ -73,8 +73,8 @@ class ResponseWriter {
   boost::asio::any_io_executor executor() { return stream_.executor(); }
   /// Whether the connection may carry another request.
   bool goes_on() const { return request_.message.keep_alive() && !closes_ && !reader_.has_unread_body(); }
-  /// Whether begin() was called: what is written goes on for as long as there is something.
-  bool is_streamed() const { return is_streamed_; }
+  /// Whether the whole request is here, and its one response is being made.
+  bool is_at_work() const { return !is_streamed_ && !reader_.has_unread_body(); }
   /// A response to HEAD has none.
   bool has_body() const { return request_.message.method() != http::verb::head; }
 

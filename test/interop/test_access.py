@@ -1,4 +1,5 @@
 """Who may do what: users, tokens, certificates, proxies and rights, over HTTP, WebSockets and Robot Raconteur."""
+import concurrent.futures
 import contextlib
 import http.client
 import itertools
@@ -734,6 +735,27 @@ def test_users_and_rights_are_read_anew_and_sessions_go_on(device, tmp_path):
             assert ask(gateway.port, "GET", BASE + "/p_double", headers=basic("carol", "new")).status == 401
         assert is_alive(link)
         link.close()
+
+
+def test_who_loses_his_rights_gets_the_answer_to_what_is_at_work(own_service, tmp_path):
+    service, device = own_service
+    make_users(tmp_path)
+    with running(tmp_path, device, {"users_file": "users"}) as gateway:
+        assert ask(gateway.port, "GET", BASE + "/p_double", headers=basic("vera")).status == 200
+        service.pause()
+        with concurrent.futures.ThreadPoolExecutor(1) as pool:
+            try:
+                waits = pool.submit(ask, gateway.port, "GET", BASE + "/p_double", headers=basic("vera"))
+                time.sleep(0.3)
+                others = [line for line in (tmp_path / "users").read_text().splitlines(True) if not line.startswith("vera ")]
+                (tmp_path / "users").write_text("".join(others))
+                gateway.hang_up()
+                gateway.wait_for("users and rights read anew")
+                time.sleep(1.5)  # connections are judged each second
+            finally:
+                service.resume()
+            assert waits.result().status == 200
+        assert ask(gateway.port, "GET", BASE + "/p_double", headers=basic("vera")).status == 401
 
 
 def test_credentials_are_the_devices_where_the_gateway_has_no_users(device, tmp_path):
