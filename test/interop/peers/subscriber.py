@@ -5,6 +5,7 @@ subscriber.py URL...    prints {"connected"} when all are; at each line on stand
 """
 import json
 import sys
+import time
 
 import RobotRaconteur as RR
 
@@ -24,11 +25,15 @@ class Subscribed:
         return self._subscription.GetDefaultClientWait(PATIENCE)
 
     def tell(self):
-        try:
-            value = self.client().add(1, 2)
-        except RR.RobotRaconteurException:  # it was lost in between
-            value = self.client().add(1, 2)
-        return {"losses": self.losses, "value": value}
+        end = time.monotonic() + PATIENCE
+        while True:
+            try:
+                return {"value": self.client().add(1, 2), "losses": self.losses}
+            except RR.ConnectionException:
+                # A subscription hands out a client whose connection has ended until it has seen the end itself.
+                if time.monotonic() > end:
+                    raise
+                time.sleep(0.05)
 
 
 def main():
