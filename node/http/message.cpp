@@ -1,5 +1,6 @@
 #include "node/http/message.hpp"
 
+#include <algorithm>
 #include <boost/beast/core/string.hpp>
 #include <boost/beast/http/status.hpp>
 #include <nlohmann/json.hpp>
@@ -12,6 +13,29 @@ namespace {
 
 std::string_view view(boost::beast::string_view text) {
   return {text.data(), text.size()};
+}
+
+bool has_header(const Response& response, std::string_view name) {
+  const auto is_name = [name](const auto& header) { return equals_ignoring_case(header.first, name); };
+  return std::any_of(response.headers.begin(), response.headers.end(), is_name);
+}
+
+/// What a browser may make of a response that says nothing else itself: no page, no part of another one, no script of
+/// another type. What a page of another origin may read, it may show too.
+/// Source: Fetch (nosniff, Cross-Origin-Resource-Policy), HTML section 7.1.3, CSP level 3.
+std::string format_guards(const Response& response) {
+  const bool is_shared = has_header(response, "Access-Control-Allow-Origin");
+  const std::pair<std::string_view, std::string_view> guards[] = {
+      {"X-Content-Type-Options", "nosniff"},
+      {"Referrer-Policy", "no-referrer"},
+      {"Content-Security-Policy", "default-src 'none'; frame-ancestors 'none'"},
+      {"Cross-Origin-Opener-Policy", "same-origin"},
+      {"Cross-Origin-Resource-Policy", is_shared ? "cross-origin" : "same-origin"},
+  };
+  std::string out;
+  for (const auto& [name, value] : guards)
+    if (!has_header(response, name)) out += std::string(name) + ": " + std::string(value) + "\r\n";
+  return out;
 }
 
 }  // namespace
@@ -72,7 +96,7 @@ std::string format_response_head(const Response& response, bool keeps_alive, uns
   if (response.is_streamed && http_minor_version > 0) out += "Transfer-Encoding: chunked\r\n";
   if (may_have_body && !response.is_streamed)
     out += "Content-Length: " + std::to_string(response.body ? response.body->size() : 0) + "\r\n";
-  out += "X-Content-Type-Options: nosniff\r\nReferrer-Policy: no-referrer\r\n";
+  out += format_guards(response);
   if (!keeps_alive) {
     out += "Connection: close\r\n";
   } else if (http_minor_version == 0) {

@@ -147,9 +147,11 @@ rr::awaitable<void> serve_connection(GatewayState& gateway, std::unique_ptr<rr::
       break;
     case Protocol::unknown: {
       gateway.reject(Rejection::unknown_protocol);
-      // The line that native nodes answer with.
-      const auto line = rr::as_bytes("HTTP/1.1 404 File Not Found\r\n");
-      const std::span<const rr::ByteSpan> slices(&line, 1);
+      // Native nodes answer with 404 too.
+      const auto response = problem_response(404, "neither HTTP nor Robot Raconteur: nothing here speaks that");
+      const auto text = format_response_head(response, false, 1) + *response.body;
+      const auto slice = rr::as_bytes(text);
+      const std::span<const rr::ByteSpan> slices(&slice, 1);
       co_await current->write(slices);
       co_await current->end(rr::no_reason);
       break;

@@ -240,7 +240,7 @@ TEST_CASE("neither HTTP nor Robot Raconteur gets the line of native nodes; TLS g
   TestGateway gateway;
   TestClient garbage(gateway.port());
   garbage.send("hello there\r\n");
-  CHECK(garbage.receive_all() == "HTTP/1.1 404 File Not Found\r\n");
+  CHECK_THAT(garbage.receive_all(), Catch::StartsWith("HTTP/1.1 404 Not Found\r\n"));
   TestClient tls(gateway.port());
   tls.send("\x16\x03\x01\x02");
   CHECK(tls.receive_all().empty());
