@@ -17,6 +17,10 @@ bool is_page_allowed(const HttpRequest& request, const PageRules& rules) {
          is_origin_listed(request.header(http::field::origin), rules.allowed_origins);
 }
 
+bool changes_nothing(const HttpRequest& request) {
+  return request.message.method() == http::verb::get || request.message.method() == http::verb::head;
+}
+
 /// As the client named it, before any proxy.
 std::string_view host_of(const HttpRequest& request) {
   return request.arrival.host.empty() ? request.header(http::field::host) : std::string_view(request.arrival.host);
@@ -50,14 +54,22 @@ std::optional<Response> refuse_foreign_page(const HttpRequest& request, const Pa
                                      " may not connect; allowed_origins in the configuration lists those that may");
   }
   const auto site = request.header("Sec-Fetch-Site");
-  const bool changes_nothing = message.method() == http::verb::get || message.method() == http::verb::head;
-  const bool is_link =
-      changes_nothing && request.header("Sec-Fetch-Mode") == "navigate" && !request.path().starts_with("/api/");
-  if ((site == "cross-site" && !is_link) || (site == "same-site" && !changes_nothing))
+  const bool is_link = changes_nothing(request) && request.header("Sec-Fetch-Mode") == "navigate" &&
+                       !request.path().starts_with("/api/");
+  if ((site == "cross-site" && !is_link) || (site == "same-site" && !changes_nothing(request)))
     return problem_response(403,
                             "a page of another site asked for this; pages that may are in allowed_origins of the "
                             "configuration, and their <img> and <script> need crossorigin");
   return std::nullopt;
+}
+
+bool is_from_own_page(const HttpRequest& request) {
+  const auto site = request.header("Sec-Fetch-Site");
+  if (!site.empty() && site != "same-origin" && site != "none") return false;
+  const auto origins = request.message.count(http::field::origin);
+  if (origins == 0) return changes_nothing(request) && !asks_for_websocket(request);
+  return origins == 1 &&
+         is_same_origin(request.header(http::field::origin), host_of(request), request.arrival.is_encrypted);
 }
 
 }  // namespace rrgate

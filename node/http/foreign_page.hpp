@@ -31,4 +31,9 @@ std::optional<Response> refuse_unknown_host(const HttpRequest& request, const Pa
 /// shown.
 std::optional<Response> refuse_foreign_page(const HttpRequest& request, const PageRules& rules);
 
+/// Whether a cookie of the server may say who sends the request: whether it is one of the server's own page, or one
+/// that somebody typed. Pages of allowed origins are others. What changes something, and what becomes a WebSocket, has
+/// to name its origin, as browsers do. Source: Fetch, section 3.1; Fetch Metadata, which browsers leave out in clear.
+bool is_from_own_page(const HttpRequest& request);
+
 }  // namespace rrgate

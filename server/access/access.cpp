@@ -140,7 +140,10 @@ class Access::Users final : public rr::Authenticator {
   std::shared_ptr<const rr::PasswordFileAuthenticator> users_;
 };
 
-Access::Access(const AccessConfig& config) : audit_(std::make_unique<AuditLog>()), users_(std::make_shared<Users>()) {
+Access::Access(const AccessConfig& config) : Access(config, rr::random_bytes(min_ticket_key)) {}
+
+Access::Access(const AccessConfig& config, const rr::Bytes& key)
+    : audit_(std::make_unique<AuditLog>()), users_(std::make_shared<Users>()), tickets_(key), sign_ins_(key) {
   // Until load() has read who may, nobody may who must show it.
   auto empty = std::make_shared<AccessState>();
   empty->config = config;
@@ -162,8 +165,11 @@ rr::Result<> Access::replace(AccessStatePtr next) {
 }
 
 void Access::take(AccessStatePtr next) {
-  if (next->ticket_key != state_->ticket_key)
-    tickets_ = next->ticket_key.empty() ? Tickets() : Tickets(next->ticket_key);
+  if (next->ticket_key != state_->ticket_key) {
+    const auto key = next->ticket_key.empty() ? rr::random_bytes(min_ticket_key) : next->ticket_key;
+    tickets_ = Tickets(key);
+    sign_ins_ = SignIns(key);
+  }
   state_ = std::move(next);
   users_->set(state_->users);
 }
@@ -185,6 +191,13 @@ void Access::reload(bool is_forced) {
   }
   take(std::move(*loaded));
   if (has_files) log(LogLevel::info, "users and rights read anew", {{"files", seen_.size()}});
+}
+
+bool Access::sign_out(const Identity& who) {
+  if (!sign_ins_.end(who.sign_in, std::chrono::system_clock::now())) return false;
+  state_ = std::make_shared<const AccessState>(*state_);  // so that everybody is judged anew
+  record({"signed_out", &who, nullptr, {}});
+  return true;
 }
 
 rr::Result<> Access::check(const Identity& who, const AccessRequest& what) {
@@ -249,7 +262,7 @@ Identity Access::with_grants(Identity identity) const {
 
 std::optional<Identity> Access::renew(const Identity& who) const {
   const auto now = std::chrono::system_clock::now();
-  if (now >= who.ends) return std::nullopt;
+  if (now >= who.ends || sign_ins_.has_ended(who.sign_in)) return std::nullopt;
   auto out = who;
   out.roles = who.proven_roles;
   switch (who.proof) {

@@ -14,6 +14,7 @@
 #include "server/access/api_tokens.hpp"
 #include "server/access/audit_log.hpp"
 #include "server/access/refusal_digest.hpp"
+#include "server/access/sign_ins.hpp"
 #include "server/access/tickets.hpp"
 
 namespace rrgate {
@@ -78,6 +79,9 @@ class Access {
   std::shared_ptr<const rr::Authenticator> authenticator() const;
 
   Tickets& tickets() { return tickets_; }
+  const SignIns& sign_ins() const { return sign_ins_; }
+  /// Ends a sign-in, and what goes on by it. False: too many have ended lately; its cookies are good on.
+  bool sign_out(const Identity& who);
 
   // Identities, with the roles that the configuration adds. `client`: where from, as logs name it.
   Identity anonymous(std::string client) const;
@@ -102,6 +106,7 @@ class Access {
  private:
   class Users;
 
+  explicit Access(const AccessConfig& config, const rr::Bytes& key);
   void take(AccessStatePtr next);
 
   AccessStatePtr state_;
@@ -109,6 +114,7 @@ class Access {
   std::unique_ptr<AuditLog> audit_;
   std::shared_ptr<Users> users_;
   Tickets tickets_;
+  SignIns sign_ins_;
   RefusalDigest refusals_;
   std::chrono::steady_clock::time_point last_complaint_{};
 };

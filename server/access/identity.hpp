@@ -56,7 +56,8 @@ struct Identity {
   std::string device_user = {};
   /// Tells a password or a token from any other that the name has had. No secret can be had from it.
   std::string credential = {};
-  Time ends = never;  ///< of the proof
+  std::string sign_in = {};  ///< which one the proof is remembered by (SignIns); empty: it was shown with the request
+  Time ends = never;         ///< of the proof
 
   bool is_proven() const { return proof != Proof::none; }
   bool has_role(std::string_view role) const { return std::find(roles.begin(), roles.end(), role) != roles.end(); }

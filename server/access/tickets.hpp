@@ -18,10 +18,7 @@ class Tickets {
  public:
   using Time = std::chrono::system_clock::time_point;
   static constexpr std::chrono::seconds lifetime{30};
-  static constexpr std::size_t max_size = 2048;
 
-  /// With a key that nobody else has.
-  Tickets();
   explicit Tickets(rr::Bytes key) : key_(std::move(key)) {}
 
   /// nullopt: its roles don't fit into a URL.
@@ -34,7 +31,7 @@ class Tickets {
   static constexpr std::size_t max_used = 65'536;
 
   rr::Bytes key_;
-  std::map<rr::Bytes, Time> used_;  ///< by signature, until they would be too late
+  std::map<std::string, Time> used_;  ///< until they would be too late
 };
 
 }  // namespace rrgate

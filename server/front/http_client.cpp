@@ -87,7 +87,7 @@ rr::awaitable<Continuation> accept_json_socket(GatewayState& gateway, Connection
   if (!place) {
     const bool is_denied = place.error().code == rr::ErrorCode::permission_denied;
     gateway.reject(is_denied ? Rejection::forbidden : Rejection::no_such_device);
-    const auto response = is_denied ? gateway.http_access().refusal(request.identity, place.error())
+    const auto response = is_denied ? gateway.http_access().refusal(request, place.error())
                                     : problem_response(404, place.error().message);
     co_await write_refusal(gateway, *stream, response);
     co_await stream->end(rr::no_reason);
@@ -133,7 +133,7 @@ rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& 
     const bool is_denied = error.code == rr::ErrorCode::permission_denied;
     gateway.reject(is_denied ? Rejection::forbidden : Rejection::no_such_device);
     const auto response =
-        is_denied ? gateway.http_access().refusal(request.identity, error)
+        is_denied ? gateway.http_access().refusal(request, error)
                   : problem_response(error.code == rr::ErrorCode::node_not_found ? 404 : 400, error.message);
     co_await refuse(response);
     co_return Continuation();
@@ -156,7 +156,7 @@ rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& 
   const bool can_show = takes_close || !way.empty();
   const bool hears_in_session = !allowed && names_protocol && (has_shown || !can_show);
   if (!allowed && !hears_in_session && !(takes_close && has_shown)) {
-    const auto response = gateway.http_access().refusal(request.identity, allowed.error());
+    const auto response = gateway.http_access().refusal(request, allowed.error());
     co_await refuse(response);
     co_return Continuation();
   }
@@ -338,6 +338,7 @@ rr::awaitable<Continuation> serve_http_client(GatewayState& gateway, Connection&
     std::vector<std::pair<std::string, std::string>> headers;
     if (request.arrival.is_encrypted && config.tls.hsts_seconds > 0)
       headers.emplace_back("Strict-Transport-Security", "max-age=" + std::to_string(config.tls.hsts_seconds));
+    if (!admitted.cookie.empty()) headers.emplace_back("Set-Cookie", std::move(admitted.cookie));
     ResponseOptions options{gateway.is_stopping(), std::move(headers), config.timeouts.send_stall, !makes_work(request),
                             &gateway.metrics()};
     ResponseWriter writer(*stream, reader, request, std::move(memory), std::move(options));

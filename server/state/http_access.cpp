@@ -2,8 +2,10 @@
 
 #include "core/session/url.hpp"
 #include "core/support/words.hpp"
+#include "node/http/foreign_page.hpp"
 #include "node/http/upgrade.hpp"
 #include "node/tls/base64.hpp"
+#include "server/http/sign_in_cookie.hpp"
 #include "server/json/json.hpp"
 #include "server/limits/client_network.hpp"
 #include "server/state/connection.hpp"
@@ -57,24 +59,10 @@ rr::awaitable<rr::Result<Identity>> HttpAccess::identify(const Request& request,
   auto told = by_proxy(request, connection, config);
   if (!told) co_return told.error();
   if (told->is_proven()) co_return proven(std::move(*told));
-  const auto header = request.header(http::field::authorization);
-  const auto& state = access_.state();
-  const auto bearer = credentials_of(header, "Bearer");
-  if (bearer && (state.tokens || state.jwt)) {
-    auto identity = by_token(*bearer);
-    if (!identity) {
-      const auto nobody = access_.anonymous(client);
-      access_.record_refusal({"login_failed", &nobody, nullptr, identity.error().message});
-      co_return identity.error();
-    }
-    co_return proven(std::move(*identity));
-  }
-  const auto basic = credentials_of(header, "Basic");
-  if (basic && state.users) {
-    auto from = request.origin();
-    std::string credentials(*basic);
-    co_return co_await by_password(std::move(credentials), std::move(from));
-  }
+  std::string header(request.header(http::field::authorization));
+  auto from = request.origin();
+  auto shown = co_await by_authorization(std::move(header), std::move(from));
+  if (!shown || shown->is_proven()) co_return shown;
   if (asks_for_websocket(request))
     if (const auto ticket = rr::query_value(request.query(), "ticket")) {
       auto identity = access_.tickets().redeem(*ticket, std::chrono::system_clock::now());
@@ -84,8 +72,32 @@ rr::awaitable<rr::Result<Identity>> HttpAccess::identify(const Request& request,
       if (!identity) co_return refused("what the ticket was given for was revoked or has expired");
       co_return std::move(*identity);
     }
+  if (is_from_own_page(request))
+    if (auto found = access_.sign_ins().find(sign_in_cookie(request), std::chrono::system_clock::now())) {
+      found->client = client;
+      if (auto renewed = access_.renew(*found)) co_return std::move(*renewed);
+    }
   if (connection.identity.proof == Proof::certificate) co_return proven(connection.identity);
   co_return access_.anonymous(client);
+}
+
+rr::awaitable<rr::Result<Identity>> HttpAccess::by_authorization(std::string header, ClientOrigin from) {
+  const auto nobody = access_.anonymous(from.client);
+  const auto& state = access_.state();
+  const auto bearer = credentials_of(header, "Bearer");
+  if (bearer && (state.tokens || state.jwt)) {
+    auto identity = by_token(*bearer);
+    if (!identity) {
+      access_.record_refusal({"login_failed", &nobody, nullptr, identity.error().message});
+      co_return identity.error();
+    }
+    identity->client = from.client;
+    co_return access_.with_grants(std::move(*identity));
+  }
+  const auto basic = credentials_of(header, "Basic");
+  if (!basic || !state.users) co_return nobody;
+  std::string credentials(*basic);
+  co_return co_await by_password(std::move(credentials), std::move(from));
 }
 
 rr::Result<Identity> HttpAccess::by_token(std::string_view token) const {
@@ -109,10 +121,10 @@ rr::awaitable<rr::Result<Identity>> HttpAccess::by_password(std::string credenti
   co_return access_.logged_in(*user, client);
 }
 
-Response HttpAccess::refusal(const Identity& who, const rr::Error& error) const {
+Response HttpAccess::refusal(const Request& request, const rr::Error& error) const {
   const auto& state = access_.state();
   const bool has_challenge = state.users || state.tokens || state.jwt;
-  const bool helps = error.code == rr::ErrorCode::authentication_error || !who.is_proven();
+  const bool helps = error.code == rr::ErrorCode::authentication_error || !request.identity.is_proven();
   unsigned status = has_challenge && helps ? 401 : 403;
   if (error.code == rr::ErrorCode::out_of_system_resource) status = 503;
   if (error.code == rr::ErrorCode::invalid_argument) status = 400;
@@ -126,7 +138,8 @@ Response HttpAccess::refusal(const Identity& who, const rr::Error& error) const 
   auto response = text_response(status, "application/problem+json",
                                 problem.dump(-1, ' ', false, rr::OrderedJson::error_handler_t::replace) + "\n");
   response.set("Cache-Control", "no-store");
-  if (status == 401 && state.users) response.set("WWW-Authenticate", "Basic realm=\"rrgate\", charset=\"UTF-8\"");
+  if (status == 401 && state.users && request.header("X-Requested-With").empty())
+    response.set("WWW-Authenticate", "Basic realm=\"rrgate\", charset=\"UTF-8\"");
   if (status == 401 && (state.tokens || state.jwt)) response.set("WWW-Authenticate", "Bearer realm=\"rrgate\"");
   if (status == 503) response.set("Retry-After", "2");
   return response;
@@ -151,11 +164,14 @@ rr::awaitable<HttpAccess::Admitted> HttpAccess::admit(Request& request, const Co
   const auto& of_user = config.rates.user;
   auto identity = co_await identify(request, connection, config);
   if (!identity) {
-    out.refusal = refusal(access_.anonymous(request.arrival.peer), identity.error());
+    out.refusal = refusal(request, identity.error());
     co_return out;
   }
   request.identity = std::move(*identity);
   if (!request.identity.is_proven()) co_return out;
+  if (!request.identity.sign_in.empty())
+    if (const auto next = access_.sign_ins().extend(sign_in_cookie(request), std::chrono::system_clock::now()))
+      out.cookie = format_sign_in_cookie(request.arrival, *next);
   out.user = users_.enter(request.identity.subject().key(), of_user.per_second, of_user.at_once,
                           std::chrono::steady_clock::now());
   if (!out.user) out.refusal = too_much("of " + rr::quote(request.identity.name));

@@ -26,22 +26,27 @@ class HttpAccess {
   HttpAccess& operator=(const HttpAccess&) = delete;
 
   /// What the request shows, in this order: the headers of a trusted proxy, Authorization, a ticket where it becomes a
-  /// WebSocket, the certificate of the connection. All are borrowed until the answer.
+  /// WebSocket, the cookie of a sign-in, the certificate of the connection. All are borrowed until the answer. A cookie
+  /// that is not good any more shows nothing: no page can take it away.
   /// Errors   authentication_error: what it shows is wrong; out_of_system_resource: too many tries; invalid_argument:
   /// two proxies in one, see IdentityHeaders.
   rr::awaitable<rr::Result<Identity>> identify(const Request& request, const Connection& connection,
                                                const Config& config);
+  /// What an Authorization header shows; of nobody where the gateway knows none of its schemes. Errors   as above.
+  rr::awaitable<rr::Result<Identity>> by_authorization(std::string header, ClientOrigin from);
   /// Whether Basic credentials are for the gateway; else they are for the device.
   bool takes_basic() const { return access_.state().users != nullptr; }
 
-  /// 401 where showing who one is may help, 403, 503, or 400. As application/problem+json.
-  Response refusal(const Identity& who, const rr::Error& error) const;
+  /// 401 where showing who one is may help, 403, 503, or 400. As application/problem+json. A page that asks with
+  /// X-Requested-With has a form of its own: its browser is not told of passwords, so that it opens no dialog.
+  Response refusal(const Request& request, const rr::Error& error) const;
 
   /// What lets one request pass, as long as it is answered; or what it is refused with.
   struct Admitted {
     std::optional<RateGate::Pass> client = {};
     std::optional<RateGate::Pass> user = {};
     std::optional<Response> refusal = {};
+    std::string cookie = {};  ///< to go on with, for Set-Cookie; empty: the one that was shown, or none
   };
   /// Finds out who sends a request, which is noted in it, and whether he asks for too much.
   rr::awaitable<Admitted> admit(Request& request, const Connection& connection, const Config& config);

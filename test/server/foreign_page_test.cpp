@@ -103,3 +103,39 @@ TEST_CASE("what another site's page embeds is refused; a link to the page may be
     CHECK(status(site, "navigate", image) == 0);
   }
 }
+
+TEST_CASE("a cookie says who asks where the server's own page has sent it, and nowhere else") {
+  const auto counts = [](Headers headers, http::verb method = http::verb::get, bool is_encrypted = true) {
+    HttpRequest request;
+    request.message.method(method);
+    headers.emplace_back("Host", "mybox.local");
+    for (const auto& [name, value] : headers) request.message.insert(name, value);
+    request.arrival = {{}, {}, is_encrypted, "mybox.local", {}};
+    return is_from_own_page(request);
+  };
+  const Headers socket = {{"Upgrade", "websocket"}, {"Connection", "Upgrade"}};
+  const auto with = [](Headers headers, Headers more) {
+    headers.insert(headers.end(), more.begin(), more.end());
+    return headers;
+  };
+  const Headers own = {{"Origin", "https://mybox.local"}};
+  CHECK(counts({}));  // in clear browsers tell less
+  CHECK(counts({{"Sec-Fetch-Site", "same-origin"}}));
+  CHECK(counts({{"Sec-Fetch-Site", "none"}}));
+  for (const auto method : {http::verb::get, http::verb::put, http::verb::post, http::verb::delete_}) {
+    CHECK(counts(own, method));
+    CHECK_FALSE(counts({{"Origin", "https://lab.example"}}, method));
+    CHECK_FALSE(counts({{"Origin", "https://mybox.local:8443"}}, method));
+    CHECK_FALSE(counts({{"Origin", "http://mybox.local"}}, method));
+    CHECK_FALSE(counts({{"Origin", "null"}}, method));
+    CHECK_FALSE(counts(with(own, own), method));
+    CHECK_FALSE(counts({{"Sec-Fetch-Site", "same-site"}}, method));
+    CHECK_FALSE(counts({{"Sec-Fetch-Site", "cross-site"}}, method));
+    CHECK_FALSE(counts(with(own, {{"Sec-Fetch-Site", "cross-site"}}), method));
+  }
+  CHECK_FALSE(counts({}, http::verb::post));
+  CHECK_FALSE(counts({{"Sec-Fetch-Site", "same-origin"}}, http::verb::delete_));
+  CHECK(counts(with(own, socket)));
+  CHECK_FALSE(counts(socket));
+  CHECK_FALSE(counts(with({{"Origin", "https://lab.example"}}, socket)));
+}

@@ -9,6 +9,7 @@
 #include "server/gateway/gateway.hpp"
 #include "server/http/endpoints/documentation.hpp"
 #include "server/http/router.hpp"
+#include "server/http/sign_in_cookie.hpp"
 #include "server/http/static_files.hpp"
 
 using namespace rrgate;
@@ -253,4 +254,32 @@ TEST_CASE("the first bytes tell the protocol, as early as they can") {
     INFO(text);
     CHECK(detect(text) == Protocol::unknown);
   }
+}
+
+TEST_CASE("a sign-in's cookie: whose it is stands in its name") {
+  const auto cookie_for = [](bool is_encrypted, std::string host, std::string prefix = {}) {
+    return format_sign_in_cookie({{}, {}, is_encrypted, std::move(host), std::move(prefix)}, "abc");
+  };
+  CHECK(cookie_for(true, "lab.example") == "__Host-rrgate=abc; Path=/; HttpOnly; SameSite=Strict; Secure");
+  CHECK(cookie_for(true, "lab.example:8443") == "__Host-rrgate-8443=abc; Path=/; HttpOnly; SameSite=Strict; Secure");
+  CHECK(cookie_for(true, "[fd00::1]", "/robots") ==
+        "__Secure-rrgate=abc; Path=/robots/; HttpOnly; SameSite=Strict; Secure");
+  CHECK(cookie_for(false, "[::1]:8080") == "rrgate-8080=abc; Path=/; HttpOnly; SameSite=Strict");
+  CHECK(cookie_for(false, "localhost:x;y") == "rrgate=abc; Path=/; HttpOnly; SameSite=Strict");
+  CHECK_THAT(format_sign_in_cookie({}, {}), Catch::StartsWith("rrgate=; Path=/; ") && Catch::EndsWith("; Max-Age=0"));
+}
+
+TEST_CASE("a sign-in's cookie is found among others, by its whole name") {
+  const auto found = [](std::vector<std::string> lines, bool is_encrypted = false) {
+    HttpRequest request;
+    for (const auto& line : lines) request.message.insert(http::field::cookie, line);
+    request.arrival.is_encrypted = is_encrypted;
+    return std::string(sign_in_cookie(request));
+  };
+  CHECK(found({}).empty());
+  CHECK(found({"a=b; rrgate=c.d; e=f"}) == "c.d");
+  CHECK(found({"a=b", "e=f;rrgate=c.d "}) == "c.d");
+  CHECK(found({"xrrgate=1; rrgate-8080=2; rrgate"}).empty());
+  CHECK(found({"rrgate=1; __Host-rrgate=2"}, true) == "2");
+  CHECK(found({"rrgate=1"}, true).empty());
 }

@@ -1,16 +1,17 @@
 import { formatRoute, parseRoute } from "../../web/src/app/router";
 import { readRequests } from "../../web/src/gateway/access";
 import { readDevices, relayUrl } from "../../web/src/gateway/devices";
-import { formatProof, mustSignIn, readWho } from "../../web/src/gateway/session";
+import { mustSignIn, proofOf, readWho } from "../../web/src/gateway/session";
 import { readFrame } from "../../web/src/camera/frame";
 import { fit, gridStep, include, START, toCanvas } from "../../web/src/chart/view";
 import { sentence, span, staleAge } from "../../web/src/ui/words";
 
 describe("access", () => {
   it("reads who the gateway takes the page for", () => {
-    const who = { user: "root", roles: ["admin"], login: true, requests: true, admin: true };
+    const who = { user: "root", roles: ["admin"], login: true, session: true, requests: true, admin: true };
     expect(readWho({ ...who, proof: "password" })).toEqual(who);
-    expect(readWho(null)).toEqual({ user: null, roles: [], login: false, requests: false, admin: false });
+    const nobody = { user: null, roles: [], login: false, session: false, requests: false, admin: false };
+    expect(readWho(null)).toEqual(nobody);
   });
 
   it("asks for a sign-in where there is nothing to see without", () => {
@@ -23,9 +24,9 @@ describe("access", () => {
   });
 
   it("shows a name and a password, or a token", () => {
-    expect(formatProof("vera", "größer: als")).toBe("Basic dmVyYTpncsO2w59lcjogYWxz");
-    expect(formatProof("", " rrg_secret\n")).toBe("Bearer rrg_secret");
-    expect(() => formatProof("a:b", "c")).toThrow("A name has no colon.");
+    expect(proofOf("vera", "größer: als ")).toEqual({ user: "vera", password: "größer: als " });
+    expect(proofOf("", " rrg_secret\n")).toEqual({ token: "rrg_secret" });
+    expect(() => proofOf("a:b", "c")).toThrow("A name has no colon.");
   });
 
   it("lists the requests that are to be decided on", () => {

@@ -2,10 +2,14 @@
 
 #include <algorithm>
 
+#include "node/http/foreign_page.hpp"
 #include "node/platform/secret_file.hpp"
 #include "node/platform/text_file.hpp"
+#include "node/tls/base64.hpp"
 #include "server/access/access_text.hpp"
 #include "server/access/api_tokens.hpp"
+#include "server/http/response_writer.hpp"
+#include "server/http/sign_in_cookie.hpp"
 #include "server/json/json.hpp"
 #include "server/limits/client_network.hpp"
 #include "server/log/log.hpp"
@@ -70,7 +74,7 @@ std::optional<Response> refuse_stranger(GatewayState& gateway, const Request& re
   const auto allowed = gateway.access().check(request.identity, {.verb = Verb::admin});
   if (allowed) return std::nullopt;
   gateway.reject(Rejection::forbidden);
-  return gateway.http_access().refusal(request.identity, allowed.error());
+  return gateway.http_access().refusal(request, allowed.error());
 }
 
 /// Writes a new token into the tokens file, and has it read. Returns it.
@@ -141,7 +145,90 @@ Response claim(GatewayState& gateway, const Request& request, const std::string&
   return answer(200, out);
 }
 
+/// The header that says the same as the body. Errors   invalid_argument.
+rr::Result<std::string> authorization_of(const Request& request) {
+  const auto body = body_of(request);
+  if (!body) return body.error();
+  const auto user = text_of(*body, "user");
+  const auto password = text_of(*body, "password");
+  const auto token = text_of(*body, "token");
+  for (const auto* text : {&user, &password, &token})
+    if (!*text) return text->error();
+  if (token->empty() == user->empty()) return bad("expected either user and password, or token");
+  if (!token->empty()) return "Bearer " + *token;
+  if (user->find(':') != std::string::npos) return bad("a name has no colon");
+  return "Basic " + rr::encode_base64(rr::as_bytes(*user + ":" + *password));
+}
+
+rr::awaitable<Response> judge_sign_in(GatewayState& gateway, const Request& request) {
+  const auto& http_access = gateway.http_access();
+  auto who = request.identity;
+  if (!request.message.body().empty()) {
+    auto header = authorization_of(request);
+    if (!header) co_return error_answer(header.error());
+    auto from = request.origin();
+    auto shown = co_await gateway.http_access().by_authorization(std::move(*header), std::move(from));
+    if (!shown) co_return http_access.refusal(request, shown.error());
+    who = std::move(*shown);
+  }
+  if (gateway.access().is_open()) co_return problem_response(409, "everybody may do everything here");
+  if (!request.message.body().empty() && !who.is_proven())
+    co_return problem_response(
+        409, "the gateway takes no such proof: passwords need a users_file, tokens a tokens_file or jwt");
+  if (!who.is_proven() || !who.sign_in.empty()) {
+    const auto error = rr::make_error(rr::ErrorCode::authentication_error, "a sign-in needs a password or a token");
+    co_return http_access.refusal(request, error);
+  }
+  if (who.proof != Proof::password && who.proof != Proof::token && who.proof != Proof::jwt)
+    co_return problem_response(409, "a certificate, or a proxy, shows with each request who you are");
+  const auto now = Clock::now();
+  const auto cookie = gateway.access().sign_ins().begin(who, now);
+  if (!cookie) co_return problem_response(409, "you have more roles than a cookie can name");
+  gateway.access().record({"signed_in", &who, nullptr, {}});
+  const auto left = std::min(Clock::duration(SignIns::lifetime), who.ends - now);
+  auto response = answer(201, {{"user", who.name},
+                               {"roles", who.roles},
+                               {"expires_in", std::chrono::duration_cast<std::chrono::seconds>(left).count()}});
+  response.set("Set-Cookie", format_sign_in_cookie(request.arrival, *cookie));
+  co_return response;
+}
+
+rr::awaitable<void> answer_sign_in(GatewayState& gateway, ResponseWriter& writer) {
+  constexpr std::size_t largest_body = 16 * 1024;  // a JSON Web Token
+  auto response = co_await writer.read_body(largest_body);
+  if (!response) response = co_await judge_sign_in(gateway, writer.request());
+  co_await writer.send(*response);
+}
+
+/// Pages of allowed origins show who they are themselves.
+std::optional<Response> refuse_other_page(const Request& request) {
+  if (request.message.count(http::field::origin) == 0 || is_from_own_page(request)) return std::nullopt;
+  return problem_response(403, "signing in and out is for the gateway's own page");
+}
+
 }  // namespace
+
+Handler sign_in_endpoint(GatewayState& gateway) {
+  return [&gateway](const Request& request, std::string_view) {
+    if (auto refusal = refuse_other_page(request)) return std::move(*refusal);
+    Response response;
+    response.answer_later = [&gateway](ResponseWriter& writer) { return answer_sign_in(gateway, writer); };
+    return response;
+  };
+}
+
+Handler sign_out_endpoint(GatewayState& gateway) {
+  return [&gateway](const Request& request, std::string_view) {
+    if (auto refusal = refuse_other_page(request)) return std::move(*refusal);
+    auto& access = gateway.access();
+    const auto who = access.sign_ins().find(sign_in_cookie(request), Clock::now());
+    Response response;
+    response.status = 204;
+    if (who && !access.sign_out(*who)) response = problem_response(503, "too many have signed out; the cookie is gone");
+    response.set("Set-Cookie", format_sign_in_cookie(request.arrival, {}));
+    return response;
+  };
+}
 
 Handler who_endpoint(GatewayState& gateway) {
   return [&gateway](const Request& request, std::string_view) {
@@ -154,6 +241,7 @@ Handler who_endpoint(GatewayState& gateway) {
     out["proof"] = std::string(to_string(who.proof));
     out["login"] = !access.is_open();
     out["requests"] = !access.state().config.tokens_file.empty();
+    out["session"] = !who.sign_in.empty();
     out["admin"] = !access.is_open() && access.state().rules.check(who, {.verb = Verb::admin}).has_value();
     return answer(200, out);
   };
@@ -163,8 +251,8 @@ Handler tickets_endpoint(GatewayState& gateway) {
   return [&gateway](const Request& request, std::string_view) {
     auto& http_access = gateway.http_access();
     if (!request.identity.is_proven() && !gateway.access().is_open())
-      return http_access.refusal(request.identity, rr::make_error(rr::ErrorCode::authentication_error,
-                                                                  "a ticket is for who has shown who he is"));
+      return http_access.refusal(
+          request, rr::make_error(rr::ErrorCode::authentication_error, "a ticket is for who has shown who he is"));
     const auto ticket = gateway.access().tickets().issue(request.identity, Clock::now());
     if (!ticket) return problem_response(409, "you have more roles than a ticket can name");
     return answer(201, {{"ticket", *ticket}, {"expires_in", Tickets::lifetime.count()}});

@@ -1,4 +1,4 @@
-// Who one is, tickets for upgrades, requests of access. Layer: server/http/endpoints.
+// Who one is, sign-ins of pages, tickets for upgrades, requests of access. Layer: server/http/endpoints.
 #pragma once
 
 #include <array>
@@ -11,8 +11,14 @@ namespace rrgate {
 class GatewayState;
 
 /// GET /api/v1/access: {"user","roles","proof","login": whether there is anything to prove,"requests": whether one may
-/// ask for access,"admin": whether one decides on that}; user is null for who has shown nothing.
+/// ask for access,"admin": whether one decides on that,"session": whether a cookie has said so}; user is null for who
+/// has shown nothing.
 Handler who_endpoint(GatewayState& gateway);
+/// POST /api/v1/session {"user","password"}, {"token"}, or with Authorization: 201 {"user","roles","expires_in"} and a
+/// cookie that says the same from then on (SignIns).
+Handler sign_in_endpoint(GatewayState& gateway);
+/// DELETE /api/v1/session: takes the cookie away, and what goes on by it ends. 204, signed in or not.
+Handler sign_out_endpoint(GatewayState& gateway);
 /// POST /api/v1/tickets: {"ticket","expires_in"}, for the upgrade .../devices/NAME?ticket=TICKET, once.
 Handler tickets_endpoint(GatewayState& gateway);
 

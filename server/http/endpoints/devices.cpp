@@ -55,7 +55,7 @@ Handler devices_endpoint(GatewayState& gateway) {
         out["devices"].push_back(describe(*device, request, access));
     if (out["devices"].empty() && !access.is_open() && !request.identity.is_proven())
       return gateway.http_access().refusal(
-          request.identity, rr::make_error(rr::ErrorCode::permission_denied, "who is not logged in may see no device"));
+          request, rr::make_error(rr::ErrorCode::permission_denied, "who is not logged in may see no device"));
     return json_response(200, out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
   };
 }
@@ -102,7 +102,7 @@ Handler device_endpoint(GatewayState& gateway) {
     // Strangers are not told what there is.
     if (const auto allowed = gateway.access().check(request.identity, {.device = name}); !allowed) {
       gateway.reject(Rejection::forbidden);
-      return gateway.http_access().refusal(request.identity, allowed.error());
+      return gateway.http_access().refusal(request, allowed.error());
     }
     if (!gateway.devices().find(name)) return no_such_device(name);
     return upgrade_required("this is a WebSocket for Robot Raconteur clients; connect with a ws:// or rr+ws:// URL");

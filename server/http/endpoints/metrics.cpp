@@ -174,7 +174,7 @@ std::uint64_t cpu_microseconds() {
 Handler metrics_endpoint(GatewayState& gateway) {
   return [&gateway](const Request& request, std::string_view) {
     if (const auto allowed = gateway.access().check(request.identity, {.verb = Verb::metrics}); !allowed)
-      return gateway.http_access().refusal(request.identity, allowed.error());
+      return gateway.http_access().refusal(request, allowed.error());
     const auto& metrics = gateway.metrics();
     Exposition out;
     out.family("rrgate_build_info", "gauge", "Which rrgate this is.");

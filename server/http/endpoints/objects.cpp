@@ -69,7 +69,7 @@ std::optional<Response> refuse_device(GatewayState& gateway, const Request& requ
                                       const std::string& service, std::optional<RateGate::Pass>& pass) {
   if (const auto allowed = gateway.access().check(request.identity, {.device = device, .service = service}); !allowed) {
     gateway.reject(Rejection::forbidden);
-    return gateway.http_access().refusal(request.identity, allowed.error());
+    return gateway.http_access().refusal(request, allowed.error());
   }
   if (!gateway.devices().find(device)) return no_such_device(device);
   pass = gateway.http_access().enter_device(device, gateway.config().rates);
@@ -211,7 +211,7 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
             gateway.access().check(writer.request().identity, access_request(*target, verb_of(request, *target)));
         !allowed) {
       gateway.reject(Rejection::forbidden);
-      const auto refusal = gateway.http_access().refusal(writer.request().identity, allowed.error());
+      const auto refusal = gateway.http_access().refusal(writer.request(), allowed.error());
       co_await writer.send(refusal);
       co_return;
     }

@@ -51,6 +51,8 @@ std::vector<Route> list_routes(GatewayState& gateway) {
       {options, "/api/v1/devices/*", objects_endpoint(gateway)},
       {get, "/api/v1/discovery", discovery_endpoint(gateway)},
       {get, "/api/v1/access", who_endpoint(gateway)},
+      {post, "/api/v1/session", sign_in_endpoint(gateway)},
+      {delete_, "/api/v1/session", sign_out_endpoint(gateway)},
       {post, "/api/v1/tickets", tickets_endpoint(gateway)},
       {post, "/api/v1/access/requests", with_body(ask_endpoint(gateway))},
       {get, "/api/v1/access/requests", requests_endpoint(gateway)},

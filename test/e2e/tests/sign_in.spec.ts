@@ -34,7 +34,7 @@ async function signIn(page: Page, name: string, secret: string): Promise<void> {
   await page.keyboard.press("Enter");
 }
 
-test("a wrong password is told; the right one shows the devices, in this tab alone and until signing out", async ({
+test("a wrong password is told; the right one shows the devices, in all tabs until signing out", async ({
   page,
   context,
 }) => {
@@ -51,7 +51,7 @@ test("a wrong password is told; the right one shows the devices, in this tab alo
   await signIn(page, "root", "wrong");
   await expect(page.getByRole("alert")).toHaveText("Wrong name or password.");
   await expect(page.getByLabel("Name")).toHaveValue("root");
-  expect(refused).toEqual(["/api/v1/access"]);
+  expect(refused).toEqual(["/api/v1/session"]);
 
   await signIn(page, "root", password);
   await expect(page.getByRole("heading", { name: "Devices" })).toBeVisible();
@@ -62,11 +62,19 @@ test("a wrong password is told; the right one shows the devices, in this tab alo
   await expect(page.getByText("create", { exact: true })).toBeVisible();
   const other = await context.newPage();
   await other.goto(lab.url);
-  await expect(form(other)).toBeVisible();
-  await other.close();
+  await expect(other.getByText("create", { exact: true })).toBeVisible();
+  const kept = await page.evaluate(() => JSON.stringify([{ ...localStorage }, { ...sessionStorage }, document.cookie]));
+  expect(kept).not.toContain(password);
+  expect(kept).not.toContain("rrgate");
+  const [cookie] = await context.cookies(lab.url);
+  expect(cookie).toMatchObject({ httpOnly: true, sameSite: "Strict", path: "/" });
 
   await signOut(page).click();
   await expect(form(page)).toBeVisible();
+  await expect(form(other)).toBeVisible();
+  await expect(other.getByRole("alert")).toHaveText("The gateway no longer accepts this sign-in.");
+  await other.close();
+  await context.addCookies([cookie!]);
   await expect(page.getByText("create", { exact: true })).toBeHidden();
   await page.reload();
   await expect(form(page)).toBeVisible();

@@ -4,6 +4,7 @@
 #include "server/access/access_requests.hpp"
 #include "server/access/login_limits.hpp"
 #include "server/access/refusal_digest.hpp"
+#include "server/access/sign_ins.hpp"
 #include "server/access/tickets.hpp"
 #include "server/limits/client_network.hpp"
 #include "test/support/print.hpp"
@@ -85,7 +86,7 @@ TEST_CASE("guessing: so many of a network are judged at a time") {
 }
 
 TEST_CASE("tickets: once, soon, and by gateways of one key") {
-  Tickets tickets;
+  Tickets tickets(rr::Bytes(32, 1));
   Identity alice;
   alice.name = "alice";
   alice.roles = alice.proven_roles = {"operator", "viewer"};
@@ -94,7 +95,7 @@ TEST_CASE("tickets: once, soon, and by gateways of one key") {
   CHECK(tickets.issue(alice, day) != ticket);
   for (const auto& wrong : {ticket + "x", ticket.substr(1), std::string(), std::string("."), std::string("e30.")})
     CHECK_FALSE(tickets.redeem(wrong, day));
-  CHECK_FALSE(Tickets().redeem(ticket, day));
+  CHECK_FALSE(Tickets(rr::Bytes(32, 2)).redeem(ticket, day));
   CHECK(tickets.redeem(ticket, day + seconds(29)) == alice);
   CHECK_FALSE(tickets.redeem(ticket, day + seconds(29)));
   const auto late = tickets.issue(alice, day).value();
@@ -114,7 +115,7 @@ TEST_CASE("tickets: once, soon, and by gateways of one key") {
 }
 
 TEST_CASE("tickets: those that were used are kept until they would be too late, and no more than fit") {
-  Tickets tickets;
+  Tickets tickets(rr::Bytes(32, 1));
   const auto use = [&](seconds at) {
     return tickets.redeem(tickets.issue({}, day + at).value(), day + at).has_value();
   };
@@ -122,6 +123,79 @@ TEST_CASE("tickets: those that were used are kept until they would be too late, 
   while (used < 70'000 && use(seconds(0))) ++used;
   CHECK(used == 65'536);
   CHECK(use(seconds(31)));
+}
+
+TEST_CASE("sign-ins: for hours, by gateways of one key, and for nothing else") {
+  using std::chrono::hours;
+  const rr::Bytes key(32, 7);
+  const SignIns here(key);
+  Identity alice;
+  alice.name = "alice";
+  alice.roles = alice.proven_roles = {"operator"};
+  alice.proof = Proof::password;
+  alice.credential = "abc";
+  const auto cookie = here.begin(alice, day).value();
+  const auto found = SignIns(key).find(cookie, day + hours(8) - seconds(1)).value();
+  CHECK(found.name == "alice");
+  CHECK(found.roles == alice.roles);
+  CHECK(found.credential == "abc");
+  CHECK_FALSE(found.sign_in.empty());
+  CHECK(here.find(here.begin(alice, day).value(), day)->sign_in != found.sign_in);
+  CHECK_FALSE(here.find(cookie, day + hours(8)));
+  CHECK_FALSE(SignIns(rr::Bytes(32, 8)).find(cookie, day));
+  for (const auto& wrong : {cookie + "x", cookie.substr(1), std::string(), std::string(".")})
+    CHECK_FALSE(here.find(wrong, day));
+
+  Tickets tickets(key);
+  CHECK_FALSE(tickets.redeem(cookie, day));
+  CHECK_FALSE(here.find(tickets.issue(alice, day).value(), day));
+  CHECK(tickets.redeem(tickets.issue(found, day).value(), day)->sign_in == found.sign_in);
+
+  alice.ends = day + hours(1);
+  const auto short_one = here.begin(alice, day).value();
+  CHECK(here.find(short_one, day + hours(1) - seconds(1))->ends == alice.ends);
+  CHECK_FALSE(here.find(short_one, day + hours(1)));
+  CHECK_FALSE(here.extend(short_one, day + hours(1) - seconds(1)));
+  alice.proven_roles.assign(1000, "operator");
+  CHECK_FALSE(here.begin(alice, day));
+}
+
+TEST_CASE("sign-ins: with use they go on for a week, and end with all their cookies") {
+  using std::chrono::hours;
+  SignIns sign_ins(rr::Bytes(32, 7));
+  Identity alice;
+  alice.name = "alice";
+  const auto first = sign_ins.begin(alice, day).value();
+  CHECK_FALSE(sign_ins.extend(first, day + hours(4) - seconds(1)));
+  auto newest = first;
+  auto now = day;
+  int cookies = 1;
+  while (sign_ins.find(newest, now)) {
+    now += hours(1);
+    if (auto next = sign_ins.extend(newest, now)) {
+      newest = std::move(*next);
+      ++cookies;
+    }
+  }
+  CHECK(now == day + hours(7 * 24));
+  CHECK(cookies == 41);  // each four hours; the last time there are no four left
+
+  const auto other = sign_ins.begin(alice, day).value();
+  const auto second = sign_ins.extend(first, day + hours(5)).value();
+  CHECK(sign_ins.end(sign_ins.find(first, day)->sign_in, day));
+  CHECK_FALSE(sign_ins.find(first, day));
+  CHECK_FALSE(sign_ins.find(second, day));
+  CHECK_FALSE(sign_ins.extend(first, day + hours(5)));
+  CHECK(sign_ins.find(other, day));
+}
+
+TEST_CASE("sign-ins: what has ended is kept until it would be too late, and no more than fit") {
+  SignIns sign_ins(rr::Bytes(32, 7));
+  int ended = 0;
+  while (ended < 70'000 && sign_ins.end(std::to_string(ended), day)) ++ended;
+  CHECK(ended == 65'536);
+  CHECK(sign_ins.end("another", day + std::chrono::hours(9)));
+  CHECK_FALSE(sign_ins.has_ended("0"));
 }
 
 TEST_CASE("requests of access: asked, decided, fetched once") {

@@ -1,5 +1,5 @@
 // Who this page is to the gateway: signing in and out, and what its requests and connections show.
-// Layer: web/gateway. Source: GET /api/v1/access, POST /api/v1/tickets.
+// Layer: web/gateway. Source: GET /api/v1/access, POST and DELETE /api/v1/session, POST /api/v1/tickets.
 
 import { Store } from "../app/store";
 
@@ -9,6 +9,8 @@ export interface Who {
   roles: string[];
   /** Whether the gateway asks who one is at all. */
   login: boolean;
+  /** Whether it is a sign-in here that says who, so that one can sign out. */
+  session: boolean;
   /** Whether one may ask for access. */
   requests: boolean;
   /** Whether this user decides on requests. */
@@ -17,19 +19,13 @@ export interface Who {
 
 const POLL_MS = 5_000;
 const DEADLINE_MS = 10_000;
-const KEY = "rrgate-proof";
 
 export class Session {
   readonly who = new Store<Who | null>(null);
   /** Why a sign-in that was good is not any more. */
   readonly trouble = new Store<string | null>(null);
-  /** The header that signing in has made; of this tab alone. null: the browser shows what it has, cookies for example. */
-  readonly proof = new Store<string | null>(readProof());
   #known: Promise<void> = Promise.resolve();
-
-  constructor() {
-    this.proof.watch(keepProof);
-  }
+  #asked = 0;
 
   /** @returns once the gateway has said who the page is, or could not. */
   start(): Promise<void> {
@@ -38,29 +34,31 @@ export class Session {
     return this.#known;
   }
 
-  /** `name` "": `secret` is a token. @throws Error with what is wrong, for people. */
+  /**
+   * `name` "": `secret` is a token. It is kept nowhere: the gateway gives a cookie that no script can read.
+   *
+   * @throws Error with what is wrong, for people.
+   */
   async signIn(name: string, secret: string): Promise<void> {
-    const proof = formatProof(name, secret);
-    const response = await this.#ask(proof).catch((error: unknown) => {
+    const body = JSON.stringify(proofOf(name, secret));
+    const init = { method: "POST", headers: { ["Content-Type"]: "application/json" }, body };
+    const response = await this.#ask("api/v1/session", init).catch((error: unknown) => {
       throw new Error(`The gateway does not answer (${(error as Error).message}).`);
     });
     if (response.status === 401) throw new Error(name === "" ? "This token is not valid." : "Wrong name or password.");
     if (!response.ok) throw new Error(await problemOf(response));
-    const who = readWho(await response.json());
-    if (who.login && who.user === null)
-      throw new Error("The gateway takes no passwords here. Leave the name empty to show a token.");
     this.trouble.value = null;
-    this.proof.value = proof;
-    this.who.value = who;
+    await this.#look();
   }
 
-  signOut(why: string | null = null): Promise<void> {
-    const before = this.who.value;
-    this.proof.value = null;
-    this.trouble.value = why;
+  /** @throws Error: the gateway could not be told. */
+  async signOut(): Promise<void> {
+    const response = await this.#ask("api/v1/session", { method: "DELETE" });
+    if (!response.ok) throw new Error(await problemOf(response));
+    this.trouble.value = null;
     // What the browser shows by itself, or nothing: until the gateway says so, nothing.
-    if (before) this.who.value = { ...before, user: null, roles: [], admin: false };
-    return this.#look();
+    if (this.who.value) this.who.value = { ...this.who.value, user: null, roles: [], session: false, admin: false };
+    await this.#look();
   }
 
   /** As fetch(), of a path of the gateway. A refusal never opens the browser's own dialog. */
@@ -68,7 +66,7 @@ export class Session {
     await this.#known;
     const who = this.who.value;
     const isOfBrowser = who !== null && !(who.login && who.user === null);
-    const response = await fetch(address(path), withProof(init, this.proof.value, isOfBrowser));
+    const response = await fetch(address(path), ofPage(init, isOfBrowser));
     if (response.status === 401) void this.#look();
     return response;
   }
@@ -83,21 +81,18 @@ export class Session {
     return `${url}&${new URLSearchParams({ ticket }).toString()}`;
   }
 
-  /** This one request is answered whoever asks, so that the browser may show what it has. */
-  #ask(proof: string | null): Promise<Response> {
-    const signal = AbortSignal.timeout(DEADLINE_MS);
-    return fetch(address("api/v1/access"), withProof({ signal }, proof, true));
+  /** These requests are answered whoever asks, so that the browser may show what it has. */
+  #ask(path: string, init: RequestInit = {}): Promise<Response> {
+    return fetch(address(path), ofPage({ ...init, signal: AbortSignal.timeout(DEADLINE_MS) }, true));
   }
 
   async #look(): Promise<void> {
-    const proof = this.proof.value;
+    const asked = ++this.#asked;
     try {
-      const response = await this.#ask(proof);
+      const response = await this.#ask("api/v1/access");
       const answer: unknown = response.ok ? await response.json() : {};
-      if (proof !== this.proof.value) return; // signed in or out meanwhile
+      if (asked !== this.#asked) return; // asked again meanwhile, or signed in or out
       if (response.ok) this.#take(readWho(answer));
-      else if (response.status === 401 && proof !== null)
-        await this.signOut("The gateway no longer accepts this sign-in.");
       else if (response.status === 404) this.#take(readWho({})); // an older gateway, which asks nobody
     } catch {
       // The list of devices tells that the gateway is away.
@@ -105,6 +100,8 @@ export class Session {
   }
 
   #take(who: Who): void {
+    const hasEnded = this.who.value?.session === true && who.user === null;
+    if (hasEnded) this.trouble.value = "The gateway no longer accepts this sign-in.";
     if (JSON.stringify(who) !== JSON.stringify(this.who.value)) this.who.value = who;
   }
 
@@ -129,17 +126,16 @@ export function readWho(answer: unknown): Who {
     user: typeof user === "string" ? user : null,
     roles: Array.isArray(roles) ? roles.filter((role) => typeof role === "string") : [],
     login: given["login"] === true,
+    session: given["session"] === true,
     requests: given["requests"] === true,
     admin: given["admin"] === true,
   };
 }
 
 /** @throws Error: the protocol has no place for this name. */
-export function formatProof(name: string, secret: string): string {
-  if (name === "") return `Bearer ${secret.trim()}`;
+export function proofOf(name: string, secret: string): Record<string, string> {
   if (name.includes(":")) throw new Error("A name has no colon.");
-  const bytes = new TextEncoder().encode(`${name}:${secret}`);
-  return `Basic ${btoa(String.fromCharCode(...bytes))}`;
+  return name === "" ? { token: secret.trim() } : { user: name, password: secret };
 }
 
 /** What the gateway said about a request that it refused. */
@@ -148,29 +144,13 @@ export async function problemOf(response: Response): Promise<string> {
   return typeof problem?.detail === "string" ? problem.detail : `the gateway answered ${response.status}`;
 }
 
-function withProof(init: RequestInit, proof: string | null, isOfBrowser: boolean): RequestInit {
+/** X-Requested-With: the page has a form, so no browser's dialog is wanted. */
+function ofPage(init: RequestInit, isOfBrowser: boolean): RequestInit {
   const headers = new Headers(init.headers);
-  if (proof !== null) headers.set("Authorization", proof);
-  return { ...init, headers, cache: "no-store", credentials: proof === null && isOfBrowser ? "same-origin" : "omit" };
+  headers.set("X-Requested-With", "rrgate");
+  return { ...init, headers, cache: "no-store", credentials: isOfBrowser ? "same-origin" : "omit" };
 }
 
 function address(path: string): URL {
   return new URL(path, document.baseURI);
-}
-
-function readProof(): string | null {
-  try {
-    return sessionStorage.getItem(KEY);
-  } catch {
-    return null; // as below
-  }
-}
-
-function keepProof(proof: string | null): void {
-  try {
-    if (proof === null) sessionStorage.removeItem(KEY);
-    else sessionStorage.setItem(KEY, proof);
-  } catch {
-    // Storage may be forbidden; the sign-in then lasts as long as the page.
-  }
 }

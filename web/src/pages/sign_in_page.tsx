@@ -79,7 +79,7 @@ export function SignInPage({ session, done }: { session: Session; done: () => vo
 
 export function Account({ session, ask }: { session: Session; ask: () => void }) {
   const who = useStore(session.who);
-  const proof = useStore(session.proof);
+  const [failure, setFailure] = useState<string | null>(null);
   if (!who?.login) return null;
   if (who.user === null)
     return who.roles.length === 0 ? null : (
@@ -93,11 +93,16 @@ export function Account({ session, ask }: { session: Session; ask: () => void })
       <p>
         <strong>{who.user}</strong> <span class="account-roles">{roles}</span>
       </p>
-      {proof !== null && (
-        <button class="button" type="button" onClick={() => void session.signOut()}>
+      {who.session && (
+        <button
+          class="button"
+          type="button"
+          onClick={() => void session.signOut().catch((error: unknown) => setFailure((error as Error).message))}
+        >
           Sign out
         </button>
       )}
+      <Failure text={failure} />
     </div>
   );
 }

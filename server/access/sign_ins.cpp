@@ -1,0 +1,53 @@
+#include "server/access/sign_ins.hpp"
+
+#include <algorithm>
+
+#include "server/access/sealed_identity.hpp"
+
+namespace rrgate {
+
+namespace {
+
+constexpr std::string_view sign_in_purpose = "sign-in";
+
+SignIns::Time end_of(const SealedIdentity& sign_in, SignIns::Time now) {
+  return std::min({now + SignIns::lifetime, sign_in.began + SignIns::longest, sign_in.who.ends});
+}
+
+}  // namespace
+
+std::optional<std::string> SignIns::begin(const Identity& who, Time now) const {
+  SealedIdentity made{who, make_seal_id(), now, {}};
+  made.who.sign_in = made.id;
+  made.ends = end_of(made, now);
+  return seal(key_, sign_in_purpose, made);
+}
+
+std::optional<SealedIdentity> SignIns::open(std::string_view cookie, Time now) const {
+  auto found = unseal(key_, sign_in_purpose, cookie, now);
+  if (found && has_ended(found->id)) return std::nullopt;
+  return found;
+}
+
+std::optional<Identity> SignIns::find(std::string_view cookie, Time now) const {
+  auto found = open(cookie, now);
+  return found ? std::optional(std::move(found->who)) : std::nullopt;
+}
+
+std::optional<std::string> SignIns::extend(std::string_view cookie, Time now) const {
+  auto found = open(cookie, now);
+  if (!found || found->ends - now > lifetime / 2) return std::nullopt;
+  const auto ends = end_of(*found, now);
+  if (ends <= found->ends) return std::nullopt;
+  found->ends = ends;
+  return seal(key_, sign_in_purpose, *found);
+}
+
+bool SignIns::end(const std::string& id, Time now) {
+  if (ended_.size() >= max_ended) std::erase_if(ended_, [now](const auto& item) { return item.second <= now; });
+  if (ended_.size() >= max_ended) return false;
+  ended_.emplace(id, now + lifetime);
+  return true;
+}
+
+}  // namespace rrgate
