@@ -32,7 +32,8 @@ export const makeSidebar = (decisions) => [
   group("Security", [
     ["Who may do what", "/access"],
     ["TLS", "/tls"],
-    ["What is defended, and reporting", "/security"],
+    ["What is defended", "/security"],
+    ["Reporting a hole", "/reporting"],
   ]),
   group("Behind a proxy", [["Behind a reverse proxy", "/reverse-proxy"]]),
   group("Many gateways", [["Many gateways", "/many-gateways"]]),

@@ -18,7 +18,7 @@ const elsewhere = {
   "CHANGELOG.md": "changelog.md",
   "CODE_OF_CONDUCT.md": "code-of-conduct.md",
   "CONTRIBUTING.md": "contributing.md",
-  "SECURITY.md": "security.md",
+  "SECURITY.md": "reporting.md",
   "robdef/README.md": "definitions.md",
   "test/examples/paper/README.md": "paper.md",
   "test/interop/README.md": "interoperability.md",

@@ -37,6 +37,14 @@ std::optional<ReadFailure> check_header(const HttpRequest& request) {
 RequestReader::RequestReader(rr::ByteStream& stream, RequestLimits limits)
     : stream_(stream), limits_(limits), limit_(stream.executor(), [this] { stream_.cancel(); }) {}
 
+/// A header that goes on in another line: obsolete (RFC 9112, section 5.2), and not read alike by everybody. The parser
+/// takes no header before it has seen how the next line begins, so that both are in buffer_.
+bool RequestReader::has_folded_header() const {
+  const auto text = rr::as_text(buffer_);
+  const auto header = text.substr(0, text.find("\r\n\r\n"));
+  return header.find("\r\n ") != std::string_view::npos || header.find("\r\n\t") != std::string_view::npos;
+}
+
 /// Beast's own header_limit is a few bytes generous; ours counts every byte up to and with the empty line.
 bool RequestReader::is_header_too_long(std::size_t consumed) const {
   const auto text = rr::as_text(buffer_);
@@ -79,6 +87,7 @@ rr::awaitable<ReadRequest> RequestReader::next() {
   for (;;) {
     boost::beast::error_code error;
     if (is_header_too_long(consumed)) error = http::error::header_limit;
+    if (!error && has_folded_header()) error = http::error::bad_obs_fold;
     if (!error && !buffer_.empty()) consumed += parse(parser, buffer_, error);
     if (error) {
       limit_.disarm();
@@ -126,6 +135,10 @@ rr::awaitable<std::optional<ReadFailure>> RequestReader::read_body(HttpRequest& 
     if (!buffer_.empty()) received += parse(parser, buffer_, error);
     if (error) co_return failure_of(error, limits_, limit);
     if (parser.is_done()) break;
+    // What the parser has not taken is no data.
+    if (buffer_.size() > limits_.header_bytes)
+      co_return ReadFailure{
+          431, "a chunk's extensions, or trailers, longer than " + std::to_string(limits_.header_bytes) + " bytes"};
     const auto end = begin + limits_.header_timeout + std::chrono::milliseconds(received * 1000 / least_rate);
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
     limit_.arm(std::min(limits_.header_timeout, left));

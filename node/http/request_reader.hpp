@@ -60,6 +60,7 @@ class RequestReader {
   using Parser = http::request_parser<http::string_body>;
 
   bool is_header_too_long(std::size_t consumed) const;
+  bool has_folded_header() const;
   /// Gives the parser what was read. Returns how much of it was taken.
   static std::size_t parse(Parser& parser, rr::Bytes& buffer, boost::beast::error_code& error);
   rr::awaitable<std::optional<ReadFailure>> read_on();

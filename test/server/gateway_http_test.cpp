@@ -236,7 +236,23 @@ TEST_CASE("silent, half-open and idle connections are closed") {
   CHECK(idle.receive_all().empty());
 }
 
-TEST_CASE("neither HTTP nor Robot Raconteur gets the line of native nodes; TLS gets nothing") {
+TEST_CASE("a header in several lines, and a chunk whose extensions do not end, are refused") {
+  const Folder files;
+  TestGateway gateway(0, [&](Config& config) { config.access.tokens_file = files.write("tokens", ""); });
+  const std::string begin = "POST /api/v1/access/requests HTTP/1.1\r\nHost: localhost\r\n";
+  for (const auto fold : {"X-A: b\r\n c\r\n", "X-A: b\r\n\tc\r\n", "Transfer-Encoding:\r\n chunked\r\n"})
+    CHECK(fetch(gateway, begin + fold + "\r\n").status == 400);
+  TestClient in_parts(gateway.port());
+  for (const auto* part : {"GET /healthz HTTP/1.1\r\nHost: localhost\r\nX-A: b\r\n", " c\r\n\r\n"})
+    in_parts.send(std::string_view(part));
+  CHECK(in_parts.receive_response().status == 400);
+  TestClient endless(gateway.port());
+  endless.send(begin + "Content-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n2;" +
+               std::string(200'000, 'a'));
+  CHECK(endless.receive_response().status == 431);
+}
+
+TEST_CASE("neither HTTP nor Robot Raconteur gets 404; TLS gets nothing") {
   TestGateway gateway;
   TestClient garbage(gateway.port());
   garbage.send("hello there\r\n");
