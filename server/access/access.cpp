@@ -1,6 +1,7 @@
 #include "server/access/access.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/support/glob.hpp"
 #include "node/platform/file_look.hpp"
@@ -31,6 +32,7 @@ rr::Error in_file(std::string_view what, const std::string& path, const rr::Erro
 }
 
 rr::Result<JwtVerifier> load_jwt(const JwtConfig& config) {
+  if (config.discovers) return JwtVerifier::without_keys(config.claims);
   const bool has_keys = !config.jwks_file.empty();
   const auto& path = has_keys ? config.jwks_file : config.secret_file;
   const std::string_view what = has_keys ? "JSON Web Key Set" : "secret";
@@ -172,6 +174,21 @@ void Access::take(AccessStatePtr next) {
   }
   state_ = std::move(next);
   users_->set(state_->users);
+  if (!issuer_keys_.empty()) (void)take_issuer_keys(std::exchange(issuer_, {}), std::exchange(issuer_keys_, {}));
+}
+
+rr::Result<> Access::take_issuer_keys(const std::string& issuer, std::string key_set) {
+  const auto& jwt = state_->config.jwt;
+  if (!jwt.discovers || jwt.claims.issuer != issuer) return {};  // the configuration has changed meanwhile
+  if (issuer == issuer_ && key_set == issuer_keys_) return {};
+  auto made = JwtVerifier::from_published(key_set, jwt.claims);
+  if (!made) return made.error();
+  auto next = std::make_shared<AccessState>(*state_);
+  next->jwt = std::move(*made);
+  state_ = std::move(next);
+  issuer_ = issuer;
+  issuer_keys_ = std::move(key_set);
+  return {};
 }
 
 void Access::reload(bool is_forced) {

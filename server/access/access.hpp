@@ -59,6 +59,10 @@ class Access {
   /// Reads the files anew: those that changed, or all. What can't be used stays as it was, and the log says why.
   void reload(bool is_forced);
 
+  /// The keys that the issuer has published (JwtConfig::discovers). Errors   invalid_configuration: none can be used;
+  /// those from before stay in use, as they do when the configuration changes and the issuer does not.
+  [[nodiscard]] rr::Result<> take_issuer_keys(const std::string& issuer, std::string key_set);
+
   /// Whether somebody may do something. Refusals, writes, calls and locks go into the audit log.
   /// Errors   permission_denied: a sentence for the client.
   [[nodiscard]] rr::Result<> check(const Identity& who, const AccessRequest& what);
@@ -113,6 +117,8 @@ class Access {
   std::map<std::string, std::string> seen_;
   std::unique_ptr<AuditLog> audit_;
   std::shared_ptr<Users> users_;
+  std::string issuer_;  ///< whose keys these are:
+  std::string issuer_keys_;
   Tickets tickets_;
   SignIns sign_ins_;
   RefusalDigest refusals_;

@@ -14,8 +14,11 @@ struct JwtConfig {
   std::string jwks_file = {};    ///< a JSON Web Key Set
   std::string secret_file = {};  ///< for HS256
   JwtClaims claims = {};
+  bool discovers = false;  ///< the keys are those that the issuer has published (IssuerKeys)
+  std::vector<std::string> ca =
+      {};  ///< PEM files: who may vouch for the issuer's server; empty: whom this system trusts
 
-  bool is_used() const { return !jwks_file.empty() || !secret_file.empty(); }
+  bool is_used() const { return !jwks_file.empty() || !secret_file.empty() || discovers; }
   bool operator==(const JwtConfig&) const = default;
 };
 

@@ -155,6 +155,23 @@ rr::Result<JwtVerifier> JwtVerifier::from_jwks(std::string_view text, JwtClaims 
   return out;
 }
 
+rr::Result<JwtVerifier> JwtVerifier::from_published(std::string_view text, JwtClaims claims) {
+  auto out = from_jwks(text, std::move(claims));
+  if (!out) return out;
+  std::erase_if(out->keys_, [](const Key& key) { return key.key.algorithm() == rr::SignatureAlgorithm::hs256; });
+  if (out->keys_.empty()) return unusable_key_set("no key can be used: a secret that is published is none");
+  return out;
+}
+
+bool JwtVerifier::misses_key_of(std::string_view token) const {
+  if (!looks_like_jwt(token) || token.size() > max_token_size) return false;
+  const auto header = read_object(parts_of(token)[0]);
+  if (!header) return false;
+  const auto id = text_of(*header, "kid");
+  const auto fits = [&id](const Key& key) { return id.empty() || key.id.empty() || key.id == id; };
+  return std::none_of(keys_.begin(), keys_.end(), fits);
+}
+
 rr::Result<JwtVerifier> JwtVerifier::from_secret(std::string_view text, JwtClaims claims) {
   while (!text.empty() && std::string_view(" \t\r\n").find(text.back()) != std::string_view::npos)
     text.remove_suffix(1);

@@ -28,6 +28,10 @@ class JwtVerifier {
   /// RS256, ES256, EdDSA (Ed25519) and, for "oct" keys, HS256. Keys of other kinds or uses are passed over.
   /// Errors   invalid_configuration: no JSON Web Key Set, or none of its keys can be used; what is wrong with which.
   static rr::Result<JwtVerifier> from_jwks(std::string_view text, JwtClaims claims);
+  /// What everybody may read: secrets in it ("oct") are none. Errors   as above.
+  static rr::Result<JwtVerifier> from_published(std::string_view text, JwtClaims claims);
+  /// Refuses each token.
+  static JwtVerifier without_keys(JwtClaims claims) { return JwtVerifier(std::move(claims)); }
   /// HS256. White space at the end of the text does not count.
   /// Errors   invalid_configuration: fewer than 32 bytes.
   static rr::Result<JwtVerifier> from_secret(std::string_view text, JwtClaims claims);
@@ -36,6 +40,8 @@ class JwtVerifier {
   /// Errors   authentication_error: why it is refused, for the client.
   rr::Result<Identity> verify(std::string_view token, std::chrono::system_clock::time_point now) const;
 
+  /// Whether the token names a key that is not here: its issuer may have a new one.
+  bool misses_key_of(std::string_view token) const;
   std::size_t key_count() const { return keys_.size(); }
 
  private:

@@ -50,8 +50,14 @@ void read_jwt(ObjectReader& in, JwtConfig& jwt) {
   in.text("audience", jwt.claims.audience);
   in.text("user_claim", jwt.claims.user_claim);
   in.text("roles_claim", jwt.claims.roles_claim);
-  if (jwt.jwks_file.empty() == jwt.secret_file.empty())
-    in.finding("jwks_file", "expected either jwks_file or secret_file: what tokens are checked with");
+  in.flag("discover", jwt.discovers);
+  in.texts("ca", false, read_file(jwt.ca));
+  if (!jwt.jwks_file.empty() + !jwt.secret_file.empty() + jwt.discovers != 1)
+    in.finding("jwks_file", "expected either jwks_file, secret_file or discover: what tokens are checked with");
+  if (jwt.discovers && !jwt.claims.issuer.starts_with("https://"))
+    in.finding("issuer",
+               "found " + rr::quote(jwt.claims.issuer) + ", expected the https:// URL where its keys are found");
+  if (!jwt.ca.empty() && !jwt.discovers) in.finding("ca", "nothing is fetched; expected discover beside it");
 }
 
 void read_identity_headers(ObjectReader& in, IdentityHeaders& headers) {
@@ -136,7 +142,7 @@ void for_each_file(AccessConfig& access, const std::function<void(std::string&)>
   for (auto* file : {&access.users_file, &access.tokens_file, &access.jwt.jwks_file, &access.jwt.secret_file,
                      &access.ticket_key_file, &access.audit_file})
     locate(*file);
-  for (auto* files : {&access.clients.ca, &access.clients.crl})
+  for (auto* files : {&access.clients.ca, &access.clients.crl, &access.jwt.ca})
     for (auto& file : *files) locate(file);
 }
 

@@ -108,6 +108,7 @@ rr::Result<std::vector<rr::HostPort>> Gateway::start(const std::vector<int>& soc
   own_service_->start();
   shared_.add_own(own_service_->device(), std::string(GatewayService::name));
   if (found_) found_->start();
+  issuer_keys_.start();
   asio::co_spawn(io_, watch_files(), asio::detached);
   return bound;
 }
@@ -201,6 +202,7 @@ rr::Result<> Gateway::reconfigure(Config next) {
   if (auto replaced = access_.replace(std::move(*access)); !replaced) return replaced;
 
   const auto before = std::exchange(config_, std::move(next));
+  if (before.access.jwt != config_.access.jwt) issuer_keys_.start();
   if (has_other_tls) web_tls_ = std::move(web_tls);
   std::erase_if(listeners_, [&](const Listener& listener) {
     const bool is_gone = !has(config_.listen, listener.address);
@@ -287,6 +289,7 @@ void Gateway::stop(std::function<void()> on_stopped) {
   on_stopped_ = std::move(on_stopped);
   if (on_stop_) on_stop_();
   if (found_) found_->stop();
+  issuer_keys_.stop();
   devices_.stop();
   clients_.stop();
   devices_.on_change(nullptr);

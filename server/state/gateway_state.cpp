@@ -11,7 +11,8 @@ GatewayState::GatewayState(boost::asio::io_context& io, Config config)
       memory_(memory_total(config_)),
       access_(config_.access),
       logins_(io.get_executor(), access_),
-      http_access_(access_, logins_),
+      issuer_keys_(io.get_executor(), access_),
+      http_access_(access_, logins_, issuer_keys_),
       web_tls_(config_.tls.certificates.empty()
                    ? nullptr
                    : std::make_unique<TlsFiles>(config_.tls.certificates, config_.access.clients)),

@@ -74,6 +74,7 @@ class GatewayState {
   MemoryBudget memory_;
   Access access_;
   Logins logins_;
+  IssuerKeys issuer_keys_;
   HttpAccess http_access_;
   std::unique_ptr<TlsFiles> web_tls_;
   DeviceRegistry devices_;

@@ -83,8 +83,9 @@ rr::awaitable<rr::Result<Identity>> HttpAccess::identify(const Request& request,
 
 rr::awaitable<rr::Result<Identity>> HttpAccess::by_authorization(std::string header, ClientOrigin from) {
   const auto nobody = access_.anonymous(from.client);
-  const auto& state = access_.state();
   const auto bearer = credentials_of(header, "Bearer");
+  if (bearer && access_.state().jwt && access_.state().jwt->misses_key_of(*bearer)) co_await issuer_keys_.look_anew();
+  const auto& state = access_.state();
   if (bearer && (state.tokens || state.jwt)) {
     auto identity = by_token(*bearer);
     if (!identity) {

@@ -14,6 +14,7 @@
 #include "server/http/request.hpp"
 #include "server/limits/bounded_table.hpp"
 #include "server/limits/rate_gate.hpp"
+#include "server/state/issuer_keys.hpp"
 
 namespace rrgate {
 
@@ -21,7 +22,8 @@ struct Connection;
 
 class HttpAccess {
  public:
-  HttpAccess(Access& access, Logins& logins) : access_(access), logins_(logins) {}
+  HttpAccess(Access& access, Logins& logins, IssuerKeys& issuer_keys)
+      : access_(access), logins_(logins), issuer_keys_(issuer_keys) {}
   HttpAccess(const HttpAccess&) = delete;
   HttpAccess& operator=(const HttpAccess&) = delete;
 
@@ -70,6 +72,7 @@ class HttpAccess {
 
   Access& access_;
   Logins& logins_;
+  IssuerKeys& issuer_keys_;
   AccessRequests requests_;
   RateGate clients_;
   RateGate users_;

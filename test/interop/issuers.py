@@ -1,9 +1,13 @@
 """What an operator's other programs make: JSON Web Tokens, and certificates of people."""
 import base64
+import collections
 import datetime
 import hashlib
 import hmac
+import http.server
 import json
+import ssl
+import threading
 import time
 
 from cryptography import x509
@@ -24,8 +28,10 @@ def number(value, size=None):
 
 
 class Issuer:
-    def __init__(self, name, audience):
-        self.name, self.audience = name, audience
+    """`generation` is a part of its keys' names: another one has other keys."""
+
+    def __init__(self, name, audience, generation=""):
+        self.name, self.audience, self.generation = name, audience, generation
         self.rsa = rsa.generate_private_key(public_exponent=65537, key_size=2048)
         self.ec = ec.generate_private_key(ec.SECP256R1())
         self.ed = ed25519.Ed25519PrivateKey.generate()
@@ -35,9 +41,9 @@ class Issuer:
         point = self.ec.public_key().public_numbers()
         raw = self.ed.public_key().public_bytes(serialization.Encoding.Raw, serialization.PublicFormat.Raw)
         return {"keys": [
-            {"kty": "RSA", "kid": "RS256", "use": "sig", "alg": "RS256", "n": number(public.n), "e": number(public.e)},
-            {"kty": "EC", "kid": "ES256", "crv": "P-256", "x": number(point.x, 32), "y": number(point.y, 32)},
-            {"kty": "OKP", "kid": "EdDSA", "crv": "Ed25519", "x": encoded(raw)},
+            {"kty": "RSA", "kid": "RS256" + self.generation, "use": "sig", "alg": "RS256", "n": number(public.n), "e": number(public.e)},
+            {"kty": "EC", "kid": "ES256" + self.generation, "crv": "P-256", "x": number(point.x, 32), "y": number(point.y, 32)},
+            {"kty": "OKP", "kid": "EdDSA" + self.generation, "crv": "Ed25519", "x": encoded(raw)},
         ]}
 
     def _text(self, user, roles, header, seconds=600):
@@ -45,7 +51,7 @@ class Issuer:
         return encoded(header) + "." + encoded(claims)
 
     def token(self, user, roles, algorithm, seconds=600):
-        text = self._text(user, roles, {"alg": algorithm, "kid": algorithm, "typ": "JWT"}, seconds)
+        text = self._text(user, roles, {"alg": algorithm, "kid": algorithm + self.generation, "typ": "JWT"}, seconds)
         if algorithm == "RS256":
             signature = self.rsa.sign(text.encode(), padding.PKCS1v15(), hashes.SHA256())
         elif algorithm == "ES256":
@@ -63,6 +69,41 @@ class Issuer:
         secret = self.rsa.public_key().public_bytes(serialization.Encoding.PEM, serialization.PublicFormat.SubjectPublicKeyInfo)
         text = self._text(user, roles, {"alg": "HS256", "kid": "RS256"})
         return text + "." + encoded(hmac.digest(secret, text.encode(), hashlib.sha256))
+
+
+class IssuerServer:
+    """Publishes an issuer's keys by HTTPS. `silent`: takes connections, and answers nothing for as long."""
+
+    def __init__(self, certificate, key):
+        self.key_set, self.name, self.asked, self.silent = {"keys": []}, None, collections.Counter(), False
+        owner = self
+
+        class Handler(http.server.BaseHTTPRequestHandler):
+            def do_GET(self):
+                owner.asked[self.path] += 1
+                while owner.silent:
+                    time.sleep(0.02)
+                body = json.dumps(owner.key_set if self.path == "/keys" else
+                                  {"issuer": owner.name or owner.url, "jwks_uri": owner.url + "/keys"}).encode()
+                self.send_response(200)
+                self.send_header("Content-Length", str(len(body)))
+                self.end_headers()
+                self.wfile.write(body)
+
+            def log_message(self, *arguments):
+                pass
+
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+        context.load_cert_chain(certificate, key)
+        self._server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+        self._server.socket = context.wrap_socket(self._server.socket, server_side=True)
+        self.url = f"https://localhost:{self._server.server_port}"
+        threading.Thread(target=self._server.serve_forever, daemon=True).start()
+
+    def stop(self):
+        self.silent = False
+        self._server.shutdown()
+        self._server.server_close()
 
 
 class People:

@@ -242,6 +242,57 @@ def test_tickets_for_pages(guarded):
     assert foreign.status == 403
 
 
+def cookie_of(answer):
+    assert answer.status == 201, answer.body
+    return answer.headers["Set-Cookie"].split(";")[0]
+
+
+def test_sign_ins_hold_at_all_gateways_of_one_key(device, tmp_path):
+    """With TLS before them, of which a trusted proxy tells: the cookie is of that one, and for TLS alone."""
+    (tmp_path / "ticket.key").write_text("of this test alone " * 3)
+    access = {"users_file": "users", "ticket_key_file": str(tmp_path / "ticket.key"), "rules": RULES, "audit_file": "audit"}
+    page = {"Host": "localhost", "Origin": "https://localhost", "X-Forwarded-Proto": "https"}
+    with contextlib.ExitStack() as stack:
+        gateways = []
+        for name in ("here", "there"):
+            (tmp_path / name).mkdir()
+            make_users(tmp_path / name)
+            gateways.append(stack.enter_context(running(tmp_path / name, device, access, trusted_proxies=["127.0.0.1"])))
+        here, there = gateways
+        proof = {"user": "alice", "password": PASSWORDS["alice"]}
+        made = ask(here.port, "POST", "/api/v1/session", proof, page)
+        cookie = {"Cookie": cookie_of(made)}
+        assert made.headers["Set-Cookie"].startswith("__Host-rrgate=") and made.headers["Set-Cookie"].endswith("; Secure")
+        for gateway in gateways:
+            who = ask(gateway.port, "GET", "/api/v1/access", headers={**page, **cookie}).json
+            assert (who["user"], who["proof"], who["session"]) == ("alice", "password", True)
+            assert ask(gateway.port, "PUT", BASE + "/p_double", 1.5, {**page, **cookie}).status == 204
+            elsewhere = {**page, **cookie, "Origin": "https://localhost:8443"}
+            assert ask(gateway.port, "PUT", BASE + "/p_double", 1.5, elsewhere).status == 403
+        rrgate("passwd", tmp_path / "there" / "users", "alice", "--roles", "operator", given="another\n")
+        there.wait_for("users and rights read anew")
+        assert ask(there.port, "GET", "/api/v1/access", headers={**page, **cookie}).json["user"] is None
+        assert ask(here.port, "DELETE", "/api/v1/session", headers={**page, **cookie}).status == 204
+        assert ask(here.port, "GET", "/api/v1/access", headers={**page, **cookie}).json["user"] is None
+        assert [line["event"] for line in audit_of(here) if line["event"].startswith("signed")] == ["signed_in", "signed_out"]
+
+
+def test_a_sign_in_ends_at_once_with_what_goes_on_by_it(device, tmp_path):
+    make_users(tmp_path)
+    devices = [{"name": "interop", "url": device, "mode": "shared"}, {"name": "relayed", "url": device}]
+    with running(tmp_path, device, {"users_file": "users", "rules": RULES}, devices=devices) as gateway:
+        gateway.wait_for("device online", device="relayed")
+        page = {"Origin": f"http://127.0.0.1:{gateway.port}"}
+        proof = {"user": "root", "password": PASSWORDS["root"]}
+        signed = {**page, "Cookie": cookie_of(ask(gateway.port, "POST", "/api/v1/session", proof, page))}
+        with sessions_of_all_kinds(gateway.port, signed) as links:
+            for name in ("relay", "json", "ticket"):
+                assert is_alive(links[name]), name
+            assert ask(gateway.port, "DELETE", "/api/v1/session", headers=signed).status == 204
+            seconds = {name: ends(link) for name, link in links.items()}
+            assert max(seconds.values()) < 1.5, seconds
+
+
 def test_the_audit_log_tells_who_did_what(guarded):
     ask(guarded.port, "PUT", BASE + "/p_double", 2.5, basic("alice"))
     ask(guarded.port, "PUT", BASE + "/p_int32", 2, basic("vera"))
@@ -370,6 +421,76 @@ def test_json_web_tokens(device, tmp_path):
             assert refused.status == 401 and "expired" in refused.json["detail"]
         for forged in (issuer.unsigned("alice", ["admin"]), issuer.signed_with_public_key("alice", ["admin"])):
             assert ask(gateway.port, "GET", BASE + "/p_double", headers=bearer(forged)).status == 401
+
+
+@contextlib.contextmanager
+def publishing(folder, device, tls_of=None, **served):
+    """(server, gateway): an issuer's server, and a gateway that takes its keys from there."""
+    make_web_certificates(folder / "id")
+    make_web_certificates(folder / "other")
+    server = issuers.IssuerServer(folder / "id" / "localhost.pem", folder / "id" / "localhost.key")
+    for name, value in served.items():
+        setattr(server, name, value)
+    jwt = {"discover": True, "issuer": server.url, "audience": "rrgate", "ca": [str(folder / (tls_of or "id") / "web-ca.pem")]}
+    token = rrgate("token", folder / "tokens", "ci", "--roles", "admin")
+    try:
+        with running(folder, device, {"jwt": jwt, "tokens_file": "tokens", "rules": RULES}) as gateway:
+            gateway.token = token
+            yield server, gateway
+    finally:
+        server.stop()
+
+
+def test_keys_that_the_issuer_publishes(device, tmp_path):
+    """A token that names a new one has them fetched again; whoever makes names up has not."""
+    first = issuers.Issuer("", "rrgate")
+    with publishing(tmp_path, device, key_set=first.key_set()) as (server, gateway):
+        first.name = server.url
+
+        def status(issuer, algorithm="ES256"):
+            return ask(gateway.port, "GET", BASE + "/p_double", headers=bearer(issuer.token("alice", ["viewer"], algorithm))).status
+
+        gateway.wait_for("keys of the issuer fetched")
+        assert [status(first, algorithm) for algorithm in issuers.ALGORITHMS] == [200, 200, 200]
+        assert server.asked["/keys"] == 1
+        second, third = (issuers.Issuer(server.url, "rrgate", generation) for generation in ("-2", "-3"))
+        server.key_set = second.key_set()
+        assert [status(second), status(second, "EdDSA"), status(first)] == [200, 200, 401]
+        assert server.asked["/keys"] == 2
+        server.key_set = third.key_set()
+        assert [status(third) for _ in range(20)] == [401] * 20  # the issuer has just been asked
+        assert server.asked["/keys"] == 2
+        for forged in (second.unsigned("alice", ["admin"]), second.signed_with_public_key("alice", ["admin"])):
+            assert ask(gateway.port, "GET", BASE + "/p_double", headers=bearer(forged)).status == 401
+        server.stop()
+        assert status(second) == 200
+
+
+def test_an_issuer_that_does_not_answer_keeps_nobody_else_waiting(device, tmp_path):
+    with publishing(tmp_path, device, silent=True) as (server, gateway):
+        waits = bearer(issuers.Issuer(server.url, "rrgate").token("alice", ["viewer"], "ES256"))
+        with concurrent.futures.ThreadPoolExecutor(1) as pool:
+            waiting = pool.submit(ask, gateway.port, "GET", BASE + "/p_double", None, waits)
+            began = time.monotonic()
+            for _ in range(20):
+                assert ask(gateway.port, "GET", BASE + "/p_double", headers=bearer(gateway.token)).status == 200
+            assert time.monotonic() - began < 2 and not waiting.done()
+            assert waiting.result(20).status == 401
+        ask(gateway.port, "GET", BASE + "/p_double", headers=waits)
+        began = time.monotonic()
+        assert gateway.process.stop() == 0
+        assert time.monotonic() - began < 4
+
+
+@pytest.mark.parametrize("wrong, why", [({"tls_of": "other"}, "certificate"), ({"name": "https://evil.example"}, "evil.example"),
+                                        ({"key_set": {"keys": [{"kty": "oct", "k": "A" * 43}]}}, "secret")])
+def test_an_issuer_that_is_not_believed(device, tmp_path, wrong, why):
+    """Another CA than the configured one; a document of another issuer; a secret that everybody may read."""
+    with publishing(tmp_path, device, **wrong) as (server, gateway):
+        failed = gateway.wait_for("keys of the issuer can't be fetched; those from before stay in use")
+        assert why in failed["error"]
+        token = issuers.Issuer(server.url, "rrgate").token("alice", ["viewer"], "ES256")
+        assert ask(gateway.port, "GET", BASE + "/p_double", headers=bearer(token)).status == 401
 
 
 def test_client_certificates(device, tmp_path):
@@ -505,7 +626,7 @@ def ends(link):
 def sessions_of_all_kinds(port, proof, protocol="Sec-WebSocket-Protocol: robotraconteur.robotraconteur.com\r\n"):
     """{name: socket} of what stays open for somebody: relayed, shared and JSON sessions, streams; and one that is let in
     by a ticket for the same proof."""
-    header = f"Authorization: {proof['Authorization']}\r\n"
+    header = "".join(f"{name}: {value}\r\n" for name, value in proof.items())
     ticket = ask(port, "POST", "/api/v1/tickets", headers=proof).json["ticket"]
     links = {
         "relay": open_websocket(port, "/devices/relayed", header),

@@ -112,6 +112,9 @@ TEST_CASE("who may do what") {
   access_finds(R"("rules": [{"roles": ["a"], "devices": ["d"], "may": ["admin"]}])", "/rules/0/may", "as a whole");
   access_finds(R"("jwt": {})", "/jwt/jwks_file", "either");
   access_finds(R"("jwt": {"jwks_file": "a", "secret_file": "b"})", "/jwt/jwks_file", "either");
+  access_finds(R"("jwt": {"jwks_file": "a", "discover": true, "issuer": "https://i"})", "/jwt/jwks_file", "either");
+  access_finds(R"("jwt": {"discover": true, "issuer": "http://i"})", "/jwt/issuer", "https://");
+  access_finds(R"("jwt": {"jwks_file": "a", "ca": ["b"]})", "/jwt/ca", "discover");
   access_finds(R"("identity_headers": {"user": "X-User"})", "/identity_headers", "trusted_proxies");
   access_finds(R"("client_ca": ["ca.pem"])", "/client_ca", "tls.certificates");
   access_finds(R"("anonymous_role": "guest")", "/anonymous_role", "rules");

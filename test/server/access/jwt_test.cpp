@@ -155,6 +155,23 @@ TEST_CASE("JWT: keys by name, and what is wrong with a key set") {
   CHECK(refusal(*by_secret, JwtSigner("HS256", secret).sign(claims())) == "taken");
 }
 
+TEST_CASE("JWT: a key set that is published has no secrets, and may lack the key that a token names") {
+  const JwtSigner signer("ES256");
+  const nlohmann::json secret_key = {{"kty", "oct"}, {"k", encode_base64url(rr::as_bytes(secret))}, {"kid", "s"}};
+  const auto verify = JwtVerifier::from_published(jwks({signer.jwk("1"), secret_key}), {});
+  REQUIRE(verify);
+  CHECK(refusal(*verify, signer.sign(claims(), {{"kid", "1"}})) == "taken");
+  CHECK(refusal(*verify, JwtSigner("HS256", secret).sign(claims(), {{"kid", "s"}})) != "taken");
+  CHECK_FALSE(JwtVerifier::from_published(jwks({secret_key}), {}));
+  CHECK(verify->misses_key_of(signer.sign(claims(), {{"kid", "2"}})));
+  CHECK_FALSE(verify->misses_key_of(signer.sign(claims(), {{"kid", "1"}})));
+  CHECK_FALSE(verify->misses_key_of(signer.sign(claims())));
+  CHECK_FALSE(verify->misses_key_of("no.token"));
+  const auto none = JwtVerifier::without_keys({});
+  CHECK(none.misses_key_of(signer.sign(claims())));
+  CHECK(refusal(none, signer.sign(claims())) != "taken");
+}
+
 TEST_CASE("JWT: what is none") {
   const JwtSigner signer("EdDSA");
   const auto verify = verifier(signer);
