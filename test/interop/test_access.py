@@ -4,6 +4,7 @@ import contextlib
 import http.client
 import itertools
 import json
+import shutil
 import socket
 import ssl
 import subprocess
@@ -254,9 +255,10 @@ def test_sign_ins_hold_at_all_gateways_of_one_key(device, tmp_path):
     page = {"Host": "localhost", "Origin": "https://localhost", "X-Forwarded-Proto": "https"}
     with contextlib.ExitStack() as stack:
         gateways = []
-        for name in ("here", "there"):
+        make_users(tmp_path)
+        for name in ("here", "there"):  # each has a copy of the one file of users
             (tmp_path / name).mkdir()
-            make_users(tmp_path / name)
+            shutil.copy(tmp_path / "users", tmp_path / name)
             gateways.append(stack.enter_context(running(tmp_path / name, device, access, trusted_proxies=["127.0.0.1"])))
         here, there = gateways
         proof = {"user": "alice", "password": PASSWORDS["alice"]}

@@ -19,7 +19,9 @@ const signOut = (page: Page) => page.getByRole("button", { name: "Sign out" });
 async function watchDialogs(page: Page): Promise<string[]> {
   const dialogs: string[] = [];
   const browser = await page.context().newCDPSession(page);
-  browser.on("Fetch.requestPaused", ({ requestId }) => void browser.send("Fetch.continueRequest", { requestId }));
+  // A page that is loaded again gives up what it has asked for.
+  const goOn = (requestId: string) => browser.send("Fetch.continueRequest", { requestId }).catch(() => undefined);
+  browser.on("Fetch.requestPaused", ({ requestId }) => void goOn(requestId));
   browser.on("Fetch.authRequired", ({ requestId, request }) => {
     dialogs.push(request.url);
     void browser.send("Fetch.continueWithAuth", { requestId, authChallengeResponse: { response: "CancelAuth" } });
