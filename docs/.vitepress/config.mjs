@@ -26,7 +26,7 @@ for (const { link, text } of sidebar.flatMap((group) => group.items))
 const links = new Set(sidebar.flatMap((group) => group.items.map(({ link }) => link)));
 for (const page of readdirSync(pages, { recursive: true }).filter((name) => name.endsWith(".md"))) {
   const link = `/${page.slice(0, -3).replace(/(^|\/)index$/, "$1")}`;
-  const isBeside = /^\/(source|reference\/rrgate-client)\/|^\/(paper|code-of-conduct)$/.test(link);
+  const isBeside = /^\/(source|reference\/(rrgate-client|cpp))\/|^\/(paper|code-of-conduct)$/.test(link);
   if (!isBeside && !links.has(link)) throw new Error(`navigation: ${page} is missing in navigation.mjs`);
 }
 

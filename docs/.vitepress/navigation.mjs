@@ -42,6 +42,7 @@ export const makeSidebar = (decisions) => [
     ["Commands", "/reference/commands"],
     ["HTTP of the gateway", "/reference/http"],
     ["rrgate-client in TypeScript", "/reference/rrgate-client/"],
+    ["The C++ API", "/reference/cpp/"],
     ["Definitions of this project", "/definitions"],
     ["Changelog", "/changelog"],
   ]),

@@ -9,6 +9,7 @@ import { configurationPage } from "./configuration.mjs";
 import { commandsPage } from "./commands.mjs";
 import { httpPage } from "./http.mjs";
 import { clientPages } from "./client_api.mjs";
+import { cppPages } from "./cpp_api.mjs";
 
 const repository = fileURLToPath(new URL("../..", import.meta.url));
 const target = path.join(repository, "docs/.vitepress/pages");
@@ -36,6 +37,7 @@ const aliases = {
   "docs/howto": "howto/add-transport.md",
   "wasm-client": "rrgate-client.md",
   robdef: "definitions.md",
+  "include/rrgate": "reference/cpp/index.md",
   "wasm-client/ts/index.ts": "reference/rrgate-client/index.md",
 };
 
@@ -121,6 +123,7 @@ for (const [file, [page, make]] of Object.entries(generated)) {
   pages.set(page, withSiteLinks(await make(repository), file, page));
 }
 for (const [name, text] of await clientPages(repository)) pages.set(`reference/rrgate-client/${name}`, text);
+for (const [name, text] of await cppPages(repository)) pages.set(`reference/cpp/${name}`, text);
 for (const file of shown) pages.set(pageOf(file) ?? showPage(file), shownText(file));
 
 /** The licences of what the site's scripts are made of, which goes with them. */

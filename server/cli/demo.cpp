@@ -1,9 +1,10 @@
-// rrgate demo: two simulated devices and a gateway to them, on free ports. Layer: server/cli.
+// rrgate demo: simulated devices and a gateway to them, on free ports. Layer: server/cli.
 #include <qrencode.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
@@ -11,8 +12,10 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <csignal>
 #include <filesystem>
+#include <iomanip>
 #include <iostream>
 #include <memory>
+#include <span>
 
 #include "server/cli/command.hpp"
 #include "server/cli/first_login.hpp"
@@ -44,6 +47,28 @@ struct DemoDevice {
     return text;
   }
 };
+
+/// Devices that are shown together. The others follow the first one.
+struct DemoSystem {
+  std::string_view name;
+  std::string_view summary;
+  std::vector<DemoDevice> devices;
+};
+
+/// The first is the one that is run where none is named.
+std::vector<DemoSystem> list_systems() {
+  // The robot stops when the client that drives it is gone: it must see each client. Frames are the same for all.
+  const DemoDevice create{"create", "rrgate-demo-create", "Create"};
+  const DemoDevice webcams{"webcams", "rrgate-demo-webcams", "Webcam", DeviceMode::shared};
+  return {{"create", "a mobile robot in a room, and two cameras that ride on it", {create, webcams}},
+          {"webcams", "two cameras that stand in a room", {webcams}}};
+}
+
+int print_systems() {
+  for (const auto& system : list_systems())
+    std::cout << std::left << std::setw(10) << system.name << system.summary << "\n";
+  return exit_ok;
+}
 
 /// The program beside rrgate (installed) or below it (in the build tree).
 std::string find_program(std::string_view name) {
@@ -217,20 +242,23 @@ Config make_config(const std::vector<DemoDevice>& devices, std::uint16_t port, c
 }
 
 struct DemoOptions {
+  std::string system;
+  bool is_list = false;
   std::optional<std::uint16_t> port;
   bool is_lan = false;
 };
 
 int demo(const DemoOptions& options) {
+  if (options.is_list) return print_systems();
   const auto port = options.port.value_or(is_port_free(preferred_port) ? preferred_port : 0);
   std::optional<DemoLogin> login;
   if (options.is_lan) login.emplace();
   const auto* const user = login ? &*login : nullptr;
   if (user && !user->password()) return report_failure("demo", user->password().error().message);
 
-  // The robot stops when the client that drives it is gone: it must see each client. Frames are the same for all.
-  std::vector<DemoDevice> devices = {{"create", "rrgate-demo-create", "Create"},
-                                     {"webcams", "rrgate-demo-webcams", "Webcam", DeviceMode::shared}};
+  const auto systems = list_systems();
+  const auto is_wanted = [&options](const DemoSystem& system) { return system.name == options.system; };
+  auto devices = std::find_if(systems.begin(), systems.end(), is_wanted)->devices;
   for (auto& device : devices) {
     device.path = find_program(device.program);
     if (device.path.empty()) {
@@ -241,8 +269,8 @@ int demo(const DemoOptions& options) {
     device.port = find_free_port();
     device.arguments = {"--port", std::to_string(device.port)};
   }
-  // The cameras ride on the robot: they follow its pose.
-  devices[1].arguments.insert(devices[1].arguments.end(), {"--robot", devices[0].url()});
+  for (auto& device : std::span(devices).subspan(1))
+    device.arguments.insert(device.arguments.end(), {"--robot", devices.front().url()});
   for (auto& device : devices) device.process = start_program(device.path, device.arguments);
   for (const auto& device : devices) wait_until_listening(device);
 
@@ -268,7 +296,14 @@ int demo(const DemoOptions& options) {
 }  // namespace
 
 void add_demo(Commands& commands) {
-  const auto [app, options] = commands.add("demo", "Run two simulated devices and a gateway to them", demo);
+  const auto [app, options] = commands.add("demo", "Run simulated devices and a gateway to them", demo);
+  std::vector<std::string> names;
+  for (const auto& system : list_systems()) names.emplace_back(system.name);
+  options.system = names.front();
+  app.add_option("NAME", options.system, "What is simulated; --list tells what there is")
+      ->check(CLI::IsMember(names))
+      ->option_text("[" + names.front() + "]");
+  app.add_flag("--list", options.is_list, "Print what can be simulated, and end");
   app.add_option("--port", options.port, "0 for a free one; without it 8080 where that is free")
       ->check(CLI::Range(0, 65535))
       ->option_text("N");

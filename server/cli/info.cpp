@@ -1,6 +1,7 @@
 // rrgate info, robdef: what a service says of itself. Layer: server/cli.
 #include <iostream>
 
+#include "core/session/service_path.hpp"
 #include "server/cli/remote_service.hpp"
 
 namespace rrgate {
@@ -64,12 +65,47 @@ rr::OrderedJson attributes_of(const rr::RemoteObject& root, const rr::TypeRegist
   return to_json(rr::Value(root.connection().attributes()), type, types);
 }
 
+bool is_device_of_gateway(std::string_view url) {
+  return url.starts_with("http") && url.find("/devices/") != std::string_view::npos;
+}
+
+/// Locks at, above and below an object, as the gateway's own service lists them. Robot Raconteur itself has no question
+/// for them.
+rr::OrderedJson locks_of(const RemoteAddress& address, std::string_view path) {
+  auto url = rr::parse_url(address.url).value();
+  if (url.path.ends_with('/')) url.path.pop_back();
+  const auto gateway = open_gateway(address);
+  const auto found = find_member(gateway, "locks");
+  auto out = rr::OrderedJson::array();
+  for (auto& lock : to_json(gateway.get("locks"), found.member->type, found.types())) {
+    const auto locked = lock["path"].get<std::string>();
+    const bool is_here = url.path.ends_with("/devices/" + rr::percent_encode(lock["device"].get<std::string>())) &&
+                         lock["service_name"] == url.service;
+    if (!is_here || !(rr::is_within(locked, path) || rr::is_within(path, locked))) continue;
+    lock.erase("device");
+    lock.erase("service_name");
+    out.push_back(std::move(lock));
+  }
+  return out;
+}
+
+/// "monitor lock arm.tool: a client of user alice".
+std::string lock_text(const rr::OrderedJson& lock) {
+  const auto kind = lock["kind"].get<std::string>();
+  const auto user = lock["user"].get<std::string>();
+  auto holder = user.empty() ? "" : "user " + user;
+  if (kind != "user") holder = holder.empty() ? "a client" : "a client of " + holder;
+  return (kind == "monitor" ? "monitor lock " : "lock ") + lock["path"].get<std::string>() + ": " + holder;
+}
+
 void print_description(const rr::OrderedJson& description) {
   std::cout << description["path"].get<std::string>() << ": " << description["type"].get<std::string>() << "\n";
   if (const auto text = description["documentation"].get<std::string>(); !text.empty())
     std::cout << "  " << first_line(text) << "\n";
   for (const auto& [name, value] : description["attributes"].items())
     std::cout << "  attribute " << name << ": " << rr::write_json(value) << "\n";
+  if (description.contains("locks"))
+    for (const auto& lock : description["locks"]) std::cout << "  " << lock_text(lock) << "\n";
   for (const auto& member : description["members"]) {
     std::cout << "  " << member["declaration"].get<std::string>() << "\n";
     if (const auto text = member["documentation"].get<std::string>(); !text.empty())
@@ -83,9 +119,17 @@ struct InfoOptions : RemoteOptions {
 
 int info(const InfoOptions& options) {
   return run_remote("info", options.url, [&] {
-    const auto root = open_service(remote_address(options));
+    const auto address = remote_address(options);
+    const auto root = open_service(address);
     const auto found = find_member(root, options.object);
     auto description = describe(found);
+    if (is_device_of_gateway(options.url)) {
+      try {
+        description["locks"] = locks_of(address, found.object.path());
+      } catch (const std::exception& refusal) {  // what the service is can be told all the same
+        std::cerr << "rrgate info: the gateway does not tell of locks: " << refusal.what() << "\n";
+      }
+    }
     if (options.object.empty()) description["attributes"] = attributes_of(root, found.types());
     if (found.member) {  // one member alone
       auto& members = description["members"];

@@ -9,9 +9,11 @@
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <iostream>
+#include <optional>
 #include <thread>
 
 #include "node/discovery/discovery.hpp"
+#include "server/cli/progress.hpp"
 #include "server/cli/remote_service.hpp"
 
 namespace rrgate {
@@ -19,6 +21,8 @@ namespace rrgate {
 namespace asio = boost::asio;
 
 namespace {
+
+constexpr std::chrono::milliseconds listen_step{100};
 
 struct FoundService {
   std::string node;
@@ -36,15 +40,21 @@ void add_services(std::vector<FoundService>& out, const rr::NodeServices& answer
 }
 
 /// Hears for `wait` who is there, then asks all for their services, side by side.
-rr::awaitable<void> find_services(rr::Discovery& discovery, std::chrono::milliseconds wait,
+rr::awaitable<void> find_services(rr::Discovery& discovery, std::chrono::milliseconds wait, bool shows_progress,
                                   std::vector<FoundService>& out) {
   asio::steady_timer timer(co_await asio::this_coro::executor);
   discovery.refresh();
-  timer.expires_after(wait);
-  co_await timer.async_wait(asio::as_tuple(asio::use_awaitable));
+  std::optional<Progress> progress;
+  if (shows_progress) progress.emplace("listening", wait.count());
+  for (auto heard = std::chrono::milliseconds(0); heard < wait; heard += listen_step) {
+    timer.expires_after(std::min(listen_step, wait - heard));
+    co_await timer.async_wait(asio::as_tuple(asio::use_awaitable));
+    if (progress) progress->show(static_cast<std::uint64_t>((heard + listen_step).count()));
+  }
   const auto nodes = discovery.detected_nodes();
   auto waiting = nodes.size();
   timer.expires_at(asio::steady_timer::time_point::max());
+  if (shows_progress) progress.emplace("asking nodes", waiting);
   for (const auto& node : nodes) {
     rr::ServiceQueryOptions options;
     options.dial.timeout = std::chrono::milliseconds(3000);
@@ -56,20 +66,23 @@ rr::awaitable<void> find_services(rr::Discovery& discovery, std::chrono::millise
                      else
                        out.push_back({node.node_name.empty() ? rr::format_node_id(node.node_id) : node.node_name, "",
                                       "", node.urls.front().url, failure ? "no answer" : answer.error().message});
-                     if (--waiting == 0) timer.cancel();
+                     --waiting;
+                     if (progress) progress->show(nodes.size() - waiting);
+                     if (waiting == 0) timer.cancel();
                    });
   }
   if (waiting > 0) co_await timer.async_wait(asio::as_tuple(asio::use_awaitable));
 }
 
-std::vector<FoundService> services_around(std::chrono::milliseconds wait) {
+std::vector<FoundService> services_around(std::chrono::milliseconds wait, bool shows_progress) {
   asio::io_context io;
   std::vector<FoundService> out;
   {
     rr::DiscoveryOptions options;
     options.report = [](const std::string& problem) { std::cerr << "rrgate ls: " << problem << "\n"; };
     rr::Discovery discovery(io, options);
-    asio::co_spawn(io, find_services(discovery, wait, out), [&](const std::exception_ptr&) { io.stop(); });
+    asio::co_spawn(io, find_services(discovery, wait, shows_progress, out),
+                   [&](const std::exception_ptr&) { io.stop(); });
     io.run();
   }
   return out;
@@ -93,7 +106,7 @@ std::vector<FoundService> services_of_node(const RemoteAddress& address) {
 
 /// Each service of each device, with the URL by which it is reached through the gateway.
 std::vector<FoundService> services_of_gateway(const std::string& web_url, RemoteAddress address) {
-  const auto base = web_url.substr(0, web_url.find('/', web_url.find("://") + 3));
+  const auto base = gateway_base(web_url);
   const auto gateway = open_gateway(std::move(address));
   const auto found = find_member(gateway, "devices");
   const auto devices = to_json(gateway.get("devices"), found.member->type, found.types());
@@ -123,7 +136,7 @@ struct ListOptions : RemoteOptions {
 std::vector<FoundService> list_services(const ListOptions& options) {
   std::vector<FoundService> out;
   if (options.url.empty()) {
-    out = services_around(std::chrono::seconds(options.wait));
+    out = services_around(std::chrono::seconds(options.wait), !options.watches);
   } else {
     const auto address = remote_address(options);
     out = options.url.starts_with("http") ? services_of_gateway(options.url, address) : services_of_node(address);
@@ -189,7 +202,7 @@ int ls(const ListOptions& options) {
 
 std::vector<std::string> find_service_urls(std::chrono::milliseconds wait) {
   std::vector<std::string> out;
-  for (auto& each : services_around(wait))
+  for (auto& each : services_around(wait, false))
     if (each.problem.empty()) out.push_back(std::move(each.url));
   return out;
 }

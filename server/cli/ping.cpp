@@ -3,6 +3,7 @@
 #include <iomanip>
 #include <iostream>
 
+#include "server/cli/progress.hpp"
 #include "server/cli/remote_service.hpp"
 
 namespace rrgate {
@@ -22,18 +23,31 @@ Milliseconds time_request(const rr::RemoteObject& root) {
   return steady_clock::now() - begin;
 }
 
+/// So many requests, one after the other. Throws   rr::Exception: one has failed.
+std::vector<Milliseconds> time_requests(const rr::RemoteObject& root, std::uint32_t count) {
+  std::vector<Milliseconds> times;
+  Progress progress("asking", count);
+  while (times.size() < count) {
+    times.push_back(time_request(root));
+    progress.show(times.size());
+  }
+  return times;
+}
+
 /// So many requests, of which `parallel` are under way at a time. Throws   rr::Exception: one has failed.
 std::vector<Milliseconds> time_requests(const rr::RemoteObject& root, const std::string& property, std::uint32_t count,
                                         std::uint32_t parallel) {
   std::vector<Milliseconds> times;
   std::optional<rr::Error> failure;
   std::uint32_t begun = 0;
+  Progress progress("asking", count);
   auto& connection = root.connection();
   std::function<void()> begin_one = [&] {
     if (begun == count || failure) return;
     ++begun;
     auto done = [&, begin = steady_clock::now()](const rr::Result<rr::Value>& answer) {
       times.emplace_back(steady_clock::now() - begin);
+      progress.show(times.size());
       if (!answer) failure = answer.error();
       begin_one();
     };
@@ -90,9 +104,7 @@ struct PingOptions : RemoteOptions {
 int ping(const PingOptions& options) {
   return run_remote("ping", options.url, [&] {
     const auto root = open_service(remote_address(options));
-    std::vector<Milliseconds> times;
-    for (std::uint32_t i = 0; i < options.count; ++i) times.push_back(time_request(root));
-    print_times(std::move(times), options.is_json);
+    print_times(time_requests(root, options.count), options.is_json);
   });
 }
 

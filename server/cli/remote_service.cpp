@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "node/tls/base64.hpp"
+#include "server/cli/stored_logins.hpp"
 #include "server/http/split_path.hpp"
 #include "server/json/value_from_json.hpp"
 
@@ -19,17 +20,10 @@ std::string environment(const char* name) {
   return value ? value : "";
 }
 
-/// "http://h:1/devices/arm?service=Arm" as "rr+ws://h:1/devices/arm?service=Arm"; empty for URLs of other schemes.
-std::string gateway_url(std::string_view url) {
-  for (const auto& [web, native] : {std::pair{"http://", "rr+ws://"}, std::pair{"https://", "rr+wss://"}})
-    if (url.starts_with(web)) return native + std::string(url.substr(std::string_view(web).size()));
-  return {};
-}
-
 /// Empty: no login.
-std::string authorization(const std::string& user, const std::string& password, const std::string& token) {
-  if (!token.empty()) return "Bearer " + token;
-  if (!user.empty()) return "Basic " + rr::encode_base64(rr::as_bytes(user + ":" + password));
+std::string authorization(const StoredLogin& login) {
+  if (!login.token.empty()) return "Bearer " + login.token;
+  if (!login.user.empty()) return "Basic " + rr::encode_base64(rr::as_bytes(login.user + ":" + login.password));
   return {};
 }
 
@@ -111,7 +105,9 @@ RemoteAddress remote_address(const RemoteOptions& options) {
     credentials.items.emplace_back("password", rr::Value(password));
     if (!user.empty()) out.options.credentials = rr::Value(std::move(credentials));
   } else {
-    const auto header = authorization(user, password, environment("RRGATE_TOKEN"));
+    StoredLogin login{user, password, environment("RRGATE_TOKEN")};
+    if (login.user.empty() && login.token.empty()) login = find_stored_login(gateway_base(url));
+    const auto header = authorization(login);
     if (!header.empty()) out.options.dial.headers.emplace_back("Authorization", header);
   }
   if (const auto parsed_url = rr::parse_url(out.url, rr::ServiceInUrl::optional); !parsed_url)
@@ -125,12 +121,22 @@ rr::RemoteObject open_service(const RemoteAddress& address) {
   return rr::connect(address.url, address.options);
 }
 
+std::string gateway_url(std::string_view url) {
+  for (const auto& [web, native] : {std::pair{"http://", "rr+ws://"}, std::pair{"https://", "rr+wss://"}})
+    if (url.starts_with(web)) return native + std::string(url.substr(std::string_view(web).size()));
+  return {};
+}
+
+std::string gateway_base(std::string_view url) {
+  url = url.substr(0, url.find_first_of("?#"));
+  url = url.substr(0, url.find("/devices/"));
+  while (url.ends_with('/')) url.remove_suffix(1);
+  return std::string(url);
+}
+
 rr::RemoteObject open_gateway(RemoteAddress address) {
-  auto url = rr::parse_url(address.url, rr::ServiceInUrl::optional).value();
-  url.path = "/";
-  // By its name, since a gateway with one relayed device leads whoever asks for no node to that.
-  url.query = "nodename=rrgate&service=gateway";
-  address.url = rr::format_url(url);
+  // By this path whatever its node is called: one with a single relayed device leads whoever asks at "/" to that.
+  address.url = gateway_base(address.url) + "/gateway?service=gateway";
   return open_service(address);
 }
 

@@ -41,7 +41,7 @@ CLI::Option* add_json(CLI::App& app, RemoteOptions& options);
 CLI::Option* add_count(CLI::App& app, const std::string& name, std::uint32_t& count, const std::string& summary);
 
 /// How a service is reached. The password of --user is that of $RRGATE_PASSWORD; a gateway's token that of
-/// $RRGATE_TOKEN.
+/// $RRGATE_TOKEN. Where neither is given, a gateway's login is the stored one.
 struct RemoteAddress {
   std::string url;  ///< a Robot Raconteur URL
   rr::ConnectOptions options = {};
@@ -52,6 +52,10 @@ struct RemoteAddress {
 /// the gateway's. Throws   NotUnderstood.
 RemoteAddress remote_address(const RemoteOptions& options);
 rr::RemoteObject open_service(const RemoteAddress& address);
+/// "rr+ws://h:1/devices/arm?service=Arm" of "http://h:1/devices/arm?service=Arm"; empty for URLs of other schemes.
+std::string gateway_url(std::string_view url);
+/// "http://h:1/robots" of "http://h:1/robots/devices/arm?service=Arm": by what a gateway goes, a path prefix included.
+std::string gateway_base(std::string_view url);
 /// The gateway's own service (org.rrgate.gateway). `address`  of anything at the gateway.
 rr::RemoteObject open_gateway(RemoteAddress address);
 

@@ -3,6 +3,7 @@
 #include <iostream>
 
 #include "node/platform/text_file.hpp"
+#include "server/cli/progress.hpp"
 #include "server/cli/remote_service.hpp"
 #include "server/http/endpoints/image_values.hpp"
 #include "server/json/arguments.hpp"
@@ -41,15 +42,45 @@ void deliver(const rr::Value& value, const rr::TypeDefinition& type, const rr::T
   if (!write_text_file(file, content)) throw std::runtime_error(file + ": can't be written");
 }
 
+/// Waits for a request, as BlockingConnection::wait_for(), and shows how much has passed meanwhile.
+template <class Start>
+rr::Value wait_showing_bytes(const rr::RemoteObject& object, const Start& start) {
+  auto& connection = object.connection();
+  const auto passed = [&connection] {
+    const auto& stats = connection.asynchronous().session().connection().stats();
+    return stats.bytes_received + stats.bytes_sent;
+  };
+  Progress progress("transferring");
+  const auto before = passed();
+  std::optional<rr::Result<rr::Value>> answer;
+  start(connection.asynchronous(), [&answer](rr::Result<rr::Value> result) { answer = std::move(result); });
+  const auto is_done = [&answer] { return answer.has_value(); };
+  constexpr std::uint64_t little = 100'000;  // it is not the transfer that takes its time
+  while (!connection.run_until(is_done, std::chrono::milliseconds(100)))
+    if (const auto bytes = passed() - before; bytes > little) progress.show(bytes);
+  if (!*answer) throw rr::ClientException(answer->error());
+  return std::move(**answer);
+}
+
+/// All of it.
+rr::Value read_memory(const rr::RemoteObject& object, const std::string& name) {
+  const auto count = object.memory(name).dimensions();
+  const rr::MemoryShape position(count.size(), 0);
+  return wait_showing_bytes(object, [&](auto& connection, auto done) {
+    connection.read_memory(object.path(), name, {position, count}, std::move(done));
+  });
+}
+
 void get_value(const RemoteMember& found, const ValueOptions& options) {
   const auto& name = found.member->name;
   rr::Value value;
-  if (found.member->kind == property)
-    value = found.object.get(name);
+  if (found.member->kind == memory)
+    value = read_memory(found.object, name);
   else if (found.member->kind == wire)
     value = found.object.peek_in(name);
   else
-    value = found.object.memory(name).read();
+    value = wait_showing_bytes(
+        found.object, [&](auto& connection, auto done) { connection.get(found.object.path(), name, std::move(done)); });
   deliver(value, found.member->type, found.types(), options);
 }
 
@@ -59,7 +90,9 @@ void set_value(const RemoteMember& found, const ValueOptions& options) {
       rr::value_from_json(read_json_argument(options.value, member.type), member.type, found.types(), {}, member.name);
   if (!value) throw NotUnderstood(value.error().message);
   if (member.kind == property)
-    found.object.set(member.name, *value);
+    wait_showing_bytes(found.object, [&](auto& connection, auto done) {
+      connection.set(found.object.path(), member.name, *value, std::move(done));
+    });
   else
     found.object.poke_out(member.name, *value);
 }
@@ -113,7 +146,9 @@ void call_function(const RemoteMember& found, const ValueOptions& options) {
     for (const auto& value : generator) deliver(value, type, found.types(), options);
     return;
   }
-  const auto result = found.object.call_values(member.name, values);
+  const auto result = wait_showing_bytes(found.object, [&](auto& connection, auto done) {
+    connection.call(found.object.path(), member.name, values, std::move(done));
+  });
   if (type.type != rr::DataType::void_t) deliver(result, type, found.types(), options);
 }
 

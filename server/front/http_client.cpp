@@ -21,6 +21,7 @@ namespace {
 constexpr std::size_t longest_way = 1024;
 
 constexpr std::string_view devices_prefix = "/devices/";
+constexpr std::string_view gateway_path = "/gateway";
 
 /// What a connection goes on as when HTTP is done with it; not valid() where it has ended.
 using Continuation = rr::awaitable<void>;
@@ -42,7 +43,8 @@ rr::awaitable<rr::error_code> write_refusal(GatewayState& gateway, rr::ByteStrea
   co_return co_await stream.write(slices);
 }
 
-/// Where an upgrade leads: by path, or at "/" by the node that native clients put into the query.
+/// Where an upgrade leads: by path, or at "/" by the node that native clients put into the query. "/gateway" is the
+/// gateway's own node, whatever its name is.
 rr::Result<Destination> find_destination(GatewayState& gateway, const Request& request) {
   const auto path = request.path();
   const auto not_found = [](std::string text) {
@@ -58,7 +60,8 @@ rr::Result<Destination> find_destination(GatewayState& gateway, const Request& r
     }
     return destination_of(gateway, *device);
   }
-  if (path != "/") return not_found("no WebSocket at " + rr::quote(path) + "; expected /devices/NAME or /");
+  if (path == gateway_path) return Destination{nullptr, &gateway.shared().node()};
+  if (path != "/") return not_found("no WebSocket at " + rr::quote(path) + "; expected /devices/NAME, /gateway or /");
   rr::NodeId node_id;
   if (const auto text = rr::query_value(request.query(), "nodeid")) {
     auto parsed = rr::parse_node_id(*text);

@@ -4,6 +4,7 @@
 #include "server/gateway/robdef_text.hpp"
 #include "server/log/log.hpp"
 #include "server/state/gateway_state.hpp"
+#include "server/upstream/service_locks.hpp"
 
 namespace rrgate {
 
@@ -28,6 +29,10 @@ DeviceConfig device_config(const rr::Node& node) {
   return config;
 }
 
+std::string to_string(HeldLock::Kind kind) {
+  return kind == HeldLock::Kind::user ? "user" : kind == HeldLock::Kind::client ? "client" : "monitor";
+}
+
 double seconds(std::chrono::microseconds time) {
   return std::chrono::duration<double>(time).count();
 }
@@ -48,6 +53,7 @@ void GatewayService::add_members() {
       [this] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun_).count(); });
   service_->property("devices").get([this] { return list_devices(); });
   service_->property("subscriptions").get([this] { return list_subscriptions(); });
+  service_->property("locks").get([this] { return list_locks(); });
   service_->function("find_device", [this](const std::string& wanted) {
     const auto* device = gateway_.devices().find(wanted);
     if (!device) throw rr::Exception(rr::make_error(rr::ErrorCode::key_not_found, "no device " + rr::quote(wanted)));
@@ -139,6 +145,20 @@ rr::Value GatewayService::list_subscriptions() const {
                                        {"age_p50", seconds(ledger.ages.quantile(0.5))},
                                        {"age_p99", seconds(ledger.ages.quantile(0.99))}}});
   });
+  return out;
+}
+
+rr::Value GatewayService::list_locks() const {
+  rr::List out;
+  for (const auto& device : gateway_.devices().all())
+    for (const auto& [service, locks] : device->locks())
+      for (auto& lock : locks->held())
+        out.items.push_back(rr::Structure{"org.rrgate.gateway.Lock",
+                                          {{"device", device->config().name},
+                                           {"service_name", service},
+                                           {"path", std::move(lock.path)},
+                                           {"kind", to_string(lock.kind)},
+                                           {"user", std::move(lock.by.name)}}});
   return out;
 }
 

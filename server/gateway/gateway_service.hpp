@@ -36,6 +36,7 @@ class GatewayService {
   rr::Value list_devices() const;
   rr::Value list_statistics() const;
   rr::Value list_subscriptions() const;
+  rr::Value list_locks() const;
 
   GatewayState& gateway_;
   rr::Node node_;

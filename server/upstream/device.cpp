@@ -153,6 +153,13 @@ std::shared_ptr<ServiceLocks> Device::locks_of(const std::string& service) {
   return locks;
 }
 
+std::map<std::string, std::shared_ptr<ServiceLocks>> Device::locks() const {
+  std::map<std::string, std::shared_ptr<ServiceLocks>> out;
+  for (const auto& [service, known] : locks_)
+    if (auto locks = known.lock()) out[service] = std::move(locks);
+  return out;
+}
+
 bool Device::can_become(const DeviceConfig& config) const {
   auto same = config;
   same.max_clients = config_.max_clients;

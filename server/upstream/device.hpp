@@ -70,6 +70,8 @@ class Device : public std::enable_shared_from_this<Device> {
   const Retry& retry() const { return retry_; }
   /// Of one service, for all sessions that the gateway has with it.
   std::shared_ptr<ServiceLocks> locks_of(const std::string& service);
+  /// The same for all services that clients use now, by their names.
+  std::map<std::string, std::shared_ptr<ServiceLocks>> locks() const;
   bool is_shared() const { return config_.mode == DeviceMode::shared; }
   /// Called when state() or identity() has changed.
   void on_change(std::function<void()> handler) { on_change_ = std::move(handler); }

@@ -440,6 +440,16 @@ bool LockTable::is_empty() const {
   return locks_.empty() && monitors_.empty() && lost_locks_.empty() && lost_monitors_.empty();
 }
 
+std::vector<HeldLock> LockTable::held() const {
+  std::vector<HeldLock> out;
+  for (const auto& [key, lock] : locks_)
+    if (lock.owner != 0)
+      out.push_back({lock.user.is_nobody() ? HeldLock::Kind::client : HeldLock::Kind::user, key, lock.by});
+  for (const auto& [key, monitor] : monitors_)
+    if (monitor.owner != 0) out.push_back({HeldLock::Kind::monitor, key, monitor.by});
+  return out;
+}
+
 rr::Result<> LockTable::check(LockClient client, std::string_view path, bool is_exempt, rr::TimePoint now) {
   if (is_empty()) return {};
   const auto key = canonical_lock_path(path);

@@ -16,6 +16,7 @@
 #include <string_view>
 #include <utility>
 #include <variant>
+#include <vector>
 
 #include "core/session/service/service_session.hpp"
 #include "server/access/identity.hpp"
@@ -60,6 +61,16 @@ struct LockSessionInDoubt {
 };
 using LockEvent = std::variant<LockAsked, LockAnswered, LockClientLeft, LockSessionInDoubt>;
 
+/// A lock that keeps others out now.
+struct HeldLock {
+  enum class Kind : std::uint8_t { user, client, monitor };
+  Kind kind = Kind::client;
+  std::string path;  ///< canonical
+  Subject by;        ///< as whom its owner has taken it
+
+  bool operator==(const HeldLock&) const = default;
+};
+
 class LockTable {
  public:
   // --- told ---
@@ -88,6 +99,8 @@ class LockTable {
   std::optional<LockEvent> poll_event();
   /// Whether nobody holds, waits for, or has lost anything.
   bool is_empty() const;
+  /// Those that a client holds, or is about to; without those that nobody holds any more.
+  std::vector<HeldLock> held() const;
   rr::TimePoint poll_timeout() const;
 
  private:

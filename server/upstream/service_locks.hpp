@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "server/upstream/lock_table.hpp"
 
@@ -30,6 +31,7 @@ class ServiceLocks : public std::enable_shared_from_this<ServiceLocks> {
                      std::function<void(const rr::Result<>&)> done);
   /// Whether the client may use an object now. See LockTable.
   rr::Result<> check(const UpstreamClient& client, std::string_view path, bool is_exempt);
+  std::vector<HeldLock> held() const { return table_.held(); }
   /// The upstream has lost its session with the device.
   void handle_lost(const Upstream& upstream);
   /// The device has replaced the objects at and below a path.

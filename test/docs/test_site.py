@@ -1,7 +1,9 @@
 """The site that `./dev docs` makes, as the gateway serves it."""
+import html
 import html.parser
 import http.client
 import json
+import re
 import urllib.parse
 
 import pytest
@@ -63,22 +65,36 @@ def test_the_reference_has_every_option_and_command(site):
     assert "unused_session_ms" in text and "opaque_rate" in text
     assert "rrgate check-config" in (SITE / "reference/commands.html").read_text()
     assert (SITE / "reference/rrgate-client/functions/connect.html").exists()
+    for page, names in {"device": ["make_generator_handler", "class Node", "class Service"], "client": ["async_connect", "class RemoteObject"],
+                        "subscribe": ["subscribe_service", "class Discovery"], "gateway": ["class EmbeddedGateway"],
+                        "beast": ["make_beast_stream"], "values": ["struct NodeId"]}.items():
+        text = html.unescape(re.sub("<[^>]*>", "", (SITE / f"reference/cpp/{page}.html").read_text()))
+        assert [name for name in names if name not in text] == [], page
 
 
-def test_the_gateway_serves_it(site, tmp_path):
+@pytest.mark.parametrize("prefix", ["", "/robots/lab"])
+def test_the_gateway_serves_it(site, tmp_path, prefix):
     port = free_port()
     (tmp_path / "site").mkdir()
-    (tmp_path / "gateway.json").write_text(json.dumps({"listen": [f"127.0.0.1:{port}"], "devices": [], "web_root": "site"}))
+    (tmp_path / "gateway.json").write_text(json.dumps({"listen": [f"127.0.0.1:{port}"], "devices": [], "web_root": "site",
+                                                       "base_path": prefix}))
     gateway = Background([BUILD / "server" / "rrgate", "serve", "--config", tmp_path / "gateway.json"], tmp_path / "log")
     try:
         gateway.wait_until(lambda: read_json(f"http://127.0.0.1:{port}/readyz"))
-        assert ask(port, "/docs")[:2] == (308, "docs/")
-        for path in ("/docs/", "/docs/start.html", "/docs/reference/rrgate-client/"):
-            status, _, policy = ask(port, path)
+        assert ask(port, prefix + "/docs")[:2] == (308, "docs/")
+        loads = set()
+        for path in ("/docs/", "/docs/start.html", "/docs/reference/rrgate-client/", "/docs/reference/cpp/client.html"):
+            status, _, policy, text = ask(port, prefix + path)
             assert status == 200 and "script-src 'self' 'wasm-unsafe-eval'" in policy and "unsafe-inline" not in policy
-        loads = {load for page in site.values() for load in page.loads}
-        assert [load for load in loads if ask(port, load)[0] != 200] == []
-        assert ask(port, "/docs/nothing.html")[0] == 404
+            page = Page(text)
+            assert [link for link in page.links if link.startswith("/") and not link.startswith(prefix + "/docs/")] == []
+            loads |= set(page.loads)
+        if prefix:  # what a script loads when it runs
+            assert any(f'"{prefix}/docs/' in ask(port, load)[3] for load in loads if load.endswith(".js"))
+        else:
+            loads |= {load for page in site.values() for load in page.loads}
+        assert len(loads) > 5 and [load for load in loads if ask(port, load)[0] != 200] == []
+        assert ask(port, prefix + "/docs/nothing.html")[0] == 404
     finally:
         gateway.stop()
 
@@ -88,7 +104,7 @@ def ask(port, path):
     try:
         connection.request("GET", path)
         answer = connection.getresponse()
-        answer.read()
-        return answer.status, answer.headers["Location"], answer.headers["Content-Security-Policy"]
+        text = answer.read().decode(errors="replace")
+        return answer.status, answer.headers["Location"], answer.headers["Content-Security-Policy"], text
     finally:
         connection.close()

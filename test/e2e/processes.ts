@@ -72,17 +72,23 @@ export class Program {
   }
 }
 
-/** A gateway of its own to one device. */
+/** A gateway of its own to one device; `more`: of its configuration. */
 export async function startGateway(
   device: string,
   deviceUrl: string,
   site: string,
+  more: object = {},
 ): Promise<{ program: Program; url: string }> {
   const port = await freePort();
   const config = path.join(mkdtempSync(path.join(tmpdir(), "rrgate-e2e-")), "gateway.json");
   writeFileSync(
     config,
-    JSON.stringify({ listen: [`127.0.0.1:${port}`], web_root: site, devices: [{ name: device, url: deviceUrl }] }),
+    JSON.stringify({
+      listen: [`127.0.0.1:${port}`],
+      web_root: site,
+      devices: [{ name: device, url: deviceUrl }],
+      ...more,
+    }),
   );
   const program = new Program(rrgate, ["serve", "--config", config]);
   program.start();

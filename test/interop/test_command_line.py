@@ -1,17 +1,23 @@
 """The commands of rrgate that use a device, against Reynard the Robot: directly, and through a gateway with users and
 without."""
+import contextlib
 import json
 import os
+import pty
+import re
 import socket
 import subprocess
 import sys
 import time
 
 import pytest
+import RobotRaconteur as RR
 
 from found_nodes import THEIRS, TYPE
 from gateways import RRGATE, Gateway
 from processes import BUILD, ROOT, Background, free_port
+from shared_sites import Site
+from tap import Tap
 from users import PASSWORDS, make_users
 
 DONE, FAILED, NOT_UNDERSTOOD, UNREACHABLE, REFUSED, DEVICE_ERROR = range(6)
@@ -61,18 +67,26 @@ def url(request, reynard, tmp_path_factory):
         yield reynard
         return
     gateway = Gateway(tmp_path_factory.mktemp("gateway"),
-                      {"devices": [{"name": "fox", "url": reynard, "mode": request.param}]})
+                      {"node": {"name": "lab.gateway"},
+                       "devices": [{"name": "fox", "url": reynard, "mode": request.param}]})
     gateway.wait_for("device online")
     yield f"http://127.0.0.1:{gateway.port}/devices/fox?service=reynard"
     gateway.process.stop()
 
 
 @pytest.fixture(scope="module")
-def guarded(reynard, tmp_path_factory):
+def token(tmp_path_factory):
+    """Its file and itself."""
+    file = tmp_path_factory.mktemp("tokens") / "tokens"
+    return file, run("token", file, "ci", "--roles", "operator")
+
+
+@pytest.fixture(scope="module")
+def guarded(reynard, token, tmp_path_factory):
     folder = tmp_path_factory.mktemp("guarded")
     make_users(folder)
     gateway = Gateway(folder, {"devices": [{"name": "fox", "url": reynard, "mode": "shared"}],
-                               "access": {"users_file": "users", "rules": RULES}})
+                               "access": {"users_file": "users", "tokens_file": str(token[0]), "rules": RULES}})
     gateway.wait_for("device online")
     yield f"http://127.0.0.1:{gateway.port}/devices/fox?service=reynard"
     gateway.process.stop()
@@ -157,6 +171,31 @@ def test_what_a_service_has_is_told(url):
     assert "wire ReynardState state [readonly]" in run("robdef", url)
 
 
+def test_locks_of_a_gateways_device_are_told(node, tmp_path):
+    site = Site(tmp_path, node, {"login": {"username": "gateway", "password": "secret"}})
+    url = f"http://127.0.0.1:{site.port}/devices/interop?service=guarded"
+
+    def locks(*path):
+        return json.loads(run("info", url, *path, "--json"))["locks"]
+
+    try:
+        assert locks() == []
+        tool = site.connect().get_tools(0)
+        site.node.RequestObjectLock(tool, RR.RobotRaconteurObjectLockFlags_CLIENT_LOCK)
+        held = {"path": "guarded.tools[0]", "kind": "client", "user": ""}
+        assert locks() == [held] and locks("tools/0") == [held] and locks("tools/1") == []
+        assert "  lock guarded.tools[0]: a client\n" in run("info", url)
+        site.node.ReleaseObjectLock(tool)
+        assert locks() == []
+        arm = site.connect("guarded", "alice")
+        site.node.RequestObjectLock(arm, RR.RobotRaconteurObjectLockFlags_USER_LOCK)
+        assert locks("tools/0") == [{"path": "guarded", "kind": "user", "user": "alice"}]
+        assert "  lock guarded: user alice\n" in run("info", url)
+        assert "locks" not in json.loads(run("info", site.url.split("?")[0] + "?service=plain", "--json"))
+    finally:
+        site.stop()
+
+
 def test_values_are_watched(url):
     lines = [json.loads(line) for line in run("watch", url, "state", "--count", "3", "--json").splitlines()]
     times = [line["value"]["time"] for line in lines]
@@ -196,6 +235,49 @@ def test_many_requests_are_timed_side_by_side(url):
     assert times["count"] == 200 and times["per_second"] > 0
     assert json.loads(run("bench", url, "color", "--count", "20", "--json"))["count"] == 20
     assert Ran(["bench", url, "say", "--count", "20"]).refused(NOT_UNDERSTOOD, "'say' is a function", "property")
+
+
+def shown_on_terminal(*arguments):
+    """What somebody at a terminal sees on standard error."""
+    terminal, theirs = pty.openpty()
+    with subprocess.Popen([RRGATE, *map(str, arguments)], stdout=subprocess.DEVNULL, stderr=theirs) as process:
+        os.close(theirs)
+        shown = b""
+        with contextlib.suppress(OSError):  # it has ended
+            while piece := os.read(terminal, 4096):
+                shown += piece
+        os.close(terminal)
+    assert process.returncode == DONE, shown
+    return shown.decode()
+
+
+@pytest.mark.parametrize("command, words", [
+    (["ls", "--wait", "1"], r"listening \[#+\.+\]  \d\d %"),
+    (["ping", "URL", "--count", "3000"], r"asking \[#+\.+\]  \d\d %"),
+    (["bench", "URL", "--count", "20000"], r"asking \[#+\.+\]  \d\d %")])
+def test_who_waits_at_a_terminal_sees_how_far_it_is(reynard, command, words):
+    command = [reynard if word == "URL" else word for word in command]
+    shown = shown_on_terminal(*command)
+    assert re.search(words, shown) and shown.endswith("\r\x1b[K"), shown
+    assert Ran(command).error == ""  # no terminal
+
+
+def test_who_waits_for_much_to_pass_sees_how_much_it_is(reynard, tmp_path):
+    def take_time(data):
+        time.sleep(0.01)
+        return data
+
+    port = reynard.split(":")[2].split("/")[0]
+    line = Tap(int(port), take_time)
+    words = tmp_path / "words"
+    words.write_text("x" * 8_000_000)
+    try:
+        slow = reynard.replace(f":{port}/", f":{line.port}/")
+        shown = shown_on_terminal("call", slow, "say", f"@{words}")
+        assert re.search(r"transferring \d+\.\d MB", shown) and shown.endswith("\r\x1b[K"), shown
+        assert "transferring" not in shown_on_terminal("call", slow, "say", "little")
+    finally:
+        line.close()
 
 
 def test_values_go_to_files(reynard, tmp_path):
@@ -324,6 +406,47 @@ def test_logins_and_rights_of_a_gateway(guarded):
     assert Ran(["get", guarded, "color", "--user", "vera"], **as_user("vera", "guess")).refused(REFUSED, "401")
     assert Ran(["get", guarded, "color"]).refused(REFUSED, "not logged in")
     assert Ran(["get", guarded, "color", "--user", "vera"]).refused(NOT_UNDERSTOOD, "RRGATE_PASSWORD")
+
+
+def test_logins_are_kept_in_a_file(guarded, token, tmp_path):
+    base = guarded.split("/devices/")[0]
+    file = tmp_path / "rrgate" / "logins.json"
+    file.parent.mkdir()
+    environment = {"XDG_CONFIG_HOME": str(tmp_path)}
+
+    def write(content, mode=0o600):
+        file.write_text(content if isinstance(content, str) else json.dumps(content))
+        file.chmod(mode)
+
+    def is_refused(code, *words):
+        return Ran(["get", guarded, "color"], environment=environment).refused(code, *words)
+
+    alice = {"user": "alice", "password": PASSWORDS["alice"]}
+    write({"gateways": {"https://other.lab": {"token": "x"}, base + "/": alice}})
+    run("set", guarded, "color", "[0.5, 0.5, 1]", environment=environment)
+    assert run("ls", base, environment=environment).endswith(guarded)
+    write({"gateways": {base: {"token": token[1]}}})
+    run("set", guarded, "color", "[0.5, 0.5, 1]", environment=environment)
+    vera = {**environment, "RRGATE_PASSWORD": PASSWORDS["vera"]}  # what the command line says, holds
+    assert Ran(["set", guarded, "color", "[1, 1, 1]", "--user", "vera"], environment=vera).refused(REFUSED, "vera")
+    assert Ran(["get", guarded, "color"], environment={**environment, "RRGATE_TOKEN": "guess"}).refused(REFUSED, "401")
+    write({"gateways": {base: {"token": "guess"}}})
+    assert is_refused(REFUSED, "401")
+    write({"gateways": {"http://127.0.0.1": alice}})  # another port
+    assert is_refused(REFUSED, "not logged in")
+    home = {"XDG_CONFIG_HOME": "", "HOME": str(tmp_path)}
+    (tmp_path / ".config").mkdir()
+    (tmp_path / ".config" / "rrgate").symlink_to(file.parent)
+    write({"gateways": {base: alice}})
+    assert run("get", guarded, "color", environment=home).startswith("[")
+
+    write({"gateways": {base: alice}}, 0o640)
+    assert is_refused(NOT_UNDERSTOOD, str(file), "others", "chmod 600")
+    for content, word in ("{", "not JSON"), ({base: alice}, '"gateways"'), \
+            ({"gateways": {"lab": alice}}, "'lab'"), ({"gateways": {base: {"user": "alice"}}}, '"password"'), \
+            ({"gateways": {base: {"token": ""}}}, '"token"'):
+        write(content)
+        assert is_refused(NOT_UNDERSTOOD, str(file), word)
 
 
 def test_a_gateway_for_one_device_needs_no_file(reynard, tmp_path):

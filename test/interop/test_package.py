@@ -74,6 +74,14 @@ def answer_of(gateway, port, path, **how):
             time.sleep(0.05)
 
 
+def test_nothing_tells_where_it_was_built():
+    debs = sorted(PACKAGES.glob("*_amd64.deb"))
+    assert [deb.name.split("_")[0] for deb in debs] == ["rrgate", "rrgate-dev"]
+    for deb in debs:
+        files = subprocess.run(["dpkg-deb", "--fsys-tarfile", deb], capture_output=True, check=True, timeout=120).stdout
+        assert str(ROOT).encode() not in files, deb.name
+
+
 def test_what_is_where(root):
     assert root.run("stat", "-c", "%U:%G %a", "/etc/rrgate", "/etc/rrgate/gateway.json", "/var/lib/rrgate",
                     "/var/log/rrgate").stdout.split("\n")[:4] == \

@@ -187,23 +187,41 @@ TEST_CASE("the documentation comes with the dashboard, from the program's tree o
   CHECK(documentation_folder(root.folder / "web", bin) == root.folder / "web/docs");
 }
 
-TEST_CASE("the documentation is at the root of a host") {
+TEST_CASE("the documentation is below a path as at the root of a host") {
   boost::asio::io_context io;
   WebRoot root;
   root.write("web/docs/index.html", "<html>guide");
+  const std::string links =
+      R"(<a href="/docs/x"> <code>/docs/</code> https://a.b/docs/ "{\"base\":\"/docs/\"}" url(/docs/y))";
+  for (const auto* name : {"page.html", "page.js", "page.js.gz", "page.css", "page.txt"})
+    root.write(std::string("web/docs/") + name, links);
   Config config;
   config.web_root = (root.folder / "web").string();
   Gateway gateway(io, std::move(config));
   const auto get = [&](const std::string& path, const std::string& prefix = "") {
     auto asked = request(http::verb::get, path);
     asked.arrival.prefix = prefix;
+    asked.message.set(http::field::accept_encoding, "gzip");
     return gateway.router().answer(asked);
   };
   CHECK(*get("/docs/").body == "<html>guide");
   CHECK(header(get("/docs/"), "Content-Security-Policy") == header(get("/"), "Content-Security-Policy"));
   CHECK(get("/docs").status == 308);
   CHECK(header(get("/docs"), "Location") == "docs/");
-  CHECK(get("/docs/", "/robots").status == 404);
+  CHECK(*get("/docs/", "/robots").body == "<html>guide");
+  const std::string below =
+      R"(<a href="/a/b/docs/x"> <code>/docs/</code> https://a.b/docs/ "{\"base\":\"/a/b/docs/\"}" url(/a/b/docs/y))";
+  for (const auto* name : {"page.html", "page.js", "page.css"}) {
+    CHECK(*get(std::string("/docs/") + name, "/a/b").body == below);
+    CHECK(*get(std::string("/docs/") + name).body == links);
+  }
+  CHECK(*get("/docs/page.txt", "/a/b").body == links);
+  CHECK(header(get("/docs/page.js", "/a/b"), "Content-Encoding").empty());
+  CHECK(get("/docs/nothing.html", "/a/b").status == 404);
+  auto known = request(http::verb::get, "/docs/page.html");
+  known.arrival.prefix = "/a/b";
+  known.message.set(http::field::if_none_match, header(get("/docs/page.html"), "ETag"));
+  CHECK(gateway.router().answer(known).status == 304);
 }
 
 TEST_CASE("a file that changes is read again") {

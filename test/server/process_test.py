@@ -156,6 +156,17 @@ class Demo(Files):
                          [("create", "relay", "online"), ("webcams", "shared", "online")])
 
 
+    def test_what_can_be_simulated_is_listed(self):
+        listed = run("demo", "--list")
+        self.assertEqual((listed.returncode, listed.stderr), (0, ""))
+        self.assertEqual([line.split()[0] for line in listed.stdout.splitlines()], ["create", "webcams"])
+        with urllib.request.urlopen(self.start("webcams") + "api/v1/devices", timeout=10) as answer:
+            self.assertEqual([each["name"] for each in json.load(answer)["devices"]], ["webcams"])
+        unknown = run("demo", "fox")
+        self.assertEqual((unknown.returncode, unknown.stdout), (2, ""))
+        self.assertIn("fox", unknown.stderr)
+        self.assertIn("webcams", unknown.stderr)
+
     def test_other_machines_come_with_a_password(self):
         url = self.start("--lan")
         password = next(line for line in self.said if line.startswith("rrgate demo: user demo, ")).split()[-1]

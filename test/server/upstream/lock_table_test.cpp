@@ -108,6 +108,23 @@ TEST_CASE("others are kept out from the moment in which the device is asked") {
   CHECK(t.may(holder));
 }
 
+TEST_CASE("what is held is told, and as whom it was taken") {
+  Transcript t;
+  const auto alice = t.shares(1, "alice"), nobody = t.shares(2);
+  CHECK(t.table.held().empty());
+  t.takes(alice, LockCommand::lock_for_user, shared, "s.a[01]");
+  t.takes(nobody, LockCommand::lock_for_client, shared, "s.b");
+  t.wants(nobody, LockCommand::enter_monitor, "s");
+  t.device_says(t.asked(LockCommand::enter_monitor));
+  t.answered(nobody);
+  const Subject as_alice{Subject::Kind::user, "alice"};
+  CHECK(t.table.held() == std::vector<HeldLock>{{HeldLock::Kind::user, "s.a[1]", as_alice},
+                                                {HeldLock::Kind::client, "s.b", {}},
+                                                {HeldLock::Kind::monitor, "s", {}}});
+  t.table.remove(nobody, t.now);  // the device is to take back what nobody holds
+  CHECK(t.table.held() == std::vector<HeldLock>{{HeldLock::Kind::user, "s.a[1]", as_alice}});
+}
+
 TEST_CASE("locks do not overlap") {
   Transcript t;
   const auto holder = t.shares(1), other = t.shares(2);
