@@ -31,7 +31,8 @@ void deliver(const rr::Value& value, const rr::TypeDefinition& type, const rr::T
   std::string content;
   if (file.ends_with(".png") || file.ends_with(".jpg") || file.ends_with(".jpeg")) {
     if (!is_image_type(type, types)) throw NotUnderstood("its value is no image: " + rr::format_type(type));
-    auto image = image_bytes(value, type, types, file.ends_with(".png") ? png_type : jpeg_type);
+    const auto work = prepare_image(value, type, types, file.ends_with(".png") ? png_type : jpeg_type);
+    auto image = work ? encode_image(*work) : work.error();
     if (!image) throw rr::ClientException(image.error());
     content = std::move(*image);
   } else {

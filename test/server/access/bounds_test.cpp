@@ -14,6 +14,7 @@ using std::chrono::seconds;
 namespace {
 
 const auto day = std::chrono::system_clock::time_point(seconds(1'900'000'000));
+const auto start = std::chrono::steady_clock::time_point(seconds(1000));
 
 }  // namespace
 
