@@ -49,11 +49,13 @@ rr::Result<Identity> by_proxy(const Request& request, const Connection& connecti
 rr::awaitable<rr::Result<Identity>> HttpAccess::identify(const Request& request, const Connection& connection,
                                                          const Config& config) {
   const auto& client = request.arrival.peer;
-  const auto proven = [this, &client](Identity identity) {
+  const auto face = request.identity.face;
+  const auto proven = [this, &client, face](Identity identity) {
     identity.client = client;
+    identity.face = face;
     return access_.with_grants(std::move(identity));
   };
-  if (access_.is_open()) co_return access_.anonymous(client);
+  if (access_.is_open()) co_return access_.anonymous(client, face);
   auto told = by_proxy(request, connection, config);
   if (!told) co_return told.error();
   if (told->is_proven()) co_return proven(std::move(*told));
@@ -63,8 +65,11 @@ rr::awaitable<rr::Result<Identity>> HttpAccess::identify(const Request& request,
   if (bearer && (state.tokens || state.jwt)) {
     auto identity = by_token(*bearer);
     if (!identity) {
-      const auto nobody = access_.anonymous(client);
-      access_.record_refusal({"login_failed", &nobody, nullptr, identity.error().message});
+      const auto nobody = access_.anonymous(client, face);
+      access_.record_refusal({.event = "login_failed",
+                              .who = &nobody,
+                              .detail = identity.error().message,
+                              .outcome = Outcome::refused});
       co_return identity.error();
     }
     co_return proven(std::move(*identity));
@@ -80,12 +85,13 @@ rr::awaitable<rr::Result<Identity>> HttpAccess::identify(const Request& request,
       auto identity = access_.tickets().redeem(*ticket, std::chrono::system_clock::now());
       if (!identity) co_return refused("the ticket is unknown, was used, or is older than 30 seconds");
       identity->client = client;
+      identity->face = face;
       identity = access_.renew(*identity);
       if (!identity) co_return refused("what the ticket was given for was revoked or has expired");
       co_return std::move(*identity);
     }
   if (connection.identity.proof == Proof::certificate) co_return proven(connection.identity);
-  co_return access_.anonymous(client);
+  co_return access_.anonymous(client, face);
 }
 
 rr::Result<Identity> HttpAccess::by_token(std::string_view token) const {
@@ -104,9 +110,10 @@ rr::awaitable<rr::Result<Identity>> HttpAccess::by_password(std::string credenti
   attempt.username = text.substr(0, colon);
   attempt.credentials.items.emplace_back("password", rr::Value(std::string_view(text).substr(colon + 1)));
   const auto client = from.client;
+  const auto face = from.face;
   const auto user = co_await logins_.judge(std::move(attempt), std::move(from), Logins::Of::request);
   if (!user) co_return user.error();
-  co_return access_.logged_in(*user, client);
+  co_return access_.logged_in(*user, client, face);
 }
 
 Response HttpAccess::refusal(const Identity& who, const rr::Error& error) const {
