@@ -28,8 +28,7 @@ class Workers {
   template <class Work>
   rr::awaitable<std::invoke_result_t<Work>> run(Work work) {
     auto working = perform(std::move(work));
-    auto result =
-        co_await boost::asio::co_spawn(pool_.get_executor(), std::move(working), boost::asio::use_awaitable);
+    auto result = co_await boost::asio::co_spawn(pool_.get_executor(), std::move(working), boost::asio::use_awaitable);
     co_return std::move(*result);
   }
 
