@@ -342,7 +342,9 @@ void Access::tend_audit(bool is_forced) {
   if (is_failing == std::exchange(is_failing_, is_failing)) return;
   if (is_failing)
     log(LogLevel::error, "audit log can't be written",
-        {{"error", state.failure}, {"waiting", state.waiting}, {"fail_closed", state_->config.audit.fails_closed ? 1 : 0}});
+        {{"error", state.failure},
+         {"waiting", state.waiting},
+         {"fail_closed", state_->config.audit.fails_closed ? 1 : 0}});
   else
     log(LogLevel::info, "audit log can be written again", {{"lost", state.lost}, {"refused", state.refused}});
 }
@@ -352,7 +354,8 @@ Access::~Access() {
   if (!audit_->is_used()) return;
   (void)audit_->flush(std::chrono::seconds(1));
   const auto state = audit_->state();
-  log(LogLevel::info, "audit log ends", {{"record", state.chain.seq}, {"hash", state.chain.hash}, {"lost", state.lost}});
+  log(LogLevel::info, "audit log ends",
+      {{"record", state.chain.seq}, {"hash", state.chain.hash}, {"lost", state.lost}});
 }
 
 }  // namespace rrgate

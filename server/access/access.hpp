@@ -59,7 +59,8 @@ class Access {
   void reload(bool is_forced);
 
   /// Whether somebody may do something. Refusals go into the audit log.
-  /// Errors   permission_denied: a sentence for the client; out_of_system_resource: it has to be recorded, and can't be.
+  /// Errors   permission_denied: a sentence for the client; out_of_system_resource: it has to be recorded, and can't
+  /// be.
   [[nodiscard]] rr::Result<> check(const Identity& who, const AccessRequest& what);
   /// What is to be recorded of something that may be done: writes, calls, locks, subscriptions. `event`  a literal;
   /// empty: the verb.

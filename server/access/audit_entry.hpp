@@ -13,7 +13,8 @@ namespace rrgate {
 class AuditEntry {
  public:
   /// `event`  the name of the record; a literal. Of `what` all is copied.
-  AuditEntry(std::shared_ptr<AuditLog> log, Identity who, const AccessRequest& what, std::string_view event, std::string_view trace)
+  AuditEntry(std::shared_ptr<AuditLog> log, Identity who, const AccessRequest& what, std::string_view event,
+             std::string_view trace)
       : log_(std::move(log)),
         who_(std::move(who)),
         device_(what.device),

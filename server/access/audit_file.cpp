@@ -129,8 +129,8 @@ rr::Result<> AuditFile::rotate() {
   for (auto number = config_.keep; number > 1; --number) ::rename(name(number - 1).c_str(), name(number).c_str());
   // Where somebody else has renamed it, there is nothing left to do.
   if (::rename(config_.file.c_str(), name(1).c_str()) != 0 && errno != ENOENT)
-    return rr::make_error(rr::ErrorCode::io_error, "audit file " + rr::quote(config_.file, 200) +
-                                                       " can't be renamed: " + system_text());
+    return rr::make_error(rr::ErrorCode::io_error,
+                          "audit file " + rr::quote(config_.file, 200) + " can't be renamed: " + system_text());
   return reopen();
 }
 

@@ -11,8 +11,8 @@
 
 namespace rrgate {
 
-/// Used by one thread at a time. Beside a regular file FILE goes FILE.head, 86 bytes with the number and the hash of the
-/// last record: what is cut off the end of FILE is missed when it is verified, and by the next start.
+/// Used by one thread at a time. Beside a regular file FILE goes FILE.head, 86 bytes with the number and the hash of
+/// the last record: what is cut off the end of FILE is missed when it is verified, and by the next start.
 class AuditFile {
  public:
   /// Opens the file with mode 0600, made where it is not there, and finds where its chain has got to.
@@ -48,7 +48,7 @@ class AuditFile {
   AuditConfig config_;
   AuditChain chain_;
   int file_ = -1;
-  int head_ = -1;            ///< -1: no regular file, or it can't be made
+  int head_ = -1;  ///< -1: no regular file, or it can't be made
   bool is_regular_ = false;
   std::uint64_t size_ = 0;
   bool is_new_ = true;       ///< the next record is the first of the file or of a start

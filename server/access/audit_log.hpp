@@ -18,19 +18,20 @@
 
 namespace rrgate {
 
-/// May be used from any thread; none but its own waits for the disk, open() and the destructor apart. Records that can't
-/// be written wait, up to max_waiting_bytes; above, they are lost and counted. Writing is tried again each second.
+/// May be used from any thread; none but its own waits for the disk, open() and the destructor apart. Records that
+/// can't be written wait, up to max_waiting_bytes; above, they are lost and counted. Writing is tried again each
+/// second.
 class AuditLog {
  public:
   static constexpr std::size_t max_waiting_bytes = 8u * 1024 * 1024;
   struct State {
-    std::string failure = {};     ///< why nothing can be written; empty: it can
-    std::string found = {};       ///< what was wrong with the file when it was opened; empty: nothing
-    AuditChain chain = {};        ///< of what is written
-    std::uint64_t records = 0;    ///< that were written
-    std::uint64_t lost = 0;       ///< that were not, and will not be
-    std::uint64_t refused = 0;    ///< what admit() has refused
-    std::size_t waiting = 0;      ///< records
+    std::string failure = {};   ///< why nothing can be written; empty: it can
+    std::string found = {};     ///< what was wrong with the file when it was opened; empty: nothing
+    AuditChain chain = {};      ///< of what is written
+    std::uint64_t records = 0;  ///< that were written
+    std::uint64_t lost = 0;     ///< that were not, and will not be
+    std::uint64_t refused = 0;  ///< what admit() has refused
+    std::size_t waiting = 0;    ///< records
   };
 
   AuditLog() = default;

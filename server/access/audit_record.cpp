@@ -32,9 +32,8 @@ std::string hash_of(std::string_view previous, std::string_view text) {
 }
 
 bool is_hash(std::string_view text) {
-  return text.size() == hash_digits && std::all_of(text.begin(), text.end(), [](char c) {
-           return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f');
-         });
+  return text.size() == hash_digits &&
+         std::all_of(text.begin(), text.end(), [](char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); });
 }
 
 }  // namespace

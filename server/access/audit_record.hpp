@@ -1,7 +1,7 @@
 // One record of the audit log: its text, and the chain that joins it to the one before. Layer: server/access.
 //
-// A record is a line: {"seq":17,...,"hash":"<64 hex digits>"}. Its hash is the SHA-256 of the previous record's hash (as
-// digits) and of this record's text without its hash, {"seq":17,...}. The first record of a file or of a start also
+// A record is a line: {"seq":17,...,"hash":"<64 hex digits>"}. Its hash is the SHA-256 of the previous record's hash
+// (as digits) and of this record's text without its hash, {"seq":17,...}. The first record of a file or of a start also
 // says the hash before it, as "prev".
 #pragma once
 
@@ -47,9 +47,9 @@ struct AuditChain {
 /// A line as it was read.
 struct AuditLine {
   std::uint64_t seq = 0;
-  std::string hash;                         ///< that it claims
+  std::string hash;                          ///< that it claims
   std::optional<std::string> previous = {};  ///< hash that it claims the record before has
-  std::string_view text;                    ///< what is hashed, without the closing '}'
+  std::string_view text;                     ///< what is hashed, without the closing '}'
 };
 /// `line`  borrowed, without '\n'. nullopt: no record.
 std::optional<AuditLine> parse_audit_line(std::string_view line);

@@ -140,10 +140,10 @@ rr::Result<AuditTrail> verify_audit_files(const std::vector<std::string>& files)
   }
   for (std::size_t i = 0; i < heads.size(); ++i)
     if (const auto& [seq, hash] = heads[i].chain; hashes[i] != hash)
-      trail.findings.push_back({heads[i].file, 0,
-                                hashes[i].empty() ? "an end at " + name_of(trail.last.seq)
-                                                  : name_of(seq) + " with hash " + hashes[i],
-                                name_of(seq) + " with hash " + hash + ", as " + heads[i].file + ".head says"});
+      trail.findings.push_back(
+          {heads[i].file, 0,
+           hashes[i].empty() ? "an end at " + name_of(trail.last.seq) : name_of(seq) + " with hash " + hashes[i],
+           name_of(seq) + " with hash " + hash + ", as " + heads[i].file + ".head says"});
   return trail;
 }
 

@@ -42,8 +42,8 @@ void interrupt_audit(int) {
 /// "15m", "2h", "7d" ago, or a time as records have it, or its beginning. nullopt: neither.
 std::optional<std::string> parse_since(const std::string& text) {
   const bool is_time = text.size() >= 4 && std::all_of(text.begin(), text.end(), [](char c) {
-    return std::string_view("0123456789-:.TZ").find(c) != std::string_view::npos;
-  });
+                         return std::string_view("0123456789-:.TZ").find(c) != std::string_view::npos;
+                       });
   if (is_time || text.empty()) return text;
   const auto count = text.substr(0, text.size() - 1);
   if (count.empty() || count.size() > 6 || count.find_first_not_of("0123456789") != std::string::npos)
@@ -157,8 +157,8 @@ int verify(const AuditOptions& options) {
     std::cout << "no records\n";
   else
     std::cout << trail->records << " records, " << trail->first << " to " << trail->last.seq << ", the last with hash "
-              << trail->last.hash << ": " << (trail->findings.empty() ? "as they were written" : "NOT as they were written")
-              << "\n";
+              << trail->last.hash << ": "
+              << (trail->findings.empty() ? "as they were written" : "NOT as they were written") << "\n";
   return trail->findings.empty() ? exit_ok : exit_failed;
 }
 

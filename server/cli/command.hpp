@@ -10,8 +10,8 @@
 
 namespace rrgate {
 
-/// Exit codes: done; failed while running; not understood (arguments or configuration); of `audit`, a file that can't be
-/// read, which says nothing of its chain.
+/// Exit codes: done; failed while running; not understood (arguments or configuration); of `audit`, a file that can't
+/// be read, which says nothing of its chain.
 enum ExitCode { exit_ok = 0, exit_failed = 1, exit_usage = 2, exit_unreadable = 3 };
 
 /// A command before the program runs it: its options, bound to `values`.

@@ -26,10 +26,13 @@ enum class Rejection {
   rate,          ///< asked for more than "rates" allow
   audit,         ///< would be recorded, and can't be: "audit.fail_closed"
 };
-inline constexpr std::array<std::string_view, 14> rejection_names = {
-    "too_many", "unknown_protocol", "tls",         "proxy_header",   "bad_request",  "host",
-    "origin",   "no_such_device",   "device_full", "device_offline", "unauthorized", "forbidden",
-    "rate",     "audit"};
+inline constexpr std::array<std::string_view, 14> rejection_names = {"too_many",     "unknown_protocol",
+                                                                     "tls",          "proxy_header",
+                                                                     "bad_request",  "host",
+                                                                     "origin",       "no_such_device",
+                                                                     "device_full",  "device_offline",
+                                                                     "unauthorized", "forbidden",
+                                                                     "rate",         "audit"};
 
 struct Metrics {
   std::uint64_t connections = 0;  ///< accepted

@@ -12,10 +12,10 @@ rr::Result<> may_relay(GatewayState& gateway, const Connection& connection, cons
   return allowed;
 }
 
-rr::awaitable<rr::Result<std::unique_ptr<Boarding>>> board(GatewayState& gateway, const Connection& connection, Device& device,
-                                                         std::string way) {
-  const auto entry = gateway.access().begin(
-      connection.identity, {.device = device.config().name, .verb = Verb::call}, {}, "relay");
+rr::awaitable<rr::Result<std::unique_ptr<Boarding>>> board(GatewayState& gateway, const Connection& connection,
+                                                           Device& device, std::string way) {
+  const auto entry =
+      gateway.access().begin(connection.identity, {.device = device.config().name, .verb = Verb::call}, {}, "relay");
   const auto refused = [&entry](rr::Error error) {
     if (entry) entry->finish(error);
     return error;

@@ -118,8 +118,7 @@ AuditEntryPtr SessionRights::begin(const rr::MemberAccess& admitted) {
 }
 
 AuditEntryPtr SessionRights::begin_lock(const rr::LockWanted& wanted, const rr::AuthenticatedUser* user) {
-  const bool is_release =
-      wanted.command == rr::LockCommand::unlock || wanted.command == rr::LockCommand::exit_monitor;
+  const bool is_release = wanted.command == rr::LockCommand::unlock || wanted.command == rr::LockCommand::exit_monitor;
   return begin({.path = wanted.path, .verb = Verb::lock}, user, is_release ? "unlock" : "lock");
 }
 

@@ -66,10 +66,8 @@ rr::awaitable<rr::Result<Identity>> HttpAccess::identify(const Request& request,
     auto identity = by_token(*bearer);
     if (!identity) {
       const auto nobody = access_.anonymous(client, face);
-      access_.record_refusal({.event = "login_failed",
-                              .who = &nobody,
-                              .detail = identity.error().message,
-                              .outcome = Outcome::refused});
+      access_.record_refusal(
+          {.event = "login_failed", .who = &nobody, .detail = identity.error().message, .outcome = Outcome::refused});
       co_return identity.error();
     }
     co_return proven(std::move(*identity));
