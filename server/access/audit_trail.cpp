@@ -106,6 +106,7 @@ std::vector<Head> read_heads(const std::vector<std::string>& files) {
 
 rr::Result<std::vector<std::string>> sort_audit_files(std::vector<std::string> files) {
   std::multimap<std::uint64_t, std::string> sorted;
+  std::erase_if(files, [](const std::string& file) { return file.ends_with(".head"); });  // as FILE* gives
   for (auto& file : files) {
     std::ifstream in(file);
     if (!in) return unreadable(file);

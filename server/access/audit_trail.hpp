@@ -25,7 +25,7 @@ struct AuditTrail {
   std::uint64_t unchained = 0;  ///< lines before record 1, of versions that had no chain
 };
 
-/// In the order of their records. Errors   io_error: which can't be read.
+/// In the order of their records, without those that only name the last one. Errors   io_error: which can't be read.
 rr::Result<std::vector<std::string>> sort_audit_files(std::vector<std::string> files);
 
 /// Checks the chain through all files, in any order, and where there is a FILE.head, that its record is there.

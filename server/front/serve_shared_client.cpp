@@ -142,7 +142,7 @@ std::shared_ptr<SharedClient> begin_session(GatewayState& gateway, Connection& c
   const auto shown = std::make_shared<Standing>(gateway.access(), connection.identity);
   const auto rights = std::make_shared<SessionRights>(gateway.access(), *destination.node, device, shown);
   SharedArrival arrival{
-      .from = {connection.client, connection.network},
+      .from = {connection.client, connection.network, connection.identity.face},
       .base_url = std::move(base_url),
       .admit = make_admission(gateway, *destination.node, connection.client, rights, std::move(seating)),
       .enter = make_entrance(gateway, *destination.node, connection, rights),
