@@ -31,6 +31,7 @@ export const makeSidebar = (decisions) => [
   ]),
   group("Security", [
     ["Who may do what", "/access"],
+    ["The audit log", "/audit"],
     ["TLS", "/tls"],
     ["What is defended", "/security"],
     ["Reporting a hole", "/reporting"],

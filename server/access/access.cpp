@@ -7,6 +7,7 @@
 #include "node/platform/file_look.hpp"
 #include "node/platform/text_file.hpp"
 #include "node/tls/digest.hpp"
+#include "server/access/access_text.hpp"
 #include "server/access/base64url.hpp"
 #include "server/limits/client_network.hpp"
 #include "server/log/log.hpp"
@@ -15,8 +16,6 @@ namespace rrgate {
 
 namespace {
 
-/// How often the log says that the audit log can't be written.
-constexpr std::chrono::seconds complaint_period{60};
 /// Fewer bytes could be guessed from one ticket.
 constexpr std::size_t min_ticket_key = 32;
 
@@ -67,7 +66,7 @@ void add_role(std::vector<std::string>& roles, const std::string& role) {
 
 /// What goes into the audit log though it was allowed.
 bool is_recorded(Verb verb) {
-  return verb == Verb::write || verb == Verb::call || verb == Verb::lock || verb == Verb::admin;
+  return verb == Verb::write || verb == Verb::call || verb == Verb::lock || verb == Verb::subscribe;
 }
 
 }  // namespace
@@ -145,7 +144,7 @@ class Access::Users final : public rr::Authenticator {
 Access::Access(const AccessConfig& config) : Access(config, rr::random_bytes(min_ticket_key)) {}
 
 Access::Access(const AccessConfig& config, const rr::Bytes& key)
-    : audit_(std::make_unique<AuditLog>()), users_(std::make_shared<Users>()), tickets_(key), sign_ins_(key) {
+    : audit_(std::make_shared<AuditLog>()), users_(std::make_shared<Users>()), tickets_(key), sign_ins_(key) {
   // Until load() has read who may, nobody may who must show it.
   auto empty = std::make_shared<AccessState>();
   empty->config = config;
@@ -160,10 +159,38 @@ rr::Result<> Access::load() {
 }
 
 rr::Result<> Access::replace(AccessStatePtr next) {
-  if (auto opened = audit_->open(next->config.audit_file); !opened) return opened;
+  const bool is_other = next->config.audit.file != state_->config.audit.file || !audit_->is_used();
+  if (auto opened = audit_->open(next->config.audit); !opened) return opened;
+  if (is_other && audit_->is_used()) {
+    const auto state = audit_->state();
+    log(state.found.empty() ? LogLevel::info : LogLevel::warning, "audit log",
+        {{"file", next->config.audit.file},
+         {"record", state.chain.seq},
+         {"hash", state.chain.hash},
+         {"found", state.found}});
+  }
   take(std::move(next));
   seen_ = state_->looks;
   return {};
+}
+
+void Access::record_tokens(const AccessState& before, const AccessState& now) {
+  const auto names = [](const AccessState& state) {
+    return state.tokens ? state.tokens->names() : std::map<std::string, std::vector<std::string>>();
+  };
+  const auto old = names(before);
+  const auto current = names(now);
+  const auto tell = [this](std::string_view event, const std::string& name, const std::vector<std::string>& roles) {
+    const auto detail = name + ": roles " + format_roles(roles);
+    record({.event = event, .detail = detail});
+  };
+  for (const auto& [name, roles] : old)
+    if (!current.contains(name)) tell("token_revoked", name, roles);
+  for (const auto& [name, roles] : current)
+    if (const auto found = old.find(name); found == old.end())
+      tell("token_made", name, roles);
+    else if (found->second != roles)
+      tell("token_changed", name, roles);
 }
 
 void Access::take(AccessStatePtr next) {
@@ -206,6 +233,7 @@ void Access::reload(bool is_forced) {
         {{"error", loaded.error().message}});
     return;
   }
+  record_tokens(*state_, **loaded);
   take(std::move(*loaded));
   if (has_files) log(LogLevel::info, "users and rights read anew", {{"files", seen_.size()}});
 }
@@ -213,26 +241,38 @@ void Access::reload(bool is_forced) {
 bool Access::sign_out(const Identity& who) {
   if (!sign_ins_.end(who.sign_in, std::chrono::system_clock::now())) return false;
   state_ = std::make_shared<const AccessState>(*state_);  // so that everybody is judged anew
-  record({"signed_out", &who, nullptr, {}});
+  record({.event = "signed_out", .who = &who});
   return true;
 }
 
 rr::Result<> Access::check(const Identity& who, const AccessRequest& what) {
   auto checked = state_->rules.check(who, what);
-  if (!checked)
-    record_refusal({"refused", &who, &what, {}});
-  else if (is_recorded(what.verb))
-    record({to_string(what.verb), &who, &what, {}});
+  if (checked && is_recorded(what.verb)) return audit_->admit();
+  if (!checked) record_refusal({.event = "refused", .who = &who, .what = &what, .outcome = Outcome::refused});
   return checked;
+}
+
+AuditEntryPtr Access::begin(const Identity& who, const AccessRequest& what, std::string_view trace,
+                            std::string_view event) {
+  if (!audit_->is_used() || !is_recorded(what.verb)) return nullptr;
+  return std::make_shared<AuditEntry>(audit_, who, what, event.empty() ? to_string(what.verb) : event, trace);
+}
+
+rr::Result<AuditEntryPtr> Access::check_and_begin(const Identity& who, const AccessRequest& what,
+                                                  std::string_view trace, std::string_view event) {
+  if (auto checked = check(who, what); !checked) return checked.error();
+  return begin(who, what, trace, event);
 }
 
 rr::Result<> Access::check_whole_device(const Identity& who, std::string_view device) {
   auto checked = state_->rules.check_whole_device(who, device);
+  if (checked) return audit_->admit();
   const AccessRequest what{.device = device, .verb = Verb::call};
-  if (checked)
-    record({"relay", &who, &what, {}});
-  else
-    record_refusal({"refused", &who, &what, "not every right on the whole device"});
+  record_refusal({.event = "refused",
+                  .who = &who,
+                  .what = &what,
+                  .detail = "not every right on the whole device",
+                  .outcome = Outcome::refused});
   return checked;
 }
 
@@ -240,14 +280,15 @@ std::shared_ptr<const rr::Authenticator> Access::authenticator() const {
   return state_->users ? users_ : nullptr;
 }
 
-Identity Access::anonymous(std::string client) const {
+Identity Access::anonymous(std::string client, Face face) const {
   Identity out;
   out.client = std::move(client);
+  out.face = face;
   if (!state_->config.anonymous_role.empty()) out.roles.push_back(state_->config.anonymous_role);
   return out;
 }
 
-Identity Access::logged_in(const rr::AuthenticatedUser& user, std::string client) const {
+Identity Access::logged_in(const rr::AuthenticatedUser& user, std::string client, Face face) const {
   Identity out;
   out.name = user.name;
   out.roles = user.privileges;
@@ -255,12 +296,13 @@ Identity Access::logged_in(const rr::AuthenticatedUser& user, std::string client
   if (const auto* credential = user.properties.find(judged_here))
     out.credential = credential->to_text().value();  // as judge_login() has put it there
   out.client = std::move(client);
+  out.face = face;
   return with_grants(std::move(out));
 }
 
 Identity Access::in_session(const Identity& shown, const rr::AuthenticatedUser* user) const {
   if (!user) return shown;
-  if (subject_of(*user).kind == Subject::Kind::user) return logged_in(*user, shown.client);
+  if (subject_of(*user).kind == Subject::Kind::user) return logged_in(*user, shown.client, shown.face);
   auto out = shown;
   out.device_user = user->name;
   return out;
@@ -284,7 +326,7 @@ std::optional<Identity> Access::renew(const Identity& who) const {
   out.roles = who.proven_roles;
   switch (who.proof) {
     case Proof::none:
-      out = anonymous(who.client);
+      out = anonymous(who.client, who.face);
       out.device_user = who.device_user;
       return out;
     case Proof::password: {
@@ -318,20 +360,32 @@ void Access::record_refusal(const AuditEvent& event) {
     record(event);
 }
 
-void Access::sum_up_refusals(bool is_forced) {
+void Access::tend_audit(bool is_forced) {
   for (const auto& [network, count] : refusals_.take(std::chrono::steady_clock::now(), is_forced)) {
     Identity strangers;
     strangers.client = network.empty() ? "other networks" : network;
-    record({"refusals", &strangers, nullptr, std::to_string(count) + " more within a minute"});
+    const auto detail = std::to_string(count) + " more within a minute";
+    record({.event = "refusals", .who = &strangers, .detail = detail, .outcome = Outcome::refused});
   }
+  const auto state = audit_->state();
+  const bool is_failing = !state.failure.empty();
+  if (is_failing == std::exchange(is_failing_, is_failing)) return;
+  if (is_failing)
+    log(LogLevel::error, "audit log can't be written",
+        {{"error", state.failure},
+         {"waiting", state.waiting},
+         {"fail_closed", state_->config.audit.fails_closed ? 1 : 0}});
+  else
+    log(LogLevel::info, "audit log can be written again", {{"lost", state.lost}, {"refused", state.refused}});
 }
 
-void Access::record(const AuditEvent& event) {
-  if (audit_->write(event)) return;
-  const auto now = std::chrono::steady_clock::now();
-  if (last_complaint_ != std::chrono::steady_clock::time_point() && now - last_complaint_ < complaint_period) return;
-  last_complaint_ = now;
-  log(LogLevel::error, "audit log can't be written; lines are lost", {{"lost", audit_->lost_lines()}});
+Access::~Access() {
+  tend_audit(true);
+  if (!audit_->is_used()) return;
+  (void)audit_->flush(std::chrono::seconds(1));
+  const auto state = audit_->state();
+  log(LogLevel::info, "audit log ends",
+      {{"record", state.chain.seq}, {"hash", state.chain.hash}, {"lost", state.lost}});
 }
 
 }  // namespace rrgate

@@ -12,7 +12,7 @@
 #include "server/access/access_config.hpp"
 #include "server/access/access_rules.hpp"
 #include "server/access/api_tokens.hpp"
-#include "server/access/audit_log.hpp"
+#include "server/access/audit_entry.hpp"
 #include "server/access/refusal_digest.hpp"
 #include "server/access/sign_ins.hpp"
 #include "server/access/tickets.hpp"
@@ -49,7 +49,7 @@ class Access {
   explicit Access(const AccessConfig& config);
   Access(const Access&) = delete;
   Access& operator=(const Access&) = delete;
-  ~Access() { sum_up_refusals(true); }
+  ~Access();
 
   /// Reads all files, and opens the audit log. Errors   as load_access(); nothing has changed.
   [[nodiscard]] rr::Result<> load();
@@ -63,10 +63,18 @@ class Access {
   /// those from before stay in use, as they do when the configuration changes and the issuer does not.
   [[nodiscard]] rr::Result<> take_issuer_keys(const std::string& issuer, std::string key_set);
 
-  /// Whether somebody may do something. Refusals, writes, calls and locks go into the audit log.
-  /// Errors   permission_denied: a sentence for the client.
+  /// Whether somebody may do something. Refusals go into the audit log.
+  /// Errors   permission_denied: a sentence for the client; out_of_system_resource: it has to be recorded, and can't
+  /// be.
   [[nodiscard]] rr::Result<> check(const Identity& who, const AccessRequest& what);
-  /// Whether somebody's bytes may pass unread, to and from a device. Errors   permission_denied.
+  /// What is to be recorded of something that may be done: writes, calls, locks, subscriptions. `event`  a literal;
+  /// empty: the verb.
+  AuditEntryPtr begin(const Identity& who, const AccessRequest& what, std::string_view trace = {},
+                      std::string_view event = {});
+  /// Both in one.
+  [[nodiscard]] rr::Result<AuditEntryPtr> check_and_begin(const Identity& who, const AccessRequest& what,
+                                                          std::string_view trace = {}, std::string_view event = {});
+  /// Whether somebody's bytes may pass unread, to and from a device. Errors   as check().
   [[nodiscard]] rr::Result<> check_whole_device(const Identity& who, std::string_view device);
   /// See AccessRules::sees().
   bool sees(const Identity& who, std::string_view device, std::optional<std::string_view> service = {},
@@ -88,9 +96,9 @@ class Access {
   bool sign_out(const Identity& who);
 
   // Identities, with the roles that the configuration adds. `client`: where from, as logs name it.
-  Identity anonymous(std::string client) const;
+  Identity anonymous(std::string client, Face face = Face::none) const;
   /// A user of the users file, who has logged in.
-  Identity logged_in(const rr::AuthenticatedUser& user, std::string client) const;
+  Identity logged_in(const rr::AuthenticatedUser& user, std::string client, Face face = Face::none) const;
   /// Who the client of a session is. `shown`  by its connection. `user`  as whom it has logged in since; null: it has
   /// not. A user whom authenticator() has not judged is a device's: that changes no right here.
   Identity in_session(const Identity& shown, const rr::AuthenticatedUser* user) const;
@@ -99,30 +107,32 @@ class Access {
   /// The same client by the users, tokens and rights of now. nullopt: what it has shown was revoked or has expired.
   std::optional<Identity> renew(const Identity& who) const;
 
-  /// Writes into the audit log; a line that can't be written is noted in the gateway's log, not too often.
-  void record(const AuditEvent& event);
+  void record(const AuditEvent& event) { audit_->add(event); }
   /// The same for what was refused: of those who have not proven who they are, one of a network a minute.
   void record_refusal(const AuditEvent& event);
-  /// Writes how many refusals were left out, where a minute is over. To be called now and then.
-  void sum_up_refusals(bool is_forced = false);
-  const AuditLog& audit() const { return *audit_; }
+  /// Writes how many refusals were left out, where a minute is over, and tells the gateway's log where the audit log
+  /// can't be written, or can again. To be called now and then.
+  void tend_audit(bool is_forced = false);
+  AuditLog& audit() { return *audit_; }
 
  private:
   class Users;
 
   explicit Access(const AccessConfig& config, const rr::Bytes& key);
   void take(AccessStatePtr next);
+  /// What has come into the tokens file, and what has gone from it.
+  void record_tokens(const AccessState& before, const AccessState& now);
 
   AccessStatePtr state_;
   std::map<std::string, std::string> seen_;
-  std::unique_ptr<AuditLog> audit_;
+  std::shared_ptr<AuditLog> audit_;  ///< entries may outlive this
   std::shared_ptr<Users> users_;
   std::string issuer_;  ///< whose keys these are:
   std::string issuer_keys_;
   Tickets tickets_;
   SignIns sign_ins_;
   RefusalDigest refusals_;
-  std::chrono::steady_clock::time_point last_complaint_{};
+  bool is_failing_ = false;  ///< the audit log, as far as the log has been told
 };
 
 }  // namespace rrgate

@@ -6,6 +6,7 @@
 
 #include "node/tls/client_certificates.hpp"
 #include "server/access/access_rules.hpp"
+#include "server/access/audit_config.hpp"
 #include "server/access/jwt.hpp"
 
 namespace rrgate {
@@ -48,7 +49,7 @@ struct AccessConfig {
   std::string anonymous_role = {};  ///< of who has shown nothing; empty: he has none
   std::vector<RoleGrant> grants = {};
   std::vector<AccessRule> rules = {};
-  std::string audit_file = {};  ///< empty: no audit log
+  AuditConfig audit = {};  ///< "audit" of the configuration; its file also "audit_file" of "access"
 
   /// Whether there is a way to prove who one is.
   bool has_users() const {

@@ -28,6 +28,8 @@ class ApiTokens {
   /// By the identity's credential. nullopt: as above.
   std::optional<Identity> find(std::string_view credential, std::chrono::system_clock::time_point now) const;
   std::size_t size() const { return by_hash_.size(); }
+  /// With their roles.
+  std::map<std::string, std::vector<std::string>> names() const;
 
  private:
   struct Entry {

@@ -1,106 +1,173 @@
 #include "server/access/audit_log.hpp"
 
-#include <fcntl.h>
-#include <unistd.h>
-
-#include <array>
-#include <cerrno>
-#include <cstring>
-#include <ctime>
 #include <utility>
-
-#include "server/json/json.hpp"
 
 namespace rrgate {
 
 namespace {
 
-constexpr std::size_t longest_text = 500;  // of what strangers choose
-
-/// "2030-01-31T12:00:00.123Z".
-std::string format_time(std::chrono::system_clock::time_point now) {
-  const auto seconds = std::chrono::floor<std::chrono::seconds>(now);
-  const auto time = std::chrono::system_clock::to_time_t(seconds);
-  std::tm parts{};
-  ::gmtime_r(&time, &parts);
-  std::array<char, 32> text{};
-  const auto size = std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%S", &parts);
-  const auto fraction = std::chrono::duration_cast<std::chrono::milliseconds>(now - seconds).count();
-  const auto digits = std::to_string(fraction);
-  return std::string(text.data(), size) + "." + std::string(3 - digits.size(), '0') + digits + "Z";
-}
+constexpr std::chrono::seconds retry_period{1};
+/// Written at a time.
+constexpr std::size_t max_batch_bytes = 32 * 1024;
+/// What is admitted while so much waits has room for its record.
+constexpr std::size_t much_waiting = AuditLog::max_waiting_bytes / 2;
 
 }  // namespace
 
-std::string format_audit_line(const AuditEvent& event, std::chrono::system_clock::time_point now) {
-  auto out = rr::OrderedJson::object();
-  const auto add = [&out](std::string_view key, std::string_view text) {
-    if (!text.empty()) rr::add_key(out, key) = std::string(text.substr(0, longest_text));
-  };
-  add("time", format_time(now));
-  add("event", event.event);
-  if (event.who) {
-    add("user", event.who->name);
-    if (!event.who->roles.empty()) rr::add_key(out, "roles") = event.who->roles;
-    add("proof", to_string(event.who->proof));
-    add("client", event.who->client);
-    add("device_user", event.who->device_user);
-  }
-  if (event.what) {
-    add("verb", to_string(event.what->verb));
-    add("device", event.what->device);
-    add("service", event.what->service);
-    add("path", event.what->path);
-    add("member", event.what->member);
-  }
-  add("detail", event.detail);
-  return out.dump(-1, ' ', false, rr::OrderedJson::error_handler_t::replace) + "\n";
-}
-
 AuditLog::~AuditLog() {
-  if (file_ >= 0) ::close(file_);
+  {
+    const std::lock_guard lock(mutex_);
+    is_stopping_ = true;
+  }
+  news_.notify_all();
+  if (writer_.joinable()) writer_.join();
+  if (file_.is_open()) write_now("stopped", {});
 }
 
-rr::Result<> AuditLog::open(const std::string& path) {
-  int opened = -1;
-  if (!path.empty()) {
-    opened = ::open(path.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NOCTTY, 0600);
-    if (opened < 0)
-      return rr::make_error(rr::ErrorCode::io_error,
-                            "audit file " + rr::quote(path, 200) + ": " + std::strerror(errno));
-  }
+/// Tells of the log itself, by the thread that calls.
+void AuditLog::write_now(std::string_view event, std::string_view detail) {
+  const auto record = format_audit_event({.event = event, .detail = detail}, std::chrono::system_clock::now());
+  const auto done = file_.write({&record, 1});
   const std::lock_guard lock(mutex_);
-  const int old = std::exchange(file_, opened);
-  path_ = path;
-  begins_line_ = true;
-  if (old >= 0) ::close(old);
+  note_written(done, 1);
+  if (!done) put(record);
+}
+
+rr::Result<> AuditLog::open(const AuditConfig& config) {
+  const std::lock_guard file_lock(file_mutex_);
+  const bool is_same = file_.is_open() && file_.config().file == config.file;
+  if (is_same) {
+    if (auto reopened = file_.reopen(); !reopened) return reopened;
+    file_.set_config(config);
+  } else if (config.file.empty()) {
+    if (file_.is_open()) write_now("stopped", {});
+    file_ = AuditFile();
+  } else {
+    auto opened = AuditFile::open(config);
+    if (!opened) return opened.error();
+    if (file_.is_open()) write_now("stopped", {});
+    file_ = std::move(*opened);
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    config_ = config;
+    is_used_ = file_.is_open();
+    if (!is_same) {
+      state_.found = file_.found();
+      state_.chain = file_.chain();
+    }
+  }
+  if (is_same || !file_.is_open()) return {};
+  write_now("started", file_.found());
+  if (!writer_.joinable()) writer_ = std::thread([this] { run(); });
   return {};
 }
 
 rr::Result<> AuditLog::reopen() {
-  std::string path;
+  const std::lock_guard file_lock(file_mutex_);
+  return file_.is_open() ? file_.reopen() : rr::Result<>();
+}
+
+rr::Result<> AuditLog::admit() {
+  if (!is_used_) return {};
+  const std::lock_guard lock(mutex_);
+  if (!config_.fails_closed) return {};
+  const bool is_full = waiting_bytes_ > much_waiting;
+  if (state_.failure.empty() && !is_full) return {};
+  ++state_.refused;
+  return rr::make_error(rr::ErrorCode::out_of_system_resource,
+                        "the gateway can't write its audit log (" +
+                            (is_full ? std::string("the disk is too slow") : state_.failure) +
+                            "), and does nothing that it can't record; try again later");
+}
+
+void AuditLog::add(const AuditEvent& event) {
+  if (!is_used_) return;
+  auto record = format_audit_event(event, std::chrono::system_clock::now());
   {
     const std::lock_guard lock(mutex_);
-    path = path_;
+    put(std::move(record));
   }
-  return open(path);
+  news_.notify_one();
 }
 
-bool AuditLog::write(const AuditEvent& event) {
-  const std::lock_guard lock(mutex_);
-  if (file_ < 0) return true;
-  auto line = format_audit_line(event, std::chrono::system_clock::now());
-  if (!begins_line_) line.insert(0, "\n");
-  const auto written = ::write(file_, line.data(), line.size());
-  const bool is_whole = written == static_cast<ssize_t>(line.size());
-  if (written > 0) begins_line_ = is_whole;
-  if (!is_whole) ++lost_;
-  return is_whole;
+void AuditLog::put(std::string record) {
+  if (waiting_bytes_ + record.size() > max_waiting_bytes) {
+    ++state_.lost;
+    return;
+  }
+  waiting_bytes_ += record.size();
+  waiting_.push_back(std::move(record));
 }
 
-std::uint64_t AuditLog::lost_lines() const {
+void AuditLog::note_written(const rr::Result<>& result, std::size_t count) {
+  const auto now = std::chrono::steady_clock::now();
+  if (!result) {
+    if (state_.failure.empty()) failing_since_ = now;
+    state_.failure = result.error().message;
+    return;
+  }
+  state_.chain = file_.chain();
+  state_.records += count;
+  const auto lost = state_.lost - std::exchange(lost_before_, state_.lost);
+  const auto refused = state_.refused - std::exchange(refused_before_, state_.refused);
+  if (state_.failure.empty() && lost == 0) return;
+  const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(now - failing_since_).count();
+  const auto why = state_.failure.empty() ? std::string("the disk is too slow")
+                                          : state_.failure + " for " + std::to_string(seconds) + " s";
+  state_.failure.clear();
+  const auto detail =
+      why + ": " + std::to_string(lost) + " records were lost, " + std::to_string(refused) + " requests refused";
+  put(format_audit_event({.event = "resumed", .detail = detail}, std::chrono::system_clock::now()));
+}
+
+void AuditLog::run() {
+  std::vector<std::string> batch;  // what could not be written stays in it
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    if (state_.failure.empty())
+      news_.wait(lock, [this] { return is_stopping_ || !waiting_.empty(); });
+    else
+      news_.wait_for(lock, retry_period, [this] { return is_stopping_; });
+    std::size_t bytes = 0;
+    for (const auto& record : batch) bytes += record.size();
+    while (bytes < max_batch_bytes && !waiting_.empty()) {
+      bytes += waiting_.front().size();
+      batch.push_back(std::move(waiting_.front()));
+      waiting_.pop_front();
+    }
+    if (batch.empty() && is_stopping_) return;
+    state_.waiting = batch.size();
+    lock.unlock();
+    {
+      const std::lock_guard file_lock(file_mutex_);
+      const auto done = file_.is_open() ? file_.write(batch) : rr::Result<>();
+      lock.lock();
+      note_written(done, batch.size());
+      if (done) {
+        waiting_bytes_ -= bytes;
+        batch.clear();
+      }
+      state_.waiting = batch.size();
+    }
+    if (waiting_.empty() && batch.empty()) idle_.notify_all();
+    if (is_stopping_ && !batch.empty()) {
+      state_.lost += batch.size() + waiting_.size();
+      return;
+    }
+  }
+}
+
+AuditLog::State AuditLog::state() const {
   const std::lock_guard lock(mutex_);
-  return lost_;
+  auto out = state_;
+  out.waiting += waiting_.size();
+  return out;
+}
+
+bool AuditLog::flush(std::chrono::milliseconds time) {
+  std::unique_lock lock(mutex_);
+  return idle_.wait_for(lock, time, [this] { return waiting_.empty() && state_.waiting == 0; });
 }
 
 }  // namespace rrgate

@@ -37,10 +37,26 @@ struct Subject {
   bool operator==(const Subject&) const = default;
 };
 
+/// By which of the gateway's faces somebody comes.
+enum class Face : std::uint8_t {
+  none,       ///< the gateway itself
+  native,     ///< Robot Raconteur over TCP or TLS
+  websocket,  ///< Robot Raconteur over a WebSocket
+  rest,       ///< requests of HTTP
+  stream,     ///< event and image streams of HTTP
+  json,       ///< JSON over a WebSocket
+};
+inline constexpr std::string_view face_names[] = {"", "native", "websocket", "rest", "stream", "json"};
+
+constexpr std::string_view to_string(Face face) {
+  return face_names[static_cast<std::size_t>(face)];
+}
+
 /// Where a client comes from.
 struct ClientOrigin {
   std::string client = {};   ///< as logs name it: "192.0.2.1:40000"
   std::string network = {};  ///< as what it counts, see network_name()
+  Face face = Face::none;
 };
 
 struct Identity {
@@ -52,6 +68,7 @@ struct Identity {
   std::vector<std::string> proven_roles = {};  ///< those of the proof alone
   Proof proof = Proof::none;
   std::string client = {};  ///< where it comes from, as logs name it: "192.0.2.1:40000"
+  Face face = Face::none;
   /// As whom a device knows the client, by a login that the device has judged. It gives no right here.
   std::string device_user = {};
   /// Tells a password or a token from any other that the name has had. No secret can be had from it.

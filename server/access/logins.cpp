@@ -59,11 +59,14 @@ void Logins::judge(rr::LoginAttempt attempt, ClientOrigin from, Of of, Done done
   const auto key = key_of(attempt);
   if (const auto* known = known_.find(key); known && now.steady < known->ends) {
     const Judged user = known->user;
-    if (of == Of::session) record(attempt, from, user);
+    if (of == Of::request) return answer(user);
+    if (const auto recordable = access_.audit().admit(); !recordable) return answer(recordable.error());
+    record(attempt, from, user);
     return answer(user);
   }
   auto ticket = limits_.begin(limited_as(attempt), from.network, now);
   if (!ticket) return answer(ticket.error());
+  if (const auto recordable = access_.audit().admit(); !recordable) return answer(recordable.error());
   auto& of_network = waiting_[from.network];
   if (of_network.empty()) turns_.push_back(from.network);
   of_network.push_back({std::make_shared<const rr::LoginAttempt>(std::move(attempt)), std::move(from), std::move(done),
@@ -135,12 +138,17 @@ void Logins::record(const rr::LoginAttempt& attempt, const ClientOrigin& from, c
   Identity who;
   who.name = attempt.username;
   who.client = from.client;
-  if (result) who = access_.logged_in(*result, from.client);
-  access_.record({result ? "login" : "login_failed", &who, attempt.service.empty() ? nullptr : &what,
-                  result ? std::string_view() : std::string_view(result.error().message)});
+  who.face = from.face;
+  if (result) who = access_.logged_in(*result, from.client, from.face);
+  access_.record({.event = result ? "login" : "login_failed",
+                  .who = &who,
+                  .what = attempt.service.empty() ? nullptr : &what,
+                  .detail = result ? std::string_view() : std::string_view(result.error().message),
+                  .outcome = result ? Outcome::ok : Outcome::refused});
 }
 
 rr::Result<LoginLimits::Ticket> Logins::begin_at_device(const DeviceLogin& login) {
+  if (const auto recordable = access_.audit().admit(); !recordable) return recordable.error();
   return limits_.begin(limited_as(login), login.from.network, steady_clock_now());
 }
 
@@ -150,9 +158,14 @@ void Logins::finish_at_device(const DeviceLogin& login, const rr::Result<>& resu
   if (is_wrong) limits_.handle_failure(limited_as(login), login.from.network, steady_clock_now());
   Identity who;
   who.client = login.from.client;
+  who.face = login.from.face;
   who.device_user = login.user;
   const AccessRequest what{.device = login.device, .service = login.service, .verb = Verb::read};
-  access_.record({is_wrong ? "login_failed" : "login", &who, &what, is_wrong ? "the device refused it" : ""});
+  access_.record({.event = is_wrong ? "login_failed" : "login",
+                  .who = &who,
+                  .what = &what,
+                  .detail = is_wrong ? "the device refused it" : "",
+                  .outcome = is_wrong ? Outcome::refused : Outcome::ok});
 }
 
 }  // namespace rrgate

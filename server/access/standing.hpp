@@ -15,7 +15,7 @@ namespace rrgate {
 enum class Recorded : std::uint8_t {
   each_time,
   first_time,  ///< packets of a wire or a pipe: there may be thousands a second
-  never,       ///< part of something whose beginning is recorded, or done by the device
+  never,       ///< part of something whose beginning is recorded, or done by the device; its refusals neither
 };
 
 /// A client and what it has shown, looked at anew whenever users, tokens or rights have changed. Who keeps a connection
@@ -29,8 +29,16 @@ class Standing {
   bool is_good();
   /// As of now; who is not good any more is nobody.
   const Identity& identity();
-  /// See Access::check(). Errors   also authentication_error: not good any more.
+  /// See Access::check(). What is recorded the first time alone, is. Errors   also authentication_error: not good any
+  /// more.
   [[nodiscard]] rr::Result<> check(const AccessRequest& what, Recorded recorded = Recorded::each_time);
+  /// See Access::check_and_begin(). Null also where it is recorded the first time alone, and this is not that.
+  [[nodiscard]] rr::Result<AuditEntryPtr> check_and_begin(const AccessRequest& what, std::string_view trace,
+                                                          Recorded recorded, std::string_view event = {});
+  /// See Access::begin().
+  AuditEntryPtr begin(const AccessRequest& what, std::string_view event = {}) {
+    return access_.begin(identity(), what, {}, event);
+  }
 
  private:
   using Place = std::pair<std::string, std::string>;  ///< path and member
@@ -44,6 +52,9 @@ class Standing {
   };
 
   static constexpr std::size_t max_noted = 4096;
+
+  /// Whether it may be done, and if so, whether that is to be recorded.
+  rr::Result<bool> judge(const AccessRequest& what, Recorded recorded);
 
   Access& access_;
   AccessStatePtr judged_by_;

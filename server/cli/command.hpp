@@ -10,8 +10,9 @@
 
 namespace rrgate {
 
-/// Exit codes: done; failed while running; not understood (arguments or configuration).
-enum ExitCode { exit_ok = 0, exit_failed = 1, exit_usage = 2 };
+/// Exit codes: done; failed while running; not understood (arguments or configuration); of `audit`, a file that can't
+/// be read, which says nothing of its chain.
+enum ExitCode { exit_ok = 0, exit_failed = 1, exit_usage = 2, exit_unreadable = 3 };
 
 /// A command before the program runs it: its options, bound to `values`.
 template <class Options>
@@ -68,6 +69,7 @@ void add_check_config(Commands& commands);
 void add_health(Commands& commands);
 void add_passwd(Commands& commands);
 void add_token(Commands& commands);
+void add_audit(Commands& commands);
 void add_cert(Commands& commands);
 void add_ls(Commands& commands);
 void add_info(Commands& commands);

@@ -14,6 +14,7 @@ int run_command_line(std::vector<std::string> words) {
   add_health(commands);
   add_passwd(commands);
   add_token(commands);
+  add_audit(commands);
   add_cert(commands);
   commands.set_heading("Devices");
   add_ls(commands);

@@ -6,6 +6,7 @@
 
 #include <iostream>
 #include <memory>
+#include <optional>
 
 #include "core/support/error.hpp"
 #include "server/cli/command.hpp"

@@ -38,7 +38,7 @@ std::vector<WantedFile> wanted_files(const std::string& file, const Config& conf
   for (const auto* path : {&config.access.users_file, &config.access.tokens_file, &config.access.jwt.jwks_file,
                            &config.access.jwt.secret_file, &config.access.ticket_key_file, &config.web_root})
     reads(*path);
-  if (const auto& audit = config.access.audit_file; !audit.empty()) {
+  if (const auto& audit = config.access.audit.file; !audit.empty()) {
     wanted.push_back({fs::path(audit).parent_path().string(), W_OK | X_OK});
     std::error_code error;
     if (fs::exists(audit, error)) wanted.push_back({audit, W_OK});

@@ -117,7 +117,19 @@ void read_access(ObjectReader& in, AccessConfig& access) {
       in.finding("anonymous_role", checked.error().message);
   in.objects("grants", false, [&](ObjectReader& item) { read_grant(item, access.grants.emplace_back()); });
   in.objects("rules", false, [&](ObjectReader& item) { read_rule(item, access.rules.emplace_back()); });
-  in.text("audit_file", access.audit_file);
+  std::string audit_file;
+  in.text("audit_file", audit_file);
+  if (!audit_file.empty() && !access.audit.file.empty())
+    in.finding("audit_file", "the file has a name already, in audit.file; expected one of the two");
+  if (!audit_file.empty()) access.audit.file = audit_file;
+}
+
+void read_audit(ObjectReader& in, AuditConfig& audit) {
+  in.text("file", audit.file);
+  in.size("max_bytes", audit.max_bytes, {0, 1'000'000'000'000});
+  in.size("keep", audit.keep, {1, 10'000});
+  in.flag("fsync", audit.syncs);
+  in.flag("fail_closed", audit.fails_closed);
 }
 
 void check_access(const Config& config, std::vector<Finding>& findings) {
@@ -140,7 +152,7 @@ void check_access(const Config& config, std::vector<Finding>& findings) {
 
 void for_each_file(AccessConfig& access, const std::function<void(std::string&)>& locate) {
   for (auto* file : {&access.users_file, &access.tokens_file, &access.jwt.jwks_file, &access.jwt.secret_file,
-                     &access.ticket_key_file, &access.audit_file})
+                     &access.ticket_key_file, &access.audit.file})
     locate(*file);
   for (auto* files : {&access.clients.ca, &access.clients.crl, &access.jwt.ca})
     for (auto& file : *files) locate(file);

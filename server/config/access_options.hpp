@@ -9,6 +9,8 @@
 
 namespace rrgate {
 
+/// To be read before "access", which may name the file too.
+void read_audit(ObjectReader& in, AuditConfig& audit);
 void read_access(ObjectReader& in, AccessConfig& access);
 
 /// What of it contradicts the rest.

@@ -297,6 +297,7 @@ void read_config(ObjectReader& in, Config& config) {
     return {};
   });
   in.object("tls", [&](ObjectReader& part) { read_tls(part, config.tls); });
+  in.object("audit", [&](ObjectReader& part) { read_audit(part, config.access.audit); });
   in.object("access", [&](ObjectReader& part) { read_access(part, config.access); });
   in.flag("insecure", config.insecure);
   in.object("limits", [&](ObjectReader& part) { read_limits(part, config.limits); });

@@ -134,8 +134,9 @@ rr::awaitable<void> serve_connection(GatewayState& gateway, std::unique_ptr<rr::
   connection.network = network_name(connection.peer.endpoint.address());
   auto& identity = connection.identity;
   identity.client = connection.client;
+  identity.face = Face::native;
   identity = identity.is_proven() ? gateway.access().with_grants(std::move(identity))
-                                  : gateway.access().anonymous(connection.client);
+                                  : gateway.access().anonymous(connection.client, Face::native);
   rr::awaitable<void> continuation;
   switch (protocol) {
     case Protocol::robot_raconteur:

@@ -179,7 +179,7 @@ rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& 
   }
   rr::Result<std::unique_ptr<Boarding>> boarding(nullptr);
   if (allowed)
-    boarding = co_await board(gateway, *destination->device, std::move(way));
+    boarding = co_await board(gateway, connection, *destination->device, std::move(way));
   else
     boarding = allowed.error();
   if (!boarding && !takes_close) {
@@ -318,6 +318,9 @@ rr::awaitable<Continuation> serve_http_client(GatewayState& gateway, Connection&
     request.arrival = see_through_proxies(request, connection.peer, config.proxy.trust);
     take_base_path(request, config.base_path);
     const bool is_refused = gateway.is_stopping() && !is_answered_while_stopping(request);
+    request.identity.face = !asks_for_websocket(request) ? Face::rest
+                            : is_json_socket(request)    ? Face::json
+                                                         : Face::websocket;
     HttpAccess::Admitted admitted;
     admitted.refusal = refuse_page(gateway, request);
     if (!admitted.refusal) admitted.refusal = require_tls(gateway, request);

@@ -129,7 +129,7 @@ rr::awaitable<rr::awaitable<void>> serve_native_client(GatewayState& gateway, Co
         "rr+tcp://" + rr::format_host_port(connection.local.address().to_string(), connection.local.port()) + "/";
     co_return serve_shared_client(gateway, connection, *destination, std::move(stream), std::move(base_url));
   } else if (destination) {
-    auto boarding = co_await board(gateway, *destination->device);
+    auto boarding = co_await board(gateway, connection, *destination->device);
     if (boarding) co_return relay_client(gateway, connection, std::move(stream), std::move(*boarding));
     refusal = boarding.error();
   } else {

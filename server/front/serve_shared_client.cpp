@@ -57,22 +57,39 @@ rr::awaitable<bool> wait_until_ready(GatewayState& gateway, const Destination& d
   }
 }
 
+/// What a request holds until it is answered, and is recorded with then.
+struct SharedPass : rr::RequestPass {
+  void handle_answer(const rr::Result<>& result) override {
+    if (entry) entry->finish(result);
+  }
+
+  std::shared_ptr<const HttpAccess::Passes> rates;
+  AuditEntryPtr entry;
+};
+
 /// How much a client may ask for, whoever he logs in as meanwhile.
-auto make_rate_gate(GatewayState& gateway, const SharedNode& node, const Connection& connection) {
+auto make_entrance(GatewayState& gateway, const SharedNode& node, const Connection& connection,
+                   std::shared_ptr<SessionRights> rights) {
   const auto memory = std::make_shared<const MemoryBudget::Charge>(gateway.memory().charge(connection.network));
-  return [&gateway, &node, memory, network = connection.network, shown = connection.identity.subject()](
-             const rr::MemberAccess& wanted) -> rr::Result<std::shared_ptr<const void>> {
+  return [&gateway, &node, memory, rights = std::move(rights), network = connection.network,
+          shown = connection.identity.subject()](
+             const rr::MemberAccess& wanted) -> rr::Result<std::shared_ptr<rr::RequestPass>> {
     if (!memory->has_room(least_room))
       return rr::make_error(rr::ErrorCode::service_error, "the gateway has no memory left; try again in a moment");
-    const auto& rates = gateway.config().rates;
-    if (!rates.is_bound()) return std::shared_ptr<const void>();
-    const auto user = wanted.user ? subject_of(*wanted.user) : Subject();
-    const bool is_ours = user.kind == Subject::Kind::user;
-    const auto device = node.device_of(wanted.path.substr(0, wanted.path.find('.')));
-    auto passes = gateway.http_access().enter(network, is_ours ? user : shown, device, rates);
-    if (passes) return std::shared_ptr<const void>(std::move(*passes));
-    gateway.reject(Rejection::rate);
-    return passes.error();
+    auto out = std::make_shared<SharedPass>();
+    if (const auto& rates = gateway.config().rates; rates.is_bound()) {
+      const auto user = wanted.user ? subject_of(*wanted.user) : Subject();
+      const bool is_ours = user.kind == Subject::Kind::user;
+      const auto device = node.device_of(wanted.path.substr(0, wanted.path.find('.')));
+      auto passes = gateway.http_access().enter(network, is_ours ? user : shown, device, rates);
+      if (!passes) {
+        gateway.reject(Rejection::rate);
+        return passes.error();
+      }
+      out->rates = std::move(*passes);
+    }
+    out->entry = rights->begin(wanted);
+    return out->entry || out->rates ? std::shared_ptr<rr::RequestPass>(std::move(out)) : nullptr;
   };
 }
 
@@ -109,7 +126,7 @@ auto make_admission(GatewayState& gateway, const SharedNode& node, std::string p
     auto allowed = rights->admit(wanted);
     if (!connects) return allowed;
     if (!allowed)
-      gateway.reject(Rejection::forbidden);
+      gateway.reject(allowed.error());
     else
       allowed = seating->sit_down(node.device_of(wanted.path));
     if (!allowed) log(LogLevel::info, "client refused", {{"peer", peer}, {"error", allowed.error().message}});
@@ -125,10 +142,11 @@ std::shared_ptr<SharedClient> begin_session(GatewayState& gateway, Connection& c
   const auto shown = std::make_shared<Standing>(gateway.access(), connection.identity);
   const auto rights = std::make_shared<SessionRights>(gateway.access(), *destination.node, device, shown);
   SharedArrival arrival{
-      .from = {connection.client, connection.network},
+      .from = {connection.client, connection.network, connection.identity.face},
       .base_url = std::move(base_url),
       .admit = make_admission(gateway, *destination.node, connection.client, rights, std::move(seating)),
-      .enter = make_rate_gate(gateway, *destination.node, connection),
+      .enter = make_entrance(gateway, *destination.node, connection, rights),
+      .begin_lock = [rights](const auto& wanted, const auto* user) { return rights->begin_lock(wanted, user); },
       .is_encrypted = connection.peer.is_encrypted,
       .memory = gateway.memory().charge(connection.network)};
   auto session = destination.node->add(std::move(client), std::move(arrival), std::move(ended));

@@ -9,9 +9,9 @@ namespace rrgate {
 
 /// A request and who sent it.
 struct Request : HttpRequest {
-  Identity identity = {};  ///< of nobody until that was found out
+  Identity identity = {};  ///< of nobody until that was found out, but for the face
 
-  ClientOrigin origin() const { return {arrival.peer, network_name(arrival.address)}; }
+  ClientOrigin origin() const { return {arrival.peer, network_name(arrival.address), identity.face}; }
 };
 
 }  // namespace rrgate

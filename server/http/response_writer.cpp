@@ -7,6 +7,7 @@
 #include <boost/asio/detached.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <cstdio>
+#include <utility>
 
 namespace rrgate {
 
@@ -63,7 +64,8 @@ rr::awaitable<std::optional<Response>> ResponseWriter::read_body(std::size_t lim
   co_return problem_response(body_failure_->status == 0 ? 400 : body_failure_->status, body_failure_->detail);
 }
 
-void ResponseWriter::count(const Response& response) const {
+void ResponseWriter::note_begin(const Response& response) {
+  if (const auto begun = std::exchange(on_begin_, nullptr)) begun(response.status);
   if (!metrics_) return;
   metrics_->respond(response.status);
   const auto is_image = [](const auto& header) {
@@ -84,7 +86,7 @@ rr::awaitable<rr::error_code> ResponseWriter::send(const Response& whole) {
   const Response no_memory = fits ? Response() : no_memory_response();
   const Response& response = fits ? whole : no_memory;
   if (response.closes) closes_ = true;
-  count(response);
+  note_begin(response);
   const auto head = head_of(response);
   const bool sends_body = response.body && has_body();
   const rr::ByteSpan parts[] = {rr::as_bytes(head), sends_body ? rr::as_bytes(*response.body) : rr::ByteSpan()};
@@ -94,7 +96,7 @@ rr::awaitable<rr::error_code> ResponseWriter::send(const Response& whole) {
 
 rr::awaitable<rr::error_code> ResponseWriter::begin(const Response& head) {
   is_streamed_ = true;
-  count(head);
+  note_begin(head);
   if (minor_version() == 0) closes_ = true;
   const auto text = head_of(head);
   const auto slice = rr::as_bytes(text);

@@ -53,6 +53,9 @@ class ResponseWriter {
   /// Goes into what is sent from now on.
   void add_header(std::string name, std::string value) { headers_.emplace_back(std::move(name), std::move(value)); }
 
+  /// Called once, with the status, when the response begins.
+  void on_begin(std::function<void(unsigned status)> begun) { on_begin_ = std::move(begun); }
+
   rr::awaitable<rr::error_code> send(const Response& response);
 
   /// Status and headers; the length stays open. HTTP/1.0 clients see the end by the connection's.
@@ -82,7 +85,7 @@ class ResponseWriter {
   struct Watch;
   static rr::awaitable<void> read_while(std::shared_ptr<Watch> watch, rr::ByteStream& stream);
   std::string head_of(const Response& response) const;
-  void count(const Response& response) const;
+  void note_begin(const Response& response);
   bool make_room(const std::shared_ptr<const std::string>& body);
   rr::awaitable<rr::error_code> write_slices(std::span<const rr::ByteSpan> slices);
   unsigned minor_version() const { return request_.message.version() == 10 ? 0 : 1; }
@@ -99,6 +102,7 @@ class ResponseWriter {
   std::vector<std::pair<std::string, std::string>> headers_;
   std::chrono::milliseconds patience_;
   rr::Deadline slow_;
+  std::function<void(unsigned status)> on_begin_;
   bool is_streamed_ = false;
   std::shared_ptr<Watch> watch_;
 };

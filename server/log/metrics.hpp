@@ -24,11 +24,15 @@ enum class Rejection {
   unauthorized,  ///< a wrong password or token, or none where one is needed
   forbidden,     ///< no right to it
   rate,          ///< asked for more than "rates" allow
+  audit,         ///< would be recorded, and can't be: "audit.fail_closed"
 };
-inline constexpr std::array<std::string_view, 13> rejection_names = {
-    "too_many", "unknown_protocol", "tls",         "proxy_header",   "bad_request",  "host",
-    "origin",   "no_such_device",   "device_full", "device_offline", "unauthorized", "forbidden",
-    "rate"};
+inline constexpr std::array<std::string_view, 14> rejection_names = {"too_many",     "unknown_protocol",
+                                                                     "tls",          "proxy_header",
+                                                                     "bad_request",  "host",
+                                                                     "origin",       "no_such_device",
+                                                                     "device_full",  "device_offline",
+                                                                     "unauthorized", "forbidden",
+                                                                     "rate",         "audit"};
 
 struct Metrics {
   std::uint64_t connections = 0;  ///< accepted

@@ -7,24 +7,30 @@
 namespace rrgate {
 
 rr::Result<> may_relay(GatewayState& gateway, const Connection& connection, const Device& device) {
-  auto& access = gateway.access();
-  if (access.is_open()) return {};
-  auto allowed = access.check_whole_device(connection.identity, device.config().name);
-  if (!allowed) gateway.reject(Rejection::forbidden);
+  auto allowed = gateway.access().check_whole_device(connection.identity, device.config().name);
+  if (!allowed) gateway.reject(allowed.error());
   return allowed;
 }
 
-rr::awaitable<rr::Result<std::unique_ptr<Boarding>>> board(GatewayState& gateway, Device& device, std::string way) {
+rr::awaitable<rr::Result<std::unique_ptr<Boarding>>> board(GatewayState& gateway, const Connection& connection,
+                                                           Device& device, std::string way) {
+  const auto entry =
+      gateway.access().begin(connection.identity, {.device = device.config().name, .verb = Verb::call}, {}, "relay");
+  const auto refused = [&entry](rr::Error error) {
+    if (entry) entry->finish(error);
+    return error;
+  };
   auto seat = device.take_seat();
   if (!seat) {
     gateway.reject(Rejection::device_full);
-    co_return rr::make_error(rr::ErrorCode::connection_error, device.full_text());
+    co_return refused(rr::make_error(rr::ErrorCode::connection_error, device.full_text()));
   }
   auto stream = co_await device.connect(std::move(way));
   if (!stream) {
     gateway.reject(Rejection::device_offline);
-    co_return rr::make_error(rr::ErrorCode::connection_error, device.offline_text(stream.error()));
+    co_return refused(rr::make_error(rr::ErrorCode::connection_error, device.offline_text(stream.error())));
   }
+  if (entry) entry->finish({});
   auto boarding = std::make_unique<Boarding>(Boarding{device, std::move(*seat), std::move(*stream)});
   co_return boarding;
 }

@@ -22,7 +22,8 @@ rr::Result<> may_relay(GatewayState& gateway, const Connection& connection, cons
 
 /// `way`    see Device::connect().
 /// Errors   connection_error: the device is full or can't be reached; the text is for the client.
-rr::awaitable<rr::Result<std::unique_ptr<Boarding>>> board(GatewayState& gateway, Device& device, std::string way = {});
+rr::awaitable<rr::Result<std::unique_ptr<Boarding>>> board(GatewayState& gateway, const Connection& connection,
+                                                           Device& device, std::string way = {});
 
 /// Relays until one side ends; ends both. `client` is at the start of its Robot Raconteur stream.
 rr::awaitable<void> relay_client(GatewayState& gateway, Connection& connection, std::unique_ptr<rr::ByteStream> client,

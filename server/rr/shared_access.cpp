@@ -39,6 +39,8 @@ Recorded recorded_of(rr::EntryType type) {
     case rr::EntryType::event_req:
     case rr::EntryType::callback_call_req:
     case rr::EntryType::generator_next_req:
+    case rr::EntryType::wire_disconnect_req:
+    case rr::EntryType::pipe_disconnect_req:
       return Recorded::never;
     default:
       return Recorded::each_time;
@@ -91,7 +93,7 @@ rr::Result<> SessionRights::admit_to_service(Standing& asker, const rr::MemberAc
 }
 
 rr::Result<> SessionRights::admit(const rr::MemberAccess& wanted) {
-  if (access_.is_open()) return {};
+  if (access_.is_open() && !access_.audit().is_used()) return {};
   auto& asker = standing_of(wanted.user);
   if (wanted.type == rr::EntryType::get_node_info)
     return wanted.path.empty() ? asker.check({.verb = Verb::admin}, Recorded::never)
@@ -107,6 +109,24 @@ rr::Result<> SessionRights::admit(const rr::MemberAccess& wanted) {
   if (wanted.member) request.member = wanted.member->name;
   request.verb = verb_of(wanted.type);
   return asker.check(request, recorded_of(wanted.type));
+}
+
+AuditEntryPtr SessionRights::begin(const rr::MemberAccess& admitted) {
+  if (!admitted.member || recorded_of(admitted.type) != Recorded::each_time) return nullptr;
+  AccessRequest what{.path = admitted.path, .member = admitted.member->name, .verb = verb_of(admitted.type)};
+  return begin(what, admitted.user, {});
+}
+
+AuditEntryPtr SessionRights::begin_lock(const rr::LockWanted& wanted, const rr::AuthenticatedUser* user) {
+  const bool is_release = wanted.command == rr::LockCommand::unlock || wanted.command == rr::LockCommand::exit_monitor;
+  return begin({.path = wanted.path, .verb = Verb::lock}, user, is_release ? "unlock" : "lock");
+}
+
+AuditEntryPtr SessionRights::begin(AccessRequest what, const rr::AuthenticatedUser* user, std::string_view event) {
+  what.service = what.path.substr(0, what.path.find('.'));
+  const auto device = node_.device_of(what.service);
+  what.device = device;
+  return standing_of(user).begin(what, event);
 }
 
 }  // namespace rrgate

@@ -18,12 +18,16 @@ class SessionRights {
 
   /// For ServiceSessionOptions::admit. Errors   permission_denied; authentication_error: a login may help.
   [[nodiscard]] rr::Result<> admit(const rr::MemberAccess& wanted);
+  /// What is to be recorded of something that was admitted; see Access::begin().
+  AuditEntryPtr begin(const rr::MemberAccess& admitted);
+  AuditEntryPtr begin_lock(const rr::LockWanted& wanted, const rr::AuthenticatedUser* user);
   /// Whether all that was shown is still good; see Standing.
   bool is_good() { return shown_->is_good() && (!user_ || user_->is_good()); }
 
  private:
   /// Whose rights count. `user`  null: has not logged in.
   Standing& standing_of(const rr::AuthenticatedUser* user);
+  AuditEntryPtr begin(AccessRequest what, const rr::AuthenticatedUser* user, std::string_view event);
   rr::Result<> admit_to_service(Standing& asker, const rr::MemberAccess& wanted, std::string_view service);
 
   Access& access_;

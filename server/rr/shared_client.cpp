@@ -21,11 +21,13 @@ const std::string& path_of(const rr::ServiceObject& object) {
 }  // namespace
 
 SharedClient::SharedClient(SharedClientOwner& owner, rr::ServiceDirectory& directory, rr::ServiceSessionOptions options,
-                           std::unique_ptr<rr::ByteStream> stream, ClientOrigin from, MemoryBudget::Charge memory)
+                           std::unique_ptr<rr::ByteStream> stream, ClientOrigin from, MemoryBudget::Charge memory,
+                           LockRecorder begin_lock)
     : SessionDriver(std::move(stream), directory, std::move(options), rr::read_clocks()),
       owner_(&owner),
       from_(std::move(from)),
-      memory_(std::move(memory)) {}
+      memory_(std::move(memory)),
+      begin_lock_(std::move(begin_lock)) {}
 
 void SharedClient::close_service() {
   session_.close_service(rr::read_clocks());
@@ -370,7 +372,9 @@ void SharedClient::handle(const rr::UserChanged&) {
 void SharedClient::handle(const rr::LockWanted& wanted) {
   if (!service_) return;
   const std::weak_ptr<StreamDriver> weak = weak_from_this();
-  home_->lock(*this, wanted, [this, weak, id = wanted.id](const rr::Result<>& result) {
+  const auto entry = begin_lock_ ? begin_lock_(wanted, session_.user()) : nullptr;
+  home_->lock(*this, wanted, [this, weak, entry, id = wanted.id](const rr::Result<>& result) {
+    if (entry) entry->finish(result);
     const auto self = weak.lock();
     if (!self) return;
     session_.answer_lock(id, result, rr::read_clocks());

@@ -28,10 +28,14 @@ class SharedClientOwner {
   ~SharedClientOwner() = default;
 };
 
+/// What is to be recorded of a lock that `user` asks for (null: nobody has logged in).
+using LockRecorder = std::function<AuditEntryPtr(const rr::LockWanted& wanted, const rr::AuthenticatedUser* user)>;
+
 class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private UpstreamClient {
  public:
   SharedClient(SharedClientOwner& owner, rr::ServiceDirectory& directory, rr::ServiceSessionOptions options,
-               std::unique_ptr<rr::ByteStream> stream, ClientOrigin from, MemoryBudget::Charge memory);
+               std::unique_ptr<rr::ByteStream> stream, ClientOrigin from, MemoryBudget::Charge memory,
+               LockRecorder begin_lock);
 
   const rr::ServiceSession& session() const { return session_; }
   /// For logs.
@@ -109,6 +113,7 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   SharedClientOwner* owner_;
   ClientOrigin from_;
   MemoryBudget::Charge memory_;
+  LockRecorder begin_lock_;
   std::string end_reason_;
   bool is_behind_ = false;
   bool was_behind_ = false;  ///< and it is in the log

@@ -17,7 +17,8 @@ struct SharedArrival {
   std::string base_url;  ///< of the node, as this client reaches it: "rr+tcp://10.0.0.5:52222/"
   std::function<rr::Result<>(const rr::MemberAccess&)> admit;  ///< none: everything is allowed
   /// See ServiceSessionOptions.
-  std::function<rr::Result<std::shared_ptr<const void>>(const rr::MemberAccess&)> enter;
+  std::function<rr::Result<std::shared_ptr<rr::RequestPass>>(const rr::MemberAccess&)> enter;
+  LockRecorder begin_lock;  ///< none: locks are not recorded
   bool is_encrypted = false;
   MemoryBudget::Charge memory;  ///< what is held for it
 };

@@ -166,7 +166,17 @@ rr::awaitable<rr::OrderedJson> JsonOperations::perform(RequestPtr request) {
   if (!operation->traits.has_target) co_return co_await (this->*operation->perform)(request, target);
   target = co_await find(request, *operation);
   const CallLog logged(place_.trace, place_.device->config().name, operation->name, path_of(*target));
-  co_return co_await (this->*operation->perform)(request, target);
+  const auto entry = admit(*target, *operation);
+  rr::OrderedJson result;
+  std::optional<rr::Error> error;
+  try {
+    result = co_await (this->*operation->perform)(request, target);
+  } catch (const rr::Exception& exception) {
+    error = exception.error();
+  }
+  if (entry) entry->finish(error ? rr::Result<>(*error) : rr::Result<>());
+  if (error) throw rr::Exception(std::move(*error));
+  co_return result;
 }
 
 rr::awaitable<JsonOperations::TargetPtr> JsonOperations::find(RequestPtr request, const Operation& operation) {
@@ -186,10 +196,16 @@ rr::awaitable<JsonOperations::TargetPtr> JsonOperations::find(RequestPtr request
     target->client = own_;
   }
   if (is_stopped_) refuse(rr::ErrorCode::operation_cancelled, "the WebSocket has ended");
-  const auto wanted = access_request(*target, operation.verb);
-  if (const auto allowed = place_.standing->check(wanted, operation.traits.recorded); !allowed)
-    throw rr::Exception(allowed.error());
   co_return target;
+}
+
+AuditEntryPtr JsonOperations::admit(const Target& target, const Operation& operation) {
+  const auto wanted = access_request(target, operation.verb);
+  auto begun = place_.standing->check_and_begin(wanted, place_.trace, operation.traits.recorded,
+                                                operation.verb == Verb::lock ? operation.name : std::string_view());
+  if (begun) return std::move(*begun);
+  if (begun.error().code == rr::ErrorCode::out_of_system_resource) gateway_.reject(begun.error());
+  throw rr::Exception(begun.error());
 }
 
 rr::awaitable<std::shared_ptr<ValueClient>> JsonOperations::client() {

@@ -75,6 +75,8 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
                                  MemoryBudget::Charge memory);
   rr::awaitable<rr::OrderedJson> perform(RequestPtr request);
   rr::awaitable<TargetPtr> find(RequestPtr request, const Operation& operation);
+  /// Throws   rr::Exception: there is no right to it, or it can't be recorded.
+  AuditEntryPtr admit(const Target& target, const Operation& operation);
   rr::awaitable<std::shared_ptr<ValueClient>> client();
   void tell_error(const std::string& id, const rr::Error& error);
 

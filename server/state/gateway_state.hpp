@@ -39,6 +39,10 @@ class GatewayState {
   FoundDevices* found() { return config_.discover.is_enabled ? found_.get() : nullptr; }
   Metrics& metrics() { return metrics_; }
   void reject(Rejection why) { metrics_.reject(why); }
+  /// For an error of Access::check().
+  void reject(const rr::Error& why) {
+    reject(why.code == rr::ErrorCode::out_of_system_resource ? Rejection::audit : Rejection::forbidden);
+  }
   Admission& admission() { return admission_; }
   /// Documents about devices that were asked for lately, by what they are made of.
   using Documents = BoundedTable<std::string, Response>;

@@ -51,11 +51,13 @@ rr::Result<Identity> by_proxy(const Request& request, const Connection& connecti
 rr::awaitable<rr::Result<Identity>> HttpAccess::identify(const Request& request, const Connection& connection,
                                                          const Config& config) {
   const auto& client = request.arrival.peer;
-  const auto proven = [this, &client](Identity identity) {
+  const auto face = request.identity.face;
+  const auto proven = [this, &client, face](Identity identity) {
     identity.client = client;
+    identity.face = face;
     return access_.with_grants(std::move(identity));
   };
-  if (access_.is_open()) co_return access_.anonymous(client);
+  if (access_.is_open()) co_return access_.anonymous(client, face);
   auto told = by_proxy(request, connection, config);
   if (!told) co_return told.error();
   if (told->is_proven()) co_return proven(std::move(*told));
@@ -68,6 +70,7 @@ rr::awaitable<rr::Result<Identity>> HttpAccess::identify(const Request& request,
       auto identity = access_.tickets().redeem(*ticket, std::chrono::system_clock::now());
       if (!identity) co_return refused("the ticket is unknown, was used, or is older than 30 seconds");
       identity->client = client;
+      identity->face = face;
       identity = access_.renew(*identity);
       if (!identity) co_return refused("what the ticket was given for was revoked or has expired");
       co_return std::move(*identity);
@@ -75,24 +78,27 @@ rr::awaitable<rr::Result<Identity>> HttpAccess::identify(const Request& request,
   if (is_from_own_page(request))
     if (auto found = access_.sign_ins().find(sign_in_cookie(request), std::chrono::system_clock::now())) {
       found->client = client;
+      found->face = face;
       if (auto renewed = access_.renew(*found)) co_return std::move(*renewed);
     }
   if (connection.identity.proof == Proof::certificate) co_return proven(connection.identity);
-  co_return access_.anonymous(client);
+  co_return access_.anonymous(client, face);
 }
 
 rr::awaitable<rr::Result<Identity>> HttpAccess::by_authorization(std::string header, ClientOrigin from) {
-  const auto nobody = access_.anonymous(from.client);
+  const auto nobody = access_.anonymous(from.client, from.face);
   const auto bearer = credentials_of(header, "Bearer");
   if (bearer && access_.state().jwt && access_.state().jwt->misses_key_of(*bearer)) co_await issuer_keys_.look_anew();
   const auto& state = access_.state();
   if (bearer && (state.tokens || state.jwt)) {
     auto identity = by_token(*bearer);
     if (!identity) {
-      access_.record_refusal({"login_failed", &nobody, nullptr, identity.error().message});
+      access_.record_refusal(
+          {.event = "login_failed", .who = &nobody, .detail = identity.error().message, .outcome = Outcome::refused});
       co_return identity.error();
     }
     identity->client = from.client;
+    identity->face = from.face;
     co_return access_.with_grants(std::move(*identity));
   }
   const auto basic = credentials_of(header, "Basic");
@@ -117,9 +123,10 @@ rr::awaitable<rr::Result<Identity>> HttpAccess::by_password(std::string credenti
   attempt.username = text.substr(0, colon);
   attempt.credentials.items.emplace_back("password", rr::Value(std::string_view(text).substr(colon + 1)));
   const auto client = from.client;
+  const auto face = from.face;
   const auto user = co_await logins_.judge(std::move(attempt), std::move(from), Logins::Of::request);
   if (!user) co_return user.error();
-  co_return access_.logged_in(*user, client);
+  co_return access_.logged_in(*user, client, face);
 }
 
 Response HttpAccess::refusal(const Request& request, const rr::Error& error) const {

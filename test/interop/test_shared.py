@@ -337,6 +337,19 @@ def test_who_answers_callbacks(node, tmp_path, answer):
         service.stop()
 
 
+def audited(gateway, folder, is_there):
+    """What others than the audit log itself are recorded with, once it is there."""
+    found = []
+
+    def read():
+        lines = map(json.loads, (folder / "audit").read_text().splitlines())
+        found[:] = [line for line in lines if line["event"] not in ("started", "stopped")]
+        return found and is_there(found)
+
+    gateway.wait_until(read)
+    return found
+
+
 def test_rights_member_by_member(node, tmp_path):
     """Users of the gateway in a shared session, each verb against what the rules say."""
     service, url = start_service(tmp_path)
@@ -385,7 +398,7 @@ def test_rights_member_by_member(node, tmp_path):
                     denied = False
                 assert denied == (what not in allowed), (user, what)
             node.DisconnectService(root)
-        lines = [json.loads(line) for line in (tmp_path / "audit").read_text().splitlines()]
+        lines = audited(gateway, tmp_path, lambda lines: any(line["event"] == "login" and line["user"] == "root" for line in lines))
         assert any(line.get("user") == "vera" and line.get("member") == "p_double" for line in lines), lines[-5:]
         logins = [(line["event"], line["user"]) for line in lines if line["event"].startswith("login")]
         assert logins == [("login_failed", "alice"), *(("login", user) for user in may)]
@@ -410,7 +423,7 @@ def test_a_login_that_the_device_judges_gives_no_rights_of_the_gateways_users(no
         with pytest.raises(RR.PermissionDeniedException, match="'alice' of the device, who is no user of the gateway, may not write"):
             root.level = 2.0
         node.DisconnectService(root)
-        lines = [json.loads(line) for line in (tmp_path / "audit").read_text().splitlines()]
+        lines = audited(gateway, tmp_path, lambda lines: lines[-1]["event"] == "refused")
         (refused,) = (line for line in lines if line["event"] == "refused")
         assert (refused["proof"], refused["device_user"]) == ("none", "alice")
         (login,) = (line for line in lines if line["event"] == "login")
@@ -418,7 +431,7 @@ def test_a_login_that_the_device_judges_gives_no_rights_of_the_gateways_users(no
         assert login["client"].startswith("127.0.0.1:")
         with pytest.raises(RR.AuthenticationException):
             node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=guarded", *password_of("alice", "wrong"))
-        lines = [json.loads(line) for line in (tmp_path / "audit").read_text().splitlines()]
+        lines = audited(gateway, tmp_path, lambda lines: lines[-1]["event"] == "login_failed")
         assert (lines[-1]["event"], lines[-1]["device_user"]) == ("login_failed", "alice")
     finally:
         gateway.stop()
@@ -491,9 +504,8 @@ def test_who_may_do_nothing_gets_to_no_service(node, tmp_path):
         with pytest.raises(RR.ConnectionException, match="all the clients it may have"):
             node.ConnectService(of_gateway + "interop", *password_of("vera"))
         node.DisconnectService(root)
-        lines = [json.loads(line) for line in (tmp_path / "audit").read_text().splitlines()]
-        assert any((line["event"], line["device"], line.get("user")) == ("refused", "interop", "nora") for line in lines
-                   if "device" in line)
+        audited(gateway, tmp_path, lambda lines: any((line["event"], line.get("device"), line.get("user")) == ("refused", "interop", "nora")
+                                                     for line in lines))
         for each in strangers:
             node.DisconnectService(each)
     finally:

@@ -101,8 +101,13 @@ TEST_CASE("who may do what") {
   CHECK(access.grants == std::vector<RoleGrant>{{{"*@lab"}, {"viewer"}}});
   CHECK(access.rules == std::vector<AccessRule>{{{"*"}, {"a"}, {"s"}, {"s.*"}, {""}, {Verb::read, Verb::lock}},
                                                 {{"ops"}, {}, {}, {}, {}, {Verb::metrics, Verb::admin}}});
-  CHECK(access.audit_file == "audit");
+  CHECK(access.audit.file == "audit");
   CHECK(access.has_users());
+  const auto audit =
+      parse_config(with(R"("audit": {"file": "a", "max_bytes": 1000, "keep": 3, "fsync": true, "fail_closed": true})"));
+  CHECK(audit.config.access.audit == AuditConfig{"a", 1000, 3, true, true});
+  finds(with(R"("audit": {"file": "a"}, "access": {"audit_file": "b"})"),
+        "gateway.json: /access/audit_file: ", "expected one of the two");
   const auto access_finds = [](const std::string& part, const std::string& path, const std::string& contains) {
     finds(with(R"("access": {)" + part + "}"), "gateway.json: /access" + path + ": ", contains);
   };

@@ -37,8 +37,18 @@ Result<> ServiceSession::enter(const MessageEntry& entry, const MemberDefinition
   return {};
 }
 
-void ServiceSession::release_pass(std::uint32_t request_id) {
-  if (const auto found = passes_.find(request_id); found != passes_.end()) passes_.erase(found);
+std::shared_ptr<RequestPass> ServiceSession::release_pass(std::uint32_t request_id) {
+  auto node = passes_.extract(request_id);
+  return node ? std::move(node.mapped()) : nullptr;
+}
+
+void ServiceSession::answer_pass(const MessageEntry& answer) {
+  const auto pass = release_pass(answer.request_id);
+  if (!pass) return;
+  if (answer.error == ErrorCode::none)
+    pass->handle_answer({});
+  else if (service_)
+    pass->handle_answer(read_error(outgoing_, answer, service_->types()));
 }
 
 // --- objects ---

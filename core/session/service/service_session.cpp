@@ -225,7 +225,7 @@ void ServiceSession::close_service(Now now) {
 void ServiceSession::send_outgoing(Now now, bool is_urgent) {
   if (!passes_.empty())
     for (const auto& entry : outgoing_.entries)
-      if (!is_request(entry.type)) release_pass(entry.request_id);
+      if (!is_request(entry.type)) answer_pass(entry);
   if (auto sent = connection_.send(outgoing_, now, is_urgent); sent)
     return;
   else if (connection_.state() == ConnectionState::closed)

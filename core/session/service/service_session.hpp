@@ -39,6 +39,17 @@ struct MemberAccess {
   const AuthenticatedUser* user;  ///< null: has not logged in
 };
 
+/// What a request holds until it is answered; gone with the session, if that ends before.
+class RequestPass {
+ public:
+  RequestPass() = default;
+  RequestPass(const RequestPass&) = delete;
+  RequestPass& operator=(const RequestPass&) = delete;
+  virtual ~RequestPass() = default;
+  /// Called once, when the client is answered: with nothing, or with an error.
+  virtual void handle_answer(const Result<>&) {}
+};
+
 struct ServiceSessionOptions {
   ConnectionOptions connection;  ///< `self` is taken from the directory
   std::string base_url = {};     ///< "rr+tcp://127.0.0.1:52222/": what the service index says of this connection
@@ -61,7 +72,7 @@ struct ServiceSessionOptions {
   /// Asked behind `admit` for each request to a member, unless it ends something; packets are none. What it returns is
   /// kept until the request is answered; what it refuses with is what the client gets, and nothing is lost by it. None:
   /// as many as may come.
-  std::function<Result<std::shared_ptr<const void>>(const MemberAccess&)> enter = {};
+  std::function<Result<std::shared_ptr<RequestPass>>(const MemberAccess&)> enter = {};
   /// With it nothing is served here: the first request for a service fails so, and the session ends behind it.
   std::optional<Error> refusal = {};
 };
@@ -457,7 +468,8 @@ class ServiceSession {
   Result<> admit_special(const Message& message, const MessageEntry& entry) const;
   const ServiceDefinition* find_definition(std::string_view service, std::string_view name) const;
   Result<> enter(const MessageEntry& entry, const MemberDefinition& member);
-  void release_pass(std::uint32_t request_id);
+  void answer_pass(const MessageEntry& answer);
+  std::shared_ptr<RequestPass> release_pass(std::uint32_t request_id);
 
   // callbacks (service_callback.cpp)
   void handle_callback_reply(const Message& message, const MessageEntry& entry);
@@ -519,7 +531,7 @@ class ServiceSession {
 
   CallId last_call_id_ = 0;
   std::vector<OpenCall> calls_;
-  std::unordered_multimap<std::uint32_t, std::shared_ptr<const void>>
+  std::unordered_multimap<std::uint32_t, std::shared_ptr<RequestPass>>
       passes_;  ///< of requests, until they are answered
   GeneratorTable generators_;
   Wires wires_;

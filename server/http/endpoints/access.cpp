@@ -73,7 +73,7 @@ rr::Result<std::string> text_of(const rr::Json& body, const char* key) {
 std::optional<Response> refuse_stranger(GatewayState& gateway, const Request& request) {
   const auto allowed = gateway.access().check(request.identity, {.verb = Verb::admin});
   if (allowed) return std::nullopt;
-  gateway.reject(Rejection::forbidden);
+  gateway.reject(allowed.error());
   return gateway.http_access().refusal(request, allowed.error());
 }
 
@@ -120,7 +120,7 @@ Response approve(GatewayState& gateway, const Request& request, const std::strin
   requests.decide(id, std::move(*token));
   const auto detail = pending->name + " of " + pending->client + ": roles " + format_roles(roles) + ", until " +
                       (last_day ? format_day(*last_day) : "it is deleted");
-  gateway.access().record({"approved", &request.identity, nullptr, detail});
+  gateway.access().record({.event = "approved", .who = &request.identity, .detail = detail});
   return answer(200, {{"state", "approved"}});
 }
 
@@ -129,7 +129,8 @@ Response deny(GatewayState& gateway, const Request& request, const std::string& 
   const auto pending = requests.find_pending(id, Clock::now());
   if (!pending) return error_answer(pending.error());
   requests.decide(id, {});
-  gateway.access().record({"denied", &request.identity, nullptr, pending->name + " of " + pending->client});
+  const auto detail = pending->name + " of " + pending->client;
+  gateway.access().record({.event = "denied", .who = &request.identity, .detail = detail});
   return answer(200, {{"state", "denied"}});
 }
 
@@ -184,7 +185,7 @@ rr::awaitable<Response> judge_sign_in(GatewayState& gateway, const Request& requ
   const auto now = Clock::now();
   const auto cookie = gateway.access().sign_ins().begin(who, now);
   if (!cookie) co_return problem_response(409, "you have more roles than a cookie can name");
-  gateway.access().record({"signed_in", &who, nullptr, {}});
+  gateway.access().record({.event = "signed_in", .who = &who});
   const auto left = std::min(Clock::duration(SignIns::lifetime), who.ends - now);
   auto response = answer(201, {{"user", who.name},
                                {"roles", who.roles},
@@ -272,7 +273,7 @@ Handler ask_endpoint(GatewayState& gateway) {
                                                             network_name(request.arrival.address), Clock::now());
     if (!asked) return error_answer(asked.error());
     log(LogLevel::info, "access asked for", {{"name", *name}, {"peer", request.arrival.peer}, {"reason", *reason}});
-    gateway.access().record({"asked", &request.identity, nullptr, *name});
+    gateway.access().record({.event = "asked", .who = &request.identity, .detail = *name});
     const auto lifetime = std::chrono::seconds(AccessRequests::lifetime).count();
     return answer(202, {{"id", asked->id}, {"secret", asked->secret}, {"expires_in", lifetime}});
   };
@@ -304,6 +305,8 @@ Handler request_endpoint(GatewayState& gateway) {
       return problem_response(404, "expected .../requests/ID/approve, deny or claim");
     if (what == "claim") return claim(gateway, request, id);
     if (auto refusal = refuse_stranger(gateway, request)) return std::move(*refusal);
+    if (const auto recordable = gateway.access().audit().admit(); !recordable)
+      return gateway.http_access().refusal(request, recordable.error());
     return what == "approve" ? approve(gateway, request, id) : deny(gateway, request, id);
   };
 }

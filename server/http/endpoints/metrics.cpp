@@ -169,6 +169,16 @@ std::uint64_t cpu_microseconds() {
   return static_cast<std::uint64_t>(used.tv_sec) * 1'000'000 + static_cast<std::uint64_t>(used.tv_nsec) / 1000;
 }
 
+void write_audit(Exposition& out, const AuditLog::State& audit) {
+  out.single("rrgate_audit_up", "gauge", "Whether the audit log can be written; 1 where there is none.",
+             audit.failure.empty() ? 1 : 0);
+  out.single("rrgate_audit_records_total", "counter", "Records that were written into the audit log.", audit.records);
+  out.single("rrgate_audit_lost_total", "counter", "Records that will never be there.", audit.lost);
+  out.single("rrgate_audit_refused_total", "counter", "What was refused since it could not be recorded.",
+             audit.refused);
+  out.single("rrgate_audit_waiting", "gauge", "Records that are not written yet.", audit.waiting);
+}
+
 }  // namespace
 
 Handler metrics_endpoint(GatewayState& gateway) {
@@ -197,6 +207,7 @@ Handler metrics_endpoint(GatewayState& gateway) {
     out.single("rrgate_memory_budget_used_bytes", "gauge", "What they make it hold.", memory.used());
     out.single("rrgate_memory_budget_refusals_total", "counter", "What was refused because that was too much.",
                memory.refusals());
+    write_audit(out, gateway.access().audit().state());
     const auto devices = look_at(gateway);
     write_devices(out, devices);
     write_ledgers(out, devices, gateway.shared());

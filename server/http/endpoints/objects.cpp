@@ -188,7 +188,7 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
   auto trace = trace_id_of(traceparent);
   if (!trace.empty()) writer.add_header("traceparent", std::string(traceparent));
   const auto method = writer.request().message.method_string();
-  const CallLog logged(std::move(trace), device->config().name, {method.data(), method.size()},
+  const CallLog logged(trace, device->config().name, {method.data(), method.size()},
                        std::string(writer.request().path()));
   auto key = session_key(gateway, writer.request(), service);
   auto from = writer.request().origin();
@@ -206,15 +206,25 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
   } else {
     error = client.error();
   }
-  if (target)
-    if (const auto allowed =
-            gateway.access().check(writer.request().identity, access_request(*target, verb_of(request, *target)));
-        !allowed) {
-      gateway.reject(Rejection::forbidden);
-      const auto refusal = gateway.http_access().refusal(writer.request(), allowed.error());
+  AuditEntryPtr entry;
+  if (target) {
+    const auto wanted = access_request(*target, verb_of(request, *target));
+    auto who = writer.request().identity;
+    if (wanted.verb == Verb::subscribe) who.face = Face::stream;
+    auto begun = gateway.access().check_and_begin(who, wanted, trace);
+    if (!begun) {
+      gateway.reject(begun.error());
+      const auto refusal = gateway.http_access().refusal(writer.request(), begun.error());
       co_await writer.send(refusal);
       co_return;
     }
+    entry = std::move(*begun);
+  }
+  if (entry)
+    writer.on_begin([&entry, &error](unsigned status) {
+      if (status < 400) return entry->finish({});
+      entry->finish(Outcome::error, error ? error->message : "answered with status " + std::to_string(status));
+    });
   if (target)
     if (const auto failed = co_await writer.read_body()) {
       co_await writer.send(*failed);

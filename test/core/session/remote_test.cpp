@@ -363,11 +363,20 @@ TEST_CASE("what a client may do is asked before it is done") {
 TEST_CASE("requests are bounded until they are answered; what is too much is refused, and nothing is lost by it") {
   Remote pair;
   int open = 0;
+  std::vector<ErrorCode> answers;
+  struct Pass : RequestPass {
+    Pass(int& counted, std::vector<ErrorCode>& told) : open(counted), answers(told) { ++open; }
+    ~Pass() override { --open; }
+    void handle_answer(const Result<>& result) override {
+      answers.push_back(result ? ErrorCode::none : result.error().code);
+    }
+    int& open;
+    std::vector<ErrorCode>& answers;
+  };
   ServiceSessionOptions options;
-  options.enter = [&open](const MemberAccess&) -> Result<std::shared_ptr<const void>> {
+  options.enter = [&](const MemberAccess&) -> Result<std::shared_ptr<RequestPass>> {
     if (open == 2) return make_error(ErrorCode::out_of_system_resource, "too much");
-    ++open;
-    return std::shared_ptr<const void>(&open, [&open](const void*) { --open; });
+    return std::make_shared<Pass>(open, answers);
   };
   ClientOptions client_options;
   client_options.connection.self = {client_id, ""};
@@ -393,6 +402,7 @@ TEST_CASE("requests are bounded until they are answered; what is too much is ref
   pair.next_service<WireConnected>();
   const auto read = pair.next_service<Called>();
   CHECK(open == 2);
+  CHECK(answers == std::vector{ErrorCode::none});
   expect_refused(pair.client->next_generator("arm", "count", index, {}, pair.now));
   expect_refused(pair.client->connect_pipe("arm", "samples", any_pipe_index, pair.now));
 

@@ -6,11 +6,14 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "server/access/audit_trail.hpp"
 #include "test/support/print.hpp"
 
 using namespace rrgate;
 
 namespace {
+
+namespace fs = std::filesystem;
 
 Identity alice() {
   Identity out;
@@ -18,59 +21,243 @@ Identity alice() {
   out.roles = {"operator"};
   out.proof = Proof::token;
   out.client = "192.0.2.1:5";
+  out.face = Face::rest;
   return out;
 }
 
-std::string read(const std::filesystem::path& path) {
+struct Folder {
+  Folder() {
+    std::string made = (fs::temp_directory_path() / "rrgate-audit-XXXXXX").string();
+    REQUIRE(::mkdtemp(made.data()));
+    path = made;
+  }
+  ~Folder() { fs::remove_all(path); }
+  std::string file(const std::string& name = "audit") const { return (path / name).string(); }
+  fs::path path;
+};
+
+std::string read(const std::string& path) {
   std::ifstream file(path);
   std::ostringstream text;
   text << file.rdbuf();
   return text.str();
 }
 
+std::vector<std::string> lines_of(const std::string& path) {
+  std::istringstream text(read(path));
+  std::vector<std::string> out;
+  for (std::string line; std::getline(text, line);) out.push_back(line);
+  return out;
+}
+
+void write_lines(const std::string& path, const std::vector<std::string>& lines) {
+  std::ofstream out(path);
+  for (const auto& line : lines) out << line << '\n';
+}
+
+std::vector<std::string> events_of(const std::string& path) {
+  std::vector<std::string> out;
+  for (const auto& line : lines_of(path)) out.push_back(nlohmann::json::parse(line)["event"]);
+  return out;
+}
+
+/// A start, `count` records and a stop.
+void write_log(const AuditConfig& config, int count) {
+  AuditLog log;
+  REQUIRE(log.open(config));
+  const auto who = alice();
+  for (int i = 0; i < count; ++i) log.add({.event = "write", .who = &who, .detail = std::to_string(i)});
+  REQUIRE(log.flush(std::chrono::seconds(10)));
+}
+
+std::vector<AuditFinding> findings_of(const std::vector<std::string>& files) {
+  return verify_audit_files(files).value().findings;
+}
+
 }  // namespace
 
-TEST_CASE("a line of the audit log says who did what, when") {
+TEST_CASE("a record of the audit log says who did what, when") {
   const auto who = alice();
   const AccessRequest what{"create", "Create", "Create.axes[0]", "speed", Verb::write};
   const auto now = std::chrono::system_clock::time_point(std::chrono::milliseconds(1'900'000'000'007));
-  CHECK(format_audit_line({"write", &who, &what, {}}, now) ==
-        R"({"time":"2030-03-17T17:46:40.007Z","event":"write","user":"alice","roles":["operator"],"proof":"token",)"
-        R"("client":"192.0.2.1:5","verb":"write","device":"create","service":"Create","path":"Create.axes[0]",)"
-        R"("member":"speed"})"
-        "\n");
+  CHECK(format_audit_event({.event = "write", .who = &who, .what = &what, .trace = "0af7"}, now) ==
+        R"("time":"2030-03-17T17:46:40.007Z","event":"write","outcome":"ok","face":"rest","user":"alice",)"
+        R"("roles":["operator"],"proof":"token","client":"192.0.2.1:5","verb":"write","device":"create",)"
+        R"("service":"Create","path":"Create.axes[0]","member":"speed","trace":"0af7")");
   // Nothing that strangers choose begins another line, or fills the disk with one.
   Identity evil;
   evil.name = "a\n{\"event\":\"login\"}\xff" + std::string(5000, 'x');
-  const auto line = format_audit_line({"login_failed", &evil, nullptr, "why"}, now);
-  CHECK(line.find('\n') == line.size() - 1);
-  CHECK(line.size() < 1000);
-  CHECK(nlohmann::json::parse(line)["detail"] == "why");
+  const auto text =
+      format_audit_event({.event = "login_failed", .who = &evil, .detail = "why", .outcome = Outcome::refused}, now);
+  CHECK(text.find('\n') == std::string::npos);
+  CHECK(text.size() < 1000);
+  CHECK(nlohmann::json::parse("{" + text + "}")["detail"] == "why");
 }
 
-TEST_CASE("the audit log is added to, moves on when its file has moved, and outlives a full disk") {
-  std::string folder = (std::filesystem::temp_directory_path() / "rrgate-audit-XXXXXX").string();
-  REQUIRE(::mkdtemp(folder.data()));
-  const std::filesystem::path path = folder + "/audit";
-  const auto who = alice();
+TEST_CASE("the hash of a record is that of its text behind the hash before") {
+  AuditChain chain;
+  const auto first = chain.add("\"event\":\"a\"", true);
+  CHECK(first == R"({"seq":1,"prev":"0000000000000000000000000000000000000000000000000000000000000000","event":"a",)"
+                 R"("hash":")" +
+                     chain.hash + "\"}\n");
+  // printf '%064d{"seq":1,"prev":"%064d","event":"a"}' 0 0 | sha256sum
+  CHECK(chain.hash == "ed624815d436a54a52df0da6d3bd927931130e230d199f7f615296f4779bf909");
+  const auto before = chain.hash;
+  const auto line = chain.add("\"event\":\"b\"", false);
+  const auto parsed = parse_audit_line(std::string_view(line).substr(0, line.size() - 1));
+  REQUIRE(parsed);
+  CHECK(parsed->seq == 2);
+  CHECK_FALSE(parsed->previous);
+  CHECK(hash_audit_line(before, *parsed) == chain.hash);
+  for (std::size_t size = 0; size + 1 < line.size(); ++size) CHECK_FALSE(parse_audit_line(line.substr(0, size)));
+  for (const auto* other : {R"({"seq":0,"event":"b","hash":")", R"({"seq":x,"event":"b","hash":")"})
+    CHECK_FALSE(parse_audit_line(other + chain.hash + "\"}"));
+}
+
+TEST_CASE("the chain goes on behind a restart, a rotation and a file that was moved") {
+  const Folder folder;
+  const AuditConfig config{.file = folder.file(), .max_bytes = 2000, .keep = 3};
+  write_log(config, 3);
+  CHECK((fs::status(folder.file()).permissions() & fs::perms(0777)) == fs::perms(0600));
+  CHECK(events_of(folder.file()) == std::vector<std::string>{"started", "write", "write", "write", "stopped"});
+  write_log(config, 20);
+  CHECK(fs::exists(folder.file("audit.1")));
+  {
+    AuditLog log;
+    REQUIRE(log.open(config));
+    fs::rename(folder.file(), folder.file("moved"));
+    REQUIRE(log.reopen());
+    log.add({.event = "write"});
+    REQUIRE(log.flush(std::chrono::seconds(10)));
+    CHECK_FALSE(log.open({.file = folder.file("no/such")}));
+    log.add({.event = "write"});
+    REQUIRE(log.flush(std::chrono::seconds(10)));
+    CHECK(log.state().lost == 0);
+  }
+  std::vector<std::string> files;
+  for (const auto& each : fs::directory_iterator(folder.path)) files.push_back(each.path().string());
+  const auto trail = verify_audit_files(files).value();
+  for (const auto& each : trail.findings) UNSCOPED_INFO(each.file << ":" << each.line << " " << each.found);
+  CHECK(trail.findings.empty());
+  CHECK(trail.first == 1);
+  CHECK(trail.last.seq == trail.records);
+  CHECK(trail.records == 5 + 22 + 4);
+}
+
+TEST_CASE("of the renamed files as many are kept as are wanted") {
+  const Folder folder;
+  write_log({.file = folder.file(), .max_bytes = 1000, .keep = 2}, 5);
+  for (int i = 0; i < 5; ++i) write_log({.file = folder.file(), .max_bytes = 1000, .keep = 2}, 5);
+  CHECK(fs::exists(folder.file("audit.2")));
+  CHECK_FALSE(fs::exists(folder.file("audit.3")));
+  const auto trail = verify_audit_files({folder.file(), folder.file("audit.1"), folder.file("audit.2")}).value();
+  CHECK(trail.findings.empty());
+  CHECK(trail.first > 1);
+  // A file that is missing in between is seen.
+  const auto found = findings_of({folder.file(), folder.file("audit.2")});
+  REQUIRE(found.size() == 1);
+  CHECK(found[0].file == folder.file());
+  CHECK(found[0].line == 1);
+}
+
+TEST_CASE("records that were edited, cut out, put elsewhere or cut off are found") {
+  const Folder folder;
+  write_log({.file = folder.file()}, 6);
+  auto lines = lines_of(folder.file());
+  REQUIRE(lines.size() == 8);
+  const auto check = [&](std::uint64_t line, std::string_view found, std::string_view expected) {
+    write_lines(folder.file(), lines);
+    const auto findings = findings_of({folder.file()});
+    REQUIRE_FALSE(findings.empty());
+    CHECK(findings[0].line == line);
+    CHECK(findings[0].found.find(found) != std::string::npos);
+    CHECK(findings[0].expected.find(expected) != std::string::npos);
+    return findings.size();
+  };
+  CHECK(findings_of({folder.file()}).empty());
+  SECTION("edited") {
+    lines[3].replace(lines[3].find("alice"), 5, "bob");
+    CHECK(check(4, "record 4 with hash", "by its text and the record before") == 1);
+  }
+  SECTION("edited, with a hash that fits") {
+    const auto before = parse_audit_line(lines[2])->hash;
+    lines[3].replace(lines[3].find("alice"), 5, "bobby");
+    const auto hash = hash_audit_line(before, *parse_audit_line(lines[3]));
+    lines[3].replace(lines[3].size() - 66, 64, hash);
+    CHECK(check(5, "record 5 with hash", "hash") == 1);
+  }
+  SECTION("cut out") {
+    lines.erase(lines.begin() + 3);
+    CHECK(check(4, "record 5", "record 4") == 1);
+  }
+  SECTION("put elsewhere") {
+    std::swap(lines[3], lines[4]);
+    check(4, "record 5", "record 4");
+  }
+  SECTION("put in") {
+    lines.insert(lines.begin() + 3, "{\"seq\":4}");
+    CHECK(check(4, "no record: '{\"seq\":4}'", "record 4") == 1);
+  }
+  SECTION("cut off in front") {
+    lines.erase(lines.begin());
+    CHECK(check(1, "record 2 without \"prev\"", "the first record of a file") == 1);
+  }
+  SECTION("cut off at the end") {
+    lines.resize(5);
+    CHECK(check(0, "an end at record 5", "record 8 with hash") == 1);
+    // The next start knows, and what is missing stays missed.
+    write_log({.file = folder.file()}, 1);
+    CHECK(read(folder.file()).find("ends with record 5, but 8 were written") != std::string::npos);
+    const auto findings = findings_of({folder.file()});
+    REQUIRE(findings.size() == 1);
+    CHECK(findings[0].line == 6);
+    CHECK(findings[0].found == "record 9");
+    CHECK(findings[0].expected == "record 6");
+  }
+  SECTION("cut off at the end, and what tells of it is gone") {
+    lines.resize(5);
+    write_lines(folder.file(), lines);
+    fs::remove(folder.file("audit.head"));
+    CHECK(findings_of({folder.file()}).empty());
+    write_log({.file = folder.file()}, 1);
+    CHECK(read(folder.file()).find("there is no \\\"stopped\\\"") != std::string::npos);
+  }
+}
+
+TEST_CASE("a line that the power failed in is cut off; lines of before there was a chain stay") {
+  const Folder folder;
+  write_lines(folder.file(), {R"({"time":"2020-01-01T00:00:00.000Z","event":"write"})"});
+  write_log({.file = folder.file(), .syncs = true}, 1);
+  std::ofstream(folder.file(), std::ios::app) << R"({"seq":4,"ti)";
+  write_log({.file = folder.file()}, 1);
+  const auto trail = verify_audit_files({folder.file()}).value();
+  CHECK(trail.findings.empty());
+  CHECK(trail.unchained == 1);
+  CHECK(trail.records == 6);
+  CHECK(read(folder.file()).find("12 bytes were cut off") != std::string::npos);
+}
+
+TEST_CASE("a full disk keeps nobody waiting; what does not fit into memory is lost, and counted") {
+  const Folder folder;
   AuditLog log;
-  CHECK(log.write({"login", &who}));  // nowhere
-  REQUIRE(log.open(path.string()));
-  CHECK((std::filesystem::status(path).permissions() & std::filesystem::perms(0777)) == std::filesystem::perms(0600));
-  CHECK(log.write({"login", &who}));
-  std::filesystem::rename(path, folder + "/audit.1");
-  CHECK(log.write({"login", &who}));
-  REQUIRE(log.reopen());
-  CHECK(log.write({"call", &who}));
-  const auto lines = [](const std::string& text) { return std::count(text.begin(), text.end(), '\n'); };
-  CHECK(lines(read(folder + "/audit.1")) == 2);
-  CHECK(lines(read(path)) == 1);
-  CHECK_FALSE(log.open(folder + "/no/such/folder"));
-  CHECK(log.write({"call", &who}));
-  CHECK(lines(read(path)) == 2);
-  CHECK(log.lost_lines() == 0);
-  REQUIRE(log.open("/dev/full"));
-  CHECK_FALSE(log.write({"call", &who}));
-  CHECK(log.lost_lines() == 1);
-  std::filesystem::remove_all(folder);
+  const auto who = alice();
+  log.add({.event = "login", .who = &who});  // nowhere
+  REQUIRE(log.open({.file = "/dev/full"}));
+  CHECK(log.state().failure == "No space left on device");
+  CHECK(log.admit());
+  for (int i = 0; i < 10; ++i) log.add({.event = "call", .who = &who});
+  CHECK_FALSE(log.flush(std::chrono::milliseconds(1)));
+  CHECK(log.state().lost == 0);
+  const std::string long_text(400, 'x');
+  for (std::size_t i = 0; i < AuditLog::max_waiting_bytes / 400; ++i) log.add({.event = "call", .detail = long_text});
+  const auto lost = log.state().lost;
+  CHECK(lost > 0);
+  // What waits is written as soon as there is a disk, and that something is missing is told.
+  REQUIRE(log.open({.file = folder.file(), .fails_closed = true}));
+  REQUIRE(log.flush(std::chrono::seconds(30)));
+  CHECK(log.admit());
+  const auto text = read(folder.file());
+  CHECK(text.find("\"event\":\"resumed\"") != std::string::npos);
+  CHECK(text.find(std::to_string(lost) + " records were lost") != std::string::npos);
+  CHECK(findings_of({folder.file()}).empty());
 }
