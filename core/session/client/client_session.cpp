@@ -495,13 +495,15 @@ void ClientSession::fail_unpolled() {
 
 void ClientSession::fail(Error reason) {
   if (state_ == ClientState::closed) return;
+  // Requests of the connect sequence are this side's own, as is the one that disconnects: nobody knows their ids.
+  const bool is_connecting = state_ == ClientState::connecting;
   state_ = ClientState::closed;
   connection_.close(reason);
   std::vector<RequestId> waiting;
   for (const auto& [id, pending] : pending_)
     if (const auto fetch = fetches_.find(id); fetch != fetches_.end())
       waiting.push_back(fetch->second.lookup);
-    else if (has_started_ && !pending.is_abandoned)
+    else if (!is_connecting && !pending.is_abandoned && pending.type != EntryType::disconnect_client)
       waiting.push_back(id);
   std::sort(waiting.begin(), waiting.end());
   pending_.clear();
