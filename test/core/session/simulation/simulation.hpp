@@ -114,7 +114,7 @@ class Simulation {
     bool is_connected = false, is_closed = false;
     std::map<RequestId, Done> requests = {};
     std::map<std::pair<std::string, std::int32_t>, ClientPipe> pipes = {};
-    bool wants_wire = false, has_wire = false;
+    bool wants_wire = false, has_wire = false, is_wire_left = false;
     double in_value = 0, out_sent = 0;  ///< last of this connection of the wire; 0: none
     RequestId wire_request = 0;
     std::size_t events = 0;         ///< of `told` that have come
