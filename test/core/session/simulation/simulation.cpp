@@ -1,6 +1,7 @@
 #include "test/core/session/simulation/simulation.hpp"
 
 #include <algorithm>
+#include <iostream>
 #include <utility>
 
 #include "core/session/service_path.hpp"
@@ -97,8 +98,9 @@ class Simulation::Object final : public ServiceObject {
   std::string type_;
 };
 
-Simulation::Simulation(std::uint64_t seed)
+Simulation::Simulation(std::uint64_t seed, bool is_loud)
     : seed_(seed),
+      is_loud_(is_loud),
       dice_(seed),
       max_open_calls_(dice_.one_in(3) ? 2 : 1024),
       client_features_(random_features(dice_)),
@@ -196,6 +198,7 @@ void Simulation::act_as_service(Link& link) {
     case 1:
       if (dice_.one_in(4)) return tell_all();
       if (dice_.one_in(6)) {
+        tell(link, "service closes the wire");
         link.in_sent = link.out_value = 0;
         return link.service->close_wire("arm", *arm_->root_type().find_member("torque"), now_);
       }
@@ -209,8 +212,9 @@ void Simulation::act_as_service(Link& link) {
   }
 }
 
-void Simulation::request(Link& link, RequestId id, Done done) {
-  demand(link.requests.emplace(id, std::move(done)).second, &link, "a request id is given twice");
+void Simulation::request(Link& link, const std::string& what, RequestId id, Done done) {
+  tell(link, what + " #" + std::to_string(id));
+  demand(link.requests.emplace(id, Request{what, std::move(done)}).second, &link, "a request id is given twice");
 }
 
 void Simulation::call(Link& link) {
@@ -218,7 +222,7 @@ void Simulation::call(Link& link) {
   const std::vector<Value> arguments{Value(number), Value(1.0)};
   const auto id = link.client->call_function("arm", "add", arguments, now_);
   if (dice_.one_in(12)) return link.client->cancel(id);
-  request(link, id, [this, &link, number](const Result<Value>& result) {
+  request(link, "call", id, [this, &link, number](const Result<Value>& result) {
     const auto runs = executed_.find(number);
     if (!result) return count(Deed::error);
     demand(runs != executed_.end(), &link, "a call was answered that never ran");
@@ -233,10 +237,11 @@ void Simulation::use_pipe(Link& link) {
     const auto index = dice_.one_in(2) ? any_pipe_index : static_cast<std::int32_t>(dice_.below(4));
     const auto id = link.client->connect_pipe("arm", member, index, now_);
     if (dice_.one_in(8)) return link.client->cancel(id);
-    return request(link, id, [this, &link, member](const Result<Value>& result) {
-      if (!result) return;
-      link.pipes[{member, result->to<std::int32_t>().value()}] = ClientPipe{.stream = ++last_number_};
-    });
+    return request(link, "connect pipe " + member + " " + std::to_string(index), id,
+                   [this, &link, member](const Result<Value>& result) {
+                     if (!result) return;
+                     link.pipes[{member, result->to<std::int32_t>().value()}] = ClientPipe{.stream = ++last_number_};
+                   });
   }
   const auto chosen = std::next(link.pipes.begin(), static_cast<std::ptrdiff_t>(dice_.below(link.pipes.size())));
   const auto& [member, index] = chosen->first;
@@ -246,7 +251,7 @@ void Simulation::use_pipe(Link& link) {
     pipe.is_closing = true;
     const auto stream = pipe.stream;
     const auto key = chosen->first;
-    return request(link, link.client->disconnect_pipe("arm", member, index, now_),
+    return request(link, "disconnect pipe", link.client->disconnect_pipe("arm", member, index, now_),
                    [this, &link, key, stream](const Result<Value>& result) {
                      demand(result || result.error().code != ErrorCode::invalid_argument, &link, text_of(result));
                      const auto ended = link.pipes.find(key);
@@ -274,13 +279,13 @@ void Simulation::use_wire(Link& link) {
     link.wants_wire = link.has_wire = false;
     link.wire_request = 0;
     link.in_value = link.out_sent = 0;
-    request(link, link.client->disconnect_wire("arm", "torque", now_), [](const Result<Value>&) {});
+    request(link, "disconnect wire", link.client->disconnect_wire("arm", "torque", now_), [](const Result<Value>&) {});
     if (dice_.one_in(2)) return;
   }
   link.wants_wire = true;
   const auto id = link.client->connect_wire("arm", "torque", now_);
   link.wire_request = id;
-  request(link, id, [this, &link, id](const Result<Value>& result) {
+  request(link, "connect wire", id, [this, &link, id](const Result<Value>& result) {
     if (id != link.wire_request) return;  // disconnected meanwhile
     link.has_wire = link.wants_wire = result.has_value();
     // Nobody tells a service that its answer came too late: it keeps the wire.
@@ -293,9 +298,10 @@ void Simulation::use_wire(Link& link) {
 
 void Simulation::use_generator(Link& link) {
   if (link.generators.empty() || dice_.one_in(5)) {
-    return request(link, link.client->open_generator("arm", "count", {}, now_), [&link](const Result<Value>& result) {
-      if (result) link.generators[result->to<std::int32_t>().value()] = {};
-    });
+    return request(link, "open generator", link.client->open_generator("arm", "count", {}, now_),
+                   [&link](const Result<Value>& result) {
+                     if (result) link.generators[result->to<std::int32_t>().value()] = {};
+                   });
   }
   const auto chosen =
       std::next(link.generators.begin(), static_cast<std::ptrdiff_t>(dice_.below(link.generators.size())));
@@ -306,10 +312,10 @@ void Simulation::use_generator(Link& link) {
     running.is_ending = true;
     const auto id = dice_.one_in(2) ? link.client->close_generator("arm", "count", index, now_)
                                     : link.client->abort_generator("arm", "count", index, now_);
-    return request(link, id, [&link, index](const Result<Value>&) { link.generators.erase(index); });
+    return request(link, "end generator", id, [&link, index](const Result<Value>&) { link.generators.erase(index); });
   }
   const auto which = ++running.asked;
-  request(link, link.client->next_generator("arm", "count", index, std::nullopt, now_),
+  request(link, "next of generator", link.client->next_generator("arm", "count", index, std::nullopt, now_),
           [this, &link, index, which](const Result<Value>& result) {
             if (!result) {
               if (result.error().code != ErrorCode::object_locked_error &&
@@ -329,9 +335,10 @@ void Simulation::use_memory(Link& link) {
   const auto size = dice_.below(std::min<std::size_t>(memory_items - from, 1000) + 1);
   const MemoryShape position{from}, sizes{size};
   if (dice_.one_in(2))
-    return request(link, link.client->write_memory("arm", "data", position, Value(items(from, size)), now_),
+    return request(link, "write memory",
+                   link.client->write_memory("arm", "data", position, Value(items(from, size)), now_),
                    [](const Result<Value>&) {});
-  request(link, link.client->read_memory("arm", "data", position, sizes, now_),
+  request(link, "read memory", link.client->read_memory("arm", "data", position, sizes, now_),
           [this, &link, from, size](const Result<Value>& result) {
             if (!result) return;
             count(Deed::memory);
@@ -344,10 +351,10 @@ void Simulation::use_lock(Link& link) {
   if (dice_.one_in(2)) {
     ++link.unlocks;
     give_up(locks_, link, path);
-    return request(link, link.client->unlock(path, now_), [](const Result<Value>&) {});
+    return request(link, "unlock", link.client->unlock(path, now_), [](const Result<Value>&) {});
   }
   const auto kind = dice_.one_in(2) ? LockKind::user : LockKind::client;
-  request(link, link.client->lock(path, kind, now_),
+  request(link, "lock", link.client->lock(path, kind, now_),
           [this, &link, path, before = link.unlocks](const Result<Value>& result) {
             if (!result || link.is_gone || link.unlocks != before) return;
             count(Deed::lock);
@@ -360,13 +367,13 @@ void Simulation::use_monitor(Link& link) {
   const auto leave = [this, &link] {
     ++link.exits;
     give_up(monitors_, link, "arm");
-    request(link, link.client->exit_monitor("arm", now_), [](const Result<Value>&) {});
+    request(link, "exit monitor", link.client->exit_monitor("arm", now_), [](const Result<Value>&) {});
   };
   if (dice_.one_in(2)) return leave();
   const auto timeout = dice_.one_in(3) ? milliseconds(-1) : milliseconds(dice_.below(3000));
   // An owner that does nothing for 30 s has lost it.
   const auto until = now_.steady + std::chrono::seconds(30);
-  request(link, link.client->enter_monitor("arm", timeout, now_),
+  request(link, "enter monitor", link.client->enter_monitor("arm", timeout, now_),
           [this, &link, leave, until, before = link.exits](const Result<Value>& result) {
             if (!result || link.is_gone || link.exits != before) return;
             count(Deed::monitor);
@@ -379,16 +386,18 @@ void Simulation::use_monitor(Link& link) {
 void Simulation::use_object(Link& link) {
   const std::string path = dice_.one_in(2) ? "arm.tools[a]" : "arm.tools[b]";
   if (!link.objects.contains(path))
-    return request(link, link.client->find_object(path, now_), [this, &link, path](const Result<Value>& result) {
-      if (!result) return;
-      demand(*result == Value(tool_type), &link, "an object of another type");
-      if (link.client->object_type(path)) link.objects.insert(path);
-    });
-  request(link, link.client->get_property(path, "name", now_), [this, &link, path](const Result<Value>& result) {
-    if (!result) return;
-    count(Deed::object);
-    demand(*result == Value(path), &link, "the property of another object");
-  });
+    return request(link, "find object", link.client->find_object(path, now_),
+                   [this, &link, path](const Result<Value>& result) {
+                     if (!result) return;
+                     demand(*result == Value(tool_type), &link, "an object of another type");
+                     if (link.client->object_type(path)) link.objects.insert(path);
+                   });
+  request(link, "get property", link.client->get_property(path, "name", now_),
+          [this, &link, path](const Result<Value>& result) {
+            if (!result) return;
+            count(Deed::object);
+            demand(*result == Value(path), &link, "the property of another object");
+          });
 }
 
 void Simulation::answer_question(Link& link) {
@@ -416,6 +425,7 @@ void Simulation::use_service_pipe(Link& link) {
     return;
   }
   if (dice_.one_in(15)) {
+    tell(link, "service closes pipe " + pipe.member + " " + std::to_string(pipe.index));
     link.service->close_pipe(id, now_);
     link.service_pipes.erase(chosen);
     return;
@@ -555,7 +565,7 @@ void Simulation::settle() {
     if (!link->is_connected || link->is_closed) continue;
     ++link->exits;
     give_up(monitors_, *link, "arm");
-    request(*link, link->client->exit_monitor("arm", now_), [](const Result<Value>&) {});
+    request(*link, "exit monitor", link->client->exit_monitor("arm", now_), [](const Result<Value>&) {});
   }
   for (int rounds = 0; rounds < 300; ++rounds) {
     for (int i = 0; settle_step(); ++i) demand(i < 2000, nullptr, "both sides talk for ever");
@@ -604,6 +614,12 @@ void Simulation::demand(bool is_so, const Link* link, const std::string& what) c
                  (link ? ", connection " + std::to_string(link->number) : "") + ": " + what);
 }
 
+void Simulation::tell(const Link& link, const std::string& what) const {
+  if (is_loud_)
+    std::cerr << std::chrono::duration_cast<milliseconds>(now_.steady - TimePoint{}).count() << " step " << step_
+              << ", connection " << link.number << ": " << what << "\n";
+}
+
 void Simulation::note(std::uint64_t what) {
   trace_ = (trace_ ^ what) * 1099511628211u;
 }
@@ -630,7 +646,8 @@ void Simulation::handle(Link& link, ClientEvent& event) {
   } else if (auto* completed = std::get_if<Completed>(&event)) {
     auto request = link.requests.extract(completed->id);
     demand(!request.empty(), &link, "a request ended that nobody waits for: " + text_of(completed->result));
-    request.mapped()(completed->result);
+    tell(link, request.mapped().what + " #" + std::to_string(completed->id) + ": " + text_of(completed->result));
+    request.mapped().done(completed->result);
   } else if (auto* told = std::get_if<EventReceived>(&event)) {
     const auto number = number_of(told->arguments.at(0));
     while (link.events < link.events_before && link.told[link.events] != number) ++link.events;
@@ -643,6 +660,7 @@ void Simulation::handle(Link& link, ClientEvent& event) {
     link.in_value = number_of(value->value);
     count(Deed::wire);
   } else if (std::holds_alternative<WireClosedByService>(event)) {
+    tell(link, "the service closed the wire");
     link.wants_wire = link.has_wire = false;
     link.wire_request = 0;
     link.in_value = link.out_sent = 0;
@@ -655,6 +673,7 @@ void Simulation::handle(Link& link, ClientEvent& event) {
       demand(pipe->second.unacknowledged.erase(number) == 1, &link, "a packet was acknowledged twice");
     count(Deed::ack);
   } else if (auto* closed = std::get_if<PipeClosedByService>(&event)) {
+    tell(link, "pipe closed by the service: " + closed->member + " " + std::to_string(closed->index));
     const auto pipe = link.pipes.extract({closed->member, closed->index});
     demand(!pipe.empty() && !pipe.mapped().is_closing, &link, "an endpoint was closed that is not open");
     demand(pipe.mapped().peer == 0 || pipe.mapped().received == sent_on_[pipe.mapped().peer], &link,
@@ -683,12 +702,14 @@ void Simulation::handle(Link& link, ServiceEvent& event) {
   } else if (std::holds_alternative<LocksChanged>(event)) {
     for (auto& each : links_) each->service->handle_locks_changed(now_);
   } else if (std::holds_alternative<WireConnected>(event) || std::holds_alternative<WireDisconnected>(event)) {
+    tell(link, "service: wire connected or disconnected");
     link.in_sent = link.out_value = 0;
   } else if (auto* value = std::get_if<WireReceived>(&event)) {
     demand(number_of(value->value) > link.out_value, &link, "a wire went back to an older value");
     link.out_value = number_of(value->value);
     count(Deed::out_wire);
   } else if (auto* wanted = std::get_if<PipeConnected>(&event)) {
+    tell(link, "service: pipe connected " + wanted->member->name + " " + std::to_string(wanted->index));
     link.service_pipes.emplace(
         wanted->id, ServicePipe{.member = wanted->member->name, .index = wanted->index, .stream = ++last_number_});
   } else if (auto* packet = std::get_if<PipeReceived>(&event)) {
@@ -700,6 +721,7 @@ void Simulation::handle(Link& link, ServiceEvent& event) {
       demand(pipe->second.unacknowledged.erase(number) == 1, &link, "a packet was acknowledged twice");
     count(Deed::ack);
   } else if (auto* closed = std::get_if<PipeClosed>(&event)) {
+    tell(link, "service: pipe closed by the client");
     const auto pipe = link.service_pipes.extract(closed->id);
     demand(!pipe.empty(), &link, "an endpoint was closed that is not open");
     demand(pipe.mapped().peer == 0 || pipe.mapped().received == sent_on_[pipe.mapped().peer], &link,
@@ -725,7 +747,7 @@ void Simulation::handle(Link& link, ServiceEvent& event) {
 /// What the application does; its answer is kept for a while.
 void Simulation::handle_call(Link& link, Called& called) {
   const auto is_arm = called.object->type_name() == arm_type;
-  check_lock(monitors_, link, is_arm ? "arm" : "arm.tools", false);
+  if (is_arm) check_lock(monitors_, link, "arm", false);
   if (is_arm) check_lock(locks_, link, "arm", false);
   Result<Value> result = Value{};
   switch (called.kind) {
@@ -823,7 +845,8 @@ void Simulation::check_rest(const Link& link) {
          "a wire is connected on one side alone");
   if (link.has_wire) {
     // A value of the connection before may still have come, where the service told this one none.
-    demand(link.in_value == link.in_sent || link.in_sent == 0, &link, "the client has not the last value of the wire");
+    demand(link.in_value == link.in_sent || link.in_sent == 0, &link,
+           "the client has " + std::to_string(link.in_value) + " of the wire, and not " + std::to_string(link.in_sent));
     demand(link.out_value == link.out_sent, &link, "the service has not the last value of the wire");
   }
   demand(link.pipes.size() == link.service_pipes.size(), &link, "a pipe endpoint is open on one side alone");

@@ -58,7 +58,8 @@ using Deeds = std::array<std::size_t, static_cast<std::size_t>(Deed::object) + 1
 
 class Simulation {
  public:
-  explicit Simulation(std::uint64_t seed);
+  /// `is_loud`  tells on stderr what happens.
+  explicit Simulation(std::uint64_t seed, bool is_loud = false);
   ~Simulation();
   /// Throws   Broken.
   void run();
@@ -68,6 +69,10 @@ class Simulation {
 
  private:
   using Done = std::function<void(const Result<Value>&)>;
+  struct Request {
+    std::string what;
+    Done done;
+  };
   /// One direction of a connection: what the sender's system has taken and the receiver has not.
   struct Lane {
     Bytes bytes;
@@ -112,7 +117,7 @@ class Simulation {
 
     // what the client knows
     bool is_connected = false, is_closed = false;
-    std::map<RequestId, Done> requests = {};
+    std::map<RequestId, Request> requests = {};
     std::map<std::pair<std::string, std::int32_t>, ClientPipe> pipes = {};
     bool wants_wire = false, has_wire = false, is_wire_left = false;
     double in_value = 0, out_sent = 0;  ///< last of this connection of the wire; 0: none
@@ -153,7 +158,7 @@ class Simulation {
   void use_lock(Link& link);
   void use_monitor(Link& link);
   void use_object(Link& link);
-  void request(Link& link, RequestId id, Done done);
+  void request(Link& link, const std::string& what, RequestId id, Done done);
   void use_service_pipe(Link& link);
   void tell_all();
   void answer_one(Link& link);
@@ -186,9 +191,11 @@ class Simulation {
   void check_rest(const Link& link);
   void demand(bool is_so, const Link* link, const std::string& what) const;
   void note(std::uint64_t what);
+  void tell(const Link& link, const std::string& what) const;
   void count(Deed deed) { ++deeds_[static_cast<std::size_t>(deed)]; }
 
   std::uint64_t seed_;
+  bool is_loud_;
   Dice dice_;
   Now now_{TimePoint{} + std::chrono::hours(1), {1'700'000'000, 0}};
   std::shared_ptr<HostedService> arm_;
