@@ -50,7 +50,7 @@ void GatewayService::add_members() {
   service_->property("subscriptions").get([this] { return list_subscriptions(); });
   service_->function("find_device", [this](const std::string& wanted) {
     const auto* device = gateway_.devices().find(wanted);
-    if (!device) throw rr::Exception(rr::make_error(rr::ErrorCode::key_not_found, "no device " + rr::quoted(wanted)));
+    if (!device) throw rr::Exception(rr::make_error(rr::ErrorCode::key_not_found, "no device " + rr::quote(wanted)));
     return describe(*device);
   });
 }
