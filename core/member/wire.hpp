@@ -65,7 +65,7 @@ enum class WireState : std::uint8_t { connecting, connected };
 struct WireConnection {
   WireState state = WireState::connecting;
   const MemberDefinition* member = nullptr;
-  std::uint32_t request_id = 0;  ///< of the connect, while a service answers it later
+  std::uint32_t request_id = 0;  ///< of the connect: a client's, and a service's that answers it later
   std::optional<TimeSpec> last_received = {};
   std::optional<TimeSpec> last_sent = {};
   std::optional<WireValue> early = {};    ///< came before the connect reply; newest only

@@ -249,7 +249,7 @@ RequestId ClientSession::find_object(std::string_view path, Now now) {
 RequestId ClientSession::connect_wire(std::string_view path, std::string_view member, Now now) {
   const auto id = request(EntryType::wire_connect_req, MemberKind::wire, path, member, now, no_elements);
   if (const auto found = pending_.find(id); found != pending_.end())
-    wires_[{std::string(path), std::string(member)}] = {.member = found->second.member};
+    wires_[{std::string(path), std::string(member)}] = {.member = found->second.member, .request_id = id};
   return id;
 }
 
@@ -303,7 +303,8 @@ void ClientSession::flush_wires(Now now) {
 }
 
 void ClientSession::cancel(RequestId id) {
-  if (const auto found = pending_.find(id); found != pending_.end() && abandon_pipe_request(id, found->second.deadline))
+  if (const auto found = pending_.find(id);
+      found != pending_.end() && abandon_pipe_request(id, found->second.deadline + late_reply_period))
     return;
   pending_.erase(id);
   fetches_.erase(id);
@@ -390,9 +391,8 @@ void ClientSession::handle_reply(const Message& message, const MessageEntry& ent
     return handle_pipe_reply(message, entry, id, pending, now);
   if (pending.memory) return handle_memory_reply(message, entry, id, std::move(pending), now);
   if (entry.error != ErrorCode::none) {
-    if (pending.type == EntryType::wire_connect_req && pending.member)
-      if (const auto wire = wires_.find(PathMemberView{pending.path, pending.member->name}); wire != wires_.end())
-        wires_.erase(wire);
+    if (pending.type == EntryType::wire_connect_req)
+      if (const auto wire = find_connecting_wire(pending, id); wire != wires_.end()) wires_.erase(wire);
     return emit(Completed{id, read_error(message, entry, types_)});
   }
   if (pending.type == EntryType::object_type_name)
@@ -400,7 +400,7 @@ void ClientSession::handle_reply(const Message& message, const MessageEntry& ent
   if (pending.type == EntryType::client_session_op_req)
     return handle_session_op_reply(message, entry, id, std::move(pending.path), now);
   emit(Completed{id, read_reply(message, entry, pending)});
-  if (pending.type == EntryType::wire_connect_req) handle_wire_connected(pending);
+  if (pending.type == EntryType::wire_connect_req) handle_wire_connected(pending, id);
 }
 
 Result<Value> ClientSession::read_reply(const Message& message, const MessageEntry& entry,
@@ -433,9 +433,15 @@ Result<Value> ClientSession::read_reply(const Message& message, const MessageEnt
   }
 }
 
-void ClientSession::handle_wire_connected(const Pending& pending) {
+/// The wire that a connect reply is for; none where it was disconnected meanwhile, be it connected anew.
+ClientSession::Wires::iterator ClientSession::find_connecting_wire(const Pending& pending, RequestId id) {
   const auto found = wires_.find(PathMemberView{pending.path, pending.member->name});
-  if (found == wires_.end()) return;  // disconnected meanwhile
+  return found != wires_.end() && found->second.request_id == id ? found : wires_.end();
+}
+
+void ClientSession::handle_wire_connected(const Pending& pending, RequestId id) {
+  const auto found = find_connecting_wire(pending, id);
+  if (found == wires_.end()) return;
   auto& wire = found->second;
   wire.state = WireState::connected;
   if (!wire.early) return;
@@ -495,13 +501,15 @@ void ClientSession::fail_unpolled() {
 
 void ClientSession::fail(Error reason) {
   if (state_ == ClientState::closed) return;
+  // Requests of the connect sequence are this side's own, as is the one that disconnects: nobody knows their ids.
+  const bool is_connecting = state_ == ClientState::connecting;
   state_ = ClientState::closed;
   connection_.close(reason);
   std::vector<RequestId> waiting;
   for (const auto& [id, pending] : pending_)
     if (const auto fetch = fetches_.find(id); fetch != fetches_.end())
       waiting.push_back(fetch->second.lookup);
-    else if (has_started_ && !pending.is_abandoned)
+    else if (!is_connecting && !pending.is_abandoned && pending.type != EntryType::disconnect_client)
       waiting.push_back(id);
   std::sort(waiting.begin(), waiting.end());
   pending_.clear();

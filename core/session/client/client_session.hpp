@@ -341,7 +341,9 @@ class ClientSession {
   void handle_reply(const Message& message, const MessageEntry& entry, Now now);
   Result<Value> read_reply(const Message& message, const MessageEntry& entry, const Pending& pending) const;
   void handle_type_name_reply(const MessageEntry& entry, RequestId id, std::string path, Now now);
-  void handle_wire_connected(const Pending& pending);
+  using Wires = std::map<PathMember, WireConnection, PathMemberLess>;
+  Wires::iterator find_connecting_wire(const Pending& pending, RequestId id);
+  void handle_wire_connected(const Pending& pending, RequestId id);
   void handle_event(const Message& message, const MessageEntry& entry);
   void handle_wire_packet(const Message& message, const MessageEntry& entry);
   void handle_wire_closed(const MessageEntry& entry);
@@ -401,7 +403,7 @@ class ClientSession {
   TimePoint closing_deadline_ = TimePoint::max();
 
   std::map<std::string, const EntityDefinition*, std::less<>> objects_;
-  std::map<PathMember, WireConnection, PathMemberLess> wires_;
+  Wires wires_;
   std::map<PathMember, std::uint32_t, PathMemberLess> memory_limits_;  ///< MaxTransferSize of memories that were used
   PipeStore pipe_store_;                                               ///< outlives pipes_
   std::map<PathMember, ClientPipe, PathMemberLess> pipes_;

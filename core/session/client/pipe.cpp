@@ -115,7 +115,10 @@ Result<std::int32_t> ClientSession::open_pipe(const Message& message, const Mess
   if (!index) return index;
   auto* pipe = find_pipe(pending.path, pending.member->name);
   if (!pipe || pending.is_abandoned) {
-    if (pipe) pipe->endpoints.erase(*index);
+    // What it sends meanwhile must not reach the next endpoint of this index.
+    if (pipe)
+      pipe->endpoints.try_emplace(*index, *pending.member, pipe_store_, PipeState::closing)
+          .first->second.start_closing();
     request_silent_disconnect(pending.path, *pending.member, *index, now);
     return make_error(ErrorCode::object_not_found, "object " + quote(pending.path) + " was replaced");
   }

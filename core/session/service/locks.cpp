@@ -16,6 +16,10 @@ bool is_packet(EntryType type) {
   return type == EntryType::wire_packet || type == EntryType::pipe_packet;
 }
 
+bool is_disconnect(EntryType type) {
+  return type == EntryType::wire_disconnect_req || type == EntryType::pipe_disconnect_req;
+}
+
 /// Whether object locks leave the member alone.
 bool is_exempt(EntryType type, const MemberDefinition& member) {
   if (member.has_modifier("nolock")) return true;
@@ -26,10 +30,10 @@ bool is_exempt(EntryType type, const MemberDefinition& member) {
 
 }  // namespace
 
-/// Locks hold for requests on members; packets of what is connected already go on.
+/// Locks hold for requests on members; packets of what is connected already go on, and so does whatever ends that.
 Result<> ServiceSession::check_locks(const MessageEntry& entry, const HostedService::Found& found,
                                      const MemberDefinition& member, Now now) {
-  if (is_packet(entry.type)) return {};
+  if (is_packet(entry.type) || is_disconnect(entry.type)) return {};
   auto& locks = service_->object_locks();
   if (!locks.empty() && !is_exempt(entry.type, member)) {
     const auto path = service_->canonical_path(entry.service_path);
