@@ -41,7 +41,7 @@ Result<void> check_title(std::string_view packet, std::string_view& rest, std::s
                    std::to_string(max_discovery_packet_bytes));
   rest = packet;
   const auto line = take_line(rest);
-  if (line != title) return refused("begins with " + quoted(line) + ", expected " + quoted(title));
+  if (line != title) return refused("begins with " + quote(line) + ", expected " + quote(title));
   return {};
 }
 
@@ -54,15 +54,15 @@ bool is_credible(const IpAddress& address, const PacketSource& source) {
 }
 
 Result<std::string> check_url(std::string_view text, const NodeId& node_id, const PacketSource& source) {
-  if (text.size() > max_url_bytes) return refused("URL longer than 256 characters: " + quoted(text));
+  if (text.size() > max_url_bytes) return refused("URL longer than 256 characters: " + quote(text));
   auto url = parse_url(text);
   if (!url) return refused(url.error().message);
   const auto address = parse_url_address(url->host);
-  if (!address) return refused("URL " + quoted(text, 200) + ": expected an IP address as its host");
+  if (!address) return refused("URL " + quote(text, 200) + ": expected an IP address as its host");
   if (url->node_id != node_id)
-    return refused("URL " + quoted(text, 200) + ": expected nodeid=" + format_node_id(node_id, NodeIdFormat::dashes));
+    return refused("URL " + quote(text, 200) + ": expected nodeid=" + format_node_id(node_id, NodeIdFormat::dashes));
   if (!is_credible(*address, source))
-    return refused("URL " + quoted(text, 200) + ": its address does not belong to the sender's network");
+    return refused("URL " + quote(text, 200) + ": its address does not belong to the sender's network");
   // A zone that came with the packet is the sender's name for the link, not ours.
   url->host.resize(std::min(url->host.size(), url->host.find('%')));
   if (address->is_v6 && address->is_link_local() && !source.zone.empty()) url->host += "%" + source.zone;

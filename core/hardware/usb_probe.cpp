@@ -105,7 +105,7 @@ Result<> UsbProbe::handle_answer(ByteSpan data) {
   const auto name = parse_usb_string(data);
   if (!name) return name.error();
   if (!name->empty() && !is_valid_node_name(*name))
-    return protocol_error("USB NodeName string: " + quoted(*name) + " is not a node name");
+    return protocol_error("USB NodeName string: " + quote(*name) + " is not a node name");
   info_.name = *name;
   result_ = info_;
   return {};

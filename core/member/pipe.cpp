@@ -52,7 +52,7 @@ Result<std::int32_t> read_pipe_index(const MessageElement& element) {
   const auto* end = element.name.data() + element.name.size();
   const auto parsed = std::from_chars(element.name.data(), end, index);
   if (element.key_kind != KeyKind::name || parsed.ec != std::errc{} || parsed.ptr != end)
-    return protocol_error("pipe: element " + quoted(element.name) + " does not name an endpoint");
+    return protocol_error("pipe: element " + quote(element.name) + " does not name an endpoint");
   return index;
 }
 

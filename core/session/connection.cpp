@@ -258,9 +258,9 @@ Result<> Connection::handle_stream_op_reply(const MessageEntry& entry, Now) {
       (!target.name.empty() && header.sender_node_name != target.name))
     return make_error(ErrorCode::connection_error,
                       "wrong node: found " + format_node_id(header.sender_node_id) + " " +
-                          quoted(header.sender_node_name) + ", expected " +
+                          quote(header.sender_node_name) + ", expected " +
                           (target.id.is_any() ? std::string("any id") : format_node_id(target.id)) + " " +
-                          quoted(target.name));
+                          quote(target.name));
   if (const auto* element = incoming_.elements_of(entry).find("capabilities");
       element && entry.error == ErrorCode::none) {
     const auto words = read_capabilities(*element);

@@ -37,7 +37,7 @@ std::optional<std::string> decode_index(std::string_view text) {
 
 Result<std::vector<PathSegment>> parse_service_path(std::string_view path) {
   const auto fail = [path] {
-    return make_error(ErrorCode::service_error, "Invalid service path specified: " + quoted(path));
+    return make_error(ErrorCode::service_error, "Invalid service path specified: " + quote(path));
   };
   std::vector<PathSegment> segments;
   while (true) {

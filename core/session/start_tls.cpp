@@ -42,7 +42,7 @@ bool says_true(const Message& message, const MessageEntry& entry) {
 }
 
 std::string describe(const NodeIdentity& node) {
-  return (node.id.is_any() ? std::string("any id") : format_node_id(node.id)) + " " + rr::quoted(node.name);
+  return (node.id.is_any() ? std::string("any id") : format_node_id(node.id)) + " " + rr::quote(node.name);
 }
 
 }  // namespace
@@ -130,7 +130,7 @@ std::string format_certificate_name(const NodeId& id) {
 Result<NodeId> parse_certificate_name(std::string_view common_name) {
   const auto fail = [&](const char* expected) {
     return make_error(ErrorCode::authentication_error,
-                      "the certificate is of " + quoted(common_name, 100) + ", expected " + expected);
+                      "the certificate is of " + quote(common_name, 100) + ", expected " + expected);
   };
   if (common_name.substr(0, name_prefix.size()) != name_prefix) return fail("\"Robot Raconteur Node {id}\"");
   const auto id = parse_node_id(common_name.substr(name_prefix.size()));

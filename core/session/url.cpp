@@ -9,11 +9,11 @@ namespace rr {
 namespace {
 
 Error bad_url(std::string_view text, std::string what) {
-  return make_error(ErrorCode::connection_error, "URL " + quoted(text, 200) + ": " + std::move(what));
+  return make_error(ErrorCode::connection_error, "URL " + quote(text, 200) + ": " + std::move(what));
 }
 
 Error bad_value(std::string_view text, std::string what) {
-  return make_error(ErrorCode::invalid_argument, "URL " + quoted(text, 200) + ": " + std::move(what));
+  return make_error(ErrorCode::invalid_argument, "URL " + quote(text, 200) + ": " + std::move(what));
 }
 
 bool is_word(char c) {
@@ -49,14 +49,14 @@ Result<Authority> parse_authority(std::string_view text, std::string_view whole)
     const auto address = inside.substr(0, percent);
     const auto is_address_char = [](char c) { return hex_value(c) >= 0 || c == ':' || c == '.'; };
     if (address.empty() || !std::all_of(address.begin(), address.end(), is_address_char))
-      return bad_url(whole, "IPv6 address " + quoted(inside) + ": expected hex digits and ':'");
+      return bad_url(whole, "IPv6 address " + quote(inside) + ": expected hex digits and ':'");
     out.host = std::string(address);
     if (percent != std::string_view::npos) {
       auto zone = inside.substr(percent + 1);
       if (zone.size() > 2 && zone.substr(0, 2) == "25") zone.remove_prefix(2);
       const auto is_zone_char = [](char c) { return is_word(c) || c == '-' || c == '.'; };
       if (zone.empty() || !std::all_of(zone.begin(), zone.end(), is_zone_char))
-        return bad_url(whole, "IPv6 zone " + quoted(zone) + ": expected an interface name or number");
+        return bad_url(whole, "IPv6 zone " + quote(zone) + ": expected an interface name or number");
       out.host += '%';
       out.host += zone;
     }
@@ -66,10 +66,10 @@ Result<Authority> parse_authority(std::string_view text, std::string_view whole)
     out.host = std::string(text.substr(0, colon));
     rest = colon == std::string_view::npos ? std::string_view() : text.substr(colon);
     if (out.host.find_first_of("[]") != std::string::npos)
-      return bad_url(whole, "host " + quoted(out.host) + ": an IPv6 address stands in brackets, [::1]");
+      return bad_url(whole, "host " + quote(out.host) + ": an IPv6 address stands in brackets, [::1]");
   }
   if (rest.empty()) return out;
-  if (rest.front() != ':') return bad_url(whole, quoted(rest) + " after the host: expected ':' and a port");
+  if (rest.front() != ':') return bad_url(whole, quote(rest) + " after the host: expected ':' and a port");
   out.has_port = true;
   out.port = rest.substr(1);
   return out;
@@ -85,7 +85,7 @@ Result<void> read_query(std::string_view text, ServiceInUrl rule, ConnectionUrl&
     const auto part = rest.substr(0, end);
     const auto equals = part.find('=');
     if (equals == std::string_view::npos || part.find('=', equals + 1) != std::string_view::npos)
-      return bad_url(text, "query part " + quoted(part) + ": expected name=value");
+      return bad_url(text, "query part " + quote(part) + ": expected name=value");
     const auto name = part.substr(0, equals);
     const auto raw = part.substr(equals + 1);
     if (name == "service" || name == "nodeid" || name == "nodename") {
@@ -103,7 +103,7 @@ Result<void> read_query(std::string_view text, ServiceInUrl rule, ConnectionUrl&
         has_node_name = true;
         if (!is_valid_node_name(*value))
           return bad_value(text,
-                           "nodename " + quoted(*value) + ": expected a letter, then letters, digits, '_', '.', '-'");
+                           "nodename " + quote(*value) + ": expected a letter, then letters, digits, '_', '.', '-'");
         url.node_name = *value;
       }
     }
@@ -128,7 +128,7 @@ Result<ConnectionUrl> parse_legacy(std::string_view text, std::string_view rest)
   const auto separator = path.find('/');
   if (separator == std::string_view::npos || separator == 0 || separator + 1 == path.size() ||
       path.find('/', separator + 1) != std::string_view::npos)
-    return bad_url(text, "path " + quoted(path) + ": expected node/service");
+    return bad_url(text, "path " + quote(path) + ": expected node/service");
   ConnectionUrl url;
   url.scheme = "rr+tcp";
   url.path = "/";
@@ -141,7 +141,7 @@ Result<ConnectionUrl> parse_legacy(std::string_view text, std::string_view rest)
     url.node_id = *id;
     url.query = "nodeid=" + format_node_id(*id, NodeIdFormat::dashes) + "&";
   } else {
-    if (!is_valid_node_name(node)) return bad_value(text, "node name " + quoted(node) + " is not valid");
+    if (!is_valid_node_name(node)) return bad_value(text, "node name " + quote(node) + " is not valid");
     url.node_name = std::string(node);
     url.query = "nodename=" + url.node_name + "&";
   }
@@ -194,7 +194,7 @@ Result<ConnectionUrl> parse_url(std::string_view text, ServiceInUrl rule) {
   if (separator == std::string_view::npos) return bad_url(text, "expected scheme://host:port/?service=NAME");
   const auto* scheme = find_url_scheme(text.substr(0, separator));
   if (!scheme)
-    return bad_url(text, "scheme " + quoted(text.substr(0, separator)) + " unknown; known: " + known_schemes());
+    return bad_url(text, "scheme " + quote(text.substr(0, separator)) + " unknown; known: " + known_schemes());
   auto rest = text.substr(separator + 3);
   if (scheme->name == "tcp") return parse_legacy(text, rest);
 
@@ -209,7 +209,7 @@ Result<ConnectionUrl> parse_url(std::string_view text, ServiceInUrl rule) {
   if (slash != std::string_view::npos) url.path = std::string(location.substr(slash));
   // "rr+local:////?..." is refused by the reference; so is any path where none is passed on.
   if (!scheme->passes_path && url.path.size() > 1)
-    return bad_url(text, "path " + quoted(url.path) + ": " + url.scheme + " takes no path");
+    return bad_url(text, "path " + quote(url.path) + ": " + url.scheme + " takes no path");
 
   if (scheme->needs_host) {
     if (authority->host.empty()) return bad_url(text, "no host; expected " + url.scheme + "://host:port/");
@@ -217,7 +217,7 @@ Result<ConnectionUrl> parse_url(std::string_view text, ServiceInUrl rule) {
     url.port = scheme->default_port;
     if (authority->has_port) {
       const auto port = parse_port(authority->port, 1);
-      if (!port) return bad_url(text, "port " + quoted(authority->port) + ": expected 1 to 65535");
+      if (!port) return bad_url(text, "port " + quote(authority->port) + ": expected 1 to 65535");
       url.port = *port;
     }
   } else {
@@ -231,11 +231,11 @@ Result<ConnectionUrl> parse_url(std::string_view text, ServiceInUrl rule) {
       const bool begins_well = !url.user.empty() && is_word(url.user.front()) && url.user.front() != '_' &&
                                !(url.user.front() >= '0' && url.user.front() <= '9');
       if (!begins_well || !std::all_of(url.user.begin(), url.user.end(), is_user_char))
-        return bad_url(text, "user " + quoted(url.user) + ": expected a letter, then letters, digits, '_', '-'");
-      if (host != "localhost") return bad_url(text, "host " + quoted(host) + ": a user goes with localhost only");
+        return bad_url(text, "user " + quote(url.user) + ": expected a letter, then letters, digits, '_', '-'");
+      if (host != "localhost") return bad_url(text, "host " + quote(host) + ": a user goes with localhost only");
     }
     const bool is_allowed = host.empty() || (host == "localhost" && url.scheme != "rr+intra");
-    if (!is_allowed) return bad_url(text, "host " + quoted(host) + ": " + url.scheme + " names a node, not a host");
+    if (!is_allowed) return bad_url(text, "host " + quote(host) + ": " + url.scheme + " names a node, not a host");
     url.host = host;
   }
 
@@ -267,14 +267,14 @@ std::string format_host_port(std::string_view host, std::uint16_t port) {
 Result<HostPort> parse_host_port(std::string_view text) {
   const auto fail = [text](const std::string& why) {
     return make_error(ErrorCode::invalid_argument,
-                      "address " + quoted(text) + ": " + why + "; expected \"host:port\" or \"[IPv6]:port\"");
+                      "address " + quote(text) + ": " + why + "; expected \"host:port\" or \"[IPv6]:port\"");
   };
   auto authority = parse_authority(text, text);
   if (!authority) return fail("not understood");
   if (authority->host.empty()) return fail("no host");
   if (!authority->has_port) return fail("no port");
   const auto port = parse_port(authority->port, 0);
-  if (!port) return fail("port " + quoted(authority->port) + " is not 0 to 65535");
+  if (!port) return fail("port " + quote(authority->port) + " is not 0 to 65535");
   return HostPort{authority->host, *port};
 }
 
@@ -305,7 +305,7 @@ Result<std::string> percent_decode(std::string_view text) {
     const int byte = hex_byte(text.substr(i + 1));
     if (byte < 0)
       return make_error(ErrorCode::invalid_argument,
-                        "escape in " + quoted(text) + ": expected two hex digits after '%'");
+                        "escape in " + quote(text) + ": expected two hex digits after '%'");
     out += static_cast<char>(byte);
     i += 2;
   }

@@ -127,7 +127,7 @@ void throw_exception_from_error(const Error& error, const boost::source_location
 #endif
 }
 
-std::string quoted(std::string_view text, std::size_t limit) {
+std::string quote(std::string_view text, std::size_t limit) {
   std::string out = "'";
   for (const char character : text.substr(0, limit)) {
     const auto byte = static_cast<unsigned char>(character);

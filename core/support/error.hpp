@@ -89,7 +89,7 @@ using Result = boost::system::result<T, Error>;
 [[noreturn]] void throw_exception_from_error(const Error& error, const boost::source_location& location);
 
 /// Untrusted text for a message: quoted, control characters escaped, cut after `limit` bytes.
-std::string quoted(std::string_view text, std::size_t limit = 60);
+std::string quote(std::string_view text, std::size_t limit = 60);
 
 inline Error make_error(ErrorCode code, std::string message) {
   return Error{code, std::move(message)};

@@ -32,7 +32,7 @@ std::string format_node_id(const NodeId& id, NodeIdFormat format) {
 Result<NodeId> parse_node_id(std::string_view text) {
   const auto fail = [text] {
     return make_error(ErrorCode::invalid_argument,
-                      "NodeID " + quoted(text) + ": expected 32 hex digits as 8-4-4-4-12, with or without braces");
+                      "NodeID " + quote(text) + ": expected 32 hex digits as 8-4-4-4-12, with or without braces");
   };
   if (trim(text) == "{0}") return NodeId{};
   std::string_view rest = text;

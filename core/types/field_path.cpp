@@ -26,13 +26,13 @@ std::string path_text(const FieldPath& path) {
     switch (step.step) {
       case FieldPath::Step::field:
         if (!text.empty()) text += '.';
-        text += is_word(step.name) ? std::string(step.name) : quoted(step.name, 40);
+        text += is_word(step.name) ? std::string(step.name) : quote(step.name, 40);
         break;
       case FieldPath::Step::index:
         text += '[' + std::to_string(step.number) + ']';
         break;
       case FieldPath::Step::key:
-        text += '[' + quoted(step.name, 40) + ']';
+        text += '[' + quote(step.name, 40) + ']';
         break;
     }
   }

@@ -6,7 +6,7 @@ namespace rr {
 
 bool Packer::pack_named(const FieldPath& path, const Value& value, const TypeDefinition& type, Place place) {
   const auto* entity = types_.find_entity(type.qualified_name);
-  if (!entity) return fail(ErrorCode::data_type_error, path, "type " + quoted(type.qualified_name) + " is not known");
+  if (!entity) return fail(ErrorCode::data_type_error, path, "type " + quote(type.qualified_name) + " is not known");
   const std::string_view type_name = type.qualified_name;
   const bool as_multidim = is_multidim(type) && place == Place::anywhere;
   switch (entity->kind) {
@@ -37,7 +37,7 @@ bool Packer::pack_named(const FieldPath& path, const Value& value, const TypeDef
 
 bool Packer::pack_named_varvalue(const FieldPath& path, const Value& value, std::string_view type_name) {
   const auto* entity = types_.find_entity(type_name);
-  if (!entity) return fail(ErrorCode::data_type_error, path, "type " + quoted(type_name) + " is not known");
+  if (!entity) return fail(ErrorCode::data_type_error, path, "type " + quote(type_name) + " is not known");
   if (const auto* structure = value.get_if<Structure>()) {
     if (entity->kind == EntityKind::structure) return pack_structure(path, *structure, *entity, type_name);
     if (entity->kind == EntityKind::pod) return pack_pod_items(path, path, {structure, 1}, *entity, type_name);
@@ -148,7 +148,7 @@ bool Packer::check_shape(const FieldPath& path, const Named& value, std::size_t 
 
 bool Packer::check_type_name(const FieldPath& path, std::string_view found, std::string_view expected) {
   if (found.empty() || found == expected) return true;
-  return fail(ErrorCode::data_type_error, path, "found type " + quoted(found) + ", expected " + std::string(expected));
+  return fail(ErrorCode::data_type_error, path, "found type " + quote(found) + ", expected " + std::string(expected));
 }
 
 }  // namespace rr

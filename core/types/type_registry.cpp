@@ -16,7 +16,7 @@ auto find_in(const Index& index, std::string_view name) {
 }
 
 Error definition_error(const Diagnostic& diagnostic) {
-  const auto service = diagnostic.service.empty() ? std::string() : " " + quoted(diagnostic.service);
+  const auto service = diagnostic.service.empty() ? std::string() : " " + quote(diagnostic.service);
   return make_error(ErrorCode::service_definition_error,
                     "service definition" + service + ": " + format_diagnostic(diagnostic));
 }

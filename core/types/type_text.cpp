@@ -15,7 +15,7 @@ bool is_type_character(char c) {
 
 Result<TypeDefinition> parse_type_text(std::string_view text, const TypeRegistry& types) {
   const auto refuse = [&](std::string_view why) {
-    return make_error(ErrorCode::invalid_argument, "type " + quoted(text) + " " + std::string(why));
+    return make_error(ErrorCode::invalid_argument, "type " + quote(text) + " " + std::string(why));
   };
   if (text.empty() || !std::all_of(text.begin(), text.end(), is_type_character))
     return refuse("is not written as in a service definition");

@@ -18,7 +18,7 @@ FieldPath root_path(const MessageElement& element) {
 std::string element_text(const MessageElement& element) {
   const std::string name(data_type_name(element.type));
   if (is_numeric(element.type)) return name + "[" + std::to_string(element.count) + "]";
-  return element.type_name.empty() ? name : name + " " + quoted(element.type_name);
+  return element.type_name.empty() ? name : name + " " + quote(element.type_name);
 }
 
 FieldPath step_to(const FieldPath& path, std::int32_t key) {
@@ -233,7 +233,7 @@ bool Unpacker::read_key(const FieldPath& path, const MessageElement& element, st
   const auto text = element.name;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), key);
   if (element.key_kind == KeyKind::name && error == std::errc() && end == text.data() + text.size()) return true;
-  return fail(ErrorCode::data_type_error, path, "has the key " + quoted(text) + ", expected an int32");
+  return fail(ErrorCode::data_type_error, path, "has the key " + quote(text) + ", expected an int32");
 }
 
 bool Unpacker::read_key(const FieldPath& path, const MessageElement& element, std::string& key) {

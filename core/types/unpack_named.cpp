@@ -56,7 +56,7 @@ bool Unpacker::unpack_named(const FieldPath& path, const MessageElement& element
   const std::string_view type_name = type.qualified_name;
   const auto* entity = types_.find_entity(type_name);
   if (!entity || entity->kind == EntityKind::object)
-    return fail(ErrorCode::data_type_error, path, quoted(type_name) + (entity ? " is an object" : " is not known"));
+    return fail(ErrorCode::data_type_error, path, quote(type_name) + (entity ? " is an object" : " is not known"));
   if (element.type == DataType::void_t) {
     if (entity->kind == EntityKind::structure) return true;
     const auto code = type.array == ArrayKind::none ? ErrorCode::data_type_error : ErrorCode::null_value;
@@ -84,12 +84,12 @@ bool Unpacker::unpack_named(const FieldPath& path, const MessageElement& element
 bool Unpacker::unpack_named_varvalue(const FieldPath& path, const MessageElement& element, Value& out) {
   if (element.type == DataType::pod_t) return fail_mismatch(path, element, "a value; a pod stands only in a pod array");
   const auto* entity = types_.find_entity(element.type_name);
-  if (!entity) return fail(ErrorCode::data_type_error, path, "type " + quoted(element.type_name) + " is not known");
+  if (!entity) return fail(ErrorCode::data_type_error, path, "type " + quote(element.type_name) + " is not known");
   const std::string_view type_name = element.type_name;
   const bool is_multidim_element =
       element.type == DataType::pod_multidimarray_t || element.type == DataType::namedarray_multidimarray_t;
   if (entity->kind == EntityKind::object || element.type != element_type(entity->kind, is_multidim_element))
-    return fail_mismatch(path, element, "the kind of type that " + quoted(type_name) + " is");
+    return fail_mismatch(path, element, "the kind of type that " + quote(type_name) + " is");
 
   if (entity->kind == EntityKind::structure) return unpack_structure(path, element, *entity, type_name, out);
   if (entity->kind == EntityKind::pod) {
@@ -204,7 +204,7 @@ bool Unpacker::check_element(const FieldPath& path, const MessageElement& elemen
   if (element.type != type) return fail_mismatch(path, element, data_type_name(type));
   if (element.type_name == type_name) return true;
   return fail(ErrorCode::data_type_error, path,
-              "found type " + quoted(element.type_name) + ", expected " + std::string(type_name));
+              "found type " + quote(element.type_name) + ", expected " + std::string(type_name));
 }
 
 }  // namespace rr

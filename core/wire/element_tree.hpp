@@ -43,12 +43,12 @@ inline void read_leaf_data(ByteReader& in, std::size_t count_at, MessageElement&
   if (element.type == DataType::void_t) {
     if (element.count != 0 || left != 0)
       in.fail(ErrorCode::protocol_error, "DataCount", count_at,
-              "void element " + quoted(element.name) + " has count " + std::to_string(element.count) + " and " +
+              "void element " + quote(element.name) + " has count " + std::to_string(element.count) + " and " +
                   std::to_string(left) + " data bytes, expected none");
   } else if (std::uint64_t{element.count} * item_size(element.type) != left) {
     in.fail(ErrorCode::data_serialization_error, "DataCount", count_at,
             std::to_string(element.count) + " items of " + std::string(data_type_name(element.type)) + " in element " +
-                quoted(element.name) + ", but " + std::to_string(left) + " data bytes");
+                quote(element.name) + ", but " + std::to_string(left) + " data bytes");
   } else {
     element.data = in.bytes(left, "element data");
   }

@@ -18,7 +18,7 @@ inline constexpr std::size_t max_entry_count = 65535;
 
 inline Error element_error(ErrorCode code, const Message& message, std::size_t index, const std::string& problem) {
   const auto& element = message.elements[index];
-  const auto key = element.key_kind == KeyKind::number ? "#" + std::to_string(element.number) : quoted(element.name);
+  const auto key = element.key_kind == KeyKind::number ? "#" + std::to_string(element.number) : quote(element.name);
   return make_error(code, "encode: element " + key + " (index " + std::to_string(index) + "): " + problem);
 }
 

@@ -10,7 +10,7 @@ namespace rr {
 Result<> check_frame_start(ByteSpan start, std::size_t limit) {
   const auto magic = as_text(start.first(std::min(start.size(), frame_magic.size())));
   if (magic != frame_magic.substr(0, magic.size()))
-    return protocol_error("magic at byte 0: found " + quoted(magic) + ", expected 'RRAC'");
+    return protocol_error("magic at byte 0: found " + quote(magic) + ", expected 'RRAC'");
   if (start.size() < 8) return {};
   const auto size = frame_message_size(start);
   if (size < min_message_size)

@@ -27,12 +27,12 @@ std::string read_option(const Program& program, std::string_view name, std::stri
   } else if (name == "--port") {
     const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), options.port);
     if (error != std::errc{} || end != value.data() + value.size())
-      return "--port " + rr::quoted(value) + ": expected a number from 0 to 65535";
+      return "--port " + rr::quote(value) + ": expected a number from 0 to 65535";
   } else if (name == "--robot" && !program.defaults.robot.empty()) {
     if (const auto url = rr::parse_url(value); !url) return "--robot: " + url.error().message;
     options.robot = value;
   } else {
-    return "unknown option " + rr::quoted(name) + "; --help lists all";
+    return "unknown option " + rr::quote(name) + "; --help lists all";
   }
   return {};
 }
@@ -55,7 +55,7 @@ std::optional<Options> parse_options(const Program& program, int argc, char** ar
     else if (i + 1 < argc)
       problem = read_option(program, name, argv[++i], options);
     else
-      problem = "option " + rr::quoted(name) + " needs a value, or is unknown; --help lists all";
+      problem = "option " + rr::quote(name) + " needs a value, or is unknown; --help lists all";
     if (problem.empty()) continue;
     std::cerr << program.name << ": " << problem << '\n';
     exit_code = 2;

@@ -82,7 +82,7 @@ std::shared_ptr<ClientOpening> ClientConnection::open(asio::io_context& io, std:
     const auto parsed = parse_url(text);
     if (!parsed) return refuse(parsed.error().code, parsed.error().message);
     if (!can_dial(parsed->scheme))
-      return refuse(ErrorCode::connection_error, "connect to " + quoted(text) + ": scheme '" + parsed->scheme +
+      return refuse(ErrorCode::connection_error, "connect to " + quote(text) + ": scheme '" + parsed->scheme +
                                                      "' is not available here, expected " + dialable_schemes());
     urls.push_back(*parsed);
   }

@@ -32,7 +32,7 @@ std::optional<Response> refuse_unknown_host(const HttpRequest& request, const Pa
   for (const auto host : {request.header(http::field::host), host_of(request)})
     if (!host.empty() && !is_own_host(host, rules))
       return problem_response(421,
-                              "the name " + rr::quoted(host_name_of(host)) +
+                              "the name " + rr::quote(host_name_of(host)) +
                                   " is not known here; use the IP address, or add the name to allowed_hosts in the "
                                   "configuration");
   return std::nullopt;
@@ -44,8 +44,9 @@ std::optional<Response> refuse_foreign_page(const HttpRequest& request, const Pa
   if (const auto origins = message.count(http::field::origin); origins != 0) {
     const auto origin = request.header(http::field::origin);
     const auto host = host_of(request);
-    if (origins == 1 && is_same_origin(origin, host) && is_own_host(host, rules)) return std::nullopt;
-    return problem_response(403, "pages of origin " + rr::quoted(origin) +
+    if (origins == 1 && is_same_origin(origin, host, request.arrival.is_encrypted) && is_own_host(host, rules))
+      return std::nullopt;
+    return problem_response(403, "pages of origin " + rr::quote(origin) +
                                      " may not connect; allowed_origins in the configuration lists those that may");
   }
   const auto site = request.header("Sec-Fetch-Site");

@@ -99,9 +99,9 @@ bool is_origin_listed(std::string_view origin, std::span<const std::string> patt
   });
 }
 
-bool is_same_origin(std::string_view origin, std::string_view authority) {
+bool is_same_origin(std::string_view origin, std::string_view authority, bool is_encrypted) {
   const auto page = parse_origin(origin);
-  if (!page || (page->scheme != "http" && page->scheme != "https")) return false;
+  if (!page || (page->scheme != "https" && (page->scheme != "http" || is_encrypted))) return false;
   return parse_authority(page->scheme, authority) == page;
 }
 

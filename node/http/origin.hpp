@@ -15,8 +15,10 @@ namespace rrgate {
 bool is_origin_pattern(std::string_view text);
 bool is_origin_listed(std::string_view origin, std::span<const std::string> patterns);
 
-/// Whether a page of `origin` was loaded from `authority`, host[:port].
-bool is_same_origin(std::string_view origin, std::string_view authority);
+/// Whether a page of `origin` was loaded from `authority`, host[:port], in the way in which it asks now. A page that
+/// came in clear is not the one that comes by TLS: anybody on the way may have written it. The other way round TLS has
+/// ended before, at a proxy that says nothing of it: browsers let no page from HTTPS ask in clear.
+bool is_same_origin(std::string_view origin, std::string_view authority, bool is_encrypted);
 
 /// A host without a port, or *.domain for all names below a domain.
 bool is_host_pattern(std::string_view text);

@@ -23,7 +23,7 @@ std::optional<ReadFailure> check_header(const HttpRequest& request) {
   const auto codings = message.count(http::field::transfer_encoding);
   const auto coding = request.header(http::field::transfer_encoding);
   if (codings > 1 || (codings == 1 && !equals_ignoring_case(coding, "chunked")))
-    return ReadFailure{501, "Transfer-Encoding is " + rr::quoted(coding) + ", expected \"chunked\" alone"};
+    return ReadFailure{501, "Transfer-Encoding is " + rr::quote(coding) + ", expected \"chunked\" alone"};
   if (codings != 0 && (message.version() < 11 || message.count(http::field::content_length) != 0))
     return ReadFailure{400, "Transfer-Encoding needs HTTP/1.1, and no Content-Length beside it"};
   const auto hosts = message.count(http::field::host);

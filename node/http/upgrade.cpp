@@ -29,7 +29,7 @@ std::optional<Response> refuse_upgrade(const HttpRequest& request, std::string_v
     return upgrade_required("no Sec-WebSocket-Key in the request", subprotocol);
   if (!has_token(request.header(http::field::sec_websocket_version), "13"))
     return upgrade_required(
-        "Sec-WebSocket-Version " + rr::quoted(request.header(http::field::sec_websocket_version)) + ": expected 13",
+        "Sec-WebSocket-Version " + rr::quote(request.header(http::field::sec_websocket_version)) + ": expected 13",
         subprotocol);
   // A header may be repeated; then any of its lines will do.
   bool has_protocol = false;
@@ -40,7 +40,7 @@ std::optional<Response> refuse_upgrade(const HttpRequest& request, std::string_v
     has_ours = has_ours || has_token({it->value().data(), it->value().size()}, subprotocol);
   }
   if (has_protocol && !has_ours)
-    return upgrade_required("subprotocol " + rr::quoted(request.header(http::field::sec_websocket_protocol)) +
+    return upgrade_required("subprotocol " + rr::quote(request.header(http::field::sec_websocket_protocol)) +
                                 ": expected " + std::string(subprotocol),
                             subprotocol);
   return std::nullopt;

@@ -36,7 +36,7 @@ Result<fs::path> first_of(std::span<const Place> places, const fs::path& otherwi
     const fs::path folder(value);
     if (!folder.is_absolute())
       return make_error(ErrorCode::invalid_configuration,
-                        std::string(place.variable) + " is " + rr::quoted(value) + ", expected an absolute path");
+                        std::string(place.variable) + " is " + rr::quote(value) + ", expected an absolute path");
     return *place.below != '\0' ? folder / place.below : folder;
   }
   if (otherwise.empty())

@@ -39,7 +39,7 @@ Result<fs::path> id_file(std::string_view name) {
 
 Result<NodeIdClaim> NodeIdClaim::take(std::string_view name) {
   if (!is_valid_node_name(name))
-    return make_error(ErrorCode::invalid_argument, rr::quoted(name) + " is not a node name");
+    return make_error(ErrorCode::invalid_argument, rr::quote(name) + " is not a node name");
   const auto run = user_run_folder();
   if (!run) return run.error();
   if (auto made = make_folder(*run / "nodeids"); !made) return made.error();
@@ -64,7 +64,7 @@ Result<NodeIdClaim> NodeIdClaim::take(std::string_view name) {
   const auto id = parse_node_id(trim(text, " \t\r\n"));
   if (!id || id->is_any())
     return make_error(ErrorCode::invalid_configuration,
-                      file->string() + " holds " + rr::quoted(text) + ", expected the NodeID of " + rr::quoted(name));
+                      file->string() + " holds " + rr::quote(text) + ", expected the NodeID of " + rr::quote(name));
   return NodeIdClaim(*id, std::move(*lock));
 }
 

@@ -36,7 +36,7 @@ constexpr std::chrono::milliseconds send_stall{15000};
 
 NodeIdentity make_identity(std::string name, const NodeId& id) {
   if (!name.empty() && !is_valid_node_name(name))
-    throw std::invalid_argument("node name " + rr::quoted(name) +
+    throw std::invalid_argument("node name " + rr::quote(name) +
                                 " is not valid: expected letters, digits, '_', '-', '.'");
   return {id.is_any() ? random_node_id() : id, std::move(name)};
 }
@@ -50,7 +50,7 @@ ListenUrl parse_listen_url(std::string_view url) {
   constexpr std::string_view scheme = "rr+tcp://";
   constexpr std::string_view secure_scheme = "rrs+tcp://";
   const auto fail = [&](const std::string& why) {
-    throw std::invalid_argument("listen on " + rr::quoted(url) + ": " + why +
+    throw std::invalid_argument("listen on " + rr::quote(url) + ": " + why +
                                 ", expected rr+tcp://HOST:PORT, rr+local:/// or rr+intra:///");
   };
   const bool is_secure = url.substr(0, secure_scheme.size()) == secure_scheme;
@@ -66,7 +66,7 @@ ListenUrl parse_listen_url(std::string_view url) {
 std::optional<NodeIdClaim> claim_stored_id(const std::string& name, const NodeOptions& options) {
   if (!options.keeps_id) return std::nullopt;
   auto claim = NodeIdClaim::take(name);
-  if (!claim) throw std::runtime_error("node " + rr::quoted(name) + ": " + claim.error().message);
+  if (!claim) throw std::runtime_error("node " + rr::quote(name) + ": " + claim.error().message);
   return std::move(*claim);
 }
 
@@ -134,7 +134,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     const auto parsed = parse_listen_url(url);
     const bool requires_tls = parsed.requires_tls || options_.require_tls;
     if (requires_tls && !(options_.tls && options_.tls->has_certificate()))
-      throw std::invalid_argument("listen on " + rr::quoted(url) + ": TLS needs a certificate: NodeOptions::tls");
+      throw std::invalid_argument("listen on " + rr::quote(url) + ": TLS needs a certificate: NodeOptions::tls");
     auto listener = std::make_unique<TcpListener>(io_.get_executor());
     const auto bound = listener->open(parsed.address, true);
     if (!bound) throw std::runtime_error(bound.error().message);
@@ -201,7 +201,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   void accept(std::unique_ptr<ByteStream> stream, std::string_view url) {
     const auto colon = url.find("://");
     if (colon == std::string_view::npos || !url.starts_with("rr"))
-      throw std::invalid_argument("accept for " + rr::quoted(url) + ": expected a URL as \"rr+ws://HOST:PORT/\"");
+      throw std::invalid_argument("accept for " + rr::quote(url) + ": expected a URL as \"rr+ws://HOST:PORT/\"");
     Door door{std::string(url.substr(0, colon)), std::string(url.substr(colon + 3)), options_.require_tls};
     if (door.address.ends_with('/')) door.address.pop_back();
     if (!is_stopping_ && !is_full()) welcome(std::move(stream), std::move(door));

@@ -39,9 +39,9 @@ Result<std::shared_ptr<const PasswordFileAuthenticator>> PasswordFileAuthenticat
   std::ifstream file(path, std::ios::binary);
   std::ostringstream text;
   if (!file || !(text << file.rdbuf()).good())
-    return make_error(ErrorCode::io_error, "password file " + quoted(path, 200) + " cannot be read, or is empty");
+    return make_error(ErrorCode::io_error, "password file " + quote(path, 200) + " cannot be read, or is empty");
   auto read = from_text(text.str(), options);
-  if (!read) return make_error(read.error().code, quoted(path, 200) + ": " + read.error().message);
+  if (!read) return make_error(read.error().code, quote(path, 200) + ": " + read.error().message);
   return read;
 }
 
@@ -56,7 +56,7 @@ Result<> PasswordFileAuthenticator::add_line(std::string_view line) {
   if (!hash) return hash.error();
   if (hash->scheme() == PasswordScheme::md5 && !options_.accepts_md5)
     return make_error(ErrorCode::invalid_configuration,
-                      "user " + quoted(fields[0]) + " has an MD5 hash, which must be allowed; use scrypt");
+                      "user " + quote(fields[0]) + " has an MD5 hash, which must be allowed; use scrypt");
   User user{std::move(*hash), {}, {}};
   if (fields[2] != "_")
     for (const auto privilege : split_words(fields[2], ",")) user.privileges.emplace_back(privilege);

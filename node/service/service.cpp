@@ -43,7 +43,7 @@ bool may_stand_behind(const TypeRegistry& types, const std::string& type, const 
 std::string read_file(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   std::ostringstream text;
-  if (!file || !(text << file.rdbuf())) refuse("service definition " + rr::quoted(path, 200) + " cannot be read");
+  if (!file || !(text << file.rdbuf())) refuse("service definition " + rr::quote(path, 200) + " cannot be read");
   return text.str();
 }
 
@@ -69,7 +69,7 @@ void check_result(const std::string& where, const HandlerType& result, const Typ
 
 const MemberDefinition& Object::require_member(std::string_view name, MemberKind kind) const {
   const MemberDefinition* member = type_->find_member(name);
-  if (!member) refuse(type_name() + " has no member " + rr::quoted(name));
+  if (!member) refuse(type_name() + " has no member " + rr::quote(name));
   if (member->kind != kind)
     refuse(type_name() + "." + member->name + " is a " + std::string(member_kind_name(member->kind)) + ", not a " +
            std::string(member_kind_name(kind)));
@@ -348,8 +348,8 @@ std::shared_ptr<Service> Service::from_text(const std::vector<std::string>& defi
   service->name_ = std::move(name);
   service->types_ = std::make_shared<TypeRegistry>();
   if (auto added = service->types_->add(definitions, mode); !added)
-    refuse("service " + rr::quoted(service->name_) + ": " + added.error().message);
-  if (definitions.empty()) refuse("service " + rr::quoted(service->name_) + " has no definition");
+    refuse("service " + rr::quote(service->name_) + ": " + added.error().message);
+  if (definitions.empty()) refuse("service " + rr::quote(service->name_) + " has no definition");
   service->definition_ = parse_service_definition(definitions.back(), mode).definition.name;
   service->root_ = service->make_object(root_type);
   return service;
@@ -367,7 +367,7 @@ std::shared_ptr<Object> Service::make_object(std::string_view type) {
   if (qualified.find('.') == std::string::npos) qualified = definition_ + "." + qualified;
   const EntityDefinition* entity = types_->find_entity(qualified);
   if (!entity || entity->kind != EntityKind::object)
-    refuse("service " + rr::quoted(name_) + ": there is no object type " + rr::quoted(qualified));
+    refuse("service " + rr::quote(name_) + ": there is no object type " + rr::quote(qualified));
   std::shared_ptr<Object> object(new Object(*this, *entity));
   std::erase_if(objects_, [](const std::weak_ptr<Object>& other) { return other.expired(); });
   objects_.push_back(object);
@@ -382,27 +382,27 @@ void Service::forget_client(ClientId client) {
 }
 
 void Service::set_attribute(std::string key, Value value) {
-  if (host_) refuse("service " + rr::quoted(name_) + ": attributes are set before the service is added to a node");
+  if (host_) refuse("service " + rr::quote(name_) + ": attributes are set before the service is added to a node");
   std::erase_if(attributes_.items, [&](const auto& item) { return item.first == key; });
   attributes_.items.emplace_back(std::move(key), std::move(value));
 }
 
 void Service::set_security(SecurityPolicy policy) {
-  if (host_) refuse("service " + rr::quoted(name_) + ": security is set before the service is added to a node");
+  if (host_) refuse("service " + rr::quote(name_) + ": security is set before the service is added to a node");
   if (policy.require_valid_user && !policy.authenticator)
-    refuse("service " + rr::quoted(name_) + " requires a user, but has no authenticator: nobody could log in");
+    refuse("service " + rr::quote(name_) + " requires a user, but has no authenticator: nobody could log in");
   security_ = std::move(policy);
 }
 
 std::shared_ptr<HostedService> Service::attach(ServiceHost& host) {
-  if (hosted_) refuse("service " + rr::quoted(name_) + " was added to a node before");
+  if (hosted_) refuse("service " + rr::quote(name_) + " was added to a node before");
   std::string missing;
   for (const std::weak_ptr<Object>& weak : objects_)
     if (const auto object = weak.lock())
       for (const std::string& handler : object->missing_handlers()) missing += (missing.empty() ? "" : ", ") + handler;
-  if (!missing.empty()) refuse("service " + rr::quoted(name_) + ": no handler for " + missing);
+  if (!missing.empty()) refuse("service " + rr::quote(name_) + ": no handler for " + missing);
   auto hosted = HostedService::make(name_, root_, types_, attributes_);
-  if (!hosted) refuse("service " + rr::quoted(name_) + ": " + hosted.error().message);
+  if (!hosted) refuse("service " + rr::quote(name_) + ": " + hosted.error().message);
   hosted_ = std::move(*hosted);
   hosted_->set_policy(security_);
   host_ = &host;

@@ -41,7 +41,7 @@ std::int32_t ServiceStub::rr_number(std::string_view text) {
   std::int32_t number = 0;
   const auto end = std::from_chars(text.data(), text.data() + text.size(), number);
   if (end.ec == std::errc() && end.ptr == text.data() + text.size()) return number;
-  throw Exception(make_error(ErrorCode::invalid_argument, "index " + quoted(text) + ": expected an int32"));
+  throw Exception(make_error(ErrorCode::invalid_argument, "index " + quote(text) + ": expected an int32"));
 }
 
 std::shared_ptr<Service> make_service(std::string name, const std::shared_ptr<ServiceStub>& root) {

@@ -15,7 +15,7 @@ std::string one_service_of(const std::vector<std::string>& urls) {
   for (const auto& text : urls) {
     const auto url = parse_url(text);
     if (!url) throw std::invalid_argument("subscribe_service: " + url.error().message);
-    if (services.insert(url->service).second) found += (found.empty() ? "" : ", ") + quoted(url->service);
+    if (services.insert(url->service).second) found += (found.empty() ? "" : ", ") + quote(url->service);
   }
   if (services.size() == 1) return *services.begin();
   throw std::invalid_argument("subscribe_service: found " + (found.empty() ? "no URL" : "the services " + found) +
@@ -24,7 +24,7 @@ std::string one_service_of(const std::vector<std::string>& urls) {
 
 void check_path(const std::string& path) {
   if (path != "*" && !path.starts_with("*."))
-    throw std::invalid_argument("path " + quoted(path) + " of a subscription: expected \"*\" or \"*.OBJREF...\"");
+    throw std::invalid_argument("path " + quote(path) + " of a subscription: expected \"*\" or \"*.OBJREF...\"");
 }
 
 }  // namespace

@@ -61,10 +61,10 @@ Result<std::string> format_hosts(const std::vector<std::string>& hosts) {
                                                "0123456789.-_:*") == std::string::npos;
     if (!is_plain)
       return make_error(ErrorCode::invalid_argument,
-                        "host " + rr::quoted(host) + ": expected a name or an IP address, without port");
+                        "host " + rr::quote(host) + ": expected a name or an IP address, without port");
     const Octets address(a2i_IPADDRESS(host.c_str()));
     if (!address && host.find(':') != std::string::npos)
-      return make_error(ErrorCode::invalid_argument, "host " + rr::quoted(host) + ": not an IPv6 address");
+      return make_error(ErrorCode::invalid_argument, "host " + rr::quote(host) + ": not an IPv6 address");
     ERR_clear_error();
     out += (out.empty() ? "" : ",") + std::string(address ? "IP:" : "DNS:") + host;
   }
@@ -105,7 +105,7 @@ Result<CertificateAndKey> issue_certificate(const CertificateWish& wish, const C
                                  reinterpret_cast<const unsigned char*>(wish.common_name.data()),
                                  static_cast<int>(wish.common_name.size()), -1, 0) != 1)
     return make_error(ErrorCode::invalid_argument,
-                      "common name " + rr::quoted(wish.common_name) + " can't be used: " + last_error());
+                      "common name " + rr::quote(wish.common_name) + " can't be used: " + last_error());
   X509_set_issuer_name(certificate.get(), X509_get_subject_name(signer));
 
   X509V3_CTX context;

@@ -56,7 +56,7 @@ inline std::string name_text(const X509_NAME* name) {
   X509_NAME_print_ex(out.get(), name, 0, XN_FLAG_ONELINE & ~ASN1_STRFLGS_ESC_MSB);
   char* data = nullptr;
   const long size = BIO_get_mem_data(out.get(), &data);
-  return quoted(std::string_view(data, static_cast<std::size_t>(size)), 120);
+  return quote(std::string_view(data, static_cast<std::size_t>(size)), 120);
 }
 
 }  // namespace rr::openssl

@@ -66,13 +66,13 @@ bool is_published_root(X509* certificate) {
 
 Result<> add_published_roots(X509_STORE* store, const std::string& file) {
   const openssl::Bio in(BIO_new_file(file.c_str(), "r"));
-  if (!in) return unusable("CA file " + quoted(file, 200) + ": " + last_error());
+  if (!in) return unusable("CA file " + quote(file, 200) + ": " + last_error());
   int added = 0;
   while (const openssl::Certificate certificate{PEM_read_bio_X509(in.get(), nullptr, nullptr, nullptr)})
     if (is_published_root(certificate.get())) added += X509_STORE_add_cert(store, certificate.get());
   ERR_clear_error();
   if (added == 0)
-    return unusable("CA file " + quoted(file, 200) +
+    return unusable("CA file " + quote(file, 200) +
                     ": none of the published Robot Raconteur roots is in it; a CA of your own is named by "
                     "ROBOTRACONTEUR_SSL_CERT_FILE");
   return {};
@@ -82,10 +82,10 @@ Result<> set_trust(SSL_CTX* context, const TlsTrust& trust) {
   X509_STORE* const store = SSL_CTX_get_cert_store(context);
   for (const auto& file : trust.files)
     if (X509_STORE_load_file(store, file.c_str()) != 1)
-      return unusable("CA file " + quoted(file, 200) + ": " + last_error() + "; expected certificates in PEM");
+      return unusable("CA file " + quote(file, 200) + ": " + last_error() + "; expected certificates in PEM");
   for (const auto& directory : trust.directories)
     if (X509_STORE_load_path(store, directory.c_str()) != 1)
-      return unusable("CA folder " + quoted(directory, 200) + ": " + last_error());
+      return unusable("CA folder " + quote(directory, 200) + ": " + last_error());
   for (const auto& file : trust.published_roots)
     if (auto added = add_published_roots(store, file); !added) return added.error();
   return {};
@@ -93,7 +93,7 @@ Result<> set_trust(SSL_CTX* context, const TlsTrust& trust) {
 
 Result<> load_node_certificate(SSL_CTX* context, const std::string& file, const NodeId& id) {
   const auto fail = [&file](const std::string& why) {
-    return unusable("node certificate " + quoted(file, 200) + ": " + why);
+    return unusable("node certificate " + quote(file, 200) + ": " + why);
   };
   const openssl::Bio in(BIO_new_file(file.c_str(), "rb"));
   if (!in) return fail(last_error());
@@ -159,25 +159,25 @@ int choose_certificate(SSL* ssl, int*, void* argument) {
 
 Result<> load_web_certificate(SSL_CTX* context, const WebCertificate& files) {
   if (SSL_CTX_use_certificate_chain_file(context, files.certificate_file.c_str()) != 1)
-    return unusable("certificate " + quoted(files.certificate_file, 200) + ": " + last_error() +
+    return unusable("certificate " + quote(files.certificate_file, 200) + ": " + last_error() +
                     "; expected PEM, the server's own certificate first");
   if (SSL_CTX_use_PrivateKey_file(context, files.key_file.c_str(), SSL_FILETYPE_PEM) != 1)
-    return unusable("key " + quoted(files.key_file, 200) + ": " + last_error() + "; expected the PEM key of " +
-                    quoted(files.certificate_file, 200) + ", without a password");
+    return unusable("key " + quote(files.key_file, 200) + ": " + last_error() + "; expected the PEM key of " +
+                    quote(files.certificate_file, 200) + ", without a password");
   if (X509_cmp_current_time(X509_get0_notAfter(SSL_CTX_get0_certificate(context))) < 0)
-    return unusable("certificate " + quoted(files.certificate_file, 200) + ": it has expired");
+    return unusable("certificate " + quote(files.certificate_file, 200) + ": it has expired");
   return {};
 }
 
 Result<> add_revocation_list(X509_STORE* store, const std::string& file) {
   const openssl::Bio in(BIO_new_file(file.c_str(), "r"));
-  if (!in) return unusable("revocation list " + quoted(file, 200) + ": " + last_error());
+  if (!in) return unusable("revocation list " + quote(file, 200) + ": " + last_error());
   int added = 0;
   while (const openssl::RevocationList list{PEM_read_bio_X509_CRL(in.get(), nullptr, nullptr, nullptr)})
     added += X509_STORE_add_crl(store, list.get());
   ERR_clear_error();
   if (added == 0)
-    return unusable("revocation list " + quoted(file, 200) + ": found none in it, expected PEM (X509 CRL)");
+    return unusable("revocation list " + quote(file, 200) + ": found none in it, expected PEM (X509 CRL)");
   X509_STORE_set_flags(store, X509_V_FLAG_CRL_CHECK | X509_V_FLAG_CRL_CHECK_ALL);
   return {};
 }

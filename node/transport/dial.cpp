@@ -168,7 +168,7 @@ awaitable<Dialed> dial(ConnectionUrl url, DialOptions options) {
   const auto* dialer = find_dialer(url.scheme);
   if (!dialer)
     co_return make_error(ErrorCode::connection_error,
-                         "scheme " + rr::quoted(url.scheme) + " can't be dialed; available: " + dialable_schemes());
+                         "scheme " + rr::quote(url.scheme) + " can't be dialed; available: " + dialable_schemes());
   co_return co_await dialer->dial(std::move(url), options);
 }
 

@@ -74,7 +74,7 @@ awaitable<Result<Answer>> ask(ByteStream& stream, std::string request, std::stri
 
 std::string describe(const Answer& answer) {
   const auto reason = answer.reason();
-  return "status " + std::to_string(answer.result_int()) + " " + quoted(std::string_view(reason.data(), reason.size()));
+  return "status " + std::to_string(answer.result_int()) + " " + quote(std::string_view(reason.data(), reason.size()));
 }
 
 }  // namespace
@@ -123,7 +123,7 @@ awaitable<Result<std::unique_ptr<ByteStream>>> connect_websocket(std::unique_ptr
   const auto protocol = answer->find(http::field::sec_websocket_protocol);
   if (protocol != answer->end() &&
       !has_token(header(*answer, http::field::sec_websocket_protocol), websocket_subprotocol))
-    co_return fail("the server speaks the subprotocol " + quoted(header(*answer, http::field::sec_websocket_protocol)) +
+    co_return fail("the server speaks the subprotocol " + quote(header(*answer, http::field::sec_websocket_protocol)) +
                    ", expected " + std::string(websocket_subprotocol));
   std::unique_ptr<ByteStream> socket =
       std::make_unique<WebSocketStream>(std::move(stream), WebSocketRole::client, false);

@@ -84,7 +84,7 @@ Result<LocalNodeInfo> parse_local_info(std::string_view text) {
   if (!id) return make_error(ErrorCode::invalid_configuration, "info file: " + id.error().message);
   LocalNodeInfo info{{*id, values["nodename"]}, values["socket"], values["username"], values["ServiceStateNonce"]};
   if (!info.node.name.empty() && !is_valid_node_name(info.node.name))
-    return make_error(ErrorCode::invalid_configuration, "info file: nodename " + rr::quoted(info.node.name));
+    return make_error(ErrorCode::invalid_configuration, "info file: nodename " + rr::quote(info.node.name));
   // A byte of zero would cut it short where it is used.
   if (info.socket.empty() || info.socket.front() != '/' || info.socket.find('\0') != std::string::npos)
     return make_error(ErrorCode::invalid_configuration, "info file: no absolute path of a socket");

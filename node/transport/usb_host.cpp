@@ -174,7 +174,7 @@ awaitable<Result<std::unique_ptr<ByteStream>>> UsbHost::dial(std::function<bool(
   if (!chosen) {
     std::string seen;
     for (const auto& node : found.nodes)
-      seen += "; found " + quoted(node.name) + " " + format_node_id(node.id) + " at " + node.device;
+      seen += "; found " + quote(node.name) + " " + format_node_id(node.id) + " at " + node.device;
     for (const auto& problem : found.problems) seen += "; not asked: " + problem;
     co_return make_error(ErrorCode::connection_error,
                          "no such node on USB" + (seen.empty() ? "; no device found" : seen));

@@ -7,6 +7,7 @@
 #include "node/platform/text_file.hpp"
 #include "node/tls/digest.hpp"
 #include "server/access/base64url.hpp"
+#include "server/limits/client_network.hpp"
 #include "server/log/log.hpp"
 
 namespace rrgate {
@@ -21,12 +22,12 @@ constexpr std::size_t min_ticket_key = 32;
 rr::Result<std::string> read_file(std::string_view what, const std::string& path) {
   auto text = read_text_file(path);
   if (!text)
-    return rr::make_error(rr::ErrorCode::io_error, std::string(what) + " " + rr::quoted(path, 200) + ": can't be read");
+    return rr::make_error(rr::ErrorCode::io_error, std::string(what) + " " + rr::quote(path, 200) + ": can't be read");
   return std::move(*text);
 }
 
 rr::Error in_file(std::string_view what, const std::string& path, const rr::Error& error) {
-  return rr::make_error(error.code, std::string(what) + " " + rr::quoted(path, 200) + ": " + error.message);
+  return rr::make_error(error.code, std::string(what) + " " + rr::quote(path, 200) + ": " + error.message);
 }
 
 rr::Result<JwtVerifier> load_jwt(const JwtConfig& config) {
@@ -109,7 +110,7 @@ rr::Result<AccessStatePtr> load_access(const AccessConfig& config) {
     if (!text) return text.error();
     if (text->size() < min_ticket_key)
       return rr::make_error(rr::ErrorCode::invalid_configuration,
-                            "ticket key " + rr::quoted(config.ticket_key_file, 200) + ": has " +
+                            "ticket key " + rr::quote(config.ticket_key_file, 200) + ": has " +
                                 std::to_string(text->size()) + " bytes, expected at least 32");
     out->ticket_key.assign(text->begin(), text->end());
   }
@@ -119,8 +120,6 @@ rr::Result<AccessStatePtr> load_access(const AccessConfig& config) {
 /// The users of now, for logins that are judged on other threads.
 class Access::Users final : public rr::Authenticator {
  public:
-  explicit Users(std::shared_ptr<AuditLog> audit) : audit_(std::move(audit)) {}
-
   void set(std::shared_ptr<const rr::PasswordFileAuthenticator> users) {
     const std::lock_guard lock(mutex_);
     users_ = std::move(users);
@@ -133,25 +132,15 @@ class Access::Users final : public rr::Authenticator {
       users = users_;
     }
     if (!users) return rr::make_error(rr::ErrorCode::authentication_error, "Invalid username or password");
-    auto user = judge_login(*users, attempt);
-    Identity who;
-    who.name = attempt.username;
-    if (user) who.roles = user->privileges;
-    who.proof = user ? Proof::password : Proof::none;
-    const AccessRequest what{.service = attempt.service, .verb = Verb::read};
-    audit_->write({user ? "login" : "login_failed", &who, attempt.service.empty() ? nullptr : &what,
-                   user ? std::string_view() : std::string_view(user.error().message)});
-    return user;
+    return judge_login(*users, attempt);
   }
 
  private:
-  std::shared_ptr<AuditLog> audit_;
   mutable std::mutex mutex_;
   std::shared_ptr<const rr::PasswordFileAuthenticator> users_;
 };
 
-Access::Access(const AccessConfig& config)
-    : audit_(std::make_shared<AuditLog>()), users_(std::make_shared<Users>(audit_)) {
+Access::Access(const AccessConfig& config) : audit_(std::make_unique<AuditLog>()), users_(std::make_shared<Users>()) {
   // Until load() has read who may, nobody may who must show it.
   auto empty = std::make_shared<AccessState>();
   empty->config = config;
@@ -201,7 +190,7 @@ void Access::reload(bool is_forced) {
 rr::Result<> Access::check(const Identity& who, const AccessRequest& what) {
   auto checked = state_->rules.check(who, what);
   if (!checked)
-    record({"refused", &who, &what, {}});
+    record_refusal({"refused", &who, &what, {}});
   else if (is_recorded(what.verb))
     record({to_string(what.verb), &who, &what, {}});
   return checked;
@@ -210,7 +199,10 @@ rr::Result<> Access::check(const Identity& who, const AccessRequest& what) {
 rr::Result<> Access::check_whole_device(const Identity& who, std::string_view device) {
   auto checked = state_->rules.check_whole_device(who, device);
   const AccessRequest what{.device = device, .verb = Verb::call};
-  record({checked ? "relay" : "refused", &who, &what, checked ? "" : "not every right on the whole device"});
+  if (checked)
+    record({"relay", &who, &what, {}});
+  else
+    record_refusal({"refused", &who, &what, "not every right on the whole device"});
   return checked;
 }
 
@@ -289,6 +281,19 @@ std::optional<Identity> Access::renew(const Identity& who) const {
       break;
   }
   return with_grants(std::move(out));
+}
+
+void Access::record_refusal(const AuditEvent& event) {
+  if (event.who->is_proven() || refusals_.note(network_name_of(event.who->client), std::chrono::steady_clock::now()))
+    record(event);
+}
+
+void Access::sum_up_refusals(bool is_forced) {
+  for (const auto& [network, count] : refusals_.take(std::chrono::steady_clock::now(), is_forced)) {
+    Identity strangers;
+    strangers.client = network.empty() ? "other networks" : network;
+    record({"refusals", &strangers, nullptr, std::to_string(count) + " more within a minute"});
+  }
 }
 
 void Access::record(const AuditEvent& event) {

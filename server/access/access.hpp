@@ -13,6 +13,7 @@
 #include "server/access/access_rules.hpp"
 #include "server/access/api_tokens.hpp"
 #include "server/access/audit_log.hpp"
+#include "server/access/refusal_digest.hpp"
 #include "server/access/tickets.hpp"
 
 namespace rrgate {
@@ -45,6 +46,9 @@ rr::Result<rr::AuthenticatedUser> judge_login(const rr::PasswordFileAuthenticato
 class Access {
  public:
   explicit Access(const AccessConfig& config);
+  Access(const Access&) = delete;
+  Access& operator=(const Access&) = delete;
+  ~Access() { sum_up_refusals(true); }
 
   /// Reads all files, and opens the audit log. Errors   as load_access(); nothing has changed.
   [[nodiscard]] rr::Result<> load();
@@ -70,7 +74,7 @@ class Access {
   /// Another one whenever users, tokens or rights have changed.
   const AccessStatePtr& state_ptr() const { return state_; }
 
-  /// Logins of Robot Raconteur by the users file; follows its changes. Null where there is none.
+  /// Logins of Robot Raconteur by the users file; follows its changes. Null where there is none. See Logins.
   std::shared_ptr<const rr::Authenticator> authenticator() const;
 
   Tickets& tickets() { return tickets_; }
@@ -89,6 +93,10 @@ class Access {
 
   /// Writes into the audit log; a line that can't be written is noted in the gateway's log, not too often.
   void record(const AuditEvent& event);
+  /// The same for what was refused: of those who have not proven who they are, one of a network a minute.
+  void record_refusal(const AuditEvent& event);
+  /// Writes how many refusals were left out, where a minute is over. To be called now and then.
+  void sum_up_refusals(bool is_forced = false);
   const AuditLog& audit() const { return *audit_; }
 
  private:
@@ -98,9 +106,10 @@ class Access {
 
   AccessStatePtr state_;
   std::map<std::string, std::string> seen_;
-  std::shared_ptr<AuditLog> audit_;
+  std::unique_ptr<AuditLog> audit_;
   std::shared_ptr<Users> users_;
   Tickets tickets_;
+  RefusalDigest refusals_;
   std::chrono::steady_clock::time_point last_complaint_{};
 };
 

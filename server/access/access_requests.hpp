@@ -35,7 +35,7 @@ class AccessRequests {
     std::string id;
     std::string secret;  ///< to fetch the answer with
   };
-  /// `address`  of the client, which may have three open requests.
+  /// `address`  as what the client counts, see network_name(); it may have three open requests.
   /// Errors   invalid_argument: a name that no token can have, a long reason; out_of_system_resource: too many.
   rr::Result<Asked> ask(std::string name, std::string reason, std::string client, std::string address, Time now);
 

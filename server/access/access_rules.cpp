@@ -35,21 +35,21 @@ bool gives(const AccessRule& rule, Verb verb) {
 
 std::string describe(const Identity& who) {
   if (who.name.empty() && !who.device_user.empty())
-    return rr::quoted(who.device_user) + " of the device, who is no user of the gateway,";
+    return rr::quote(who.device_user) + " of the device, who is no user of the gateway,";
   if (who.name.empty()) return "who is not logged in";
   std::string roles;
   for (const auto& role : who.roles) roles += (roles.empty() ? "" : ", ") + role;
-  return rr::quoted(who.name) + " (" + (roles.empty() ? "no roles" : roles) + ")";
+  return rr::quote(who.name) + " (" + (roles.empty() ? "no roles" : roles) + ")";
 }
 
 std::string describe(const AccessRequest& what) {
   if (!is_device_verb(what.verb))
     return what.verb == Verb::metrics ? "read the gateway's metrics" : "manage the gateway";
   std::string out(to_string(what.verb));
-  if (!what.member.empty()) out += " " + rr::quoted(what.member) + " of";
+  if (!what.member.empty()) out += " " + rr::quote(what.member) + " of";
   const auto path = what.path.empty() ? what.service : what.path;
-  if (!path.empty()) out += " " + rr::quoted(path) + " on";
-  return out + " device " + rr::quoted(what.device);
+  if (!path.empty()) out += " " + rr::quote(path) + " on";
+  return out + " device " + rr::quote(what.device);
 }
 
 rr::Error denied(const Identity& who, const std::string& what) {
@@ -89,7 +89,7 @@ rr::Result<> AccessRules::check_whole_device(const Identity& who, std::string_vi
     });
   };
   if (std::all_of(std::begin(device_verbs), std::end(device_verbs), has_all_of)) return {};
-  return denied(who, "do everything to device " + rr::quoted(device) +
+  return denied(who, "do everything to device " + rr::quote(device) +
                          ", which a connection needs that passes through the gateway unread; with \"mode\": \"shared\" "
                          "of the device rights hold for each member");
 }

@@ -29,7 +29,7 @@ rr::Result<> check_name(std::string_view what, std::string_view name) {
   if (name.empty() || name.size() > 128 || name.front() == '#' || name.front() == '_' ||
       std::any_of(name.begin(), name.end(), is_bad))
     return rr::make_error(rr::ErrorCode::invalid_argument,
-                          "found " + rr::quoted(name) + ", expected a " + std::string(what) +
+                          "found " + rr::quote(name) + ", expected a " + std::string(what) +
                               " of 1 to 128 characters without blanks, ',' and ':', no '#' or '_' in front");
   return {};
 }

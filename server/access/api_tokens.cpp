@@ -82,12 +82,12 @@ rr::Result<> ApiTokens::add_line(std::string_view line) {
     return unusable("has " + std::to_string(fields.size()) + " fields, expected name, SHA-256, roles or _, day or _");
   if (auto checked = check_name("token name", fields[0]); !checked) return checked.error();
   if (fields[1].size() != hash_digits || fields[1].find_first_not_of(rr::lower_hex_digits) != std::string_view::npos)
-    return unusable("the second field of " + rr::quoted(fields[0]) + " is no SHA-256 in lower-case hex");
+    return unusable("the second field of " + rr::quote(fields[0]) + " is no SHA-256 in lower-case hex");
   auto roles = parse_roles(fields[2]);
   if (!roles) return roles.error();
   Entry entry{std::string(fields[0]), std::move(*roles), parse_day(fields[3])};
   if (!entry.last_day && fields[3] != "_")
-    return unusable("found " + rr::quoted(fields[3]) + ", expected a day as 2030-12-31, or _");
+    return unusable("found " + rr::quote(fields[3]) + ", expected a day as 2030-12-31, or _");
   by_hash_.emplace(fields[1], std::move(entry));
   return {};
 }

@@ -67,7 +67,7 @@ rr::Result<> AuditLog::open(const std::string& path) {
     opened = ::open(path.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NOCTTY, 0600);
     if (opened < 0)
       return rr::make_error(rr::ErrorCode::io_error,
-                            "audit file " + rr::quoted(path, 200) + ": " + std::strerror(errno));
+                            "audit file " + rr::quote(path, 200) + ": " + std::strerror(errno));
   }
   const std::lock_guard lock(mutex_);
   const int old = std::exchange(file_, opened);

@@ -37,6 +37,12 @@ struct Subject {
   bool operator==(const Subject&) const = default;
 };
 
+/// Where a client comes from.
+struct ClientOrigin {
+  std::string client = {};   ///< as logs name it: "192.0.2.1:40000"
+  std::string network = {};  ///< as what it counts, see network_name()
+};
+
 struct Identity {
   using Time = std::chrono::system_clock::time_point;
   static constexpr Time never = Time::max();

@@ -46,7 +46,7 @@ rr::Result<rr::SignatureKey> read_key(const rr::Json& jwk) {
   if (type == "OKP" && text_of(jwk, "crv") == "Ed25519") return rr::SignatureKey::from_ed25519(number("x"));
   if (type == "oct") return rr::SignatureKey::from_secret(number("k"));
   return rr::make_error(rr::ErrorCode::invalid_argument,
-                        "kty is " + rr::quoted(type) + ", expected RSA, EC (P-256), OKP (Ed25519) or oct");
+                        "kty is " + rr::quote(type) + ", expected RSA, EC (P-256), OKP (Ed25519) or oct");
 }
 
 bool is_for_signatures(const rr::Json& jwk, const rr::SignatureKey& key) {
@@ -172,7 +172,7 @@ rr::Result<> JwtVerifier::check_signature(std::string_view signed_part, std::str
   if (header->contains("crit")) return refused("its header asks for extensions that are unknown here");
   const auto name = text_of(*header, "alg");
   const auto algorithm = parse_algorithm(name);
-  if (!algorithm) return refused("algorithm " + rr::quoted(name) + "; expected RS256, ES256, EdDSA or HS256");
+  if (!algorithm) return refused("algorithm " + rr::quote(name) + "; expected RS256, ES256, EdDSA or HS256");
   const auto id = text_of(*header, "kid");
   bool has_key = false;
   for (const auto& key : keys_) {
@@ -199,7 +199,7 @@ rr::Result<Identity> JwtVerifier::verify(std::string_view token, std::chrono::sy
   Identity out;
   const auto* user = find_claim(*claims, claims_.user_claim);
   if (user && user->is_string()) out.name = user->get<std::string>();
-  if (out.name.empty()) return refused("it names no user (" + rr::quoted(claims_.user_claim) + ")");
+  if (out.name.empty()) return refused("it names no user (" + rr::quote(claims_.user_claim) + ")");
   out.roles = out.proven_roles = read_roles(find_claim(*claims, claims_.roles_claim));
   out.proof = Proof::jwt;
   out.ends = end_of(*claims);

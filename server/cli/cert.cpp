@@ -59,7 +59,7 @@ struct NodeCertificateOptions : CertificateOptions {
 /// The id that a node of this name has or, from now on, will have: what the reference keeps in nodeids/NAME.
 rr::Result<rr::NodeId> id_of_name(const std::string& name) {
   if (!rr::is_valid_node_name(name))
-    return rr::make_error(rr::ErrorCode::invalid_argument, rr::quoted(name) + " is neither a node id nor a node name");
+    return rr::make_error(rr::ErrorCode::invalid_argument, rr::quote(name) + " is neither a node id nor a node name");
   const auto folder = rr::user_config_folder();
   if (!folder) return folder.error();
   const auto path = fs::path(*folder) / "nodeids" / name;

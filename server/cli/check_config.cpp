@@ -4,6 +4,7 @@
 #include "server/cli/command.hpp"
 #include "server/cli/findings.hpp"
 #include "server/cli/service_rights.hpp"
+#include "server/config/cautions.hpp"
 
 namespace rrgate {
 
@@ -33,6 +34,8 @@ int check_config(const CheckOptions& options) {
     for (const auto& sentence : *missing) std::cerr << short_name(file) << ": " << sentence << "\n";
     if (!missing->empty()) return exit_usage;
   }
+  for (const auto& caution : find_cautions(config.config))
+    std::cerr << format_finding(short_name(file), {caution.path, "warning: " + caution.text}) << "\n";
   std::cout << short_name(file) << ": good; " << config.config.devices.size() << " devices\n";
   return exit_ok;
 }

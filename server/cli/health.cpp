@@ -61,7 +61,7 @@ struct HealthOptions {
 
 int ask_health(const HealthOptions& options) {
   const auto address = parse_address(options.address);
-  if (!address) return usage_error("health", rr::quoted(options.address) + ": expected HOST:PORT");
+  if (!address) return usage_error("health", rr::quote(options.address) + ": expected HOST:PORT");
   const auto answer = ask(*address, options.asks_ready ? "/readyz" : "/healthz");
   const auto line = answer.substr(0, answer.find('\r'));
   const bool is_well = line.find(" 200 ") != std::string::npos;

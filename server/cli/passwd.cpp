@@ -51,7 +51,7 @@ std::optional<std::string> ask(const char* prompt) {
 rr::Result<std::string> read_password(const std::string& name) {
   std::optional<std::string> password;
   if (::isatty(STDIN_FILENO)) {
-    password = ask(("Password of " + rr::quoted(name) + ": ").c_str());
+    password = ask(("Password of " + rr::quote(name) + ": ").c_str());
     if (password && ask("The same again: ") != password)
       return rr::make_error(rr::ErrorCode::invalid_argument, "the two passwords differ; nothing was changed");
   } else {
@@ -102,7 +102,7 @@ int set_password(const PasswordOptions& options) {
   if (const auto users = rr::PasswordFileAuthenticator::from_text(text, {.accepts_md5 = true}); !users)
     return report_failure("passwd", file + ": " + users.error().message);
   const auto before = find_line(text, name);
-  if (deletes && before.empty()) return report_failure("passwd", file + " has no user " + rr::quoted(name));
+  if (deletes && before.empty()) return report_failure("passwd", file + " has no user " + rr::quote(name));
   std::string line;
   if (!deletes) {
     auto made = make_line(name, before, roles);
@@ -111,7 +111,7 @@ int set_password(const PasswordOptions& options) {
   }
   if (auto done = rr::write_secret(file, with_line(text, name, line), true, rr::SecretReaders::folder_group); !done)
     return report_failure("passwd", done.error().message);
-  std::cout << file << ": user " << rr::quoted(name)
+  std::cout << file << ": user " << rr::quote(name)
             << (deletes          ? " is deleted"
                 : before.empty() ? " is added"
                                  : " is changed")

@@ -76,7 +76,7 @@ void add_connection_options(CLI::App& app, RemoteOptions& options) {
       ->check([](const std::string& text) {
         double seconds = 0;
         const bool is_good = CLI::detail::lexical_cast(text, seconds) && seconds > 0 && seconds <= 86'400;
-        return is_good ? std::string() : "found " + rr::quoted(text) + ", expected seconds, 86400 at most";
+        return is_good ? std::string() : "found " + rr::quote(text) + ", expected seconds, 86400 at most";
       })
       ->option_text("SECONDS [10]");
 }
@@ -145,27 +145,27 @@ RemoteMember find_member(const rr::RemoteObject& root, std::string_view path) {
   const auto look_at = [&](const rr::RemoteObject& object) {
     out.object = object;
     out.type = out.types().find_entity(object.type_name());
-    if (!out.type) throw NotUnderstood("the type of " + rr::quoted(object.path()) + " is not known");
+    if (!out.type) throw NotUnderstood("the type of " + rr::quote(object.path()) + " is not known");
   };
   look_at(root);
   const auto segments = split_path(path);
   if (!segments)
-    throw NotUnderstood(rr::quoted(path) + " is no path of a member; expected \"position\" or \"axes/0/position\"");
+    throw NotUnderstood(rr::quote(path) + " is no path of a member; expected \"position\" or \"axes/0/position\"");
   for (std::size_t i = 0; i < segments->size(); ++i) {
     const auto& name = (*segments)[i];
     const auto* member = out.type->find_member(name);
     if (!member)
-      throw NotUnderstood("no member " + rr::quoted(name) + " in " + out.type->qualified_name +
+      throw NotUnderstood("no member " + rr::quote(name) + " in " + out.type->qualified_name +
                           "; it has: " + member_names(*out.type));
     if (member->kind != rr::MemberKind::objref) {
-      if (i + 1 != segments->size()) throw NotUnderstood(rr::quoted(name) + " is no object: nothing is below it");
+      if (i + 1 != segments->size()) throw NotUnderstood(rr::quote(name) + " is no object: nothing is below it");
       out.member = member;
       break;
     }
     const bool is_indexed =
         member->type.array != rr::ArrayKind::none || member->type.container != rr::ContainerKind::none;
     if (is_indexed && ++i == segments->size())
-      throw NotUnderstood("objref " + rr::quoted(name) + " needs an index: " + name + "/INDEX");
+      throw NotUnderstood("objref " + rr::quote(name) + " needs an index: " + name + "/INDEX");
     look_at(is_indexed ? out.object.object(name, (*segments)[i]) : out.object.object(name));
   }
   return out;
@@ -178,8 +178,8 @@ void expect_kind(const RemoteMember& found, const std::vector<rr::MemberKind>& k
     expected += (expected.empty() ? "" : ", ") + std::string(rr::member_kind_name(kind));
   }
   const auto what =
-      found.member ? rr::quoted(found.member->name) + " is a " + std::string(rr::member_kind_name(found.member->kind))
-                   : rr::quoted(found.object.path()) + " is an object";
+      found.member ? rr::quote(found.member->name) + " is a " + std::string(rr::member_kind_name(found.member->kind))
+                   : rr::quote(found.object.path()) + " is an object";
   throw NotUnderstood(what + "; " + std::string(verb) + " expects one of: " + expected);
 }
 
@@ -189,7 +189,7 @@ rr::Json read_json_argument(std::string_view text, const rr::TypeDefinition& typ
     content = read_all(std::cin);
   } else if (text.starts_with("@")) {
     std::ifstream file{std::string(text.substr(1)), std::ios::binary};
-    if (!file) throw NotUnderstood("file " + rr::quoted(text.substr(1)) + " can't be read");
+    if (!file) throw NotUnderstood("file " + rr::quote(text.substr(1)) + " can't be read");
     content = read_all(file);
   }
   const bool is_one = type.container == rr::ContainerKind::none && type.array == rr::ArrayKind::none;
@@ -200,7 +200,7 @@ rr::Json read_json_argument(std::string_view text, const rr::TypeDefinition& typ
   // What a shell makes of "red" is red, and 5 is text where text is wanted.
   const bool is_word = !content.starts_with('{') && !content.starts_with('[');
   if (takes_text || (takes_word && is_word)) return rr::Json(content);
-  throw NotUnderstood(rr::quoted(text) + " is not JSON: " + json.error().message);
+  throw NotUnderstood(rr::quote(text) + " is not JSON: " + json.error().message);
 }
 
 rr::OrderedJson to_json(const rr::Value& value, const rr::TypeDefinition& type, const rr::TypeRegistry& types) {

@@ -70,7 +70,7 @@ std::string missing_rights(const std::string& user, const std::vector<WantedFile
     const auto path = fs::absolute(each.path.empty() ? "." : each.path).lexically_normal();
     if (::eaccess(path.c_str(), each.access) == 0) continue;
     const auto* what = each.access == R_OK ? " can't read " : " can't write ";
-    lines += "user " + rr::quoted(user) + what + path.string() + ": " + obstacle(path) + "\n";
+    lines += "user " + rr::quote(user) + what + path.string() + ": " + obstacle(path) + "\n";
   }
   return lines;
 }
@@ -94,7 +94,7 @@ rr::Result<std::vector<std::string>> find_missing_rights(const std::string& user
                                                          const Config& config) {
   const auto* about = ::getpwnam(user.c_str());  // NOLINT(concurrency-mt-unsafe): one thread
   if (about == nullptr)
-    return rr::make_error(rr::ErrorCode::invalid_argument, "there is no user " + rr::quoted(user) + " on this machine");
+    return rr::make_error(rr::ErrorCode::invalid_argument, "there is no user " + rr::quote(user) + " on this machine");
   int ends[2];
   if (::pipe(ends) != 0) return rr::make_error(rr::ErrorCode::io_error, "no pipe: too many files are open");
   // What is asked for, before rights are gone: another user may not even see whether a file exists.
@@ -115,7 +115,7 @@ rr::Result<std::vector<std::string>> find_missing_rights(const std::string& user
   int status = -1;
   if (child < 0 || ::waitpid(child, &status, 0) != child || status != 0)
     return rr::make_error(rr::ErrorCode::system_resource_permission_denied,
-                          "only root can ask what user " + rr::quoted(user) + " may do");
+                          "only root can ask what user " + rr::quote(user) + " may do");
   std::vector<std::string> found;
   for (std::size_t begin = 0, end = 0; (end = lines.find('\n', begin)) != std::string::npos; begin = end + 1)
     found.push_back(lines.substr(begin, end - begin));

@@ -68,10 +68,10 @@ StoredLogin find_stored_login(std::string_view gateway) {
   StoredLogin out;
   for (const auto& [url, login] : json->at("gateways").items()) {
     const auto known = gateway_of(url);
-    if (!known) throw NotUnderstood(file + ": found gateway " + rr::quoted(url) + ", expected http(s)://HOST:PORT");
+    if (!known) throw NotUnderstood(file + ": found gateway " + rr::quote(url) + ", expected http(s)://HOST:PORT");
     const auto read = read_login(login);
     if (!read)
-      throw NotUnderstood(file + ": gateway " + rr::quoted(url) +
+      throw NotUnderstood(file + ": gateway " + rr::quote(url) +
                           R"(: expected {"token": "..."} or {"user": "...", "password": "..."})");
     if (known == wanted) out = *read;
   }

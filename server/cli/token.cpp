@@ -40,17 +40,17 @@ int make_token(const TokenOptions& options) {
   const bool is_there = !find_line(text, name).empty();
   if (is_there != deletes)
     return report_failure("token", file + (deletes ? " has no token " : " has a token already of the name ") +
-                                       rr::quoted(name) + (deletes ? "" : "; --delete takes it out"));
+                                       rr::quote(name) + (deletes ? "" : "; --delete takes it out"));
   const auto token = make_api_token();
   const auto line =
       deletes ? "" : name + " " + hash_api_token(token) + " " + format_roles(*roles) + " " + last_day(days);
   if (auto done = rr::write_secret(file, with_line(text, name, line), true, rr::SecretReaders::folder_group); !done)
     return report_failure("token", done.error().message);
   if (deletes) {
-    std::cout << file << ": token " << rr::quoted(name) << " is deleted\n";
+    std::cout << file << ": token " << rr::quote(name) << " is deleted\n";
     return exit_ok;
   }
-  std::cerr << file << ": token " << rr::quoted(name) << " is added. It is shown this once:\n";
+  std::cerr << file << ": token " << rr::quote(name) << " is added. It is shown this once:\n";
   std::cout << token << "\n";
   return exit_ok;
 }

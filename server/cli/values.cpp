@@ -32,7 +32,8 @@ void deliver(const rr::Value& value, const rr::TypeDefinition& type, const rr::T
   std::string content;
   if (file.ends_with(".png") || file.ends_with(".jpg") || file.ends_with(".jpeg")) {
     if (!is_image_type(type, types)) throw NotUnderstood("its value is no image: " + rr::format_type(type));
-    auto image = image_bytes(value, type, types, file.ends_with(".png") ? png_type : jpeg_type);
+    const auto work = prepare_image(value, type, types, file.ends_with(".png") ? png_type : jpeg_type);
+    auto image = work ? encode_image(*work) : work.error();
     if (!image) throw rr::ClientException(image.error());
     content = std::move(*image);
   } else {
@@ -118,7 +119,7 @@ std::vector<rr::Value> read_arguments(const RemoteMember& found, const std::vect
       unnamed.push_back(text);
       continue;
     }
-    if (json.contains(name)) throw NotUnderstood("argument " + rr::quoted(name) + " is given twice");
+    if (json.contains(name)) throw NotUnderstood("argument " + rr::quote(name) + " is given twice");
     json[name] = read_json_argument(std::string_view(text).substr(name.size() + 1), parameter->type);
   }
   auto next = unnamed.begin();
@@ -136,7 +137,7 @@ void call_function(const RemoteMember& found, const ValueOptions& options) {
   const auto& member = *found.member;
   for (const auto& parameter : member.parameters)
     if (parameter.type.container == rr::ContainerKind::generator)
-      throw NotUnderstood(rr::quoted(member.name) + " takes values while it runs, which this command can't give");
+      throw NotUnderstood(rr::quote(member.name) + " takes values while it runs, which this command can't give");
   const auto values = read_arguments(found, options.arguments->results());
   auto type = member.type;
   if (member.is_generator()) {

@@ -58,7 +58,7 @@ void read_identity_headers(ObjectReader& in, IdentityHeaders& headers) {
   in.text("user", headers.user);
   in.text("roles", headers.roles);
   for (const auto& [key, name] : {std::pair("user", &headers.user), std::pair("roles", &headers.roles)})
-    if (!is_header_name(*name)) in.finding(key, "found " + rr::quoted(*name) + ", expected the name of a header");
+    if (!is_header_name(*name)) in.finding(key, "found " + rr::quote(*name) + ", expected the name of a header");
   if (headers.user.empty()) in.finding("user", "missing; expected the name of a header");
 }
 
@@ -76,7 +76,7 @@ void read_rule(ObjectReader& in, AccessRule& rule) {
   in.texts("may", true, [&](const std::string& text) -> std::string {
     const auto verb = parse_verb(text);
     if (!verb)
-      return "found " + rr::quoted(text) + ", expected one of: read, write, call, subscribe, lock, metrics, admin";
+      return "found " + rr::quote(text) + ", expected one of: read, write, call, subscribe, lock, metrics, admin";
     rule.may.push_back(*verb);
     return {};
   });
@@ -122,6 +122,9 @@ void check_access(const Config& config, std::vector<Finding>& findings) {
     findings.push_back({"/access/client_crl", "there is no CA whose certificates it revokes; expected client_ca"});
   if (!access.clients.ca.empty() && config.tls.certificates.empty())
     findings.push_back({"/access/client_ca", "clients show certificates within TLS; expected tls.certificates"});
+  if (config.tls.is_required && config.tls.certificates.empty() && config.proxy.trust.proxies.empty())
+    findings.push_back(
+        {"/tls/required", "nobody could come; expected tls.certificates, or trusted_proxies that serve TLS"});
   if (!access.anonymous_role.empty() && access.rules.empty())
     findings.push_back({"/access/anonymous_role", "there is no rule that gives it anything; expected rules"});
   if (!config.insecure)

@@ -27,7 +27,7 @@ std::string check_device_name(const std::string& name) {
   const auto is_name_char = [&](char c) { return is_plain(c) || c == '_' || c == '-' || c == '.'; };
   if (name.empty() || name.size() > 64 || !is_plain(name.front()) ||
       !std::all_of(name.begin(), name.end(), is_name_char))
-    return "found " + rr::quoted(name) + ", expected 1 to 64 letters, digits, '_', '-', '.', first a letter or digit";
+    return "found " + rr::quote(name) + ", expected 1 to 64 letters, digits, '_', '-', '.', first a letter or digit";
   return {};
 }
 
@@ -36,7 +36,7 @@ std::string read_device_url(const std::string& text, rr::ConnectionUrl& target) 
   if (!url) return url.error().message;
   // No node of this process is a device.
   if (!rr::can_dial(url->scheme) || url->scheme == "rr+intra")
-    return "scheme " + rr::quoted(url->scheme) + " is not available for devices; available: " + rr::dialable_schemes();
+    return "scheme " + rr::quote(url->scheme) + " is not available for devices; available: " + rr::dialable_schemes();
   target = *url;
   return {};
 }
@@ -81,7 +81,7 @@ void read_way(ObjectReader& in, DeviceConfig& device) {
       return {};
     });
     if (!header.first.empty() && !rr::is_extra_header(header.first, header.second))
-      item.finding("name", "header " + rr::quoted(header.first) +
+      item.finding("name", "header " + rr::quote(header.first) +
                                " can't be added: the upgrade sets it itself, or its name or value has a character that "
                                "headers can't have");
     device.headers.push_back(std::move(header));
@@ -122,13 +122,13 @@ void read_node(ObjectReader& in, NodeConfig& node) {
   in.text("name", node.name);
   in.text("id", id);
   if (!rr::is_valid_node_name(node.name))
-    in.finding("name", "found " + rr::quoted(node.name) + ", expected letters, digits, '_', '-', '.', a letter first");
+    in.finding("name", "found " + rr::quote(node.name) + ", expected letters, digits, '_', '-', '.', a letter first");
   if (id.empty()) return;
   const auto parsed = rr::parse_node_id(id);
   if (parsed && !parsed->is_any())
     node.id = *parsed;
   else
-    in.finding("id", "found " + rr::quoted(id) + ", expected a UUID that is not all zeros");
+    in.finding("id", "found " + rr::quote(id) + ", expected a UUID that is not all zeros");
 }
 
 void read_device(ObjectReader& in, DeviceConfig& device) {
@@ -157,6 +157,7 @@ void read_tls(ObjectReader& in, TlsConfig& tls) {
     item.required_text("key", read_file_name(certificate.key_file));
     tls.certificates.push_back(std::move(certificate));
   });
+  in.flag("required", tls.is_required);
   in.size("hsts_seconds", tls.hsts_seconds, {0, 100'000'000});
 }
 
@@ -169,14 +170,14 @@ void read_discover_rule(ObjectReader& in, DiscoverRule& rule) {
     return std::string_view("*?._-").find(c) != std::string_view::npos || std::isalnum(static_cast<unsigned char>(c));
   };
   if (!std::all_of(rule.node_name.begin(), rule.node_name.end(), is_glob_char))
-    in.finding("node_name", "found " + rr::quoted(rule.node_name) +
+    in.finding("node_name", "found " + rr::quote(rule.node_name) +
                                 ", expected the letters, digits, '_', '-', '.' of node names, '*' or '?'");
   if (!node_id.empty()) {
     const auto id = rr::parse_node_id(node_id);
     if (id && !id->is_any())
       rule.node_id = *id;
     else
-      in.finding("node_id", "found " + rr::quoted(node_id) + ", expected a UUID that is not all zeros");
+      in.finding("node_id", "found " + rr::quote(node_id) + ", expected a UUID that is not all zeros");
   } else if (rule.node_name.empty() && rule.service_type.empty()) {
     in.finding("node_name",
                "missing; a rule needs one of node_name, node_id and service_type (\"node_name\": \"*\" allows all)");
@@ -188,7 +189,7 @@ void read_discover(ObjectReader& in, Discover& discover) {
   std::vector<std::string> scopes;
   in.texts("scopes", false, [&](const std::string& text) -> std::string {
     if (text != "node_local" && text != "link_local" && text != "site_local" && text != "ipv4_broadcast")
-      return "found " + rr::quoted(text) + ", expected one of: node_local, link_local, site_local, ipv4_broadcast";
+      return "found " + rr::quote(text) + ", expected one of: node_local, link_local, site_local, ipv4_broadcast";
     scopes.push_back(text);
     return {};
   });
@@ -205,11 +206,11 @@ void read_proxy(ObjectReader& in, Config& config) {
   in.text("base_path", config.base_path);
   if (!is_path_prefix(config.base_path))
     in.finding("base_path",
-               "found " + rr::quoted(config.base_path) + ", expected a path as \"/robots\", without '/' at its end");
+               "found " + rr::quote(config.base_path) + ", expected a path as \"/robots\", without '/' at its end");
   in.texts("trusted_proxies", false, [&](const std::string& text) -> std::string {
     const auto range = parse_address_range(text);
     if (!range)
-      return "found " + rr::quoted(text) + ", expected an address or a range as \"10.0.0.0/8\", no bits set behind it";
+      return "found " + rr::quote(text) + ", expected an address or a range as \"10.0.0.0/8\", no bits set behind it";
     config.proxy.trust.proxies.push_back(*range);
     return {};
   });
@@ -275,7 +276,7 @@ void read_config(ObjectReader& in, Config& config) {
     read_device(item, device);
     const auto same = [&](const DeviceConfig& other) { return other.name == device.name; };
     if (!device.name.empty() && std::any_of(config.devices.begin(), config.devices.end(), same))
-      item.finding("name", "found " + rr::quoted(device.name) + " a second time; expected a name of its own");
+      item.finding("name", "found " + rr::quote(device.name) + " a second time; expected a name of its own");
     config.devices.push_back(std::move(device));
   });
   in.object("discover", [&](ObjectReader& part) { read_discover(part, config.discover); });
@@ -284,13 +285,13 @@ void read_config(ObjectReader& in, Config& config) {
   read_proxy(in, config);
   in.texts("allowed_origins", false, [&](const std::string& text) -> std::string {
     if (!is_origin_pattern(text))
-      return "found " + rr::quoted(text) + ", expected scheme://host[:port] or scheme://*.domain[:port]";
+      return "found " + rr::quote(text) + ", expected scheme://host[:port] or scheme://*.domain[:port]";
     config.allowed_origins.push_back(text);
     return {};
   });
   in.texts("allowed_hosts", false, [&](const std::string& text) -> std::string {
     if (!is_host_pattern(text))
-      return "found " + rr::quoted(text) +
+      return "found " + rr::quote(text) +
              ", expected a name as \"mybox.local\" or \"*.domain\", without scheme and port";
     config.allowed_hosts.push_back(text);
     return {};
@@ -325,7 +326,7 @@ std::optional<nlohmann::json> parse_json(std::string_view text, std::vector<Find
     if (event == nlohmann::json::parse_event_t::object_start) seen.emplace_back();
     if (event == nlohmann::json::parse_event_t::object_end) seen.pop_back();
     if (event == nlohmann::json::parse_event_t::key && !seen.back().insert(parsed.get<std::string>()).second)
-      findings.push_back({{}, "key " + rr::quoted(parsed.get<std::string>()) + " appears twice in one object"});
+      findings.push_back({{}, "key " + rr::quote(parsed.get<std::string>()) + " appears twice in one object"});
     return true;
   };
   try {

@@ -129,6 +129,7 @@ struct Retry {
 /// HTTPS and secure WebSockets, on the same ports as everything else.
 struct TlsConfig {
   std::vector<rr::WebCertificate> certificates;  ///< empty: TLS is not served
+  bool is_required = false;                      ///< clients in clear are sent to HTTPS, or refused
   std::size_t hsts_seconds = 0;                  ///< how long browsers shall come by HTTPS alone; 0: they are not told
 
   bool operator==(const TlsConfig&) const = default;

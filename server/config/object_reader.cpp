@@ -22,7 +22,7 @@ std::string type_of(const nlohmann::json& value) {
 
 /// The offending value itself, short.
 std::string shown(const nlohmann::json& value) {
-  if (value.is_string()) return "string " + rr::quoted(value.get_ref<const std::string&>());
+  if (value.is_string()) return "string " + rr::quote(value.get_ref<const std::string&>());
   if (value.is_structured()) return type_of(value);
   return type_of(value) + " " + value.dump();
 }
@@ -133,7 +133,7 @@ void ObjectReader::choice(std::string_view key, std::string& target, std::vector
   }
   std::string expected;
   for (const auto& name : choices) expected += (expected.empty() ? "" : ", ") + name;
-  finding(key, "found " + rr::quoted(text) + ", expected one of: " + expected);
+  finding(key, "found " + rr::quote(text) + ", expected one of: " + expected);
 }
 
 void ObjectReader::required_text(std::string_view key, const ReadText& read) {

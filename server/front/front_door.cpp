@@ -131,7 +131,7 @@ rr::awaitable<void> serve_connection(GatewayState& gateway, std::unique_ptr<rr::
     protocol = co_await look_at_first_bytes(*stream, connection.client, patience);
   }
 
-  connection.address = client_network(connection.peer.endpoint.address()).to_string();
+  connection.network = network_name(connection.peer.endpoint.address());
   auto& identity = connection.identity;
   identity.client = connection.client;
   identity = identity.is_proven() ? gateway.access().with_grants(std::move(identity))

@@ -26,14 +26,17 @@ constexpr std::string_view gateway_path = "/gateway";
 /// What a connection goes on as when HTTP is done with it; not valid() where it has ended.
 using Continuation = rr::awaitable<void>;
 
-rr::awaitable<rr::error_code> write_text(rr::ByteStream& stream, std::string_view text) {
+/// 101: what follows is a WebSocket.
+rr::awaitable<rr::error_code> write_acceptance(GatewayState& gateway, rr::ByteStream& stream, std::string_view text) {
+  gateway.metrics().respond(101);
   const auto slice = rr::as_bytes(text);
   const std::span<const rr::ByteSpan> slices(&slice, 1);
   co_return co_await stream.write(slices);
 }
 
 /// Refuses what is not a request, or not one that goes on.
-rr::awaitable<rr::error_code> write_refusal(rr::ByteStream& stream, const Response& response) {
+rr::awaitable<rr::error_code> write_refusal(GatewayState& gateway, rr::ByteStream& stream, const Response& response) {
+  gateway.metrics().respond(response.status);
   const auto head = format_response_head(response, false, 1);
   const rr::ByteSpan parts[] = {rr::as_bytes(head), response.body ? rr::as_bytes(*response.body) : rr::ByteSpan()};
   const std::span<const rr::ByteSpan> slices(parts, 2);
@@ -53,12 +56,12 @@ rr::Result<Destination> find_destination(GatewayState& gateway, const Request& r
     auto* device = gateway.devices().find(name);
     if (!device) {  // strangers are not told so
       if (auto allowed = gateway.access().check(request.identity, {.device = name}); !allowed) return allowed.error();
-      return not_found("no device " + rr::quoted(name) + "; /api/v1/devices lists them");
+      return not_found("no device " + rr::quote(name) + "; /api/v1/devices lists them");
     }
     return destination_of(gateway, *device);
   }
   if (path == gateway_path) return Destination{nullptr, &gateway.shared().node()};
-  if (path != "/") return not_found("no WebSocket at " + rr::quoted(path) + "; expected /devices/NAME, /gateway or /");
+  if (path != "/") return not_found("no WebSocket at " + rr::quote(path) + "; expected /devices/NAME, /gateway or /");
   rr::NodeId node_id;
   if (const auto text = rr::query_value(request.query(), "nodeid")) {
     auto parsed = rr::parse_node_id(*text);
@@ -89,12 +92,12 @@ rr::awaitable<Continuation> accept_json_socket(GatewayState& gateway, Connection
     gateway.reject(is_denied ? Rejection::forbidden : Rejection::no_such_device);
     const auto response = is_denied ? gateway.http_access().refusal(request.identity, place.error())
                                     : problem_response(404, place.error().message);
-    co_await write_refusal(*stream, response);
+    co_await write_refusal(gateway, *stream, response);
     co_await stream->end(rr::no_reason);
     co_return Continuation();
   }
   const auto accepted = format_upgrade_response(request, json_subprotocol);
-  if (co_await write_text(*stream, accepted)) co_return Continuation();
+  if (co_await write_acceptance(gateway, *stream, accepted)) co_return Continuation();
   stream->put_back(unread);
   co_return serve_json_socket(gateway, connection, std::move(stream), *place);
 }
@@ -105,10 +108,10 @@ rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& 
                                              rr::ByteSpan unread) {
   auto& tcp = *stream;
   connection.client = request.arrival.peer;
-  connection.address = client_network(request.arrival.address).to_string();
+  connection.network = network_name(request.arrival.address);
   connection.identity = request.identity;
-  const auto refuse = [&tcp](const Response& refusal) -> rr::awaitable<void> {
-    co_await write_refusal(tcp, refusal);
+  const auto refuse = [&gateway, &tcp](const Response& refusal) -> rr::awaitable<void> {
+    co_await write_refusal(gateway, tcp, refusal);
     co_await tcp.end(rr::no_reason);
   };
   const auto subprotocol = is_json_socket(request) ? json_subprotocol : rr::websocket_subprotocol;
@@ -121,7 +124,7 @@ rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& 
   if (!connection.ticket.pass_to(request.arrival.address)) {
     gateway.reject(Rejection::too_many);
     log(LogLevel::warning, "connection refused: too many", {{"peer", connection.client}});
-    const auto response = problem_response(503, "too many connections from " + request.arrival.address.to_string());
+    const auto response = problem_response(503, "too many connections from " + connection.network);
     co_await refuse(response);
     co_return Continuation();
   }
@@ -162,7 +165,7 @@ rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& 
   }
   if (hears_in_session || destination->node) {
     const auto accepted = format_upgrade_response(request);
-    if (co_await write_text(tcp, accepted)) co_return Continuation();
+    if (co_await write_acceptance(gateway, tcp, accepted)) co_return Continuation();
     tcp.put_back(unread);
     auto socket = std::make_unique<rr::WebSocketStream>(std::move(stream), rr::WebSocketRole::server, takes_close);
     if (hears_in_session) {
@@ -186,7 +189,7 @@ rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& 
     co_return Continuation();
   }
   const auto accepted = format_upgrade_response(request);
-  if (co_await write_text(tcp, accepted)) co_return Continuation();
+  if (co_await write_acceptance(gateway, tcp, accepted)) co_return Continuation();
   tcp.put_back(unread);
   auto socket = std::make_unique<rr::WebSocketStream>(std::move(stream), rr::WebSocketRole::server, takes_close);
   if (!boarding) {  // a page can't read the status of a refused upgrade, but it can read why a WebSocket closes
@@ -214,6 +217,29 @@ std::optional<Response> refuse_page(GatewayState& gateway, const Request& reques
        {"host", request.arrival.host},
        {"origin", request.header(http::field::origin)}});
   return refusal;
+}
+
+/// Where TLS is required: what in clear is sent there, or refused. A client that has shown something in clear has given
+/// it away, and hears so. Whether the gateway works is no secret.
+std::optional<Response> require_tls(GatewayState& gateway, const Request& request) {
+  const auto path = request.path();
+  if (!gateway.config().tls.is_required || request.arrival.is_encrypted || path == "/healthz" || path == "/readyz")
+    return std::nullopt;
+  const auto method = request.message.method();
+  const bool shows =
+      request.message.count(http::field::authorization) != 0 || rr::query_value(request.query(), "ticket");
+  const bool is_look = method == http::verb::get || method == http::verb::head;
+  if (is_look && !shows && !asks_for_websocket(request) && !request.arrival.host.empty()) {
+    auto response = problem_response(308, "the gateway is reached by https:// alone");
+    const auto target = request.message.target();
+    response.set("Location", "https://" + request.arrival.host + request.arrival.prefix +
+                                 std::string(target.data(), target.size()));
+    return response;
+  }
+  gateway.reject(Rejection::forbidden);
+  log(LogLevel::info, "request in clear refused", {{"peer", request.arrival.peer}, {"path", path}});
+  return problem_response(403, std::string("the gateway is reached by TLS alone: https://, wss://") +
+                                   (shows ? "; what you have shown in clear may be known to others by now" : ""));
 }
 
 /// While the gateway stops, it says so, and nothing else.
@@ -283,7 +309,7 @@ rr::awaitable<Continuation> serve_http_client(GatewayState& gateway, Connection&
     if (!read.request) {
       note_unreadable(gateway, connection, read.failure);
       const auto response = problem_response(read.failure.status, read.failure.detail);
-      co_await write_refusal(*stream, response);
+      co_await write_refusal(gateway, *stream, response);
       co_await stream->end(rr::no_reason);
       break;
     }
@@ -294,15 +320,16 @@ rr::awaitable<Continuation> serve_http_client(GatewayState& gateway, Connection&
     const bool is_refused = gateway.is_stopping() && !is_answered_while_stopping(request);
     HttpAccess::Admitted admitted;
     admitted.refusal = refuse_page(gateway, request);
+    if (!admitted.refusal) admitted.refusal = require_tls(gateway, request);
     if (!admitted.refusal && !is_refused && is_guarded(request)) {
       admitted = co_await gateway.http_access().admit(request, connection, config);
       if (admitted.refusal) gateway.reject(rejection_of(admitted.refusal->status));
     }
-    auto memory = gateway.memory().charge(client_network(request.arrival.address).to_string());
+    auto memory = gateway.memory().charge(network_name(request.arrival.address));
     if (!admitted.refusal && !is_refused && makes_work(request) && !memory.has_room(least_room))
       admitted.refusal = no_memory_response();
     if (admitted.refusal && asks_for_websocket(request)) {
-      co_await write_refusal(*stream, *admitted.refusal);
+      co_await write_refusal(gateway, *stream, *admitted.refusal);
       co_await stream->end(rr::no_reason);
       break;
     }
@@ -314,8 +341,8 @@ rr::awaitable<Continuation> serve_http_client(GatewayState& gateway, Connection&
     std::vector<std::pair<std::string, std::string>> headers;
     if (request.arrival.is_encrypted && config.tls.hsts_seconds > 0)
       headers.emplace_back("Strict-Transport-Security", "max-age=" + std::to_string(config.tls.hsts_seconds));
-    ResponseOptions options{gateway.is_stopping(), std::move(headers), config.timeouts.send_stall,
-                            !makes_work(request)};
+    ResponseOptions options{gateway.is_stopping(), std::move(headers), config.timeouts.send_stall, !makes_work(request),
+                            &gateway.metrics()};
     ResponseWriter writer(*stream, reader, request, std::move(memory), std::move(options));
     const auto response = admitted.refusal                ? *admitted.refusal
                           : is_refused                    ? stopping_response()

@@ -60,7 +60,7 @@ std::string describe_wish(const rr::MessageHeader& header) {
   std::string out;
   if (!header.receiver_node_id.is_any()) out += "node id " + rr::format_node_id(header.receiver_node_id);
   if (!header.receiver_node_name.empty())
-    out += (out.empty() ? "" : ", ") + ("node name " + rr::quoted(header.receiver_node_name));
+    out += (out.empty() ? "" : ", ") + ("node name " + rr::quote(header.receiver_node_name));
   return out.empty() ? "no node in particular, and there is more than one" : out;
 }
 
@@ -91,7 +91,7 @@ rr::awaitable<rr::awaitable<void>> serve_native_client(GatewayState& gateway, Co
   auto& client = *stream;
   rr::Deadline limit(client.executor(), [&client] { client.close(); });
   limit.arm(gateway.config().limits.header_timeout);
-  auto memory = gateway.memory().charge(connection.address);
+  auto memory = gateway.memory().charge(connection.network);
   const auto largest = std::min(largest_first_message, gateway.config().limits.max_message_size);
   const auto bytes = co_await read_first_message(client, largest, memory);
   limit.disarm();
@@ -109,7 +109,16 @@ rr::awaitable<rr::awaitable<void>> serve_native_client(GatewayState& gateway, Co
   rr::Error refusal;
   bool is_denied = false;
   const bool is_relayed = destination && !destination->node;
-  const auto allowed = is_relayed ? may_relay(gateway, connection, *destination->device) : rr::Result<>();
+  // What is relayed may be encrypted end to end, from its first message on.
+  const bool is_in_clear = !connection.peer.is_encrypted && !(is_relayed && asks_for_tls(request));
+  rr::Result<> allowed;
+  if (gateway.config().tls.is_required && is_in_clear && destination) {
+    gateway.reject(Rejection::forbidden);
+    allowed = rr::make_error(rr::ErrorCode::permission_denied,
+                             "the gateway is reached by TLS alone: rr+wss, or rrs+tcp where it relays");
+  } else if (is_relayed) {
+    allowed = may_relay(gateway, connection, *destination->device);
+  }
   if (note_circle(gateway, request.header.sender_node_id)) {
     refusal = rr::make_error(rr::ErrorCode::connection_error, "the way leads back to the gateway that it began at");
   } else if (!allowed) {
@@ -130,7 +139,7 @@ rr::awaitable<rr::awaitable<void>> serve_native_client(GatewayState& gateway, Co
   log(LogLevel::info, "native client refused",
       {{"peer", connection.client}, {"wanted", describe_wish(request.header)}, {"error", refusal.message}});
   if (is_denied && !asks_for_tls(request)) {
-    auto self = relayed_identity(gateway, *destination->device);
+    auto self = is_relayed ? relayed_identity(gateway, *destination->device) : destination->node->identity();
     co_return refuse_in_session(gateway, connection, std::move(self), std::move(stream), std::move(refusal));
   }
   const auto reply = make_refusal(request, gateway.node_id(), refusal);

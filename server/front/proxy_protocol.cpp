@@ -37,7 +37,7 @@ rr::Result<ProxyHeader> parse_line(std::string_view text) {
   const auto family = next_word(rest);
   if (family == "UNKNOWN") return out;
   if (family != "TCP4" && family != "TCP6")
-    return broken("found " + rr::quoted(family) + ", expected TCP4, TCP6 or UNKNOWN");
+    return broken("found " + rr::quote(family) + ", expected TCP4, TCP6 or UNKNOWN");
   boost::system::error_code error;
   const auto source = asio::ip::make_address(std::string(next_word(rest)), error);
   if (error || source.is_v4() != (family == "TCP4")) return broken("its source is no address of its family");
@@ -46,7 +46,7 @@ rr::Result<ProxyHeader> parse_line(std::string_view text) {
   std::uint16_t port = 0;
   const auto [stop, failure] = std::from_chars(digits.data(), digits.data() + digits.size(), port);
   if (digits.empty() || failure != std::errc() || stop != digits.data() + digits.size())
-    return broken("found port " + rr::quoted(digits));
+    return broken("found port " + rr::quote(digits));
   out.client = tcp::endpoint(source, port);
   return out;
 }
@@ -86,7 +86,7 @@ rr::Result<ProxyHeader> parse_proxy_header(rr::ByteSpan bytes) {
     return text.substr(0, start.size()) == start.substr(0, text.size());
   };
   if (begins(binary_start)) return parse_block(bytes);
-  if (!begins(text_start)) return broken("found " + rr::quoted(text.substr(0, 16)));
+  if (!begins(text_start)) return broken("found " + rr::quote(text.substr(0, 16)));
   return text.size() < text_start.size() ? ProxyHeader{} : parse_line(text);
 }
 

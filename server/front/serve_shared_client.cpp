@@ -59,8 +59,8 @@ rr::awaitable<bool> wait_until_ready(GatewayState& gateway, const Destination& d
 
 /// How much a client may ask for, whoever he logs in as meanwhile.
 auto make_rate_gate(GatewayState& gateway, const SharedNode& node, const Connection& connection) {
-  const auto memory = std::make_shared<const MemoryBudget::Charge>(gateway.memory().charge(connection.address));
-  return [&gateway, &node, memory, address = connection.address, shown = connection.identity.subject()](
+  const auto memory = std::make_shared<const MemoryBudget::Charge>(gateway.memory().charge(connection.network));
+  return [&gateway, &node, memory, network = connection.network, shown = connection.identity.subject()](
              const rr::MemberAccess& wanted) -> rr::Result<std::shared_ptr<const void>> {
     if (!memory->has_room(least_room))
       return rr::make_error(rr::ErrorCode::service_error, "the gateway has no memory left; try again in a moment");
@@ -69,7 +69,7 @@ auto make_rate_gate(GatewayState& gateway, const SharedNode& node, const Connect
     const auto user = wanted.user ? subject_of(*wanted.user) : Subject();
     const bool is_ours = user.kind == Subject::Kind::user;
     const auto device = node.device_of(wanted.path.substr(0, wanted.path.find('.')));
-    auto passes = gateway.http_access().enter(address, is_ours ? user : shown, device, rates);
+    auto passes = gateway.http_access().enter(network, is_ours ? user : shown, device, rates);
     if (passes) return std::shared_ptr<const void>(std::move(*passes));
     gateway.reject(Rejection::rate);
     return passes.error();
@@ -125,12 +125,12 @@ std::shared_ptr<SharedClient> begin_session(GatewayState& gateway, Connection& c
   const auto shown = std::make_shared<Standing>(gateway.access(), connection.identity);
   const auto rights = std::make_shared<SessionRights>(gateway.access(), *destination.node, device, shown);
   SharedArrival arrival{
-      .peer = connection.client,
+      .from = {connection.client, connection.network},
       .base_url = std::move(base_url),
       .admit = make_admission(gateway, *destination.node, connection.client, rights, std::move(seating)),
       .enter = make_rate_gate(gateway, *destination.node, connection),
       .is_encrypted = connection.peer.is_encrypted,
-      .memory = gateway.memory().charge(connection.address)};
+      .memory = gateway.memory().charge(connection.network)};
   auto session = destination.node->add(std::move(client), std::move(arrival), std::move(ended));
   connection.device = destination.device;
   connection.has_session = true;

@@ -151,6 +151,7 @@ rr::awaitable<void> Gateway::watch_files() {
     co_await files_watch_.async_wait(asio::as_tuple(asio::use_awaitable));
     if (is_stopping_) break;
     access_.reload(false);
+    access_.sum_up_refusals();
     end_those_not_good();
     if (web_tls_ && web_tls_->has_changed()) web_tls_->reload();
     devices_.reload_tls(false);

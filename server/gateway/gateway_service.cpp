@@ -56,7 +56,7 @@ void GatewayService::add_members() {
   service_->property("locks").get([this] { return list_locks(); });
   service_->function("find_device", [this](const std::string& wanted) {
     const auto* device = gateway_.devices().find(wanted);
-    if (!device) throw rr::Exception(rr::make_error(rr::ErrorCode::key_not_found, "no device " + rr::quoted(wanted)));
+    if (!device) throw rr::Exception(rr::make_error(rr::ErrorCode::key_not_found, "no device " + rr::quote(wanted)));
     return describe(*device);
   });
 }

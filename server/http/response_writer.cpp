@@ -1,5 +1,6 @@
 #include "server/http/response_writer.hpp"
 
+#include <algorithm>
 #include <array>
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
@@ -56,9 +57,20 @@ rr::awaitable<rr::error_code> ResponseWriter::write_slices(std::span<const rr::B
 rr::awaitable<std::optional<Response>> ResponseWriter::read_body(std::size_t limit) {
   const RequestReader::HasRoom has_room = [this](std::size_t bytes) { return memory_.resize(bytes); };
   body_failure_ = co_await reader_.read_body(request_, has_room, limit);
+  is_whole_ = std::chrono::steady_clock::now();
   if (!body_failure_) co_return std::nullopt;
   // To a client that is gone it does not matter which.
   co_return problem_response(body_failure_->status == 0 ? 400 : body_failure_->status, body_failure_->detail);
+}
+
+void ResponseWriter::count(const Response& response) const {
+  if (!metrics_) return;
+  metrics_->respond(response.status);
+  const auto is_image = [](const auto& header) {
+    return header.first == "Content-Type" && header.second.starts_with("image/");
+  };
+  if (!is_streamed_ && std::ranges::none_of(response.headers, is_image))
+    metrics_->request_ages.add(std::chrono::steady_clock::now() - is_whole_);
 }
 
 bool ResponseWriter::make_room(const std::shared_ptr<const std::string>& body) {
@@ -72,6 +84,7 @@ rr::awaitable<rr::error_code> ResponseWriter::send(const Response& whole) {
   const Response no_memory = fits ? Response() : no_memory_response();
   const Response& response = fits ? whole : no_memory;
   if (response.closes) closes_ = true;
+  count(response);
   const auto head = head_of(response);
   const bool sends_body = response.body && has_body();
   const rr::ByteSpan parts[] = {rr::as_bytes(head), sends_body ? rr::as_bytes(*response.body) : rr::ByteSpan()};
@@ -81,6 +94,7 @@ rr::awaitable<rr::error_code> ResponseWriter::send(const Response& whole) {
 
 rr::awaitable<rr::error_code> ResponseWriter::begin(const Response& head) {
   is_streamed_ = true;
+  count(head);
   if (minor_version() == 0) closes_ = true;
   const auto text = head_of(head);
   const auto slice = rr::as_bytes(text);
@@ -89,14 +103,22 @@ rr::awaitable<rr::error_code> ResponseWriter::begin(const Response& head) {
 }
 
 rr::awaitable<rr::error_code> ResponseWriter::write(std::string_view text) {
-  if (text.empty() || !has_body()) co_return rr::error_code();
+  if (text.empty()) co_return rr::error_code();
+  const std::span<const std::string_view> parts(&text, 1);
+  co_return co_await write(parts);
+}
+
+rr::awaitable<rr::error_code> ResponseWriter::write(std::span<const std::string_view> parts) {
+  if (!has_body()) co_return rr::error_code();
+  std::size_t bytes = 0;
+  for (const auto part : parts) bytes += part.size();
   char size[24];
-  const auto length = std::snprintf(size, sizeof size, "%zx\r\n", text.size());
+  const auto length = std::snprintf(size, sizeof size, "%zx\r\n", bytes);
   const bool is_chunked = minor_version() == 1;
-  const std::string_view size_line(size, is_chunked ? static_cast<std::size_t>(length) : 0);
-  const std::string_view line_end = is_chunked ? "\r\n" : "";
-  const rr::ByteSpan parts[] = {rr::as_bytes(size_line), rr::as_bytes(text), rr::as_bytes(line_end)};
-  const std::span<const rr::ByteSpan> slices(parts, 3);
+  std::vector<rr::ByteSpan> slices;
+  if (is_chunked) slices.push_back(rr::as_bytes(std::string_view(size, static_cast<std::size_t>(length))));
+  for (const auto part : parts) slices.push_back(rr::as_bytes(part));
+  if (is_chunked) slices.push_back(rr::as_bytes(std::string_view("\r\n")));
   co_return co_await write_slices(slices);
 }
 

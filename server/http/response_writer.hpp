@@ -11,6 +11,7 @@
 #include "node/transport/byte_stream.hpp"
 #include "server/http/request.hpp"
 #include "server/limits/memory_budget.hpp"
+#include "server/log/metrics.hpp"
 
 namespace rrgate {
 
@@ -19,7 +20,8 @@ struct ResponseOptions {
   std::vector<std::pair<std::string, std::string>> headers = {};  ///< of every response of this connection
   /// For each part of a response, beside what least_rate gives for its bytes. Who reads slower is cut.
   std::chrono::milliseconds patience{15'000};
-  bool is_vital = false;  ///< answered also when there is no memory left
+  bool is_vital = false;       ///< answered also when there is no memory left
+  Metrics* metrics = nullptr;  ///< where responses are counted; null: nowhere
 };
 
 /// 503: what clients may make the gateway hold is used up.
@@ -37,6 +39,7 @@ class ResponseWriter {
         memory_(std::move(memory)),
         closes_(options.closes),
         is_vital_(options.is_vital),
+        metrics_(options.metrics),
         headers_(std::move(options.headers)),
         patience_(options.patience),
         slow_(stream.executor(), [this] { stream_.close(); }) {}
@@ -55,6 +58,8 @@ class ResponseWriter {
   /// Status and headers; the length stays open. HTTP/1.0 clients see the end by the connection's.
   rr::awaitable<rr::error_code> begin(const Response& head);
   rr::awaitable<rr::error_code> write(std::string_view text);
+  /// The same for text in parts, borrowed for the wait; none of it, or all, is empty.
+  rr::awaitable<rr::error_code> write(std::span<const std::string_view> parts);
   rr::awaitable<rr::error_code> end();
 
   /// Calls `on_gone` once when the client ends the connection before unwatch() is done. For streams that may have
@@ -77,6 +82,7 @@ class ResponseWriter {
   struct Watch;
   static rr::awaitable<void> read_while(std::shared_ptr<Watch> watch, rr::ByteStream& stream);
   std::string head_of(const Response& response) const;
+  void count(const Response& response) const;
   bool make_room(const std::shared_ptr<const std::string>& body);
   rr::awaitable<rr::error_code> write_slices(std::span<const rr::ByteSpan> slices);
   unsigned minor_version() const { return request_.message.version() == 10 ? 0 : 1; }
@@ -88,6 +94,8 @@ class ResponseWriter {
   std::optional<ReadFailure> body_failure_;
   bool closes_;
   bool is_vital_;
+  Metrics* metrics_;
+  std::chrono::steady_clock::time_point is_whole_ = std::chrono::steady_clock::now();  ///< the request
   std::vector<std::pair<std::string, std::string>> headers_;
   std::chrono::milliseconds patience_;
   rr::Deadline slow_;

@@ -37,7 +37,7 @@ Response Router::answer(const Request& request) const {
     if (route.method == http::verb::get) text += ", HEAD";
     if (std::find(allowed.begin(), allowed.end(), text) == allowed.end()) allowed.push_back(std::move(text));
   }
-  if (allowed.empty()) return problem_response(404, "nothing is at " + rr::quoted(request.path()));
+  if (allowed.empty()) return problem_response(404, "nothing is at " + rr::quote(request.path()));
   std::string list;
   for (const auto& name : allowed) list += (list.empty() ? "" : ", ") + name;
   auto response = problem_response(405, "method not supported here; supported: " + list);

@@ -102,7 +102,7 @@ Response StaticFiles::answer(const Request& request, std::string_view path) {
     if (found) encoding = name;
   }
   if (!found) found = load(file);
-  if (!found) return problem_response(404, "nothing is at " + rr::quoted(request.path()));
+  if (!found) return problem_response(404, "nothing is at " + rr::quote(request.path()));
 
   Response response;
   const auto name = file.filename().string();

@@ -15,7 +15,7 @@ Result<std::vector<Value>> arguments_from_json(const Json& json, const MemberDef
     if (parameter.type.container == ContainerKind::generator) continue;
     const auto found = json.find(parameter.name);
     if (found == json.end())
-      return refused("misses the parameter " + rr::quoted(parameter.name) + " (" + format_type(parameter.type) + ")");
+      return refused("misses the parameter " + rr::quote(parameter.name) + " (" + format_type(parameter.type) + ")");
     auto value = value_from_json(*found, parameter.type, types, form, parameter.name);
     if (!value) return value.error();
     out.push_back(std::move(*value));
@@ -23,7 +23,7 @@ Result<std::vector<Value>> arguments_from_json(const Json& json, const MemberDef
   for (const auto& [key, unused] : json.items()) {
     const auto is_known = std::any_of(member.parameters.begin(), member.parameters.end(),
                                       [&key = key](const auto& parameter) { return parameter.name == key; });
-    if (!is_known) return refused("has no parameter " + rr::quoted(key));
+    if (!is_known) return refused("has no parameter " + rr::quote(key));
   }
   return out;
 }

@@ -27,7 +27,7 @@ class JsonBuilder {
     return true;
   }
   bool set_key(std::string key) {
-    if (open_.back()->contains(key)) return fail("has the key " + rr::quoted(key) + " twice");
+    if (open_.back()->contains(key)) return fail("has the key " + rr::quote(key) + " twice");
     key_ = std::move(key);
     return true;
   }

@@ -112,7 +112,7 @@ bool NumbersFromJson::read_wide(const FieldPath& path, const std::string& text, 
   }
   return fail(
       ErrorCode::out_of_range, path,
-      "found " + rr::quoted(text) + ", expected " + std::string(data_type_name(type)) + " in plain decimal digits");
+      "found " + rr::quote(text) + ", expected " + std::string(data_type_name(type)) + " in plain decimal digits");
 }
 
 bool NumbersFromJson::read_complex(const FieldPath& path, const Json& json, DataType type, Scalar& out) {

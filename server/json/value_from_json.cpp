@@ -75,7 +75,7 @@ class FromJson : public NumbersFromJson {
   bool read_key(const FieldPath& path, const std::string& key, std::int32_t& out) {
     if (parse_canonical(key, out)) return true;
     return fail(ErrorCode::data_type_error, path,
-                "has the key " + rr::quoted(key) + ", expected an int32 in plain decimal digits");
+                "has the key " + rr::quote(key) + ", expected an int32 in plain decimal digits");
   }
 
   bool read_item(const FieldPath& path, const Json& json, const TypeDefinition& type, Value& out) {
@@ -140,7 +140,7 @@ class FromJson : public NumbersFromJson {
         return true;
       }
       return fail(ErrorCode::out_of_range, path,
-                  "found " + rr::quoted(name) + ", which is no value of " + format_type(type));
+                  "found " + rr::quote(name) + ", which is no value of " + format_type(type));
     }
     if (!json.is_number()) return fail_kind(path, json, "a name of " + format_type(type) + ", or a number");
     Scalar number;
@@ -190,7 +190,7 @@ class FromJson : public NumbersFromJson {
     const auto* entity = types_.find_entity(type_name);
     if (!entity || entity->kind == EntityKind::object)
       return fail(ErrorCode::data_type_error, path,
-                  rr::quoted(type_name) + (entity ? " is an object" : " is not known"));
+                  rr::quote(type_name) + (entity ? " is an object" : " is not known"));
     if (entity->kind == EntityKind::structure) {
       if (json.is_null()) return true;
       Structure structure;

@@ -81,7 +81,7 @@ std::string text_line(std::string_view event, const Fields& fields) {
     out += ' ';
     out += field.name;
     out += '=';
-    out += field.is_number || is_plain_word(field.value) ? field.value : rr::quoted(field.value, longest_value);
+    out += field.is_number || is_plain_word(field.value) ? field.value : rr::quote(field.value, longest_value);
   }
   return out;
 }

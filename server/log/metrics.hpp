@@ -34,9 +34,14 @@ struct Metrics {
   std::uint64_t connections = 0;  ///< accepted
   std::uint64_t requests = 0;     ///< HTTP requests that were read
   std::array<std::uint64_t, rejection_names.size()> rejected{};
+  std::array<std::uint64_t, 5> responses{};  ///< of HTTP, by status: 1xx to 5xx
+  rr::AgeHistogram request_ages;             ///< of whole requests until their responses, streams and images left out
   std::uint64_t reloads = 0;
   std::uint64_t failed_reloads = 0;
 
+  void respond(unsigned status) {
+    if (status >= 100 && status < 600) ++responses[status / 100 - 1];
+  }
   void reject(Rejection why) { ++rejected[static_cast<std::size_t>(why)]; }
 };
 

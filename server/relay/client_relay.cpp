@@ -36,7 +36,7 @@ rr::awaitable<void> relay_client(GatewayState& gateway, Connection& connection, 
   const RelayOptions options{.max_message_size = limits.max_message_size,
                              .outbox_bytes = limits.outbox_bytes,
                              .opaque_rate = limits.opaque_rate};
-  Relay relay(*client, *boarding->stream, options, device.traffic(), gateway.memory().charge(connection.address));
+  Relay relay(*client, *boarding->stream, options, device.traffic(), gateway.memory().charge(connection.network));
   connection.device = &device;
   connection.has_session = true;
   connection.stop = [&relay](rr::EndReason reason) { relay.stop(std::move(reason)); };

@@ -87,7 +87,7 @@ rr::Result<> SessionRights::admit_to_service(Standing& asker, const rr::MemberAc
   if (allowed || wanted.user || asker.identity().is_proven() || !access_.authenticator()) return allowed;
   // The same for a service that is not there.
   return rr::make_error(rr::ErrorCode::authentication_error,
-                        "who is not logged in may not use service " + rr::quoted(service));
+                        "who is not logged in may not use service " + rr::quote(service));
 }
 
 rr::Result<> SessionRights::admit(const rr::MemberAccess& wanted) {

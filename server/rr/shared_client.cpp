@@ -21,10 +21,10 @@ const std::string& path_of(const rr::ServiceObject& object) {
 }  // namespace
 
 SharedClient::SharedClient(SharedClientOwner& owner, rr::ServiceDirectory& directory, rr::ServiceSessionOptions options,
-                           std::unique_ptr<rr::ByteStream> stream, std::string peer, MemoryBudget::Charge memory)
+                           std::unique_ptr<rr::ByteStream> stream, ClientOrigin from, MemoryBudget::Charge memory)
     : SessionDriver(std::move(stream), directory, std::move(options), rr::read_clocks()),
       owner_(&owner),
-      peer_(std::move(peer)),
+      from_(std::move(from)),
       memory_(std::move(memory)) {}
 
 void SharedClient::close_service() {
@@ -186,7 +186,7 @@ void SharedClient::receive_packet(rr::PipeId id, const rr::Value& packet) {
   is_behind_ = true;
   if (std::exchange(was_behind_, true)) return;
   log(LogLevel::info, "client reads slowly: the device is held back on its pipes, as far as it minds credit",
-      {{"peer", peer_}, {"waiting_bytes", session_.queued_bytes()}});
+      {{"peer", peer()}, {"waiting_bytes", session_.queued_bytes()}});
 }
 
 void SharedClient::has_written() {
@@ -225,7 +225,7 @@ void SharedClient::close_pipe(rr::PipeId id) {
 void SharedClient::end_too_slow(const rr::Error& error) {
   if (!end_reason_.empty()) return;
   end_reason_ = "client too slow: " + error.message;
-  log(LogLevel::warning, "client closed", {{"peer", peer_}, {"reason", end_reason_}});
+  log(LogLevel::warning, "client closed", {{"peer", peer()}, {"reason", end_reason_}});
   // Not here: whoever sends goes through a list of clients.
   post([this, self = shared_from_this()] {
     session_.close_service(rr::read_clocks());
@@ -295,7 +295,12 @@ void SharedClient::handle(const rr::LoginRequested& login) {
     return session_.answer_login(login.id, rr::make_error(rr::ErrorCode::authentication_error, "Authentication Failed"),
                                  rr::read_clocks());
   const auto self = std::static_pointer_cast<SharedClient>(shared_from_this());
-  if (!service->is_for_device(*login.authenticator)) return owner_->judge_login(login, self);
+  if (!service->is_for_device(*login.authenticator)) {
+    const auto answer = [login, weak = std::weak_ptr(self)](const Logins::Judged& result) {
+      if (const auto still_there = weak.lock()) still_there->answer_login(login, result);
+    };
+    return owner_->logins().judge(login.attempt, from_, Logins::Of::session, answer);
+  }
   // A login at the device adds no right here: who has none does not even get to try.
   if (!session_.admits(rr::EntryType::object_type_name, login.attempt.service, nullptr))
     return session_.answer_login(login.id, rr::make_error(rr::ErrorCode::authentication_error, "Authentication Failed"),
@@ -305,9 +310,18 @@ void SharedClient::handle(const rr::LoginRequested& login) {
 
 rr::awaitable<void> SharedClient::log_in_at_device(std::shared_ptr<SharedClient> self,
                                                    std::shared_ptr<SharedService> service, rr::LoginRequested login) {
+  auto& logins = self->owner_->logins();
+  const DeviceLogin tried{login.attempt.username, service->device()->config().name, service->name(), self->from_};
+  const auto ticket = logins.begin_at_device(tried);
+  if (!ticket) {
+    self->session_.answer_login(login.id, ticket.error(), rr::read_clocks());
+    self->settle();
+    co_return;
+  }
   const bool is_late = !service->upstream()->requires_user() && self->service_;
   const auto upstream = service->make_own_upstream({login.attempt.username, login.attempt.credentials, is_late});
   const auto opened = co_await upstream->open();
+  logins.finish_at_device(tried, opened);
   auto& client = *self;
   if (client.is_closed()) {
     upstream->close();

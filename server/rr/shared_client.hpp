@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "node/driver/stream_driver.hpp"
-#include "server/access/access.hpp"
+#include "server/access/logins.hpp"
 #include "server/limits/memory_budget.hpp"
 #include "server/rr/shared_service.hpp"
 
@@ -21,8 +21,7 @@ class SharedClientOwner {
  public:
   /// Null: the service index.
   virtual std::shared_ptr<SharedService> find_service(std::string_view name) const = 0;
-  /// Has a login judged, and answered with client.answer_login().
-  virtual void judge_login(const rr::LoginRequested& login, const std::shared_ptr<SharedClient>& client) = 0;
+  virtual Logins& logins() = 0;
   virtual void client_ended(SharedClient& client) = 0;
 
  protected:
@@ -32,13 +31,13 @@ class SharedClientOwner {
 class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private UpstreamClient {
  public:
   SharedClient(SharedClientOwner& owner, rr::ServiceDirectory& directory, rr::ServiceSessionOptions options,
-               std::unique_ptr<rr::ByteStream> stream, std::string peer, MemoryBudget::Charge memory);
+               std::unique_ptr<rr::ByteStream> stream, ClientOrigin from, MemoryBudget::Charge memory);
 
   const rr::ServiceSession& session() const { return session_; }
-  const std::string& peer() const { return peer_; }
+  /// For logs.
+  const std::string& peer() const { return from_.client; }
   /// Null while it has not connected to a service.
   const std::shared_ptr<SharedService>& service() const { return service_; }
-  void answer_login(const rr::LoginRequested& login, rr::Result<rr::AuthenticatedUser> result);
   /// Tells the client that its service ends, then closes.
   void close_service();
   /// Why the gateway has closed it; empty where it has not.
@@ -95,6 +94,7 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   void call_callback(const std::string& path, const rr::MemberDefinition& callback,
                      std::span<const rr::Value> arguments, rr::ClientConnection::CallbackReply answer) override;
 
+  void answer_login(const rr::LoginRequested& login, rr::Result<rr::AuthenticatedUser> result);
   static rr::awaitable<void> log_in_at_device(std::shared_ptr<SharedClient> self,
                                               std::shared_ptr<SharedService> service, rr::LoginRequested login);
   static rr::awaitable<void> answer_when_open(std::shared_ptr<SharedClient> self, std::shared_ptr<Upstream> upstream,
@@ -107,7 +107,7 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   std::size_t much_waiting() const { return session_.max_pipe_queued_bytes() / 4; }
 
   SharedClientOwner* owner_;
-  std::string peer_;
+  ClientOrigin from_;
   MemoryBudget::Charge memory_;
   std::string end_reason_;
   bool is_behind_ = false;

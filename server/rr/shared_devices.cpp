@@ -27,13 +27,12 @@ std::string node_name_of(const std::string& device) {
 }  // namespace
 
 SharedDevice::SharedDevice(std::shared_ptr<Device> device, SharedNode& gateway_node, const Config& config,
-                           SharedNode::FindAuthenticator find_authenticator)
+                           Logins& logins)
     : device_(std::move(device)),
       gateway_node_(gateway_node),
       config_(config),
       node_({derived_id(gateway_node.identity().id, device_->config().name), node_name_of(device_->config().name)},
-            config) {
-  node_.set_authenticator(std::move(find_authenticator));
+            config, logins) {
   device_->on_change([this] { refresh(); });
   refresh();
 }
@@ -78,17 +77,14 @@ void SharedDevice::wake() {
   for (const auto& [name, service] : services_) service->upstream()->wake();
 }
 
-SharedDevices::SharedDevices(const rr::NodeId& id, const Config& config,
-                             SharedNode::FindAuthenticator find_authenticator)
-    : config_(config), find_authenticator_(std::move(find_authenticator)), node_({id, config.node.name}, config) {
-  node_.set_authenticator(find_authenticator_);
-}
+SharedDevices::SharedDevices(const rr::NodeId& id, const Config& config, Logins& logins)
+    : config_(config), logins_(logins), node_({id, config.node.name}, config, logins) {}
 
 void SharedDevices::sync(const DeviceRegistry& devices) {
   std::erase_if(devices_, [&](const auto& each) { return !devices.has(*each.first); });
   for (const auto& device : devices.all())
     if (device->is_shared() && !devices_.contains(device.get()))
-      devices_.emplace(device.get(), std::make_unique<SharedDevice>(device, node_, config_, find_authenticator_));
+      devices_.emplace(device.get(), std::make_unique<SharedDevice>(device, node_, config_, logins_));
 }
 
 void SharedDevices::add_own(std::shared_ptr<Device> device, const std::string& service) {

@@ -15,8 +15,7 @@ namespace rrgate {
 class SharedDevice {
  public:
   /// The other arguments outlive it.
-  SharedDevice(std::shared_ptr<Device> device, SharedNode& gateway_node, const Config& config,
-               SharedNode::FindAuthenticator find_authenticator);
+  SharedDevice(std::shared_ptr<Device> device, SharedNode& gateway_node, const Config& config, Logins& logins);
   ~SharedDevice();
 
   SharedNode& node() { return node_; }
@@ -39,8 +38,8 @@ class SharedDevice {
 
 class SharedDevices {
  public:
-  /// `config`  outlives it. `find_authenticator`: see SharedNode.
-  SharedDevices(const rr::NodeId& id, const Config& config, SharedNode::FindAuthenticator find_authenticator);
+  /// `config` and `logins` outlive it.
+  SharedDevices(const rr::NodeId& id, const Config& config, Logins& logins);
   ~SharedDevices() { stop(); }
 
   /// The gateway's own node: services of shared devices whose names are free there.
@@ -50,7 +49,7 @@ class SharedDevices {
   /// Begins to share those that are to be shared, ends those that are not there any more.
   void sync(const DeviceRegistry& devices);
   void stop();
-  /// Logins are judged by whoever `find_authenticator` finds now, also at services that are offered already.
+  /// Logins are judged by whoever Logins::authenticator() says now, also at services that are offered already.
   void renew_judges();
 
   bool is_ready() const;
@@ -76,7 +75,7 @@ class SharedDevices {
 
  private:
   const Config& config_;
-  SharedNode::FindAuthenticator find_authenticator_;
+  Logins& logins_;
   SharedNode node_;
   std::map<const Device*, std::unique_ptr<SharedDevice>> devices_;
   std::shared_ptr<SharedService> own_service_;

@@ -16,7 +16,7 @@ std::shared_ptr<SharedClient> SharedNode::add(std::unique_ptr<rr::ByteStream> st
   options.enter = std::move(arrival.enter);
   if (const auto verified = stream->verified_peer(); !verified.is_any()) options.verified_node_id = verified;
   auto client = std::make_shared<SharedClient>(*this, directory_, std::move(options), std::move(stream),
-                                               std::move(arrival.peer), std::move(arrival.memory));
+                                               std::move(arrival.from), std::move(arrival.memory));
   clients_.emplace(client.get(), client);
   ended_.emplace(client.get(), std::move(ended));
   client->start();
@@ -50,12 +50,6 @@ void SharedNode::withdraw(const rr::HostedService& hosted) {
 std::string SharedNode::device_of(std::string_view service) const {
   const auto found = find_service(service);
   return found ? found->device()->config().name : std::string();
-}
-
-void SharedNode::judge_login(const rr::LoginRequested& login, const std::shared_ptr<SharedClient>& client) {
-  judge_.judge(login, client->executor(), [login, weak = std::weak_ptr(client)](const auto& result) {
-    if (const auto still_there = weak.lock()) still_there->answer_login(login, result);
-  });
 }
 
 std::shared_ptr<SharedService> SharedNode::find_service(std::string_view name) const {

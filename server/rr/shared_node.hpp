@@ -6,7 +6,6 @@
 #include <memory>
 #include <string>
 
-#include "node/service/login_judge.hpp"
 #include "server/limits/memory_budget.hpp"
 #include "server/rr/shared_client.hpp"
 
@@ -14,7 +13,7 @@ namespace rrgate {
 
 /// What a connection brings with it.
 struct SharedArrival {
-  std::string peer;      ///< for logs
+  ClientOrigin from;
   std::string base_url;  ///< of the node, as this client reaches it: "rr+tcp://10.0.0.5:52222/"
   std::function<rr::Result<>(const rr::MemberAccess&)> admit;  ///< none: everything is allowed
   /// See ServiceSessionOptions.
@@ -25,8 +24,9 @@ struct SharedArrival {
 
 class SharedNode final : public ServiceBoard, public SharedClientOwner {
  public:
-  /// `config`  outlives it.
-  SharedNode(rr::NodeIdentity identity, const Config& config) : config_(config), directory_(std::move(identity)) {}
+  /// `config` and `logins` outlive it.
+  SharedNode(rr::NodeIdentity identity, const Config& config, Logins& logins)
+      : config_(config), logins_(logins), directory_(std::move(identity)) {}
   ~SharedNode() { close(); }
   SharedNode(const SharedNode&) = delete;
   SharedNode& operator=(const SharedNode&) = delete;
@@ -41,27 +41,21 @@ class SharedNode final : public ServiceBoard, public SharedClientOwner {
   /// Tells all clients that their services end.
   void close();
 
-  /// Who judges logins; asked when a service is published. None: each device its own.
-  using FindAuthenticator = std::function<std::shared_ptr<const rr::Authenticator>()>;
-  void set_authenticator(FindAuthenticator find) { find_authenticator_ = std::move(find); }
   /// The name of the device that a service is of; empty where there is no such service, or the index.
   std::string device_of(std::string_view service) const;
 
-  std::shared_ptr<const rr::Authenticator> authenticator() const override {
-    return find_authenticator_ ? find_authenticator_() : nullptr;
-  }
+  std::shared_ptr<const rr::Authenticator> authenticator() const override { return logins_.authenticator(); }
   void publish(const std::shared_ptr<rr::HostedService>& hosted, SharedService& service) override;
   void withdraw(const rr::HostedService& hosted) override;
 
  private:
   std::shared_ptr<SharedService> find_service(std::string_view name) const override;
-  void judge_login(const rr::LoginRequested& login, const std::shared_ptr<SharedClient>& client) override;
+  Logins& logins() override { return logins_; }
   void client_ended(SharedClient& client) override;
 
   const Config& config_;
+  Logins& logins_;
   rr::ServiceDirectory directory_;
-  FindAuthenticator find_authenticator_;
-  rr::LoginJudge judge_;
   std::map<std::string, std::pair<const rr::HostedService*, std::weak_ptr<SharedService>>, std::less<>> services_;
   std::map<SharedClient*, std::shared_ptr<SharedClient>> clients_;
   std::map<SharedClient*, std::function<void()>> ended_;

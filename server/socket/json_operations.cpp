@@ -6,6 +6,7 @@
 #include <boost/asio/post.hpp>
 
 #include "server/http/endpoints/call_log.hpp"
+#include "server/http/endpoints/large_json.hpp"
 #include "server/http/endpoints/member_values.hpp"
 
 namespace rrgate {
@@ -34,7 +35,7 @@ const rr::MemberDefinition& expect_member(const Target& target, std::string_view
                                           std::initializer_list<rr::MemberKind> kinds) {
   const auto* member = target.member;
   if (member && std::find(kinds.begin(), kinds.end(), member->kind) != kinds.end()) return *member;
-  refuse(rr::ErrorCode::invalid_operation, rr::quoted(path_of(target)) + " is a " +
+  refuse(rr::ErrorCode::invalid_operation, rr::quote(path_of(target)) + " is a " +
                                                (member ? std::string(member_kind_name(member->kind)) : "object") +
                                                "; \"" + std::string(operation) + "\" is not for that");
 }
@@ -43,7 +44,7 @@ void expect_direction(const rr::MemberDefinition& member, rr::MemberDirection ne
   if (member.direction() != never) return;
   const bool is_read_only = never == rr::MemberDirection::readonly;
   refuse(is_read_only ? rr::ErrorCode::read_only_member : rr::ErrorCode::write_only_member,
-         rr::quoted(member.name) + (is_read_only ? " can only be read" : " can only be written"));
+         rr::quote(member.name) + (is_read_only ? " can only be read" : " can only be written"));
 }
 
 bool takes_values(const rr::MemberDefinition& function) {
@@ -97,12 +98,17 @@ JsonOperations::JsonOperations(GatewayState& gateway, JsonSocketPlace place, std
     : gateway_(gateway), place_(std::move(place)), outbox_(std::move(outbox)) {}
 
 rr::awaitable<void> JsonOperations::take(const std::string& message) {
-  auto memory = gateway_.memory().charge(place_.address);
+  auto memory = gateway_.memory().charge(place_.from.network);
   if (!memory.has_room(least_room) || !memory.resize(rr::json_growth * message.size()))
     co_return tell_error("null", rr::make_error(rr::ErrorCode::out_of_system_resource,
                                                 "the gateway has no memory left for a message of " +
                                                     std::to_string(message.size()) + " bytes; try again in a moment"));
-  auto read = JsonRequest::from_text(message);
+  const auto parse = [&message] { return JsonRequest::from_text(message); };
+  rr::Result<JsonRequest> read = rr::Error();
+  if (message.size() <= large_json_bytes)
+    read = parse();
+  else
+    read = co_await gateway_.workers().run(parse);
   if (!read) co_return tell_error("null", read.error());
   const auto request = std::make_shared<const JsonRequest>(std::move(*read));
   if (running_ >= max_running)
@@ -113,7 +119,7 @@ rr::awaitable<void> JsonOperations::take(const std::string& message) {
   const auto* operation = name && name->is_string() ? find_operation(name->get_ref<const std::string&>()) : nullptr;
   Passes passes;
   if (!operation || !operation->traits.is_free) {
-    auto entered = gateway_.http_access().enter(place_.address, place_.standing->identity().subject(),
+    auto entered = gateway_.http_access().enter(place_.from.network, place_.standing->identity().subject(),
                                                 place_.device->config().name, gateway_.config().rates);
     if (!entered) {
       gateway_.reject(Rejection::rate);
@@ -142,14 +148,20 @@ rr::awaitable<void> JsonOperations::run(std::shared_ptr<JsonOperations> self, Re
   if (error) {
     self->tell_error(request->id(), *error);
   } else if (request->id() != "null") {
-    self->outbox_->add(json_answer(request->id(), result));
+    const auto write = [&request, &result] { return json_answer(request->id(), result); };
+    std::string answer;
+    if (held_bytes(result) <= large_json_bytes)
+      answer = write();
+    else
+      answer = co_await self->gateway_.workers().run(write);
+    self->outbox_->add(std::move(answer));
   }
 }
 
 rr::awaitable<rr::OrderedJson> JsonOperations::perform(RequestPtr request) {
   const auto name = request->text("op", "");
   const auto* operation = find_operation(name);
-  if (!operation) refuse(rr::ErrorCode::invalid_argument, "no operation \"op\": " + rr::quoted(name));
+  if (!operation) refuse(rr::ErrorCode::invalid_argument, "no operation \"op\": " + rr::quote(name));
   TargetPtr target;
   if (!operation->traits.has_target) co_return co_await (this->*operation->perform)(request, target);
   target = co_await find(request, *operation);
@@ -186,7 +198,8 @@ rr::awaitable<std::shared_ptr<ValueClient>> JsonOperations::client() {
     co_return own_;
   }
   auto key = place_.key;
-  co_return value_or_throw(co_await gateway_.clients().open(place_.device, std::move(key)));
+  auto from = place_.from;
+  co_return value_or_throw(co_await open_session(gateway_, place_.device, std::move(key), std::move(from)));
 }
 
 void JsonOperations::tell_error(const std::string& id, const rr::Error& error) {
@@ -206,7 +219,7 @@ void JsonOperations::stop() {
 // --- what is over with its answer ---
 
 rr::awaitable<rr::OrderedJson> JsonOperations::describe(RequestPtr, TargetPtr target) {
-  if (target->member) refuse(rr::ErrorCode::invalid_operation, rr::quoted(path_of(*target)) + " is no object");
+  if (target->member) refuse(rr::ErrorCode::invalid_operation, rr::quote(path_of(*target)) + " is no object");
   co_return describe_object(*target);
 }
 
@@ -236,7 +249,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::set(RequestPtr request, TargetPtr
 rr::awaitable<rr::OrderedJson> JsonOperations::call(RequestPtr request, TargetPtr target) {
   const auto& member = expect_member(*target, "call", {rr::MemberKind::function});
   if (member.is_generator())
-    refuse(rr::ErrorCode::invalid_operation, rr::quoted(member.name) + " is a generator; use \"open\"");
+    refuse(rr::ErrorCode::invalid_operation, rr::quote(member.name) + " is a generator; use \"open\"");
   static const auto none = rr::Json::object();
   const auto* given = request->find("args");
   auto called = target->request(rr::CallKind::function);
@@ -277,7 +290,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::lock(RequestPtr request, TargetPt
   if (target->member) refuse(rr::ErrorCode::invalid_operation, "objects are locked, not their members");
   const auto kind = request->text("kind", "client");
   if (kind != "client" && kind != "user")
-    refuse(rr::ErrorCode::invalid_argument, "\"kind\" is " + rr::quoted(kind) + ", expected \"client\" or \"user\"");
+    refuse(rr::ErrorCode::invalid_argument, "\"kind\" is " + rr::quote(kind) + ", expected \"client\" or \"user\"");
   const auto command = kind == "user" ? rr::LockCommand::lock_for_user : rr::LockCommand::lock_for_client;
   auto path = target->path();
   co_await target->client->lock(command, std::move(path));
@@ -297,7 +310,8 @@ rr::awaitable<rr::OrderedJson> JsonOperations::login(RequestPtr request, TargetP
   key.username = request->text("username", "");
   key.password = request->text("password", "");
   auto tried = key;
-  value_or_throw(co_await gateway_.clients().open(place_.device, std::move(tried)));
+  auto from = place_.from;
+  value_or_throw(co_await open_session(gateway_, place_.device, std::move(tried), std::move(from)));
   place_.key = std::move(key);  // not before: a failed login leaves the one that there was
   co_return nullptr;
 }
@@ -318,7 +332,7 @@ std::string JsonOperations::reserve(const JsonRequest& request) {
 rr::awaitable<rr::OrderedJson> JsonOperations::open(RequestPtr request, TargetPtr target) {
   const auto& member = expect_member(*target, "open", {rr::MemberKind::function});
   if (!member.is_generator())
-    refuse(rr::ErrorCode::invalid_operation, rr::quoted(member.name) + " is no generator; use \"call\"");
+    refuse(rr::ErrorCode::invalid_operation, rr::quote(member.name) + " is no generator; use \"call\"");
   static const auto none = rr::Json::object();
   const auto* given = request->find("args");
   auto arguments = value_or_throw(arguments_from_json(given ? *given : none, member, target->types(), place_.form));

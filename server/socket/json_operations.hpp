@@ -20,7 +20,7 @@ namespace rrgate {
 struct JsonSocketPlace {
   std::shared_ptr<Device> device;
   StandingPtr standing;  ///< of the gateway's users
-  std::string address;
+  ClientOrigin from;
   SessionKey key;
   std::vector<std::string> segments;  ///< below the service's root
   rr::JsonForm form;

@@ -27,7 +27,7 @@ class JsonSocket : public std::enable_shared_from_this<JsonSocket> {
  public:
   JsonSocket(GatewayState& gateway, std::unique_ptr<rr::ByteStream> stream, const JsonSocketPlace& place)
       : stream_(std::move(stream)),
-        memory_(gateway.memory().charge(place.address)),
+        memory_(gateway.memory().charge(place.from.network)),
         messages_(*stream_, gateway.config().limits.body_bytes,
                   [this](std::size_t bytes) { return memory_.resize(bytes < uncounted_bytes ? 0 : bytes); }),
         outbox_(std::make_shared<JsonOutbox>(stream_->executor(), memory_.sibling())),
@@ -111,11 +111,11 @@ rr::Result<std::shared_ptr<JsonSocketPlace>> find_json_socket(GatewayState& gate
   auto* device = gateway.devices().find(segments->front());
   if (!device)
     return rr::make_error(rr::ErrorCode::node_not_found,
-                          "no device " + rr::quoted(segments->front()) + "; /api/v1/devices lists them");
+                          "no device " + rr::quote(segments->front()) + "; /api/v1/devices lists them");
   auto place = std::make_shared<JsonSocketPlace>();
   place->device = device->shared_from_this();
   place->standing = std::make_shared<Standing>(gateway.access(), request.identity);
-  place->address = client_network(request.arrival.address).to_string();
+  place->from = request.origin();
   place->key = session_key(gateway, request, (*segments)[1]);
   place->segments.assign(segments->begin() + 2, segments->end());
   place->form = json_form(request);

@@ -38,8 +38,8 @@ struct Connection : boost::intrusive::list_base_hook<boost::intrusive::link_mode
   Admission::Ticket ticket;
   /// The client as logs name it: as `peer`, or as a trusted proxy says.
   std::string client;
-  /// Its client_network(), by which its requests are counted, and what it makes the gateway hold.
-  std::string address;
+  /// As what its requests are counted, see network_name().
+  std::string network;
   /// Who it is, as far as it has shown: by its certificate, by the request that became a WebSocket.
   Identity identity;
 };

@@ -10,15 +10,15 @@ GatewayState::GatewayState(boost::asio::io_context& io, Config config)
     : config_(std::move(config)),
       memory_(memory_total(config_)),
       access_(config_.access),
-      http_access_(std::make_unique<HttpAccess>(io.get_executor(), access_)),
+      logins_(io.get_executor(), access_),
+      http_access_(access_, logins_),
       web_tls_(config_.tls.certificates.empty()
                    ? nullptr
                    : std::make_unique<TlsFiles>(config_.tls.certificates, config_.access.clients)),
       devices_(io.get_executor(), config_),
       clients_(io.get_executor(), memory_.charge("")),
       admission_(config_.limits.clients, config_.limits.clients_per_address),
-      shared_(config_.node.id.is_any() ? rr::random_node_id() : config_.node.id, config_,
-              [this] { return access_.authenticator(); }) {}
+      shared_(config_.node.id.is_any() ? rr::random_node_id() : config_.node.id, config_, logins_) {}
 
 GatewayState::~GatewayState() = default;
 

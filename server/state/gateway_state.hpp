@@ -7,15 +7,18 @@
 
 #include "node/tls/tls_context.hpp"
 #include "server/access/access.hpp"
+#include "server/access/logins.hpp"
 #include "server/config/config.hpp"
 #include "server/config/tls_files.hpp"
 #include "server/http/router.hpp"
+#include "server/limits/bounded_table.hpp"
 #include "server/limits/memory_budget.hpp"
 #include "server/log/metrics.hpp"
 #include "server/rr/shared_devices.hpp"
 #include "server/state/admission.hpp"
 #include "server/state/connection.hpp"
 #include "server/state/http_access.hpp"
+#include "server/state/workers.hpp"
 #include "server/upstream/device.hpp"
 #include "server/upstream/found_devices.hpp"
 #include "server/upstream/value_client.hpp"
@@ -37,12 +40,19 @@ class GatewayState {
   Metrics& metrics() { return metrics_; }
   void reject(Rejection why) { metrics_.reject(why); }
   Admission& admission() { return admission_; }
+  /// Documents about devices that were asked for lately, by what they are made of.
+  using Documents = BoundedTable<std::string, Response>;
+  Documents& documents() { return documents_; }
+  /// What would take long on this thread.
+  Workers& workers() { return workers_; }
   /// What clients make the gateway hold.
   MemoryBudget& memory() { return memory_; }
   /// Who may do what.
   Access& access() { return access_; }
+  /// Who is judged for what he logs in as.
+  Logins& logins() { return logins_; }
   /// How clients of HTTP show who they are, and how much they may ask for.
-  HttpAccess& http_access() { return *http_access_; }
+  HttpAccess& http_access() { return http_access_; }
   const Router& router() const { return router_; }
   /// What new connections are encrypted with; null: TLS is not served.
   rr::TlsContextPtr tls() const { return web_tls_ ? web_tls_->context() : nullptr; }
@@ -63,7 +73,8 @@ class GatewayState {
   Config config_;
   MemoryBudget memory_;
   Access access_;
-  std::unique_ptr<HttpAccess> http_access_;
+  Logins logins_;
+  HttpAccess http_access_;
   std::unique_ptr<TlsFiles> web_tls_;
   DeviceRegistry devices_;
   ValueClients clients_;
@@ -71,9 +82,11 @@ class GatewayState {
   Admission admission_;
   SharedDevices shared_;
   Router router_;
+  Documents documents_{32};
   Metrics metrics_;
   boost::intrusive::list<Connection, boost::intrusive::constant_time_size<false>> connections_;
   bool is_stopping_ = false;
+  Workers workers_;  ///< goes first
 };
 
 }  // namespace rrgate

@@ -1,32 +1,16 @@
 #include "server/state/http_access.hpp"
 
-#include <boost/asio/co_spawn.hpp>
-#include <boost/asio/use_awaitable.hpp>
-
 #include "core/session/url.hpp"
 #include "core/support/words.hpp"
 #include "node/http/upgrade.hpp"
 #include "node/tls/base64.hpp"
-#include "node/tls/digest.hpp"
 #include "server/json/json.hpp"
 #include "server/limits/client_network.hpp"
 #include "server/state/connection.hpp"
 
 namespace rrgate {
 
-namespace asio = boost::asio;
-
 namespace {
-
-constexpr std::chrono::minutes password_memory{5};
-constexpr std::size_t max_judged = 64;
-
-using Judged = rr::Result<rr::AuthenticatedUser>;
-
-rr::awaitable<Judged> judge(std::shared_ptr<const rr::PasswordFileAuthenticator> users,
-                            std::shared_ptr<const rr::LoginAttempt> attempt) {
-  co_return judge_login(*users, *attempt);
-}
 
 rr::Error refused(std::string why) {
   return rr::make_error(rr::ErrorCode::authentication_error, std::move(why));
@@ -50,7 +34,7 @@ rr::Result<Identity> by_proxy(const Request& request, const Connection& connecti
   for (const auto* name : {&headers.user, &headers.roles})
     if (const auto count = name->empty() ? 0 : request.message.count(*name); count > 1)
       return rr::make_error(rr::ErrorCode::invalid_argument,
-                            "header " + rr::quoted(*name) + " came " + std::to_string(count) +
+                            "header " + rr::quote(*name) + " came " + std::to_string(count) +
                                 " times, expected it once: the proxy has to take away what clients put there");
   out.name = request.header(headers.user);
   if (out.name.empty()) return out;
@@ -61,14 +45,6 @@ rr::Result<Identity> by_proxy(const Request& request, const Connection& connecti
 }
 
 }  // namespace
-
-HttpAccess::HttpAccess(asio::any_io_executor executor, Access& access)
-    : executor_(std::move(executor)), access_(access), salt_(rr::random_bytes(32)), judges_(1) {}
-
-HttpAccess::~HttpAccess() {
-  judges_.stop();
-  judges_.join();
-}
 
 rr::awaitable<rr::Result<Identity>> HttpAccess::identify(const Request& request, const Connection& connection,
                                                          const Config& config) {
@@ -88,14 +64,17 @@ rr::awaitable<rr::Result<Identity>> HttpAccess::identify(const Request& request,
     auto identity = by_token(*bearer);
     if (!identity) {
       const auto nobody = access_.anonymous(client);
-      access_.record({"login_failed", &nobody, nullptr, identity.error().message});
+      access_.record_refusal({"login_failed", &nobody, nullptr, identity.error().message});
       co_return identity.error();
     }
     co_return proven(std::move(*identity));
   }
   const auto basic = credentials_of(header, "Basic");
-  if (basic && state.users)
-    co_return co_await by_password(std::string(*basic), client, client_network(request.arrival.address).to_string());
+  if (basic && state.users) {
+    auto from = request.origin();
+    std::string credentials(*basic);
+    co_return co_await by_password(std::move(credentials), std::move(from));
+  }
   if (asks_for_websocket(request))
     if (const auto ticket = rr::query_value(request.query(), "ticket")) {
       auto identity = access_.tickets().redeem(*ticket, std::chrono::system_clock::now());
@@ -116,53 +95,18 @@ rr::Result<Identity> HttpAccess::by_token(std::string_view token) const {
   return state.tokens->verify(token, now);
 }
 
-std::string HttpAccess::remembered_as(std::string_view username, std::string_view password) const {
-  rr::Bytes text = salt_;
-  for (const auto part : {username, std::string_view("\0", 1), password})
-    text.insert(text.end(), part.begin(), part.end());
-  const auto digest = rr::sha256(text);
-  return {digest.begin(), digest.end()};
-}
-
-rr::awaitable<rr::Result<Identity>> HttpAccess::by_password(std::string credentials, std::string client,
-                                                            std::string address) {
+rr::awaitable<rr::Result<Identity>> HttpAccess::by_password(std::string credentials, ClientOrigin from) {
   const auto decoded = rr::decode_base64(credentials);
   const std::string text = decoded ? std::string(decoded->begin(), decoded->end()) : "";
   const auto colon = text.find(':');
   if (colon == std::string::npos) co_return refused("Basic credentials can't be read");
-  const auto username = text.substr(0, colon);
-  const auto password = text.substr(colon + 1);
-  const auto users = access_.state().users;
-  const rr::Now now{std::chrono::steady_clock::now(), {}};
-  if (known_in_ != users) known_.clear();
-  known_in_ = users;
-  const auto key = remembered_as(username, password);
-  if (const auto* known = known_.find(key); known && now.steady < known->ends)
-    co_return access_.logged_in(known->user, client);
-
-  const auto ticket = tries_.at(address).begin(now);
-  if (!ticket) co_return ticket.error();
-  if (judged_ >= max_judged)
-    co_return rr::make_error(rr::ErrorCode::out_of_system_resource, "too many logins at once; try again later");
-  auto attempt = std::make_shared<rr::LoginAttempt>();
-  attempt->username = username;
-  attempt->credentials.items.emplace_back("password", rr::Value(std::string_view(password)));
-  ++judged_;
-  auto judging = judge(users, attempt);
-  const auto user = co_await asio::co_spawn(judges_.get_executor(), std::move(judging), asio::use_awaitable);
-  --judged_;
-  Identity who;
-  who.name = username;
-  who.client = client;
-  if (!user) {
-    tries_.at(address).handle_failure(now);
-    access_.record({"login_failed", &who, nullptr, user.error().message});
-    co_return user.error();
-  }
-  if (known_in_ == users) known_.at(key) = {*user, now.steady + password_memory};
-  who = access_.logged_in(*user, client);
-  access_.record({"login", &who, nullptr, {}});
-  co_return who;
+  rr::LoginAttempt attempt;
+  attempt.username = text.substr(0, colon);
+  attempt.credentials.items.emplace_back("password", rr::Value(std::string_view(text).substr(colon + 1)));
+  const auto client = from.client;
+  const auto user = co_await logins_.judge(std::move(attempt), std::move(from), Logins::Of::request);
+  if (!user) co_return user.error();
+  co_return access_.logged_in(*user, client);
 }
 
 Response HttpAccess::refusal(const Identity& who, const rr::Error& error) const {
@@ -197,11 +141,11 @@ Response HttpAccess::too_much(std::string_view what) {
 rr::awaitable<HttpAccess::Admitted> HttpAccess::admit(Request& request, const Connection& connection,
                                                       const Config& config) {
   Admitted out;
-  const auto address = client_network(request.arrival.address).to_string();
+  const auto network = network_name(request.arrival.address);
   const auto& of_client = config.rates.client;
-  out.client = clients_.enter(address, of_client.per_second, of_client.at_once, std::chrono::steady_clock::now());
+  out.client = clients_.enter(network, of_client.per_second, of_client.at_once, std::chrono::steady_clock::now());
   if (!out.client) {
-    out.refusal = too_much("from " + address);
+    out.refusal = too_much("from " + network);
     co_return out;
   }
   const auto& of_user = config.rates.user;
@@ -214,7 +158,7 @@ rr::awaitable<HttpAccess::Admitted> HttpAccess::admit(Request& request, const Co
   if (!request.identity.is_proven()) co_return out;
   out.user = users_.enter(request.identity.subject().key(), of_user.per_second, of_user.at_once,
                           std::chrono::steady_clock::now());
-  if (!out.user) out.refusal = too_much("of " + rr::quoted(request.identity.name));
+  if (!out.user) out.refusal = too_much("of " + rr::quote(request.identity.name));
   co_return out;
 }
 
@@ -233,7 +177,7 @@ std::string to_text(const RateLimit& limit) {
 
 }  // namespace
 
-rr::Result<std::shared_ptr<const HttpAccess::Passes>> HttpAccess::enter(const std::string& address, const Subject& user,
+rr::Result<std::shared_ptr<const HttpAccess::Passes>> HttpAccess::enter(const std::string& network, const Subject& user,
                                                                         const std::string& device, const Rates& rates) {
   if (!rates.is_bound()) return std::shared_ptr<const Passes>();
   const auto now = std::chrono::steady_clock::now();
@@ -242,15 +186,15 @@ rr::Result<std::shared_ptr<const HttpAccess::Passes>> HttpAccess::enter(const st
                           "asked for more than " + to_text(limit) + " " + what + "; try again in a second");
   };
   auto out = std::make_shared<Passes>();
-  out->client = clients_.enter(address, rates.client.per_second, rates.client.at_once, now);
-  if (!out->client) return refused(rates.client, "from " + address);
+  out->client = clients_.enter(network, rates.client.per_second, rates.client.at_once, now);
+  if (!out->client) return refused(rates.client, "from " + network);
   if (!user.is_nobody()) {
     out->user = users_.enter(user.key(), rates.user.per_second, rates.user.at_once, now);
-    if (!out->user) return refused(rates.user, "of " + rr::quoted(user.name));
+    if (!out->user) return refused(rates.user, "of " + rr::quote(user.name));
   }
   if (!device.empty()) {
     out->device = enter_device(device, rates);
-    if (!out->device) return refused(rates.device, "to device " + rr::quoted(device));
+    if (!out->device) return refused(rates.device, "to device " + rr::quote(device));
   }
   return std::shared_ptr<const Passes>(std::move(out));
 }

@@ -9,6 +9,7 @@
 
 #include "server/access/access.hpp"
 #include "server/access/access_requests.hpp"
+#include "server/access/logins.hpp"
 #include "server/config/config.hpp"
 #include "server/http/request.hpp"
 #include "server/limits/bounded_table.hpp"
@@ -20,10 +21,9 @@ struct Connection;
 
 class HttpAccess {
  public:
-  HttpAccess(boost::asio::any_io_executor executor, Access& access);
+  HttpAccess(Access& access, Logins& logins) : access_(access), logins_(logins) {}
   HttpAccess(const HttpAccess&) = delete;
   HttpAccess& operator=(const HttpAccess&) = delete;
-  ~HttpAccess();
 
   /// What the request shows, in this order: the headers of a trusted proxy, Authorization, a ticket where it becomes a
   /// WebSocket, the certificate of the connection. All are borrowed until the answer.
@@ -54,36 +54,21 @@ class HttpAccess {
   };
   /// Lets one request pass that is not one of HTTP's, until it is answered. `device`  empty: none.
   /// Errors   out_of_system_resource: too much is asked for; again in a second.
-  rr::Result<std::shared_ptr<const Passes>> enter(const std::string& address, const Subject& user,
+  rr::Result<std::shared_ptr<const Passes>> enter(const std::string& network, const Subject& user,
                                                   const std::string& device, const Rates& rates);
 
   AccessRequests& requests() { return requests_; }
 
  private:
-  /// A password that was right: asked again, it need not be hashed again.
-  struct Known {
-    rr::AuthenticatedUser user;
-    std::chrono::steady_clock::time_point ends;
-  };
-
   rr::Result<Identity> by_token(std::string_view token) const;
-  rr::awaitable<rr::Result<Identity>> by_password(std::string credentials, std::string client, std::string address);
-  std::string remembered_as(std::string_view username, std::string_view password) const;
+  rr::awaitable<rr::Result<Identity>> by_password(std::string credentials, ClientOrigin from);
 
-  boost::asio::any_io_executor executor_;
   Access& access_;
+  Logins& logins_;
   AccessRequests requests_;
   RateGate clients_;
   RateGate users_;
   RateGate devices_;
-  rr::Bytes salt_;
-  static constexpr std::size_t max_known = 1000;
-  static constexpr std::size_t max_tries = 10'000;
-  BoundedTable<std::string, Known> known_{max_known};              ///< by remembered_as()
-  std::shared_ptr<const rr::PasswordFileAuthenticator> known_in_;  ///< the users file that they are of
-  BoundedTable<std::string, rr::LoginLimit> tries_{max_tries};     ///< by client_network()
-  std::size_t judged_ = 0;                                         ///< passwords at this moment
-  boost::asio::thread_pool judges_;  ///< hashing a password takes as long as a hundred requests
 };
 
 }  // namespace rrgate

@@ -94,7 +94,7 @@ rr::DialOptions Device::dial_options(std::string_view way) const {
 rr::Result<> Device::load_tls() {
   if (!tls_) return {};
   auto loaded = tls_->load();
-  if (!loaded) loaded.error().message = "device " + rr::quoted(config_.name) + ": " + loaded.error().message;
+  if (!loaded) loaded.error().message = "device " + rr::quote(config_.name) + ": " + loaded.error().message;
   return loaded;
 }
 
@@ -141,7 +141,7 @@ rr::Result<std::shared_ptr<Upstream>> Device::find_shared(const std::string& ser
     if (auto upstream = found->second.lock()) return upstream;
   if (identity_)
     return rr::make_error(rr::ErrorCode::service_not_found,
-                          "device " + rr::quoted(config_.name) + " has no service " + rr::quoted(service));
+                          "device " + rr::quote(config_.name) + " has no service " + rr::quote(service));
   const auto error =
       rr::make_error(rr::ErrorCode::connection_error, last_error_.empty() ? "it has not answered yet" : last_error_);
   return rr::make_error(error.code, offline_text(error));
@@ -178,17 +178,17 @@ void Device::become(const DeviceConfig& config, const Config& whole) {
 }
 
 std::optional<Device::Seat> Device::take_seat() {
-  if (config_.max_clients != 0 && clients_ >= config_.max_clients) return std::nullopt;
+  if (is_full()) return std::nullopt;
   ++traffic_.sessions;
   return Seat(*this);
 }
 
 std::string Device::full_text() const {
-  return "device " + rr::quoted(config_.name) + " has all the clients it may have (" + std::to_string(clients_) + ")";
+  return "device " + rr::quote(config_.name) + " has all the clients it may have (" + std::to_string(clients_) + ")";
 }
 
 std::string Device::offline_text(const rr::Error& error) const {
-  return "device " + rr::quoted(config_.name) + " is offline: " + error.message;
+  return "device " + rr::quote(config_.name) + " is offline: " + error.message;
 }
 
 void Device::start() {

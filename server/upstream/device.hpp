@@ -91,7 +91,8 @@ class Device : public std::enable_shared_from_this<Device> {
    private:
     std::shared_ptr<Device> device_;  ///< a found device may be lost meanwhile
   };
-  /// nullopt when the device has as many clients as it may.
+  bool is_full() const { return config_.max_clients != 0 && clients_ >= config_.max_clients; }
+  /// nullopt when it is.
   std::optional<Seat> take_seat();
   // What those hear who can't get to it.
   std::string full_text() const;

@@ -460,7 +460,7 @@ rr::Result<> LockTable::check(LockClient client, std::string_view path, bool is_
     for (auto lost = lost_locks_.lower_bound({client, ""}); lost != lost_locks_.end() && lost->first.first == client;
          ++lost)
       if (rr::is_within(key, lost->first.second))
-        return locked("the lock of " + rr::quoted(lost->first.second) +
+        return locked("the lock of " + rr::quote(lost->first.second) +
                       " is not this client's any more: " + lost->second + "; unlock it, or lock it again");
   }
   const auto found = monitors_.find(key);
@@ -472,7 +472,7 @@ rr::Result<> LockTable::check(LockClient client, std::string_view path, bool is_
     if (monitor.owner == client) monitor.idle_deadline = now + idle_timeout;
   }
   if (const auto lost = lost_monitors_.find({client, key}); lost != lost_monitors_.end())
-    return invalid("the monitor lock of " + rr::quoted(key) + " is not this client's any more: " + lost->second +
+    return invalid("the monitor lock of " + rr::quote(key) + " is not this client's any more: " + lost->second +
                    "; exit it, or enter it again");
   return {};
 }

@@ -209,7 +209,7 @@ void Upstream::break_off() {
 
 rr::Error Upstream::lost_error() const {
   return rr::make_error(rr::ErrorCode::connection_error,
-                        "connection_lost: device " + rr::quoted(device_->config().name) +
+                        "connection_lost: device " + rr::quote(device_->config().name) +
                             (loss_ ? ": " + loss_->message : std::string(" is not connected")));
 }
 

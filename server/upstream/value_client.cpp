@@ -95,7 +95,7 @@ rr::awaitable<rr::Result<ValueClient::ListenerPtr>> ValueClient::listen(MemberPl
 rr::Result<ValueClient::ListenerPtr> ValueClient::answer_callback(const MemberPlace& place, CallbackHandler handler) {
   const Key key(place.path, place.member->name);
   if (topics_.contains(key))
-    return rr::make_error(rr::ErrorCode::member_busy, rr::quoted(place.member->name) + " is answered already");
+    return rr::make_error(rr::ErrorCode::member_busy, rr::quote(place.member->name) + " is answered already");
   auto& topic = topics_[key];
   topic.place = place;
   topic.callback = std::make_shared<CallbackHandler>(std::move(handler));
@@ -109,7 +109,7 @@ rr::awaitable<rr::Result<>> ValueClient::send(MemberPlace place, rr::Value value
     if (const auto joined = co_await join(key); !joined) co_return joined.error();
   const auto found = topics_.find(key);
   if (found == topics_.end() || found->second.state != TopicState::joined)
-    co_return rr::make_error(rr::ErrorCode::invalid_operation, rr::quoted(key.second) + " is not connected");
+    co_return rr::make_error(rr::ErrorCode::invalid_operation, rr::quote(key.second) + " is not connected");
   const auto member = found->second.place;
   if (member.member->kind == rr::MemberKind::wire) co_return upstream_->send_wire(member.path, *member.member, value);
   co_return upstream_->send_pipe(*this, found->second.pipe, value, std::nullopt);
@@ -125,7 +125,7 @@ rr::awaitable<rr::Result<>> ValueClient::join(Key key) {
   while (is_joining()) co_await changed_.async_wait(wait_for_news);
   const auto found = topics_.find(key);
   if (found == topics_.end())
-    co_return rr::make_error(rr::ErrorCode::operation_cancelled, rr::quoted(key.second) + " is not wanted any more");
+    co_return rr::make_error(rr::ErrorCode::operation_cancelled, rr::quote(key.second) + " is not wanted any more");
   if (found->second.state == TopicState::joined) co_return rr::Result<>();
   co_return found->second.error;
 }
@@ -314,54 +314,74 @@ rr::Result<std::shared_ptr<ValueClient>> ValueClients::make_another(std::shared_
   return std::make_shared<ValueClient>(std::move(upstream), std::move(user), std::move(*seat), memory_.sibling());
 }
 
-rr::Result<ValueClients::Entries::iterator> ValueClients::find_or_make(const std::shared_ptr<Device>& device,
-                                                                       const SessionKey& key) {
+rr::Result<std::shared_ptr<Upstream>> ValueClients::find_or_make(const std::shared_ptr<Device>& device,
+                                                                 const SessionKey& key) {
   std::shared_ptr<Upstream> shared;
   if (device->is_shared() && key.username.empty()) {
     auto found = device->find_shared(key.service);
     if (!found) return found.error();
     shared = std::move(*found);
   }
-  const auto found = entries_.find({device->config().name, key});
-  if (found != entries_.end()) {
-    const auto& upstream = found->second.client->upstream();
-    if (&upstream->device() == device.get() && (!shared || shared == upstream)) return found;
+  const std::pair place(device->config().name, key);
+  if (const auto found = entries_.find(place); found != entries_.end()) {
+    const auto upstream = found->second.upstream;
+    if (&upstream->device() == device.get() && (!shared || shared == upstream)) return upstream;
     entries_.erase(found);
   }
-  if (entries_.size() >= max_clients)
-    return rr::make_error(rr::ErrorCode::out_of_system_resource,
-                          "the gateway has " + std::to_string(max_clients) + " sessions for HTTP already");
-  const bool is_ours = shared == nullptr;
-  if (is_ours) {
+  if (device->is_full()) return rr::make_error(rr::ErrorCode::out_of_system_resource, device->full_text());
+  auto& entry = entries_[place];
+  entry.upstream = shared;
+  entry.is_ours = !shared;
+  if (entry.is_ours) {
     UpstreamLogin login{key.username, {}};
     if (!key.username.empty()) login.credentials.items.emplace_back("password", rr::Value(key.password));
-    shared = std::make_shared<Upstream>(device, key.service, std::move(login), UpstreamUse::one_user);
+    entry.upstream = std::make_shared<Upstream>(device, key.service, std::move(login), UpstreamUse::one_user);
+    entry.upstream->keep_open(device->retry());
   }
-  auto client = make_another(shared, key.subject());
-  if (!client) return client.error();
-  if (is_ours) {
-    shared->close_unused();
-    shared->keep_open(device->retry());
-  }
-  const auto entry = entries_.emplace(std::pair(device->config().name, key), Entry{std::move(*client), {}}).first;
-  return entry;
+  return entry.upstream;
+}
+
+rr::Result<std::shared_ptr<ValueClient>> ValueClients::let_in(Entry& entry, const SessionKey& key) {
+  if (entry.upstream->requires_user() && key.username.empty())
+    return rr::make_error(rr::ErrorCode::authentication_error, "Authentication Failed");
+  if (entry.client) return entry.client;
+  const auto is_in = [](const auto& item) { return item.second.client != nullptr; };
+  if (static_cast<std::size_t>(std::count_if(entries_.begin(), entries_.end(), is_in)) >= max_clients)
+    return rr::make_error(rr::ErrorCode::out_of_system_resource,
+                          "the gateway has " + std::to_string(max_clients) + " sessions for HTTP already");
+  auto made = make_another(entry.upstream, key.subject());
+  if (!made) return made.error();
+  entry.client = std::move(*made);
+  if (entry.is_ours) entry.upstream->close_unused();
+  return entry.client;
+}
+
+bool ValueClients::has(const Device& device, const SessionKey& key) const {
+  const auto found = entries_.find({device.config().name, key});
+  return found != entries_.end() && found->second.client && &found->second.upstream->device() == &device;
 }
 
 rr::awaitable<rr::Result<std::shared_ptr<ValueClient>>> ValueClients::open(std::shared_ptr<Device> device,
                                                                            SessionKey key) {
-  const auto entry = find_or_make(device, key);
-  if (!entry) co_return entry.error();
-  (*entry)->second.last_opened = std::chrono::steady_clock::now();
+  const auto made = find_or_make(device, key);
+  if (!made) co_return made.error();
+  const auto upstream = *made;
+  const std::pair place(device->config().name, key);
+  entries_[place].last_opened = std::chrono::steady_clock::now();
   if (!sweep_.is_armed()) sweep_.arm(idle_time / 3);
-  auto client = (*entry)->second.client;
-  auto opened = co_await client->upstream()->opened();
-  if (opened && client->upstream()->requires_user() && key.username.empty())
-    opened = rr::make_error(rr::ErrorCode::authentication_error, "Authentication Failed");
-  if (opened) co_return client;
+  const auto opened = co_await upstream->opened();
+  const auto found = entries_.find(place);
+  if (found == entries_.end() || found->second.upstream != upstream)
+    co_return opened ? upstream->lost_error() : opened.error();
+  auto& entry = found->second;
+  auto client = opened ? let_in(entry, key) : rr::Result<std::shared_ptr<ValueClient>>(opened.error());
+  if (client) co_return client;
   // Who can't get in, for whatever reason, takes nobody's place.
-  const auto found = entries_.find({device->config().name, key});
-  if (found != entries_.end() && found->second.client == client && !client->is_used()) entries_.erase(found);
-  co_return opened.error();
+  if (entry.client && entry.client->is_used()) co_return client;
+  const bool is_unused = entry.is_ours && !entry.client;
+  entries_.erase(found);
+  if (is_unused) upstream->close();
+  co_return client;
 }
 
 void ValueClients::sweep() {
@@ -374,7 +394,8 @@ void ValueClients::sweep() {
 
 void ValueClients::stop() {
   sweep_.disarm();
-  entries_.clear();
+  for (const auto& [place, entry] : std::exchange(entries_, {}))
+    if (entry.is_ours && !entry.client) entry.upstream->close();
 }
 
 }  // namespace rrgate

@@ -17,12 +17,15 @@
 
 namespace rrgate {
 
+struct SampleJpeg;
+
 /// What a wire, a pipe or an event brought.
 struct Sample {
-  std::uint64_t number = 0;       ///< counts within a member, from 1
-  rr::TimeSpec time;              ///< of a wire's value
-  std::vector<rr::Value> values;  ///< an event's arguments; else one
-  std::size_t bytes = 0;          ///< that it takes, about
+  std::uint64_t number = 0;                       ///< counts within a member, from 1
+  rr::TimeSpec time;                              ///< of a wire's value
+  std::vector<rr::Value> values;                  ///< an event's arguments; else one
+  std::size_t bytes = 0;                          ///< that it takes, about
+  mutable std::shared_ptr<SampleJpeg> jpeg = {};  ///< of a camera's frame, once somebody wants it (sample_jpeg.hpp)
 };
 using SamplePtr = std::shared_ptr<const Sample>;
 
@@ -175,15 +178,21 @@ class ValueClients {
   rr::awaitable<rr::Result<std::shared_ptr<ValueClient>>> open(std::shared_ptr<Device> device, SessionKey key);
   /// One more client of a session, with a seat of its own. Errors   out_of_system_resource: the device is full.
   rr::Result<std::shared_ptr<ValueClient>> make_another(std::shared_ptr<Upstream> upstream, Subject user);
+  /// Whether the device has judged this login, and there is a session for it.
+  bool has(const Device& device, const SessionKey& key) const;
   void stop();
 
  private:
   struct Entry {
-    std::shared_ptr<ValueClient> client;
+    std::shared_ptr<Upstream> upstream;
+    std::shared_ptr<ValueClient> client;  ///< null until the login was judged: it takes nobody's place before
+    bool is_ours = true;                  ///< false: the upstream is that of the device's Robot Raconteur clients
     std::chrono::steady_clock::time_point last_opened;
   };
   using Entries = std::map<std::pair<std::string, SessionKey>, Entry>;
-  rr::Result<Entries::iterator> find_or_make(const std::shared_ptr<Device>& device, const SessionKey& key);
+  rr::Result<std::shared_ptr<Upstream>> find_or_make(const std::shared_ptr<Device>& device, const SessionKey& key);
+  /// The client of an entry whose session is open.
+  rr::Result<std::shared_ptr<ValueClient>> let_in(Entry& entry, const SessionKey& key);
   void sweep();
 
   static constexpr std::size_t max_clients = 256;

@@ -106,7 +106,7 @@ rr::OrderedJson perform(const JsonRequest& request, const rr::JsonForm& form) {
   if (operation == "close" || operation == "unsubscribe")
     return request.at(operation == "close" ? "generator" : "subscription").dump();
   if (operation == "lock") return request.text("kind", "client");
-  refuse(rr::ErrorCode::invalid_argument, "no operation \"op\": " + rr::quoted(operation));
+  refuse(rr::ErrorCode::invalid_argument, "no operation \"op\": " + rr::quote(operation));
 }
 
 void check_told(const std::string& text, const std::string& id, const char* what) {

@@ -24,7 +24,7 @@ void check(const rr::Result<rr::NodeId>& node, X509* certificate) {
     return;
   }
   const auto name = openssl::name_text(X509_get_subject_name(certificate));
-  require(name == rr::quoted("CN = " + rr::format_certificate_name(*node), 120));
+  require(name == rr::quote("CN = " + rr::format_certificate_name(*node), 120));
 }
 
 }  // namespace

@@ -98,33 +98,90 @@ def test_wrong_proofs(guarded):
 
 
 def test_who_guesses_passwords_has_to_wait(device, tmp_path):
-    """From one address so many guesses in a row, then one a second; the right password too. Others are not kept out."""
+    """Of one user so many guesses in a row, of one address more, then one a second; the right password too. It keeps out
+    neither others of that address nor the same user elsewhere."""
     make_users(tmp_path)
     with running(tmp_path, device, {"users_file": "users", "rules": RULES}) as gateway:
         def log_in(name, password=None, address="127.0.0.3"):
             answer = ask(gateway.port, "GET", BASE + "/p_double", headers=basic(name, password), address=address)
             return answer.status, answer.json["detail"] if answer.status != 200 else ""
 
-        def guess(name):
+        def guess(names):
             """Until that is stopped. Returns how often."""
-            guesses = 0
-            while "too many logins have failed" not in (refused := log_in(name, f"guess {guesses}"))[1]:
+            for guesses, name in enumerate(names):
+                refused = log_in(name, f"guess {guesses}")
+                if "too many logins have failed" in refused[1]:
+                    return guesses
                 assert refused == (401, "Invalid username or password")
-                guesses += 1
-                assert guesses < 200, "guessing goes on and on"
-            return guesses
+            raise AssertionError("guessing goes on and on")
 
-        assert guess("alice") >= 60
-        assert log_in("alice", "a guess from elsewhere", "127.0.0.5") == (401, "Invalid username or password")
-        for name in PASSWORDS:
-            guess(name)
-            if (answer := log_in(name))[0] != 200:  # unless the second is over just now
+        assert 20 <= guess(["alice"] * 200) < 60
+        assert log_in("root") == (200, "")
+        assert log_in("alice", address="127.0.0.5") == (200, "")
+        guess(f"user{number}" for number in range(200))
+        assert log_in("vera", address="127.0.0.5") == (200, "")
+        for name in ("vera 2", "vera 3"):
+            rrgate("passwd", tmp_path / "users", name.replace(" ", ""), "--roles", "viewer", given="right\n")
+        gateway.wait_for("users and rights read anew")
+        for name in ("vera2", "vera3"):
+            guess(f"user{number}" for number in range(200))
+            if (answer := log_in(name, "right"))[0] != 200:  # unless the second is over just now
                 break
         assert answer[0] == 401 and "too many logins have failed" in answer[1], "the right password had not to wait"
         deadline = time.monotonic() + 20
-        while log_in(name)[0] != 200:
+        while log_in(name, "right")[0] != 200:
             assert time.monotonic() < deadline
             time.sleep(0.1)
+
+
+def test_a_right_password_gets_in_during_a_flood_of_wrong_ones(device, tmp_path):
+    make_users(tmp_path)
+    for number in range(3):
+        rrgate("passwd", tmp_path / "users", f"user{number}", "--roles", "viewer", given="right\n")
+    with running(tmp_path, device, {"users_file": "users", "rules": RULES}) as gateway:
+        numbers = itertools.count()
+
+        def flood(address):
+            def guess():
+                number = next(numbers)
+                name = f"user{number % 3}" if number % 2 else f"nobody{number}"
+                assert ask(gateway.port, "GET", BASE + "/p_double", headers=basic(name, f"guess {number}"), address=address).status == 401
+            return guess
+
+        with contextlib.ExitStack() as floods:
+            for number in range(6):
+                floods.enter_context(under_load(flood(f"127.0.1.{number + 1}")))
+            for number in range(3):
+                began = time.monotonic()
+                answer = ask(gateway.port, "GET", BASE + "/p_double", headers=basic(f"user{number}", "right"), address="127.0.2.1")
+                assert answer.status == 200, answer.body
+                assert time.monotonic() - began < 10
+
+
+def test_logins_that_a_device_has_not_judged_take_nobodys_place(device, own_service, tmp_path):
+    service, stuck = own_service
+    devices = [{"name": "interop", "url": device}, {"name": "stuck", "url": stuck, "max_clients": 1}]
+    with running(tmp_path, device, {}, devices=devices) as gateway:
+        gateway.wait_for("device online", device="stuck")
+        service.pause()
+        path = BASE.replace("devices/interop", "devices/stuck") + "/p_double"
+        links = []
+        try:
+            for number in range(260):
+                link = socket.create_connection(("127.0.0.1", gateway.port), 10, source_address=(f"127.0.1.{number % 13 + 1}", 0))
+                proof = basic(f"user{number}", "guess")["Authorization"]
+                link.sendall(f"GET {path} HTTP/1.1\r\nHost: localhost\r\nAuthorization: {proof}\r\n\r\n".encode())
+                links.append(link)
+            assert ask(gateway.port, "GET", BASE + "/p_double").status == 200
+            assert read_clients(gateway.port)["stuck"] == 0
+        finally:
+            for link in links:
+                link.close()
+            service.resume()
+
+
+def read_clients(port):
+    return {each["name"]: each["clients"] for each in ask(port, "GET", "/api/v1/devices").json["devices"]}
 
 
 def test_api_tokens(guarded):
@@ -197,6 +254,25 @@ def test_the_audit_log_tells_who_did_what(guarded):
     assert (refused["user"], refused["verb"], refused["member"]) == ("vera", "write", "p_int32")
     assert wrote["client"].startswith("127.0.0.1:") and wrote["time"].endswith("Z")
     assert {"login", "write", "call", "refused"} <= {line["event"] for line in lines}
+
+
+def test_strangers_fill_no_disk(device, tmp_path):
+    """Each of their refusals is counted; one of an address a minute is written."""
+    make_users(tmp_path)
+    access = {"users_file": "users", "tokens_file": "tokens", "rules": RULES, "audit_file": "audit"}
+    (tmp_path / "tokens").touch(0o600)
+    with running(tmp_path, device, access) as gateway:
+        for number in range(50):
+            proof = bearer("rrg_" + "A" * 43) if number % 2 else {}
+            assert ask(gateway.port, "PUT", BASE + "/p_double", 1.5, proof).status == 401
+        assert ask(gateway.port, "PUT", BASE + "/p_double", 1.5, address="127.0.0.7").status == 401
+        assert ask(gateway.port, "PUT", BASE + "/p_int32", 1, basic("vera")).status == 403
+        lines = audit_of(gateway)
+        assert [(line["event"], line["proof"], line["client"].split(":")[0]) for line in lines] == [
+            ("refused", "none", "127.0.0.1"), ("refused", "none", "127.0.0.7"), ("login", "password", "127.0.0.1"),
+            ("refused", "password", "127.0.0.1")]
+    (summed,) = (line for line in map(json.loads, (tmp_path / "audit").read_text().splitlines()) if line["event"] == "refusals")
+    assert (summed["client"], summed["detail"]) == ("127.0.0.1", "49 more within a minute")
 
 
 def test_a_new_audit_file_after_a_hang_up(guarded):
@@ -339,6 +415,54 @@ def test_certificates_that_are_revoked(device, tmp_path):
         (tmp_path / "crl.pem").write_text("nothing")  # changes nothing
         assert "found none in it" in gateway.wait_for("TLS files can't be used; those from before stay in use")["error"]
         assert status(vera) == 200
+
+
+def test_tls_alone(device, tmp_path):
+    """What comes in clear is sent to HTTPS where nothing was shown, and refused where something was: it is not even looked at."""
+    make_users(tmp_path)
+    tls = {**make_web_certificates(tmp_path / "web"), "required": True}
+    devices = [{"name": "interop", "url": device}, {"name": "shared", "url": device, "mode": "shared"}]
+    access = {"users_file": "users", "rules": RULES, "audit_file": "audit"}
+    with running(tmp_path, device, access, tls=tls, devices=devices, trusted_proxies=["127.0.0.2"]) as gateway:
+        context = ssl.create_default_context(cafile=tmp_path / "web" / "web-ca.pem")
+        assert ask(gateway.port, "GET", "/healthz").status == ask(gateway.port, "GET", "/readyz").status == 200
+        for path in ("/", "/api/v1/devices?x=1", "/metrics"):
+            sent = ask(gateway.port, "GET", path)
+            assert (sent.status, sent.headers["Location"]) == (308, f"https://127.0.0.1:{gateway.port}{path}")
+        for method, path, headers in (("GET", BASE + "/p_double", basic("root")), ("GET", "/", bearer("rrg_x")),
+                                      ("GET", "/api/v1/devices?ticket=x", {}), ("PUT", BASE + "/p_double", {})):
+            refused = ask(gateway.port, method, path, headers=headers)
+            assert refused.status == 403 and "TLS alone" in refused.json["detail"], path
+            assert ("known to others" in refused.json["detail"]) == (method == "GET")
+        for path in ("/devices/interop", "/devices/shared", "/"):
+            assert upgrade_status(gateway.port, path, basic("root")) == 403
+        assert (tmp_path / "audit").read_text() == ""
+        for name in ("interop", "shared"):
+            url = f"rr+tcp://127.0.0.1:{gateway.port}/?{'nodename=shared&' if name == 'shared' else ''}service=interop"
+            done = subprocess.run([sys.executable, "-c", NATIVE_CLIENT, url], capture_output=True, text=True, timeout=60)
+            assert done.stdout.startswith("PermissionDeniedException") and "TLS alone" in done.stdout, (url, done)
+        assert ask(gateway.port, "GET", BASE + "/p_double", headers=basic("root"), context=context).status == 200
+        through = ask(gateway.port, "GET", BASE + "/p_double", headers={**basic("root"), "X-Forwarded-Proto": "https"}, address="127.0.0.2")
+        assert through.status == 200
+        for scheme, status in (("https", 200), ("http", 403)):
+            origin = {"Origin": f"{scheme}://localhost:{gateway.port}", **basic("root")}
+            assert ask(gateway.port, "GET", BASE + "/p_double", headers=origin, context=context).status == status
+
+
+def test_check_config_warns_of_what_may_not_be_meant(tmp_path):
+    make_users(tmp_path)
+    issuer = issuers.Issuer("https://id.example", "rrgate")
+    (tmp_path / "keys.json").write_text(json.dumps(issuer.key_set()))
+    config = tmp_path / "gateway.json"
+    config.write_text(json.dumps({
+        "listen": ["127.0.0.1:0"], "devices": [{"name": "arm", "url": "rrs+tcp://127.0.0.1:1/?nodename=arm"}],
+        "trusted_proxies": ["127.0.0.1"], "tls": make_web_certificates(tmp_path / "web"),
+        "access": {"users_file": "users", "jwt": {"jwks_file": "keys.json"}}}))
+    done = subprocess.run([RRGATE, "check-config", config], capture_output=True, text=True, timeout=30)
+    assert done.returncode == 0 and "good; 1 devices" in done.stdout
+    warned = [line.split(": ")[1:3] for line in done.stderr.splitlines()]
+    assert warned == [["/access/jwt/issuer", "warning"], ["/access/jwt/audience", "warning"], ["/devices/0/url", "warning"],
+                      ["/access/rules", "warning"], ["/tls/required", "warning"]]
 
 
 def test_what_a_trusted_proxy_says(device, tmp_path):

@@ -211,11 +211,27 @@ def test_the_compose_files_are_such(names):
 
 def test_the_dashboard_asks_for_what_there_is(tmp_path):
     with running(tmp_path, {"devices": [{"name": "x", "url": "rr+tcp://127.0.0.1:1/?service=x", "mode": "shared"}]}) as gateway:
-        known = {name.split("{")[0] for name in gateway.metrics()}
-    panels = json.loads((DOCKER / "grafana" / "rrgate.json").read_text())["panels"]
-    asked = {name for panel in panels for target in panel["targets"]
-             for name in re.findall(r"(?:rrgate|process)_\w+", target["expr"])}
-    assert len(asked) >= 8 and asked <= known, asked - known
+        names = set(gateway.metrics())
+    known = {name.split("{")[0] for name in names}
+    dashboard = json.loads((DOCKER / "grafana" / "rrgate.json").read_text())
+    assert [(each["name"], each["type"]) for each in dashboard["templating"]["list"]] == [("datasource", "datasource")]
+    assert {panel["datasource"]["uid"] for panel in dashboard["panels"]} == {"${datasource}"}  # whichever it is there
+    assert "uid" not in (DOCKER / "grafana" / "datasource.yaml").read_text()
+    panels = [target["expr"] for panel in dashboard["panels"] for target in panel["targets"]]
+    alerts = []
+    mounts = yaml.safe_load((DOCKER / "compose.monitoring.yaml").read_text())["services"]["prometheus"]["volumes"]
+    for file in yaml.safe_load((DOCKER / "prometheus.yaml").read_text())["rule_files"]:
+        assert f"./{file}:/etc/prometheus/{file}:ro" in mounts
+        for group in yaml.safe_load((DOCKER / file).read_text())["groups"]:
+            for rule in group["rules"]:
+                assert rule["alert"] and rule["labels"]["severity"] and set(rule["annotations"]) == {"summary", "description"}
+                alerts.append(rule["expr"])
+    for expressions in panels, alerts:
+        asked = {name for each in expressions for name in re.findall(r"\b(?:rrgate|process)_\w+", each)}
+        assert len(asked) >= 8 and asked <= known, asked - known
+    # Values of labels that are fixed words are those that there are.
+    labels = {(name, value) for each in alerts for name, value in re.findall(r'(\w+)="(\w+)"', each)} - {("job", "rrgate")}
+    assert labels and all(any(f'{name}="{value}"' in each for each in names) for name, value in labels), labels
 
 
 def test_the_unit_is_one(tmp_path):

@@ -7,6 +7,8 @@ import os
 import struct
 import subprocess
 import sys
+import threading
+import time
 
 import pytest
 from PIL import Image
@@ -187,6 +189,21 @@ def test_a_slow_viewer_gets_the_newest(gateway):
         seen += 1
     assert seen < 60
     motion.close()
+
+
+def test_what_takes_long_keeps_nobody_waiting(gateway):
+    """Twelve million pixels, which take a second or so to pack."""
+    put(gateway, 4000, 3000, "mono8", os.urandom(4000) * 3000)
+    image = threading.Thread(target=get, args=(gateway, "/still", PNG))
+    begin = time.monotonic()
+    image.start()
+    longest = 0
+    while image.is_alive():
+        asked = time.monotonic()
+        assert ask(gateway, "GET", "/healthz").status == 200
+        longest = max(longest, time.monotonic() - asked)
+    took = time.monotonic() - begin
+    assert longest < took / 2, (longest, took)
 
 
 def test_a_browser_shows_it(gateway):

@@ -91,10 +91,18 @@ def test_who_has_a_login_has_a_session_of_his_own(relayed):
     assert ask(relayed, "GET", GUARDED + "/status", headers=basic("alice", "no")).status == 401
 
 
-def test_wrong_passwords_keep_nobody_out(relayed):
-    for number in range(300):
-        assert ask(relayed, "GET", GUARDED + "/status", headers=basic("alice", f"guess {number}")).status == 401
-    assert ask(relayed, "GET", GUARDED + "/status", headers=basic("alice", "secret")).json == 0
+def test_wrong_passwords_keep_nobody_else_out(relayed):
+    """Who guesses is soon told to wait, without asking the device: of this user, and from his own address alone."""
+    def status(user, password, address="127.0.0.1"):
+        answer = ask(relayed, "GET", GUARDED + "/status", headers=basic(user, password), address=address)
+        return answer.status, answer.json.get("detail") if answer.status == 401 else answer.json
+
+    answers = [status("alice", f"guess {number}") for number in range(100)]
+    assert {code for code, _ in answers} == {401}
+    assert "too many" in answers[-1][1] and "too many" not in answers[0][1]
+    assert "too many" in status("alice", "secret")[1]
+    assert status("alice", "secret", "127.0.0.2") == (200, 0)
+    assert status("bob", "secret") == (200, 0)
 
 
 def test_a_session_that_nobody_uses_rests(node, tmp_path):

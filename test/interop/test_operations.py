@@ -10,7 +10,7 @@ import pytest
 
 from clients import run_and_check
 from gateways import RRGATE, Gateway, running
-from http_api import fetch, is_alive, open_websocket
+from http_api import BASE, Stream, fetch, is_alive, open_websocket
 from processes import free_port
 from scenarios import SCENARIO
 
@@ -50,6 +50,36 @@ def test_metrics(device, tmp_path):
         for reason in ("device_offline", "no_such_device", "device_full", "origin", "unknown_protocol"):
             assert after[f'rrgate_rejected_total{{reason="{reason}"}}'] == 1, reason
         assert after["rrgate_connections_total"] > before["rrgate_connections_total"]
+        link.close()
+
+
+def test_metrics_of_requests(device, tmp_path):
+    """Responses by status; how long they took, but for streams and images; processor time."""
+    duration = "rrgate_http_request_duration_seconds"
+
+    def responses(metrics):
+        return [metrics[f'rrgate_http_responses_total{{code="{code}xx"}}'] for code in range(1, 6)]
+
+    with running(tmp_path, {"devices": [interop(device)]}) as gateway:
+        gateway.wait_for("device online", device="interop")
+        fetch(gateway.port, "/healthz")
+        before = gateway.metrics()
+        for _ in range(20):
+            assert fetch(gateway.port, "/api/v1/devices")[0] == 200
+        assert fetch(gateway.port, "/api/v1/devices/nobody")[0] == 404
+        assert fetch(gateway.port, "/devices/interop")[0] == 426
+        Stream(gateway.port, "/changed", base=BASE).close()
+        link = gateway.session()
+        with socket.create_connection(("127.0.0.1", gateway.port), 10) as broken:
+            broken.sendall(b"GET / HTTP/1.1\r\n\r\n")
+            assert broken.recv(100).startswith(b"HTTP/1.1 400 ")
+        after = gateway.metrics()
+        # /metrics itself is answered after it is written.
+        assert [new - old for new, old in zip(responses(after), responses(before))] == [1, 22, 0, 3, 0]
+        assert after[f"{duration}_count"] - before[f"{duration}_count"] == 23  # neither the stream, nor what was no request
+        assert after[f'{duration}_bucket{{le="+Inf"}}'] == after[f"{duration}_count"]
+        assert 0 < after[f"{duration}_sum"] - before[f"{duration}_sum"] < 10
+        assert 0 < after["process_cpu_seconds_total"] - before["process_cpu_seconds_total"] < 60
         link.close()
 
 

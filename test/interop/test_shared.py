@@ -387,6 +387,9 @@ def test_rights_member_by_member(node, tmp_path):
             node.DisconnectService(root)
         lines = [json.loads(line) for line in (tmp_path / "audit").read_text().splitlines()]
         assert any(line.get("user") == "vera" and line.get("member") == "p_double" for line in lines), lines[-5:]
+        logins = [(line["event"], line["user"]) for line in lines if line["event"].startswith("login")]
+        assert logins == [("login_failed", "alice"), *(("login", user) for user in may)]
+        assert all(line["client"].startswith("127.0.0.1:") for line in lines)
     finally:
         gateway.stop()
         service.stop()
@@ -410,6 +413,13 @@ def test_a_login_that_the_device_judges_gives_no_rights_of_the_gateways_users(no
         lines = [json.loads(line) for line in (tmp_path / "audit").read_text().splitlines()]
         (refused,) = (line for line in lines if line["event"] == "refused")
         assert (refused["proof"], refused["device_user"]) == ("none", "alice")
+        (login,) = (line for line in lines if line["event"] == "login")
+        assert (login["device_user"], login["device"], login["service"], login.get("user")) == ("alice", "interop", "guarded", None)
+        assert login["client"].startswith("127.0.0.1:")
+        with pytest.raises(RR.AuthenticationException):
+            node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=guarded", *password_of("alice", "wrong"))
+        lines = [json.loads(line) for line in (tmp_path / "audit").read_text().splitlines()]
+        assert (lines[-1]["event"], lines[-1]["device_user"]) == ("login_failed", "alice")
     finally:
         gateway.stop()
         service.stop()
@@ -540,6 +550,53 @@ def test_a_user_who_is_deleted_has_no_session_any_more(node, tmp_path):
         assert time.monotonic() - began < 1.5
         assert sessions["root"].version == "1"
         node.DisconnectService(sessions["root"])
+    finally:
+        gateway.stop()
+        service.stop()
+
+
+def test_wrong_passwords_of_one_user_keep_out_no_other(node, tmp_path):
+    service, url = start_service(tmp_path)
+    make_users(tmp_path)
+    gateway, port = start_gateway(tmp_path, url, device={"mode": "shared"}, access={"users_file": "users", "rules": RULES},
+                                  is_up=lambda: "session open device=interop service=interop" in (tmp_path / "gateway.log").read_text())
+    shared_url = f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop"
+    try:
+        for number in range(65):
+            with pytest.raises(RR.AuthenticationException):
+                node.ConnectService(shared_url, *password_of("alice", f"guess {number}"))
+        root = node.ConnectService(shared_url, *password_of("root"))
+        assert root.version == "1"
+        node.DisconnectService(root)
+    finally:
+        gateway.stop()
+        service.stop()
+
+
+def test_the_audit_log_has_the_first_packet_of_each_wire_and_pipe(node, tmp_path):
+    service, url = start_service(tmp_path)
+    make_users(tmp_path)
+    access = {"users_file": "users", "rules": RULES, "audit_file": "audit"}
+    gateway, port = start_gateway(tmp_path, url, device={"mode": "shared"}, access=access,
+                                  is_up=lambda: "session open device=interop service=interop" in (tmp_path / "gateway.log").read_text())
+
+    def recorded():
+        lines = [json.loads(line) for line in (tmp_path / "audit").read_text().splitlines()]
+        return [(line["event"], line["user"], line["member"]) for line in lines if line.get("verb") == "write"]
+
+    try:
+        root, vera = (node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop", *password_of(user))
+                      for user in ("root", "vera"))
+        wire, pipe, hers = root.both.Connect(), root.greetings.Connect(-1), vera.both.Connect()
+        for number in range(5):
+            wire.OutValue = float(number)
+            pipe.SendPacket(f"hello {number}")
+            hers.OutValue = -1.0
+        gateway.wait_until(lambda: len(recorded()) == 3)
+        gateway.wait_until(lambda: root.both.PeekOutValue()[0] == 4.0)
+        assert sorted(recorded()) == [("refused", "vera", "both"), ("write", "root", "both"), ("write", "root", "greetings")]
+        for each in (root, vera):
+            node.DisconnectService(each)
     finally:
         gateway.stop()
         service.stop()

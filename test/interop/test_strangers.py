@@ -124,7 +124,8 @@ def test_answers_that_nobody_reads_are_counted_and_bounded(gateway):
             if held + now["rrgate_memory_budget_refusals_total"] >= count:
                 break
             assert time.monotonic() < deadline, now
-    assert (held, now["rrgate_memory_budget_refusals_total"]) == (3, 3)  # one address gets half
+    assert held >= 2 and now["rrgate_memory_budget_used_bytes"] <= MEMORY // 2  # one address gets half
+    assert held + now["rrgate_memory_budget_refusals_total"] == 6
     assert now["process_resident_memory_bytes"] - before["process_resident_memory_bytes"] < MEMORY + SLACK
     assert add(gateway, 3, 4) == 7
     for stranger in strangers:

@@ -215,7 +215,7 @@ Options parse_options(int argc, char** argv) {
   out.clients = std::stoul(take("--clients", "1"));
   out.stalled = std::stoul(take("--stalled", "0"));
   out.seconds = std::stod(take("--seconds", "inf"));
-  if (!given.empty()) throw std::invalid_argument("unknown option " + rr::quoted(given.begin()->first));
+  if (!given.empty()) throw std::invalid_argument("unknown option " + rr::quote(given.begin()->first));
   return out;
 }
 

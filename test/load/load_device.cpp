@@ -88,7 +88,7 @@ int main(int argc, char** argv) {
     for (int i = 1; i < argc; i += 2) {
       const auto option = options.find(argv[i]);
       if (option == options.end() || i + 1 == argc)
-        throw std::invalid_argument("found " + rr::quoted(argv[i]) +
+        throw std::invalid_argument("found " + rr::quote(argv[i]) +
                                     ", expected --rate, --packet-rate, --packet-bytes or --event-rate with a number");
       option->second = std::stod(argv[i + 1]);
     }

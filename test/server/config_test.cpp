@@ -1,4 +1,5 @@
 #include "server/config/config.hpp"
+#include "server/config/cautions.hpp"
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -75,6 +76,8 @@ TEST_CASE("certificates, and how devices are checked") {
         "gateway.json: /tls/certificates/0/key: ", "empty");
   finds(with(R"("tls": {"certificates": [{"cert": "c"}]})"), "gateway.json: /tls/certificates/0/key: ");
   finds(with(R"("tls": {"certificate": []})"), "gateway.json: /tls/certificate: ");
+  finds(with(R"("tls": {"required": true})"), "gateway.json: /tls/required: ", "expected tls.certificates");
+  CHECK(findings_of(with(R"("tls": {"required": true}, "trusted_proxies": ["127.0.0.1"])")).empty());
 }
 
 TEST_CASE("who may do what") {
@@ -112,6 +115,32 @@ TEST_CASE("who may do what") {
   access_finds(R"("identity_headers": {"user": "X-User"})", "/identity_headers", "trusted_proxies");
   access_finds(R"("client_ca": ["ca.pem"])", "/client_ca", "tls.certificates");
   access_finds(R"("anonymous_role": "guest")", "/anonymous_role", "rules");
+}
+
+TEST_CASE("what may not be meant is no mistake, but is told") {
+  const auto cautions = [](const std::string& more, const std::string& devices = "") {
+    const auto parsed = parse_config(R"({"listen": ["127.0.0.1:0"], "devices": [)" + devices + "]" + more + "}");
+    CHECK(parsed.findings.empty());
+    std::string out;
+    for (const auto& caution : find_cautions(parsed.config)) out += caution.path + " ";
+    return out;
+  };
+  const std::string jwt = R"(, "access": {"jwt": {"jwks_file": "k")";
+  CHECK(cautions("").empty());
+  CHECK(cautions(jwt + "}}") == "/access/jwt/issuer /access/jwt/audience ");
+  CHECK(cautions(jwt + R"(, "issuer": "i"}})") == "/access/jwt/audience ");
+  CHECK(cautions(jwt + R"(, "issuer": "i", "audience": "a"}})").empty());
+  const std::string plain = R"({"name": "a", "url": "rr+tcp://h:1/?service=s"})";
+  const std::string by_tls = R"({"name": "b", "url": "rrs+tcp://h:1/?nodename=n&service=s"})";
+  const std::string by_id =
+      R"({"name": "c", "url": "rrs+tcp://h:1/?nodeid=82301bf1-e1ef-4e89-8d8f-0848291587ac&service=s"})";
+  CHECK(cautions("", plain + "," + by_tls + "," + by_id) == "/devices/1/url ");
+  const std::string proxies = R"(, "trusted_proxies": ["127.0.0.1"])";
+  CHECK(cautions(proxies) == "/access/rules ");
+  CHECK(cautions(proxies + R"(, "access": {"rules": [{"roles": ["a"], "may": ["read"]}]})").empty());
+  const std::string tls = R"(, "access": {"users_file": "u"}, "tls": {"certificates": [{"cert": "c", "key": "k"}])";
+  CHECK(cautions(tls + "}") == "/tls/required ");
+  CHECK(cautions(tls + R"(, "required": true})").empty());
 }
 
 TEST_CASE("who lets other machines in without TLS or users must say so") {

@@ -94,6 +94,8 @@ TEST_CASE("whoever has an address of IPv6 has all of its network") {
   CHECK(network("2001:db8:1:2::9") == network("2001:db8:1:2:ffff::"));
   CHECK(network("2001:db8:1:3::9") != network("2001:db8:1:2::9"));
   CHECK(network("fe80::1%5") == "fe80::");
+  CHECK(network("::1") == "::1");
+  CHECK(network_name(boost::asio::ip::make_address("2001:db8:1:2::9")) == "2001:db8:1:2::/64");
 }
 
 TEST_CASE("memory: nobody gets more than is left for all others") {

@@ -6,11 +6,17 @@
 using namespace rrgate;
 
 TEST_CASE("a page is of the origin that it was loaded from") {
-  CHECK(is_same_origin("http://127.0.0.1:8080", "127.0.0.1:8080"));
-  CHECK(is_same_origin("http://[::1]:8080", "[::1]:8080"));
-  CHECK(is_same_origin("https://gw.example", "gw.example"));
-  CHECK(is_same_origin("https://GW.example", "gw.example:443"));
-  CHECK(is_same_origin("http://gw.example:80", "gw.example"));
+  CHECK(is_same_origin("http://127.0.0.1:8080", "127.0.0.1:8080", false));
+  CHECK(is_same_origin("http://[::1]:8080", "[::1]:8080", false));
+  CHECK(is_same_origin("https://gw.example", "gw.example", false));
+  CHECK(is_same_origin("https://GW.example", "gw.example:443", false));
+  CHECK(is_same_origin("http://gw.example:80", "gw.example", false));
+}
+
+TEST_CASE("a page that came in clear is none of HTTPS") {
+  CHECK(is_same_origin("https://gw.example", "gw.example", true));
+  CHECK_FALSE(is_same_origin("http://gw.example", "gw.example", true));
+  CHECK_FALSE(is_same_origin("http://gw.example:8443", "gw.example:8443", true));
 }
 
 TEST_CASE("other pages are of other origins") {
@@ -21,12 +27,12 @@ TEST_CASE("other pages are of other origins") {
         "http://127.0.0.1:8080 http://a", "http://a@127.0.0.1:8080", "http://127.0.0.1:8080/", "file://", "file:///x",
         "://127.0.0.1:8080", "http://", "http://*", "chrome-extension://127.0.0.1:8080"}) {
     INFO(origin);
-    CHECK_FALSE(is_same_origin(origin, host));
+    CHECK_FALSE(is_same_origin(origin, host, false));
     CHECK_FALSE(is_origin_listed(origin, {}));
   }
-  CHECK_FALSE(is_same_origin("http://", ""));
-  CHECK_FALSE(is_same_origin("null", "null"));
-  CHECK_FALSE(is_same_origin("https://gw.example", "gw.example:80"));
+  CHECK_FALSE(is_same_origin("http://", "", false));
+  CHECK_FALSE(is_same_origin("null", "null", false));
+  CHECK_FALSE(is_same_origin("https://gw.example", "gw.example:80", false));
 }
 
 TEST_CASE("origins fit their patterns, and no others do") {

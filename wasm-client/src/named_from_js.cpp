@@ -8,7 +8,7 @@ bool FromJs::read_named(const FieldPath& path, const JsValue& js, const TypeDefi
   const std::string_view type_name = type.qualified_name;
   const auto* entity = types_.find_entity(type_name);
   if (!entity || entity->kind == EntityKind::object)
-    return fail(ErrorCode::data_type_error, path, quoted(type_name) + (entity ? " is an object" : " is not known"));
+    return fail(ErrorCode::data_type_error, path, quote(type_name) + (entity ? " is an object" : " is not known"));
   if (entity->kind == EntityKind::structure) {
     if (js.is_nullish()) return true;
     Structure structure;

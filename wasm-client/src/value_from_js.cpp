@@ -137,7 +137,7 @@ bool FromJs::read_enum(const FieldPath& path, const JsValue& js, const TypeDefin
           out = value.value;
           return true;
         }
-    return fail(ErrorCode::data_type_mismatch, path, quoted(name) + " is no value of " + type.qualified_name);
+    return fail(ErrorCode::data_type_mismatch, path, quote(name) + " is no value of " + type.qualified_name);
   }
   Scalar scalar;
   if (!read_scalar(path, js, DataType::int32_t, scalar)) return false;
@@ -210,7 +210,7 @@ bool FromJs::read_map_int32(const FieldPath& path, const JsValue& js, Value& out
       if (!read_text(path, key, text)) return false;
       const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
       if (error != std::errc() || end != text.data() + text.size() || std::to_string(number) != text)
-        return fail(ErrorCode::data_type_mismatch, path, "has the key " + quoted(text) + ", expected an int32");
+        return fail(ErrorCode::data_type_mismatch, path, "has the key " + quote(text) + ", expected an int32");
     } else {
       Scalar scalar;
       if (!read_scalar(path, key, DataType::int32_t, scalar)) return false;

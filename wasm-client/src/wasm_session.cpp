@@ -430,8 +430,8 @@ std::optional<WasmSession::Target> WasmSession::find_target(const JsValue& path,
   if (session_.state() != ClientState::connected)
     error_ = make_error(ErrorCode::connection_error, "the session is not connected");
   else
-    error_ = make_error(ErrorCode::object_not_found, "object " + quoted(target.path) + " with member " +
-                                                         quoted(target.member) + " is not known (any more)");
+    error_ = make_error(ErrorCode::object_not_found, "object " + quote(target.path) + " with member " +
+                                                         quote(target.member) + " is not known (any more)");
   return std::nullopt;
 }
 

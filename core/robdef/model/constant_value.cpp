@@ -85,7 +85,7 @@ class ValueReader {
   bool fail_here(std::string_view expected) {
     const auto end = std::min(position_ + 1, text_.size());
     const auto found =
-        position_ < text_.size() ? quoted(text_.substr(position_, 1)) : std::string("the end of the value");
+        position_ < text_.size() ? quote(text_.substr(position_, 1)) : std::string("the end of the value");
     return fail(position_, end, "constant-invalid", "found " + found + ", expected " + std::string(expected));
   }
   void relax(std::size_t from, std::size_t to, std::string_view code, std::string message) {
@@ -105,21 +105,20 @@ ConstantValue ValueReader::read() {
   if (type_.name == "structure" || (!is_struct && !is_string &&
                                     (!is_numeric(type_.type) || type_.type == DataType::bool_t ||
                                      type_.type == DataType::cdouble_t || type_.type == DataType::csingle_t))) {
-    fail(
-        0, 0, "constant-invalid",
-        "a constant cannot have the type " + quoted(format_type(type_)) + ", expected a number type, string or struct");
+    fail(0, 0, "constant-invalid",
+         "a constant cannot have the type " + quote(format_type(type_)) + ", expected a number type, string or struct");
     return value;
   }
   const bool may_be_array = !is_struct && !is_string;
   if (type_.array == ArrayKind::multidim || type_.array == ArrayKind::fixed_multidim ||
       (type_.array != ArrayKind::none && !may_be_array)) {
-    fail(0, 0, "constant-invalid",
-         "a constant cannot have the array type " + quoted(format_type(type_)) +
-             ", expected numbers in [], [n] or [n-]");
+    fail(
+        0, 0, "constant-invalid",
+        "a constant cannot have the array type " + quote(format_type(type_)) + ", expected numbers in [], [n] or [n-]");
     return value;
   }
   if (type_.container != ContainerKind::none) {
-    const auto message = "a constant cannot have the container type " + quoted(format_type(type_));
+    const auto message = "a constant cannot have the container type " + quote(format_type(type_));
     if (may_be_array) {
       fail(0, 0, "constant-invalid", message);
       return value;
@@ -180,7 +179,7 @@ void ValueReader::check_count(std::size_t count) {
 
 bool ValueReader::read_number(std::size_t from, std::size_t to, ConstantValue& out) {
   const auto text = text_.substr(from, to - from);
-  const auto found = "found " + (text.empty() ? std::string("nothing") : quoted(text));
+  const auto found = "found " + (text.empty() ? std::string("nothing") : quote(text));
   if (is_real()) {
     if (!is_float_literal(text)) return fail(from, to, "constant-invalid", found + ", expected a decimal number");
     const double value = parse_float_literal(text, type_.type == DataType::single_t);
@@ -248,7 +247,7 @@ bool ValueReader::read_escape(std::string& out) {
   const auto from = position_;
   const auto fail_escape = [&] {
     return fail(from, std::min(from + 2, text_.size()), "constant-invalid",
-                "found the escape " + quoted(text_.substr(from, 2)) +
+                "found the escape " + quote(text_.substr(from, 2)) +
                     R"(, expected one of \" \\ \/ \b \f \n \r \t or \u with four hex digits)");
   };
   if (from + 1 >= text_.size()) return fail_escape();
@@ -289,10 +288,10 @@ bool ValueReader::read_structure(std::vector<ConstantField>& out) {
     const auto name = word();
     if (name.empty()) return fail_here("the name of a field");
     if (!is_name(name)) {
-      return fail(from, position_, "name-invalid", "found " + quoted(name) + ", expected the name of a field");
+      return fail(from, position_, "name-invalid", "found " + quote(name) + ", expected the name of a field");
     }
     if (!names.insert(name).second) {
-      relax(from, position_, "duplicate-name", "found the field " + quoted(name) + " twice, expected it once");
+      relax(from, position_, "duplicate-name", "found the field " + quote(name) + " twice, expected it once");
     }
     skip_blanks();
     if (!accept(':')) return fail_here("':' after the field name");

@@ -11,7 +11,7 @@ namespace {
 
 Error version_error(std::string_view text) {
   return make_error(ErrorCode::service_definition_error,
-                    "version: found " + quoted(text) + ", expected two to four numbers joined by dots, such as 0.10");
+                    "version: found " + quote(text) + ", expected two to four numbers joined by dots, such as 0.10");
 }
 
 }  // namespace

@@ -115,10 +115,10 @@ void DefinitionParser::parse_end(const LogicalLine& line, std::string_view keywo
   const bool may_have_word = !stdver_ || *stdver_ < first_without_options;
   if (!may_have_word) {
     reader.fail_at(start, reader.position(), "end-word",
-                   "found " + quoted(word) + " after 'end', expected nothing: from stdver 0.9.2 on it stands alone");
+                   "found " + quote(word) + " after 'end', expected nothing: from stdver 0.9.2 on it stands alone");
   } else if (word != keyword) {
     reader.fail_at(start, reader.position(), "end-word",
-                   "found " + quoted(word) + " after 'end', expected nothing or " + quoted(keyword));
+                   "found " + quote(word) + " after 'end', expected nothing or " + quote(keyword));
   } else {
     reader.expect_end();
   }
@@ -131,7 +131,7 @@ void DefinitionParser::parse_implements(StatementReader& reader, EntityDefinitio
   const auto name = reader.token();
   if (!is_qualified_name(name)) {
     reader.fail_at(start, reader.position(), "syntax",
-                   "found " + quoted(name) + ", expected the name of an object type");
+                   "found " + quote(name) + ", expected the name of an object type");
     return;
   }
   if (reader.expect_end()) entity.implements.push_back({std::string(name), {}, reader.line().line()});
@@ -155,14 +155,14 @@ void DefinitionParser::parse_body_line(LogicalLine line, EntityDefinition& entit
   const bool is_implements = keyword == "implements" && is_object;
   if ((keyword == "constant" || is_implements) && !entity.members.empty()) {
     reader.fail_at(start, reader.position(), "order",
-                   "found " + quoted(keyword) + " after a member, expected it before the first one");
+                   "found " + quote(keyword) + " after a member, expected it before the first one");
   }
   if (is_implements) return parse_implements(reader, entity);
   if (keyword == "constant") return parse_constant_statement(reader, entity.constants);
   if (!kind || (*kind == MemberKind::field) == is_object) {
     documentation_.drop();
     reader.fail_at(start, reader.position(), "syntax",
-                   "found " + quoted(keyword) +
+                   "found " + quote(keyword) +
                        (is_object ? ", expected a member: property, function, event, objref, pipe, callback, wire, "
                                     "memory; or implements, constant, option, end"
                                   : ", expected field, constant, option or end"));

@@ -66,7 +66,7 @@ void DefinitionParser::parse_top_level(LogicalLine line) {
   if (!has_service_ && keyword != "service") {
     has_service_ = true;
     reader.fail_at(start, reader.position(), "no-service",
-                   "found " + quoted(keyword) + ", expected 'service' and the name of the service first");
+                   "found " + quote(keyword) + ", expected 'service' and the name of the service first");
   }
   if (keyword == "service") return parse_service(reader);
   if (keyword == "option") {
@@ -87,7 +87,7 @@ void DefinitionParser::parse_top_level(LogicalLine line) {
   }
   documentation_.drop();
   reader.fail_at(start, reader.position(), "syntax",
-                 "found " + quoted(keyword) +
+                 "found " + quote(keyword) +
                      ", expected a statement: stdver, import, using, option, exception, constant, enum, struct, pod, "
                      "namedarray or object");
 }
@@ -100,7 +100,7 @@ bool DefinitionParser::check_order(StatementReader& reader, std::string_view key
   constexpr std::string_view names[] = {
       "service", "stdver", "import", "using", "exception, constant and enum", "struct, pod, namedarray and object"};
   return reader.fail_at(reader.position() - keyword.size(), reader.position(), "order",
-                        "found " + quoted(keyword) + " after " + std::string(names[static_cast<int>(group_)]) +
+                        "found " + quote(keyword) + " after " + std::string(names[static_cast<int>(group_)]) +
                             ", expected it before them");
 }
 
@@ -122,7 +122,7 @@ void DefinitionParser::parse_service(StatementReader& reader) {
   const auto name = reader.token();
   if (!is_qualified_name(name)) {
     reader.fail_at(start, reader.position(), "syntax",
-                   "found " + quoted(name) + ", expected the name of the service: names joined by dots");
+                   "found " + quote(name) + ", expected the name of the service: names joined by dots");
     return;
   }
   if (!reader.expect_end()) return;
@@ -148,7 +148,7 @@ void DefinitionParser::parse_stdver(StatementReader& reader) {
   const auto version = parse_version(text);
   if (!version || *version < first_stdver) {
     reader.fail_at(start, end, "version-format",
-                   "found " + quoted(text) + ", expected a version of 0.9 or more, such as 0.10");
+                   "found " + quote(text) + ", expected a version of 0.9 or more, such as 0.10");
     return;
   }
   check_version(reader, start, *version);
@@ -210,7 +210,7 @@ void DefinitionParser::parse_option_version(StatementReader& reader, std::string
   }
   const auto version = parse_version(value);
   if (!version) {
-    reader.fail_at(from, to, "version-format", "found " + quoted(value) + ", expected a version, such as 0.8");
+    reader.fail_at(from, to, "version-format", "found " + quote(value) + ", expected a version, such as 0.8");
     return;
   }
   if (stdver_ || option_version_) {
@@ -228,7 +228,7 @@ void DefinitionParser::parse_import(StatementReader& reader) {
   const auto start = reader.position();
   const auto name = reader.token();
   if (!is_qualified_name(name)) {
-    reader.fail_at(start, reader.position(), "syntax", "found " + quoted(name) + ", expected the name of a service");
+    reader.fail_at(start, reader.position(), "syntax", "found " + quote(name) + ", expected the name of a service");
     return;
   }
   if (reader.expect_end()) definition_.imports.push_back({std::string(name), reader.line().line()});
@@ -241,7 +241,7 @@ void DefinitionParser::parse_using(StatementReader& reader) {
   const auto name = reader.token();
   if (!is_qualified_name(name) || split_qualified(name).service.empty()) {
     reader.fail_at(start, reader.position(), "syntax",
-                   "found " + quoted(name) + ", expected the qualified name of a type, such as com.example.Pose");
+                   "found " + quote(name) + ", expected the qualified name of a type, such as com.example.Pose");
     return;
   }
   UsingDefinition alias{std::string(name), std::string(split_qualified(name).name), reader.line().line()};

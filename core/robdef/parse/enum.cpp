@@ -17,13 +17,13 @@ bool read_explicit_value(StatementReader& reader, EnumValueDefinition& out) {
   IntegerLiteral literal;
   if (!parse_integer_literal(text, literal)) {
     return reader.fail_at(start, reader.position(), "enum-invalid",
-                          "found " + (text.empty() ? std::string("no value") : quoted(text)) +
+                          "found " + (text.empty() ? std::string("no value") : quote(text)) +
                               ", expected a whole number such as -5 or 0x1f");
   }
   const std::uint64_t limit = literal.is_negative ? 0x80000000u : 0x7fffffffu;
   if (literal.is_too_large || literal.magnitude > limit) {
     return reader.fail_at(start, reader.position(), "enum-invalid",
-                          "found " + quoted(text) + ", expected -2147483648 to 2147483647");
+                          "found " + quote(text) + ", expected -2147483648 to 2147483647");
   }
   const auto magnitude = static_cast<std::int64_t>(literal.magnitude);
   out.value = static_cast<std::int32_t>(literal.is_negative ? -magnitude : magnitude);
@@ -57,13 +57,13 @@ void EnumReader::count_on(StatementReader& reader, std::size_t start, std::size_
   if (out_->values.empty()) {
     has_bad_count_ = true;
     reader.fail_at(start, end, "enum-invalid",
-                   "found no value for " + quoted(item.name) + ", expected one: it is the first");
+                   "found no value for " + quote(item.name) + ", expected one: it is the first");
     return;
   }
   const auto& previous = out_->values.back();
   if (previous.value == std::numeric_limits<std::int32_t>::max()) {
     has_bad_count_ = true;
-    reader.fail_at(start, end, "enum-invalid", "the value of " + quoted(item.name) + " would be above 2147483647");
+    reader.fail_at(start, end, "enum-invalid", "the value of " + quote(item.name) + " would be above 2147483647");
     return;
   }
   item.value = previous.value + 1;

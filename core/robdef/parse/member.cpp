@@ -17,7 +17,7 @@ bool parse_parameter(StatementReader& reader, ParameterDefinition& out) {
   if (!reader.expect_word("the name of the parameter", out.name)) return false;
   if (!is_name(out.name)) {
     reader.reporter().relaxed("name-invalid", reader.span(start, reader.position()),
-                              "found " + quoted(out.name) +
+                              "found " + quote(out.name) +
                                   ", expected the name of the parameter: a letter, then letters, digits and inner '_'");
   }
   return true;
@@ -51,7 +51,7 @@ bool parse_modifier_arguments(StatementReader& reader, Modifier& out) {
     const auto argument = reader.text(start, end);
     if (!is_number_literal(argument) && !is_name(argument)) {
       return reader.fail_at(start, end, "syntax",
-                            "found " + (argument.empty() ? std::string("no argument") : quoted(argument)) +
+                            "found " + (argument.empty() ? std::string("no argument") : quote(argument)) +
                                 ", expected a number or the name of a constant");
     }
     out.arguments.emplace_back(argument);
@@ -76,7 +76,7 @@ bool parse_modifier(StatementReader& reader, Modifier& out) {
   if (!is_name(word)) {
     if (word.empty()) return reader.fail("a modifier");
     return reader.fail_at(start, reader.position(), "syntax",
-                          "found " + quoted(word) + ", expected the name of a modifier");
+                          "found " + quote(word) + ", expected the name of a modifier");
   }
   out.name = word;
   out.text = word;
@@ -141,7 +141,7 @@ bool parse_constant(StatementReader& reader, bool is_option, ConstantDefinition&
     for (auto& c : out.name) c = c == '.' ? '_' : c;
     const bool is_compat = reader.reporter().is_compat();
     reader.reporter().relaxed(is_compat ? "legacy-syntax" : "name-invalid", reader.span(name_start, reader.position()),
-                              "found the name " + quoted(name) + " with dots, expected " + quoted(out.name));
+                              "found the name " + quote(name) + " with dots, expected " + quote(out.name));
   }
   if (!reader.expect_blank("the value of the constant")) return false;
   std::size_t value_start = 0;
@@ -149,7 +149,7 @@ bool parse_constant(StatementReader& reader, bool is_option, ConstantDefinition&
   if (is_option && !out.type.name.empty()) {
     return reader.fail_at(
         type_start, type_end, "constant-invalid",
-        "found " + quoted(out.type.name) + ", expected a number type or string after 'option constant'");
+        "found " + quote(out.type.name) + ", expected a number type or string after 'option constant'");
   }
   std::vector<ConstantIssue> issues;
   read_constant_value(out.type, out.value_text, issues);
@@ -158,7 +158,7 @@ bool parse_constant(StatementReader& reader, bool is_option, ConstantDefinition&
     const bool is_about_type = issue.from == 0 && issue.to == 0;
     const auto span = is_about_type ? reader.span(type_start, type_end)
                                     : reader.span(value_start + issue.from, value_start + issue.to);
-    auto message = "constant " + quoted(out.name) + ": " + issue.message;
+    auto message = "constant " + quote(out.name) + ": " + issue.message;
     if (issue.is_relaxed) {
       reader.reporter().relaxed(issue.code, span, std::move(message));
     } else {
@@ -169,7 +169,7 @@ bool parse_constant(StatementReader& reader, bool is_option, ConstantDefinition&
   if (is_good && (out.type.type == DataType::int8_t || out.type.type == DataType::uint8_t)) {
     reader.reporter().warning(
         "interop", reader.span(type_start, type_end),
-        "constant " + quoted(out.name) + ": existing peers read 8-bit constants as characters; prefer a wider type");
+        "constant " + quote(out.name) + ": existing peers read 8-bit constants as characters; prefer a wider type");
   }
   return is_good;
 }

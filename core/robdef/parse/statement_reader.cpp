@@ -73,7 +73,7 @@ bool StatementReader::fail(std::string_view expected) {
     read_while(text_, end, is_word_character);
     if (end == position_) ++end;
   }
-  const auto found = is_end() ? std::string("the end of the statement") : quoted(text(position_, end));
+  const auto found = is_end() ? std::string("the end of the statement") : quote(text(position_, end));
   return fail_at(position_, end, "syntax", "found " + found + ", expected " + std::string(expected));
 }
 

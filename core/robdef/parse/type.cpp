@@ -25,7 +25,7 @@ bool parse_size(StatementReader& reader, std::int32_t& out) {
   if (is_too_large) {
     return reader.fail_at(
         start, reader.position(), "array-size",
-        "found the size " + quoted(reader.text(start, reader.position())) + ", expected at most 2147483647");
+        "found the size " + quote(reader.text(start, reader.position())) + ", expected at most 2147483647");
   }
   out = static_cast<std::int32_t>(value);
   return true;
@@ -47,7 +47,7 @@ void check_zero_sizes(StatementReader& reader, std::size_t start, TypeDefinition
   for (const auto size : out.sizes) has_zero = has_zero || size == 0;
   if (!has_zero) return;
   const auto span = reader.span(start, reader.position());
-  const auto found = "found the array size 0 in " + quoted(reader.text(start, reader.position()));
+  const auto found = "found the array size 0 in " + quote(reader.text(start, reader.position()));
   if (out.array == ArrayKind::max) {
     reader.reporter().relaxed("array-size", span, found + ", expected [] for any length");
     out.array = ArrayKind::variable;
@@ -90,7 +90,7 @@ bool parse_container(StatementReader& reader, TypeDefinition& out) {
   if (word == "generator") out.container = ContainerKind::generator;
   if (out.container != ContainerKind::none && reader.accept('}')) return true;
   return reader.fail_at(start, reader.position(), "syntax",
-                        "found " + quoted(reader.text(start, reader.position() + 1)) +
+                        "found " + quote(reader.text(start, reader.position() + 1)) +
                             ", expected a container: {list}, {int32}, {string} or {generator}");
 }
 
@@ -102,8 +102,7 @@ bool parse_type(StatementReader& reader, TypeDefinition& out) {
   const auto base = reader.dotted_word();
   if (base.empty()) return reader.fail("a type");
   if (!is_qualified_name(base)) {
-    return reader.fail_at(start, reader.position(), "syntax",
-                          "found " + quoted(base) + ", expected the name of a type");
+    return reader.fail_at(start, reader.position(), "syntax", "found " + quote(base) + ", expected the name of a type");
   }
   out.type = builtin_type(base);
   if (out.type == DataType::namedtype_t) out.name = base;

@@ -73,7 +73,7 @@ void ImplementsCheck::resolve(ObjectNode& node) {
     if (found.type == DataType::void_t) continue;
     if (found.type != DataType::object_t) {
       node.scope->error("implements-unknown", item.line, item.name,
-                        "found " + quoted(item.name) + " after implements, expected an object type");
+                        "found " + quote(item.name) + " after implements, expected an object type");
       continue;
     }
     if (!seen.insert(item.qualified_name).second) {
@@ -89,11 +89,11 @@ void ImplementsCheck::report_cycles() {
   for (const auto& cycle : find_cycles(graph_)) {
     const auto& first = nodes_[cycle.front()];
     first.scope->error("implements-cycle", first.object->line, first.object->name,
-                       "the object " + quoted(first.object->name) + " implements itself");
+                       "the object " + quote(first.object->name) + " implements itself");
     for (const auto member : cycle) {
       nodes_[member].is_cyclic = true;
       first.scope->reporter.note(nodes_[member].object->line,
-                                 quoted(nodes_[member].object->name) + " is part of the cycle");
+                                 quote(nodes_[member].object->name) + " is part of the cycle");
     }
   }
 }
@@ -143,9 +143,9 @@ void ImplementsCheck::check_bases(const ObjectNode& node, const ObjectNode& base
     if (own_bases.contains(item->qualified_name)) continue;
     if (++missing > max_missing_members) return;
     node.scope->error("implements-missing", node.object->line, node.object->name,
-                      quoted(node.object->name) + " implements " + quoted(implements.name) + ", which implements " +
-                          quoted(item->qualified_name) + ": expected 'implements' for it here too");
-    node.scope->reporter.note(implements.line, quoted(implements.name) + " is implemented here");
+                      quote(node.object->name) + " implements " + quote(implements.name) + ", which implements " +
+                          quote(item->qualified_name) + ": expected 'implements' for it here too");
+    node.scope->reporter.note(implements.line, quote(implements.name) + " is implemented here");
   }
 }
 
@@ -159,19 +159,19 @@ void ImplementsCheck::check_members(const ObjectNode& node, const ObjectNode& ba
       const auto what = difference(*own->second, *member);
       if (what.empty()) continue;
       node.scope->error("implements-mismatch", own->second->line, member->name,
-                        std::string(member_kind_name(own->second->kind)) + ' ' + quoted(member->name) +
-                            " differs from that of " + quoted(implements.name) + " in " + std::string(what) +
+                        std::string(member_kind_name(own->second->kind)) + ' ' + quote(member->name) +
+                            " differs from that of " + quote(implements.name) + " in " + std::string(what) +
                             ", expected them equal");
       node.scope->reporter.note(
           base.scope == node.scope ? member->line : 0,
-          "the member of " + quoted(implements.qualified_name) + ", line " + std::to_string(member->line));
+          "the member of " + quote(implements.qualified_name) + ", line " + std::to_string(member->line));
       continue;
     }
     if (++missing > max_missing_members) return;
     node.scope->error("implements-missing", node.object->line, node.object->name,
-                      quoted(node.object->name) + " implements " + quoted(implements.name) + " but lacks its " +
-                          std::string(member_kind_name(member->kind)) + ' ' + quoted(member->name));
-    node.scope->reporter.note(implements.line, quoted(implements.name) + " is implemented here");
+                      quote(node.object->name) + " implements " + quote(implements.name) + " but lacks its " +
+                          std::string(member_kind_name(member->kind)) + ' ' + quote(member->name));
+    node.scope->reporter.note(implements.line, quote(implements.name) + " is implemented here");
   }
 }
 

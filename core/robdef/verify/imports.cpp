@@ -15,13 +15,12 @@ void verify_import(VerifyScope& scope, const ImportDefinition& import,
   const auto found = services.find(import.name);
   auto* const target = found == services.end() ? nullptr : found->second;
   if (!scope.imports.emplace(import.name, target).second) {
-    scope.warning("duplicate-import", import.line, import.name,
-                  "found the import of " + quoted(import.name) + " again");
+    scope.warning("duplicate-import", import.line, import.name, "found the import of " + quote(import.name) + " again");
     return;
   }
   if (target == nullptr) {
     scope.error("import-missing", import.line, import.name,
-                "found the import of " + quoted(import.name) + ", but no such definition was given");
+                "found the import of " + quote(import.name) + ", but no such definition was given");
     return;
   }
   const auto& own = scope.definition->version;
@@ -29,11 +28,11 @@ void verify_import(VerifyScope& scope, const ImportDefinition& import,
   if (own.is_unspecified()) return;
   if (other.is_unspecified()) {
     scope.error("import-version", import.line, import.name,
-                "found the import of " + quoted(import.name) + ", which has no version, expected one of at most " +
+                "found the import of " + quote(import.name) + ", which has no version, expected one of at most " +
                     format_version(own));
   } else if (other > own) {
     scope.error("import-version", import.line, import.name,
-                "found the import of " + quoted(import.name) + " with version " + format_version(other) +
+                "found the import of " + quote(import.name) + " with version " + format_version(other) +
                     ", expected at most " + format_version(own));
   }
 }
@@ -62,12 +61,11 @@ void verify_import_cycles(VerifySet& set) {
     auto& first = *scopes[cycle.front()];
     const auto* const import = next_import(cycle.front());
     if (import == nullptr) continue;
-    first.error(
-        "import-cycle", import->line, import->name,
-        "found a cycle of imports: " + quoted(import->name) + " leads back to " + quoted(first.definition->name));
+    first.error("import-cycle", import->line, import->name,
+                "found a cycle of imports: " + quote(import->name) + " leads back to " + quote(first.definition->name));
     for (const auto node : cycle) {
       if (const auto* const edge = next_import(node)) {
-        first.reporter.note(edge->line, quoted(scopes[node]->definition->name) + " imports " + quoted(edge->name));
+        first.reporter.note(edge->line, quote(scopes[node]->definition->name) + " imports " + quote(edge->name));
       }
     }
   }
@@ -93,7 +91,7 @@ void verify_struct_constants(VerifyScope& scope, const std::vector<ConstantDefin
     if (constant.type.name != "struct" && !is_known_entity(scope, constant.type.name)) {
       scope.warning(
           "type-unknown", constant.line, constant.type.name,
-          "the struct constant " + quoted(constant.name) + " names the unknown type " + quoted(constant.type.name));
+          "the struct constant " + quote(constant.name) + " names the unknown type " + quote(constant.type.name));
     }
     std::vector<ConstantIssue> issues;
     const auto value = read_constant_value(constant.type, constant.value_text, issues);
@@ -102,12 +100,12 @@ void verify_struct_constants(VerifyScope& scope, const std::vector<ConstantDefin
     for (const auto& field : *fields) {
       if (is_reserved_name(field.name)) {
         scope.error("name-reserved", constant.line, field.name,
-                    "found the reserved field name " + quoted(field.name) + ", expected another");
+                    "found the reserved field name " + quote(field.name) + ", expected another");
       }
       const auto target = index.find(field.constant);
       if (target == index.end()) {
         scope.error("constant-invalid", constant.line, field.constant,
-                    "the struct constant " + quoted(constant.name) + " refers to " + quoted(field.constant) +
+                    "the struct constant " + quote(constant.name) + " refers to " + quote(field.constant) +
                         ", which is no constant of the same scope",
                     field.name);
         continue;
@@ -119,9 +117,9 @@ void verify_struct_constants(VerifyScope& scope, const std::vector<ConstantDefin
   if (!has_edges) return;
   for (const auto& cycle : find_cycles(graph)) {
     const auto& first = constants[cycle.front()];
-    scope.error("recursion", first.line, first.name, "the struct constant " + quoted(first.name) + " refers to itself");
+    scope.error("recursion", first.line, first.name, "the struct constant " + quote(first.name) + " refers to itself");
     for (const auto node : cycle) {
-      scope.reporter.note(constants[node].line, quoted(constants[node].name) + " is part of the cycle");
+      scope.reporter.note(constants[node].line, quote(constants[node].name) + " is part of the cycle");
     }
   }
 }
@@ -134,7 +132,7 @@ void verify_imports(VerifySet& set) {
     const auto& name = scope.definition->name;
     if (name.empty() || services.emplace(name, &scope).second) continue;
     scope.error("duplicate-name", scope.definition->line, name,
-                "found a second definition named " + quoted(name) + ", expected one");
+                "found a second definition named " + quote(name) + ", expected one");
   }
   for (auto& scope : set) {
     for (const auto& import : scope.definition->imports) verify_import(scope, import, services);
@@ -148,16 +146,15 @@ void verify_aliases(VerifyScope& scope) {
     const auto import = scope.imports.find(target.service);
     if (import == scope.imports.end()) {
       scope.error("alias-invalid", item.line, item.qualified_name,
-                  "found " + quoted(item.qualified_name) + ", but " + quoted(target.service) + " is not imported");
+                  "found " + quote(item.qualified_name) + ", but " + quote(target.service) + " is not imported");
       continue;
     }
     if (import->second == nullptr) continue;
     const auto& other = *import->second;
     if (other.entities.contains(target.name) || other.enums.contains(target.name) || other.others.contains(target.name))
       continue;
-    scope.error(
-        "alias-invalid", item.line, item.qualified_name,
-        "found " + quoted(item.qualified_name) + ", but " + quoted(target.service) + " has nothing of this name");
+    scope.error("alias-invalid", item.line, item.qualified_name,
+                "found " + quote(item.qualified_name) + ", but " + quote(target.service) + " has nothing of this name");
   }
 }
 

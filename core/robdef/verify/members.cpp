@@ -39,27 +39,27 @@ bool is_known_modifier(const MemberDefinition& member, const Modifier& modifier)
 using ConstantNames = std::unordered_set<std::string_view>;
 
 void verify_modifiers(VerifyScope& scope, const MemberDefinition& member, const ConstantNames& constants) {
-  const auto place = std::string(member_kind_name(member.kind)) + ' ' + quoted(member.name) + ": ";
+  const auto place = std::string(member_kind_name(member.kind)) + ' ' + quote(member.name) + ": ";
   std::unordered_set<std::string_view> names;
   for (const auto& modifier : member.modifiers) {
     const auto warn = [&](std::string_view code, std::string_view word, std::string message) {
       scope.warning(code, member.line, word, place + message, member.name);
     };
     if (!is_known_modifier(member, modifier)) {
-      warn("unknown-modifier", modifier.name, "the modifier " + quoted(modifier.text) + " has no meaning here");
+      warn("unknown-modifier", modifier.name, "the modifier " + quote(modifier.text) + " has no meaning here");
     }
     if (!names.insert(modifier.name).second) {
-      warn("modifier-combination", modifier.name, "the modifier " + quoted(modifier.name) + " is repeated");
+      warn("modifier-combination", modifier.name, "the modifier " + quote(modifier.name) + " is repeated");
     }
     for (const auto& argument : modifier.arguments) {
       if (!is_name(argument) || constants.contains(argument)) continue;
-      warn("modifier-argument", argument, "the argument " + quoted(argument) + " is no constant of the object");
+      warn("modifier-argument", argument, "the argument " + quote(argument) + " is no constant of the object");
     }
   }
   for (const auto& [winner, loser] : {std::pair("readonly", "writeonly"), std::pair("nolock", "nolockread")}) {
     if (!names.contains(winner) || !names.contains(loser)) continue;
     scope.warning("modifier-combination", member.line, loser,
-                  place + "found both " + quoted(winner) + " and " + quoted(loser) + "; " + quoted(winner) + " wins",
+                  place + "found both " + quote(winner) + " and " + quote(loser) + "; " + quote(winner) + " wins",
                   member.name);
   }
 }
@@ -88,7 +88,7 @@ void check_call_type(VerifyScope& scope, const TypeDefinition& type, bool may_ge
 void verify_parameter_names(VerifyScope& scope, const MemberDefinition& member, std::string_view place) {
   std::unordered_set<std::string_view> names;
   for (const auto& parameter : member.parameters) {
-    const auto where = std::string(place) + ", parameter " + quoted(parameter.name) + ": ";
+    const auto where = std::string(place) + ", parameter " + quote(parameter.name) + ": ";
     if (is_reserved_name(parameter.name)) {
       scope.warning("reserved-parameter", member.line, parameter.name, where + "the name is reserved", member.name);
     }
@@ -105,7 +105,7 @@ void verify_parameter_names(VerifyScope& scope, const MemberDefinition& member, 
 }
 
 void verify_call(VerifyScope& scope, MemberDefinition& member) {
-  const auto place = std::string(member_kind_name(member.kind)) + ' ' + quoted(member.name);
+  const auto place = std::string(member_kind_name(member.kind)) + ' ' + quote(member.name);
   const bool may_generate = member.kind == MemberKind::function;
   const bool has_generator =
       may_generate && !member.parameters.empty() && is_generator_type(member.parameters.back().type);
@@ -113,7 +113,7 @@ void verify_call(VerifyScope& scope, MemberDefinition& member) {
   for (auto& parameter : member.parameters) {
     if (!resolve_type(scope, parameter.type, member.line)) continue;
     const bool is_last = &parameter == &member.parameters.back();
-    const auto where = place + ", parameter " + quoted(parameter.name);
+    const auto where = place + ", parameter " + quote(parameter.name);
     if (may_generate && !is_last && is_generator_type(parameter.type)) {
       scope.error("generator", member.line, parameter.name,
                   where + ": found a generator, expected it as the last parameter only", member.name);
@@ -126,7 +126,7 @@ void verify_call(VerifyScope& scope, MemberDefinition& member) {
   const auto where = place + ", return type";
   if (type.type == DataType::void_t && !is_generator_type(type)) {
     if (type.array == ArrayKind::none && type.container == ContainerKind::none) return;
-    const auto message = where + ": found " + quoted(format_type(type)) + ", expected void alone";
+    const auto message = where + ": found " + quote(format_type(type)) + ", expected void alone";
     if (has_generator) {
       scope.relaxed("type-not-allowed", member.line, "void", message);
     } else {
@@ -135,7 +135,7 @@ void verify_call(VerifyScope& scope, MemberDefinition& member) {
   } else if (has_generator && !is_generator_type(type)) {
     scope.error(
         "generator", member.line, {},
-        where + ": found " + quoted(format_type(type)) + " beside a generator parameter, expected void or a generator");
+        where + ": found " + quote(format_type(type)) + " beside a generator parameter, expected void or a generator");
   } else {
     check_call_type(scope, type, may_generate, member.line, where);
   }
@@ -144,7 +144,7 @@ void verify_call(VerifyScope& scope, MemberDefinition& member) {
 void verify_memory(VerifyScope& scope, MemberDefinition& member) {
   if (!resolve_type(scope, member.type, member.line)) return;
   const auto& type = member.type;
-  const auto found = "memory " + quoted(member.name) + ": found the type " + quoted(format_type(type)) + ", expected ";
+  const auto found = "memory " + quote(member.name) + ": found the type " + quote(format_type(type)) + ", expected ";
   const auto word = type.name.empty() ? builtin_type_word(type.type) : std::string_view(type.name);
   const bool is_allowed =
       type.name.empty() ? is_numeric(type.type) : type.type == DataType::pod_t || type.type == DataType::namedarray_t;
@@ -162,7 +162,7 @@ void verify_memory(VerifyScope& scope, MemberDefinition& member) {
 void verify_objref(VerifyScope& scope, MemberDefinition& member) {
   if (!resolve_type(scope, member.type, member.line)) return;
   const auto& type = member.type;
-  const auto found = "objref " + quoted(member.name) + ": found the type " + quoted(format_type(type)) + ", expected ";
+  const auto found = "objref " + quote(member.name) + ": found the type " + quote(format_type(type)) + ", expected ";
   const auto word = type.name.empty() ? builtin_type_word(type.type) : std::string_view(type.name);
   const bool is_object = type.name.empty() ? type.type == DataType::varobject_t : type.type == DataType::object_t;
   if (!is_object) {
@@ -195,7 +195,7 @@ void verify_member(VerifyScope& scope, MemberDefinition& member) {
     case MemberKind::wire:
       if (!resolve_type(scope, member.type, member.line)) return;
       check_value_type(scope, member.type, member.line,
-                       std::string(member_kind_name(member.kind)) + ' ' + quoted(member.name));
+                       std::string(member_kind_name(member.kind)) + ' ' + quote(member.name));
   }
 }
 

@@ -25,10 +25,10 @@ void verify_service_name(VerifyScope& scope) {
   if (name.starts_with("RobotRaconteurTestService") || name == "RobotRaconteurServiceIndex") return;
   if (!is_qualified_name(name)) {
     scope.error("name-invalid", definition.line, name,
-                "found the service name " + quoted(name) + ", expected names joined by dots");
+                "found the service name " + quote(name) + ", expected names joined by dots");
   } else if (is_reserved_name(name) || name.ends_with("_signed")) {
     scope.error("name-reserved", definition.line, name,
-                "found the reserved service name " + quoted(name) + ", expected another");
+                "found the reserved service name " + quote(name) + ", expected another");
   }
 }
 
@@ -67,18 +67,18 @@ void verify_top_level_names(VerifyScope& scope) {
 void verify_enum_values(VerifyScope& scope, const EnumDefinition& enumeration) {
   if (enumeration.values.empty()) {
     scope.warning("empty-enum", enumeration.line, enumeration.name,
-                  "the enum " + quoted(enumeration.name) + " has no values");
+                  "the enum " + quote(enumeration.name) + " has no values");
   }
-  NameSpace names(scope, "the enum " + quoted(enumeration.name));
+  NameSpace names(scope, "the enum " + quote(enumeration.name));
   std::unordered_map<std::int32_t, const EnumValueDefinition*> numbers;
   for (const auto& value : enumeration.values) {
     names.declare(value.name, value.line);
     const auto [first, is_new] = numbers.emplace(value.value, &value);
     if (is_new) continue;
     scope.error("enum-invalid", value.line, value.name,
-                "found the value " + std::to_string(value.value) + " for " + quoted(value.name) + ", but " +
-                    quoted(first->second->name) + " has it already");
-    scope.reporter.note(first->second->line, quoted(first->second->name) + " is declared here");
+                "found the value " + std::to_string(value.value) + " for " + quote(value.name) + ", but " +
+                    quote(first->second->name) + " has it already");
+    scope.reporter.note(first->second->line, quote(first->second->name) + " is declared here");
   }
 }
 
@@ -90,7 +90,7 @@ void verify_entity_names(VerifyScope& scope, const EntityDefinition& entity) {
   for (const auto& item : entity.members) names.push_back({item.name, item.line, {}});
   std::stable_sort(names.begin(), names.end(),
                    [](const TopLevelName& a, const TopLevelName& b) { return a.line < b.line; });
-  NameSpace name_space(scope, quoted(entity.name));
+  NameSpace name_space(scope, quote(entity.name));
   for (const auto& item : names) name_space.declare(item.name, item.line, item.after);
 }
 
@@ -99,24 +99,24 @@ void verify_entity_names(VerifyScope& scope, const EntityDefinition& entity) {
 void NameSpace::declare(std::string_view name, std::uint32_t line, std::string_view after) {
   if (!is_name(name)) {
     scope_->error("name-invalid", line, name,
-                  "found the name " + quoted(name) + ", expected a letter, then letters, digits and inner '_'", after);
+                  "found the name " + quote(name) + ", expected a letter, then letters, digits and inner '_'", after);
     return;
   }
   if (is_reserved_name(name)) {
-    scope_->error("name-reserved", line, name, "found the reserved name " + quoted(name) + ", expected another", after);
+    scope_->error("name-reserved", line, name, "found the reserved name " + quote(name) + ", expected another", after);
   }
   const auto [first, is_new] = lines_.emplace(name, line);
   if (!is_new) {
     scope_->error("duplicate-name", line, name,
-                  "found the name " + quoted(name) + " again in " + place_ + ", expected it once", after);
-    scope_->reporter.note(first->second, quoted(name) + " is first declared here");
+                  "found the name " + quote(name) + " again in " + place_ + ", expected it once", after);
+    scope_->reporter.note(first->second, quote(name) + " is first declared here");
     return;
   }
   const auto [same, is_alone] = folded_.emplace(to_lower(name), name);
   if (is_alone) return;
-  scope_->warning(
-      "case-clash", line, name,
-      "the names " + quoted(same->second) + " and " + quoted(name) + " in " + place_ + " differ by case only", after);
+  scope_->warning("case-clash", line, name,
+                  "the names " + quote(same->second) + " and " + quote(name) + " in " + place_ + " differ by case only",
+                  after);
 }
 
 void verify_versions(VerifyScope& scope) {

@@ -12,7 +12,7 @@ namespace rr {
 namespace {
 
 std::string field_place(const EntityDefinition& entity, const MemberDefinition& field) {
-  return "field " + quoted(field.name) + " of " + quoted(entity.name);
+  return "field " + quote(field.name) + " of " + quote(entity.name);
 }
 
 bool has_positive_sizes(const TypeDefinition& type) {
@@ -27,14 +27,14 @@ void verify_pod_field(VerifyScope& scope, const EntityDefinition& pod, const Mem
       is_named ? type.type == DataType::pod_t || type.type == DataType::namedarray_t : is_numeric(type.type);
   if (!is_allowed) {
     scope.error("pod-field", field.line, field.name,
-                place + "found the type " + quoted(format_type(type)) + ", expected numbers, a pod or a namedarray");
+                place + "found the type " + quote(format_type(type)) + ", expected numbers, a pod or a namedarray");
   } else if (type.container != ContainerKind::none) {
     scope.error("pod-field", field.line, field.name,
-                place + "found the container type " + quoted(format_type(type)) + ", expected none in a pod");
+                place + "found the container type " + quote(format_type(type)) + ", expected none in a pod");
   } else if (type.array == ArrayKind::variable || type.array == ArrayKind::multidim || !has_positive_sizes(type)) {
     scope.error(
         "pod-field", field.line, field.name,
-        place + "found the array type " + quoted(format_type(type)) + ", expected fixed or bounded sizes in a pod");
+        place + "found the array type " + quote(format_type(type)) + ", expected fixed or bounded sizes in a pod");
   }
 }
 
@@ -44,11 +44,11 @@ void verify_namedarray_field(VerifyScope& scope, const EntityDefinition& array, 
   const bool is_allowed = type.name.empty() ? is_numeric(type.type) : type.type == DataType::namedarray_t;
   if (!is_allowed) {
     scope.error("namedarray-field", field.line, field.name,
-                place + "found the type " + quoted(format_type(type)) + ", expected numbers or a namedarray");
+                place + "found the type " + quote(format_type(type)) + ", expected numbers or a namedarray");
   } else if (type.container != ContainerKind::none ||
              (type.array != ArrayKind::none && type.array != ArrayKind::fixed)) {
     scope.error("namedarray-field", field.line, field.name,
-                place + "found the type " + quoted(format_type(type)) + ", expected a scalar or [n] in a namedarray");
+                place + "found the type " + quote(format_type(type)) + ", expected a scalar or [n] in a namedarray");
   }
 }
 
@@ -85,8 +85,8 @@ void flatten_namedarray(const Node& node, const std::vector<Node>& nodes, const 
       array.namedarray_type = type;
     } else if (array.namedarray_type != type) {
       node.scope->error("namedarray-field", field.line, field.name,
-                        field_place(array, field) + ": found elements of type " + quoted(builtin_type_word(type)) +
-                            ", expected " + quoted(builtin_type_word(array.namedarray_type)) +
+                        field_place(array, field) + ": found elements of type " + quote(builtin_type_word(type)) +
+                            ", expected " + quote(builtin_type_word(array.namedarray_type)) +
                             " as in the fields before");
       break;
     }
@@ -97,17 +97,16 @@ void flatten_namedarray(const Node& node, const std::vector<Node>& nodes, const 
 void report_recursion(const std::vector<std::size_t>& cycle, const std::vector<Node>& nodes) {
   const auto& first = nodes[cycle.front()];
   first.scope->error("recursion", first.entity->line, first.entity->name,
-                     quoted(first.entity->name) + " contains itself, which a pod or namedarray cannot");
+                     quote(first.entity->name) + " contains itself, which a pod or namedarray cannot");
   for (const auto member : cycle) {
-    first.scope->reporter.note(nodes[member].entity->line,
-                               quoted(nodes[member].entity->name) + " is part of the cycle");
+    first.scope->reporter.note(nodes[member].entity->line, quote(nodes[member].entity->name) + " is part of the cycle");
   }
 }
 
 }  // namespace
 
 bool check_value_type(VerifyScope& scope, const TypeDefinition& type, std::uint32_t line, std::string_view place) {
-  const auto found = std::string(place) + ": found the type " + quoted(format_type(type));
+  const auto found = std::string(place) + ": found the type " + quote(format_type(type));
   const auto word = type.name.empty() ? builtin_type_word(type.type) : std::string_view(type.name);
   const auto refuse = [&](std::string_view code, std::string_view expected) {
     scope.error(code, line, word, found + ", expected " + std::string(expected));
@@ -161,7 +160,7 @@ void verify_fields(VerifyScope& scope) {
     }
     if (entity.kind == EntityKind::namedarray && entity.members.empty()) {
       scope.error("namedarray-field", entity.line, entity.name,
-                  "the namedarray " + quoted(entity.name) + " has no fields, expected at least one");
+                  "the namedarray " + quote(entity.name) + " has no fields, expected at least one");
     }
   }
 }
@@ -188,7 +187,7 @@ void verify_containment(VerifySet& set) {
       const auto& inner = *nodes[part->second].entity;
       if (&inner == entity || inner.name != entity->name) continue;
       scope->warning("interop", field.line, field.name,
-                     field_place(*entity, field) + ": existing peers take " + quoted(field.type.qualified_name) +
+                     field_place(*entity, field) + ": existing peers take " + quote(field.type.qualified_name) +
                          " for the type that contains it, and refuse it");
     }
   }

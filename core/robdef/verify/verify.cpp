@@ -86,15 +86,15 @@ ResolvedName resolve_name(VerifyScope& scope, std::string_view name, std::uint32
       auto found = find_in(scope, name);
       if (found.type == DataType::void_t) {
         scope.error(error_code, line, name,
-                    scope.others.contains(name) ? "found " + quoted(name) + ", which is no type, expected one"
-                                                : "found the unknown name " + quoted(name) +
-                                                      ", expected a type of this definition or an alias");
+                    scope.others.contains(name)
+                        ? "found " + quote(name) + ", which is no type, expected one"
+                        : "found the unknown name " + quote(name) + ", expected a type of this definition or an alias");
       }
       return found;
     }
   } else if (target.service == scope.definition->name) {
     auto found = find_in(scope, target.name);
-    const auto message = "found " + quoted(name) + ", expected " + quoted(target.name);
+    const auto message = "found " + quote(name) + ", expected " + quote(target.name);
     if (found.type == DataType::void_t) {
       scope.error(error_code, line, name, message + ", which does not exist either");
     } else {
@@ -107,7 +107,7 @@ ResolvedName resolve_name(VerifyScope& scope, std::string_view name, std::uint32
     // A bad alias has been reported where it is declared, a missing import where it is imported.
     if (is_alias) return {};
     scope.error(error_code, line, name,
-                "found " + quoted(name) + ", but " + quoted(target.service) + " is not imported by this definition");
+                "found " + quote(name) + ", but " + quote(target.service) + " is not imported by this definition");
     return {};
   }
   if (import->second == nullptr) return {};
@@ -115,7 +115,7 @@ ResolvedName resolve_name(VerifyScope& scope, std::string_view name, std::uint32
   const bool is_other = import->second->others.contains(target.name);
   if (found.type == DataType::void_t && (is_other || !is_alias)) {
     scope.error(error_code, line, name,
-                "found " + quoted(name) + ", but " + quoted(target.name) + " is no type of " + quoted(target.service));
+                "found " + quote(name) + ", but " + quote(target.name) + " is no type of " + quote(target.service));
   }
   return found;
 }

@@ -15,7 +15,7 @@ void ClientSession::handle_callback(const Message& message, const MessageEntry& 
   if (!member || member->kind != MemberKind::callback)
     return answer_error(
         entry,
-        {ErrorCode::member_not_found, "object type " + type->name + " has no callback " + quoted(entry.member_name)},
+        {ErrorCode::member_not_found, "object type " + type->name + " has no callback " + quote(entry.member_name)},
         now);
   if (callbacks_.size() >= options_.max_open_callbacks)
     return answer_error(entry,

@@ -68,7 +68,7 @@ void ClientSession::handle_timeout(Now now) {
   if (state_ == ClientState::closed) return;
   if (auto alive = connection_.handle_timeout(now); !alive) return fail(alive.error());
   if (state_ == ClientState::connecting && now.steady - opened_ >= options_.connect_timeout)
-    return fail(connection_error("the service " + quoted(options_.service) + " did not answer in time"));
+    return fail(connection_error("the service " + quote(options_.service) + " did not answer in time"));
   if (now.steady >= closing_deadline_) return fail(connection_error("closed by this side"));
   scan_deadlines(now);
   if (state_ == ClientState::connected && now.steady - last_sent_ >= keep_alive_period) {
@@ -115,7 +115,7 @@ void ClientSession::scan_deadlines(Now now) {
     if (const auto fetch = fetches_.extract(id)) {
       fail_fetch(fetch.mapped(), std::move(error));
     } else if (state_ == ClientState::connecting) {
-      return fail(connection_error("connect to " + quoted(options_.service) + ": " + error.message));
+      return fail(connection_error("connect to " + quote(options_.service) + ": " + error.message));
     } else {
       emit(Completed{id, std::move(error)});
     }
@@ -128,12 +128,12 @@ Result<const MemberDefinition*> ClientSession::find_member(std::string_view path
                                                            MemberKind kind) const {
   if (state_ != ClientState::connected) return not_connected();
   const auto* type = object_type(path);
-  if (!type) return make_error(ErrorCode::object_not_found, "object " + quoted(path) + " was not looked up");
+  if (!type) return make_error(ErrorCode::object_not_found, "object " + quote(path) + " was not looked up");
   const auto* definition = type->find_member(member);
   if (!definition)
-    return make_error(ErrorCode::member_not_found, "object type " + type->name + " has no member " + quoted(member));
+    return make_error(ErrorCode::member_not_found, "object type " + type->name + " has no member " + quote(member));
   if (definition->kind != kind)
-    return make_error(ErrorCode::member_not_found, "member " + quoted(member) + " is a " +
+    return make_error(ErrorCode::member_not_found, "member " + quote(member) + " is a " +
                                                        std::string(member_kind_name(definition->kind)) + ", not a " +
                                                        std::string(member_kind_name(kind)));
   return definition;
@@ -276,7 +276,7 @@ RequestId ClientSession::poke_out_value(std::string_view path, std::string_view 
 Result<> ClientSession::send_wire(std::string_view path, std::string_view member, const Value& value, Now now) {
   const auto found = wires_.find(PathMemberView{path, member});
   if (state_ == ClientState::closed || found == wires_.end() || found->second.state != WireState::connected)
-    return make_error(ErrorCode::invalid_operation, "wire " + quoted(member) + " is not connected");
+    return make_error(ErrorCode::invalid_operation, "wire " + quote(member) + " is not connected");
   if (auto allowed = check_direction(EntryType::wire_packet, *found->second.member); !allowed) return allowed;
   if (connection_.queued_bytes() >= wire_high_mark) {
     found->second.waiting = WireValue{now.utc, value};

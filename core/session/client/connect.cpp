@@ -73,7 +73,7 @@ void ClientSession::handle_connect_reply(const MessageEntry& entry, EntryType re
   const auto& message = *connection_.message();
   if (entry.error != ErrorCode::none) {
     auto error = read_error(message, entry, types_);
-    error.message = "connect to " + quoted(options_.service) + ": " + error.message;
+    error.message = "connect to " + quote(options_.service) + ": " + error.message;
     return fail(std::move(error));
   }
   switch (request) {
@@ -177,7 +177,7 @@ void ClientSession::advance_fetch(Fetch fetch, Now now) {
   if (missing == fetch.wanted.end()) return finish_fetch(std::move(fetch), now);
   if (!fetch.asked.insert(*missing).second)
     return fail_fetch(fetch, make_error(ErrorCode::service_definition_error,
-                                        "the node answered with another definition than " + quoted(*missing)));
+                                        "the node answered with another definition than " + quote(*missing)));
   if (fetch.asked.size() > max_fetched_definitions)
     return fail_fetch(
         fetch, make_error(ErrorCode::service_definition_error,
@@ -212,16 +212,16 @@ void ClientSession::finish_fetch(Fetch fetch, Now now) {
   }
   const auto* type = types_.find_entity(fetch.object_type);
   if (!type || type->kind != EntityKind::object)
-    return fail_fetch(
-        fetch, make_error(ErrorCode::service_error,
-                          "object " + quoted(fetch.path) + " has the unknown type " + quoted(fetch.object_type)));
+    return fail_fetch(fetch,
+                      make_error(ErrorCode::service_error,
+                                 "object " + quote(fetch.path) + " has the unknown type " + quote(fetch.object_type)));
   objects_.insert_or_assign(fetch.path, type);
   emit(Completed{fetch.lookup, Value(fetch.object_type)});
 }
 
 void ClientSession::fail_fetch(const Fetch& fetch, Error error) {
   if (fetch.lookup != 0) return emit(Completed{fetch.lookup, std::move(error)});
-  error.message = "connect to " + quoted(options_.service) + ": " + error.message;
+  error.message = "connect to " + quote(options_.service) + ": " + error.message;
   fail(std::move(error));
 }
 
@@ -253,8 +253,8 @@ Result<std::string> ClientSession::choose_root_type() const {
       open.push_back(types_.find_entity(base.qualified_name));
     }
   }
-  return make_error(ErrorCode::service_error, "Invalid object type: " + quoted(options_.service) + " is a " +
-                                                  root_type_ + ", which does not implement " + quoted(wanted));
+  return make_error(ErrorCode::service_error, "Invalid object type: " + quote(options_.service) + " is a " +
+                                                  root_type_ + ", which does not implement " + quote(wanted));
 }
 
 void ClientSession::become_connected(Now) {
@@ -262,8 +262,8 @@ void ClientSession::become_connected(Now) {
   if (!chosen) return fail(chosen.error());
   const auto* type = types_.find_entity(*chosen);
   if (!type || type->kind != EntityKind::object)
-    return fail(make_error(ErrorCode::service_error, "the root object of " + quoted(options_.service) +
-                                                         " has the unknown type " + quoted(*chosen)));
+    return fail(make_error(ErrorCode::service_error, "the root object of " + quote(options_.service) +
+                                                         " has the unknown type " + quote(*chosen)));
   objects_.emplace(options_.service, type);
   options_.credentials = {};  // nothing needs the secret any more
   state_ = ClientState::connected;

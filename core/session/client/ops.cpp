@@ -80,7 +80,7 @@ void ClientSession::handle_session_op_reply(const Message& message, const Messag
   const auto command = entry.member_name;
   if (text != "Continue" || (command != "MonitorEnter" && command != monitor_continue_enter))
     return emit(Completed{
-        id, protocol_error("the service answered " + quoted(command) + " with " + quoted(text) + ", expected OK")});
+        id, protocol_error("the service answered " + quote(command) + " with " + quote(text) + ", expected OK")});
   connection_.begin_message(outgoing_);
   outgoing_.begin_entry(EntryType::client_session_op_req, path, monitor_continue_enter, id);
   if (auto sent = send_outgoing(now); !sent) return emit(Completed{id, sent.error()});

@@ -58,12 +58,12 @@ Result<std::uint32_t> ClientSession::send_pipe_packet(std::string_view path, std
   if (state_ == ClientState::closed || pipe == pipes_.end() || endpoint == pipe->second.endpoints.end() ||
       endpoint->second.state() != PipeState::open)
     return make_error(ErrorCode::invalid_operation,
-                      "pipe " + quoted(member) + ": endpoint " + std::to_string(index) + " is not connected");
+                      "pipe " + quote(member) + ": endpoint " + std::to_string(index) + " is not connected");
   auto& state = endpoint->second;
   if (auto allowed = check_direction(EntryType::pipe_packet, state.member()); !allowed) return allowed.error();
   if (queued_bytes() >= options_.max_pipe_queued_bytes)
     return make_error(ErrorCode::out_of_system_resource,
-                      "pipe " + quoted(member) + ": " + std::to_string(queued_bytes()) +
+                      "pipe " + quote(member) + ": " + std::to_string(queued_bytes()) +
                           " bytes wait for the stream already; send again when they are fewer");
   connection_.begin_message(outgoing_);
   auto& entry = outgoing_.begin_entry(EntryType::pipe_packet, pipe->first.path, pipe->first.member);
@@ -117,7 +117,7 @@ Result<std::int32_t> ClientSession::open_pipe(const Message& message, const Mess
   if (!pipe || pending.is_abandoned) {
     if (pipe) pipe->endpoints.erase(*index);
     request_silent_disconnect(pending.path, *pending.member, *index, now);
-    return make_error(ErrorCode::object_not_found, "object " + quoted(pending.path) + " was replaced");
+    return make_error(ErrorCode::object_not_found, "object " + quote(pending.path) + " was replaced");
   }
   // Replies may overtake one another: the index of an endpoint that is being closed may be free again already.
   if (const auto old = pipe->endpoints.find(*index);

@@ -17,9 +17,9 @@ void LoginLimit::forget_failures(Now now) {
 
 Result<LoginLimit::Ticket> LoginLimit::begin(Now now) {
   forget_failures(now);
-  if (failures_ >= max_failures)
+  if (failures_ >= max_failures_)
     return make_error(ErrorCode::authentication_error, "too many logins have failed; try again later");
-  if (static_cast<std::size_t>(tickets_.use_count()) > max_judged_at_once)
+  if (static_cast<std::size_t>(tickets_.use_count()) > max_judged_at_once_)
     return make_error(ErrorCode::out_of_system_resource, "too many logins at once; try again later");
   return tickets_;
 }

@@ -52,9 +52,13 @@ struct SecurityPolicy {
 };
 
 /// How often a whole service lets its clients try: guessing on many connections at once is no faster, and the work of
-/// judging logins is bounded.
+/// judging logins is bounded. In front of a remote service whoever judges has limits of its own.
 class LoginLimit {
  public:
+  /// `max_failures`  in a row; one is forgotten each second.
+  explicit LoginLimit(std::size_t max_failures = 60, std::size_t max_judged_at_once = 64)
+      : max_failures_(max_failures), max_judged_at_once_(max_judged_at_once) {}
+
   /// Kept for as long as a login is being judged.
   using Ticket = std::shared_ptr<const void>;
 
@@ -63,10 +67,10 @@ class LoginLimit {
   void handle_failure(Now now);
 
  private:
-  static constexpr std::size_t max_judged_at_once = 64;
-  static constexpr std::size_t max_failures = 60;  ///< in a row; one is forgotten each second
   void forget_failures(Now now);
 
+  std::size_t max_failures_;
+  std::size_t max_judged_at_once_;
   Ticket tickets_ = std::make_shared<const char>('\0');
   std::size_t failures_ = 0;
   TimePoint forgotten_until_ = {};

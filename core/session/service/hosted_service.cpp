@@ -33,7 +33,7 @@ Result<> check_index(const MemberDefinition& objref, const std::optional<std::st
   if (!index) return make_error(ErrorCode::invalid_argument, "objref '" + objref.name + "' needs an index");
   if (by_number && !is_decimal_int32(*index))
     return make_error(ErrorCode::invalid_argument,
-                      "objref '" + objref.name + "': index " + quoted(*index) + " is not an int32");
+                      "objref '" + objref.name + "': index " + quote(*index) + " is not an int32");
   return {};
 }
 
@@ -50,11 +50,11 @@ Result<std::shared_ptr<HostedService>> HostedService::make(std::string name, std
                                                            std::vector<std::string> extra_imports) {
   if (const auto path = parse_service_path(name); !path || path->size() != 1)
     return make_error(ErrorCode::invalid_argument,
-                      "service name " + quoted(name) + ": expected letters, digits and inner underscores");
+                      "service name " + quote(name) + ": expected letters, digits and inner underscores");
   const auto* type = types->find_entity(root->type_name());
   if (!type || type->kind != EntityKind::object)
     return make_error(ErrorCode::service_definition_error,
-                      "service " + quoted(name) + ": " + quoted(root->type_name()) + " is not an object type");
+                      "service " + quote(name) + ": " + quote(root->type_name()) + " is not an object type");
   std::shared_ptr<HostedService> service(new HostedService);
   service->root_ = root;
   service->types_ = std::move(types);
@@ -92,7 +92,7 @@ Result<HostedService::Found> HostedService::find_object(std::string_view path) {
   const auto segments = parse_service_path(path);
   if (!segments) return segments.error();
   if (segments->front().name != name_)
-    return make_error(ErrorCode::object_not_found, "path " + quoted(path) + " does not begin with this service");
+    return make_error(ErrorCode::object_not_found, "path " + quote(path) + " does not begin with this service");
   Found found = objects_.find(name_)->second;
   std::size_t length = name_.size();
   for (std::size_t i = 1; i < segments->size(); ++i) {
@@ -105,16 +105,16 @@ Result<HostedService::Found> HostedService::find_object(std::string_view path) {
     }
     const auto* objref = found.type->find_member(segment.name);
     if (!objref || objref->kind != MemberKind::objref)
-      return make_error(ErrorCode::member_not_found, found.type->name + " has no objref " + quoted(segment.name));
+      return make_error(ErrorCode::member_not_found, found.type->name + " has no objref " + quote(segment.name));
     if (auto valid = check_index(*objref, segment.index); !valid) return valid.error();
     auto child = found.object->find_child(*objref, segment.index);
     if (!child) return child.error();
-    if (!*child) return make_error(ErrorCode::service_error, "Requested object is null: " + quoted(prefix));
+    if (!*child) return make_error(ErrorCode::service_error, "Requested object is null: " + quote(prefix));
     found.object = std::move(*child);
     found.type = types_->find_entity(found.object->type_name());
     if (!found.type || found.type->kind != EntityKind::object)
       return make_error(ErrorCode::internal_error,
-                        "object " + quoted(prefix) + " has the unknown type " + quoted(found.object->type_name()));
+                        "object " + quote(prefix) + " has the unknown type " + quote(found.object->type_name()));
     if (objects_.size() < max_cached_objects) remember(std::string(prefix), found);
   }
   return found;
@@ -124,7 +124,7 @@ Result<> HostedService::add_object(const std::string& path, std::shared_ptr<Serv
   const auto* type = types_->find_entity(object->type_name());
   if (!type || type->kind != EntityKind::object)
     return make_error(ErrorCode::service_definition_error,
-                      "object " + quoted(path) + " has the unknown type " + quoted(object->type_name()));
+                      "object " + quote(path) + " has the unknown type " + quote(object->type_name()));
   if (objects_.size() >= max_cached_objects && !objects_.contains(path)) {
     auto victim = objects_.upper_bound(path);
     if (victim == objects_.end()) victim = objects_.begin();
@@ -146,7 +146,7 @@ Result<std::string> HostedService::canonical_path(std::string_view path) {
     if (!parent) return parent.error();
     const auto* objref = parent->type->find_member(name);
     if (!objref || objref->kind != MemberKind::objref)
-      return make_error(ErrorCode::member_not_found, parent->type->name + " has no objref " + quoted(name));
+      return make_error(ErrorCode::member_not_found, parent->type->name + " has no objref " + quote(name));
     if (auto valid = check_index(*objref, index); !valid) return valid.error();
     if (!is_indexed(*objref)) {
       canonical = child_path(canonical, name);
@@ -199,7 +199,7 @@ ServiceDirectory::ServiceDirectory(NodeIdentity identity) : identity_(std::move(
 Result<> ServiceDirectory::add(std::shared_ptr<HostedService> service) {
   const auto name = service->name();
   if (!services_.emplace(name, std::move(service)).second)
-    return make_error(ErrorCode::invalid_argument, "the node has a service " + quoted(name) + " already");
+    return make_error(ErrorCode::invalid_argument, "the node has a service " + quote(name) + " already");
   return {};
 }
 

@@ -42,9 +42,11 @@ Result<> ServiceSession::begin_login(const Message& message, const MessageEntry&
   if (credentials->type == DataType::map_string_t)
     if (auto value = unpack_varvalue(message, *credentials, service->types()))
       requested.attempt.credentials = std::move(*value->get_if<MapString>());
-  auto ticket = service->login_limit().begin(now);
-  if (!ticket) return ticket.error();
-  requested.ticket = std::move(*ticket);
+  if (!service->is_remote()) {
+    auto ticket = service->login_limit().begin(now);
+    if (!ticket) return ticket.error();
+    requested.ticket = std::move(*ticket);
+  }
   requested.id = ++last_login_id_;
   requested.authenticator = service->policy().authenticator;
   requested.attempt.service = service->name();
@@ -68,7 +70,7 @@ void ServiceSession::answer_login(LoginId id, Result<AuthenticatedUser> result, 
   if (result && result->name.empty())
     result = make_error(ErrorCode::internal_error, "the authenticator returned a user without name");
   if (!result) {
-    login.service->login_limit().handle_failure(now);
+    if (!login.service->is_remote()) login.service->login_limit().handle_failure(now);
     ++failed_logins_;
   }
   if (login.type == EntryType::connect_client_combined)

@@ -26,7 +26,7 @@ Result<> ServiceSession::answer_memory(const Message& message, const MessageEntr
     if (!call.wants_dim_count &&
         parameter->text() != (has_dims ? memory_parameter::dimensions : memory_parameter::length))
       return make_error(ErrorCode::invalid_operation,
-                        "memory '" + member.name + "': Unknown parameter " + quoted(parameter->text()));
+                        "memory '" + member.name + "': Unknown parameter " + quote(parameter->text()));
     called.kind = CallKind::memory_dimensions;
   } else {
     auto range = read_memory_range(message, entry, member);

@@ -69,7 +69,7 @@ Result<> ServiceSession::park(const Message& message, const MessageEntry& entry)
   if (!path) return path.error();
   if (path->front().name != service_->name())
     return make_error(ErrorCode::object_not_found,
-                      "path " + quoted(entry.service_path) + " does not begin with this service");
+                      "path " + quote(entry.service_path) + " does not begin with this service");
   if (parked_.size() >= options_.max_parked_requests)
     return make_error(
         ErrorCode::out_of_system_resource,

@@ -90,7 +90,7 @@ Result<Value> answer_service_index_call(std::string_view function, const Service
   if (function == "GetRoutedNodes") return describe(directory.routed_nodes(base_url), may_know);
   if (function == "GetDetectedNodes") return describe(directory.detected_nodes(base_url), may_know);
   if (function != "GetLocalNodeServices")
-    return make_error(ErrorCode::member_not_found, "the service index has no function " + quoted(function));
+    return make_error(ErrorCode::member_not_found, "the service index has no function " + quote(function));
   if (base_url.empty()) return make_error(ErrorCode::service_error, "this transport has no URL");
   const auto add = [&](const HostedService& service) {
     answer.items.emplace_back(static_cast<std::int32_t>(answer.items.size()),

@@ -333,7 +333,7 @@ Result<> ServiceSession::dispatch_member(const Message& message, const MessageEn
     return make_error(ErrorCode::member_not_found,
                       "Member not found: " + found->type->name + " has no " +
                           std::string(member_kind_name(find_member_request(entry.type)->kind)) + " " +
-                          quoted(entry.member_name));
+                          quote(entry.member_name));
   if (auto admitted = admit(entry.type, entry.service_path, member); !admitted) return admitted;
   if (auto entered = enter(entry, *member); !entered) return entered;
   if (auto allowed = check_locks(entry, *found, *member, now); !allowed) return allowed;

@@ -106,7 +106,7 @@ struct LoginRequested {
   LoginId id = 0;
   std::shared_ptr<const Authenticator> authenticator;
   LoginAttempt attempt;
-  LoginLimit::Ticket ticket;  ///< to be kept until the answer
+  LoginLimit::Ticket ticket;  ///< to be kept until the answer; null in front of a remote service
 };
 /// A wire was connected: send the current value, if there is one. Of a remote service: a client wants to connect it; to
 /// be answered with answer_wire().

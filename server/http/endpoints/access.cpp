@@ -52,7 +52,7 @@ rr::Result<rr::Json> body_of(const Request& request) {
   if (text.empty()) return {boost::system::in_place_value, rr::Json::object()};
   const auto type = request.header(http::field::content_type);
   if (!equals_ignoring_case(type.substr(0, type.find(';')), "application/json"))
-    return bad("Content-Type is " + rr::quoted(type) + ", expected application/json");
+    return bad("Content-Type is " + rr::quote(type) + ", expected application/json");
   auto json = rr::read_json(text);
   if (json && !json->is_object()) return bad("expected an object");
   return json;
@@ -82,8 +82,7 @@ rr::Result<std::string> add_token(GatewayState& gateway, const std::string& name
   const auto text = read_text_file(file);
   if (!text) return rr::make_error(rr::ErrorCode::io_error, "the tokens file can't be read");
   if (!find_line(*text, name).empty())
-    return rr::make_error(rr::ErrorCode::invalid_state,
-                          "there is a token of the name " + rr::quoted(name) + " already");
+    return rr::make_error(rr::ErrorCode::invalid_state, "there is a token of the name " + rr::quote(name) + " already");
   auto token = make_api_token();
   const auto line =
       name + " " + hash_api_token(token) + " " + format_roles(roles) + " " + (last_day ? format_day(*last_day) : "_");
@@ -181,8 +180,8 @@ Handler ask_endpoint(GatewayState& gateway) {
     const auto name = text_of(*body, "name");
     const auto reason = text_of(*body, "reason");
     if (!name || !reason) return error_answer(name ? reason.error() : name.error());
-    const auto asked = gateway.http_access().requests().ask(
-        *name, *reason, request.arrival.peer, client_network(request.arrival.address).to_string(), Clock::now());
+    const auto asked = gateway.http_access().requests().ask(*name, *reason, request.arrival.peer,
+                                                            network_name(request.arrival.address), Clock::now());
     if (!asked) return error_answer(asked.error());
     log(LogLevel::info, "access asked for", {{"name", *name}, {"peer", request.arrival.peer}, {"reason", *reason}});
     gateway.access().record({"asked", &request.identity, nullptr, *name});

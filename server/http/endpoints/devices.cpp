@@ -61,7 +61,7 @@ Handler devices_endpoint(GatewayState& gateway) {
 }
 
 Response no_such_device(std::string_view name) {
-  return problem_response(404, "no device " + rr::quoted(name) + "; /api/v1/devices lists them");
+  return problem_response(404, "no device " + rr::quote(name) + "; /api/v1/devices lists them");
 }
 
 Response describe_device(const Device& device, const Request& request, const Access& access) {
@@ -93,7 +93,7 @@ Response list_subscriptions(GatewayState& gateway, const Identity& asker, const 
 
 Handler no_such_api_endpoint() {
   return [](const Request& request, std::string_view) {
-    return problem_response(404, "nothing is at " + rr::quoted(request.path()));
+    return problem_response(404, "nothing is at " + rr::quote(request.path()));
   };
 }
 

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <optional>
 
-#include "server/http/image_encoders.hpp"
-
 namespace rrgate {
 
 namespace {
@@ -100,7 +98,7 @@ bool is_image_type(const rr::TypeDefinition& type, const rr::TypeRegistry& types
   return image && is_bytes(image->find_member("data")) && find_description(*image, types);
 }
 
-rr::Result<std::string> image_bytes(const rr::Value& value, const rr::TypeDefinition& type,
+rr::Result<ImageWork> prepare_image(const rr::Value& value, const rr::TypeDefinition& type,
                                     const rr::TypeRegistry& types, std::string_view media_type) {
   const auto* image_type = find_structure(type, types);
   const auto* image = value.get_if<rr::Structure>();
@@ -112,7 +110,8 @@ rr::Result<std::string> image_bytes(const rr::Value& value, const rr::TypeDefini
   const auto* inner = info_type == image_type ? nullptr : image->find("image_info");
   const auto* info = inner ? inner->get_if<rr::Structure>() : image;
   if (!info) return no_image("has no image_info");
-  const auto bytes = array->bytes();
+  ImageWork work{{}, *array, {}, media_type};
+  const auto bytes = work.data.bytes();
   const auto text = rr::as_text(bytes);
 
   const auto encoding = encoding_of(*info, *info_type, types);
@@ -121,16 +120,19 @@ rr::Result<std::string> image_bytes(const rr::Value& value, const rr::TypeDefini
     const std::string_view found = text.starts_with("\xff\xd8\xff") ? jpeg_type
                                    : text.starts_with("\x89PNG")    ? png_type
                                                                     : "";
-    if (found == media_type) return std::string(text);
+    if (found == media_type) {
+      work.ready = text;
+      return work;
+    }
     if (!found.empty()) return no_image("is " + std::string(found) + "; ask for that");
-    if (!encoding.empty()) return no_image("is encoded as " + rr::quoted(encoding) + ", which is not known here");
+    if (!encoding.empty()) return no_image("is encoded as " + rr::quote(encoding) + ", which is not known here");
   }
   const auto number = [&](const char* name) -> std::uint64_t {
     const auto* field = info->find(name);
     const auto read = field ? field->to<std::int64_t>() : rr::Result<std::int64_t>(0);
     return read && *read > 0 && *read <= UINT32_MAX ? static_cast<std::uint64_t>(*read) : 0;
   };
-  PixelImage pixels;
+  auto& pixels = work.pixels;
   pixels.width = static_cast<std::uint32_t>(number("width"));
   pixels.height = static_cast<std::uint32_t>(number("height"));
   pixels.data = bytes;
@@ -145,7 +147,12 @@ rr::Result<std::string> image_bytes(const rr::Value& value, const rr::TypeDefini
   pixels.format = format ? *format : *by_size;
   pixels.step = step > 0 ? static_cast<std::size_t>(step) : pixels.width * bytes_per_pixel(pixels.format);
   if (const auto checked = check_image(pixels); !checked) return checked.error();
-  return media_type == png_type ? encode_png(pixels) : encode_jpeg(pixels);
+  return work;
+}
+
+rr::Result<std::string> encode_image(const ImageWork& work) {
+  if (!work.ready.empty()) return work.ready;
+  return work.media_type == png_type ? encode_png(work.pixels) : encode_jpeg(work.pixels);
 }
 
 }  // namespace rrgate

@@ -17,21 +17,28 @@ rr::OrderedJson to_json(const ObjectRequest& request, const Target& target, cons
   return std::move(*json);
 }
 
-/// A value of the member as an image, where that is wanted and it is one. Throws   rr::Exception.
-std::optional<Response> image_response(const ObjectRequest& request, const Target& target, const rr::Value& value) {
+/// A value of the member: as an image, where that is wanted and it is one, or as JSON. Throws   rr::Exception.
+rr::awaitable<Response> value_response(const ObjectRequest& request, const Target& target, const rr::Value& value) {
   const auto& type = target.member->type;
   const auto wanted = request.wanted_image();
-  if (wanted.empty() || !is_image_type(type, target.types())) return std::nullopt;
-  auto bytes = value_or_throw(image_bytes(value, type, target.types(), wanted));
+  if (wanted.empty() || !is_image_type(type, target.types())) {
+    const auto json = to_json(request, target, value, type);
+    co_return co_await request.value_response(json);
+  }
+  const auto work = value_or_throw(prepare_image(value, type, target.types(), wanted));
+  auto room = request.writer().memory().sibling();
+  if (!room.resize(3 * work.data.bytes().size())) co_return no_memory_response();  // the rows, and what becomes of them
+  const auto encode = [&work] { return encode_image(work); };
+  auto bytes = value_or_throw(co_await request.gateway().workers().run(encode));
   auto response = text_response(200, wanted, std::move(bytes));
   response.set("Cache-Control", "no-store");
-  return response;
+  co_return response;
 }
 
-rr::Value body_value(const ObjectRequest& request, const Target& target) {
-  const auto body = request.body();
+rr::awaitable<rr::Value> body_value(const ObjectRequest& request, const Target& target) {
+  const auto body = co_await request.body();
   if (!body) throw rr::Exception(body.error());
-  return value_or_throw(
+  co_return value_or_throw(
       rr::value_from_json(*body, target.member->type, target.types(), request.form(), target.member->name));
 }
 
@@ -42,11 +49,10 @@ rr::awaitable<Response> answer_property(const ObjectRequest& request, const Targ
   const bool can_write = direction != rr::MemberDirection::readonly;
   if (request.is_read() && can_read) {
     const auto value = co_await target.ask(rr::CallKind::property_get);
-    if (auto image = image_response(request, target, value)) co_return std::move(*image);
-    co_return request.value_response(to_json(request, target, value, member.type));
+    co_return co_await value_response(request, target, value);
   }
   if (request.method() == http::verb::put && can_write) {
-    auto value = body_value(request, target);
+    auto value = co_await body_value(request, target);
     co_await target.ask(rr::CallKind::property_set, std::move(value));
     co_return request.written_response();
   }
@@ -56,14 +62,15 @@ rr::awaitable<Response> answer_property(const ObjectRequest& request, const Targ
 rr::awaitable<Response> answer_function(const ObjectRequest& request, const Target& target) {
   const auto& member = *target.member;
   if (request.method() != http::verb::post) co_return request.method_response("POST");
-  auto arguments = value_or_throw(read_arguments(request, member, target.types()));
+  auto arguments = value_or_throw(co_await read_arguments(request, member, target.types()));
   auto called = target.request(rr::CallKind::function);
   called.arguments = std::move(arguments);
   const auto value = co_await target.client->ask(std::move(called));
-  if (auto image = image_response(request, target, value)) co_return std::move(*image);
+  if (!request.wanted_image().empty() && is_image_type(member.type, target.types()))
+    co_return co_await value_response(request, target, value);
   auto result = rr::OrderedJson::object();
   rr::add_key(result, "result") = to_json(request, target, value, member.type);
-  co_return request.value_response(result);
+  co_return co_await request.value_response(result);
 }
 
 /// A wire as a value: the newest in, the newest out.
@@ -74,11 +81,10 @@ rr::awaitable<Response> answer_wire(const ObjectRequest& request, const Target& 
   const bool has_out = direction != rr::MemberDirection::readonly;
   if (request.is_read() && has_in) {
     const auto value = co_await target.ask(rr::CallKind::peek_in);
-    if (auto image = image_response(request, target, value)) co_return std::move(*image);
-    co_return request.value_response(to_json(request, target, value, member.type));
+    co_return co_await value_response(request, target, value);
   }
   if (request.method() == http::verb::put && has_out) {
-    auto value = body_value(request, target);
+    auto value = co_await body_value(request, target);
     co_await target.ask(rr::CallKind::poke_out, std::move(value));
     co_return request.written_response();
   }
@@ -105,7 +111,7 @@ std::optional<Shape> read_shape(const ObjectRequest& request, std::string_view n
     }
     at = read.ptr + 1;
   }
-  refuse(rr::ErrorCode::invalid_argument, std::string(name) + " is " + rr::quoted(*text) + ", expected " +
+  refuse(rr::ErrorCode::invalid_argument, std::string(name) + " is " + rr::quote(*text) + ", expected " +
                                               std::to_string(dimensions) + " whole numbers, separated by commas");
 }
 
@@ -194,7 +200,10 @@ rr::awaitable<Response> answer_memory(const ObjectRequest& request, const Target
     co_return request.method_response(allowed);
 
   const auto shape = co_await memory_shape(target);
-  if (target.is_shape) co_return request.value_response(rr::OrderedJson(shape));
+  if (target.is_shape) {
+    const rr::OrderedJson json(shape);
+    co_return co_await request.value_response(json);
+  }
 
   const auto position = read_shape(request, "offset", shape.size());
   if (request.method() == http::verb::put) {
@@ -207,7 +216,7 @@ rr::awaitable<Response> answer_memory(const ObjectRequest& request, const Target
                "plain bytes are for whole items of one-dimensional memories of numbers");
       items = rr::Array::copy(member.type.type, rr::as_bytes(body));
     } else {
-      items = body_value(request, target);
+      items = co_await body_value(request, target);
     }
     auto part = target.request(rr::CallKind::memory_write);
     part.range.position = position.value_or(Shape(shape.size(), 0));
@@ -225,17 +234,19 @@ rr::awaitable<Response> answer_memory(const ObjectRequest& request, const Target
     const auto bytes = rr::as_text(payload_of(items));
     co_return text_response(200, "application/octet-stream", std::string(bytes));
   }
-  co_return request.value_response(to_json(request, target, items, member.type));
+  const auto json = to_json(request, target, items, member.type);
+  co_return co_await request.value_response(json);
 }
 
 }  // namespace
 
-rr::Result<std::vector<rr::Value>> read_arguments(const ObjectRequest& request, const rr::MemberDefinition& member,
-                                                  const rr::TypeRegistry& types) {
-  if (member.parameters.empty() && request.request().message.body().empty()) return std::vector<rr::Value>();
-  const auto body = request.body();
-  if (!body) return body.error();
-  return arguments_from_json(*body, member, types, request.form());
+rr::awaitable<rr::Result<std::vector<rr::Value>>> read_arguments(const ObjectRequest& request,
+                                                                 const rr::MemberDefinition& member,
+                                                                 const rr::TypeRegistry& types) {
+  if (member.parameters.empty() && request.request().message.body().empty()) co_return std::vector<rr::Value>();
+  const auto body = co_await request.body();
+  if (!body) co_return body.error();
+  co_return arguments_from_json(*body, member, types, request.form());
 }
 
 rr::awaitable<void> answer_member(const ObjectRequest& request, const Target& target) {

@@ -11,8 +11,9 @@ rr::awaitable<void> answer_member(const ObjectRequest& request, const Target& ta
 
 /// The arguments of a function from the body {"name": value, ...}; nothing where it takes none.
 /// Errors   those of value_from_json(); invalid_argument: missing, unknown or superfluous names.
-rr::Result<std::vector<rr::Value>> read_arguments(const ObjectRequest& request, const rr::MemberDefinition& member,
-                                                  const rr::TypeRegistry& types);
+rr::awaitable<rr::Result<std::vector<rr::Value>>> read_arguments(const ObjectRequest& request,
+                                                                 const rr::MemberDefinition& member,
+                                                                 const rr::TypeRegistry& types);
 
 /// Answers while values come: events, pipes and wires as server-sent events, generators as those or as JSON lines.
 /// Throws   rr::Exception, before anything was sent.

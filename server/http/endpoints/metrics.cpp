@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 
@@ -37,9 +38,11 @@ class Exposition {
     text_.append(name).append(" ").append(type).append("\n");
   }
   void sample(std::uint64_t value, std::string_view labels = {}, std::string_view suffix = {}) {
-    text_.append(name_).append(suffix);
-    if (!labels.empty()) text_.append("{").append(labels).append("}");
-    text_.append(" ").append(std::to_string(value)).append("\n");
+    sample(std::to_string(value), labels, suffix);
+  }
+  /// In seconds.
+  void time_sample(std::uint64_t microseconds, std::string_view labels = {}, std::string_view suffix = {}) {
+    sample(seconds(microseconds), labels, suffix);
   }
   void single(std::string_view name, std::string_view type, std::string_view help, std::uint64_t value) {
     family(name, type, help);
@@ -47,19 +50,26 @@ class Exposition {
   }
   /// In seconds. Every second of its buckets, from 128 us on: each is a series of its own.
   void histogram(const rr::AgeHistogram& ages, const std::string& labels) {
+    const auto bound = labels + (labels.empty() ? "" : ",") + "le=\"";
     std::uint64_t count = 0;
     for (std::size_t i = 0; i < rr::AgeHistogram::bucket_count; ++i) {
       count += ages.counts()[i];
       if (i < 7 || i % 2 == 0 || i == rr::AgeHistogram::bucket_count - 1) continue;
-      sample(count, labels + ",le=\"" + seconds(rr::AgeHistogram::upper_bound(i).count()) + "\"", "_bucket");
+      sample(count, bound + seconds(rr::AgeHistogram::upper_bound(i).count()) + "\"", "_bucket");
     }
-    sample(count, labels + ",le=\"+Inf\"", "_bucket");
-    text_.append(name_).append("_sum{" + labels + "} ").append(seconds(ages.sum_us())).append("\n");
+    sample(count, bound + "+Inf\"", "_bucket");
+    time_sample(ages.sum_us(), labels, "_sum");
     sample(count, labels, "_count");
   }
   std::string take() { return std::move(text_); }
 
  private:
+  void sample(const std::string& value, std::string_view labels, std::string_view suffix) {
+    text_.append(name_).append(suffix);
+    if (!labels.empty()) text_.append("{").append(labels).append("}");
+    text_.append(" ").append(value).append("\n");
+  }
+
   std::string name_;
   std::string text_;
 };
@@ -153,6 +163,12 @@ std::uint64_t open_files() {
   return count;
 }
 
+std::uint64_t cpu_microseconds() {
+  timespec used{};
+  ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
+  return static_cast<std::uint64_t>(used.tv_sec) * 1'000'000 + static_cast<std::uint64_t>(used.tv_nsec) / 1000;
+}
+
 }  // namespace
 
 Handler metrics_endpoint(GatewayState& gateway) {
@@ -167,6 +183,12 @@ Handler metrics_endpoint(GatewayState& gateway) {
     out.single("rrgate_connections_total", "counter", "Connections that were accepted.", metrics.connections);
     out.single("rrgate_http_requests_total", "counter", "HTTP requests, upgrades to WebSockets among them.",
                metrics.requests);
+    out.family("rrgate_http_responses_total", "counter", "Responses of HTTP by status, 101 for WebSockets among them.");
+    for (std::size_t i = 0; i < metrics.responses.size(); ++i)
+      out.sample(metrics.responses[i], "code=\"" + std::to_string(i + 1) + "xx\"");
+    out.family("rrgate_http_request_duration_seconds", "histogram",
+               "From the end of a request until its response, without streams and images.");
+    out.histogram(metrics.request_ages, {});
     out.family("rrgate_rejected_total", "counter", "Connections and requests that were turned away.");
     for (std::size_t i = 0; i < rejection_names.size(); ++i)
       out.sample(metrics.rejected[i], "reason=\"" + std::string(rejection_names[i]) + "\"");
@@ -181,6 +203,8 @@ Handler metrics_endpoint(GatewayState& gateway) {
     out.family("rrgate_config_reloads_total", "counter", "Times that the configuration was read anew.");
     out.sample(metrics.reloads, "result=\"ok\"");
     out.sample(metrics.failed_reloads, "result=\"failed\"");
+    out.family("process_cpu_seconds_total", "counter", "Processor time that was used.");
+    out.time_sample(cpu_microseconds());
     out.single("process_resident_memory_bytes", "gauge", "Memory in use.", resident_bytes());
     out.single("process_open_fds", "gauge", "Open file descriptors.", open_files());
     auto response = text_response(200, "text/plain; version=0.0.4; charset=utf-8", out.take());

@@ -1,4 +1,5 @@
 #include "server/http/endpoints/object_request.hpp"
+#include "server/http/endpoints/large_json.hpp"
 
 #include "core/session/service_path.hpp"
 #include "node/tls/base64.hpp"
@@ -92,6 +93,19 @@ SessionKey session_key(GatewayState& gateway, const Request& request, std::strin
   return key;
 }
 
+rr::awaitable<rr::Result<std::shared_ptr<ValueClient>>> open_session(GatewayState& gateway,
+                                                                     std::shared_ptr<Device> device, SessionKey key,
+                                                                     ClientOrigin from) {
+  if (key.username.empty() || gateway.clients().has(*device, key))
+    co_return co_await gateway.clients().open(std::move(device), std::move(key));
+  const DeviceLogin login{key.username, device->config().name, key.service, std::move(from)};
+  const auto ticket = gateway.logins().begin_at_device(login);
+  if (!ticket) co_return ticket.error();
+  const auto opened = co_await gateway.clients().open(std::move(device), std::move(key));
+  gateway.logins().finish_at_device(login, opened ? rr::Result<>() : opened.error());
+  co_return opened;
+}
+
 AccessRequest access_request(const Target& target, Verb verb) {
   const auto& upstream = *target.client->upstream();
   const auto member = target.member ? std::string_view(target.member->name) : std::string_view();
@@ -106,7 +120,7 @@ rr::JsonForm json_form(const Request& request) {
   return out;
 }
 
-ObjectRequest::ObjectRequest(ResponseWriter& writer) : writer_(writer) {
+ObjectRequest::ObjectRequest(ResponseWriter& writer, GatewayState& gateway) : writer_(writer), gateway_(gateway) {
   const auto accept = request().header(http::field::accept);
   wants_events_ = accepts_type(accept, "text/event-stream");
   if (accepts_type(accept, "application/cbor")) wanted_ = BodyForm::cbor;
@@ -130,31 +144,42 @@ bool ObjectRequest::has_bytes_body() const {
   return equals_ignoring_case(media_type(request().header(http::field::content_type)), "application/octet-stream");
 }
 
-rr::Result<rr::Json> ObjectRequest::body() const {
+rr::awaitable<rr::Result<rr::Json>> ObjectRequest::body() const {
   const auto type = media_type(request().header(http::field::content_type));
   const auto& text = request().message.body();
-  if (!writer_.memory().has_room(rr::json_growth * text.size()))
-    return rr::make_error(rr::ErrorCode::out_of_system_resource,
-                          "the gateway has no memory left for what a document of " + std::to_string(text.size()) +
-                              " bytes becomes; try again in a moment");
-  if (equals_ignoring_case(type, "application/cbor")) return rr::read_cbor(rr::as_bytes(text));
+  const bool is_cbor = equals_ignoring_case(type, "application/cbor");
   // A page of another origin can send text/plain without being asked; JSON it can't.
-  if (!equals_ignoring_case(type, "application/json"))
-    return rr::make_error(rr::ErrorCode::invalid_argument,
-                          "Content-Type is " + rr::quoted(type) + ", expected application/json or application/cbor");
-  return rr::read_json(text);
+  if (!is_cbor && !equals_ignoring_case(type, "application/json"))
+    co_return rr::make_error(rr::ErrorCode::invalid_argument,
+                             "Content-Type is " + rr::quote(type) + ", expected application/json or application/cbor");
+  auto room = writer_.memory().sibling();
+  if (!room.resize(rr::json_growth * text.size()))
+    co_return rr::make_error(rr::ErrorCode::out_of_system_resource,
+                             "the gateway has no memory left for what a document of " + std::to_string(text.size()) +
+                                 " bytes becomes; try again in a moment");
+  const auto read = [&text, is_cbor] { return is_cbor ? rr::read_cbor(rr::as_bytes(text)) : rr::read_json(text); };
+  if (text.size() <= large_json_bytes) co_return read();
+  co_return co_await gateway_.workers().run(read);
 }
 
-Response ObjectRequest::value_response(const rr::OrderedJson& json) const {
-  Response response;
-  if (wanted_ == BodyForm::cbor) {
+rr::awaitable<Response> ObjectRequest::value_response(const rr::OrderedJson& json) const {
+  const bool is_cbor = wanted_ == BodyForm::cbor;
+  const auto write = [&json, is_cbor] {
+    if (!is_cbor) return rr::write_json(json) + "\n";
     const auto bytes = rr::write_cbor(json);
-    response = text_response(200, "application/cbor", std::string(bytes.begin(), bytes.end()));
+    return std::string(bytes.begin(), bytes.end());
+  };
+  auto room = writer_.memory().sibling();
+  std::string body;
+  if (const auto held = held_bytes(json); held <= large_json_bytes) {
+    body = write();
   } else {
-    response = json_response(200, rr::write_json(json) + "\n");
+    if (!room.resize(held)) co_return no_memory_response();
+    body = co_await gateway_.workers().run(write);
   }
+  auto response = text_response(200, is_cbor ? "application/cbor" : "application/json", std::move(body));
   response.set("Cache-Control", "no-store");
-  return response;
+  co_return response;
 }
 
 Response ObjectRequest::written_response() const {
@@ -221,22 +246,21 @@ rr::awaitable<rr::Result<std::shared_ptr<Target>>> find_target(std::shared_ptr<V
     const auto& name = segments[i];
     const auto* member = target->type->find_member(name);
     if (!member)
-      co_return rr::make_error(rr::ErrorCode::member_not_found, "object " + rr::quoted(target->path()) + " (" +
+      co_return rr::make_error(rr::ErrorCode::member_not_found, "object " + rr::quote(target->path()) + " (" +
                                                                     target->type->qualified_name + ") has no member " +
-                                                                    rr::quoted(name));
+                                                                    rr::quote(name));
     if (member->kind != rr::MemberKind::objref) {
       target->member = member;
       target->is_shape =
           member->kind == rr::MemberKind::memory && i + 2 == segments.size() && segments[i + 1] == "shape";
       if (i + 1 == segments.size() || target->is_shape) break;
-      co_return rr::make_error(rr::ErrorCode::object_not_found,
-                               rr::quoted(name) + " is no object; nothing is below it");
+      co_return rr::make_error(rr::ErrorCode::object_not_found, rr::quote(name) + " is no object; nothing is below it");
     }
     std::optional<std::string> index;
     if (member->type.array != rr::ArrayKind::none || member->type.container != rr::ContainerKind::none) {
       if (++i == segments.size())
         co_return rr::make_error(rr::ErrorCode::object_not_found,
-                                 "objref " + rr::quoted(name) + " needs an index: .../" + name + "/INDEX");
+                                 "objref " + rr::quote(name) + " needs an index: .../" + name + "/INDEX");
       index = segments[i];
     }
     const auto path = rr::child_path(target->path(), name, index);

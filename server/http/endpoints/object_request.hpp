@@ -38,6 +38,11 @@ struct Target {
 
 /// Whose session a request uses: user and password of HTTP Basic authentication, where they are not for the gateway.
 SessionKey session_key(GatewayState& gateway, const Request& request, std::string service);
+/// A client of that session, for somebody from there. Where a login has to be judged by the device first, that is
+/// bounded and recorded. Errors   those of ValueClients::open() and Logins::begin_at_device().
+rr::awaitable<rr::Result<std::shared_ptr<ValueClient>>> open_session(GatewayState& gateway,
+                                                                     std::shared_ptr<Device> device, SessionKey key,
+                                                                     ClientOrigin from);
 /// To do something to what a path leads to. Borrows the target.
 AccessRequest access_request(const Target& target, Verb verb);
 /// What the query says of the form of values.
@@ -46,9 +51,10 @@ rr::JsonForm json_form(const Request& request);
 /// Borrows the request.
 class ObjectRequest {
  public:
-  explicit ObjectRequest(ResponseWriter& writer);
+  ObjectRequest(ResponseWriter& writer, GatewayState& gateway);
 
   ResponseWriter& writer() const { return writer_; }
+  GatewayState& gateway() const { return gateway_; }
   const Request& request() const { return writer_.request(); }
   http::verb method() const { return request().message.method(); }
   bool is_read() const { return method() == http::verb::get || method() == http::verb::head; }
@@ -63,11 +69,13 @@ class ObjectRequest {
   const rr::JsonForm& form() const { return form_; }
   std::optional<std::string> option(std::string_view name) const;
 
-  /// The body by Content-Type. Errors   data_serialization_error; invalid_argument: another type.
-  rr::Result<rr::Json> body() const;
+  /// The body by Content-Type. Errors   data_serialization_error; invalid_argument: another type;
+  /// out_of_system_resource: there is no memory left for it.
+  rr::awaitable<rr::Result<rr::Json>> body() const;
   bool has_bytes_body() const;
 
-  Response value_response(const rr::OrderedJson& json) const;
+  /// `json`  is borrowed for the wait.
+  rr::awaitable<Response> value_response(const rr::OrderedJson& json) const;
   Response written_response() const;  ///< 204
   Response error_response(const rr::Error& error, const rr::TypeRegistry* types) const;
   /// 405 with what is possible.
@@ -75,6 +83,7 @@ class ObjectRequest {
 
  private:
   ResponseWriter& writer_;
+  GatewayState& gateway_;
   BodyForm wanted_ = BodyForm::json;
   bool wants_events_ = false;
   std::string_view wanted_image_;

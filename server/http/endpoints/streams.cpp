@@ -1,3 +1,4 @@
+#include <array>
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <charconv>
@@ -6,6 +7,7 @@
 #include "server/http/endpoints/image_values.hpp"
 #include "server/http/endpoints/member_values.hpp"
 #include "server/http/endpoints/members.hpp"
+#include "server/http/endpoints/sample_jpeg.hpp"
 #include "server/log/log.hpp"
 
 namespace rrgate {
@@ -141,6 +143,7 @@ rr::awaitable<void> stream_images(const ObjectRequest& request, const Target& ta
     asio::steady_timer news;
   };
   auto& writer = request.writer();
+  auto& gateway = request.gateway();
   const auto& member = *target.member;
   const auto newest = std::make_shared<Newest>(writer.executor());
   SampleHandler handler = [newest](const SamplePtr& sample, const rr::Error*) {
@@ -153,8 +156,8 @@ rr::awaitable<void> stream_images(const ObjectRequest& request, const Target& ta
   if (!listening) throw rr::Exception(listening.error());
   const auto listener = std::move(*listening);
 
-  const auto head = stream_head("multipart/x-mixed-replace; boundary=frame");
-  if (co_await writer.begin(head) || !writer.has_body()) co_return;
+  const auto stream = stream_head("multipart/x-mixed-replace; boundary=frame");
+  if (co_await writer.begin(stream) || !writer.has_body()) co_return;
   writer.watch([newest] {
     newest->is_gone = true;
     newest->news.cancel();
@@ -167,13 +170,14 @@ rr::awaitable<void> stream_images(const ObjectRequest& request, const Target& ta
       continue;
     }
     const auto sample = std::exchange(newest->sample, nullptr);
-    const auto jpeg = image_bytes(sample->values.at(0), member.type, target.types(), jpeg_type);
-    if (!jpeg) {
-      log(LogLevel::debug, "frame left out", {{"member", member.name}, {"error", jpeg.error().message}});
+    const auto jpeg = co_await jpeg_of(sample, member.type, target.types(), gateway.memory(), gateway.workers());
+    if (!*jpeg->result) {
+      log(LogLevel::debug, "frame left out", {{"member", member.name}, {"error", jpeg->result->error().message}});
       continue;
     }
-    const auto part = "Content-Type: image/jpeg\r\nContent-Length: " + std::to_string(jpeg->size()) + "\r\n\r\n" +
-                      *jpeg + "\r\n--frame\r\n";
+    const std::string& image = **jpeg->result;
+    const auto head = "Content-Type: image/jpeg\r\nContent-Length: " + std::to_string(image.size()) + "\r\n\r\n";
+    const std::array<std::string_view, 3> part{head, image, "\r\n--frame\r\n"};
     failed = co_await writer.write(part);
   }
   if (!failed && !newest->is_gone) co_await writer.end();
@@ -194,7 +198,7 @@ rr::awaitable<void> stream_generator(const ObjectRequest& request, const Target&
     co_await writer.send(response);
     co_return;
   }
-  auto arguments = read_arguments(request, member, target.types());
+  auto arguments = co_await read_arguments(request, member, target.types());
   if (!arguments) throw rr::Exception(arguments.error());
   auto opening = target.request(rr::CallKind::generator_open);
   const auto generator = opening.generator = target.client->next_generator();

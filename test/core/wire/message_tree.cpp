@@ -133,7 +133,7 @@ class Comparison {
     if constexpr (std::is_same_v<T, Bytes>)
       return to_hex(ByteSpan(value).first(std::min<std::size_t>(value.size(), 64)));
     else if constexpr (std::is_convertible_v<T, std::string_view>)
-      return rr::quoted(value);
+      return rr::quote(value);
     else
       return std::to_string(value);
   }

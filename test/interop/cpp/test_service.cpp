@@ -110,7 +110,7 @@ class Interop {
   static std::shared_ptr<rr::Object> find(const Parts& parts, std::string_view index) {
     const auto found = parts.find(index);
     if (found == parts.end())
-      throw rr::ServiceException("no part " + rr::quoted(index), rr::ErrorCode::object_not_found);
+      throw rr::ServiceException("no part " + rr::quote(index), rr::ErrorCode::object_not_found);
     return found->second;
   }
 

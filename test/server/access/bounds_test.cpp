@@ -2,7 +2,10 @@
 #include <catch2/catch.hpp>
 
 #include "server/access/access_requests.hpp"
+#include "server/access/login_limits.hpp"
+#include "server/access/refusal_digest.hpp"
 #include "server/access/tickets.hpp"
+#include "server/limits/client_network.hpp"
 #include "test/support/print.hpp"
 
 using namespace rrgate;
@@ -11,8 +14,75 @@ using std::chrono::seconds;
 namespace {
 
 const auto day = std::chrono::system_clock::time_point(seconds(1'900'000'000));
+const auto start = std::chrono::steady_clock::time_point(seconds(1000));
 
 }  // namespace
+
+TEST_CASE("refusals of strangers: one of a network a minute, and the sum of the others") {
+  RefusalDigest digest;
+  const auto sums = [&](seconds after, bool is_forced = false) {
+    std::string out;
+    for (const auto& [network, count] : digest.take(start + after, is_forced))
+      out += (network.empty() ? "others" : network) + " " + std::to_string(count) + "; ";
+    return out;
+  };
+  CHECK(sums(seconds(0), true).empty());
+  CHECK(digest.note("a", start));
+  CHECK(digest.note("b", start));
+  for (int i = 0; i < 7; ++i) CHECK_FALSE(digest.note("a", start + seconds(59)));
+  CHECK(sums(seconds(59)).empty());
+  CHECK(sums(seconds(60)) == "a 7; ");
+  CHECK(sums(seconds(200), true).empty());
+  CHECK(digest.note("a", start + seconds(200)));
+  int written = 1;
+  for (int i = 0; i < 20'000; ++i) written += digest.note("n" + std::to_string(i), start + seconds(200));
+  CHECK(written == 100);
+  CHECK(sums(seconds(201), true) == "others 19901; ");
+}
+
+TEST_CASE("the network of a client as logs name it") {
+  CHECK(network_name_of("192.0.2.1:40000") == "192.0.2.1");
+  CHECK(network_name_of("192.0.2.1") == "192.0.2.1");
+  CHECK(network_name_of("[2001:db8:1:2:3::4]:40000") == "2001:db8:1:2::/64");
+  CHECK(network_name_of("2001:db8:1:2:3::4") == "2001:db8:1:2::/64");
+  CHECK(network_name_of("a relay") == "a relay");
+}
+
+TEST_CASE("guessing: so often of a user and of a network, and nobody else is kept out") {
+  LoginLimits limits;
+  const auto at = [](seconds after) { return rr::Now{start + after, {}}; };
+  const auto guess = [&](const std::string& user, const std::string& network, seconds after = seconds(0)) {
+    const auto may = limits.begin(user, network, at(after)).has_value();
+    if (may) limits.handle_failure(user, network, at(after));
+    return may;
+  };
+  int guesses = 0;
+  while (guess("alice", "here") && guesses < 1000) ++guesses;
+  CHECK(guesses == 20);
+  CHECK(limits.begin("bob", "here", at(seconds(0))));
+  CHECK(limits.begin("alice", "there", at(seconds(0))));
+  CHECK(limits.begin("alice", "here", at(seconds(1))));
+  while (guess("user" + std::to_string(guesses), "here", seconds(1)) && guesses < 1000) ++guesses;
+  CHECK(guesses == 61);  // one was forgotten meanwhile
+  CHECK(limits.begin("bob", "here", at(seconds(1))).error().code == rr::ErrorCode::authentication_error);
+  CHECK(guess("carol", "here", seconds(2)));
+  // Nor do many networks make the gateway forget one of them.
+  for (int i = 0; i < 30'000; ++i) {
+    guess("alice", std::to_string(i), seconds(2));
+    if (i % 5000 == 0) CHECK_FALSE(limits.begin("bob", "here", at(seconds(2))));
+  }
+}
+
+TEST_CASE("guessing: so many of a network are judged at a time") {
+  LoginLimits limits;
+  const rr::Now now{start, {}};
+  std::vector<LoginLimits::Ticket> judged;
+  for (int i = 0; i < 64; ++i) judged.push_back(limits.begin("alice", "here", now).value());
+  CHECK(limits.begin("alice", "here", now).error().code == rr::ErrorCode::out_of_system_resource);
+  CHECK(limits.begin("alice", "there", now));
+  judged.pop_back();
+  CHECK(limits.begin("alice", "here", now));
+}
 
 TEST_CASE("tickets: once, soon, and by gateways of one key") {
   Tickets tickets;

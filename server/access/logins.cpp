@@ -1,0 +1,158 @@
+#include "server/access/logins.hpp"
+
+#include <boost/asio/post.hpp>
+#include <boost/asio/use_awaitable.hpp>
+
+#include "node/tls/digest.hpp"
+
+namespace rrgate {
+
+namespace asio = boost::asio;
+
+namespace {
+
+constexpr std::chrono::minutes password_memory{5};
+constexpr std::size_t max_known_passwords = 1000;
+
+rr::Now steady_clock_now() {
+  return {std::chrono::steady_clock::now(), {}};
+}
+
+std::string limited_as(const DeviceLogin& login) {
+  return "at " + login.device + ' ' + login.user;
+}
+
+std::string limited_as(const rr::LoginAttempt& attempt) {
+  return "here " + attempt.username;
+}
+
+}  // namespace
+
+Logins::Logins(asio::any_io_executor executor, Access& access)
+    : executor_(std::move(executor)), access_(access), salt_(rr::random_bytes(32)), known_(max_known_passwords) {}
+
+Logins::~Logins() {
+  judge_.stop();
+  judge_.join();
+}
+
+/// Empty: there is no password.
+std::string Logins::key_of(const rr::LoginAttempt& attempt) const {
+  const auto* credential = attempt.credentials.find("password");
+  const auto password = credential ? credential->to_text() : rr::Result<std::string_view>(std::string_view());
+  if (!credential || !password) return {};
+  rr::Bytes text = salt_;
+  for (const auto part : {std::string_view(attempt.username), std::string_view("\0", 1), *password})
+    text.insert(text.end(), part.begin(), part.end());
+  return std::string(rr::as_text(rr::sha256(text)));
+}
+
+void Logins::judge(rr::LoginAttempt attempt, ClientOrigin from, Of of, Done done) {
+  const auto now = steady_clock_now();
+  const auto answer = [this, &done](Judged result) {
+    asio::post(executor_, [done = std::move(done), result = std::move(result)] { done(result); });
+  };
+  const auto users = access_.state().users;
+  if (!users) return answer(rr::make_error(rr::ErrorCode::authentication_error, "Authentication Failed"));
+  if (known_in_ != users) known_.clear();
+  known_in_ = users;
+  const auto key = key_of(attempt);
+  if (const auto* known = known_.find(key); known && now.steady < known->ends) {
+    const Judged user = known->user;
+    if (of == Of::session) record(attempt, from, user);
+    return answer(user);
+  }
+  auto ticket = limits_.begin(limited_as(attempt), from.network, now);
+  if (!ticket) return answer(ticket.error());
+  auto& of_network = waiting_[from.network];
+  if (of_network.empty()) turns_.push_back(from.network);
+  of_network.push_back({std::make_shared<const rr::LoginAttempt>(std::move(attempt)), std::move(from), std::move(done),
+                        key, users, std::move(*ticket)});
+  judge_next();
+}
+
+rr::awaitable<Logins::Judged> Logins::judge(rr::LoginAttempt attempt, ClientOrigin from, Of of) {
+  constexpr asio::use_awaitable_t<> token;
+  return asio::async_initiate<const asio::use_awaitable_t<>, void(Judged)>(
+      [this, attempt = std::move(attempt), from = std::move(from), of](auto handler) mutable {
+        const auto kept = std::make_shared<decltype(handler)>(std::move(handler));
+        judge(std::move(attempt), std::move(from), of, [kept](const Judged& result) { std::move (*kept)(result); });
+      },
+      token);
+}
+
+void Logins::judge_next() {
+  if (is_judging_ || turns_.empty()) return;
+  is_judging_ = true;
+  const auto network = std::move(turns_.front());
+  turns_.pop_front();
+  const auto found = waiting_.find(network);
+  auto job = std::move(found->second.front());
+  found->second.pop_front();
+  if (found->second.empty())
+    waiting_.erase(found);
+  else
+    turns_.push_back(network);
+  asio::post(judge_, [this, executor = executor_, life = std::weak_ptr(life_), job = std::move(job)] {
+    Judged result = rr::make_error(rr::ErrorCode::authentication_error, "Authentication Failed");
+    try {
+      result = judge_login(*job.users, *job.attempt);
+    } catch (const std::exception&) {  // out of memory: the client hears that it has failed
+    }
+    asio::post(executor, [this, life, job, result = std::move(result)] {
+      if (!life.expired()) finish(job, result);
+    });
+  });
+}
+
+void Logins::finish(const Job& job, const Judged& result) {
+  is_judging_ = false;
+  const auto now = steady_clock_now();
+  record(*job.attempt, job.from, result);
+  std::vector<Done> same{job.done};
+  if (!result) {
+    limits_.handle_failure(limited_as(*job.attempt), job.from.network, now);
+  } else if (known_in_ == job.users && !job.key.empty()) {
+    known_.at(job.key) = {*result, now.steady + password_memory};
+    // A page asks for many things at once, all with one password.
+    if (const auto found = waiting_.find(job.from.network); found != waiting_.end())
+      std::erase_if(found->second, [&](const Job& other) {
+        const bool is_same = other.key == job.key && other.users == job.users;
+        if (is_same) same.push_back(other.done);
+        return is_same;
+      });
+    if (const auto found = waiting_.find(job.from.network); found != waiting_.end() && found->second.empty()) {
+      waiting_.erase(found);
+      std::erase(turns_, job.from.network);
+    }
+  }
+  judge_next();
+  for (const auto& done : same) done(result);
+}
+
+void Logins::record(const rr::LoginAttempt& attempt, const ClientOrigin& from, const Judged& result) {
+  const AccessRequest what{.service = attempt.service, .verb = Verb::read};
+  Identity who;
+  who.name = attempt.username;
+  who.client = from.client;
+  if (result) who = access_.logged_in(*result, from.client);
+  access_.record({result ? "login" : "login_failed", &who, attempt.service.empty() ? nullptr : &what,
+                  result ? std::string_view() : std::string_view(result.error().message)});
+}
+
+rr::Result<LoginLimits::Ticket> Logins::begin_at_device(const DeviceLogin& login) {
+  return limits_.begin(limited_as(login), login.from.network, steady_clock_now());
+}
+
+void Logins::finish_at_device(const DeviceLogin& login, const rr::Result<>& result) {
+  const bool is_wrong = !result && result.error().code == rr::ErrorCode::authentication_error;
+  if (!result && !is_wrong) return;  // it was not judged
+  if (is_wrong) limits_.handle_failure(limited_as(login), login.from.network, steady_clock_now());
+  Identity who;
+  who.client = login.from.client;
+  who.device_user = login.user;
+  const AccessRequest what{.device = login.device, .service = login.service, .verb = Verb::read};
+  access_.record({is_wrong ? "login_failed" : "login", &who, &what, is_wrong ? "the device refused it" : ""});
+}
+
+}  // namespace rrgate

@@ -1,0 +1,30 @@
+// A frame of a camera as JPEG: encoded once, for all who look. Layer: server/http/endpoints.
+#pragma once
+
+#include <boost/asio/steady_timer.hpp>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "server/limits/memory_budget.hpp"
+#include "server/state/workers.hpp"
+#include "server/upstream/value_client.hpp"
+
+namespace rrgate {
+
+struct SampleJpeg {
+  SampleJpeg(const boost::asio::any_io_executor& executor, MemoryBudget::Charge charge)
+      : memory(std::move(charge)), done(executor, boost::asio::steady_timer::time_point::max()) {}
+
+  std::optional<rr::Result<std::string>> result;  ///< none: it is being encoded
+  MemoryBudget::Charge memory;                    ///< of the result
+  boost::asio::steady_timer done;                 ///< cancelled when there is one
+};
+
+/// The sample's only value as JPEG, by whoever asks first; its result is there. All are borrowed for the wait, but for
+/// the workers, which outlive it. Errors   those of prepare_image() and encode_image(), in the result.
+rr::awaitable<std::shared_ptr<const SampleJpeg>> jpeg_of(SamplePtr sample, const rr::TypeDefinition& type,
+                                                         const rr::TypeRegistry& types, MemoryBudget& memory,
+                                                         Workers& workers);
+
+}  // namespace rrgate
