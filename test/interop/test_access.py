@@ -310,7 +310,7 @@ def test_the_audit_log_tells_who_did_what(guarded):
     ask(guarded.port, "PUT", BASE + "/p_double", 2.5, basic("alice"))
     ask(guarded.port, "PUT", BASE + "/p_int32", 2, basic("vera"))
     ask(guarded.port, "POST", BASE + "/add", {"left": 1, "right": 2}, basic("alice"))
-    lines = audit_of(guarded, lambda lines: {"login", "write", "refused"} <= {line["event"] for line in lines[-10:]} and lines[-1]["event"] == "call")
+    lines = audit_of(guarded, lambda lines: lines[-1]["event"] == "call" and "refused" in {line["event"] for line in lines[-4:]})
     wrote = next(line for line in reversed(lines) if line["event"] == "write")
     assert (wrote["user"], wrote["proof"], wrote["device"], wrote["path"], wrote["member"]) == \
         ("alice", "password", "interop", "interop", "p_double")
