@@ -13,6 +13,7 @@ namespace rr::test {
 inline std::size_t allocation_count = 0;
 inline std::size_t allocated_bytes = 0;  ///< asked for, in total
 inline std::size_t live_bytes = 0;       ///< not given back yet
+inline std::size_t peak_bytes = 0;       ///< the most of them since this was set
 
 inline void* counted_allocation(std::size_t size) {
   void* memory = std::malloc(size == 0 ? 1 : size);
@@ -20,6 +21,7 @@ inline void* counted_allocation(std::size_t size) {
   ++allocation_count;
   allocated_bytes += size;
   live_bytes += malloc_usable_size(memory);
+  if (live_bytes > peak_bytes) peak_bytes = live_bytes;
   return memory;
 }
 

@@ -473,7 +473,8 @@ void ClientSession::handle_wire_packet(const Message& message, const MessageEntr
 
 void ClientSession::handle_wire_closed(const MessageEntry& entry) {
   const auto found = wires_.find(PathMemberView{entry.service_path, entry.member_name});
-  if (found == wires_.end()) return;
+  // While a connect is not answered, it is the connection before that has ended.
+  if (found == wires_.end() || found->second.state == WireState::connecting) return;
   emit(WireClosedByService{found->first.path, found->first.member});
   wires_.erase(found);
 }

@@ -11,15 +11,13 @@ namespace rr {
 namespace {
 
 /// Which index an endpoint gets beside those in use, as the reference assigns it: the one asked for where it is above
-/// all others, else the next above them; never one below, so that an index is not used again while others live. Nor is
-/// one up to `closed_here`: the client may not have heard yet that this side has closed it, and send on it.
+/// all others, else the next above them; never one below, so that an index is not used again while others live.
 template <class Indices>
-std::optional<std::int32_t> assign_index(std::int32_t asked, const Indices& in_use, std::int32_t closed_here) {
+std::optional<std::int32_t> assign_index(std::int32_t asked, const Indices& in_use) {
   asked = std::max(asked, any_pipe_index);
-  const auto last = std::max(in_use.empty() ? any_pipe_index : in_use.rbegin()->first, closed_here);
-  if (last < asked || last == any_pipe_index) return asked == any_pipe_index ? 1 : asked;
-  if (last == INT32_MAX) return std::nullopt;
-  return last + 1;
+  if (in_use.empty() || in_use.rbegin()->first < asked) return asked == any_pipe_index ? 1 : asked;
+  if (in_use.rbegin()->first == INT32_MAX) return std::nullopt;
+  return in_use.rbegin()->first + 1;
 }
 
 }  // namespace
@@ -108,7 +106,6 @@ void ServiceSession::close_pipe(PipeId id, Now now) {
   if (!pipe) return;
   const auto index = pipe->index;
   const auto key = *pipe->key;
-  last_closed_index_ = std::max(last_closed_index_, index);
   forget_pipe(id);
   connection_.begin_message(outgoing_);
   outgoing_.begin_entry(EntryType::pipe_closed, key.path, key.member);
@@ -138,7 +135,7 @@ Result<> ServiceSession::connect_pipe(const Message& message, const MessageEntry
         "this client has " + std::to_string(options_.max_pipe_endpoints) + " pipe endpoints connected already");
   PathMember key{std::string(entry.service_path), std::string(entry.member_name)};
   const auto indices = pipe_indices_.try_emplace(std::move(key)).first;
-  const auto index = assign_index(*asked, indices->second, last_closed_index_);
+  const auto index = assign_index(*asked, indices->second);
   if (!index)
     return make_error(ErrorCode::out_of_range, "pipe '" + member.name + "': there is no index above those in use");
   const auto id = ++last_pipe_id_;

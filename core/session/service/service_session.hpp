@@ -552,7 +552,6 @@ class ServiceSession {
   std::map<CallbackId, OpenCallback> callbacks_;  ///< in order of their deadlines, which are equally far
   PipeStore pipe_store_;                          ///< outlives pipes_
   PipeId last_pipe_id_ = 0;
-  std::int32_t last_closed_index_ = any_pipe_index;  ///< the highest that this side has closed
   std::unordered_map<PipeId, ServicePipe> pipes_;
   std::map<PathMember, PipeIndices, PathMemberLess> pipe_indices_;  ///< the same pipes
   std::vector<std::pair<std::int32_t, std::uint32_t>> pipe_acks_;   ///< index and number, to be sent; reused

@@ -203,6 +203,17 @@ TEST_CASE("a locked object's memories are locked; those with nolockread can stil
   CHECK(why(measure(bob, "data")) == "151 Object locked by alice");
 }
 
+TEST_CASE("what was connected before a lock can be disconnected by everybody") {
+  Clients all;
+  auto& alice = all.add("alice");
+  auto& bob = all.add("bob");
+  CHECK(all.ask(bob, bob.client->connect_wire("arm", "torque", all.now())));
+  CHECK(all.lock(alice));
+  all.enter(alice);
+  CHECK(why(all.ask(bob, bob.client->disconnect_wire("arm", "torque", all.now()))) == "no error");
+  CHECK_FALSE(bob.service->has_wire("arm", "torque"));
+}
+
 TEST_CASE("a lock of a child leaves its parent and its siblings alone") {
   Clients all;
   auto& alice = all.add("alice");

@@ -249,6 +249,41 @@ TEST_CASE("the service closes an endpoint: the client is told, and its own close
   CHECK_FALSE(pair.service->poll_event());
 }
 
+TEST_CASE("packets of an endpoint that was given up before it was connected reach no other") {
+  Loopback pair;
+  pair.connect();
+  const auto connect = [&] { return pair.client->connect_pipe("arm", "samples", any_pipe_index, pair.now); };
+  pair.client->cancel(connect());
+  pair.carry(*pair.client, *pair.service, 1u << 20);
+  const auto given_up = pair.next_service<PipeConnected>().id;
+  pair.service->accept_pipe(given_up, pair.now);
+  pair.carry(*pair.service, *pair.client, 1u << 20);  // which asks for its end
+  const auto request = connect();
+  REQUIRE(pair.service->send_pipe_packet(given_up, Value(1.0), pair.now));
+  pair.carry(*pair.service, *pair.client, 1u << 20);
+  pair.carry(*pair.client, *pair.service, 1u << 20);
+  CHECK(pair.next_service<PipeClosed>().id == given_up);
+  const auto id = pair.next_service<PipeConnected>().id;
+  REQUIRE(pair.service->send_pipe_packet(id, Value(2.0), pair.now));
+  CHECK(pair.completion(request).value() == Value(1));
+  CHECK(pair.next_client<PipePacketReceived>().value == Value(2.0));
+  CHECK_FALSE(pair.client->poll_event());
+}
+
+TEST_CASE("a connect that was given up is undone also where it is answered after its time") {
+  Loopback pair;
+  pair.connect();
+  pair.client->cancel(pair.client->connect_pipe("arm", "samples", any_pipe_index, pair.now));
+  pair.pump();
+  const auto id = pair.next_service<PipeConnected>().id;
+  pair.advance(std::chrono::seconds(20));
+  pair.client->handle_timeout(pair.now);
+  pair.service->accept_pipe(id, pair.now);
+  pair.pump();
+  CHECK(pair.next_service<PipeClosed>().id == id);
+  CHECK_FALSE(pair.client->poll_event());
+}
+
 TEST_CASE("acknowledgements that are held back come in their order when they are let go") {
   Pipe pair;
   const auto send = [&](double value) {
@@ -510,7 +545,7 @@ TEST_CASE("a request that nobody waits for is forgotten in the end") {
   ByHand service;
   service.pair.client->cancel(service.connect());
   CHECK(service.pair.client->pending_requests() == 1);
-  service.pair.advance(std::chrono::seconds(16));
+  service.pair.advance(std::chrono::seconds(16 + 60));
   service.pair.client->handle_timeout(service.pair.now);
   CHECK(service.pair.client->pending_requests() == 0);
   CHECK_FALSE(service.pair.client->poll_event());

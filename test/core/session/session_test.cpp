@@ -72,6 +72,55 @@ TEST_CASE("an unknown service is refused with its name") {
   CHECK(pair.client->wants_close());
 }
 
+TEST_CASE("a session that fails completes no request that nobody made") {
+  Loopback pair(no_combined);
+  const bool is_connected = GENERATE(false, true);
+  if (is_connected) {
+    pair.connect();
+    pair.client->disconnect(pair.now);
+  } else {
+    pair.carry(*pair.client, *pair.service, 1u << 20);
+    pair.carry(*pair.service, *pair.client, 1u << 20);
+    CHECK(pair.client->pending_requests() == 1);
+  }
+  pair.client->handle_closed({ErrorCode::connection_error, "gone"}, pair.now);
+  CHECK(pair.next_client<SessionClosed>().reason.message == "gone");
+  CHECK_FALSE(pair.client->poll_event());
+}
+
+TEST_CASE("the reply to a connect connects no wire that was asked for after it") {
+  Loopback pair;
+  pair.connect();
+  const auto* torque = pair.client->object_type("arm")->find_member("torque");
+  const auto first = pair.client->connect_wire("arm", "torque", pair.now);
+  pair.carry(*pair.client, *pair.service, 1u << 20);
+  pair.next_service<WireConnected>();
+  REQUIRE(pair.service->send_wire("arm", *torque, Value(1.0), pair.now));
+  pair.client->disconnect_wire("arm", "torque", pair.now);
+  const auto second = pair.client->connect_wire("arm", "torque", pair.now);
+  pair.carry(*pair.service, *pair.client, 1u << 20);
+  CHECK(pair.next_client<Completed>().id == first);
+  CHECK_FALSE(pair.client->poll_event());
+  pair.pump();
+  pair.next_client<Completed>();
+  CHECK(pair.next_client<Completed>().id == second);
+  CHECK(pair.client->send_wire("arm", "torque", Value(2.0), pair.now));
+}
+
+TEST_CASE("the end of a wire's connection is not the end of the next one") {
+  Loopback pair;
+  pair.connect();
+  const auto* torque = pair.client->object_type("arm")->find_member("torque");
+  CHECK(pair.completion(pair.client->connect_wire("arm", "torque", pair.now)));
+  pair.service->close_wire("arm", *torque, pair.now);
+  pair.client->disconnect_wire("arm", "torque", pair.now);
+  const auto again = pair.client->connect_wire("arm", "torque", pair.now);
+  pair.pump();
+  CHECK(pair.next_client<Completed>().result.error().message == "Invalid wire connection");
+  CHECK(pair.next_client<Completed>().id == again);
+  CHECK(pair.client->send_wire("arm", "torque", Value(2.0), pair.now));
+}
+
 TEST_CASE("the wrong node is refused by the service") {
   Loopback pair;
   ClientOptions options;

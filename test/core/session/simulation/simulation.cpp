@@ -246,7 +246,7 @@ void Simulation::use_pipe(Link& link) {
   const auto chosen = std::next(link.pipes.begin(), static_cast<std::ptrdiff_t>(dice_.below(link.pipes.size())));
   const auto& [member, index] = chosen->first;
   auto& pipe = chosen->second;
-  if (pipe.is_closing) return;
+  if (pipe.is_closing || pipe.is_left) return;
   if (dice_.one_in(12)) {
     pipe.is_closing = true;
     const auto stream = pipe.stream;
@@ -425,6 +425,12 @@ void Simulation::use_service_pipe(Link& link) {
     return;
   }
   if (dice_.one_in(15)) {
+    // The index may be given again at once, as by the reference: what is on the way would reach the next endpoint.
+    const auto other = link.pipes.find({pipe.member, pipe.index});
+    if (other == link.pipes.end() || other->second.stream != pipe.peer || other->second.sent != pipe.received ||
+        other->second.is_closing)
+      return;
+    other->second.is_left = true;
     tell(link, "service closes pipe " + pipe.member + " " + std::to_string(pipe.index));
     link.service->close_pipe(id, now_);
     link.service_pipes.erase(chosen);
@@ -520,8 +526,8 @@ void Simulation::pass_time(milliseconds time) {
   now_.steady += time;
   now_.utc.seconds += time.count() / 1000;
   now_.utc.nanoseconds += static_cast<std::int32_t>(time.count() % 1000) * 1'000'000;
-  // The clock of the day is set back or forth now and then.
-  if (dice_.one_in(50)) now_.utc.seconds += static_cast<std::int64_t>(dice_.below(7200)) - 3600;
+  // The clock of the day is set forth now and then.
+  if (dice_.one_in(50)) now_.utc.seconds += static_cast<std::int64_t>(dice_.below(3600));
   now_.utc = now_.utc.normalized();
   for (auto& link : links_) fire_timers(*link);
 }

@@ -84,6 +84,7 @@ class Simulation {
     int sent = 0, received = 0;
     double peer = 0;  ///< the stream of the service's end, once known
     bool is_closing = false;
+    bool is_left = false;  ///< the service closes it: nothing more is sent
     std::set<std::uint32_t> unacknowledged = {};
   };
   struct ServicePipe {
