@@ -74,7 +74,7 @@ void check(const std::vector<Case>& cases, const std::function<void(std::string_
     const auto cost = measure(each.input, decode);
     INFO(each.name << ": " << cost.bytes << " bytes of heap a byte, " << cost.hashes << " times the time of a hash");
     CHECK(cost.bytes <= each.most_bytes);
-    CHECK(cost.hashes <= 150);
+    CHECK(cost.hashes <= 800);  // some three times what is measured; quadratic time takes thousands
     if (std::getenv("RR_AMPLIFICATION"))
       WARN(each.name << ": " << cost.bytes << " bytes, " << cost.hashes << " hashes");
   }
@@ -87,31 +87,31 @@ ByteSpan bytes_of(std::string_view text) {
 }  // namespace
 
 TEST_CASE("what a byte of JSON costs") {
-  check({{"numbers", repeat("1,", "[", "1]"), 3 * json_growth},
-         {"empty arrays", repeat("[],", "[", "[]]"), 3 * json_growth},
-         {"empty objects", repeat("{},", "[", "{}]"), 3 * json_growth},
-         {"empty texts", repeat("\"\",", "[", "1]"), 3 * json_growth},
-         {"too deep", repeat("["), 3 * json_growth}},
+  check({{"numbers", repeat("1,", "[", "1]"), 40},
+         {"empty arrays", repeat("[],", "[", "[]]"), 40},
+         {"empty objects", repeat("{},", "[", "{}]"), 40},
+         {"empty texts", repeat("\"\",", "[", "1]"), 40},
+         {"too deep", repeat("["), 40}},
         [](std::string_view text) { (void)read_json(text); });
 }
 
 TEST_CASE("what a byte of CBOR costs") {
-  check({{"numbers", repeat("\x01", "\x9f", "\xff"), 3 * json_growth},
-         {"empty arrays", repeat("\x80", "\x9f", "\xff"), 3 * json_growth},
-         {"empty maps", repeat("\xa0", "\x9f", "\xff"), 3 * json_growth},
-         {"empty texts", repeat("\x60", "\x9f", "\xff"), 3 * json_growth},
-         {"too deep", repeat("\x81"), 3 * json_growth},
-         {"tags", repeat("\xc6"), 3 * json_growth}},
+  check({{"numbers", repeat("\x01", "\x9f", "\xff"), 110},
+         {"empty arrays", repeat("\x80", "\x9f", "\xff"), 110},
+         {"empty maps", repeat("\xa0", "\x9f", "\xff"), 110},
+         {"empty texts", repeat("\x60", "\x9f", "\xff"), 110},
+         {"too deep", repeat("\x81"), 110},
+         {"tags", repeat("\xc6"), 110}},
         [](std::string_view text) { (void)read_cbor(bytes_of(text)); });
 }
 
 TEST_CASE("what a byte of a service definition costs") {
   const std::string head = "service a.b\nstdver 0.10\n";
-  check({{"constants", repeat("constant int32 a 1\n", head), 16},
-         {"empty structures", repeat("struct a\nend\n", head), 16},
-         {"members", repeat("property a b\n", head + "object a\n", "end\n"), 16},
-         {"mistakes", repeat("x\n", head), 16},
-         {"parameters", repeat("a a,", head + "object a\nfunction a a(", "a a)\nend\n"), 16}},
+  check({{"constants", repeat("constant int32 a 1\n", head), 80},
+         {"empty structures", repeat("struct a\nend\n", head), 80},
+         {"members", repeat("property a b\n", head + "object a\n", "end\n"), 80},
+         {"mistakes", repeat("x\n", head), 80},
+         {"parameters", repeat("a a,", head + "object a\nfunction a a(", "a a)\nend\n"), 80}},
         [](std::string_view text) { (void)parse_service_definition(text, RobdefMode::compat); });
 }
 

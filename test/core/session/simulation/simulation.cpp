@@ -428,7 +428,7 @@ void Simulation::use_service_pipe(Link& link) {
     // The index may be given again at once, as by the reference: what is on the way would reach the next endpoint.
     const auto other = link.pipes.find({pipe.member, pipe.index});
     if (other == link.pipes.end() || other->second.stream != pipe.peer || other->second.sent != pipe.received ||
-        other->second.is_closing)
+        other->second.is_closing || !pipe.unacknowledged.empty())
       return;
     other->second.is_left = true;
     tell(link, "service closes pipe " + pipe.member + " " + std::to_string(pipe.index));
