@@ -111,8 +111,7 @@ Response StaticFiles::answer(const Request& request, std::string_view path) {
   response.set("Vary", "Accept-Encoding");
   response.set("Cache-Control", has_content_hash(name) ? "public, max-age=31536000, immutable" : "no-cache");
   if (!encoding.empty()) response.set("Content-Encoding", std::string(encoding));
-  if (mime_type(name).substr(0, 9) == "text/html")
-    response.set("Content-Security-Policy", std::string(content_security_policy));
+  response.set("Content-Security-Policy", std::string(content_security_policy));  // the script of a worker has its own
   if (has_token(request.header(http::field::if_none_match), found->etag)) {
     response.status = 304;
   } else {

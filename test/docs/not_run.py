@@ -4,6 +4,7 @@ COMMANDS = {
     ("docs/access.md", "# in /etc/rrgate"): "root of a Debian of its own: test/interop/test_package.py runs it",
     ("docs/access.md", "curl -u vera"): "a host of the lab: test/interop/test_access.py asks the same",
     ("docs/access.md", "curl -d '{\"name\""): "a gateway with users: test/interop/test_access.py asks the same",
+    ("docs/audit.md", "rrgate audit"): "the log of a gateway that has run for hours: test/interop/test_audit.py reads one",
     ("docs/command-line.md", "pip install"): "downloads a package; the device is started by the test",
     ("docs/deploy.md", "apt install"): "installs a package: test/interop/test_package.py does",
     ("docs/deploy.md", "adduser"): "makes a user of this machine",

@@ -10,6 +10,7 @@ import subprocess
 from processes import ROOT, Background, free_port
 
 CONFIGS = ROOT / "gateway-config" / "proxies"
+PROXIES = {"nginx": "nginx.conf", "caddy": "Caddyfile", "haproxy": "haproxy.cfg", "httpd": "httpd.conf"}
 UNPACKED = ROOT / "build" / "deps" / "proxies"
 
 NGINX = """

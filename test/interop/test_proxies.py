@@ -13,11 +13,10 @@ from clients import run_and_check
 from clients import JS, run_program
 from http_api import CLIENT, fetch, open_websocket
 from processes import Background, start_gateway
-from reverse_proxies import CONFIGS, ReverseProxy
+from reverse_proxies import CONFIGS, PROXIES, ReverseProxy
 from scenarios import SCENARIO
 
 IDLE_SECONDS = float(os.environ.get("RRGATE_IDLE_SECONDS", "2"))  # longer than what the proxies' other timeouts allow here
-PROXIES = {"nginx": "nginx.conf", "caddy": "Caddyfile", "haproxy": "haproxy.cfg", "httpd": "httpd.conf"}
 STEPS = SCENARIO["functions"].steps + SCENARIO["large_arrays"].steps + SCENARIO["events"].steps
 
 

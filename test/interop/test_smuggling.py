@@ -7,9 +7,8 @@ import pytest
 
 from http_api import ask
 from processes import start_gateway
-from reverse_proxies import ReverseProxy
+from reverse_proxies import PROXIES, ReverseProxy
 from smuggling import PLAIN, attacks, hidden, origin, post
-from test_proxies import PROXIES
 
 NAMES = list(attacks(0))
 
