@@ -55,7 +55,7 @@ bool accepts_encoding(std::string_view header, std::string_view encoding) {
 
 }  // namespace
 
-StaticFiles::StaticFiles(fs::path root) {
+StaticFiles::StaticFiles(const fs::path& root) {
   std::error_code error;
   if (!root.empty()) root_ = fs::canonical(root, error);
 }

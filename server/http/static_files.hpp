@@ -16,7 +16,7 @@ namespace rrgate {
 class StaticFiles {
  public:
   /// An empty or missing folder makes every answer a 404 that says how to set one.
-  explicit StaticFiles(std::filesystem::path root);
+  explicit StaticFiles(const std::filesystem::path& root);
 
   /// `path` is percent-encoded, without a leading '/'; "" and "folder/" are the index.html there. Uses FILE.br or
   /// FILE.gz if the client takes them. Answers 304 to a matching If-None-Match.

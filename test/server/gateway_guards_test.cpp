@@ -117,7 +117,7 @@ TEST_CASE("refusals and failures have each header that guards browsers, once") {
   check(500, head_of(gateway, "POST /api/v1/access/requests/" + id + "/approve", shows + "Content-Length: 0\r\n"));
 }
 
-TEST_CASE("a page has its own policy, and so has its 304; other files have the strict one") {
+TEST_CASE("the files of a page have a policy of their own, and so has their 304; what else is answered has the strict one") {
   const Folder files;
   files.write("web/index.html", "<!doctype html>");
   files.write("web/main.js", "1");
@@ -130,7 +130,8 @@ TEST_CASE("a page has its own policy, and so has its 304; other files have the s
   const auto same = head_of(gateway, "GET /", "If-None-Match: " + values_of(page, "ETag").at(0) + "\r\n");
   CHECK(status_of(same) == 304);
   check_guards(same, policies[0]);
-  check_guards(head_of(gateway, "GET /main.js"));
+  check_guards(head_of(gateway, "GET /main.js"), policies[0]);
+  check_guards(head_of(gateway, "GET /nowhere.js"));
 }
 
 TEST_CASE("pages of an allowed origin, and no others, may show what they may read") {
