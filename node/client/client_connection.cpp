@@ -295,6 +295,11 @@ void ClientConnection::enter_monitor(std::string_view path, std::chrono::millise
   expect([&](Now now) { return session_.enter_monitor(path, timeout, now); }, std::move(done));
 }
 
+void ClientConnection::lease(std::string_view path, LeaseCommand command, std::chrono::milliseconds deadman,
+                             Completion done) {
+  expect([&](Now now) { return session_.lease(path, command, deadman, now); }, std::move(done));
+}
+
 void ClientConnection::exit_monitor(std::string_view path, Completion done) {
   expect([&](Now now) { return session_.exit_monitor(path, now); }, std::move(done));
 }

@@ -141,6 +141,10 @@ class ClientConnection final : public SessionDriver<ClientSession> {
   void logout(Completion done);
   /// As they are now, and losses of this connection's subscriptions: see read_losses() in subscription_losses.hpp.
   void get_attributes(Completion done);
+  /// See ClientSession::lease().
+  void lease(std::string_view path, LeaseCommand command, std::chrono::milliseconds deadman, Completion done);
+  /// See ClientSession::set_urgent().
+  void set_urgent(bool is_urgent) { session_.set_urgent(is_urgent); }
   void lock(std::string_view path, LockKind kind, Completion done);
   void unlock(std::string_view path, Completion done);
   void enter_monitor(std::string_view path, std::chrono::milliseconds timeout, Completion done);

@@ -117,6 +117,55 @@ void read_callback_rule(ObjectReader& in, CallbackRule& rule) {
                                   : CallbackPolicy::owner;
 }
 
+void read_lease_rule(ObjectReader& in, LeaseRule& rule) {
+  in.required_text("member", [&](const std::string& text) -> std::string {
+    rule.member = text;
+    return {};
+  });
+  std::string need = "covered";
+  in.choice("lease", need, {"required", "covered", "never"});
+  rule.need = need == "required" ? LeaseNeed::required : need == "never" ? LeaseNeed::never : LeaseNeed::covered;
+}
+
+void read_safe_action(ObjectReader& in, SafeAction& action) {
+  std::size_t kinds = 0;
+  const auto target = [&](const char* key, SafeAction::Kind kind) {
+    std::string text;
+    in.text(key, text);
+    if (text.empty()) return;
+    ++kinds;
+    action.kind = kind;
+    const auto dot = text.rfind('.');
+    if (dot == std::string::npos || dot == 0 || dot + 1 == text.size())
+      return in.finding(key, "found " + rr::quote(text) + ", expected path.member, as \"Create.Drive\"");
+    action.path = text.substr(0, dot);
+    action.member = text.substr(dot + 1);
+  };
+  target("call", SafeAction::Kind::call);
+  target("wire", SafeAction::Kind::wire);
+  target("property", SafeAction::Kind::property);
+  if (kinds != 1) in.finding("call", "expected one of call, wire and property: what is safe to do");
+  std::string arguments;
+  std::string value;
+  in.json("arguments", "array", arguments);
+  in.json("value", "", value);
+  const bool is_call = action.kind == SafeAction::Kind::call;
+  if (is_call && !value.empty()) in.finding("value", "calls have arguments, an array");
+  if (!is_call && !arguments.empty()) in.finding("arguments", "wires and properties have a value");
+  if (!is_call && value.empty()) in.finding("value", "missing; expected what is safe to write");
+  action.json = !is_call ? value : arguments.empty() ? "[]" : arguments;
+}
+
+void read_leases(ObjectReader& in, LeaseConfig& leases) {
+  leases.is_offered = true;
+  in.objects("members", false, [&](ObjectReader& item) { read_lease_rule(item, leases.members.emplace_back()); });
+  in.objects("safe", false, [&](ObjectReader& item) { read_safe_action(item, leases.safe.emplace_back()); });
+  in.texts("takeover", false, [&](const std::string& text) -> std::string {
+    leases.takeover.push_back(text);
+    return text.empty() ? "empty; expected a role, or \"*\"" : "";
+  });
+}
+
 void read_node(ObjectReader& in, NodeConfig& node) {
   std::string id;
   in.text("name", node.name);
@@ -143,6 +192,9 @@ void read_device(ObjectReader& in, DeviceConfig& device) {
   in.objects("callbacks", false,
              [&](ObjectReader& item) { read_callback_rule(item, device.callbacks.emplace_back()); });
   in.flag("shares_reads", device.shares_reads);
+  in.object("leases", [&](ObjectReader& part) { read_leases(part, device.leases); });
+  if (device.mode == DeviceMode::relay && device.leases.is_offered)
+    in.finding("leases", "the commands of a relayed device pass unread; expected \"mode\": \"shared\"");
   if (device.mode == DeviceMode::relay && (!device.login.username.empty() || !device.callbacks.empty()))
     in.finding("mode",
                "login and callbacks are of shared devices: clients of a relayed one have sessions of their own");

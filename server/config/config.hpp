@@ -53,6 +53,42 @@ struct CallbackRule {
   bool operator==(const CallbackRule&) const = default;
 };
 
+/// What a lease is to a member that is written or called.
+enum class LeaseNeed : std::uint8_t {
+  covered,   ///< while somebody has one, the holder alone may
+  required,  ///< the holder alone may, ever
+  never,     ///< everybody with the right may, past leases and locks
+};
+
+/// For the members whose "path.member" fits a pattern with * and ?.
+struct LeaseRule {
+  std::string member;
+  LeaseNeed need = LeaseNeed::covered;
+
+  bool operator==(const LeaseRule&) const = default;
+};
+
+/// What makes a device safe.
+struct SafeAction {
+  enum class Kind : std::uint8_t { call, wire, property };
+  Kind kind = Kind::call;
+  std::string path;    ///< of the object
+  std::string member;  ///< its name
+  std::string json;    ///< the arguments as an array, or the value
+
+  bool operator==(const SafeAction&) const = default;
+};
+
+/// The right to command a shared device, held by one client for as long as it renews it.
+struct LeaseConfig {
+  bool is_offered = false;
+  std::vector<LeaseRule> members;     ///< the first that fits a member counts
+  std::vector<SafeAction> safe;       ///< done in this order when a lease ends whose object they are at or below
+  std::vector<std::string> takeover;  ///< roles of those who may take a lease from others; "*": everybody
+
+  bool operator==(const LeaseConfig&) const = default;
+};
+
 /// How clients reach a device.
 enum class DeviceMode : std::uint8_t {
   relay,   ///< each by a connection of its own, byte for byte
@@ -71,6 +107,8 @@ struct DeviceConfig {
   UpstreamLogin login;                  ///< of the shared session; no user name: none
   std::vector<CallbackRule> callbacks;  ///< of a shared device; the first that fits a callback counts
   bool shares_reads = false;            ///< of a shared device: clients that read a property at once are one to it
+
+  LeaseConfig leases;                   ///< of a shared device
 
   bool operator==(const DeviceConfig&) const = default;
 };

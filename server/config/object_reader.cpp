@@ -9,6 +9,8 @@ namespace rrgate {
 
 namespace {
 
+constexpr std::string_view any_type = "any";
+
 const nlohmann::json& empty_object() {
   static const nlohmann::json value = nlohmann::json::object();
   return value;
@@ -77,7 +79,7 @@ const nlohmann::json* ObjectReader::find(std::string_view key, std::string_view 
     if (description.is_required) finding(key, "missing; expected " + with_article(type));
     return nullptr;
   }
-  if (type_of(*found) != type) {
+  if (type != any_type && type_of(*found) != type) {
     finding(key, "found " + shown(*found) + ", expected " + with_article(type));
     return nullptr;
   }
@@ -120,6 +122,11 @@ void ObjectReader::text(std::string_view key, std::string& target) {
 void ObjectReader::flag(std::string_view key, bool& target) {
   const auto* value = find(key, "boolean", {.path = {}, .type = {}, .default_value = target ? "true" : "false"});
   if (value) target = value->get<bool>();
+}
+
+void ObjectReader::json(std::string_view key, std::string_view type, std::string& target) {
+  const auto* value = find(key, type.empty() ? any_type : type, {});
+  if (value) target = value->dump();
 }
 
 void ObjectReader::choice(std::string_view key, std::string& target, std::vector<std::string> choices) {

@@ -37,6 +37,8 @@ class ObjectReader {
   void duration(std::string_view key, std::chrono::milliseconds& target, IntegerRange range);
   void text(std::string_view key, std::string& target);
   void flag(std::string_view key, bool& target);
+  /// Any JSON, as its text. `type`  empty: of any type.
+  void json(std::string_view key, std::string_view type, std::string& target);
   void choice(std::string_view key, std::string& target, std::vector<std::string> choices);
   /// `read` turns the text into something else and returns what is wrong with it, or "".
   using ReadText = std::function<std::string(const std::string&)>;

@@ -47,6 +47,24 @@ Recorded recorded_of(rr::EntryType type) {
   }
 }
 
+/// The name of the record.
+std::string_view event_of(rr::LockCommand command) {
+  switch (command) {
+    case rr::LockCommand::unlock:
+    case rr::LockCommand::exit_monitor:
+      return "unlock";
+    case rr::LockCommand::acquire_lease:
+    case rr::LockCommand::renew_lease:
+      return "lease";
+    case rr::LockCommand::take_lease:
+      return "lease_taken";
+    case rr::LockCommand::release_lease:
+      return "lease_end";
+    default:
+      return "lock";
+  }
+}
+
 /// What is not about a member, but about a service as such. An object that is looked for may be on the way to another.
 bool is_about_service(rr::EntryType type) {
   switch (type) {
@@ -118,8 +136,7 @@ AuditEntryPtr SessionRights::begin(const rr::MemberAccess& admitted) {
 }
 
 AuditEntryPtr SessionRights::begin_lock(const rr::LockWanted& wanted, const rr::AuthenticatedUser* user) {
-  const bool is_release = wanted.command == rr::LockCommand::unlock || wanted.command == rr::LockCommand::exit_monitor;
-  return begin({.path = wanted.path, .verb = Verb::lock}, user, is_release ? "unlock" : "lock");
+  return begin({.path = wanted.path, .verb = Verb::lock}, user, event_of(wanted.command));
 }
 
 AuditEntryPtr SessionRights::begin(AccessRequest what, const rr::AuthenticatedUser* user, std::string_view event) {

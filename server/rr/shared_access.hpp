@@ -21,6 +21,9 @@ class SessionRights {
   /// What is to be recorded of something that was admitted; see Access::begin().
   AuditEntryPtr begin(const rr::MemberAccess& admitted);
   AuditEntryPtr begin_lock(const rr::LockWanted& wanted, const rr::AuthenticatedUser* user);
+  bool has_role(std::string_view role, const rr::AuthenticatedUser* user) {
+    return standing_of(user).identity().has_role(role);
+  }
   /// Whether all that was shown is still good; see Standing.
   bool is_good() { return shown_->is_good() && (!user_ || user_->is_good()); }
 

@@ -22,12 +22,12 @@ const std::string& path_of(const rr::ServiceObject& object) {
 
 SharedClient::SharedClient(SharedClientOwner& owner, rr::ServiceDirectory& directory, rr::ServiceSessionOptions options,
                            std::unique_ptr<rr::ByteStream> stream, ClientOrigin from, MemoryBudget::Charge memory,
-                           LockRecorder begin_lock)
+                           LockRights rights)
     : SessionDriver(std::move(stream), directory, std::move(options), rr::read_clocks()),
       owner_(&owner),
       from_(std::move(from)),
       memory_(std::move(memory)),
-      begin_lock_(std::move(begin_lock)) {}
+      rights_(std::move(rights)) {}
 
 void SharedClient::close_service() {
   session_.close_service(rr::read_clocks());
@@ -125,8 +125,11 @@ void SharedClient::handle(const rr::WireDisconnected& disconnected) {
 }
 
 void SharedClient::handle(const rr::WireReceived& received) {
-  // The newest wins: one that can't be sent is replaced.
-  if (home_) (void)home_->send_wire(path_of(*received.object), *received.member, received.value);
+  if (!home_) return;
+  // The newest wins: one that can't be sent is replaced. The protocol has no answer to one that may not be sent.
+  const auto sent = home_->send_wire(*this, path_of(*received.object), *received.member, received.value);
+  if (!sent && sent.error().code == rr::ErrorCode::object_locked_error && !std::exchange(was_refused_, true))
+    log(LogLevel::info, "values of a wire are not passed on: " + sent.error().message, {{"peer", peer()}});
 }
 
 void SharedClient::receive_wire(rr::WirePacket& packet) {
@@ -369,10 +372,20 @@ void SharedClient::handle(const rr::UserChanged&) {
 
 // --- locks ---
 
+AuditEntryPtr SharedClient::begin_lease_end(const std::string& path) const {
+  if (!rights_.begin) return nullptr;
+  rr::LockWanted end;
+  end.command = rr::LockCommand::release_lease;
+  end.path = path;
+  return rights_.begin(end, session_.user());
+}
+
 void SharedClient::handle(const rr::LockWanted& wanted) {
   if (!service_) return;
   const std::weak_ptr<StreamDriver> weak = weak_from_this();
-  const auto entry = begin_lock_ ? begin_lock_(wanted, session_.user()) : nullptr;
+  const bool is_recorded =
+      wanted.command != rr::LockCommand::renew_lease && wanted.command != rr::LockCommand::release_lease;
+  const auto entry = rights_.begin && is_recorded ? rights_.begin(wanted, session_.user()) : nullptr;
   home_->lock(*this, wanted, [this, weak, entry, id = wanted.id](const rr::Result<>& result) {
     if (entry) entry->finish(result);
     const auto self = weak.lock();

@@ -28,14 +28,19 @@ class SharedClientOwner {
   ~SharedClientOwner() = default;
 };
 
-/// What is to be recorded of a lock that `user` asks for (null: nobody has logged in).
-using LockRecorder = std::function<AuditEntryPtr(const rr::LockWanted& wanted, const rr::AuthenticatedUser* user)>;
+/// What a session asks the gateway's access about locks. `user`  who has logged in; null: nobody.
+struct LockRights {
+  /// What is to be recorded of a lock, or of a lease's end (release_lease). None: nothing.
+  std::function<AuditEntryPtr(const rr::LockWanted& wanted, const rr::AuthenticatedUser* user)> begin;
+  /// None: nobody has one.
+  std::function<bool(std::string_view role, const rr::AuthenticatedUser* user)> has_role;
+};
 
 class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private UpstreamClient {
  public:
   SharedClient(SharedClientOwner& owner, rr::ServiceDirectory& directory, rr::ServiceSessionOptions options,
                std::unique_ptr<rr::ByteStream> stream, ClientOrigin from, MemoryBudget::Charge memory,
-               LockRecorder begin_lock);
+               LockRights rights);
 
   const rr::ServiceSession& session() const { return session_; }
   /// For logs.
@@ -80,6 +85,9 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   // UpstreamClient
   std::weak_ptr<const void> life() const override { return weak_from_this(); }
   Subject lock_user() const override { return session_.user() ? subject_of(*session_.user()) : Subject(); }
+  bool has_role(std::string_view role) const override { return rights_.has_role && rights_.has_role(role, session_.user()); }
+  AuditEntryPtr begin_lease_end(const std::string& path) const override;
+  std::shared_ptr<Upstream> upstream_in_use() const override { return home_; }
   bool may_answer(const std::string& path, const rr::MemberDefinition& callback) const override {
     return session_.admits(rr::EntryType::callback_call_req, path, &callback);
   }
@@ -113,9 +121,10 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   SharedClientOwner* owner_;
   ClientOrigin from_;
   MemoryBudget::Charge memory_;
-  LockRecorder begin_lock_;
+  LockRights rights_;
   std::string end_reason_;
   bool is_behind_ = false;
+  bool was_refused_ = false;  ///< a wire's value, and it is in the log
   bool was_behind_ = false;  ///< and it is in the log
   std::shared_ptr<SharedService> service_;
   std::shared_ptr<Upstream> home_;   ///< the shared one, or that of the user who has logged in at the device

@@ -17,7 +17,7 @@ std::shared_ptr<SharedClient> SharedNode::add(std::unique_ptr<rr::ByteStream> st
   if (const auto verified = stream->verified_peer(); !verified.is_any()) options.verified_node_id = verified;
   auto client =
       std::make_shared<SharedClient>(*this, directory_, std::move(options), std::move(stream), std::move(arrival.from),
-                                     std::move(arrival.memory), std::move(arrival.begin_lock));
+                                     std::move(arrival.memory), std::move(arrival.lock_rights));
   clients_.emplace(client.get(), client);
   ended_.emplace(client.get(), std::move(ended));
   client->start();

@@ -18,7 +18,7 @@ struct SharedArrival {
   std::function<rr::Result<>(const rr::MemberAccess&)> admit;  ///< none: everything is allowed
   /// See ServiceSessionOptions.
   std::function<rr::Result<std::shared_ptr<rr::RequestPass>>(const rr::MemberAccess&)> enter;
-  LockRecorder begin_lock;  ///< none: locks are not recorded
+  LockRights lock_rights;
   bool is_encrypted = false;
   MemoryBudget::Charge memory;  ///< what is held for it
 };

@@ -18,7 +18,9 @@ class JudgedByDevice final : public rr::Authenticator {
 /// What clients may want to know, because some things differ from a session of their own.
 rr::MapString with_mode(rr::MapString attributes) {
   constexpr std::string_view mode = "rrgate.mode";
-  std::erase_if(attributes.items, [mode](const auto& item) { return item.first == mode; });
+  // The second is that of the session with the device, where this is another gateway.
+  std::erase_if(attributes.items,
+                [mode](const auto& item) { return item.first == mode || item.first == session_attribute; });
   attributes.items.emplace_back(std::string(mode), rr::Value("shared"));
   return attributes;
 }
@@ -70,6 +72,7 @@ void SharedService::start(std::chrono::milliseconds rests_after) {
 }
 
 void SharedService::stop() {
+  upstream_->end_leases("the gateway stops, or shares the device no more");
   withdraw();
   upstream_->close();
 }

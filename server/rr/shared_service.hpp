@@ -15,6 +15,9 @@ namespace rrgate {
 class SharedClient;
 class SharedService;
 
+/// The attribute by which a client names its session to the gateway's own service.
+inline constexpr std::string_view session_attribute = "rrgate.session";
+
 /// Where a service is offered: on the node of its device, and on the gateway's.
 class ServiceBoard {
  public:

@@ -22,6 +22,7 @@ namespace rrgate {
 
 class ServiceLocks;
 class Upstream;
+struct LeaseNews;
 
 enum class DeviceState { connecting, online, offline };
 std::string_view to_string(DeviceState state);
@@ -72,6 +73,11 @@ class Device : public std::enable_shared_from_this<Device> {
   std::shared_ptr<ServiceLocks> locks_of(const std::string& service);
   /// The same for all services that clients use now, by their names.
   std::map<std::string, std::shared_ptr<ServiceLocks>> locks() const;
+  /// Told when a lease of one of its objects begins and ends.
+  void on_lease(std::function<void(const LeaseNews&)> handler) { on_lease_ = std::move(handler); }
+  void tell_lease(const LeaseNews& news) const {
+    if (on_lease_) on_lease_(news);
+  }
   bool is_shared() const { return config_.mode == DeviceMode::shared; }
   /// Called when state() or identity() has changed.
   void on_change(std::function<void()> handler) { on_change_ = std::move(handler); }
@@ -122,6 +128,7 @@ class Device : public std::enable_shared_from_this<Device> {
   DeviceConfig config_;
   std::vector<rr::ConnectionUrl> urls_;  ///< of a found device
   std::function<void()> on_change_;
+  std::function<void(const LeaseNews&)> on_lease_;
   rr::DialOptions dial_options_;
   std::shared_ptr<TlsFiles> tls_;                        ///< null: the URL wants none
   std::list<boost::asio::cancellation_signal> dialing_;  ///< what stop() ends

@@ -125,6 +125,8 @@ void LockTable::handle_wanted(LockClient client, const rr::LockWanted& wanted, r
       return enter(client, wanted, now);
     case rr::LockCommand::exit_monitor:
       return exit(client, wanted, now);
+    default:
+      return;  // of leases: see LeaseTable
   }
 }
 

@@ -1,5 +1,9 @@
 #include "server/upstream/service_locks.hpp"
 
+#include <algorithm>
+
+#include "core/session/service_path.hpp"
+#include "core/support/glob.hpp"
 #include "server/log/log.hpp"
 #include "server/upstream/upstream.hpp"
 
@@ -11,7 +15,18 @@ rr::TimePoint steady_now() {
   return std::chrono::steady_clock::now();
 }
 
+/// Whether object locks leave it alone.
+bool is_exempt(const rr::MemberDefinition& member, MemberUse use) {
+  return member.has_modifier("nolock") || (use == MemberUse::read && member.has_modifier("nolockread"));
+}
+
 }  // namespace
+
+ServiceLocks::ServiceLocks(Device& device, std::string service)
+    : device_(device),
+      service_(std::move(service)),
+      safe_(std::make_shared<SafeValues>(device.config().name, service_, device.config().leases.safe)),
+      timeout_(device.executor()) {}
 
 void ServiceLocks::add(const UpstreamClient& client, Upstream& upstream) {
   const auto id = ++last_client_;
@@ -31,6 +46,7 @@ void ServiceLocks::remove(const UpstreamClient& client, std::function<void()> le
   std::erase_if(requests_, [id](const auto& request) { return request.first.first == id; });
   if (left) leaving_[id] = std::move(left);
   table_.remove(id, steady_now());
+  leases_.handle_gone(id);
   settle();
 }
 
@@ -38,21 +54,128 @@ void ServiceLocks::handle_wanted(const UpstreamClient& client, const rr::LockWan
                                  std::function<void(const rr::Result<>&)> done) {
   const auto known = clients_.find(&client);
   if (known == clients_.end()) return;
+  if (rr::is_of_lease(wanted.command)) return done(handle_lease(client, known->second, wanted));
+  const bool takes = wanted.command != rr::LockCommand::unlock && wanted.command != rr::LockCommand::exit_monitor;
+  if (const auto free = leases_.check_lock(known->second, wanted.path, steady_now()); takes && !free) return done(free);
   requests_[{known->second, wanted.id}] = std::move(done);
   table_.handle_wanted(known->second, wanted, steady_now());
   settle();
 }
 
-rr::Result<> ServiceLocks::check(const UpstreamClient& client, std::string_view path, bool is_exempt) {
-  if (table_.is_empty()) return {};
+rr::Result<> ServiceLocks::check(const UpstreamClient& client, std::string_view path,
+                                 const rr::MemberDefinition& member, MemberUse use) {
+  const bool is_leased = use == MemberUse::command && device_.config().leases.is_offered;
+  if (table_.is_empty() && !is_leased) return {};
+  const auto need = is_leased ? need_of(path, member) : LeaseNeed::covered;
+  if (need == LeaseNeed::never) return {};
   const auto known = clients_.find(&client);
-  auto allowed = table_.check(known == clients_.end() ? 0 : known->second, path, is_exempt, steady_now());
+  const auto id = known == clients_.end() ? 0 : known->second;
+  auto allowed = table_.check(id, path, is_exempt(member, use), steady_now());
+  if (allowed && is_leased) allowed = leases_.check(id, path, need, steady_now());
   settle();
   return allowed;
 }
 
+rr::Result<> ServiceLocks::check_packet(const UpstreamClient& client, std::string_view path,
+                                        const rr::MemberDefinition& member) {
+  if (!device_.config().leases.is_offered) return {};
+  const auto need = need_of(path, member);
+  if (need == LeaseNeed::never) return {};
+  const auto known = clients_.find(&client);
+  auto allowed = leases_.check(known == clients_.end() ? 0 : known->second, path, need, steady_now());
+  settle();
+  return allowed;
+}
+
+LeaseNeed ServiceLocks::need_of(std::string_view path, const rr::MemberDefinition& member) const {
+  const auto name = std::string(path) + "." + member.name;
+  const auto& rules = device_.config().leases.members;
+  const auto rule =
+      std::find_if(rules.begin(), rules.end(), [&](const auto& each) { return rr::glob_matches(each.member, name); });
+  return rule == rules.end() ? LeaseNeed::covered : rule->need;
+}
+
+bool ServiceLocks::is_urgent(std::string_view path, const rr::MemberDefinition& member) const {
+  return device_.config().leases.is_offered && need_of(path, member) == LeaseNeed::never;
+}
+
+// --- leases ---
+
+rr::Result<> ServiceLocks::handle_lease(const UpstreamClient& client, LockClient id, const rr::LockWanted& wanted) {
+  const auto& config = device_.config().leases;
+  if (!config.is_offered)
+    return rr::make_error(rr::ErrorCode::not_implemented_error,
+                          "the gateway gives no leases of device " + rr::quote(device_.config().name) +
+                              ": its configuration has no \"leases\" there");
+  const auto now = steady_now();
+  rr::Result<> result;
+  if (wanted.command == rr::LockCommand::renew_lease) {
+    result = leases_.renew(id, wanted.path, now);
+  } else if (wanted.command == rr::LockCommand::release_lease) {
+    result = leases_.release(id, wanted.path, now);
+  } else {
+    const bool takes_over = wanted.command == rr::LockCommand::take_lease;
+    const auto may_take = [&](const std::string& role) { return role == "*" || client.has_role(role); };
+    if (takes_over && std::none_of(config.takeover.begin(), config.takeover.end(), may_take))
+      return rr::make_error(rr::ErrorCode::permission_denied,
+                            "this client has none of the roles that may take a lease over (\"takeover\")");
+    if (auto fits = safe_->check(canonical_lock_path(wanted.path)); !fits) return fits;
+    if (auto allowed = table_.check(id, wanted.path, false, now); !allowed) return allowed;
+    result = leases_.acquire(id, client.lock_user(), wanted.path, wanted.timeout, takes_over, now);
+  }
+  end_leases();
+  const bool is_new = result && (wanted.command == rr::LockCommand::acquire_lease ||
+                                 wanted.command == rr::LockCommand::take_lease);
+  if (is_new) {
+    const auto key = canonical_lock_path(wanted.path);
+    auto& holder = holders_[key];
+    holder.upstream = client.upstream_in_use();
+    if (!holder.end) holder.end = client.begin_lease_end(wanted.path);
+    for (auto& lease : leases_.held())
+      if (lease.path == key) device_.tell_lease({service_, std::move(lease), true, {}});
+  }
+  settle();
+  return result;
+}
+
+void ServiceLocks::end_leases() {
+  while (auto ended = leases_.poll_event()) {
+    const auto holder = holders_.extract(ended->lease.path);
+    const auto upstream = open_upstream(holder ? holder.mapped().upstream.lock() : nullptr);
+    const bool is_safe = safe_->send(ended->lease.path, upstream);
+    const auto what = ended->why + (is_safe ? "" : "; the device is made safe when it is back");
+    log(is_safe ? LogLevel::info : LogLevel::warning, "lease ended",
+        {{"device", device_.config().name}, {"path", ended->lease.path}, {"user", ended->lease.by.name}, {"reason", what}});
+    if (holder && holder.mapped().end) holder.mapped().end->finish(is_safe ? Outcome::ok : Outcome::error, what);
+    device_.tell_lease({service_, std::move(ended->lease), false, what});
+  }
+}
+
+/// The holder's session, where it is open still; else any other with the service.
+std::shared_ptr<Upstream> ServiceLocks::open_upstream(const std::shared_ptr<Upstream>& first) {
+  if (first && first->is_open()) return first;
+  for (const auto& [number, known] : upstreams_)
+    if (auto upstream = known.lock(); upstream && upstream->is_open()) return upstream;
+  return nullptr;
+}
+
+void ServiceLocks::end_leases(const std::string& why) {
+  leases_.handle_lost(why);
+  settle();
+}
+
+void ServiceLocks::handle_opened(const std::shared_ptr<Upstream>& upstream) {
+  if (!device_.config().leases.is_offered) return;
+  upstreams_[upstream->number()] = upstream;
+  safe_->handle_opened(upstream);
+}
+
 void ServiceLocks::handle_lost(const Upstream& upstream) {
   table_.handle_lost(upstream.number(), steady_now());
+  std::vector<std::string> lost;
+  for (const auto& [path, holder] : holders_)
+    if (holder.upstream.lock().get() == &upstream) lost.push_back(path);
+  for (const auto& path : lost) leases_.handle_lost(path, "the connection to the device was lost");
   settle();
 }
 
@@ -64,7 +187,8 @@ void ServiceLocks::handle_released(std::string_view path) {
 void ServiceLocks::settle() {
   const auto self = shared_from_this();
   while (auto event = table_.poll_event()) std::visit([this](auto& happened) { handle(std::move(happened)); }, *event);
-  const auto next = table_.poll_timeout();
+  end_leases();
+  const auto next = std::min(table_.poll_timeout(), leases_.poll_timeout());
   if (next == timeout_.expiry()) return;
   timeout_.expires_at(next);
   if (next == rr::TimePoint::max()) return;
@@ -72,6 +196,7 @@ void ServiceLocks::settle() {
     const auto still_there = weak.lock();
     if (cancelled || !still_there) return;
     still_there->table_.handle_timeout(steady_now());
+    still_there->leases_.handle_timeout(steady_now());
     still_there->settle();
   });
 }

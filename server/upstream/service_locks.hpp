@@ -10,17 +10,35 @@
 #include <utility>
 #include <vector>
 
+#include "server/access/audit_entry.hpp"
+#include "server/upstream/lease_table.hpp"
 #include "server/upstream/lock_table.hpp"
+#include "server/upstream/safe_values.hpp"
 
 namespace rrgate {
 
+class Device;
 class Upstream;
 class UpstreamClient;
 
-/// Drives a LockTable: asks the device in the sessions that its clients use, tells them what came of it.
+/// What a client is about to do with an object or a member.
+enum class MemberUse : std::uint8_t { read, connect, command };
+
+/// What has become of a lease.
+struct LeaseNews {
+  std::string service;
+  HeldLease lease;
+  bool is_held = false;
+  std::string why;  ///< it is held no more
+};
+
+/// Whether a client may use a member now: the one place where locks and leases decide. Drives a LockTable: asks the
+/// device in the sessions that its clients use, tells them what came of it; and a LeaseTable, whose leases end with the
+/// device made safe.
 class ServiceLocks : public std::enable_shared_from_this<ServiceLocks> {
  public:
-  explicit ServiceLocks(const boost::asio::any_io_executor& executor) : timeout_(executor) {}
+  /// `device`  outlives it.
+  ServiceLocks(Device& device, std::string service);
 
   /// A client begins to use an upstream.
   void add(const UpstreamClient& client, Upstream& upstream);
@@ -29,15 +47,35 @@ class ServiceLocks : public std::enable_shared_from_this<ServiceLocks> {
   /// `done`  is called exactly once, unless the client is removed before.
   void handle_wanted(const UpstreamClient& client, const rr::LockWanted& wanted,
                      std::function<void(const rr::Result<>&)> done);
-  /// Whether the client may use an object now. See LockTable.
-  rr::Result<> check(const UpstreamClient& client, std::string_view path, bool is_exempt);
+  /// Whether the client may use a member now. Errors   those of LockTable::check() and LeaseTable::check().
+  rr::Result<> check(const UpstreamClient& client, std::string_view path, const rr::MemberDefinition& member,
+                     MemberUse use);
+  /// The same for packets of what is connected already: locks leave them alone.
+  rr::Result<> check_packet(const UpstreamClient& client, std::string_view path, const rr::MemberDefinition& member);
+  /// Whether a command of the member passes whatever waits.
+  bool is_urgent(std::string_view path, const rr::MemberDefinition& member) const;
   std::vector<HeldLock> held() const { return table_.held(); }
+  std::vector<HeldLease> leases() const { return leases_.held(); }
+  /// Every lease ends, because the gateway or the device goes.
+  void end_leases(const std::string& why);
+  void handle_opened(const std::shared_ptr<Upstream>& upstream);
   /// The upstream has lost its session with the device.
   void handle_lost(const Upstream& upstream);
   /// The device has replaced the objects at and below a path.
   void handle_released(std::string_view path);
 
  private:
+  struct Holder {
+    std::weak_ptr<Upstream> upstream;
+    AuditEntryPtr end;  ///< what is to be recorded of it
+  };
+
+  LeaseNeed need_of(std::string_view path, const rr::MemberDefinition& member) const;
+  rr::Result<> handle_lease(const UpstreamClient& client, LockClient id, const rr::LockWanted& wanted);
+  /// The device is made safe where leases have ended.
+  void end_leases();
+  std::shared_ptr<Upstream> open_upstream(const std::shared_ptr<Upstream>& first);
+
   /// Does what the table wants done.
   void settle();
   void handle(LockAsked&& asked);
@@ -45,7 +83,12 @@ class ServiceLocks : public std::enable_shared_from_this<ServiceLocks> {
   void handle(LockClientLeft&& left);
   void handle(LockSessionInDoubt&& doubtful);
 
+  Device& device_;
+  std::string service_;
   LockTable table_;
+  LeaseTable leases_;
+  std::shared_ptr<SafeValues> safe_;
+  std::map<std::string, Holder> holders_;  ///< by canonical path of the lease
   std::map<const UpstreamClient*, LockClient> clients_;
   std::map<LockSession, std::weak_ptr<Upstream>> upstreams_;  ///< by Upstream::number()
   std::map<std::pair<LockClient, rr::LockRequestId>, std::function<void(const rr::Result<>&)>> requests_;

@@ -19,12 +19,19 @@ std::uint64_t next_number() {
   return ++last;
 }
 
-/// Whether object locks leave a request alone.
-bool is_exempt(const rr::Called& called) {
-  if (called.member->has_modifier("nolock")) return true;
-  const bool is_read = called.kind == rr::CallKind::property_get || called.kind == rr::CallKind::memory_read ||
-                       called.kind == rr::CallKind::memory_dimensions;
-  return is_read && called.member->has_modifier("nolockread");
+/// What a request does to a member. A peek is not what `nolockread` lets through.
+MemberUse use_of(rr::CallKind kind) {
+  switch (kind) {
+    case rr::CallKind::property_get:
+    case rr::CallKind::memory_read:
+    case rr::CallKind::memory_dimensions:
+      return MemberUse::read;
+    case rr::CallKind::peek_in:
+    case rr::CallKind::peek_out:
+      return MemberUse::connect;
+    default:
+      return MemberUse::command;
+  }
 }
 
 /// What ends something is nobody's harm.
@@ -210,7 +217,7 @@ void Upstream::request(UpstreamClient& client, const rr::Called& called, Complet
   };
   const auto& path = path_of(called);
   if (!ends_generator(called))
-    if (const auto allowed = locks_->check(client, path, is_exempt(called)); !allowed) return done(allowed.error());
+    if (const auto allowed = locks_->check(client, path, *called.member, use_of(called.kind)); !allowed) return done(allowed.error());
   if (!connection_->session().object_type(path)) {  // another session of this service has found it
     return find_object(path, [weak = weak_from_this(), &client, life = client.life(), called,
                               done](const rr::Result<rr::Value>& found) {
@@ -229,7 +236,45 @@ void Upstream::request(UpstreamClient& client, const rr::Called& called, Complet
       done(std::move(result));
     };
   }
+  // It may be the last; nothing of it is touched where nothing is offered.
+  const auto connection = locks_->is_urgent(path, *called.member) ? connection_ : nullptr;
+  if (connection) connection->set_urgent(true);
   begin_request(called, path, std::move(done));
+  if (connection) connection->set_urgent(false);
+}
+
+void Upstream::make_safe(const SafeRequest& request, Completion done) {
+  if (!connection_) return done(lost_error());
+  if (!connection_->session().object_type(request.path))  // another session of this service has found it
+    return find_object(request.path,
+                       [weak = weak_from_this(), request, done = std::move(done)](const rr::Result<rr::Value>& found) {
+                         const auto self = weak.lock();
+                         if (!self || !found) return done(found);
+                         self->make_safe(request, done);
+                       });
+  const auto connection = connection_;  // it may be lost
+  const bool has_waiting = connection->session().queued_bytes() > 0;
+  connection->set_urgent(true);
+  send_safe(request, std::move(done));
+  connection->set_urgent(false);
+  // What waits may be an older command, which must not be the last one.
+  if (has_waiting && connection_) send_safe(request, ignore_result);
+  const auto wire = wires_.find({request.path, request.member});
+  if (request.kind != SafeAction::Kind::wire || wire == wires_.end()) return;
+  wire->second->out_value = request.values.front();
+  if (connection_ && wire->second->is_attached)
+    (void)connection_->send_wire(request.path, request.member, *std::exchange(wire->second->out_value, std::nullopt));
+}
+
+void Upstream::send_safe(const SafeRequest& request, Completion done) {
+  switch (request.kind) {
+    case SafeAction::Kind::call:
+      return connection_->call(request.path, request.member, request.values, std::move(done));
+    case SafeAction::Kind::wire:
+      return connection_->poke_out(request.path, request.member, request.values.front(), std::move(done));
+    case SafeAction::Kind::property:
+      return connection_->set(request.path, request.member, request.values.front(), std::move(done));
+  }
 }
 
 void Upstream::share_read(const std::string& path, const std::string& property, Completion done) {
@@ -340,6 +385,8 @@ void Upstream::ask_for_lock(rr::LockCommand command, const std::string& path, st
       return connection_->enter_monitor(path, timeout, std::move(done));
     case rr::LockCommand::exit_monitor:
       return connection_->exit_monitor(path, std::move(done));
+    default:
+      return done(rr::make_error(rr::ErrorCode::invalid_operation, "the device knows no leases"));
   }
 }
 

@@ -39,6 +39,8 @@ class SharedObject final : public rr::ServiceObject {
   std::string type_;
 };
 
+class Upstream;
+
 /// What an upstream tells a client of it.
 class UpstreamClient {
  public:
@@ -46,6 +48,12 @@ class UpstreamClient {
   virtual std::weak_ptr<const void> life() const = 0;
   /// Whose user locks are this client's too.
   virtual Subject lock_user() const { return {}; }
+  /// Of its identity at the gateway: who may take leases over.
+  virtual bool has_role(std::string_view) const { return false; }
+  /// What is to be recorded of the end of its lease; null: nothing.
+  virtual AuditEntryPtr begin_lease_end(const std::string&) const { return nullptr; }
+  /// The one that its requests go by.
+  virtual std::shared_ptr<Upstream> upstream_in_use() const = 0;
   /// Whether the device may ask it by this callback.
   virtual bool may_answer(const std::string& path, const rr::MemberDefinition& callback) const = 0;
   virtual void receive_event(rr::EventPacket& packet) = 0;
@@ -144,17 +152,24 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   /// Of the client, not of the session: other clients are kept out by the gateway.
   void lock(UpstreamClient& client, const rr::LockWanted& wanted, std::function<void(const rr::Result<>&)> done);
 
+  /// The gateway stops, or shares the device no more: the device is made safe where a lease is held.
+  void end_leases(const std::string& why) { locks_->end_leases(why); }
+
   // For ServiceLocks.
   std::uint64_t number() const { return number_; }
   bool is_for_one_client() const { return use_ == UpstreamUse::one_client; }
   void ask_for_lock(rr::LockCommand command, const std::string& path, std::chrono::milliseconds timeout,
                     Completion done);
 
+  /// Sent past whatever waits, and once more behind it where something waits.
+  void make_safe(const SafeRequest& request, Completion done);
+
   /// Answered with answer_wire(). A client that joins a wire gets the newest value at once.
   void join_wire(UpstreamClient& client, const std::string& path, const rr::MemberDefinition& wire);
   void leave_wire(UpstreamClient& client, const std::string& path, const rr::MemberDefinition& wire);
   /// Errors   those of packing; without a session the newest is sent once there is one.
-  rr::Result<> send_wire(const std::string& path, const rr::MemberDefinition& wire, const rr::Value& value);
+  /// Also object_locked_error: another client has the lease.
+  rr::Result<> send_wire(UpstreamClient& client, const std::string& path, const rr::MemberDefinition& wire, const rr::Value& value);
 
   /// Clients of a readonly pipe share one endpoint at the device; others have one each. Answered with accept_pipe() or
   /// refuse_pipe().
@@ -231,6 +246,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   void forget_below(const std::string& path);
   void share_read(const std::string& path, const std::string& property, Completion done);
   void begin_request(const rr::Called& called, const std::string& path, Completion done);
+  void send_safe(const SafeRequest& request, Completion done);
   void answer_generator(UpstreamClient& client, const rr::Called& called, const std::string& path, Completion done);
   void attach_wire(const MemberKey& key);
   bool has_joined(const UpstreamClient& client, const MemberKey& key) const;

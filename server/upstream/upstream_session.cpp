@@ -76,6 +76,7 @@ rr::awaitable<rr::Result<>> Upstream::open() {
   }
   if (const auto* root = object_type(service_)) watch_object(service_, *root);
   look_up_again();
+  locks_->handle_opened(self);
   co_return rr::Result<>();
 }
 

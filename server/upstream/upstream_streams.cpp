@@ -25,7 +25,7 @@ constexpr std::size_t clients_a_turn = 64;
 
 void Upstream::join_wire(UpstreamClient& client, const std::string& path, const rr::MemberDefinition& member) {
   if (!connection_) return client.answer_wire(path, member, lost_error());
-  if (const auto allowed = locks_->check(client, path, member.has_modifier("nolock")); !allowed) {
+  if (const auto allowed = locks_->check(client, path, member, MemberUse::connect); !allowed) {
     client.answer_wire(path, member, allowed.error());
     return client.close_wire(path, member);  // where it comes with the wire from another session
   }
@@ -155,7 +155,9 @@ bool Upstream::has_joined(const UpstreamClient& client, const MemberKey& key) co
   return std::ranges::any_of(found->second->followers, is_it);
 }
 
-rr::Result<> Upstream::send_wire(const std::string& path, const rr::MemberDefinition& member, const rr::Value& value) {
+rr::Result<> Upstream::send_wire(UpstreamClient& client, const std::string& path, const rr::MemberDefinition& member,
+                                 const rr::Value& value) {
+  if (auto allowed = locks_->check_packet(client, path, member); !allowed) return allowed;
   const auto found = wires_.find({path, member.name});
   if (found == wires_.end()) return {};
   if (connection_ && found->second->is_attached) return connection_->send_wire(path, member.name, value);
@@ -168,7 +170,7 @@ rr::Result<> Upstream::send_wire(const std::string& path, const rr::MemberDefini
 void Upstream::join_pipe(UpstreamClient& client, rr::PipeId id, const std::string& path,
                          const rr::MemberDefinition& member) {
   if (!connection_) return client.refuse_pipe(id, lost_error());
-  if (const auto allowed = locks_->check(client, path, member.has_modifier("nolock")); !allowed) {
+  if (const auto allowed = locks_->check(client, path, member, MemberUse::connect); !allowed) {
     client.refuse_pipe(id, allowed.error());
     return client.close_pipe(id);  // where it comes with the endpoint from another session
   }
@@ -294,10 +296,11 @@ rr::Result<> Upstream::send_pipe(UpstreamClient& client, rr::PipeId id, const rr
   const auto known = endpoints_.find({&client, id});
   if (known == endpoints_.end()) return rr::make_error(rr::ErrorCode::invalid_operation, "the pipe is not connected");
   auto& pipe = pipes_.at(known->second);
-  const auto sent = pipe.state == PipeState::attached && connection_ ? pass_on(pipe, known->first, packet, wants_ack)
+  const auto allowed = locks_->check_packet(client, pipe.path, *pipe.member);
+  const auto sent = !allowed ? allowed : pipe.state == PipeState::attached && connection_ ? pass_on(pipe, known->first, packet, wants_ack)
                                                                      : rr::Result<>(lost_error());
   if (sent) return {};
-  log(LogLevel::info, "pipe endpoint closed: the device takes no packet",
+  log(LogLevel::info, "pipe endpoint closed: its packet was not taken",
       {{"device", device_->config().name},
        {"pipe", pipe.path + "." + pipe.member->name},
        {"error", sent.error().message}});

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "node/transport/watchdog.hpp"
+#include "server/access/standing.hpp"
 #include "server/limits/memory_budget.hpp"
 #include "server/upstream/upstream.hpp"
 
@@ -65,7 +66,10 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   rr::GeneratorId next_generator() { return ++last_generator_; }
   /// Of a generator that nobody wants to hear of any more.
   void drop_generator(rr::GeneratorId id) { upstream_->drop_generator(*this, id); }
-  rr::awaitable<rr::Value> lock(rr::LockCommand command, std::string path);
+  /// `timeout`  the dead-man's time, where a lease is asked for.
+  rr::awaitable<rr::Value> lock(rr::LockCommand command, std::string path, std::chrono::milliseconds timeout = {});
+  /// Who it is, for what leases need of that.
+  void set_standing(StandingPtr standing) { standing_ = std::move(standing); }
 
   /// Calls a handler with what a member brings, until it is destroyed.
   class Listener {
@@ -113,6 +117,9 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   // UpstreamClient
   std::weak_ptr<const void> life() const override { return weak_from_this(); }
   Subject lock_user() const override { return user_; }
+  bool has_role(std::string_view role) const override { return standing_ && standing_->identity().has_role(role); }
+  AuditEntryPtr begin_lease_end(const std::string& path) const override;
+  std::shared_ptr<Upstream> upstream_in_use() const override { return upstream_; }
   bool may_answer(const std::string& path, const rr::MemberDefinition& callback) const override;
   void receive_event(rr::EventPacket& packet) override;
   void receive_wire(rr::WirePacket& packet) override;
@@ -145,6 +152,7 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
 
   std::shared_ptr<Upstream> upstream_;
   Subject user_;
+  StandingPtr standing_;  ///< null: of nobody in particular
   Device::Seat seat_;
   MemoryBudget::Charge memory_;
   std::map<Key, Topic> topics_;

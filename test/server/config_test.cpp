@@ -45,7 +45,7 @@ void list_schema(const nlohmann::json& schema, const std::string& path, bool is_
   if (!path.empty()) {
     OptionInfo info;
     info.path = path;
-    info.type = schema.at("type");
+    info.type = schema.value("type", "any");
     info.is_required = is_required;
     if (schema.contains("minimum")) info.minimum = schema["minimum"];
     if (schema.contains("maximum")) info.maximum = schema["maximum"];
@@ -78,6 +78,23 @@ TEST_CASE("certificates, and how devices are checked") {
   finds(with(R"("tls": {"certificate": []})"), "gateway.json: /tls/certificate: ");
   finds(with(R"("tls": {"required": true})"), "gateway.json: /tls/required: ", "expected tls.certificates");
   CHECK(findings_of(with(R"("tls": {"required": true}, "trusted_proxies": ["127.0.0.1"])")).empty());
+}
+
+TEST_CASE("leases: what a device needs, and what makes it safe") {
+  const auto leases = [](const std::string& text, const std::string& mode = "shared") {
+    return R"({"listen": ["127.0.0.1:0"], "devices": [{"name": "a", "url": "rr+tcp://h:1/?service=s", "mode": ")" + mode +
+           R"(", "leases": )" + text + "}]}";
+  };
+  CHECK(findings_of(leases("{}")).empty());
+  finds(leases("{}", "relay"), "gateway.json: /devices/0/leases: ", "\"mode\": \"shared\"");
+  finds(leases(R"({"safe": [{}]})"), "gateway.json: /devices/0/leases/safe/0/call: ", "one of call, wire and property");
+  finds(leases(R"({"safe": [{"call": "s.Stop", "wire": "s.v"}]})"), "gateway.json: /devices/0/leases/safe/0/call: ");
+  finds(leases(R"({"safe": [{"call": "Stop"}]})"), "gateway.json: /devices/0/leases/safe/0/call: ", "path.member");
+  finds(leases(R"({"safe": [{"call": "s.Stop", "value": 1}]})"), "gateway.json: /devices/0/leases/safe/0/value: ");
+  finds(leases(R"({"safe": [{"wire": "s.v"}]})"), "gateway.json: /devices/0/leases/safe/0/value: ", "missing");
+  finds(leases(R"({"safe": [{"call": "s.Stop", "arguments": 1}]})"), "gateway.json: /devices/0/leases/safe/0/arguments: ");
+  finds(leases(R"({"members": [{"member": "*", "lease": "yes"}]})"),
+        "gateway.json: /devices/0/leases/members/0/lease: ", "required, covered, never");
 }
 
 TEST_CASE("who may do what") {
@@ -206,7 +223,11 @@ TEST_CASE("every option arrives") {
     "listen": ["[::1]:1", "localhost:2"],
     "devices": [{"name": "a", "url": "rr+tcp://h:1/?service=s", "max_clients": 3, "mode": "shared", "shares_reads": true,
                  "login": {"username": "u", "password": "p"},
-                 "callbacks": [{"member": "s.ask*", "answer": "all"}, {"member": "*", "answer": "first"}]}],
+                 "callbacks": [{"member": "s.ask*", "answer": "all"}, {"member": "*", "answer": "first"}],
+                 "leases": {"members": [{"member": "s.Stop", "lease": "never"}, {"member": "s.*", "lease": "required"}],
+                            "safe": [{"call": "s.Drive", "arguments": [0, 0]}, {"wire": "s.arm[1].velocity", "value": 0.5},
+                                     {"property": "s.speed", "value": {"x": 0}}],
+                            "takeover": ["operator"]}}],
     "node": {"name": "lab.gateway", "id": "82301bf1-e1ef-4e89-8d8f-0848291587ac"},
     "discover": {"scopes": ["node_local", "ipv4_broadcast"], "max_devices": 7, "local": false, "hardware": false, "mode": "shared",
                  "tls": {"ca": ["lab.pem"]},
@@ -232,6 +253,13 @@ TEST_CASE("every option arrives") {
   CHECK(device.login.username == "u");
   CHECK(*device.login.credentials.find("password") == rr::Value("p"));
   CHECK(device.callbacks == std::vector<CallbackRule>{{"s.ask*", CallbackPolicy::all}, {"*", CallbackPolicy::first}});
+  CHECK(device.leases ==
+        LeaseConfig{true,
+                    {{"s.Stop", LeaseNeed::never}, {"s.*", LeaseNeed::required}},
+                    {{SafeAction::Kind::call, "s", "Drive", "[0,0]"},
+                     {SafeAction::Kind::wire, "s.arm[1]", "velocity", "0.5"},
+                     {SafeAction::Kind::property, "s", "speed", R"({"x":0})"}},
+                    {"operator"}});
   const auto id = rr::parse_node_id("82301bf1-e1ef-4e89-8d8f-0848291587ac").value();
   CHECK(config.discover == Discover{true,
                                     {"node_local", "ipv4_broadcast"},

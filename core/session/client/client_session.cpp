@@ -184,7 +184,7 @@ RequestId ClientSession::request(EntryType type, MemberKind kind, std::string_vi
     return fail_request(next_request_id(), allowed.error());
   const auto id = begin_request(type, path, member);
   if (auto written = write(**definition); !written) return fail_request(id, written.error());
-  const bool is_urgent = (*definition)->has_modifier("urgent");
+  const bool is_urgent = is_urgent_ || (*definition)->has_modifier("urgent");
   if (auto sent = send_outgoing(now, is_urgent); !sent) return fail_request(id, sent.error());
   const bool has_state = kind == MemberKind::wire || kind == MemberKind::pipe;
   add_pending(id, type, *definition, has_state ? path : std::string_view{}, now);

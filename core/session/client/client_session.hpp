@@ -117,6 +117,10 @@ using ClientEvent =
 /// What an object lock keeps out: other users, or all other clients.
 enum class LockKind : std::uint8_t { user, client };
 
+/// The right to command an object, for so long as it is renewed. The numbers are those of the request.
+enum class LeaseCommand : std::uint8_t { acquire, take_over, renew, release };
+inline constexpr std::string_view lease_op = "rrgate.Lease";
+
 enum class ClientState : std::uint8_t { connecting, connected, closing, closed };
 
 /// One client session. Every request returns an id at once and ends in exactly one Completed event with that id, in
@@ -204,6 +208,9 @@ class ClientSession {
   /// null. A service frees a monitor whose owner sends no request on the object for 30 s.
   RequestId enter_monitor(std::string_view path, std::chrono::milliseconds timeout, Now now);
   RequestId exit_monitor(std::string_view path, Now now);  ///< completes with null
+  /// Does something about the lease of the object at `path`; gateways alone know leases. `deadman`  of acquire and
+  /// take_over. Completes with null.
+  RequestId lease(std::string_view path, LeaseCommand command, std::chrono::milliseconds deadman, Now now);
 
   /// Answers CallbackCalled; a void callback ignores the value. A value that does not fit the definition becomes an
   /// error that says so. For a callback that nobody takes: invalid_operation, "Callback function not set". Unknown ids
@@ -213,6 +220,8 @@ class ClientSession {
   void cancel(RequestId id);
   /// How long requests from now on may take; those that wait already keep their deadline.
   void set_request_timeout(std::chrono::milliseconds timeout) { options_.request_timeout = timeout; }
+  /// Whether requests on members that follow are sent past whatever waits, as those with the modifier `urgent` always are.
+  void set_urgent(bool is_urgent) { is_urgent_ = is_urgent; }
   /// Orderly: tells the service, then closes (after its answer or 500 ms). SessionClosed follows.
   void disconnect(Now now);
 
@@ -398,6 +407,7 @@ class ClientSession {
   PendingRequests pending_;
   SpareNode<PendingRequests> spare_pending_;
   std::unordered_map<RequestId, Fetch> fetches_;
+  bool is_urgent_ = false;
   RequestId last_request_id_ = 0;
   TimePoint earliest_deadline_ = TimePoint::max();  ///< no pending request is due before
   TimePoint closing_deadline_ = TimePoint::max();

@@ -70,6 +70,15 @@ RequestId ClientSession::exit_monitor(std::string_view path, Now now) {
   return request_session_op(path, "MonitorExit", now, nothing);
 }
 
+RequestId ClientSession::lease(std::string_view path, LeaseCommand command, std::chrono::milliseconds deadman,
+                               Now now) {
+  return request_session_op(path, lease_op, now, [&]() -> Result<> {
+    outgoing_.add_scalar("command", DataType::int32_t, static_cast<std::int32_t>(command));
+    outgoing_.add_scalar("deadman", DataType::int32_t, static_cast<std::int32_t>(deadman.count()));
+    return {};
+  });
+}
+
 /// `return` is absent where nothing had to be done; a monitor that is not free yet is asked for again under the same
 /// id.
 void ClientSession::handle_session_op_reply(const Message& message, const MessageEntry& entry, RequestId id,

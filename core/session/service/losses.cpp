@@ -8,9 +8,15 @@
 
 namespace rr {
 
-Value ServiceSession::attributes_with_losses() const {
+MapString ServiceSession::attributes_of(const HostedService& service) const {
   MapString attributes;
-  if (const auto* own = service_->attributes().get_if<MapString>()) attributes = *own;
+  if (const auto* own = service.attributes().get_if<MapString>()) attributes = *own;
+  for (const auto& item : options_.attributes.items) attributes.items.push_back(item);
+  return attributes;
+}
+
+Value ServiceSession::attributes_with_losses() const {
+  auto attributes = attributes_of(*service_);
   MapString told;
   const auto tell = [&told](std::string key, const Ledger& ledger) {
     if (told.items.size() < max_told_subscriptions) told.items.emplace_back(std::move(key), losses_value(ledger));

@@ -18,6 +18,29 @@ bool names_no_object(std::string_view command) {
   return command == "AuthenticateUser" || command == "LogoutUser";
 }
 
+/// The numbers of LeaseCommand.
+Result<> read_lease_op(const Message& message, const MessageEntry& entry, LockWanted& wanted) {
+  const auto elements = message.elements_of(entry);
+  const auto number = [&](std::string_view name) -> Result<std::int32_t> {
+    const auto* element = elements.find(name);
+    if (!element || element->type != DataType::int32_t || element->count != 1)
+      return make_error(ErrorCode::data_type_mismatch, "element " + quote(name) + " of a lease: expected one int32");
+    return load<std::int32_t>(element->data.data());
+  };
+  const auto command = number("command");
+  if (!command) return command.error();
+  const auto deadman = number("deadman");
+  if (!deadman) return deadman.error();
+  constexpr auto first = static_cast<std::int32_t>(LockCommand::acquire_lease);
+  constexpr auto last = static_cast<std::int32_t>(LockCommand::release_lease);
+  if (*command < 0 || *command > last - first)
+    return make_error(ErrorCode::invalid_argument,
+                      "lease command " + std::to_string(*command) + ", expected 0 to " + std::to_string(last - first));
+  wanted.command = static_cast<LockCommand>(first + *command);
+  wanted.timeout = std::chrono::milliseconds(*deadman);
+  return {};
+}
+
 }  // namespace
 
 Result<> ServiceSession::admit(EntryType type, std::string_view path, const MemberDefinition* member,
@@ -158,6 +181,8 @@ Result<> ServiceSession::ask_for_lock(const Message& message, const MessageEntry
     wanted.timeout = *timeout;
   } else if (command == "MonitorExit") {
     wanted.command = LockCommand::exit_monitor;
+  } else if (command == "rrgate.Lease") {
+    if (auto read = read_lease_op(message, entry, wanted); !read) return read;
   } else {
     return protocol_error("Invalid ClientSessionOp command");
   }

@@ -73,6 +73,8 @@ struct ServiceSessionOptions {
   /// kept until the request is answered; what it refuses with is what the client gets, and nothing is lost by it. None:
   /// as many as may come.
   std::function<Result<std::shared_ptr<RequestPass>>(const MemberAccess&)> enter = {};
+  /// Told of the service that is connected to, beside its own attributes.
+  MapString attributes = {};
   /// With it nothing is served here: the first request for a service fails so, and the session ends behind it.
   std::optional<Error> refusal = {};
 };
@@ -187,13 +189,26 @@ struct ObjectWanted {
   std::string path;
 };
 using LockRequestId = std::uint64_t;
-enum class LockCommand : std::uint8_t { lock_for_user, lock_for_client, unlock, enter_monitor, exit_monitor };
+enum class LockCommand : std::uint8_t {
+  lock_for_user,
+  lock_for_client,
+  unlock,
+  enter_monitor,
+  exit_monitor,
+  acquire_lease,  ///< those of leases stand in the order of LeaseCommand
+  take_lease,
+  renew_lease,
+  release_lease,
+};
+constexpr bool is_of_lease(LockCommand command) {
+  return command >= LockCommand::acquire_lease;
+}
 /// Of a remote service: to be answered exactly once, with answer_lock().
 struct LockWanted {
   LockRequestId id = 0;
   LockCommand command = LockCommand::unlock;
   std::string path;
-  std::chrono::milliseconds timeout{0};  ///< enter_monitor; negative: for ever
+  std::chrono::milliseconds timeout{0};  ///< enter_monitor; negative: for ever. acquire_lease, take_lease: dead-man's
 };
 /// Of a remote service: the client disconnects. Once what it holds there is given up: to be answered with
 /// answer_leave(), which ends the session.
@@ -411,6 +426,9 @@ class ServiceSession {
   Result<> disconnect(const Message& message, const MessageEntry& entry, Now now);
   /// A MapString (service_losses.cpp).
   Value attributes_with_losses() const;
+  Result<> write_attributes(std::string_view element, const HostedService& service);
+  /// Those of the service, and of ServiceSessionOptions.
+  MapString attributes_of(const HostedService& service) const;
 
   // logins (service_login.cpp)
   bool may_use_service() const;
@@ -522,6 +540,7 @@ class ServiceSession {
 
   Message outgoing_;
   Value told_attributes_;     ///< borrowed by outgoing_
+  Value session_attributes_;  ///< likewise
   SessionId session_id_ = 0;  ///< while service_ is set
   std::vector<OpenEnter> enters_;
   std::optional<AuthenticatedUser> user_;

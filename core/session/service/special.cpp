@@ -109,6 +109,7 @@ void ServiceSession::handle_special(const Message& message, Now now) {
                           (header.receiver_node_name.empty() || header.receiver_node_name == self.name));
   outgoing_.clear();
   told_attributes_ = {};
+  session_attributes_ = {};
   outgoing_.header.receiver_node_id = header.sender_node_id;
   outgoing_.header.receiver_node_name = header.sender_node_name;
   outgoing_.header.sender_endpoint = header.receiver_endpoint;
@@ -182,12 +183,19 @@ Result<> ServiceSession::answer_special(const Message& message, const MessageEnt
       // Once a message: it is a long answer to a short question.
       const bool tells_losses = service == service_ && may_use_service() && told_attributes_.is_null();
       if (tells_losses) told_attributes_ = attributes_with_losses();
-      const auto& attributes = tells_losses ? told_attributes_ : service->attributes();
-      return pack_varvalue(outgoing_, "return", attributes, service->types());
+      return tells_losses ? pack_varvalue(outgoing_, "return", told_attributes_, service->types())
+                          : write_attributes("return", *service);
     }
     default:
       return protocol_error("Invalid Special Operation");
   }
+}
+
+Result<> ServiceSession::write_attributes(std::string_view element, const HostedService& service) {
+  if (options_.attributes.items.empty() || !session_attributes_.is_null())  // once a message, which borrows them
+    return pack_varvalue(outgoing_, element, service.attributes(), service.types());
+  session_attributes_ = Value(attributes_of(service));
+  return pack_varvalue(outgoing_, element, session_attributes_, service.types());
 }
 
 Result<> ServiceSession::write_service_desc(const Message& message, const MessageEntry& entry) {
@@ -204,8 +212,7 @@ Result<> ServiceSession::write_service_desc(const Message& message, const Messag
   }
   const auto service = directory_.find(entry.service_path);
   if (!service) return service_not_found();
-  if (auto packed = pack_varvalue(outgoing_, "attributes", service->attributes(), service->types()); !packed)
-    return packed;
+  if (auto packed = write_attributes("attributes", *service); !packed) return packed;
   if (!service->extra_imports().empty())
     add_text_list(outgoing_, "extraimports", {service->extra_imports().begin(), service->extra_imports().end()});
   outgoing_.add_text("servicedef", service->root_definition().text);
@@ -291,7 +298,7 @@ Result<> ServiceSession::accept_combined(const OpenLogin& request, std::optional
     for (const auto* definition : service->definitions_for_client()) texts.push_back(definition->text);
     if (!write_tag(outgoing_, request.known_tag, texts)) add_text_list(outgoing_, "servicedefs", texts);
   }
-  return pack_varvalue(outgoing_, "attributes", service->attributes(), service->types());
+  return write_attributes("attributes", *service);
 }
 
 void ServiceSession::finish_combined(const OpenLogin& login, Result<AuthenticatedUser> result, Now now) {

@@ -1,0 +1,135 @@
+#include "server/upstream/safe_values.hpp"
+
+#include <algorithm>
+
+#include "core/session/service_path.hpp"
+#include "server/json/value_from_json.hpp"
+#include "server/log/log.hpp"
+#include "server/upstream/upstream.hpp"
+
+namespace rrgate {
+
+namespace {
+
+rr::Error misfit(const SafeAction& action, const std::string& why) {
+  return rr::make_error(rr::ErrorCode::invalid_configuration,
+                        "safe value " + rr::quote(action.path + "." + action.member) + " of the gateway: " + why);
+}
+
+rr::MemberKind member_kind(SafeAction::Kind kind) {
+  return kind == SafeAction::Kind::call   ? rr::MemberKind::function
+         : kind == SafeAction::Kind::wire ? rr::MemberKind::wire
+                                          : rr::MemberKind::property;
+}
+
+/// The JSON in the declared types.
+rr::Result<SafeRequest> read_action(const SafeAction& action, const rr::EntityDefinition& type,
+                                    const rr::TypeRegistry& types) {
+  const auto* member = type.find_member(action.member);
+  if (!member || member->kind != member_kind(action.kind) || member->is_generator())
+    return misfit(action, type.qualified_name + " has " +
+                              (member ? "a " + std::string(member_kind_name(member->kind)) + " of this name"
+                                      : "no such member") +
+                              ", expected a " + std::string(member_kind_name(member_kind(action.kind))));
+  if (member->direction() == rr::MemberDirection::readonly) return misfit(action, "it can only be read");
+  const auto json = rr::read_json(action.json);
+  if (!json) return misfit(action, json.error().message);
+  SafeRequest out{action.kind, action.path, action.member, {}};
+  const auto add = [&](const rr::Json& each, const rr::TypeDefinition& of, const std::string& name) -> rr::Result<> {
+    auto value = rr::value_from_json(each, of, types, {}, name);
+    if (!value) return misfit(action, value.error().message);
+    out.values.push_back(std::move(*value));
+    return {};
+  };
+  if (action.kind != SafeAction::Kind::call) {
+    if (auto added = add(*json, member->type, member->name); !added) return added.error();
+    return out;
+  }
+  if (json->size() != member->parameters.size())
+    return misfit(action, std::to_string(json->size()) + " arguments, expected " +
+                              std::to_string(member->parameters.size()));
+  for (std::size_t i = 0; i < json->size(); ++i)
+    if (auto added = add((*json)[i], member->parameters[i].type, member->parameters[i].name); !added)
+      return added.error();
+  return out;
+}
+
+}  // namespace
+
+SafeValues::SafeValues(std::string device, std::string service, const std::vector<SafeAction>& actions)
+    : device_(std::move(device)) {
+  for (const auto& action : actions)
+    if (rr::is_within(action.path, service)) items_.push_back({action, misfit(action, "not checked yet")});
+}
+
+void SafeValues::handle_opened(const std::shared_ptr<Upstream>& upstream) {
+  for (std::size_t i = 0; i < items_.size(); ++i) {
+    auto& item = items_[i];
+    if (upstream->object_type(item.action.path)) {
+      read(item, *upstream);
+      continue;
+    }
+    upstream->find_object(item.action.path,
+                          [weak = weak_from_this(), i, upstream](const rr::Result<rr::Value>& found) {
+                            const auto self = weak.lock();
+                            if (!self) return;
+                            auto& wanted = self->items_[i];
+                            if (found)
+                              self->read(wanted, *upstream);
+                            else if (upstream->is_open())
+                              wanted.request = misfit(wanted.action, found.error().message);
+                            self->pay(upstream);
+                          });
+  }
+  pay(upstream);
+}
+
+void SafeValues::read(Item& item, Upstream& upstream) {
+  const auto* type = upstream.object_type(item.action.path);
+  if (!type) return;
+  item.request = read_action(item.action, *type, *upstream.types());
+  if (!item.request)
+    log(LogLevel::error, "no leases where this would have to be safe",
+        {{"device", device_}, {"error", item.request.error().message}});
+}
+
+rr::Result<> SafeValues::check(std::string_view path) const {
+  for (const auto& item : items_)
+    if (rr::is_within(item.action.path, path) && !item.request) return item.request.error();
+  return {};
+}
+
+/// What was owed when the session was lost: first what could be checked, then, as objects are found, the rest.
+void SafeValues::pay(const std::shared_ptr<Upstream>& upstream) {
+  const auto is_due = [this](const std::string& path) { return check(path).has_value(); };
+  std::vector<std::string> due;
+  std::copy_if(owed_.begin(), owed_.end(), std::back_inserter(due), is_due);
+  std::erase_if(owed_, is_due);
+  for (const auto& path : due)
+    if (send(path, upstream))
+      log(LogLevel::warning, "the device is back, and was made safe: a lease had ended while it was away",
+          {{"device", device_}, {"path", path}});
+}
+
+bool SafeValues::send(const std::string& path, const std::shared_ptr<Upstream>& by) {
+  if (!by || !by->is_open()) {
+    if (std::find(owed_.begin(), owed_.end(), path) == owed_.end()) owed_.push_back(path);
+    return false;
+  }
+  for (const auto& item : items_) {
+    if (!rr::is_within(item.action.path, path) || !item.request) continue;
+    by->make_safe(*item.request, [weak = weak_from_this(), path, by,
+                                  action = item.action](const rr::Result<rr::Value>& result) {
+      const auto self = weak.lock();
+      if (result || !self) return;
+      log(LogLevel::error, "the device did not take a safe value",
+          {{"device", self->device_},
+           {"member", action.path + "." + action.member},
+           {"error", result.error().message}});
+      if (!by->is_open()) self->send(path, nullptr);  // again, once it is back
+    });
+  }
+  return by->is_open();
+}
+
+}  // namespace rrgate

@@ -1,0 +1,57 @@
+// What makes a service of a device safe when a lease ends. Layer: server/upstream. See docs/leases.md.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/types/value.hpp"
+#include "server/config/config.hpp"
+
+namespace rrgate {
+
+class Upstream;
+
+/// A SafeAction in the types that the device has declared.
+struct SafeRequest {
+  SafeAction::Kind kind = SafeAction::Kind::call;
+  std::string path;
+  std::string member;
+  std::vector<rr::Value> values;  ///< a call's arguments; else one
+};
+
+/// Lives in a shared_ptr, which its requests that are under way do not keep.
+class SafeValues : public std::enable_shared_from_this<SafeValues> {
+ public:
+  /// Those of `actions` that are about the service.
+  SafeValues(std::string device, std::string service, const std::vector<SafeAction>& actions);
+
+  /// A session with the device is open: what the configuration says is held against what the device declares, and what
+  /// could not be sent before is sent.
+  void handle_opened(const std::shared_ptr<Upstream>& upstream);
+  /// Whether the device can be made safe at and below a path. Errors   invalid_configuration: what does not fit.
+  rr::Result<> check(std::string_view path) const;
+  /// Sends all at and below a path, past whatever waits. False: there is no session, or it was lost at this moment; they
+  /// are sent as soon as there is one.
+  bool send(const std::string& path, const std::shared_ptr<Upstream>& by);
+  /// Whether something is to be sent as soon as there is a session.
+  bool is_owing() const { return !owed_.empty(); }
+
+ private:
+  struct Item {
+    SafeAction action;
+    rr::Result<SafeRequest> request;
+  };
+
+  void read(Item& item, Upstream& upstream);
+  void pay(const std::shared_ptr<Upstream>& upstream);
+
+  std::string device_;
+  std::vector<Item> items_;
+  std::vector<std::string> owed_;  ///< paths of leases that have ended while there was no session
+};
+
+}  // namespace rrgate
