@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Adds up what a page has to load of a built client package (.wasm and .js, after brotli) and holds it to the budgets:
-# one for what every page loads, one for usb/, which a page loads when it speaks to a USB device.
+# one for what every page loads, one for usb/, which a page loads when it speaks to a USB device, one for lease/, which
+# it loads when it takes a lease.
 # Usage: check_wasm_size.sh DIRECTORY [LIMIT_KB [USB_LIMIT_KB]]
 set -euo pipefail
 
@@ -24,7 +25,9 @@ find_files() {
   find "$directory" -type f \( -name '*.wasm' -o -name '*.js' -o -name '*.mjs' \) "$@" | sort
 }
 
-mapfile -t files < <(find_files -not -path "$directory/usb/*")
+mapfile -t files < <(find_files -not -path "$directory/usb/*" -not -path "$directory/lease/*")
 mapfile -t usb_files < <(find_files -path "$directory/usb/*")
 check client "${2:-150}" "${files[@]}"
 check "USB part" "${3:-24}" "${usb_files[@]}"
+mapfile -t lease_files < <(find_files -path "$directory/lease/*")
+check "part for leases" 2 "${lease_files[@]}"

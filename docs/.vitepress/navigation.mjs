@@ -27,6 +27,7 @@ export const makeSidebar = (decisions) => [
     ["Operating a gateway", "/deploy"],
     ["Devices from the command line", "/command-line"],
     ["Shared devices", "/shared-sessions"],
+    ["Leases", "/leases"],
     ["Discovery", "/discovery"],
   ]),
   group("Security", [

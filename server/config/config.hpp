@@ -108,7 +108,7 @@ struct DeviceConfig {
   std::vector<CallbackRule> callbacks;  ///< of a shared device; the first that fits a callback counts
   bool shares_reads = false;            ///< of a shared device: clients that read a property at once are one to it
 
-  LeaseConfig leases;                   ///< of a shared device
+  LeaseConfig leases;  ///< of a shared device
 
   bool operator==(const DeviceConfig&) const = default;
 };

@@ -146,9 +146,9 @@ std::shared_ptr<SharedClient> begin_session(GatewayState& gateway, Connection& c
       .base_url = std::move(base_url),
       .admit = make_admission(gateway, *destination.node, connection.client, rights, std::move(seating)),
       .enter = make_entrance(gateway, *destination.node, connection, rights),
-      .lock_rights = {.begin = [rights](const auto& wanted,
-                                        const auto* user) { return rights->begin_lock(wanted, user); },
-                      .has_role = [rights](auto role, const auto* user) { return rights->has_role(role, user); }},
+      .lock_rights = {
+          .begin = [rights](const auto& wanted, const auto* user) { return rights->begin_lock(wanted, user); },
+          .has_role = [rights](auto role, const auto* user) { return rights->has_role(role, user); }},
       .is_encrypted = connection.peer.is_encrypted,
       .memory = gateway.memory().charge(connection.network)};
   auto session = destination.node->add(std::move(client), std::move(arrival), std::move(ended));

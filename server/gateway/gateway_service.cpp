@@ -33,6 +33,17 @@ std::string to_string(HeldLock::Kind kind) {
   return kind == HeldLock::Kind::user ? "user" : kind == HeldLock::Kind::client ? "client" : "monitor";
 }
 
+rr::Value describe(const std::string& device, const LeaseNews& news) {
+  return rr::Structure{"org.rrgate.gateway.Lease",
+                       {{"device", device},
+                        {"service_name", news.service},
+                        {"path", news.lease.path},
+                        {"user", news.lease.by.name},
+                        {"deadman", static_cast<std::uint32_t>(news.lease.deadman.count())},
+                        {"held", news.is_held},
+                        {"reason", news.why}}};
+}
+
 double seconds(std::chrono::microseconds time) {
   return std::chrono::duration<double>(time).count();
 }
@@ -54,6 +65,7 @@ void GatewayService::add_members() {
   service_->property("devices").get([this] { return list_devices(); });
   service_->property("subscriptions").get([this] { return list_subscriptions(); });
   service_->property("locks").get([this] { return list_locks(); });
+  add_leases();
   service_->function("find_device", [this](const std::string& wanted) {
     const auto* device = gateway_.devices().find(wanted);
     if (!device) throw rr::Exception(rr::make_error(rr::ErrorCode::key_not_found, "no device " + rr::quote(wanted)));
@@ -61,14 +73,47 @@ void GatewayService::add_members() {
   });
 }
 
+void GatewayService::add_leases() {
+  using rr::LockCommand;
+  service_->property("leases").get([this] { return list_leases(); });
+  service_->function("acquire_lease",
+                     [this](const std::string& session, const std::string& path, std::uint32_t deadman) {
+                       ask_for_lease(LockCommand::acquire_lease, session, path, deadman);
+                     });
+  service_->function("take_lease", [this](const std::string& session, const std::string& path, std::uint32_t deadman) {
+    ask_for_lease(LockCommand::take_lease, session, path, deadman);
+  });
+  service_->function("renew_lease", [this](const std::string& session, const std::string& path) {
+    ask_for_lease(LockCommand::renew_lease, session, path, 0);
+  });
+  service_->function("release_lease", [this](const std::string& session, const std::string& path) {
+    ask_for_lease(LockCommand::release_lease, session, path, 0);
+  });
+}
+
+/// Leases are decided at once: nothing of it waits for the device.
+void GatewayService::ask_for_lease(rr::LockCommand command, const std::string& session, const std::string& path,
+                                   std::uint32_t deadman) {
+  const auto client = gateway_.shared().find_client(session);
+  if (!client)
+    throw rr::Exception(rr::make_error(rr::ErrorCode::key_not_found,
+                                       "no session of a shared device has this attribute \"rrgate.session\""));
+  rr::Result<> result = rr::make_error(rr::ErrorCode::connection_error, "the session has ended");
+  client->ask_for_lease(command, path, std::chrono::milliseconds(deadman),
+                        [&result](const rr::Result<>& answer) { result = answer; });
+  if (!result) throw rr::Exception(result.error());
+}
+
 void GatewayService::start() {
   node_.add(service_);
   node_.listen("rr+intra:///");
+  look_at_devices();
   node_.every(device_look_period, [this] { look_at_devices(); });
   device_->start();
 }
 
 void GatewayService::stop() {
+  for (const auto& device : gateway_.devices().all()) device->on_lease(nullptr);
   device_->stop();
   node_.stop();
 }
@@ -78,6 +123,9 @@ void GatewayService::look_at_devices() {
   for (const auto& device : gateway_.devices().all()) {
     const auto& device_name = device->config().name;
     known_[device_name] = device->state();
+    device->on_lease([this, device_name](const LeaseNews& news) {
+      service_->fire("lease_changed", rrgate::describe(device_name, news));
+    });
     const auto known = before.extract(device_name);
     if (!known || known.mapped() != device->state()) service_->fire("device_changed", describe(*device));
   }
@@ -145,6 +193,15 @@ rr::Value GatewayService::list_subscriptions() const {
                                        {"age_p50", seconds(ledger.ages.quantile(0.5))},
                                        {"age_p99", seconds(ledger.ages.quantile(0.99))}}});
   });
+  return out;
+}
+
+rr::Value GatewayService::list_leases() const {
+  rr::List out;
+  for (const auto& device : gateway_.devices().all())
+    for (const auto& [service, locks] : device->locks())
+      for (auto& lease : locks->leases())
+        out.items.push_back(rrgate::describe(device->config().name, {service, std::move(lease), true, {}}));
   return out;
 }
 

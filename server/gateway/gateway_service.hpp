@@ -37,6 +37,11 @@ class GatewayService {
   rr::Value list_statistics() const;
   rr::Value list_subscriptions() const;
   rr::Value list_locks() const;
+  rr::Value list_leases() const;
+  void add_leases();
+  /// Throws   rr::Exception.
+  void ask_for_lease(rr::LockCommand command, const std::string& session, const std::string& path,
+                     std::uint32_t deadman);
 
   GatewayState& gateway_;
   rr::Node node_;

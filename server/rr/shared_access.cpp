@@ -55,9 +55,8 @@ std::string_view event_of(rr::LockCommand command) {
       return "unlock";
     case rr::LockCommand::acquire_lease:
     case rr::LockCommand::renew_lease:
-      return "lease";
     case rr::LockCommand::take_lease:
-      return "lease_taken";
+      return "lease";
     case rr::LockCommand::release_lease:
       return "lease_end";
     default:

@@ -22,12 +22,13 @@ const std::string& path_of(const rr::ServiceObject& object) {
 
 SharedClient::SharedClient(SharedClientOwner& owner, rr::ServiceDirectory& directory, rr::ServiceSessionOptions options,
                            std::unique_ptr<rr::ByteStream> stream, ClientOrigin from, MemoryBudget::Charge memory,
-                           LockRights rights)
+                           LockRights rights, std::string key)
     : SessionDriver(std::move(stream), directory, std::move(options), rr::read_clocks()),
       owner_(&owner),
       from_(std::move(from)),
       memory_(std::move(memory)),
-      rights_(std::move(rights)) {}
+      rights_(std::move(rights)),
+      key_(std::move(key)) {}
 
 void SharedClient::close_service() {
   session_.close_service(rr::read_clocks());
@@ -372,6 +373,30 @@ void SharedClient::handle(const rr::UserChanged&) {
 
 // --- locks ---
 
+void SharedClient::begin_lock(const rr::LockWanted& wanted, std::function<void(const rr::Result<>&)> done) {
+  const bool is_recorded =
+      wanted.command != rr::LockCommand::renew_lease && wanted.command != rr::LockCommand::release_lease;
+  const auto entry = rights_.begin && is_recorded ? rights_.begin(wanted, session_.user()) : nullptr;
+  home_->lock(*this, wanted, [entry, done = std::move(done)](const rr::Result<>& result) {
+    if (entry) entry->finish(result);
+    done(result);
+  });
+}
+
+void SharedClient::ask_for_lease(rr::LockCommand command, const std::string& path, std::chrono::milliseconds deadman,
+                                 std::function<void(const rr::Result<>&)> done) {
+  if (!service_ || !rr::is_within(path, service_->name()))
+    return done(rr::make_error(rr::ErrorCode::object_not_found, "the session has no object " + rr::quote(path)));
+  if (!session_.admits(rr::EntryType::client_session_op_req, path, nullptr))
+    return done(
+        rr::make_error(rr::ErrorCode::permission_denied, "who has opened the session may not lock " + rr::quote(path)));
+  rr::LockWanted wanted;
+  wanted.command = command;
+  wanted.path = path;
+  wanted.timeout = deadman;
+  begin_lock(wanted, std::move(done));
+}
+
 AuditEntryPtr SharedClient::begin_lease_end(const std::string& path) const {
   if (!rights_.begin) return nullptr;
   rr::LockWanted end;
@@ -383,11 +408,7 @@ AuditEntryPtr SharedClient::begin_lease_end(const std::string& path) const {
 void SharedClient::handle(const rr::LockWanted& wanted) {
   if (!service_) return;
   const std::weak_ptr<StreamDriver> weak = weak_from_this();
-  const bool is_recorded =
-      wanted.command != rr::LockCommand::renew_lease && wanted.command != rr::LockCommand::release_lease;
-  const auto entry = rights_.begin && is_recorded ? rights_.begin(wanted, session_.user()) : nullptr;
-  home_->lock(*this, wanted, [this, weak, entry, id = wanted.id](const rr::Result<>& result) {
-    if (entry) entry->finish(result);
+  begin_lock(wanted, [this, weak, id = wanted.id](const rr::Result<>& result) {
     const auto self = weak.lock();
     if (!self) return;
     session_.answer_lock(id, result, rr::read_clocks());

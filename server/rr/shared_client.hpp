@@ -40,13 +40,18 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
  public:
   SharedClient(SharedClientOwner& owner, rr::ServiceDirectory& directory, rr::ServiceSessionOptions options,
                std::unique_ptr<rr::ByteStream> stream, ClientOrigin from, MemoryBudget::Charge memory,
-               LockRights rights);
+               LockRights rights, std::string key);
 
   const rr::ServiceSession& session() const { return session_; }
   /// For logs.
   const std::string& peer() const { return from_.client; }
   /// Null while it has not connected to a service.
   const std::shared_ptr<SharedService>& service() const { return service_; }
+  /// By which the client names its session to the gateway's own service; nobody else knows it.
+  const std::string& key() const { return key_; }
+  /// Does something about a lease, as if the client had asked for it here. `done`  is called once, maybe at once.
+  void ask_for_lease(rr::LockCommand command, const std::string& path, std::chrono::milliseconds deadman,
+                     std::function<void(const rr::Result<>&)> done);
   /// Tells the client that its service ends, then closes.
   void close_service();
   /// Why the gateway has closed it; empty where it has not.
@@ -85,7 +90,9 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   // UpstreamClient
   std::weak_ptr<const void> life() const override { return weak_from_this(); }
   Subject lock_user() const override { return session_.user() ? subject_of(*session_.user()) : Subject(); }
-  bool has_role(std::string_view role) const override { return rights_.has_role && rights_.has_role(role, session_.user()); }
+  bool has_role(std::string_view role) const override {
+    return rights_.has_role && rights_.has_role(role, session_.user());
+  }
   AuditEntryPtr begin_lease_end(const std::string& path) const override;
   std::shared_ptr<Upstream> upstream_in_use() const override { return home_; }
   bool may_answer(const std::string& path, const rr::MemberDefinition& callback) const override {
@@ -114,6 +121,7 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   /// From now on all that the client does goes through `upstream`.
   void move_to(std::shared_ptr<Upstream> upstream);
   void leave_login();
+  void begin_lock(const rr::LockWanted& wanted, std::function<void(const rr::Result<>&)> done);
   void end_too_slow(const rr::Error& error);
   /// Bytes that wait for the stream: above, the client is behind; below half of them it has caught up.
   std::size_t much_waiting() const { return session_.max_pipe_queued_bytes() / 4; }
@@ -122,10 +130,11 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   ClientOrigin from_;
   MemoryBudget::Charge memory_;
   LockRights rights_;
+  std::string key_;
   std::string end_reason_;
   bool is_behind_ = false;
   bool was_refused_ = false;  ///< a wire's value, and it is in the log
-  bool was_behind_ = false;  ///< and it is in the log
+  bool was_behind_ = false;   ///< and it is in the log
   std::shared_ptr<SharedService> service_;
   std::shared_ptr<Upstream> home_;   ///< the shared one, or that of the user who has logged in at the device
   std::shared_ptr<Upstream> login_;  ///< the latter; null: there is none

@@ -129,6 +129,14 @@ SharedDevice* SharedDevices::find(const rr::NodeId& node_id, std::string_view no
   return nullptr;
 }
 
+std::shared_ptr<SharedClient> SharedDevices::find_client(std::string_view key) const {
+  for (const auto& [of, device] : devices_)
+    for (const SharedNode* node : {static_cast<const SharedNode*>(&device->node()), &node_})
+      for (const auto& [raw, client] : node->clients())
+        if (client->key() == key) return client;
+  return nullptr;
+}
+
 Traffic SharedDevices::traffic_of(const Device& device) const {
   auto traffic = device.traffic();
   if (const auto* shared = find(device))

@@ -60,6 +60,8 @@ class SharedDevices {
   /// By the identity of the node that stands for a device.
   SharedDevice* find(const rr::NodeId& node_id, std::string_view node_name) const;
   const std::map<const Device*, std::unique_ptr<SharedDevice>>& all() const { return devices_; }
+  /// By SharedClient::key(). Null: no such session.
+  std::shared_ptr<SharedClient> find_client(std::string_view key) const;
   /// Of a device, the clients that are there included.
   Traffic traffic_of(const Device& device) const;
   /// Calls `visit(device, client, path, member, ledger)` for every subscription of every client.

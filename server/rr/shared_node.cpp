@@ -1,5 +1,6 @@
 #include "server/rr/shared_node.hpp"
 
+#include "core/support/random.hpp"
 #include "server/log/log.hpp"
 
 namespace rrgate {
@@ -14,10 +15,12 @@ std::shared_ptr<SharedClient> SharedNode::add(std::unique_ptr<rr::ByteStream> st
   options.base_url = std::move(arrival.base_url);
   options.admit = std::move(arrival.admit);
   options.enter = std::move(arrival.enter);
+  const auto key = rr::format_node_id(rr::random_node_id(), rr::NodeIdFormat::dashes);
+  options.attributes.items.emplace_back(std::string(session_attribute), rr::Value(key));
   if (const auto verified = stream->verified_peer(); !verified.is_any()) options.verified_node_id = verified;
   auto client =
       std::make_shared<SharedClient>(*this, directory_, std::move(options), std::move(stream), std::move(arrival.from),
-                                     std::move(arrival.memory), std::move(arrival.lock_rights));
+                                     std::move(arrival.memory), std::move(arrival.lock_rights), key);
   clients_.emplace(client.get(), client);
   ended_.emplace(client.get(), std::move(ended));
   client->start();

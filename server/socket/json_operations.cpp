@@ -85,6 +85,12 @@ const JsonOperations::Operation JsonOperations::operations[] = {
     {"write", Verb::write, &JsonOperations::write},
     {"lock", Verb::lock, &JsonOperations::lock, {.needs_own = true}},
     {"unlock", Verb::lock, &JsonOperations::unlock, {.needs_own = true}},
+    {"lease", Verb::lock, &JsonOperations::lease, {.needs_own = true}},
+    {"renew", Verb::lock, &JsonOperations::renew, {.needs_own = true, .is_free = true, .recorded = Recorded::never}},
+    {"release",
+     Verb::lock,
+     &JsonOperations::release,
+     {.needs_own = true, .is_free = true, .recorded = Recorded::never}},
     {"login", Verb::read, &JsonOperations::login, {.has_target = false, .keeps_order = true}},
 };
 
@@ -192,6 +198,14 @@ rr::awaitable<JsonOperations::TargetPtr> JsonOperations::find(RequestPtr request
       const auto& who = place_.standing->identity();
       auto user = who.is_proven() ? who.subject() : place_.key.subject();
       own_ = value_or_throw(gateway_.clients().make_another(used->upstream(), std::move(user)));
+      own_->set_standing(place_.standing);
+      own_->on_lease_ended([outbox = outbox_](const std::string& path, const std::string& why) {
+        auto news = rr::OrderedJson::object();
+        rr::add_key(news, "lease") = path;
+        rr::add_key(news, "state") = "ended";
+        rr::add_key(news, "reason") = why;
+        outbox->add(rr::write_json(news));
+      });
     }
     target->client = own_;
   }
@@ -316,6 +330,34 @@ rr::awaitable<rr::OrderedJson> JsonOperations::lock(RequestPtr request, TargetPt
 rr::awaitable<rr::OrderedJson> JsonOperations::unlock(RequestPtr, TargetPtr target) {
   auto path = target->path();
   co_await target->client->lock(rr::LockCommand::unlock, std::move(path));
+  co_return nullptr;
+}
+
+rr::awaitable<rr::OrderedJson> JsonOperations::lease(RequestPtr request, TargetPtr target) {
+  if (target->member) refuse(rr::ErrorCode::invalid_operation, "leases are of objects, not of their members");
+  const auto& deadman = request->at("deadman");
+  if (!deadman.is_number_unsigned() || deadman.get<std::uint64_t>() > std::uint64_t(longest_deadman.count()))
+    refuse(rr::ErrorCode::invalid_argument,
+           "\"deadman\" is the milliseconds without renewal until the lease ends, at most " +
+               std::to_string(longest_deadman.count()));
+  const auto* takeover = request->find("takeover");
+  if (takeover && !takeover->is_boolean()) refuse(rr::ErrorCode::invalid_argument, "\"takeover\" is true or false");
+  const bool takes_over = takeover && takeover->get<bool>();
+  auto path = target->path();
+  co_await target->client->lock(takes_over ? rr::LockCommand::take_lease : rr::LockCommand::acquire_lease,
+                                std::move(path), milliseconds(deadman.get<std::int64_t>()));
+  co_return nullptr;
+}
+
+rr::awaitable<rr::OrderedJson> JsonOperations::renew(RequestPtr, TargetPtr target) {
+  auto path = target->path();
+  co_await target->client->lock(rr::LockCommand::renew_lease, std::move(path));
+  co_return nullptr;
+}
+
+rr::awaitable<rr::OrderedJson> JsonOperations::release(RequestPtr, TargetPtr target) {
+  auto path = target->path();
+  co_await target->client->lock(rr::LockCommand::release_lease, std::move(path));
   co_return nullptr;
 }
 

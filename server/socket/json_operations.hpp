@@ -98,6 +98,9 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
   rr::awaitable<rr::OrderedJson> write(RequestPtr request, TargetPtr target);
   rr::awaitable<rr::OrderedJson> lock(RequestPtr request, TargetPtr target);
   rr::awaitable<rr::OrderedJson> unlock(RequestPtr request, TargetPtr target);
+  rr::awaitable<rr::OrderedJson> lease(RequestPtr request, TargetPtr target);
+  rr::awaitable<rr::OrderedJson> renew(RequestPtr request, TargetPtr target);
+  rr::awaitable<rr::OrderedJson> release(RequestPtr request, TargetPtr target);
   rr::awaitable<rr::OrderedJson> login(RequestPtr request, TargetPtr);
 
   /// Takes the request's id for what it opens. Throws   rr::Exception: no id, one that is in use, too many.

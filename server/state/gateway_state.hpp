@@ -47,6 +47,8 @@ class GatewayState {
   /// Documents about devices that were asked for lately, by what they are made of.
   using Documents = BoundedTable<std::string, Response>;
   Documents& documents() { return documents_; }
+  /// Clients that hold a lease for requests of HTTP, by the key that those show; each until its lease ends.
+  std::map<std::string, std::shared_ptr<ValueClient>, std::less<>>& lease_holders() { return lease_holders_; }
   /// What would take long on this thread.
   Workers& workers() { return workers_; }
   /// What clients make the gateway hold.
@@ -83,6 +85,7 @@ class GatewayState {
   std::unique_ptr<TlsFiles> web_tls_;
   DeviceRegistry devices_;
   ValueClients clients_;
+  std::map<std::string, std::shared_ptr<ValueClient>, std::less<>> lease_holders_;
   std::unique_ptr<FoundDevices> found_;
   Admission admission_;
   SharedDevices shared_;

@@ -32,10 +32,10 @@ std::vector<LeaseTable::Leases::iterator> LeaseTable::others_around(LockClient c
 rr::Result<> LeaseTable::acquire(LockClient client, const Subject& by, std::string_view path, milliseconds deadman,
                                  bool takes_over, rr::TimePoint now) {
   if (deadman < shortest_deadman || deadman > longest_deadman)
-    return rr::make_error(rr::ErrorCode::invalid_argument,
-                          "a dead-man's time of " + std::to_string(deadman.count()) + " ms: expected " +
-                              std::to_string(shortest_deadman.count()) + " to " +
-                              std::to_string(longest_deadman.count()));
+    return rr::make_error(rr::ErrorCode::invalid_argument, "a dead-man's time of " + std::to_string(deadman.count()) +
+                                                               " ms: expected " +
+                                                               std::to_string(shortest_deadman.count()) + " to " +
+                                                               std::to_string(longest_deadman.count()));
   handle_timeout(now);
   const auto key = canonical_lock_path(path);
   for (const auto& [known, lease] : leases_)
@@ -43,7 +43,8 @@ rr::Result<> LeaseTable::acquire(LockClient client, const Subject& by, std::stri
       return rr::make_error(rr::ErrorCode::invalid_operation,
                             "this client has the lease of " + rr::quote(known) + " already: release it first");
   if (leases_.size() + lost_.size() >= max_leases)
-    return rr::make_error(rr::ErrorCode::out_of_system_resource, "too many leases are held, or were lost and not released");
+    return rr::make_error(rr::ErrorCode::out_of_system_resource,
+                          "too many leases are held, or were lost and not released");
   const auto others = others_around(client, key);
   if (!others.empty() && !takes_over) return kept_by(others.front()->second);
   for (const auto& other : others) end(other, "it was taken over by " + (by.is_nobody() ? "another client" : by.name));

@@ -39,7 +39,8 @@ class LeaseTable {
  public:
   // --- asked. Errors   object_locked_error: another client has it; invalid_argument; invalid_operation: not held. ---
 
-  /// Of an object and all below it. The holder asks anew for another dead-man's time. `takes_over`  from whoever has it.
+  /// Of an object and all below it. The holder asks anew for another dead-man's time. `takes_over`  from whoever has
+  /// it.
   rr::Result<> acquire(LockClient client, const Subject& by, std::string_view path, milliseconds deadman,
                        bool takes_over, rr::TimePoint now);
   rr::Result<> renew(LockClient client, std::string_view path, rr::TimePoint now);

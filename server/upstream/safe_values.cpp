@@ -27,10 +27,10 @@ rr::Result<SafeRequest> read_action(const SafeAction& action, const rr::EntityDe
                                     const rr::TypeRegistry& types) {
   const auto* member = type.find_member(action.member);
   if (!member || member->kind != member_kind(action.kind) || member->is_generator())
-    return misfit(action, type.qualified_name + " has " +
-                              (member ? "a " + std::string(member_kind_name(member->kind)) + " of this name"
-                                      : "no such member") +
-                              ", expected a " + std::string(member_kind_name(member_kind(action.kind))));
+    return misfit(
+        action, type.qualified_name + " has " +
+                    (member ? "a " + std::string(member_kind_name(member->kind)) + " of this name" : "no such member") +
+                    ", expected a " + std::string(member_kind_name(member_kind(action.kind))));
   if (member->direction() == rr::MemberDirection::readonly) return misfit(action, "it can only be read");
   const auto json = rr::read_json(action.json);
   if (!json) return misfit(action, json.error().message);
@@ -46,8 +46,8 @@ rr::Result<SafeRequest> read_action(const SafeAction& action, const rr::EntityDe
     return out;
   }
   if (json->size() != member->parameters.size())
-    return misfit(action, std::to_string(json->size()) + " arguments, expected " +
-                              std::to_string(member->parameters.size()));
+    return misfit(action,
+                  std::to_string(json->size()) + " arguments, expected " + std::to_string(member->parameters.size()));
   for (std::size_t i = 0; i < json->size(); ++i)
     if (auto added = add((*json)[i], member->parameters[i].type, member->parameters[i].name); !added)
       return added.error();
@@ -69,17 +69,16 @@ void SafeValues::handle_opened(const std::shared_ptr<Upstream>& upstream) {
       read(item, *upstream);
       continue;
     }
-    upstream->find_object(item.action.path,
-                          [weak = weak_from_this(), i, upstream](const rr::Result<rr::Value>& found) {
-                            const auto self = weak.lock();
-                            if (!self) return;
-                            auto& wanted = self->items_[i];
-                            if (found)
-                              self->read(wanted, *upstream);
-                            else if (upstream->is_open())
-                              wanted.request = misfit(wanted.action, found.error().message);
-                            self->pay(upstream);
-                          });
+    upstream->find_object(item.action.path, [weak = weak_from_this(), i, upstream](const rr::Result<rr::Value>& found) {
+      const auto self = weak.lock();
+      if (!self) return;
+      auto& wanted = self->items_[i];
+      if (found)
+        self->read(wanted, *upstream);
+      else if (upstream->is_open())
+        wanted.request = misfit(wanted.action, found.error().message);
+      self->pay(upstream);
+    });
   }
   pay(upstream);
 }
@@ -118,16 +117,16 @@ bool SafeValues::send(const std::string& path, const std::shared_ptr<Upstream>& 
   }
   for (const auto& item : items_) {
     if (!rr::is_within(item.action.path, path) || !item.request) continue;
-    by->make_safe(*item.request, [weak = weak_from_this(), path, by,
-                                  action = item.action](const rr::Result<rr::Value>& result) {
-      const auto self = weak.lock();
-      if (result || !self) return;
-      log(LogLevel::error, "the device did not take a safe value",
-          {{"device", self->device_},
-           {"member", action.path + "." + action.member},
-           {"error", result.error().message}});
-      if (!by->is_open()) self->send(path, nullptr);  // again, once it is back
-    });
+    by->make_safe(*item.request,
+                  [weak = weak_from_this(), path, by, action = item.action](const rr::Result<rr::Value>& result) {
+                    const auto self = weak.lock();
+                    if (result || !self) return;
+                    log(LogLevel::error, "the device did not take a safe value",
+                        {{"device", self->device_},
+                         {"member", action.path + "." + action.member},
+                         {"error", result.error().message}});
+                    if (!by->is_open()) self->send(path, nullptr);  // again, once it is back
+                  });
   }
   return by->is_open();
 }

@@ -104,9 +104,9 @@ bool ServiceLocks::is_urgent(std::string_view path, const rr::MemberDefinition& 
 rr::Result<> ServiceLocks::handle_lease(const UpstreamClient& client, LockClient id, const rr::LockWanted& wanted) {
   const auto& config = device_.config().leases;
   if (!config.is_offered)
-    return rr::make_error(rr::ErrorCode::not_implemented_error,
-                          "the gateway gives no leases of device " + rr::quote(device_.config().name) +
-                              ": its configuration has no \"leases\" there");
+    return rr::make_error(rr::ErrorCode::not_implemented_error, "the gateway gives no leases of device " +
+                                                                    rr::quote(device_.config().name) +
+                                                                    ": its configuration has no \"leases\" there");
   const auto now = steady_now();
   rr::Result<> result;
   if (wanted.command == rr::LockCommand::renew_lease) {
@@ -124,8 +124,8 @@ rr::Result<> ServiceLocks::handle_lease(const UpstreamClient& client, LockClient
     result = leases_.acquire(id, client.lock_user(), wanted.path, wanted.timeout, takes_over, now);
   }
   end_leases();
-  const bool is_new = result && (wanted.command == rr::LockCommand::acquire_lease ||
-                                 wanted.command == rr::LockCommand::take_lease);
+  const bool is_new =
+      result && (wanted.command == rr::LockCommand::acquire_lease || wanted.command == rr::LockCommand::take_lease);
   if (is_new) {
     const auto key = canonical_lock_path(wanted.path);
     auto& holder = holders_[key];
@@ -145,8 +145,14 @@ void ServiceLocks::end_leases() {
     const bool is_safe = safe_->send(ended->lease.path, upstream);
     const auto what = ended->why + (is_safe ? "" : "; the device is made safe when it is back");
     log(is_safe ? LogLevel::info : LogLevel::warning, "lease ended",
-        {{"device", device_.config().name}, {"path", ended->lease.path}, {"user", ended->lease.by.name}, {"reason", what}});
+        {{"device", device_.config().name},
+         {"path", ended->lease.path},
+         {"user", ended->lease.by.name},
+         {"reason", what}});
     if (holder && holder.mapped().end) holder.mapped().end->finish(is_safe ? Outcome::ok : Outcome::error, what);
+    const auto client = std::find_if(clients_.begin(), clients_.end(),
+                                     [&](const auto& each) { return each.second == ended->lease.holder; });
+    if (client != clients_.end()) client->first->lease_ended(ended->lease.path, what);
     device_.tell_lease({service_, std::move(ended->lease), false, what});
   }
 }

@@ -217,7 +217,8 @@ void Upstream::request(UpstreamClient& client, const rr::Called& called, Complet
   };
   const auto& path = path_of(called);
   if (!ends_generator(called))
-    if (const auto allowed = locks_->check(client, path, *called.member, use_of(called.kind)); !allowed) return done(allowed.error());
+    if (const auto allowed = locks_->check(client, path, *called.member, use_of(called.kind)); !allowed)
+      return done(allowed.error());
   if (!connection_->session().object_type(path)) {  // another session of this service has found it
     return find_object(path, [weak = weak_from_this(), &client, life = client.life(), called,
                               done](const rr::Result<rr::Value>& found) {

@@ -52,6 +52,8 @@ class UpstreamClient {
   virtual bool has_role(std::string_view) const { return false; }
   /// What is to be recorded of the end of its lease; null: nothing.
   virtual AuditEntryPtr begin_lease_end(const std::string&) const { return nullptr; }
+  /// Its lease has ended.
+  virtual void lease_ended(const std::string&, const std::string&) const {}
   /// The one that its requests go by.
   virtual std::shared_ptr<Upstream> upstream_in_use() const = 0;
   /// Whether the device may ask it by this callback.
@@ -169,7 +171,8 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   void leave_wire(UpstreamClient& client, const std::string& path, const rr::MemberDefinition& wire);
   /// Errors   those of packing; without a session the newest is sent once there is one.
   /// Also object_locked_error: another client has the lease.
-  rr::Result<> send_wire(UpstreamClient& client, const std::string& path, const rr::MemberDefinition& wire, const rr::Value& value);
+  rr::Result<> send_wire(UpstreamClient& client, const std::string& path, const rr::MemberDefinition& wire,
+                         const rr::Value& value);
 
   /// Clients of a readonly pipe share one endpoint at the device; others have one each. Answered with accept_pipe() or
   /// refuse_pipe().

@@ -61,11 +61,9 @@ rr::awaitable<rr::Value> ValueClient::ask(rr::Called called) {
 
 AuditEntryPtr ValueClient::begin_lease_end(const std::string& path) const {
   if (!standing_) return nullptr;
-  return standing_->begin({.device = upstream_->device().config().name,
-                           .service = upstream_->service(),
-                           .path = path,
-                           .verb = Verb::lock},
-                          "lease_end");
+  return standing_->begin(
+      {.device = upstream_->device().config().name, .service = upstream_->service(), .path = path, .verb = Verb::lock},
+      "lease_end");
 }
 
 rr::awaitable<rr::Value> ValueClient::lock(rr::LockCommand command, std::string path,
@@ -122,7 +120,8 @@ rr::awaitable<rr::Result<>> ValueClient::send(MemberPlace place, rr::Value value
   if (found == topics_.end() || found->second.state != TopicState::joined)
     co_return rr::make_error(rr::ErrorCode::invalid_operation, rr::quote(key.second) + " is not connected");
   const auto member = found->second.place;
-  if (member.member->kind == rr::MemberKind::wire) co_return upstream_->send_wire(*this, member.path, *member.member, value);
+  if (member.member->kind == rr::MemberKind::wire)
+    co_return upstream_->send_wire(*this, member.path, *member.member, value);
   co_return upstream_->send_pipe(*this, found->second.pipe, value, std::nullopt);
 }
 

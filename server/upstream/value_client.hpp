@@ -68,6 +68,10 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   void drop_generator(rr::GeneratorId id) { upstream_->drop_generator(*this, id); }
   /// `timeout`  the dead-man's time, where a lease is asked for.
   rr::awaitable<rr::Value> lock(rr::LockCommand command, std::string path, std::chrono::milliseconds timeout = {});
+  /// Called when a lease of its own has ended, with the object's path and why.
+  void on_lease_ended(std::function<void(const std::string& path, const std::string& why)> handler) {
+    on_lease_ended_ = std::move(handler);
+  }
   /// Who it is, for what leases need of that.
   void set_standing(StandingPtr standing) { standing_ = std::move(standing); }
 
@@ -119,6 +123,9 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   Subject lock_user() const override { return user_; }
   bool has_role(std::string_view role) const override { return standing_ && standing_->identity().has_role(role); }
   AuditEntryPtr begin_lease_end(const std::string& path) const override;
+  void lease_ended(const std::string& path, const std::string& why) const override {
+    if (on_lease_ended_) on_lease_ended_(path, why);
+  }
   std::shared_ptr<Upstream> upstream_in_use() const override { return upstream_; }
   bool may_answer(const std::string& path, const rr::MemberDefinition& callback) const override;
   void receive_event(rr::EventPacket& packet) override;
@@ -152,6 +159,7 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
 
   std::shared_ptr<Upstream> upstream_;
   Subject user_;
+  std::function<void(const std::string&, const std::string&)> on_lease_ended_;
   StandingPtr standing_;  ///< null: of nobody in particular
   Device::Seat seat_;
   MemoryBudget::Charge memory_;

@@ -82,8 +82,8 @@ TEST_CASE("certificates, and how devices are checked") {
 
 TEST_CASE("leases: what a device needs, and what makes it safe") {
   const auto leases = [](const std::string& text, const std::string& mode = "shared") {
-    return R"({"listen": ["127.0.0.1:0"], "devices": [{"name": "a", "url": "rr+tcp://h:1/?service=s", "mode": ")" + mode +
-           R"(", "leases": )" + text + "}]}";
+    return R"({"listen": ["127.0.0.1:0"], "devices": [{"name": "a", "url": "rr+tcp://h:1/?service=s", "mode": ")" +
+           mode + R"(", "leases": )" + text + "}]}";
   };
   CHECK(findings_of(leases("{}")).empty());
   finds(leases("{}", "relay"), "gateway.json: /devices/0/leases: ", "\"mode\": \"shared\"");
@@ -92,7 +92,8 @@ TEST_CASE("leases: what a device needs, and what makes it safe") {
   finds(leases(R"({"safe": [{"call": "Stop"}]})"), "gateway.json: /devices/0/leases/safe/0/call: ", "path.member");
   finds(leases(R"({"safe": [{"call": "s.Stop", "value": 1}]})"), "gateway.json: /devices/0/leases/safe/0/value: ");
   finds(leases(R"({"safe": [{"wire": "s.v"}]})"), "gateway.json: /devices/0/leases/safe/0/value: ", "missing");
-  finds(leases(R"({"safe": [{"call": "s.Stop", "arguments": 1}]})"), "gateway.json: /devices/0/leases/safe/0/arguments: ");
+  finds(leases(R"({"safe": [{"call": "s.Stop", "arguments": 1}]})"),
+        "gateway.json: /devices/0/leases/safe/0/arguments: ");
   finds(leases(R"({"members": [{"member": "*", "lease": "yes"}]})"),
         "gateway.json: /devices/0/leases/members/0/lease: ", "required, covered, never");
 }
@@ -253,13 +254,12 @@ TEST_CASE("every option arrives") {
   CHECK(device.login.username == "u");
   CHECK(*device.login.credentials.find("password") == rr::Value("p"));
   CHECK(device.callbacks == std::vector<CallbackRule>{{"s.ask*", CallbackPolicy::all}, {"*", CallbackPolicy::first}});
-  CHECK(device.leases ==
-        LeaseConfig{true,
-                    {{"s.Stop", LeaseNeed::never}, {"s.*", LeaseNeed::required}},
-                    {{SafeAction::Kind::call, "s", "Drive", "[0,0]"},
-                     {SafeAction::Kind::wire, "s.arm[1]", "velocity", "0.5"},
-                     {SafeAction::Kind::property, "s", "speed", R"({"x":0})"}},
-                    {"operator"}});
+  CHECK(device.leases == LeaseConfig{true,
+                                     {{"s.Stop", LeaseNeed::never}, {"s.*", LeaseNeed::required}},
+                                     {{SafeAction::Kind::call, "s", "Drive", "[0,0]"},
+                                      {SafeAction::Kind::wire, "s.arm[1]", "velocity", "0.5"},
+                                      {SafeAction::Kind::property, "s", "speed", R"({"x":0})"}},
+                                     {"operator"}});
   const auto id = rr::parse_node_id("82301bf1-e1ef-4e89-8d8f-0848291587ac").value();
   CHECK(config.discover == Discover{true,
                                     {"node_local", "ipv4_broadcast"},

@@ -53,6 +53,9 @@ RR_EXPORT(handle_closed) void rr_handle_closed(JsHandle reason) {
 
 // --- asked ---
 
+RR_EXPORT(set_urgent) void rr_set_urgent(bool is_urgent) {
+  session->set_urgent(is_urgent);
+}
 RR_EXPORT(set_request_timeout) void rr_set_request_timeout(double milliseconds) {
   session->set_request_timeout(milliseconds);
 }
@@ -133,6 +136,10 @@ RR_EXPORT(unlock) RequestId rr_unlock(JsHandle path) {
 }
 RR_EXPORT(enter_monitor) RequestId rr_enter_monitor(JsHandle path, double milliseconds) {
   return session->enter_monitor(JsValue(path), milliseconds);
+}
+/// `command` a rr::LeaseCommand.
+RR_EXPORT(lease) RequestId rr_lease(JsHandle path, int command, double deadman) {
+  return session->lease(JsValue(path), static_cast<rr::LeaseCommand>(command), deadman);
 }
 RR_EXPORT(exit_monitor) RequestId rr_exit_monitor(JsHandle path) {
   return session->exit_monitor(JsValue(path));

@@ -236,6 +236,10 @@ RequestId WasmSession::enter_monitor(const JsValue& path, double milliseconds) {
   return session_.enter_monitor(text_of(path), to_milliseconds(milliseconds), now_);
 }
 
+RequestId WasmSession::lease(const JsValue& path, LeaseCommand command, double deadman) {
+  return session_.lease(text_of(path), command, to_milliseconds(deadman), now_);
+}
+
 RequestId WasmSession::exit_monitor(const JsValue& path) {
   return session_.exit_monitor(text_of(path), now_);
 }

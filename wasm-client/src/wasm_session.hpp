@@ -32,6 +32,7 @@ class WasmSession {
 
   /// For requests from now on.
   void set_request_timeout(double milliseconds);
+  void set_urgent(bool is_urgent) { session_.set_urgent(is_urgent); }
   using MemberRequest = RequestId (ClientSession::*)(std::string_view path, std::string_view member, Now now);
   using ValueRequest = RequestId (ClientSession::*)(std::string_view path, std::string_view member, const Value& value,
                                                     Now now);
@@ -64,6 +65,7 @@ class WasmSession {
   /// `milliseconds` below 0: no limit.
   RequestId enter_monitor(const JsValue& path, double milliseconds);
   RequestId exit_monitor(const JsValue& path);
+  RequestId lease(const JsValue& path, LeaseCommand command, double deadman);
   /// Answers a callback with what its handler returned. Returns undefined, or why that does not fit: the service is
   /// told so, too.
   JsValue reply_callback(double id, const JsValue& path, const JsValue& member, const JsValue& value);

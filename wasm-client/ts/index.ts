@@ -13,6 +13,7 @@ export type {
   PipeSubscriptionOptions,
   WireSubscription,
 } from "./member_subscription.js";
+export { lease } from "./object.js";
 export { findServices } from "./find_services.js";
 export type { FoundService, ServiceQuery } from "./find_services.js";
 export { subscribe } from "./subscribe.js";

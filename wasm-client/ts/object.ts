@@ -16,6 +16,8 @@ import { checkSignal, within } from "./within.js";
 import type {
   CallOptions,
   DynamicMember,
+  Lease,
+  LeaseOptions,
   MemberInfo,
   MemberKind,
   ObjectInfo,
@@ -106,6 +108,17 @@ export class ObjectTree {
   }
 }
 
+/** For what belongs to this package. */
+export const sessionOf = (object: RemoteObject): Session => (object.$ as Info).session;
+
+/**
+ * Holds the right to command `object` and all below it at a gateway that gives leases of it.
+ * @throws RobotRaconteurError (rejects) ObjectLockedError: somebody else has it; NotImplementedError: there are none;
+ * InvalidOperation: this page is hidden; PermissionDenied; InvalidArgument
+ */
+export const lease = async (object: RemoteObject, options?: LeaseOptions): Promise<Lease> =>
+  (await import("./lease/held_lease.js")).lease(object, options);
+
 class Info implements ObjectInfo {
   #isReleased = false;
   readonly #tree: ObjectTree;
@@ -132,6 +145,18 @@ class Info implements ObjectInfo {
     this.#attributes = session.look((core) => core.attributes()) ?? new Map<string, RrValue>();
     this.#node = session.look((core) => core.peer()) ?? { id: "", name: "" };
     released.push(() => this.#release());
+  }
+
+  get session(): Session {
+    return this.#session;
+  }
+
+  get urgent(): ObjectInfo["urgent"] {
+    const functions = Object.create(null) as Record<string, (...args: unknown[]) => Promise<RrValue | undefined>>;
+    for (const [name, handle] of this.#handles) {
+      if (typeof handle === "function") functions[name] = (...args) => this.#session.urgently(() => handle(...args));
+    }
+    return functions;
   }
 
   get state(): ObjectState {

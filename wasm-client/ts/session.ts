@@ -35,6 +35,9 @@ export class Session {
   #wasConnected = false;
   #isClosed = false;
   #isPumping = false;
+  #isUrgent = false;
+  /** What time calls of an object have, where a lease says so. */
+  timeoutAt?: ((path: string) => number | undefined) | undefined;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #timerAt = Infinity;
   readonly #pending = new Map<number, Pending>();
@@ -98,6 +101,7 @@ export class Session {
       if (signal?.aborted) return reject(signal.reason);
       if (this.#end) return reject(this.#end.reason);
       this.core.setRequestTimeout(checkTimeout(options.timeout ?? this.timeout));
+      this.core.setUrgent(this.#isUrgent);
       const id = ask(this.core);
       const abort = () => {
         this.#pending.delete(id);
@@ -112,6 +116,16 @@ export class Session {
       signal?.addEventListener("abort", abort, { once: true });
       this.#pump();
     });
+  }
+
+  /** What is asked for meanwhile goes past whatever waits. */
+  urgently<T>(what: () => T): T {
+    this.#isUrgent = true;
+    try {
+      return what();
+    } finally {
+      this.#isUrgent = false;
+    }
   }
 
   /** Something without an answer. @throws RobotRaconteurError */

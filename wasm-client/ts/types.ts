@@ -47,6 +47,26 @@ export interface CallOptions {
   timeout?: number | undefined;
 }
 
+export interface LeaseOptions extends CallOptions {
+  /** Milliseconds (50 to 60000) without renewal until the gateway makes the device safe; 1000 where not given. */
+  deadman?: number;
+  /** Takes it from whoever has it, with a role that may. */
+  takeover?: boolean;
+  /** Milliseconds for calls and writes of the object while the lease is held, where they say nothing; 2000. */
+  callTimeout?: number;
+}
+
+export interface Lease {
+  readonly isHeld: boolean;
+  /** Resolves when the lease has ended: with the reason, or without one after release(). Never rejects. */
+  readonly ended: Promise<RobotRaconteurError | undefined>;
+  /** Calls `lost` once when the lease ends without release(). @returns a function that takes it back. */
+  onLost(lost: (reason: RobotRaconteurError) => void): () => void;
+  /** Ends it: the gateway makes the device safe. Repeated calls do nothing. */
+  release(): Promise<void>;
+  [Symbol.asyncDispose](): Promise<void>;
+}
+
 export type MemberKind = "property" | "function" | "event" | "objref" | "pipe" | "callback" | "wire" | "memory";
 
 export interface ParameterInfo {
@@ -91,6 +111,11 @@ export interface ObjectInfo {
   /** The texts of all service definitions known so far. */
   readonly types: readonly string[];
   readonly stats: SessionStats;
+  /**
+   * The functions of the object, as they are called otherwise, but sent past whatever waits to be sent:
+   * `robot.$.urgent.Stop()`.
+   */
+  readonly urgent: Readonly<Record<string, (...args: unknown[]) => Promise<RrValue | undefined>>>;
   /** A member by name: the way to those whose names JavaScript itself calls ("then", "toString"). */
   member(name: string): DynamicMember;
   /**

@@ -88,6 +88,8 @@ interface WasmSession extends CoreExports {
   unlock(path: Handle): number;
   enter_monitor(path: Handle, milliseconds: number): number;
   exit_monitor(path: Handle): number;
+  lease(path: Handle, command: number, deadman: number): number;
+  set_urgent(is_urgent: boolean): void;
   reply_callback(id: number, path: Handle, member: Handle, value: Handle): Handle;
   fail_callback(id: number, error: Handle): void;
   cancel(id: number): void;
@@ -279,6 +281,16 @@ export class Core {
   /** `milliseconds` below 0: no limit. */
   enterMonitor(path: string, milliseconds: number): number {
     return this.#checked(this.#atNow().enter_monitor(this.#give(path), milliseconds));
+  }
+
+  /** `command`: see leaseCommands. */
+  lease(path: string, command: number, deadman: number): number {
+    return this.#checked(this.#atNow().lease(this.#give(path), command, deadman));
+  }
+
+  /** Whether the requests on members that follow are sent past whatever waits. */
+  setUrgent(isUrgent: boolean): void {
+    this.#session.set_urgent(isUrgent);
   }
 
   exitMonitor(path: string): number {

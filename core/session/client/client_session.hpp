@@ -220,7 +220,7 @@ class ClientSession {
   void cancel(RequestId id);
   /// How long requests from now on may take; those that wait already keep their deadline.
   void set_request_timeout(std::chrono::milliseconds timeout) { options_.request_timeout = timeout; }
-  /// Whether requests on members that follow are sent past whatever waits, as those with the modifier `urgent` always are.
+  /// Whether requests on members that follow are sent past whatever waits, as those with the modifier `urgent` are.
   void set_urgent(bool is_urgent) { is_urgent_ = is_urgent; }
   /// Orderly: tells the service, then closes (after its answer or 500 ms). SessionClosed follows.
   void disconnect(Now now);

@@ -27,8 +27,23 @@ RequestId ClientSession::request_session_op(std::string_view path, std::string_v
 }
 
 namespace {
-constexpr auto nothing = []() -> Result<> { return {}; };
-}
+
+/// What most commands need: up to two numbers. One type for all, so that the request is compiled once.
+struct Numbers {
+  Message* to = nullptr;
+  std::string_view name = {};
+  std::int32_t number = 0;
+  std::string_view other_name = {};
+  std::int32_t other = 0;
+
+  Result<> operator()() const {
+    if (!name.empty()) to->add_scalar(name, DataType::int32_t, number);
+    if (!other_name.empty()) to->add_scalar(other_name, DataType::int32_t, other);
+    return {};
+  }
+};
+
+}  // namespace
 
 RequestId ClientSession::authenticate(std::string_view username, const Value& credentials, Now now) {
   return request_session_op(options_.service, "AuthenticateUser", now, [&]() -> Result<> {
@@ -49,34 +64,29 @@ RequestId ClientSession::logout(Now now) {
 
 RequestId ClientSession::lock(std::string_view path, LockKind kind, Now now) {
   const auto command = kind == LockKind::user ? "RequestObjectLock" : "RequestClientObjectLock";
-  return request_session_op(path, command, now, nothing);
+  return request_session_op(path, command, now, Numbers{});
 }
 
 RequestId ClientSession::unlock(std::string_view path, Now now) {
-  return request_session_op(path, "ReleaseObjectLock", now, nothing);
+  return request_session_op(path, "ReleaseObjectLock", now, Numbers{});
 }
 
 RequestId ClientSession::enter_monitor(std::string_view path, std::chrono::milliseconds timeout, Now now) {
   constexpr std::int64_t longest = std::numeric_limits<std::int32_t>::max();
   const auto milliseconds =
       static_cast<std::int32_t>(timeout.count() < 0 ? -1 : std::min<std::int64_t>(timeout.count(), longest));
-  return request_session_op(path, "MonitorEnter", now, [&]() -> Result<> {
-    outgoing_.add_scalar("timeout", DataType::int32_t, milliseconds);
-    return {};
-  });
+  return request_session_op(path, "MonitorEnter", now, Numbers{&outgoing_, "timeout", milliseconds});
 }
 
 RequestId ClientSession::exit_monitor(std::string_view path, Now now) {
-  return request_session_op(path, "MonitorExit", now, nothing);
+  return request_session_op(path, "MonitorExit", now, Numbers{});
 }
 
 RequestId ClientSession::lease(std::string_view path, LeaseCommand command, std::chrono::milliseconds deadman,
                                Now now) {
-  return request_session_op(path, lease_op, now, [&]() -> Result<> {
-    outgoing_.add_scalar("command", DataType::int32_t, static_cast<std::int32_t>(command));
-    outgoing_.add_scalar("deadman", DataType::int32_t, static_cast<std::int32_t>(deadman.count()));
-    return {};
-  });
+  return request_session_op(path, lease_op, now,
+                            Numbers{&outgoing_, "command", static_cast<std::int32_t>(command), "deadman",
+                                    static_cast<std::int32_t>(deadman.count())});
 }
 
 /// `return` is absent where nothing had to be done; a monitor that is not free yet is asked for again under the same

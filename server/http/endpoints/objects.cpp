@@ -8,6 +8,7 @@
 #include "server/http/endpoints/device_documents.hpp"
 #include "server/http/endpoints/devices.hpp"
 #include "server/http/endpoints/image_values.hpp"
+#include "server/http/endpoints/leases.hpp"
 #include "server/http/endpoints/member_values.hpp"
 #include "server/http/endpoints/members.hpp"
 #include "server/log/log.hpp"
@@ -19,7 +20,7 @@ namespace {
 
 /// What a request does to a member.
 Verb verb_of(const ObjectRequest& request, const Target& target) {
-  if (!target.member) return Verb::read;
+  if (!target.member) return request.option("lease") ? Verb::lock : Verb::read;
   const auto& member = *target.member;
   const bool writes = request.method() == http::verb::put;
   switch (member.kind) {
@@ -38,6 +39,11 @@ Verb verb_of(const ObjectRequest& request, const Target& target) {
 }
 
 rr::awaitable<void> serve_target(const ObjectRequest& request, const Target& target) {
+  if (!target.member && request.option("lease")) {
+    const auto response = co_await answer_lease(request, target);
+    co_await request.writer().send(response);
+    co_return;
+  }
   if (!target.member) {
     auto response = request.method_response("GET, HEAD");
     if (request.is_read()) {
@@ -198,7 +204,14 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
   std::optional<rr::Error> error;
   std::shared_ptr<Target> target;
   if (client) {
-    auto found = co_await find_target(*client, std::move(segments));
+    auto used = *client;
+    if (const auto key = writer.request().header(lease_header); !key.empty()) {
+      const auto holder = gateway.lease_holders().find(key);
+      // A key that is none any more: its commands are those of a client without a lease.
+      if (holder != gateway.lease_holders().end() && holder->second->upstream() == used->upstream())
+        used = holder->second;
+    }
+    auto found = co_await find_target(std::move(used), std::move(segments));
     if (found)
       target = *found;
     else
@@ -211,7 +224,12 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
     const auto wanted = access_request(*target, verb_of(request, *target));
     auto who = writer.request().identity;
     if (wanted.verb == Verb::subscribe) who.face = Face::stream;
-    auto begun = gateway.access().check_and_begin(who, wanted, trace);
+    const auto event = lease_event(request, *target);
+    rr::Result<AuditEntryPtr> begun = AuditEntryPtr();
+    if (event)
+      begun = gateway.access().check_and_begin(who, wanted, trace, *event);
+    else if (const auto allowed = gateway.access().check(who, wanted); !allowed)
+      begun = allowed.error();
     if (!begun) {
       gateway.reject(begun.error());
       const auto refusal = gateway.http_access().refusal(writer.request(), begun.error());
@@ -257,7 +275,7 @@ rr::awaitable<void> answer(GatewayState& gateway, ResponseWriter& writer, std::s
     response.status = 204;
     response.set("Access-Control-Allow-Methods", "GET, HEAD, PUT, POST");
     response.set("Access-Control-Allow-Headers",
-                 "Accept, Authorization, Content-Type, Last-Event-ID, Range, traceparent");
+                 "Accept, Authorization, Content-Type, Last-Event-ID, Range, Rrgate-Lease, traceparent");
     response.set("Access-Control-Max-Age", "600");
   } else if (!segments || segments->empty()) {
     response = problem_response(404, segments ? "expected /api/v1/devices/NAME" : segments.error().message);

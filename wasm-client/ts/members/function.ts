@@ -13,7 +13,10 @@ export function makeFunction(context: MemberContext): Call {
   const isVoid = info.type === "void";
   const call = async (...args: unknown[]) => {
     const { values, options } = splitArguments(signature(info), count, args);
-    const value = await session.request((core) => core.callFunction(path, info.name, values), options);
+    const value = await session.request((core) => core.callFunction(path, info.name, values), {
+      timeout: session.timeoutAt?.(path),
+      ...options,
+    });
     return isVoid ? undefined : value;
   };
   return Object.defineProperty(call, "name", { value: info.name });

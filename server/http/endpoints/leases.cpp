@@ -1,0 +1,75 @@
+#include "server/http/endpoints/leases.hpp"
+
+#include <boost/asio/post.hpp>
+#include <charconv>
+
+#include "core/support/random.hpp"
+#include "server/http/endpoints/refusal.hpp"
+#include "server/state/http_access.hpp"
+#include "server/upstream/lease_table.hpp"
+
+namespace rrgate {
+
+namespace {
+
+/// More leases than that are nobody's wish: each is a client of a device.
+constexpr std::size_t max_lease_holders = 256;
+
+milliseconds read_deadman(const ObjectRequest& request) {
+  const auto text = request.option("deadman").value_or("");
+  std::int64_t number = 0;
+  const auto read = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (text.empty() || read.ec != std::errc() || read.ptr != text.data() + text.size())
+    refuse(rr::ErrorCode::invalid_argument, "deadman is " + rr::quote(text) + ", expected milliseconds");
+  return milliseconds(number);
+}
+
+/// One more client of the session, which holds the lease until that ends.
+rr::awaitable<std::string> acquire(const ObjectRequest& request, const Target& target, rr::LockCommand command) {
+  auto& gateway = request.gateway();
+  const auto deadman = read_deadman(request);
+  if (gateway.lease_holders().size() >= max_lease_holders)
+    refuse(rr::ErrorCode::out_of_system_resource, "too many leases are held by HTTP already");
+  const auto& who = request.request().identity;
+  const UpstreamClient& asker = *target.client;
+  const auto user = who.is_proven() ? who.subject() : asker.lock_user();
+  const auto holder = value_or_throw(gateway.clients().make_another(target.client->upstream(), user));
+  holder->set_standing(std::make_shared<Standing>(gateway.access(), who));
+  auto path = target.path();
+  co_await holder->lock(command, std::move(path), deadman);
+  auto key = rr::format_node_id(rr::random_node_id(), rr::NodeIdFormat::dashes);
+  gateway.lease_holders().emplace(key, holder);
+  holder->on_lease_ended([&gateway, key, executor = holder->upstream()->device().executor()](const auto&, const auto&) {
+    boost::asio::post(executor, [&gateway, key] { gateway.lease_holders().erase(key); });  // not within its own call
+  });
+  co_return key;
+}
+
+}  // namespace
+
+std::optional<std::string_view> lease_event(const ObjectRequest& request, const Target& target) {
+  const auto what = target.member ? std::nullopt : request.option("lease");
+  if (!what) return "";
+  if (*what == "acquire" || *what == "take") return "lease";
+  return std::nullopt;
+}
+
+rr::awaitable<Response> answer_lease(const ObjectRequest& request, const Target& target) {
+  if (request.method() != http::verb::post) co_return request.method_response("POST");
+  const auto what = request.option("lease").value_or("");
+  if (what == "acquire" || what == "take") {
+    const auto command = what == "take" ? rr::LockCommand::take_lease : rr::LockCommand::acquire_lease;
+    auto json = rr::OrderedJson::object();
+    rr::add_key(json, "lease") = co_await acquire(request, target, command);
+    co_return co_await request.value_response(json);
+  }
+  if (what != "renew" && what != "release")
+    refuse(rr::ErrorCode::invalid_argument,
+           "lease is " + rr::quote(what) + ", expected acquire, take, renew or release");
+  auto path = target.path();
+  const auto command = what == "renew" ? rr::LockCommand::renew_lease : rr::LockCommand::release_lease;
+  co_await target.client->lock(command, std::move(path));
+  co_return request.written_response();
+}
+
+}  // namespace rrgate

@@ -1,0 +1,20 @@
+// Leases for clients of HTTP: POST .../OBJECT?lease=acquire. Layer: server/http/endpoints. See docs/leases.md.
+#pragma once
+
+#include <optional>
+#include <string_view>
+
+#include "server/http/endpoints/object_request.hpp"
+
+namespace rrgate {
+
+/// The header by which requests show the key of their lease.
+inline constexpr std::string_view lease_header = "Rrgate-Lease";
+
+/// The name of the record of a request: where it asks for a lease, that; empty: its verb. nullopt: it is not recorded,
+/// since a lease is renewed several times a second, and its end has a record of its own.
+std::optional<std::string_view> lease_event(const ObjectRequest& request, const Target& target);
+/// Throws   rr::Exception.
+rr::awaitable<Response> answer_lease(const ObjectRequest& request, const Target& target);
+
+}  // namespace rrgate

@@ -1,0 +1,257 @@
+"""Leases of a shared device: who may command it, on every face, and what becomes of the device when a lease ends. Device and
+native clients are those of the real package; what the device was told is asked of it by a client that comes by no gateway."""
+import json
+import subprocess
+import sys
+import time
+
+import pytest
+import RobotRaconteur as RR
+
+from http_api import ask
+from json_sockets import Socket
+from news import News
+from shared_sites import Site, is_refused
+from users import PASSWORDS, basic, make_users
+
+PLAIN = "/api/v1/devices/interop/plain"
+LEASES = {
+    "members": [{"member": "plain.finish", "lease": "never"}, {"member": "plain.speed", "lease": "required"}],
+    "safe": [{"property": "plain.speed", "value": 0}, {"wire": "plain.target", "value": -1}],
+    "takeover": ["operator", "admin"],
+}
+LOCKED = RR.ObjectLockedException
+DEADMAN = 200
+SOON = 0.3  # s, behind the dead-man's time: when the device is safe
+
+
+@pytest.fixture
+def site(node, tmp_path):
+    made = Site(tmp_path, node, {"leases": LEASES})
+    yield made
+    made.stop()
+
+
+@pytest.fixture
+def gateway(site):
+    """The gateway's own service."""
+    root = site.node.ConnectService(f"rr+tcp://127.0.0.1:{site.port}/?nodename=rrgate&service=gateway")
+    site.roots.append(root)
+    return root
+
+
+def session_of(root):
+    return RR.RobotRaconteurNode.s.GetServiceAttributes(root)["rrgate.session"].data
+
+
+def wait_for(is_so, within=10):
+    begin = time.monotonic()
+    while not is_so():
+        assert time.monotonic() - begin < within, "not in time"
+        time.sleep(0.005)
+    return time.monotonic() - begin
+
+
+def is_safe(arm):
+    return arm.speed == 0 and arm.seen_target == -1
+
+
+def drives(page, arm):
+    """A page that has taken a lease, and the device goes as it says."""
+    page.ask("lease", deadman=DEADMAN)
+    page.ask("set", "speed", value=2)
+    page.ask("set", "target", value=3)
+    wait_for(lambda: (arm.speed, arm.seen_target) == (2, 3))
+
+
+def test_the_device_is_made_safe_when_nobody_renews(site):
+    arm = site.direct("plain")
+    with Socket(site.port, PLAIN) as page:
+        drives(page, arm)
+        for _ in range(5):
+            page.ask("renew")
+            time.sleep(DEADMAN / 2 / 1000)
+        assert (arm.speed, arm.seen_target) == (2, 3)
+        page.ask("renew")
+        assert DEADMAN / 1000 - 0.02 < wait_for(lambda: is_safe(arm)) < DEADMAN / 1000 + SOON
+        ended = page.next(lease="plain", state="ended")
+        assert ended["reason"] == f"its holder has not renewed it for {DEADMAN} ms"
+        assert page.refusal("set", "speed", value=1)[0] == "ObjectLockedError"
+        assert ended["reason"] in page.refusal("renew")[1]
+        assert page.refusal("set", "target", value=1)[0] == "ObjectLockedError"
+        drives(page, arm)
+
+
+def test_others_are_refused_on_every_face_and_may_read(site, gateway):
+    arm, native = site.direct("plain"), site.connect("plain")
+    target = native.target.Connect()
+    with Socket(site.port, PLAIN) as other, Socket(site.port, PLAIN) as page:
+        other.ask("send", "target", value=1)
+        page.ask("lease", deadman=20000)
+        page.ask("set", "target", value=3)
+        page.ask("set", "speed", value=2)
+        wait_for(lambda: arm.seen_target == 3)
+
+        def set_speed(root):
+            root.speed = 1
+        with pytest.raises(LOCKED, match="another client has the lease of 'plain'"):
+            set_speed(native)
+        with pytest.raises(LOCKED):
+            native.target.PokeOutValue(1)
+        with pytest.raises(LOCKED):
+            RR.RobotRaconteurNode.s.RequestObjectLock(native, RR.RobotRaconteurObjectLockFlags_CLIENT_LOCK)
+        assert is_refused(LOCKED, lambda: gateway.acquire_lease(session_of(native), "plain", 1000))
+        target.OutValue = 1
+        for refusal in (other.refusal("set", "speed", value=1), other.refusal("call", "move", args={"position": 1}),
+                        other.refusal("send", "target", value=1), other.refusal("lease", deadman=1000)):
+            assert refusal[0] == "ObjectLockedError", refusal
+        for method, path, body in (("PUT", "/speed", 1), ("PUT", "/target", 1), ("POST", "/move", {"position": 1})):
+            refused = ask(site.port, method, PLAIN + path, body)
+            assert (refused.status, refused.json["error"]["name"]) == (423, "RobotRaconteur.ObjectLockedError"), path
+        assert ask(site.port, "POST", PLAIN + "?lease=acquire&deadman=1000").status == 423
+
+        assert (native.speed, other.ask("get", "speed"), ask(site.port, "GET", PLAIN + "/speed").json) == (2, 2, 2)
+        native.finish()  # which always passes
+        other.ask("call", "finish")
+        assert ask(site.port, "POST", PLAIN + "/finish", {}).status == 200
+        assert (arm.speed, arm.seen_target) == (2, 3)
+        page.ask("release")
+        wait_for(lambda: is_safe(arm))
+        with pytest.raises(LOCKED, match="needs the lease of 'plain', which nobody has"):
+            set_speed(native)
+        native.target.PokeOutValue(5)
+        wait_for(lambda: arm.seen_target == 5)
+
+
+KILLED = """
+import sys, time
+import RobotRaconteur as RR
+node = RR.RobotRaconteurNode.s
+arm = node.ConnectService(sys.argv[1])
+gateway = node.ConnectService(sys.argv[2])
+session = node.GetServiceAttributes(arm)["rrgate.session"].data
+gateway.acquire_lease(session, "plain", 20000)
+arm.speed = 2
+gateway.renew_lease(session, "plain")
+print("drives", flush=True)
+time.sleep(60)
+"""
+
+
+def test_a_native_client_that_is_killed_leaves_the_device_safe(site, gateway):
+    arm = site.direct("plain")
+    news = News()
+    gateway.lease_changed += lambda lease: news.add((lease.path, lease.held, lease.reason))
+    urls = [f"rr+tcp://127.0.0.1:{site.port}/?nodename={node}&service={service}"
+            for node, service in (("interop", "plain"), ("rrgate", "gateway"))]
+    with subprocess.Popen([sys.executable, "-c", KILLED, *urls], stdout=subprocess.PIPE) as driver:
+        assert driver.stdout.readline() == b"drives\n"
+        assert arm.speed == 2
+        assert [(each.device, each.path, each.deadman, each.held) for each in gateway.leases] == [("interop", "plain", 20000, 1)]
+        driver.kill()
+        assert wait_for(lambda: is_safe(arm)) < SOON
+    wait_for(lambda: len(news.all()) == 2)
+    assert news.all() == [("plain", 1, ""), ("plain", 0, "the connection of its holder has ended")]
+    assert not gateway.leases
+    assert is_refused(RR.RobotRaconteurException, lambda: gateway.acquire_lease("nobody's", "plain", 1000))
+
+
+def test_requests_of_http_show_the_key_of_their_lease(site):
+    arm = site.direct("plain")
+    taken = ask(site.port, "POST", PLAIN + "?lease=acquire&deadman=500")
+    assert taken.status == 200
+    key = {"Rrgate-Lease": taken.json["lease"]}
+    assert ask(site.port, "PUT", PLAIN + "/speed", 2, key).status == 204
+    assert ask(site.port, "PUT", PLAIN + "/speed", 1).status == 423
+    assert ask(site.port, "POST", PLAIN + "?lease=renew", headers=key).status == 204
+    assert ask(site.port, "POST", PLAIN + "?lease=release", headers=key).status == 204
+    wait_for(lambda: is_safe(arm))
+    assert ask(site.port, "PUT", PLAIN + "/speed", 1, key).status == 423
+    ask(site.port, "POST", PLAIN + "?lease=acquire&deadman=200")
+    wait_for(lambda: ask(site.port, "POST", PLAIN + "?lease=acquire&deadman=200").status == 200, 2)
+    for query in ("lease=borrow", "lease=acquire", "lease=acquire&deadman=soon", "lease=acquire&deadman=5"):
+        assert ask(site.port, "POST", f"{PLAIN}?{query}").status == 400, query
+
+
+def test_a_device_that_was_away_is_made_safe_when_it_is_back(site):
+    arm = site.direct("plain")
+    with Socket(site.port, PLAIN) as page:
+        page.ask("lease", deadman=20000)
+        page.ask("set", "speed", value=2)
+        site.line.cut()
+        reason = page.next(lease="plain", state="ended")["reason"]
+        assert reason == "the connection to the device was lost; the device is made safe when it is back"
+        wait_for(lambda: is_safe(arm))
+        site.gateway.wait_until(lambda: "the device is back, and was made safe" in site.gateway.description())
+        assert page.refusal("set", "speed", value=1)[0] in ("ObjectLockedError", "ConnectionError")
+
+
+def test_a_gateway_that_stops_leaves_the_device_safe(site):
+    arm = site.direct("plain")
+    with Socket(site.port, PLAIN) as page:
+        drives(page, arm)
+        page.ask("lease", deadman=60000)
+        site.gateway.stop()
+        wait_for(lambda: is_safe(arm))
+
+
+def test_an_operator_takes_a_lease_over_and_all_of_it_is_recorded(node, tmp_path):
+    make_users(tmp_path)
+    access = {"users_file": "users", "audit_file": "audit",
+              "rules": [{"roles": ["viewer", "operator"], "may": ["read", "subscribe", "write", "call", "lock"]}]}
+    auth = {name: basic(name) for name in PASSWORDS}
+    site = Site(tmp_path, node, {"leases": LEASES}, access=access, is_up=lambda: True)
+    try:
+        site.gateway.wait_until(lambda: ask(site.port, "GET", PLAIN + "/speed", headers=auth["vera"]).status == 200)
+        arm = site.direct("plain")
+        arm.speed = 7
+        with Socket(site.port, PLAIN, additional_headers=auth["vera"]) as vera, \
+                Socket(site.port, PLAIN, additional_headers=auth["alice"]) as alice:
+            vera.ask("lease", deadman=20000)
+            vera.ask("set", "speed", value=2)
+            assert "'vera' has the lease of 'plain'" in alice.refusal("set", "speed", value=1)[1]
+            alice.ask("lease", deadman=20000, takeover=True)
+            assert wait_for(lambda: is_safe(arm)) < SOON
+            assert vera.next(lease="plain")["reason"] == "it was taken over by alice"
+            alice.ask("set", "speed", value=3)
+            assert arm.speed == 3
+            assert vera.refusal("set", "speed", value=1)[0] == "ObjectLockedError"
+            assert vera.refusal("lease", deadman=1000, takeover=True)[0] == "PermissionDenied"
+
+        def ends():
+            records = [json.loads(line) for line in (tmp_path / "audit").read_text().splitlines()]
+            return [(each["user"], each["event"], each["outcome"]) for each in records if each["event"].startswith("lease")]
+        wait_for(lambda: len(ends()) == 5)
+        assert ends() == [("vera", "lease", "ok"), ("vera", "lease_end", "ok"), ("alice", "lease", "ok"),
+                          ("vera", "lease", "error"), ("alice", "lease_end", "ok")]
+    finally:
+        site.stop()
+
+
+@pytest.mark.parametrize(("safe", "why"), [
+    ({"property": "plain.sped", "value": 0}, "experimental.arm.Arm has no such member"),
+    ({"call": "plain.speed"}, "has a property of this name"),
+    ({"call": "plain.move", "arguments": []}, "0 arguments, expected 1"),
+    ({"property": "plain.speed", "value": "none"}, "speed"),
+    ({"property": "plain.arms[3].speed", "value": 0}, "plain.arms[3]"),
+])
+def test_safe_values_that_do_not_fit_the_device_give_no_lease(node, tmp_path, safe, why):
+    site = Site(tmp_path, node, {"leases": {"safe": [safe]}})
+    try:
+        with Socket(site.port, PLAIN) as page:
+            name, text = page.refusal("lease", deadman=1000)
+            assert why in text, text
+            site.gateway.wait_until(lambda: why in site.gateway.description())
+            page.ask("set", "speed", value=1)
+    finally:
+        site.stop()
+
+
+def test_devices_without_leases_give_none(node, tmp_path):
+    site = Site(tmp_path, node)
+    try:
+        with Socket(site.port, PLAIN) as page:
+            assert page.refusal("lease", deadman=1000)[0] == "NotImplementedError"
+            page.ask("set", "speed", value=1)
+    finally:
+        site.stop()
