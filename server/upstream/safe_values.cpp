@@ -76,7 +76,7 @@ void SafeValues::handle_opened(const std::shared_ptr<Upstream>& upstream) {
       if (found)
         self->read(wanted, *upstream);
       else if (upstream->is_open())
-        wanted.request = misfit(wanted.action, found.error().message);
+        self->take(wanted, misfit(wanted.action, found.error().message));
       self->pay(upstream);
     });
   }
@@ -85,8 +85,11 @@ void SafeValues::handle_opened(const std::shared_ptr<Upstream>& upstream) {
 
 void SafeValues::read(Item& item, Upstream& upstream) {
   const auto* type = upstream.object_type(item.action.path);
-  if (!type) return;
-  item.request = read_action(item.action, *type, *upstream.types());
+  if (type) take(item, read_action(item.action, *type, *upstream.types()));
+}
+
+void SafeValues::take(Item& item, rr::Result<SafeRequest> request) {
+  item.request = std::move(request);
   if (!item.request)
     log(LogLevel::error, "no leases where this would have to be safe",
         {{"device", device_}, {"error", item.request.error().message}});

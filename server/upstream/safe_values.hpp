@@ -47,6 +47,7 @@ class SafeValues : public std::enable_shared_from_this<SafeValues> {
   };
 
   void read(Item& item, Upstream& upstream);
+  void take(Item& item, rr::Result<SafeRequest> request);
   void pay(const std::shared_ptr<Upstream>& upstream);
 
   std::string device_;

@@ -108,9 +108,6 @@ export class ObjectTree {
   }
 }
 
-/** For what belongs to this package. */
-export const sessionOf = (object: RemoteObject): Session => (object.$ as Info).session;
-
 /**
  * Holds the right to command `object` and all below it at a gateway that gives leases of it.
  * @throws RobotRaconteurError (rejects) ObjectLockedError: somebody else has it; NotImplementedError: there are none;
@@ -119,7 +116,8 @@ export const sessionOf = (object: RemoteObject): Session => (object.$ as Info).s
 export const lease = async (object: RemoteObject, options?: LeaseOptions): Promise<Lease> =>
   (await import("./lease/held_lease.js")).lease(object, options);
 
-class Info implements ObjectInfo {
+/** What stands behind `$`; not for users of the package. */
+export class Info implements ObjectInfo {
   #isReleased = false;
   readonly #tree: ObjectTree;
   readonly #session: Session;
@@ -147,8 +145,8 @@ class Info implements ObjectInfo {
     released.push(() => this.#release());
   }
 
-  get session(): Session {
-    return this.#session;
+  static sessionOf(object: RemoteObject): Session {
+    return (object.$ as Info).#session;
   }
 
   get urgent(): ObjectInfo["urgent"] {

@@ -100,8 +100,7 @@ export class Session {
       checkSignal(signal);
       if (signal?.aborted) return reject(signal.reason);
       if (this.#end) return reject(this.#end.reason);
-      this.core.setRequestTimeout(checkTimeout(options.timeout ?? this.timeout));
-      this.core.setUrgent(this.#isUrgent);
+      this.core.prepareRequest(checkTimeout(options.timeout ?? this.timeout), this.#isUrgent);
       const id = ask(this.core);
       const abort = () => {
         this.#pending.delete(id);

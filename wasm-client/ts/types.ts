@@ -62,7 +62,10 @@ export interface Lease {
   readonly ended: Promise<RobotRaconteurError | undefined>;
   /** Calls `lost` once when the lease ends without release(). @returns a function that takes it back. */
   onLost(lost: (reason: RobotRaconteurError) => void): () => void;
-  /** Ends it: the gateway makes the device safe. Repeated calls do nothing. */
+  /**
+   * Ends it: the gateway makes the device safe. Of one that was lost: what it covered may be commanded again as without
+   * it. Repeated calls do nothing.
+   */
   release(): Promise<void>;
   [Symbol.asyncDispose](): Promise<void>;
 }

@@ -169,8 +169,10 @@ export class Core {
 
   // --- asked: the number of the request; throws RobotRaconteurError for values that do not fit ---
 
-  setRequestTimeout(milliseconds: number): void {
-    this.#session.set_request_timeout(milliseconds);
+  /** For what follows; `isUrgent`: requests on members are sent past whatever waits. */
+  prepareRequest(timeout: number, isUrgent: boolean): void {
+    this.#session.set_request_timeout(timeout);
+    this.#session.set_urgent(isUrgent);
   }
 
   getProperty(path: string, member: string): number {
@@ -286,11 +288,6 @@ export class Core {
   /** `command`: see leaseCommands. */
   lease(path: string, command: number, deadman: number): number {
     return this.#checked(this.#atNow().lease(this.#give(path), command, deadman));
-  }
-
-  /** Whether the requests on members that follow are sent past whatever waits. */
-  setUrgent(isUrgent: boolean): void {
-    this.#session.set_urgent(isUrgent);
   }
 
   exitMonitor(path: string): number {

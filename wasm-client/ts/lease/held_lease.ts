@@ -2,7 +2,7 @@
 // Renewed by a timer of this thread: a page that is frozen, hidden, offline or gone renews nothing, and the gateway makes
 // the device safe.
 import { callSafely, ErrorCode, makeError, RobotRaconteurError } from "../errors.js";
-import { sessionOf } from "../object.js";
+import { Info } from "../object.js";
 import type { Session } from "../session.js";
 import type { CallOptions, Lease, LeaseOptions, RemoteObject } from "../types.js";
 
@@ -19,7 +19,7 @@ export async function lease(object: RemoteObject, options: LeaseOptions = {}): P
     throw makeError("InvalidArgument", `deadman ${String(deadman)}: expected 50 to 60000 ms`);
   }
   if (isHidden()) throw makeError("InvalidOperation", "this page is hidden: it can hold no lease");
-  const session = sessionOf(object);
+  const session = Info.sessionOf(object);
   const path = object.$.path;
   const ask = (command: number, more: CallOptions = {}) =>
     session.request((core) => core.lease(path, command, deadman), more);
@@ -60,6 +60,7 @@ class HeldLease implements Lease {
   #end!: (reason?: RobotRaconteurError) => void;
   #isHeld = true;
   #isRenewing = false;
+  #isReleased = false;
   readonly #losers = new Set<(reason: RobotRaconteurError) => void>();
   readonly #undo: (() => void)[] = [];
 
@@ -86,9 +87,10 @@ class HeldLease implements Lease {
   }
 
   async release(): Promise<void> {
-    if (!this.#isHeld) return;
-    this.#finish();
-    await this.ask(Command.release);
+    if (this.#isReleased) return;
+    this.#isReleased = true;
+    if (this.#isHeld) this.#finish();
+    await this.ask(Command.release); // of one that was lost, too: until then its commands are refused
   }
 
   [Symbol.asyncDispose](): Promise<void> {
