@@ -88,7 +88,8 @@ TEST_CASE("leases: what a device needs, and what makes it safe") {
   CHECK(findings_of(leases("{}")).empty());
   finds(leases("{}", "relay"), "gateway.json: /devices/0/leases: ", "\"mode\": \"shared\"");
   finds(leases(R"({"safe": [{}]})"), "gateway.json: /devices/0/leases/safe/0/call: ", "one of call, wire and property");
-  finds(leases(R"({"safe": [{"call": "s.Stop", "wire": "s.v"}]})"), "gateway.json: /devices/0/leases/safe/0/call: ");
+  finds(leases(R"({"safe": [{"call": "s.Stop", "wire": "s.v", "value": 1}]})"),
+        "gateway.json: /devices/0/leases/safe/0/call: ");
   finds(leases(R"({"safe": [{"call": "Stop"}]})"), "gateway.json: /devices/0/leases/safe/0/call: ", "path.member");
   finds(leases(R"({"safe": [{"call": "s.Stop", "value": 1}]})"), "gateway.json: /devices/0/leases/safe/0/value: ");
   finds(leases(R"({"safe": [{"wire": "s.v"}]})"), "gateway.json: /devices/0/leases/safe/0/value: ", "missing");

@@ -25,17 +25,17 @@ struct Transcript {
   }
   std::string why_not(LockClient client, std::string_view path = "s", LeaseNeed need = LeaseNeed::covered) {
     const auto allowed = table.check(client, path, need, now);
-    REQUIRE_FALSE(allowed);
+    REQUIRE_FALSE(allowed.has_value());
     return allowed.error().message;
   }
   void ended(LockClient holder, const std::string& path, const std::string& why) {
     const auto event = table.poll_event();
-    REQUIRE(event);
+    REQUIRE(event.has_value());
     CHECK(event->lease.holder == holder);
     CHECK(event->lease.path == path);
     CHECK(event->why == why);
   }
-  void nothing_more() { CHECK_FALSE(table.poll_event()); }
+  void nothing_more() { CHECK_FALSE(table.poll_event().has_value()); }
 
  private:
   static ErrorCode code(const rr::Result<>& result) { return result ? ErrorCode::none : result.error().code; }
