@@ -57,7 +57,7 @@ class UpstreamClient {
   virtual void close_wire(const std::string& path, const rr::MemberDefinition& wire) = 0;
   virtual void accept_pipe(rr::PipeId id) = 0;
   virtual void refuse_pipe(rr::PipeId id, const rr::Error& error) = 0;
-  virtual void receive_packet(rr::PipeId id, const rr::Value& packet) = 0;
+  virtual void receive_packet(rr::PipeId id, rr::SharedPipePacket& packet) = 0;
   /// Whether much waits for its stream: what it has joined should be sent no faster than it reads. It says with
   /// Upstream::caught_up() that this is over.
   virtual bool is_behind() const = 0;

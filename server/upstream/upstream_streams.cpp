@@ -214,8 +214,9 @@ void Upstream::attach_pipe(PipeNumber number) {
     const auto at = self->pipes_.find(number);
     if (at == self->pipes_.end()) return;
     const auto endpoints = at->second.endpoints;  // they may leave
+    rr::SharedPipePacket shared(packet);
     for (const auto& endpoint : endpoints)
-      if (self->endpoints_.contains(endpoint)) endpoint.first->receive_packet(endpoint.second, packet);
+      if (self->endpoints_.contains(endpoint)) endpoint.first->receive_packet(endpoint.second, shared);
     self->pace_pipe(number);
   };
   handlers.acknowledged = [weak, number](std::span<const std::uint32_t> numbers) {

@@ -257,6 +257,8 @@ class ServiceSession {
   /// Errors   invalid_operation: closed; write_only_member; out_of_system_resource: too much waits for the stream (see
   ///          queued_bytes()), nothing was sent; those of pack().
   Result<std::uint32_t> send_pipe_packet(PipeId id, const Value& value, Now now, bool wants_ack = false);
+  /// The same for a packet that others are sent as well.
+  Result<std::uint32_t> send_pipe_packet(PipeId id, SharedPipePacket& packet, Now now);
   /// Answers PipeReceived of a remote service. Unknown ids (the endpoint is closed) are ignored.
   void acknowledge_pipe(PipeId id, std::span<const std::uint32_t> numbers, Now now);
   /// Closes the endpoint and tells the client; no event follows.
@@ -488,6 +490,9 @@ class ServiceSession {
   ServicePipe* find_pipe(PipeId id);
   ServicePipe* find_pipe(const MessageEntry& entry, std::int32_t index);
   void forget_pipe(PipeId id);
+  /// `send(pipe, number)` of the next packet's number, which it takes where that succeeds.
+  template <class Send>
+  Result<std::uint32_t> send_numbered(PipeId id, Now now, Send&& send);
 
   // generators (service_generator.cpp)
   Result<> open_generator(const Message& message, const MessageEntry& entry, HostedService::Found found,
