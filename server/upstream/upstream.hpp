@@ -243,6 +243,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   void pipe_attached(PipeNumber number, const std::string& path, const std::string& member,
                      const rr::Result<rr::Value>& result, bool is_first);
   void drop_pipe(PipeNumber number);
+  void end_endpoint(const EndpointKey& endpoint);
   std::vector<PipeNumber> pipes_of(const UpstreamClient& client) const;
   /// Lets the device go on, or not, as the slowest client of the pipe can take it.
   void pace_pipe(PipeNumber number);
@@ -280,6 +281,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   std::map<PipeNumber, Pipe> pipes_;
   std::map<MemberKey, PipeNumber> shared_pipes_;
   std::map<EndpointKey, PipeNumber> endpoints_;
+  std::uint64_t endpoints_left_ = 0;  ///< how many ever have: while none does, nobody has to be looked up in endpoints_
   PipeNumber last_pipe_ = 0;
   std::map<std::pair<UpstreamClient*, rr::GeneratorId>, Generator> generators_;
   std::vector<OpenCall> calls_;                         ///< of functions, oldest first

@@ -87,8 +87,11 @@ Result<std::uint32_t> ServiceSession::send_pipe_packet(PipeId id, SharedPipePack
 
 template <class Send>
 Result<std::uint32_t> ServiceSession::send_numbered(PipeId id, Now now, Send&& send) {
-  accept_pipe(id, now);
   auto* pipe = find_pipe(id);
+  if (pipe && pipe->state.state() == PipeState::connecting) {
+    accept_pipe(id, now);
+    pipe = find_pipe(id);
+  }
   if (!pipe) return make_error(ErrorCode::invalid_operation, "the pipe endpoint is closed");
   auto& state = pipe->state;
   const auto& member = state.member();
