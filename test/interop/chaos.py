@@ -9,6 +9,7 @@ lock is held by one; when the faults have ended, wires have the last value, and 
 were. Ends with 1 where something did not hold. The seed makes the order of faults and their lengths.
 """
 import argparse
+import collections
 import contextlib
 import json
 import os
@@ -23,7 +24,7 @@ import tempfile
 import threading
 import time
 
-from chaos_clients import Caller, Findings, Listener, Locker, OurPiper, Piper, Program, Tokens, Watcher
+from chaos_clients import Caller, Findings, Listener, Locker, OurPiper, Piper, Program, Publisher, Tokens, Watcher
 from directions import PEERS
 from gateways import RRGATE, read_metrics
 from http_api import ask, fetch
@@ -239,7 +240,8 @@ class Site:
         websocket = f"rr+ws://127.0.0.1:{self.front.port}/devices/%s?service=chaos"
         self.programs = [Program("native", self, native % "shared"), Program("websocket", self, websocket % "shared"),
                          Program("relayed", self, websocket % "relayed")]
-        self.clients = [*self.programs, *(kind(f"{kind.__name__}{number}", self) for number in (1, 2)
+        self.publisher = Publisher("Publisher", self)
+        self.clients = [self.publisher, *self.programs, *(kind(f"{kind.__name__}{number}", self) for number in (1, 2)
                                           for kind in (Caller, Listener, Watcher, Piper, OurPiper, Locker))]
 
     def end(self):
@@ -266,6 +268,7 @@ class Site:
             self.findings.break_("gateway", f"has ended with {self.gateway.process.poll()}")
             return
         wait_until(self.is_online, "all devices are online again")
+        self.publisher.stop()
         value = float(self.tokens.next())
         wait_until(lambda: self.publish(value), "the device answers again")
         watchers = [client.name for client in self.clients if isinstance(client, (Watcher, Program))]
@@ -279,9 +282,8 @@ class Site:
             self.findings.break_("wires", f"{error}, which is {value}: {seen}")
         self.end()
         ran = self.device.ran()
-        twice = {token for token in ran if ran.count(token) > 1} if len(set(ran)) != len(ran) else {}
-        if twice:
-            self.findings.break_("calls", f"ran twice: {sorted(twice)[:5]}")
+        if twice := [token for token, count in collections.Counter(ran).items() if count > 1]:
+            self.findings.break_("calls", f"ran twice: {twice[:5]}")
         if missing := self.findings.answered - set(ran):
             self.findings.break_("calls", f"were answered and never ran: {sorted(missing)[:5]}")
         memory, descriptors = self.rest()

@@ -1,7 +1,10 @@
 """Clients for chaos.py: each works for as long as it is wanted, comes back whenever it has lost its connection, and says what it
 found that must not be."""
+import contextlib
+import http.client
 import json
 import random
+import socket
 import sys
 import threading
 import time
@@ -12,7 +15,7 @@ from http_api import Stream, ask
 from json_sockets import Socket
 from processes import ROOT, Background
 
-LOSSES = (OSError, EOFError, ValueError, websockets.exceptions.WebSocketException)  # ValueError: half a document
+LOSSES = (OSError, http.client.HTTPException, EOFError, ValueError, websockets.exceptions.WebSocketException)  # ValueError: half a document
 PEERS = ROOT / "test" / "interop" / "peers"
 
 
@@ -29,6 +32,7 @@ class Findings:
     def break_(self, who, what):
         with self._lock:
             self.broken.append(f"{who}: {what}")
+        print(f"BROKEN {who}: {what}", flush=True)
 
     def count(self, what, number=1):
         with self._lock:
@@ -95,40 +99,66 @@ class Caller(Client):
             self.findings.break_(self.name, f"call {token} was answered with {answer.status}: {answer.body[:200]}")
 
 
-class Listener(Client):
+class Publisher(Client):
+    """Gives the wire new values."""
+
+    def work(self):
+        self.site.publish(self.site.tokens.next())
+
+
+class Follower(Client):
+    """Reads a stream of events."""
+
+    socket = None
+
+    def work(self):
+        connection = http.client.HTTPConnection("127.0.0.1", self.site.front.port, timeout=20)
+        connection.connect()
+        self.socket = connection.sock  # the connection itself soon forgets it
+        try:
+            stream = Stream(self.site.front.port, f"{self.site.base}/{self.member}", connection=connection)
+            self.follow(stream)
+        finally:
+            self.socket.close()
+            connection.close()
+
+    def stop(self):
+        self.is_wanted = False
+        with contextlib.suppress(OSError, AttributeError):
+            self.socket.shutdown(socket.SHUT_RDWR)
+        super().stop()
+
+
+class Listener(Follower):
     """Hears events, which follow one another as long as nothing is said of a lost connection."""
 
-    def work(self):
-        stream = Stream(self.site.front.port, f"{self.site.base}/ticked")
-        try:
-            last = None
-            while self.is_wanted:
-                _, kind, event = stream.next()
-                if kind == "state":
-                    last = None
-                    continue
-                number = event["number"]
-                if last is not None and number != last + 1:
-                    self.findings.break_(self.name, f"event {number:.0f} came behind {last:.0f}")
-                last = number
-                self.findings.count("events")
-        finally:
-            stream.close()
+    member = "ticked"
+
+    def follow(self, stream):
+        last = None
+        while self.is_wanted:
+            _, kind, event = stream.next()
+            if kind == "state":
+                last = None
+                continue
+            number = event["number"]
+            if last is not None and number != last + 1:
+                self.findings.break_(self.name, f"event {number:.0f} came behind {last:.0f}")
+            last = number
+            self.findings.count("events")
 
 
-class Watcher(Client):
+class Watcher(Follower):
     """Follows the wire."""
 
-    def work(self):
-        stream = Stream(self.site.front.port, f"{self.site.base}/value")
-        try:
-            while self.is_wanted:
-                _, kind, event = stream.next()
-                if kind != "state":
-                    self.findings.last_values[self.name] = event["value"] if isinstance(event, dict) else event
-                    self.findings.count("values")
-        finally:
-            stream.close()
+    member = "value"
+
+    def follow(self, stream):
+        while self.is_wanted:
+            _, kind, event = stream.next()
+            if kind != "state":
+                self.findings.last_values[self.name] = event
+                self.findings.count("values")
 
 
 class Piper(Client):

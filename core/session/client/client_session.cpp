@@ -111,7 +111,7 @@ void ClientSession::scan_deadlines(Now now) {
       pending_.erase(found);
       continue;
     }
-    if (!abandon_pipe_request(id, now.steady + late_reply_period)) pending_.erase(found);
+    if (!abandon_request(id, now.steady + late_reply_period)) pending_.erase(found);
     if (const auto fetch = fetches_.extract(id)) {
       fail_fetch(fetch.mapped(), std::move(error));
     } else if (state_ == ClientState::connecting) {
@@ -304,7 +304,7 @@ void ClientSession::flush_wires(Now now) {
 
 void ClientSession::cancel(RequestId id) {
   if (const auto found = pending_.find(id);
-      found != pending_.end() && abandon_pipe_request(id, found->second.deadline + late_reply_period))
+      found != pending_.end() && abandon_request(id, found->second.deadline + late_reply_period))
     return;
   pending_.erase(id);
   fetches_.erase(id);
@@ -389,6 +389,7 @@ void ClientSession::handle_reply(const Message& message, const MessageEntry& ent
   if (pending.type == EntryType::disconnect_client) return fail(connection_error("closed by this side"));
   if (pending.type == EntryType::pipe_connect_req || pending.type == EntryType::pipe_disconnect_req)
     return handle_pipe_reply(message, entry, id, pending, now);
+  if (pending.is_abandoned) return disconnect_left_wire(entry, pending, now);
   if (pending.memory) return handle_memory_reply(message, entry, id, std::move(pending), now);
   if (entry.error != ErrorCode::none) {
     if (pending.type == EntryType::wire_connect_req)
@@ -449,6 +450,13 @@ void ClientSession::handle_wire_connected(const Pending& pending, RequestId id) 
   wire.early.reset();
 }
 
+/// A wire that came too late is one that nobody wants, unless it was connected anew: that is the same connection.
+void ClientSession::disconnect_left_wire(const MessageEntry& entry, const Pending& pending, Now now) {
+  if (entry.error != ErrorCode::none || wires_.contains(PathMemberView{pending.path, pending.member->name})) return;
+  begin_request(EntryType::wire_disconnect_req, pending.path, pending.member->name);
+  send_outgoing(now);  // its reply is nobody's
+}
+
 void ClientSession::handle_event(const Message& message, const MessageEntry& entry) {
   const auto* type = object_type(entry.service_path);
   const auto* member = type ? type->find_member(entry.member_name) : nullptr;
@@ -463,11 +471,13 @@ void ClientSession::handle_wire_packet(const Message& message, const MessageEntr
   if (found == wires_.end() || found->second.member->direction() == MemberDirection::writeonly) return;
   auto& wire = found->second;
   auto packet = read_wire_value(message, entry, *wire.member, types_);
-  if (!packet || !wire.accept(packet->time)) return;
+  if (!packet) return;
   if (wire.state == WireState::connecting) {
+    // It may be of the connection before, whose time stamps say nothing of this one's: a clock may have been set back.
     wire.early = std::move(*packet);
     return;
   }
+  if (!wire.accept(packet->time)) return;
   emit(WireValueReceived{found->first.path, found->first.member, packet->time, std::move(packet->value)});
 }
 

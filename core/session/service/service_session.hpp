@@ -488,6 +488,7 @@ class ServiceSession {
   ServicePipe* find_pipe(PipeId id);
   ServicePipe* find_pipe(const MessageEntry& entry, std::int32_t index);
   void forget_pipe(PipeId id);
+  void leave_pipe(PipeId id);
 
   // generators (service_generator.cpp)
   Result<> open_generator(const Message& message, const MessageEntry& entry, HostedService::Found found,
@@ -554,6 +555,7 @@ class ServiceSession {
   PipeId last_pipe_id_ = 0;
   std::unordered_map<PipeId, ServicePipe> pipes_;
   std::map<PathMember, PipeIndices, PathMemberLess> pipe_indices_;  ///< the same pipes
+  std::int32_t closed_index_ = any_pipe_index;                      ///< the highest of those that this side has closed
   std::vector<std::pair<std::int32_t, std::uint32_t>> pipe_acks_;   ///< index and number, to be sent; reused
   Fifo<ServiceEvent> events_;
 };

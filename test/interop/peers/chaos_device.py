@@ -31,6 +31,7 @@ class Chaos:
     def __init__(self, journal):
         self._journal = os.open(journal, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
         self._vault = Vault()
+        self.ticked = RR.EventHook()
         self._echoing = threading.Lock()
 
     def RRServiceObjectInit(self, context, path):
