@@ -16,6 +16,7 @@ import os
 import pathlib
 import random
 import resource
+import signal
 import socket
 import struct
 import subprocess
@@ -122,10 +123,6 @@ class Device:
         self.process.process.kill()
         self.process.process.wait()
 
-    def ran(self):
-        """Tokens of calls, in their order."""
-        return [int(line) for line in self.journal.read_text().split()] if self.journal.exists() else []
-
 
 class Gateway:
     """With its log on a pipe, which somebody reads unless he is told to rest."""
@@ -188,6 +185,17 @@ class Gateway:
         except subprocess.TimeoutExpired:
             self.kill()
             return None
+
+
+def ran(journal):
+    """Tokens of the calls that a device has run."""
+    return [int(line) for line in journal.read_text().split()] if journal.exists() else []
+
+
+def faults_of_calls(ran, answered):
+    twice = [token for token, count in collections.Counter(ran).items() if count > 1]
+    missing = sorted(answered - set(ran))
+    return [f"{what}: {tokens[:5]}" for what, tokens in (("ran twice", twice), ("were answered and never ran", missing)) if tokens]
 
 
 def wait_until(is_so, what):
@@ -281,11 +289,8 @@ class Site:
             seen = {name: self.findings.last_values.get(name) for name in watchers}
             self.findings.break_("wires", f"{error}, which is {value}: {seen}")
         self.end()
-        ran = self.device.ran()
-        if twice := [token for token, count in collections.Counter(ran).items() if count > 1]:
-            self.findings.break_("calls", f"ran twice: {twice[:5]}")
-        if missing := self.findings.answered - set(ran):
-            self.findings.break_("calls", f"were answered and never ran: {sorted(missing)[:5]}")
+        for fault in faults_of_calls(ran(self.device.journal), self.findings.answered):
+            self.findings.break_("calls", fault)
         memory, descriptors = self.rest()
         if memory > before[0] + MORE_MEMORY:
             self.findings.break_("memory", f"{before[0]} bytes before, {memory} now")
@@ -326,11 +331,11 @@ def stopped(process):
     @contextlib.contextmanager
     def fault(site, dice):
         pid = process(site, dice).pid
-        os.kill(pid, 19)
+        os.kill(pid, signal.SIGSTOP)
         try:
             yield
         finally:
-            os.kill(pid, 18)
+            os.kill(pid, signal.SIGCONT)
     return fault
 
 
