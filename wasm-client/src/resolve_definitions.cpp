@@ -4,8 +4,10 @@
 #include "core/robdef/resolve/resolve.hpp"
 #include "core/robdef/verify/verify.hpp"
 
-std::vector<rr::Diagnostic> rr::verify_service_definitions(std::span<ServiceDefinition* const> set, RobdefMode) {
-  return resolve_service_definitions(set);
+std::vector<rr::Diagnostic> rr::verify_service_definitions(std::span<ServiceDefinition* const> set,
+                                                           std::span<const ServiceDefinition* const> known,
+                                                           RobdefMode) {
+  return resolve_service_definitions(set, known);
 }
 
 bool rr::check_constant(StatementReader&, const ConstantDefinition&, const ConstantPlace&) {

@@ -22,17 +22,20 @@ bool may_be_member(const MemberDefinition& member);
 
 class Resolver {
  public:
-  explicit Resolver(std::span<ServiceDefinition* const> set) : set_(set), has_error_(set.size()) {}
+  Resolver(std::span<ServiceDefinition* const> set, std::span<const ServiceDefinition* const> known)
+      : set_(set), known_(known), has_error_(set.size()) {}
   std::vector<Diagnostic> run();
 
  private:
   struct Named {
     DataType type = DataType::void_t;
-    EntityDefinition* entity = nullptr;
+    const EntityDefinition* entity = nullptr;
+    EntityDefinition* own = nullptr;  ///< the same, where it is of the set
     std::size_t service = 0;
   };
 
   void index_names();
+  void index_entity(const EntityDefinition& entity, EntityDefinition* own, std::size_t service);
   void check_imports();
   void resolve_entity(std::size_t service, EntityDefinition& entity);
   bool resolve_type(std::size_t service, TypeDefinition& type, std::uint32_t line);
@@ -42,6 +45,7 @@ class Resolver {
   void refuse(std::size_t service, std::uint32_t line, std::string message);
 
   std::span<ServiceDefinition* const> set_;
+  std::span<const ServiceDefinition* const> known_;
   std::unordered_map<std::string, Named> names_ = {};  ///< by qualified name
   std::vector<bool> has_error_;
   std::vector<Diagnostic> errors_ = {};
@@ -57,16 +61,27 @@ std::vector<Diagnostic> Resolver::run() {
 }
 
 void Resolver::index_names() {
+  const auto index_enums = [&](const ServiceDefinition& definition) {
+    for (const auto& item : definition.enums)
+      names_.emplace(definition.name + '.' + item.name, Named{.type = DataType::enum_t});
+  };
   for (std::size_t service = 0; service < set_.size(); ++service) {
     auto& definition = *set_[service];
     for (auto& entity : definition.entities) {
       entity.qualified_name = definition.name + '.' + entity.name;
-      constexpr DataType types[] = {DataType::structure_t, DataType::pod_t, DataType::namedarray_t, DataType::object_t};
-      names_.emplace(entity.qualified_name, Named{types[static_cast<std::size_t>(entity.kind)], &entity, service});
+      index_entity(entity, &entity, service);
     }
-    for (const auto& item : definition.enums)
-      names_.emplace(definition.name + '.' + item.name, Named{DataType::enum_t, nullptr, service});
+    index_enums(definition);
   }
+  for (const auto* definition : known_) {
+    for (const auto& entity : definition->entities) index_entity(entity, nullptr, 0);
+    index_enums(*definition);
+  }
+}
+
+void Resolver::index_entity(const EntityDefinition& entity, EntityDefinition* own, std::size_t service) {
+  constexpr DataType types[] = {DataType::structure_t, DataType::pod_t, DataType::namedarray_t, DataType::object_t};
+  names_.emplace(entity.qualified_name, Named{types[static_cast<std::size_t>(entity.kind)], &entity, own, service});
 }
 
 void Resolver::check_imports() {
@@ -74,7 +89,8 @@ void Resolver::check_imports() {
   for (std::size_t service = 0; service < set_.size(); ++service) {
     if (!services.emplace(set_[service]->name, service).second) refuse(service, 0, "a second definition of this name");
   }
-  Graph graph(set_.size());
+  for (const auto* definition : known_) services.emplace(definition->name, set_.size());
+  Graph graph(set_.size() + 1);  // the last node stands for all that is known, which imports nothing of the set
   for (std::size_t service = 0; service < set_.size(); ++service) {
     for (const auto& import : set_[service]->imports) {
       const auto found = services.find(import.name);
@@ -137,7 +153,7 @@ void Resolver::check_containment() {
   std::unordered_map<const EntityDefinition*, std::size_t> index;
   std::vector<Named*> nodes;
   for (auto& [name, item] : names_) {
-    if (item.type != DataType::pod_t && item.type != DataType::namedarray_t) continue;
+    if (!item.own || (item.type != DataType::pod_t && item.type != DataType::namedarray_t)) continue;
     index.emplace(item.entity, nodes.size());
     nodes.push_back(&item);
   }
@@ -157,7 +173,7 @@ void Resolver::check_containment() {
   if (!cycles.empty()) return;
   for (const auto node : dependencies_first(graph)) {
     const auto& item = *nodes[node];
-    if (item.type == DataType::namedarray_t && !flatten(*item.entity))
+    if (item.type == DataType::namedarray_t && !flatten(*item.own))
       refuse(item.service, item.entity->line, quote(item.entity->name) + ": expected elements of one numeric type");
   }
 }
@@ -255,8 +271,9 @@ bool may_be_member(const MemberDefinition& member) {
 
 }  // namespace
 
-std::vector<Diagnostic> resolve_service_definitions(std::span<ServiceDefinition* const> set) {
-  return Resolver(set).run();
+std::vector<Diagnostic> resolve_service_definitions(std::span<ServiceDefinition* const> set,
+                                                    std::span<const ServiceDefinition* const> known) {
+  return Resolver(set, known).run();
 }
 
 }  // namespace rr

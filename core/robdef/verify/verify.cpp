@@ -1,4 +1,5 @@
 // Verification of a set of definitions. Layer: robdef. Source: service definitions spec section 5.7.
+#include <deque>
 #include <iterator>
 #include <utility>
 
@@ -46,6 +47,15 @@ std::vector<Diagnostic> verify_service_definitions(std::span<ServiceDefinition* 
     diagnostics.insert(diagnostics.end(), std::make_move_iterator(found.begin()), std::make_move_iterator(found.end()));
   }
   return diagnostics;
+}
+
+std::vector<Diagnostic> verify_service_definitions(std::span<ServiceDefinition* const> set,
+                                                   std::span<const ServiceDefinition* const> known, RobdefMode mode) {
+  std::deque<ServiceDefinition> copies;
+  std::vector<ServiceDefinition*> all;
+  for (const auto* definition : known) all.push_back(&copies.emplace_back(*definition));
+  all.insert(all.end(), set.begin(), set.end());
+  return verify_service_definitions(all, mode);
 }
 
 }  // namespace rr

@@ -68,6 +68,22 @@ TEST_CASE("resolved definitions mean what verified ones mean", "[robdef]") {
   CHECK(compared > 60);
 }
 
+TEST_CASE("what is known already is imported without being touched", "[robdef]") {
+  const std::string base =
+      "service demo.b\nstdver 0.10\nenum E\na=1\nend\nnamedarray N\nfield double x\nfield double[2] y\nend\n";
+  const std::string text =
+      body("import demo.b\nusing demo.b.N as M\nnamedarray T\nfield M[2] a\nend\nstruct S\nfield demo.b.E e\nend\n");
+  const auto together = resolve({text, base});
+  const auto known = resolve({base});
+  auto later = parse_service_definition(text, RobdefMode::compat).definition;
+  ServiceDefinition* const set[] = {&later};
+  const ServiceDefinition* const imported[] = {&known.definitions.front()};
+  CHECK(resolve_service_definitions(set, imported).empty());
+  CHECK(meaning(later) == meaning(together.definitions.front()));
+  CHECK(later.entities.front().namedarray_count == 6);
+  CHECK(resolve_service_definitions(set).size() == 1);
+}
+
 TEST_CASE("definitions that values could not be read by are refused without the verifier, too", "[robdef]") {
   const std::pair<std::string, std::string> cases[] = {
       {"struct S\nfield Missing a\nend\n", "unknown type 'Missing'"},
