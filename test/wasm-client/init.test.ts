@@ -61,6 +61,15 @@ it("takes it from another place", async () => {
   expect(error.message).toContain("elsewhere.wasm");
 });
 
+it("has it in the script of the inline build", async () => {
+  vi.resetModules();
+  const inline = await import("../../wasm-client/dist/inline.js");
+  const robot = await inline.connect(url, { transport: (await start()).transport });
+  expect(robot.$.type).toBe("test.init.Root");
+  expect(loads).toEqual([]);
+  await robot.$.close();
+});
+
 it("refuses another one when it is loaded", async () => {
   await fresh.preload();
   expect(() => fresh.init({ wasm: core })).toThrow("loaded already");

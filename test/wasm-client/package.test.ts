@@ -45,7 +45,7 @@ it("loads what speaks to USB devices when there is one to speak to, and not befo
 
 it("loads two scripts in a page", () => {
   const scripts = readdirSync(dist).filter((name) => name.endsWith(".js"));
-  expect(scripts.sort()).toEqual(["client.js", "index.js", "internal.js", "node.js"]);
+  expect(scripts.sort()).toEqual(["client.js", "index.js", "inline.js", "internal.js", "node.js"]);
   expect(read("index.js").match(/"\.[^"]*"/g)).toEqual(['"./client.js"']);
 });
 
