@@ -13,6 +13,8 @@ export interface Remote {
   /** Qualified object type, such as `experimental.create.Create`. */
   readonly type: string;
   readonly members: readonly Member[];
+  /** The texts of the definitions known so far. */
+  readonly definitions: readonly string[];
   has(name: string, kind: MemberKind): boolean;
   call(name: string, args: readonly unknown[], options?: CallOptions): Promise<unknown>;
   get(name: string): Promise<unknown>;
@@ -25,11 +27,25 @@ export interface Remote {
   /** Items of a memory in each dimension. */
   dimensions(memory: string): Promise<number[]>;
   read(memory: string, position: readonly number[], count: readonly number[]): Promise<unknown>;
+  write(memory: string, position: readonly number[], value: unknown): Promise<void>;
+  /** An endpoint to send with; what it receives is not read. */
+  openPipe(name: string): Promise<Sender>;
+  /** A run of a generator function. */
+  generate(name: string, args: readonly unknown[]): AsyncGenerator<unknown, void, unknown>;
+  lock(kind: "user" | "client"): Promise<void>;
+  unlock(): Promise<void>;
+  /** Asks the device for this object, which costs it little: whether it still answers. */
+  ping(timeoutMs: number): Promise<void>;
   /** Answers a callback by `handler`. @returns a function that stops answering. */
   answer(name: string, handler: (...args: unknown[]) => unknown): () => void;
   /** @returns a function that unsubscribes. */
   on(name: string, heard: (...args: unknown[]) => void): () => void;
   child(name: string, index?: string | number): Promise<Remote>;
+}
+
+export interface Sender {
+  send(value: unknown): Promise<void>;
+  close(): Promise<void>;
 }
 
 /** One sentence for any failure; errors of a device keep the name of their Robot Raconteur exception. */
@@ -51,6 +67,9 @@ export function remoteOf(object: RemoteObject): Remote {
   return {
     type: info.type,
     members: info.members,
+    get definitions() {
+      return info.types;
+    },
     has: (name, kind) => info.members.some((m) => m.name === name && m.kind === kind),
     call: async (name, args, options) => member(name)(...args, ...(options ? [options] : [])),
     get: async (name) => member(name).get(),
@@ -59,6 +78,12 @@ export function remoteOf(object: RemoteObject): Remote {
     pipe: (name, signal) => valuesOf(() => member(name).connect(-1, { signal }), signal),
     dimensions: async (name) => member(name).dimensions(),
     read: async (name, position, count) => member(name).read(position, count),
+    write: async (name, position, value) => member(name).write(position, value),
+    openPipe: async (name) => member(name).connect(-1, {}),
+    generate: (name, args) => member(name)(...args) as AsyncGenerator<unknown, void, unknown>,
+    lock: async (kind) => info.lock(kind),
+    unlock: async () => info.unlock(),
+    ping: async (timeout) => void (await info.find(info.path, { timeout })),
     answer: (name, handler) => {
       const callback = member(name);
       callback.handler = handler;
