@@ -49,6 +49,11 @@ export function parseStep(segment: string): PathStep {
   return match ? { member: match[1] ?? "", index: match[2] ?? "" } : { member: segment, index: null };
 }
 
+/** The steps of an object's path: at the dots that are not within brackets, since a key may have some. */
+export function splitSteps(path: string): string[] {
+  return path.match(/[^.[\]]+(\[[^\]]*\])?/g) ?? [];
+}
+
 /** The current page; follows the address bar. */
 export function watchRoute(): Store<Route> {
   const route = new Store(parseRoute(location.hash));

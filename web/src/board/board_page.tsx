@@ -18,7 +18,7 @@ import { saveFile } from "../ui/save_file";
 import { Definitions, scopeOf } from "../values/definitions";
 import { keepBoard, makeId, packBoard, PANEL_KINDS, parseBoard, recallBoard, unpackBoard, writeBoard } from "./board";
 import type { Board, Panel, PanelKind } from "./board";
-import { findRoom, inOrder, put, settle } from "./layout";
+import { findRoom, inOrder, nudge, put, settle } from "./layout";
 import { PanelFrame } from "./panel_frame";
 import { presetFor } from "./presets";
 import { StopButton } from "./stop";
@@ -84,6 +84,7 @@ export default function BoardPage({ link, route, list }: { link: Link; route: Se
             services={services}
             arranging={arranging}
             move={(place) => setPanels(put(board.panels, panel.id, place))}
+            step={(dx, dy) => setPanels(nudge(board.panels, panel.id, dx, dy))}
             update={(change) => update(panel.id, change)}
             remove={() => setPanels(settle(board.panels.filter(({ id }) => id !== panel.id)))}
           />

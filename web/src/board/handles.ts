@@ -13,12 +13,12 @@ const STEPS: Readonly<Record<string, readonly [number, number]>> = {
   ArrowDown: [0, 1],
 };
 
-export function handleKey(event: KeyboardEvent, panel: Place, move: Change): void {
-  const step = STEPS[event.key];
-  if (!step) return;
+export function handleKey(event: KeyboardEvent, panel: Place, move: Change, step: (dx: number, dy: number) => void): void {
+  const [dx, dy] = STEPS[event.key] ?? [0, 0];
+  if (dx === 0 && dy === 0) return;
   event.preventDefault();
-  if (event.shiftKey) move({ w: panel.w + step[0], h: panel.h + step[1] });
-  else move({ x: panel.x + step[0], y: Math.max(0, panel.y + step[1]) });
+  if (event.shiftKey) move({ w: panel.w + dx, h: panel.h + dy });
+  else step(dx, dy);
 }
 
 interface Grip {

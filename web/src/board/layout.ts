@@ -23,12 +23,23 @@ export function put<T extends Placed>(panels: readonly T[], id: string, place: P
   const moved = panels.find((panel) => panel.id === id);
   if (!moved) return [...panels];
   const at = { ...moved, ...within({ ...moved, ...place }) };
-  // It stands before those that it covers by half, so that it changes places with its neighbours on the way down, too.
   const others = settle(panels.filter((panel) => panel.id !== id));
   const fixed: T[] = [at];
   for (const panel of inOrder(others)) fixed.push(fall(panel, fixed));
   const back = new Map(settle(fixed).map((panel) => [panel.id, panel]));
   return panels.map((panel) => back.get(panel.id) ?? panel);
+}
+
+/** One step on: as far as it takes to get past what stands in the way. */
+export function nudge<T extends Placed>(panels: readonly T[], id: string, dx: number, dy: number): T[] {
+  const from = panels.find((panel) => panel.id === id);
+  if (!from) return [...panels];
+  for (let step = 1; step <= MOST_ROWS; step++) {
+    const next = put(panels, id, { x: from.x + dx, y: Math.max(0, from.y + dy * step) });
+    const to = next.find((panel) => panel.id === id);
+    if (dy <= 0 || (to && to.y > from.y)) return next;
+  }
+  return [...panels];
 }
 
 /** A place for one more: the first free one from the top. */

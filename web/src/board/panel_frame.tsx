@@ -22,11 +22,12 @@ export interface PanelFrameProps {
   services: readonly string[];
   arranging: boolean;
   move: Change;
+  step: (dx: number, dy: number) => void;
   update: (change: Partial<Panel>) => void;
   remove: () => void;
 }
 
-export function PanelFrame({ panel, link, place, services, arranging, move, update, remove }: PanelFrameProps) {
+export function PanelFrame({ panel, link, place, services, arranging, move, step, update, remove }: PanelFrameProps) {
   const path = [place.object, panel.object].filter((each) => each !== "" && panel.from === "").join(".");
   const { object, last, failure } = useObject(link, panel.from, panel.from === "" ? path : panel.object);
   const count = last?.definitions.length ?? 0;
@@ -54,7 +55,7 @@ export function PanelFrame({ panel, link, place, services, arranging, move, upda
               class="panel-handle"
               type="button"
               aria-label={t("Move or size {0}: arrow keys, with Shift to size", name)}
-              onKeyDown={(event) => handleKey(event, panel, move)}
+              onKeyDown={(event) => handleKey(event, panel, move, step)}
               {...drag.move}
             >
               <span aria-hidden="true">⠿</span>

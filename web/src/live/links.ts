@@ -10,7 +10,7 @@ import { Link } from "../robot/link";
 import type { LinkState } from "../robot/link";
 import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
-import { parseStep } from "../app/router";
+import { parseStep, splitSteps } from "../app/router";
 import { walk } from "../robot/walk";
 
 const links = new Map<string, { link: Link; users: number }>();
@@ -67,9 +67,4 @@ export function useObject(
     last: found?.path === path ? found.object : null,
     failure: failure ?? (from !== "" && state.kind === "lost" ? state.reason : null),
   };
-}
-
-/** At the dots that are not within brackets: a key may have some. */
-export function splitSteps(path: string): string[] {
-  return path.match(/[^.[\]]+(\[[^\]]*\])?/g) ?? [];
 }

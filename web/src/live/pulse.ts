@@ -3,6 +3,7 @@
 
 import { useEffect, useState } from "preact/hooks";
 import type { Remote } from "../robot/remote";
+import { openFeeds } from "./feed";
 
 const EVERY_MS = 400;
 const SILENT_MS = 500;
@@ -23,9 +24,9 @@ export function usePulse(object: Remote | null): number | null {
     };
     const timer = setInterval(() => {
       if (isOver || document.hidden) return;
-      const waits = askedAt === null ? 0 : performance.now() - askedAt;
+      const waits = Math.max(askedAt === null ? 0 : performance.now() - askedAt, stillness(object));
       setSilent(waits > SILENT_MS ? Math.floor(waits / 100) * 100 : null);
-      if (askedAt === null || waits > PATIENCE_MS) ask();
+      if (askedAt === null || performance.now() - askedAt > PATIENCE_MS) ask();
     }, EVERY_MS / 4);
     return () => {
       isOver = true;
@@ -33,4 +34,12 @@ export function usePulse(object: Remote | null): number | null {
     };
   }, [object]);
   return silent;
+}
+
+/** A gateway may answer for the device: how long all is old that came regularly from this object; 0 while any comes. */
+function stillness(object: Remote): number {
+  const now = performance.now();
+  const regular = openFeeds().filter((feed) => feed.object === object && feed.pace.periodMs !== null);
+  if (regular.length === 0 || !regular.every(({ pace }) => pace.isStale(now))) return 0;
+  return Math.min(...regular.map(({ pace }) => pace.ageMs(now) ?? 0));
 }

@@ -1,6 +1,7 @@
 // What a form does, as code: for a page, a shell, and a Python program.
 // Layer: web/panels, pure. Names and values are quoted: they come from the device.
 
+import { parseStep, splitSteps } from "../app/router";
 import type { Member } from "../robot/remote";
 import { jsonOf } from "../values/draft";
 
@@ -48,12 +49,12 @@ function curl(base: string, place: CodePlace, member: Member, values: readonly u
 
 function python(url: string, { object }: CodePlace, member: Member, values: readonly unknown[]): string {
   const args = values.map(pythonValue).join(", ");
-  const steps = object === "" ? [] : object.split(".");
-  const target = steps.reduce((at, step) => {
-    const match = /^(\w+)\[(.*)\]$/.exec(step);
-    const index = match?.[2] ?? "";
-    return match ? `${at}.get_${match[1]}(${/^\d+$/.test(index) ? index : JSON.stringify(index)})` : `${at}.get_${step}()`;
-  }, "robot");
+  const target = splitSteps(object)
+    .map(parseStep)
+    .reduce((at, { member: step, index }) => {
+      const key = index === null ? "" : /^\d+$/.test(index) ? index : JSON.stringify(index);
+      return `${at}.get_${step}(${key})`;
+    }, "robot");
   const done =
     member.kind === "function"
       ? `print(${target}.${member.name}(${args}))`
@@ -84,11 +85,9 @@ function pythonValue(value: unknown): string {
 
 /** "Webcams[0].lens" as steps of a URL: Webcams, 0, lens. */
 function httpSteps(object: string): string[] {
-  if (object === "") return [];
-  return object.split(".").flatMap((step) => {
-    const match = /^(\w+)\[(.*)\]$/.exec(step);
-    return match ? [match[1] ?? "", match[2] ?? ""] : [step];
-  });
+  return splitSteps(object)
+    .map(parseStep)
+    .flatMap(({ member, index }) => (index === null ? [member] : [member, index]));
 }
 
 function shell(text: string): string {

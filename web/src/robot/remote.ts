@@ -34,7 +34,7 @@ export interface Remote {
   generate(name: string, args: readonly unknown[]): AsyncGenerator<unknown, void, unknown>;
   lock(kind: "user" | "client"): Promise<void>;
   unlock(): Promise<void>;
-  /** Asks the device for this object, which costs it little: whether it still answers. */
+  /** Asks the device for something small: whether it still answers. Nothing is asked of an object that has nothing small. */
   ping(timeoutMs: number): Promise<void>;
   /** Answers a callback by `handler`. @returns a function that stops answering. */
   answer(name: string, handler: (...args: unknown[]) => unknown): () => void;
@@ -83,7 +83,11 @@ export function remoteOf(object: RemoteObject): Remote {
     generate: (name, args) => member(name)(...args) as AsyncGenerator<unknown, void, unknown>,
     lock: async (kind) => info.lock(kind),
     unlock: async () => info.unlock(),
-    ping: async (timeout) => void (await info.find(info.path, { timeout })),
+    ping: async (timeout) => {
+      const small = smallest(info.members);
+      if (small?.kind === "wire") await member(small.name).peek({ timeout });
+      else if (small) await member(small.name).get({ timeout });
+    },
     answer: (name, handler) => {
       const callback = member(name);
       callback.handler = handler;
@@ -94,6 +98,17 @@ export function remoteOf(object: RemoteObject): Remote {
     child: async (name, index) =>
       remoteOf(await (index === undefined ? member(name).get<RemoteObject>() : member(name).get(index))),
   };
+}
+
+/** A wire to peek at, or a property to read, whose value is a word. */
+function smallest(members: readonly Member[]): Member | undefined {
+  const readable = members.filter(({ modifiers }) => !modifiers.includes("writeonly"));
+  const words = readable.filter(({ type }) => /^(double|single|bool|u?int(8|16|32|64)|\w*[mM]ode)$/.test(type));
+  return (
+    words.find(({ kind }) => kind === "property") ??
+    words.find(({ kind }) => kind === "wire") ??
+    readable.find(({ kind }) => kind === "wire")
+  );
 }
 
 /** Leaving the loop, or `signal`, closes the wire's connection or the pipe's endpoint. */
