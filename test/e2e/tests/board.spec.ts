@@ -113,6 +113,12 @@ test("the stop is sent at once and its arrival is said, also while another call 
   await openBoard(page, lab.url);
   await page.getByRole("button", { name: "Stop", exact: true }).click();
   await expect(page.locator('[data-stop="arrived"]')).toHaveText(/^arrived after \d+ ms/);
+  lab.create.signal("SIGSTOP"); // calls hang from here on
+  await panel(page, "Calls").getByRole("button", { name: /^Call / }).click();
+  await page.keyboard.press("Escape");
+  await expect(page.locator('[data-stop="sent"]')).toBeVisible();
+  lab.create.signal("SIGCONT");
+  await expect(page.locator('[data-stop="arrived"]')).toBeVisible();
   await lab.create.kill();
   await page.keyboard.press("Escape");
   await expect(page.locator('[data-stop="failed"]')).toContainText("NOT STOPPED", { timeout: 5_000 });

@@ -2,6 +2,8 @@
 // Layer: web/app.
 
 import { useEffect, useRef, useState } from "preact/hooks";
+import { chooseLanguage, language, LANGUAGES, t } from "./language";
+import type { Language } from "./language";
 import { useStore } from "./store";
 import type { Store } from "./store";
 import { formatRoute, formatStep } from "./router";
@@ -43,7 +45,7 @@ export function App({ route, list, usb, access, session }: AppParts) {
   return (
     <>
       <a class="skip" href="#main" onClick={(event) => (event.preventDefault(), main.current?.focus())}>
-        Skip to content
+        {t("Skip to content")}
       </a>
       <header class="head">
         <a class="brand" href="#/">
@@ -52,6 +54,7 @@ export function App({ route, list, usb, access, session }: AppParts) {
         </a>
         <Crumbs route={where} />
         <Account session={session} ask={() => setAsked(true)} />
+        <LanguageSelect />
         <ThemeButton />
       </header>
       <main id="main" ref={main} tabIndex={-1}>
@@ -107,6 +110,25 @@ function ThemeButton() {
     >
       <SunMoonIcon theme={chosen} />
     </button>
+  );
+}
+
+function LanguageSelect() {
+  return (
+    <label>
+      <span class="unseen">{t("Language")}</span>
+      <select
+        class="field language"
+        value={language}
+        onChange={(event) => chooseLanguage(event.currentTarget.value as Language)}
+      >
+        {Object.entries(LANGUAGES).map(([each, name]) => (
+          <option key={each} value={each} lang={each}>
+            {name}
+          </option>
+        ))}
+      </select>
+    </label>
   );
 }
 

@@ -33,10 +33,11 @@ export interface Panel extends Placed {
   settings: Settings;
 }
 
-/** What stops the device: a function, and its arguments. */
+/** What stops the device: a function with its arguments, and a property to set as well: some drivers have only one of them. */
 export interface StopCall {
   call: string;
   args: readonly number[];
+  set?: { property: string; value: number };
 }
 
 export interface Board {
@@ -161,11 +162,15 @@ function readPanel(json: unknown, index: number): Panel {
 }
 
 function readStop(json: unknown): StopCall {
-  const { call, args = [] } = record(json, "/stop");
+  const { call, args = [], set } = record(json, "/stop");
   if (typeof call !== "string") throw new Error(`/stop/call is ${say(call)}, expected the name of a function`);
   if (!Array.isArray(args) || args.some((each) => typeof each !== "number"))
     throw new Error(`/stop/args is ${say(args)}, expected a list of numbers`);
-  return { call, args: args as number[] };
+  if (set === undefined) return { call, args: args as number[] };
+  const { property, value } = record(set, "/stop/set");
+  if (typeof property !== "string" || typeof value !== "number")
+    throw new Error(`/stop/set is ${say(set)}, expected {"property": name, "value": number}`);
+  return { call, args: args as number[], set: { property, value } };
 }
 
 function record(json: unknown, where: string): Record<string, unknown> {

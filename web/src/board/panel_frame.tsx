@@ -105,7 +105,7 @@ export function PanelFrame({ panel, link, place, services, arranging, move, step
             class="field"
             aria-label={t("Object of {0}", name)}
             placeholder={t("object, such as Webcams[0]")}
-            value={panel.object}
+            defaultValue={panel.object}
             onChange={(event) => update({ object: event.currentTarget.value.trim() })}
           />
         </div>

@@ -18,9 +18,9 @@ export interface Described {
 type Spec = [kind: PanelKind, x: number, y: number, w: number, h: number, settings?: Settings, title?: string];
 
 const ROBOT = "com.robotraconteur.robotics.robot.Robot";
-const STANDARD: Readonly<Record<string, { stop: string | null; panels: readonly Spec[] }>> = {
+const STANDARD: Readonly<Record<string, { stop: StopCall | null; panels: readonly Spec[] }>> = {
   [ROBOT]: {
-    stop: "halt",
+    stop: { call: "halt", args: [], set: { property: "command_mode", value: 0 } },
     panels: [
       ["robot", 0, 0, 7, 13],
       ["plot", 7, 0, 5, 8, { member: "robot_state" }],
@@ -42,7 +42,7 @@ const STANDARD: Readonly<Record<string, { stop: string | null; panels: readonly 
     ],
   },
   ["com.robotraconteur.robotics.tool.Tool"]: {
-    stop: "halt",
+    stop: { call: "halt", args: [] },
     panels: [
       ["form", 0, 0, 4, 10, { members: ["open", "close", "setf_command", "halt"] }, "Tool"],
       ["plot", 4, 0, 8, 10, { member: "tool_state", paths: ["position", "command"] }],
@@ -51,7 +51,7 @@ const STANDARD: Readonly<Record<string, { stop: string | null; panels: readonly 
     ],
   },
   ["com.robotraconteur.servo.Servo"]: {
-    stop: "halt",
+    stop: { call: "halt", args: [] },
     panels: [
       ["plot", 0, 0, 8, 10, { member: "position" }],
       ["table", 8, 0, 4, 10, { member: "servo_state" }],
@@ -82,7 +82,7 @@ export function presetFor(object: Described): Board {
   const panels = standard.panels
     .filter(([, , , , , settings]) => isThere(settings, object.members))
     .map((spec) => makePanel(spec));
-  return { panels: settle(panels), stop: standard.stop === null ? null : { call: standard.stop, args: [] } };
+  return { panels: settle(panels), stop: standard.stop };
 }
 
 const STOPS = /^(halt|stop|e_?stop|emergency_stop|abort)$/i;

@@ -26,7 +26,9 @@ export function StopButton({ object, stop }: { object: Remote | null; stop: Stop
     if (!device) return setState({ kind: "failed", why: t("not connected: nothing was sent") });
     setState({ kind: "sent", at });
     // Nothing is waited for: a call that hangs does not hold this one up, and each press sends again.
-    device.call(stop.call, stop.args, { timeout: TIMEOUT_MS }).then(
+    const ways = [device.call(stop.call, stop.args, { timeout: TIMEOUT_MS })];
+    if (stop.set) ways.push(device.set(stop.set.property, stop.set.value, { timeout: TIMEOUT_MS }));
+    firstToArrive(ways).then(
       () => setState({ kind: "arrived", tookMs: performance.now() - at, time: Date.now() }),
       (error: unknown) => setState({ kind: "failed", why: explain(error) }),
     );
@@ -57,6 +59,15 @@ export function StopButton({ object, stop }: { object: Remote | null; stop: Stop
       </p>
     </div>
   );
+}
+
+/** @throws (rejects) why the first way failed, where all did. */
+async function firstToArrive(ways: readonly Promise<unknown>[]): Promise<void> {
+  try {
+    await Promise.any(ways);
+  } catch (error) {
+    throw (error as AggregateError).errors[0];
+  }
 }
 
 function wordsOf(state: State, stop: StopCall): string {

@@ -1,7 +1,7 @@
 // The events of an object as they come, newest first, and only those that have the words asked for.
 // Layer: web/panels.
 
-import { useEffect, useState } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
 import { openFeed } from "../live/feed";
 import { formatArguments } from "../members/log";
@@ -19,24 +19,31 @@ interface Entry {
   text: string;
 }
 
-const MOST = 500;
+const MOST = 200;
+const SHOW_MS = 100;
 
 export default function LogPanel({ object, members, settings, change }: PanelProps) {
   const events = members.filter(({ kind }) => kind === "event");
   const [entries, setEntries] = useState<readonly Entry[]>([]);
+  const kept = useRef<readonly Entry[]>([]);
   const [failure, setFailure] = useState<string | null>(null);
   const filter = textIn(settings, "filter");
   useEffect(() => {
     if (!object) return;
     setFailure(null);
     try {
-      const closes = events.map((event) => listen(object, event, (entry) => setEntries((old) => add(old, entry))));
+      const closes = events.map((event) => listen(object, event, (entry) => (kept.current = add(kept.current, entry))));
       return () => closes.forEach((close) => close());
     } catch (error) {
       setFailure(explain(error));
       return undefined;
     }
   }, [object]);
+  useEffect(() => {
+    const timer = setInterval(() => setEntries(kept.current), SHOW_MS); // events may come a thousand times a second
+    return () => clearInterval(timer);
+  }, []);
+  const clear = (): void => setEntries((kept.current = []));
   const wanted = filter.toLowerCase();
   const shown = entries.filter(({ name, text }) => `${name} ${text}`.toLowerCase().includes(wanted));
   return (
@@ -52,7 +59,7 @@ export default function LogPanel({ object, members, settings, change }: PanelPro
             onInput={(event) => change({ filter: event.currentTarget.value })}
           />
         </label>
-        <button class="button button-quiet" type="button" onClick={() => setEntries([])}>
+        <button class="button button-quiet" type="button" onClick={clear}>
           {t("Clear")}
         </button>
       </div>

@@ -18,7 +18,7 @@ export interface Remote {
   has(name: string, kind: MemberKind): boolean;
   call(name: string, args: readonly unknown[], options?: CallOptions): Promise<unknown>;
   get(name: string): Promise<unknown>;
-  set(name: string, value: unknown): Promise<void>;
+  set(name: string, value: unknown, options?: CallOptions): Promise<void>;
   /** Values of a wire from now on, the newest only; ends with the connection or with `signal`. */
   wire(name: string, signal: AbortSignal): AsyncGenerator<unknown, void>;
   poke(name: string, value: unknown): Promise<void>;
@@ -73,7 +73,7 @@ export function remoteOf(object: RemoteObject): Remote {
     has: (name, kind) => info.members.some((m) => m.name === name && m.kind === kind),
     call: async (name, args, options) => member(name)(...args, ...(options ? [options] : [])),
     get: async (name) => member(name).get(),
-    set: async (name, value) => member(name).set(value),
+    set: async (name, value, options) => member(name).set(value, options),
     wire: (name, signal) => valuesOf(() => member(name).connect({ signal }), signal),
     pipe: (name, signal) => valuesOf(() => member(name).connect(-1, { signal }), signal),
     dimensions: async (name) => member(name).dimensions(),

@@ -65,6 +65,7 @@ function words(value: unknown, of: Of, path: string, name: string): string {
     const flags = of.definitions.flags(name, of.scope);
     if (flags) return flagNames(value, flags).join(", ") || "–";
   }
+  if (typeof value === "string") return formatValue(value);
   const unit = of.root === "" ? "" : unitOf(of.root, path, of.definitions, of.rootScope);
   return `${formatValue(value, 1)}${unit === "" ? "" : ` ${unit}`}`;
 }
