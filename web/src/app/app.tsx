@@ -34,7 +34,7 @@ export function App({ route, list, usb, access, session }: AppParts) {
   const who = useStore(session.who);
   const [asked, setAsked] = useState(false);
   const isForm = mustSignIn(who) || (asked && who?.user === null);
-  const title = isForm ? "Sign in" : titleOf(where);
+  const title = isForm ? t("Sign in") : titleOf(where);
   const first = useRef(true);
   useEffect(() => {
     document.title = title === "" ? "rrgate" : `${title} · rrgate`;
@@ -86,7 +86,7 @@ function Crumbs({ route }: { route: Route }) {
     })),
   ];
   return (
-    <nav class="crumbs" aria-label="Where you are">
+    <nav class="crumbs" aria-label={t("Where you are")}>
       <ol>
         {links.map(({ text, href }) => (
           <li key={text}>{href === null ? <span aria-current="page">{text}</span> : <a href={href}>{text}</a>}</li>
@@ -148,8 +148,8 @@ function UnknownPage({ address }: { address: string }) {
 }
 
 function titleOf(route: Route): string {
-  if (route.page === "devices") return "Devices";
-  if (route.page === "unknown") return "No such page";
+  if (route.page === "devices") return t("Devices");
+  if (route.page === "unknown") return t("No such page");
   const last = route.path[route.path.length - 1];
   return last ? `${formatStep(last)} of ${route.device}` : route.device;
 }

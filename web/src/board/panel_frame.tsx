@@ -134,7 +134,7 @@ export function PanelFrame({ panel, link, place, services, arranging, move, step
 }
 
 export function nameOf(panel: Panel): string {
-  if (panel.title !== "") return panel.title;
+  if (panel.title !== "") return t(panel.title); // titles of presets are known
   const member = textIn(panel.settings, "member");
   return member === "" ? t(KINDS[panel.kind].title) : member;
 }
