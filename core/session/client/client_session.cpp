@@ -111,7 +111,7 @@ void ClientSession::scan_deadlines(Now now) {
       pending_.erase(found);
       continue;
     }
-    if (!abandon_pipe_request(id, now.steady + late_reply_period)) pending_.erase(found);
+    if (!abandon_request(id, now.steady + late_reply_period)) pending_.erase(found);
     if (const auto fetch = fetches_.extract(id)) {
       fail_fetch(fetch.mapped(), std::move(error));
     } else if (state_ == ClientState::connecting) {
@@ -245,7 +245,7 @@ RequestId ClientSession::find_object(std::string_view path, Now now) {
 
 void ClientSession::cancel(RequestId id) {
   if (const auto found = pending_.find(id);
-      found != pending_.end() && abandon_pipe_request(id, found->second.deadline + late_reply_period))
+      found != pending_.end() && abandon_request(id, found->second.deadline + late_reply_period))
     return;
   pending_.erase(id);
   fetches_.erase(id);
@@ -330,6 +330,7 @@ void ClientSession::handle_reply(const Message& message, const MessageEntry& ent
   if (pending.type == EntryType::disconnect_client) return fail(connection_error("closed by this side"));
   if (pending.type == EntryType::pipe_connect_req || pending.type == EntryType::pipe_disconnect_req)
     return handle_pipe_reply(message, entry, id, pending, now);
+  if (pending.is_abandoned) return disconnect_left_wire(entry, pending, now);
   if (pending.memory) return handle_memory_reply(message, entry, id, std::move(pending), now);
   if (entry.error != ErrorCode::none) {
     if (pending.type == EntryType::wire_connect_req)

@@ -160,13 +160,17 @@ void ClientSession::end_pipe_request(const Pending& pending) {
   if (pipe.endpoints.empty()) pipes_.erase(found);
 }
 
-/// A connect reply that comes later must close its endpoint again, a disconnect must free its index: the request stays,
-/// though nobody waits for it. Returns whether `id` is such a request.
-bool ClientSession::abandon_pipe_request(RequestId id, TimePoint deadline) {
+/// A connect reply that comes later must close its endpoint, or its wire, again, a disconnect must free its index: the
+/// request stays, though nobody waits for it. Returns whether `id` is such a request.
+bool ClientSession::abandon_request(RequestId id, TimePoint deadline) {
   const auto found = pending_.find(id);
   if (found == pending_.end()) return false;
   auto& pending = found->second;
-  if (pending.type != EntryType::pipe_connect_req && pending.type != EntryType::pipe_disconnect_req) return false;
+  if (pending.type == EntryType::wire_connect_req) {
+    if (const auto wire = find_connecting_wire(pending, id); wire != wires_.end()) wires_.erase(wire);
+  } else if (pending.type != EntryType::pipe_connect_req && pending.type != EntryType::pipe_disconnect_req) {
+    return false;
+  }
   pending.is_abandoned = true;
   pending.deadline = deadline;
   earliest_deadline_ = std::min(earliest_deadline_, deadline);

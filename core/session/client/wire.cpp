@@ -88,16 +88,25 @@ void ClientSession::handle_wire_connected(const Pending& pending, RequestId id) 
   wire.early.reset();
 }
 
+/// A wire that came too late is one that nobody wants, unless it was connected anew: that is the same connection.
+void ClientSession::disconnect_left_wire(const MessageEntry& entry, const Pending& pending, Now now) {
+  if (entry.error != ErrorCode::none || wires_.contains(PathMemberView{pending.path, pending.member->name})) return;
+  begin_request(EntryType::wire_disconnect_req, pending.path, pending.member->name);
+  send_outgoing(now);  // its reply is nobody's
+}
+
 void ClientSession::handle_wire_packet(const Message& message, const MessageEntry& entry) {
   const auto found = wires_.find(PathMemberView{entry.service_path, entry.member_name});
   if (found == wires_.end() || found->second.member->direction() == MemberDirection::writeonly) return;
   auto& wire = found->second;
   auto packet = read_wire_value(message, entry, *wire.member, types_);
-  if (!packet || !wire.accept(packet->time)) return;
+  if (!packet) return;
   if (wire.state == WireState::connecting) {
+    // It may be of the connection before, whose time stamps say nothing of this one's: a clock may have been set back.
     wire.early = std::move(*packet);
     return;
   }
+  if (!wire.accept(packet->time)) return;
   emit(WireValueReceived{found->first.path, found->first.member, packet->time, std::move(packet->value)});
 }
 

@@ -11,13 +11,15 @@ namespace rr {
 namespace {
 
 /// Which index an endpoint gets beside those in use, as the reference assigns it: the one asked for where it is above
-/// all others, else the next above them; never one below, so that an index is not used again while others live.
+/// all others, else the next above them; never one below, so that an index is not used again while others live. Nor is
+/// one up to `closed` that this side has closed: packets for that endpoint may still be on their way.
 template <class Indices>
-std::optional<std::int32_t> assign_index(std::int32_t asked, const Indices& in_use) {
+std::optional<std::int32_t> assign_index(std::int32_t asked, const Indices& in_use, std::int32_t closed) {
+  const auto last = in_use.empty() ? closed : std::max(closed, in_use.rbegin()->first);
   asked = std::max(asked, any_pipe_index);
-  if (in_use.empty() || in_use.rbegin()->first < asked) return asked == any_pipe_index ? 1 : asked;
-  if (in_use.rbegin()->first == INT32_MAX) return std::nullopt;
-  return in_use.rbegin()->first + 1;
+  if (last < asked || last == any_pipe_index) return asked == any_pipe_index ? 1 : asked;
+  if (last == INT32_MAX) return std::nullopt;
+  return last + 1;
 }
 
 }  // namespace
@@ -38,6 +40,13 @@ void ServiceSession::forget_pipe(PipeId id) {
   ended().pipes.add(pipe->second.ledger);
   if (pipe->second.state.state() == PipeState::connecting) release_pass(pipe->second.request_id);
   pipes_.erase(pipe);
+}
+
+/// This side ends an endpoint that the client may still be sending to.
+void ServiceSession::leave_pipe(PipeId id) {
+  if (const auto* pipe = find_pipe(id); pipe && pipe->index < INT32_MAX)
+    closed_index_ = std::max(closed_index_, pipe->index);
+  forget_pipe(id);
 }
 
 void ServiceSession::accept_pipe(PipeId id, Now now) {
@@ -127,7 +136,7 @@ void ServiceSession::close_pipe(PipeId id, Now now) {
   if (!pipe) return;
   const auto index = pipe->index;
   const auto key = *pipe->key;
-  forget_pipe(id);
+  leave_pipe(id);
   connection_.begin_message(outgoing_);
   outgoing_.begin_entry(EntryType::pipe_closed, key.path, key.member);
   write_pipe_index(outgoing_, index);
@@ -139,7 +148,7 @@ void ServiceSession::release_pipes(std::string_view path) {
   for (const auto& [id, pipe] : pipes_)
     if (is_within(pipe.key->path, path)) released.push_back(id);
   for (const auto id : released) {
-    forget_pipe(id);
+    leave_pipe(id);
     events_.push(PipeClosed{id});
   }
 }
@@ -156,7 +165,7 @@ Result<> ServiceSession::connect_pipe(const Message& message, const MessageEntry
         "this client has " + std::to_string(options_.max_pipe_endpoints) + " pipe endpoints connected already");
   PathMember key{std::string(entry.service_path), std::string(entry.member_name)};
   const auto indices = pipe_indices_.try_emplace(std::move(key)).first;
-  const auto index = assign_index(*asked, indices->second);
+  const auto index = assign_index(*asked, indices->second, closed_index_);
   if (!index)
     return make_error(ErrorCode::out_of_range, "pipe '" + member.name + "': there is no index above those in use");
   const auto id = ++last_pipe_id_;

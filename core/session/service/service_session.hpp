@@ -360,6 +360,7 @@ class ServiceSession {
   ServicePipe* find_pipe(PipeId id);
   ServicePipe* find_pipe(const MessageEntry& entry, std::int32_t index);
   void forget_pipe(PipeId id);
+  void leave_pipe(PipeId id);
   /// `send(pipe, number)` of the next packet's number, which it takes where that succeeds.
   template <class Send>
   Result<std::uint32_t> send_numbered(PipeId id, Now now, Send&& send);
@@ -429,6 +430,7 @@ class ServiceSession {
   PipeId last_pipe_id_ = 0;
   std::map<PipeId, ServicePipe> pipes_;                             ///< mostly none or one
   std::map<PathMember, PipeIndices, PathMemberLess> pipe_indices_;  ///< the same pipes
+  std::int32_t closed_index_ = any_pipe_index;                      ///< the highest of those that this side has closed
   std::vector<std::pair<std::int32_t, std::uint32_t>> pipe_acks_;   ///< index and number, to be sent; reused
   Fifo<ServiceEvent> events_;
 };
