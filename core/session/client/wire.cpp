@@ -2,6 +2,7 @@
 #include <functional>
 #include <utility>
 
+#include "core/member/member_table.hpp"
 #include "core/session/client/client_session.hpp"
 
 namespace rr {
