@@ -97,11 +97,15 @@ it("follows an event from one connection to the next", async () => {
   const loop = (async () => {
     for await (const occurrence of subscription.event("moved")) seen.push(occurrence);
   })();
-  await (await subscription.client())["fire_moved"]!(1, "first");
+  await (
+    await subscription.client()
+  )["fire_moved"]!(1, "first");
   await until(() => seen.length === 1);
   first.drop("gone");
   await until(() => subscription.defaultClient === undefined);
-  await (await subscription.client())["fire_moved"]!(2, "second");
+  await (
+    await subscription.client()
+  )["fire_moved"]!(2, "second");
   await until(() => seen.length === 2);
   await subscription.close();
   await loop;

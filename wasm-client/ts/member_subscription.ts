@@ -199,7 +199,7 @@ export class PipeSubscription<T = RrValue> extends StreamSubscription<PipeEndpoi
   }
 
   protected async connect(object: RemoteObject): Promise<PipeEndpoint<T, unknown>> {
-    return (await object.$.member(this.member).connect(-1)) as PipeEndpoint as PipeEndpoint<T, unknown>;
+    return (await object.$.member(this.member).connect(-1)) as PipeEndpoint<T, unknown>;
   }
 
   protected async follow(endpoint: PipeEndpoint<T, unknown>): Promise<void> {

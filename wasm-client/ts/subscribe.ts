@@ -229,7 +229,7 @@ export class Subscription<T = RemoteObject> {
     handler: T[K] extends { handler: infer H } ? NonNullable<H> : never,
   ): () => void {
     const setHandler = (client: Client<T> | undefined, to: typeof handler | null) => {
-      if (client) (client.$.member(member as string) as { handler: unknown }).handler = to;
+      if (client) (client.$.member(member) as { handler: unknown }).handler = to;
     };
     const stop = this.onConnected((client) => {
       try {

@@ -147,7 +147,9 @@ function loadCore(): Promise<WebAssembly.Module> {
 async function compile(): Promise<WebAssembly.Module> {
   // Written out so that bundlers see it and ship the file.
   if (source === undefined) return platform.loadWasm(new URL("./rrgate.wasm", import.meta.url));
-  const given = await (typeof source === "function" ? source() : source);
+  const from = source; // to the compiler, a Module may be a function, too: it has no members
+  const give = async () => (typeof from === "function" ? (from as () => WasmSource | Promise<WasmSource>)() : from);
+  const given = await give();
   if (given instanceof WebAssembly.Module) return given;
   if (typeof given === "string") return platform.loadWasm(new URL(given, globalThis.location?.href));
   return given instanceof URL ? platform.loadWasm(given) : WebAssembly.compile(given);
