@@ -16,6 +16,14 @@ bool fits(const std::vector<std::string>& patterns, std::string_view text) {
                                          [&](const auto& pattern) { return rr::glob_matches(pattern, text); });
 }
 
+/// Whether the patterns fit an object, or any below it.
+bool leads_to(const std::vector<std::string>& patterns, std::string_view path) {
+  if (fits(patterns, path)) return true;
+  const auto below = std::string(path) + ".";
+  return std::any_of(patterns.begin(), patterns.end(),
+                     [&](const auto& pattern) { return rr::glob_leads_on(pattern, below); });
+}
+
 /// Whether the patterns fit every text there is.
 bool fits_all(const std::vector<std::string>& patterns) {
   const auto is_stars = [](const std::string& pattern) {
@@ -104,10 +112,11 @@ bool AccessRules::sees_any(const Identity& who) const {
 bool AccessRules::sees(const Identity& who, std::string_view device, std::optional<std::string_view> service,
                        std::optional<std::string_view> path) const {
   if (is_open() || (!has_rules() && who.is_proven())) return true;
+  if (!path) path = service;  // its root object: all others are below
   return std::any_of(rules_.begin(), rules_.end(), [&](const AccessRule& rule) {
     return std::any_of(rule.may.begin(), rule.may.end(), is_device_verb) && is_for(rule, who) &&
            fits(rule.devices, device) && (!service || fits(rule.services, *service)) &&
-           (!path || fits(rule.paths, *path));
+           (!path || leads_to(rule.paths, *path));
   });
 }
 

@@ -183,7 +183,8 @@ rr::awaitable<JsonOperations::TargetPtr> JsonOperations::find(RequestPtr request
   auto segments = place_.segments;
   for (auto& segment : value_or_throw(split_path(request->text("path", "")))) segments.push_back(std::move(segment));
   auto used = co_await client();
-  auto target = value_or_throw(co_await find_target(used, segments));
+  LookJudge may_look = [standing = place_.standing](const AccessRequest& object) { return standing->check(object); };
+  auto target = value_or_throw(co_await find_target(used, segments, std::move(may_look)));
   // Packets to a client come on the endpoint on which it has sent: nobody else's.
   const bool is_two_way = target->member && target->member->kind == rr::MemberKind::pipe &&
                           target->member->direction() == rr::MemberDirection::both;
@@ -385,6 +386,7 @@ JsonOperations::Generator& JsonOperations::generator_of(const JsonRequest& reque
 rr::awaitable<rr::OrderedJson> JsonOperations::next(RequestPtr request, TargetPtr) {
   const auto [target, generator] = generator_of(*request);
   const auto& member = *target->member;
+  value_or_throw(place_.standing->check(access_request(*target, Verb::call), Recorded::never));
   auto step = target->request(rr::CallKind::generator_next);
   step.generator = generator;
   if (takes_values(member))
@@ -504,6 +506,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::send(RequestPtr request, TargetPt
     if (senders_.size() >= max_open)
       refuse(rr::ErrorCode::out_of_system_resource,
              "this WebSocket sends on " + std::to_string(max_open) + " wires and pipes already");
+    value_or_throw(place_.standing->check(access_request(*target, verb_to_connect(*target->member)), Recorded::never));
     SampleHandler nothing = [](const SamplePtr&, const rr::Error*) {};
     auto place = target->place();
     auto listening = value_or_throw(co_await target->client->listen(std::move(place), 0, std::move(nothing)));
