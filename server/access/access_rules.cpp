@@ -82,8 +82,9 @@ rr::Result<> AccessRules::check(const Identity& who, const AccessRequest& what) 
   if (what.verb == Verb::read && what.member.empty())
     return sees(who, what.device, given(what.service), given(what.path)) ? rr::Result<>() : denied(who, describe(what));
   for (const auto& rule : rules_)
-    if (gives(rule, what.verb) && is_for(rule, who) && fits(rule.devices, what.device) &&
-        fits(rule.services, what.service) && fits(rule.paths, what.path) && fits(rule.members, what.member))
+    if ((gives(rule, what.verb) || (what.is_shape && gives(rule, Verb::write))) && is_for(rule, who) &&
+        fits(rule.devices, what.device) && fits(rule.services, what.service) && fits(rule.paths, what.path) &&
+        fits(rule.members, what.member))
       return {};
   return denied(who, describe(what));
 }

@@ -40,6 +40,7 @@ struct AccessRequest {
   std::string_view path = {};     ///< of the object, as Robot Raconteur says it: "Create.axes[2]"; empty: the service
   std::string_view member = {};   ///< empty: the object as such
   Verb verb = Verb::read;         ///< to read a device, a service or an object as such is to know of it
+  bool is_shape = false;          ///< to read how large a memory is: also for those who may write it
 };
 
 /// Gives everybody who has one of the roles all of `may` on whatever fits one pattern of each list. Patterns have '*'

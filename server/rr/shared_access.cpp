@@ -111,6 +111,7 @@ rr::Result<> SessionRights::admit(const rr::MemberAccess& wanted) {
   request.path = wanted.path;
   if (wanted.member) request.member = wanted.member->name;
   request.verb = verb_of(wanted.type, wanted.member);
+  request.is_shape = wanted.type == rr::EntryType::memory_get_param;
   return asker.check(request, recorded_of(wanted.type));
 }
 

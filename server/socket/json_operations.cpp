@@ -80,7 +80,7 @@ const JsonOperations::Operation JsonOperations::operations[] = {
      {.needs_own = true, .keeps_order = true, .is_free = true, .recorded = Recorded::first_time}},
     {"callback", Verb::subscribe, &JsonOperations::callback, {.needs_own = true}},
     {"answer", Verb::subscribe, &JsonOperations::answer, {.has_target = false, .is_free = true}},
-    {"shape", Verb::read, &JsonOperations::shape},
+    {"shape", Verb::read, &JsonOperations::shape, {.asks_shape = true}},
     {"read", Verb::read, &JsonOperations::read},
     {"write", Verb::write, &JsonOperations::write},
     {"lock", Verb::lock, &JsonOperations::lock, {.needs_own = true}},
@@ -201,7 +201,8 @@ rr::awaitable<JsonOperations::TargetPtr> JsonOperations::find(RequestPtr request
 }
 
 AuditEntryPtr JsonOperations::admit(const Target& target, const Operation& operation) {
-  const auto wanted = access_request(target, operation.verb);
+  auto wanted = access_request(target, operation.verb);
+  wanted.is_shape = operation.traits.asks_shape;
   auto begun = place_.standing->check_and_begin(wanted, place_.trace, operation.traits.recorded,
                                                 operation.verb == Verb::lock ? operation.name : std::string_view());
   if (begun) return std::move(*begun);
