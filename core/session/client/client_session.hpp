@@ -327,6 +327,9 @@ class ClientSession {
 
   RequestId fail_request(RequestId id, Error error);
   Result<> send_outgoing(Now now, bool is_urgent = false);
+  /// `value`  what the request carries; null: nothing.
+  RequestId request_wire(EntryType type, std::string_view path, std::string_view member, Now now,
+                         const Value* value = nullptr);
   Result<> send_wire_packet(const PathMember& key, WireConnection& wire, const Value& value, Now now);
 
   template <class AddElements>
@@ -342,6 +345,7 @@ class ClientSession {
   Result<Value> read_reply(const Message& message, const MessageEntry& entry, const Pending& pending) const;
   void handle_type_name_reply(const MessageEntry& entry, RequestId id, std::string path, Now now);
   using Wires = std::map<PathMember, WireConnection, PathMemberLess>;
+  void release_wires(std::string_view path);
   Wires::iterator find_connecting_wire(const Pending& pending, RequestId id);
   void handle_wire_connected(const Pending& pending, RequestId id);
   void handle_event(const Message& message, const MessageEntry& entry);

@@ -66,8 +66,7 @@ Result<std::uint32_t> ClientSession::send_pipe_packet(std::string_view path, std
                       "pipe " + quote(member) + ": " + std::to_string(queued_bytes()) +
                           " bytes wait for the stream already; send again when they are fewer");
   connection_.begin_message(outgoing_);
-  auto& entry = outgoing_.begin_entry(EntryType::pipe_packet, pipe->first.path, pipe->first.member);
-  if (state.is_unreliable()) outgoing_.header.metadata = entry.metadata = unreliable_metadata;
+  begin_pipe_packets(outgoing_, pipe->first.path, pipe->first.member, state.is_unreliable());
   const auto number = state.take_number();
   Result<> sent = write_pipe_packet(outgoing_, index, number, value, wants_ack, state.member(), types_);
   if (sent) sent = send_outgoing(now);

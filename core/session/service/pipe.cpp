@@ -65,8 +65,33 @@ void ServiceSession::refuse_pipe(PipeId id, const Error& error, Now now) {
 }
 
 Result<std::uint32_t> ServiceSession::send_pipe_packet(PipeId id, const Value& value, Now now, bool wants_ack) {
-  accept_pipe(id, now);
+  return send_numbered(id, now, [&](const ServicePipe& pipe, std::uint32_t number) -> Result<> {
+    connection_.begin_message(outgoing_);
+    begin_pipe_packets(outgoing_, pipe.key->path, pipe.key->member, pipe.is_unreliable);
+    if (auto written =
+            write_pipe_packet(outgoing_, pipe.index, number, value, wants_ack, pipe.state.member(), service_->types());
+        !written)
+      return written;
+    return connection_.send(outgoing_, now);
+  });
+}
+
+Result<std::uint32_t> ServiceSession::send_pipe_packet(PipeId id, SharedPipePacket& packet, Now now) {
+  return send_numbered(id, now, [&](const ServicePipe& pipe, std::uint32_t number) -> Result<> {
+    const auto message =
+        packet.message(pipe.key->path, pipe.state.member(), pipe.is_unreliable, pipe.index, number, service_->types());
+    if (!message) return message.error();
+    return connection_.send(**message, now);
+  });
+}
+
+template <class Send>
+Result<std::uint32_t> ServiceSession::send_numbered(PipeId id, Now now, Send&& send) {
   auto* pipe = find_pipe(id);
+  if (pipe && pipe->state.state() == PipeState::connecting) {
+    accept_pipe(id, now);
+    pipe = find_pipe(id);
+  }
   if (!pipe) return make_error(ErrorCode::invalid_operation, "the pipe endpoint is closed");
   auto& state = pipe->state;
   const auto& member = state.member();
@@ -77,12 +102,8 @@ Result<std::uint32_t> ServiceSession::send_pipe_packet(PipeId id, const Value& v
     return make_error(ErrorCode::out_of_system_resource,
                       "pipe '" + member.name + "': " + std::to_string(queued_bytes()) +
                           " bytes wait for the stream already; send again when they are fewer");
-  connection_.begin_message(outgoing_);
-  auto& entry = outgoing_.begin_entry(EntryType::pipe_packet, pipe->key->path, pipe->key->member);
-  if (state.is_unreliable()) outgoing_.header.metadata = entry.metadata = unreliable_metadata;
   const auto number = state.take_number();
-  Result<> sent = write_pipe_packet(outgoing_, pipe->index, number, value, wants_ack, member, service_->types());
-  if (sent) sent = connection_.send(outgoing_, now);
+  const Result<> sent = send(*pipe, number);
   if (sent) {
     pipe->ledger.note_delivery({});
     return number;
