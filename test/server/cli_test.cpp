@@ -7,6 +7,7 @@
 #include "server/log/log.hpp"
 #include "test/server/support/command_run.hpp"
 #include "test/support/folder.hpp"
+#include "test/support/print.hpp"
 
 using namespace rrgate;
 
