@@ -60,7 +60,7 @@ const JsonOperations::Operation JsonOperations::operations[] = {
      {.needs_own = true, .keeps_order = true, .is_free = true, .recorded = Recorded::first_time}},
     {"callback", Verb::subscribe, &JsonOperations::callback, {.needs_own = true}},
     {"answer", Verb::subscribe, &JsonOperations::answer, {.has_target = false, .is_free = true}},
-    {"shape", Verb::read, &JsonOperations::pass_on<&get_shape>},
+    {"shape", Verb::read, &JsonOperations::pass_on<&get_shape>, {.asks_shape = true}},
     {"read", Verb::read, &JsonOperations::pass_on<&read_memory>},
     {"write", Verb::write, &JsonOperations::pass_on<&write_memory>},
     {"lock", Verb::lock, &JsonOperations::pass_on<&lock_object>, {.needs_own = true}},
@@ -163,7 +163,8 @@ rr::awaitable<TargetPtr> JsonOperations::find(JsonRequestPtr request, const Oper
   auto segments = place_.segments;
   for (auto& segment : value_or_throw(split_path(request->text("path", "")))) segments.push_back(std::move(segment));
   auto used = co_await client();
-  auto target = value_or_throw(co_await find_target(used, segments));
+  LookJudge may_look = [standing = place_.standing](const AccessRequest& object) { return standing->check(object); };
+  auto target = value_or_throw(co_await find_target(used, segments, std::move(may_look)));
   // Packets to a client come on the endpoint on which it has sent: nobody else's.
   const bool is_two_way = target->member && target->member->kind == rr::MemberKind::pipe &&
                           target->member->direction() == rr::MemberDirection::both;
@@ -180,7 +181,8 @@ rr::awaitable<TargetPtr> JsonOperations::find(JsonRequestPtr request, const Oper
 }
 
 AuditEntryPtr JsonOperations::admit(const Target& target, const Operation& operation) {
-  const auto wanted = access_request(target, operation.verb);
+  auto wanted = access_request(target, operation.verb);
+  wanted.is_shape = operation.traits.asks_shape;
   auto begun = place_.standing->check_and_begin(wanted, place_.trace, operation.traits.recorded,
                                                 operation.verb == Verb::lock ? operation.name : std::string_view());
   if (begun) return std::move(*begun);
@@ -275,6 +277,7 @@ JsonOperations::Generator& JsonOperations::generator_of(const JsonRequest& reque
 
 rr::awaitable<rr::OrderedJson> JsonOperations::next(JsonRequestPtr request, TargetPtr) {
   const auto [target, generator] = generator_of(*request);
+  value_or_throw(place_.standing->check(access_request(*target, Verb::call), Recorded::never));
   auto step = target->request(rr::CallKind::generator_next);
   step.generator = generator;
   if (takes_values(*target->member)) {
@@ -393,6 +396,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::send(JsonRequestPtr request, Targ
     if (senders_.size() >= max_open)
       refuse(rr::ErrorCode::out_of_system_resource,
              "this WebSocket sends on " + std::to_string(max_open) + " wires and pipes already");
+    value_or_throw(place_.standing->check(access_request(*target, verb_to_connect(*target->member)), Recorded::never));
     SampleHandler nothing = [](const SamplePtr&, const rr::Error*) {};
     auto place = target->place();
     auto listening = value_or_throw(co_await target->client->listen(std::move(place), 0, std::move(nothing)));

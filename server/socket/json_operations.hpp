@@ -42,6 +42,7 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
     bool has_target = true;    ///< the request names an object or a member by its path
     bool needs_own = false;    ///< to be a client of its own
     bool keeps_order = false;  ///< the next message waits for it
+    bool asks_shape = false;   ///< see AccessRequest::is_shape
     bool is_free = false;      ///< of bounds on requests: packets, and what ends something
     Recorded recorded = Recorded::each_time;
   };
