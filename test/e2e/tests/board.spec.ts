@@ -2,8 +2,9 @@
 import { readFileSync } from "node:fs";
 import type { Page } from "@playwright/test";
 import { expect, test } from "../lab_test";
+import { addPanel } from "../board";
 
-const panel = (page: Page, name: string) => page.getByRole("region", { name, exact: true });
+const panel = (page: Page, name: string) => page.getByRole("group", { name, exact: true });
 
 async function openBoard(page: Page, url: string, object = "create/Create"): Promise<void> {
   await page.goto(`${url}#/devices/${object}?view=board`);
@@ -34,7 +35,7 @@ test("shows a plot, a table, and a form that calls; a wrong value says where", a
 
 test("panels are moved and sized by keys and pointer, and are where they were after a reload", async ({ page, lab }) => {
   await openBoard(page, lab.url);
-  await page.getByLabel("Add a panel").selectOption("notes");
+  await addPanel(page, "notes");
   const notes = page.locator('[data-panel="notes"]');
   const place = () => notes.evaluate((element) => [element.style.gridColumn, element.style.gridRow]);
   const handle = notes.getByRole("button", { name: /^Move or size/ });
@@ -67,7 +68,7 @@ test("panels are moved and sized by keys and pointer, and are where they were af
 
 test("a board goes by its address, and as a file, to another browser", async ({ page, lab, browser }) => {
   await openBoard(page, lab.url);
-  await page.getByLabel("Add a panel").selectOption("notes");
+  await addPanel(page, "notes");
   await page.locator('[data-panel="notes"]').getByRole("textbox", { name: "Notes", exact: true }).fill("für alle");
   const address = page.url();
   expect(address).toContain("&board=");
@@ -131,7 +132,7 @@ test("the stop is sent at once and its arrival is said, also while another call 
 
 test("a camera of another device stands beside the robot, with an object of its own", async ({ page, lab }) => {
   await openBoard(page, lab.url);
-  await page.getByLabel("Add a panel").selectOption("image");
+  await addPanel(page, "image");
   const image = page.locator('[data-panel="image"]');
   await image.getByLabel("Service").selectOption("webcams/Webcam");
   await image.getByRole("textbox", { name: /^Object of/ }).fill("Webcams[0]");

@@ -162,6 +162,7 @@ interface BoardToolsProps {
 
 function BoardTools({ board, name, arranging, setArranging, add, take, reset, fail }: BoardToolsProps) {
   const file = useRef<HTMLInputElement>(null);
+  const [kind, setKind] = useState<PanelKind>("plot");
   const save = (): void =>
     saveFile(
       `${decodeURIComponent(name).replace(/[^\w.-]+/g, "-")}.board.json`,
@@ -181,24 +182,22 @@ function BoardTools({ board, name, arranging, setArranging, add, take, reset, fa
         {arranging ? t("Done") : t("Arrange")}
       </button>
       <label>
-        <span class="unseen">{t("Add a panel")}</span>
+        <span class="unseen">{t("Kind of panel")}</span>
         <select
           class="field"
-          value=""
-          onChange={(event) => {
-            const kind = PANEL_KINDS.find((each) => each === event.currentTarget.value);
-            event.currentTarget.value = "";
-            if (kind) add(kind);
-          }}
+          value={kind}
+          onChange={(event) => setKind(PANEL_KINDS.find((each) => each === event.currentTarget.value) ?? "plot")}
         >
-          <option value="">{t("Add a panel")}</option>
-          {PANEL_KINDS.map((kind) => (
-            <option key={kind} value={kind}>
-              {t(KINDS[kind].title)}
+          {PANEL_KINDS.map((each) => (
+            <option key={each} value={each}>
+              {t(KINDS[each].title)}
             </option>
           ))}
         </select>
       </label>
+      <button class="button" type="button" onClick={() => add(kind)}>
+        {t("Add panel")}
+      </button>
       <button class="button button-quiet" type="button" onClick={save}>
         {t("Save file")}
       </button>

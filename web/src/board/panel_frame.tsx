@@ -38,7 +38,8 @@ export function PanelFrame({ panel, link, place, services, arranging, move, step
     panel.from === "" ? [] : panel.from.split("/").map(decodeURIComponent);
   const drag = useDrag(panel, move);
   return (
-    <section
+    <div
+      role="group"
       class={`board-panel ${arranging ? "is-arranged" : ""}`}
       aria-label={name}
       data-panel={panel.kind}
@@ -129,7 +130,7 @@ export function PanelFrame({ panel, link, place, services, arranging, move, step
         {!last && failure === null && <span class="bone" aria-hidden="true" />}
       </div>
       {arranging && <span class="panel-corner" aria-hidden="true" {...drag.size} />}
-    </section>
+    </div>
   );
 }
 

@@ -3,7 +3,8 @@
 
 const german: Readonly<Record<string, string>> = {
   "Add": "Hinzufügen",
-  "Add a panel": "Feld hinzufügen",
+  "Add panel": "Feld hinzufügen",
+  "Kind of panel": "Art des Felds",
   "Age": "Alter",
   "All members": "Alle Mitglieder",
   "Arrange": "Anordnen",
