@@ -1,8 +1,11 @@
 // Every text that the page passes through t() has a German one, with the same places for values.
 import german from "../../web/src/messages/de";
 
-// @ts-expect-error Vite's own; its types are not of this project
-const files = import.meta.glob("../../web/src/**/*.{ts,tsx}", { query: "?raw", import: "default", eager: true }) as Record<string, string>;
+const files = import.meta.glob("../../web/src/**/*.{ts,tsx}", {
+  query: "?raw",
+  import: "default",
+  eager: true,
+}) as Record<string, string>;
 const texts = new Set(
   Object.values(files).flatMap((source) =>
     [...source.matchAll(/\bt\(\s*"((?:[^"\\]|\\.)*)"/g)].map((match) => match[1] ?? ""),

@@ -11,16 +11,30 @@ async function violations(page: Page): Promise<string[]> {
   await page.evaluate(axe); // past the page's policy, as a debugger
   return page.evaluate(async () => {
     const { violations: found } = await (window as any).axe.run(document, { resultTypes: ["violations"] });
-    return found.map((each: any) => `${each.id}: ${each.nodes.map((node: any) => node.html).join(" ").slice(0, 400)}`);
+    return found.map(
+      (each: any) =>
+        `${each.id}: ${each.nodes
+          .map((node: any) => node.html)
+          .join(" ")
+          .slice(0, 400)}`,
+    );
   });
 }
 
 for (const colorScheme of ["light", "dark"] as const) {
-  for (const [size, viewport] of Object.entries({ desk: { width: 1280, height: 800 }, phone: { width: 412, height: 839 } })) {
+  for (const [size, viewport] of Object.entries({
+    desk: { width: 1280, height: 800 },
+    phone: { width: 412, height: 839 },
+  })) {
     test(`no page has a barrier that axe finds: ${colorScheme}, ${size}`, async ({ page, lab }) => {
       await page.setViewportSize(viewport);
       await page.emulateMedia({ colorScheme, reducedMotion: "reduce" });
-      for (const address of ["#/", "#/devices/create/Create", "#/devices/create/Create?view=board", "#/devices/create/Create?view=members"]) {
+      for (const address of [
+        "#/",
+        "#/devices/create/Create",
+        "#/devices/create/Create?view=board",
+        "#/devices/create/Create?view=members",
+      ]) {
         await page.goto(`${lab.url}${address}`);
         await expect(page.locator('[data-state="online"]').first()).toBeVisible();
         if (address.endsWith("board")) {
@@ -28,7 +42,9 @@ for (const colorScheme of ["light", "dark"] as const) {
           await page.getByRole("button", { name: "Arrange" }).click();
         }
         expect(await violations(page), address).toEqual([]);
-        const tooWide = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+        const tooWide = await page.evaluate(
+          () => document.documentElement.scrollWidth - document.documentElement.clientWidth,
+        );
         expect(tooWide, address).toBeLessThanOrEqual(0);
       }
     });
@@ -44,7 +60,10 @@ test("a board is made by keyboard alone", async ({ page, lab }) => {
   await page.keyboard.press("Tab");
   await page.keyboard.press("Enter");
   await expect(page.locator('[data-panel="notes"]')).toBeVisible();
-  await page.locator('[data-panel="notes"]').getByRole("button", { name: /^Move or size/ }).focus();
+  await page
+    .locator('[data-panel="notes"]')
+    .getByRole("button", { name: /^Move or size/ })
+    .focus();
   await page.keyboard.press("ArrowRight");
   await page.keyboard.press("Shift+ArrowDown");
   await page.keyboard.press("Tab");

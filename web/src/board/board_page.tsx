@@ -171,10 +171,13 @@ function BoardTools({ board, name, arranging, setArranging, add, take, reset, fa
     );
   const open = (chosen: File | undefined): void => {
     if (!chosen) return;
-    chosen.text().then(
-      (text) => take(parseBoard(text)),
-      (error: unknown) => fail((error as Error).message),
-    ).catch((error: unknown) => fail((error as Error).message));
+    chosen
+      .text()
+      .then(
+        (text) => take(parseBoard(text)),
+        (error: unknown) => fail((error as Error).message),
+      )
+      .catch((error: unknown) => fail((error as Error).message));
   };
   return (
     <div class="board-tools">
@@ -221,4 +224,3 @@ function BoardTools({ board, name, arranging, setArranging, add, take, reset, fa
     </div>
   );
 }
-

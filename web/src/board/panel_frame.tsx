@@ -77,10 +77,7 @@ export function PanelFrame({ panel, link, place, services, arranging, move, step
           <h2>
             {name}
             {(panel.from !== "" || panel.object !== "") && (
-              <small>
-                {" "}
-                {[panel.from === "" ? "" : device, panel.object].filter(Boolean).join(" · ")}
-              </small>
+              <small> {[panel.from === "" ? "" : device, panel.object].filter(Boolean).join(" · ")}</small>
             )}
           </h2>
         )}

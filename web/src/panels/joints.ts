@@ -27,7 +27,11 @@ export function jointsOf(info: unknown): Joint[] {
   const joints = (info as { joint_info?: unknown } | null)?.joint_info;
   if (!Array.isArray(joints)) return [];
   return joints.map((each, i) => {
-    const { joint_identifier: id, joint_limits: limits, default_units: unit } = (each ?? {}) as {
+    const {
+      joint_identifier: id,
+      joint_limits: limits,
+      default_units: unit,
+    } = (each ?? {}) as {
       joint_identifier?: { name?: string } | null;
       joint_limits?: { lower?: number; upper?: number; velocity?: number; reduced_velocity?: number } | null;
       default_units?: number;

@@ -59,7 +59,13 @@ export default function RobotPanel({ object, members, definitions, scope, settin
         ))}
       </ul>
       <div class="row-line" role="group" aria-label={t("Mode")}>
-        <button class="button" type="button" aria-pressed={mode === "halt"} disabled={!object} onClick={() => setMode(0)}>
+        <button
+          class="button"
+          type="button"
+          aria-pressed={mode === "halt"}
+          disabled={!object}
+          onClick={() => setMode(0)}
+        >
           {t("Halt")}
         </button>
         <button
@@ -115,7 +121,9 @@ export default function RobotPanel({ object, members, definitions, scope, settin
         })}
       </ol>
       {!canJog && object && (
-        <p class="note">{look.stale === null ? t("Choose Jog to move joints by hand.") : t("No jogging on old values.")}</p>
+        <p class="note">
+          {look.stale === null ? t("Choose Jog to move joints by hand.") : t("No jogging on old values.")}
+        </p>
       )}
       <Freshness look={look} isLive={object !== null} />
     </div>
