@@ -95,10 +95,10 @@ describe("drafts", () => {
     draft.fields.set("__proto__", { kind: "text", text: "7" });
     const value = valueOf(draft, "Arm", definitions, scope) as Record<string, any>;
     expect(value["pose"]["mode"]).toBe(16);
-    expect(Array.from(value["pose"]["q"])).toEqual([1, 2, 3]);
+    expect(Array.from(value["pose"]["q"] as Float64Array)).toEqual([1, 2, 3]);
     expect([...value["limits"]]).toEqual([["__proto__", 2.5]]);
     expect(Object.getPrototypeOf(value)).toBeNull();
-    expect(Array.from(value["__proto__"])).toEqual([7]);
+    expect(Array.from(value["__proto__"] as Uint8Array)).toEqual([7]);
     expect(formatUuid(value["id"].uuid_bytes)).toBe("39b513e7-21b9-4b49-8654-7537473030eb");
     const again = draftOf(value, "Arm", definitions, scope);
     expect(again.kind === "struct" && again.fields?.get("id")).toEqual(draft.fields.get("id"));

@@ -1,11 +1,11 @@
 // Every text that the page passes through t() has a German one, with the same places for values.
 import german from "../../web/src/messages/de";
 
-const files = import.meta.glob("../../web/src/**/*.{ts,tsx}", {
+const files = import.meta.glob<string>("../../web/src/**/*.{ts,tsx}", {
   query: "?raw",
   import: "default",
   eager: true,
-}) as Record<string, string>;
+});
 const texts = new Set(
   Object.values(files).flatMap((source) =>
     [...source.matchAll(/\bt\(\s*"((?:[^"\\]|\\.)*)"/g)].map((match) => match[1] ?? ""),

@@ -35,7 +35,7 @@ test("every panel shows a hostile service, and runs nothing of it", async ({ pag
     await expect(of(kind).locator(".panel-body")).not.toBeEmpty();
   }
   await of("locks").getByRole("button", { name: "Lock for this page" }).click();
-  await expect(of("locks")).toContainText(/Locked by this page since|Error|Exception/);
+  await expect(of("locks")).toContainText(/Locked by this page since|RobotRaconteur/);
   await expect(page.locator("main img")).toHaveCount(0);
   await expect(page).toHaveTitle("peer · rrgate");
   await page.goto(`${hostile.url}#/devices/peer/hostile?view=members`);

@@ -32,7 +32,7 @@ export function PanelFrame({ panel, link, place, services, arranging, move, step
   const { object, last, failure } = useObject(link, panel.from, panel.from === "" ? path : panel.object);
   const count = last?.definitions.length ?? 0;
   const definitions = useMemo(() => new Definitions(last?.definitions ?? []), [last, count]);
-  const shown = useLoaded(panel.kind);
+  const Shown = useLoaded(panel.kind);
   const name = nameOf(panel);
   const [device = place.device, service = place.service] =
     panel.from === "" ? [] : panel.from.split("/").map(decodeURIComponent);
@@ -110,10 +110,9 @@ export function PanelFrame({ panel, link, place, services, arranging, move, step
       )}
       <div class="panel-body">
         <Failure text={failure} />
-        {last && shown && (
+        {last && Shown && (
           <Guard key={panel.kind}>
-            <Body
-              shown={shown}
+            <Shown
               object={object}
               members={last.members}
               definitions={definitions}
@@ -135,10 +134,6 @@ export function nameOf(panel: Panel): string {
   if (panel.title !== "") return t(panel.title); // titles of presets are known
   const member = textIn(panel.settings, "member");
   return member === "" ? t(KINDS[panel.kind].title) : member;
-}
-
-function Body({ shown: Shown, ...props }: PanelProps & { shown: ComponentType<PanelProps> }) {
-  return <Shown {...props} />;
 }
 
 /** A panel's code, when a board has one. */

@@ -130,7 +130,7 @@ export function draftOf(value: unknown, type: string, definitions: Definitions, 
             }))
           : [],
     };
-  if (shape.kind === "uuid") return { kind: "text", text: formatUuid((value as { uuid_bytes?: unknown })?.uuid_bytes) };
+  if (shape.kind === "uuid") return { kind: "text", text: formatUuid(uuidBytes(value)) };
   if (shape.kind === "enum") {
     const found = definitions.enum(parseType(type).base, scope);
     return { kind: "text", text: (found && enumName(value, found)) ?? String(value) };
@@ -174,6 +174,11 @@ export function readUuid(text: string): Uint8Array {
       `"${text}" is no UUID; expected 32 hexadecimal digits such as 39b513e7-21b9-4b49-8654-7537473030eb`,
     );
   return Uint8Array.from({ length: 16 }, (_, i) => Number.parseInt(digits.slice(2 * i, 2 * i + 2), 16));
+}
+
+/** Of a com.robotraconteur.uuid.UUID. */
+export function uuidBytes(value: unknown): unknown {
+  return (value as Record<string, unknown> | null)?.["uuid_bytes"];
 }
 
 export function formatUuid(bytes: unknown): string {
@@ -230,5 +235,5 @@ function emptyText(type: string): string {
 function textOf(value: unknown): string {
   if (value === null || value === undefined) return "";
   if (ArrayBuffer.isView(value)) return Array.from(value as unknown as ArrayLike<number>).join(", ");
-  return typeof value === "object" ? JSON.stringify(jsonOf(value)) : String(value as string);
+  return typeof value === "object" ? JSON.stringify(jsonOf(value)) : String(value);
 }
