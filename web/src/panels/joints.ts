@@ -15,13 +15,14 @@ export interface RobotState {
 /** undefined: nothing came yet. */
 export function readState(value: unknown): RobotState | undefined {
   if (value === null || typeof value !== "object") return undefined;
-  const { command_mode, operational_mode, controller_state, robot_state_flags, joint_position } = value as Fields;
+  const state = value as Fields;
+  const { robot_state_flags: flags, joint_position: positions } = state;
   return {
-    commandMode: Number(command_mode),
-    operationalMode: Number(operational_mode),
-    controllerState: Number(controller_state),
-    flags: typeof robot_state_flags === "bigint" ? robot_state_flags : Number(robot_state_flags),
-    positions: joint_position instanceof Float64Array ? joint_position : new Float64Array(),
+    commandMode: Number(state["command_mode"]),
+    operationalMode: Number(state["operational_mode"]),
+    controllerState: Number(state["controller_state"]),
+    flags: typeof flags === "bigint" ? flags : Number(flags),
+    positions: positions instanceof Float64Array ? positions : new Float64Array(),
   };
 }
 
@@ -39,18 +40,18 @@ export interface Joint {
 const UNITS: Readonly<Record<number, string>> = { 1: "m", 2: "rad", 3: "°" };
 
 export function jointsOf(info: unknown): Joint[] {
-  const { joint_info } = (info ?? {}) as Fields;
-  if (!Array.isArray(joint_info)) return [];
-  return joint_info.map((each: unknown, i) => {
-    const { joint_identifier, joint_limits, default_units } = (each ?? {}) as Fields;
-    const { name } = (joint_identifier ?? {}) as Fields;
-    const { lower, upper, velocity, reduced_velocity } = (joint_limits ?? {}) as Fields;
+  const { joint_info: joints } = (info ?? {}) as Fields;
+  if (!Array.isArray(joints)) return [];
+  return joints.map((each: unknown, i) => {
+    const { joint_identifier: id, joint_limits: limits, default_units: unit } = (each ?? {}) as Fields;
+    const { name } = (id ?? {}) as Fields;
+    const { lower, upper, velocity, reduced_velocity: reduced } = (limits ?? {}) as Fields;
     return {
       name: typeof name === "string" && name !== "" ? name : `joint ${i + 1}`,
-      unit: UNITS[Number(default_units)] ?? "",
+      unit: UNITS[Number(unit)] ?? "",
       low: Number(lower),
       high: Number(upper),
-      fastest: Number(reduced_velocity) || Number(velocity) || 1,
+      fastest: Number(reduced) || Number(velocity) || 1,
     };
   });
 }

@@ -235,5 +235,5 @@ function emptyText(type: string): string {
 function textOf(value: unknown): string {
   if (value === null || value === undefined) return "";
   if (ArrayBuffer.isView(value)) return Array.from(value as unknown as ArrayLike<number>).join(", ");
-  return typeof value === "object" ? JSON.stringify(jsonOf(value)) : String(value);
+  return typeof value === "string" ? value : JSON.stringify(jsonOf(value));
 }
