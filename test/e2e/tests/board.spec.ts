@@ -88,13 +88,11 @@ test("a board goes by its address, and as a file, to another browser", async ({ 
   await expect(third.locator('[data-panel="notes"]')).toHaveCount(0);
   await third.getByLabel("Board file").setInputFiles(file);
   await expect(third.locator('[data-panel="notes"]').getByRole("textbox")).toHaveValue("für alle");
-  await third
-    .getByLabel("Board file")
-    .setInputFiles({
-      name: "x.json",
-      mimeType: "application/json",
-      buffer: Buffer.from('{"board":1,"panels":[{"kind":"oven"}]}'),
-    });
+  await third.getByLabel("Board file").setInputFiles({
+    name: "x.json",
+    mimeType: "application/json",
+    buffer: Buffer.from('{"board":1,"panels":[{"kind":"oven"}]}'),
+  });
   await expect(third.locator("main").getByRole("alert").first()).toContainText(
     '/panels/0/kind is "oven", expected one of plot',
   );
