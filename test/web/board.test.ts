@@ -95,10 +95,10 @@ describe("drafts", () => {
     draft.fields.set("__proto__", { kind: "text", text: "7" });
     const value = valueOf(draft, "Arm", definitions, scope) as Record<string, any>;
     expect(value["pose"]["mode"]).toBe(16);
-    expect(Array.from(value["pose"]["q"])).toEqual([1, 2, 3]);
+    expect(Array.from(value["pose"]["q"] as Float64Array)).toEqual([1, 2, 3]);
     expect([...value["limits"]]).toEqual([["__proto__", 2.5]]);
     expect(Object.getPrototypeOf(value)).toBeNull();
-    expect(Array.from(value["__proto__"])).toEqual([7]);
+    expect(Array.from(value["__proto__"] as Uint8Array)).toEqual([7]);
     expect(formatUuid(value["id"].uuid_bytes)).toBe("39b513e7-21b9-4b49-8654-7537473030eb");
     const again = draftOf(value, "Arm", definitions, scope);
     expect(again.kind === "struct" && again.fields?.get("id")).toEqual(draft.fields.get("id"));
@@ -173,8 +173,9 @@ describe("the layout", () => {
     { id: "c", x: 0, y: 4, w: 12, h: 3 },
   ];
   const overlaps = (all: readonly Placed[]): number =>
-    all.flatMap((a) => all.filter((b) => a.id < b.id && a.x < b.x + b.w && b.x < a.x + a.w && a.y < b.y + b.h && b.y < a.y + a.h))
-      .length;
+    all.flatMap((a) =>
+      all.filter((b) => a.id < b.id && a.x < b.x + b.w && b.x < a.x + a.w && a.y < b.y + b.h && b.y < a.y + a.h),
+    ).length;
 
   test("makes room for what is moved, and nothing overlaps or floats", () => {
     const moved = put(panels, "c", { y: 0 });
@@ -217,7 +218,10 @@ describe("a board", () => {
     for (const [file, words] of [
       ["[]", "the file is [], expected an object { … }"],
       ['{"board":2}', 'field "board" is 2, expected 1'],
-      ['{"board":1,"panels":[{"kind":"notes","x":-1,"y":0,"w":1,"h":1}]}', "/panels/0/x is -1, expected a whole number from 0"],
+      [
+        '{"board":1,"panels":[{"kind":"notes","x":-1,"y":0,"w":1,"h":1}]}',
+        "/panels/0/x is -1, expected a whole number from 0",
+      ],
       ['{"board":1,"panels":[],"stop":{"call":1}}', "/stop/call is 1, expected the name of a function"],
       ["{", "the file is no JSON"],
     ] as const)
@@ -238,13 +242,19 @@ describe("a board", () => {
       modifiers: [],
       documentation: "",
     });
-    const members = [member("pose", "wire", "Pose"), member("halt", "function", "void"), member("then", "property", "double")];
+    const members = [
+      member("pose", "wire", "Pose"),
+      member("halt", "function", "void"),
+      member("then", "property", "double"),
+    ];
     const made = presetFor({ type: "com.example.arm.Robot", members, definitions, scope });
     expect(made.panels.map(({ kind }) => kind)).toEqual(["plot", "table", "form", "table"]);
     expect(made.stop).toEqual({ call: "halt", args: [] });
     expect(hasPreset("__proto__") || hasPreset("constructor")).toBe(false);
     const tool = "com.robotraconteur.robotics.tool.Tool";
-    expect(presetFor({ type: tool, members: [member("open", "function", "void")], definitions, scope }).panels).toHaveLength(1);
+    expect(
+      presetFor({ type: tool, members: [member("open", "function", "void")], definitions, scope }).panels,
+    ).toHaveLength(1);
     expect(hasPreset(tool)).toBe(true);
   });
 
@@ -268,7 +278,9 @@ test("code quotes what comes from the device", () => {
     `curl -X POST 'http://h/api/v1/devices/it'\\''s/a%20b/Arms/x.y/Drive' \\\n  -H 'Content-Type: application/json' -d '{"__proto__":"'\\''; rm -rf /"}'`,
   );
   expect(asCode("JavaScript", "http://h/", place, member, [1])).toContain('robot.$.find("*.Arms[x.y]")');
-  expect(asCode("Python", "https://h/", { ...place, object: "" }, member, [true, null])).toContain("robot.Drive(True, None)");
+  expect(asCode("Python", "https://h/", { ...place, object: "" }, member, [true, null])).toContain(
+    "robot.Drive(True, None)",
+  );
 });
 
 test("memories are shown as bytes and as grey values", () => {
@@ -286,5 +298,7 @@ test("pictures of the standard types are read by their encoding", () => {
   const depth = { image_info: { width: 2, height: 1, step: 4, encoding: 0x4000 }, data: Uint8Array.of(0, 0, 16, 39) };
   expect([...(readPicture(depth).rgba ?? [])]).toEqual([0, 0, 0, 255, 255, 255, 255, 255]);
   expect(readPicture({ image_info: info, data: Uint8Array.of(255, 216, 255) }).encoded).not.toBeNull();
-  expect(() => readPicture({ image_info: { ...info, width: 9 }, data: Uint8Array.of(1, 2, 3) })).toThrow("the picture has 3 bytes");
+  expect(() => readPicture({ image_info: { ...info, width: 9 }, data: Uint8Array.of(1, 2, 3) })).toThrow(
+    "the picture has 3 bytes",
+  );
 });

@@ -114,7 +114,10 @@ describe("addresses", () => {
       board: null,
     });
     expect(parseRoute(formatRoute("c", "C", [], "members"))).toMatchObject({ view: "members" });
-    expect(parseRoute(`${formatRoute("c", "C", [], "board")}&board=e30`)).toMatchObject({ view: "board", board: "e30" });
+    expect(parseRoute(`${formatRoute("c", "C", [], "board")}&board=e30`)).toMatchObject({
+      view: "board",
+      board: "e30",
+    });
   });
 });
 

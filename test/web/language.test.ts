@@ -1,12 +1,14 @@
 // Every text that the page passes through t() has a German one, with the same places for values.
-import { readdirSync, readFileSync } from "node:fs";
 import german from "../../web/src/messages/de";
 
-const source = new URL("../../web/src/", import.meta.url);
-const files = readdirSync(source, { recursive: true, encoding: "utf8" }).filter((name) => /\.tsx?$/.test(name));
+const files = import.meta.glob<string>("../../web/src/**/*.{ts,tsx}", {
+  query: "?raw",
+  import: "default",
+  eager: true,
+});
 const texts = new Set(
-  files.flatMap((name) =>
-    [...readFileSync(new URL(name, source), "utf8").matchAll(/\bt\(\s*"((?:[^"\\]|\\.)*)"/g)].map((match) => match[1] ?? ""),
+  Object.values(files).flatMap((source) =>
+    [...source.matchAll(/\bt\(\s*"((?:[^"\\]|\\.)*)"/g)].map((match) => match[1] ?? ""),
   ),
 );
 

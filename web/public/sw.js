@@ -10,7 +10,9 @@ self.addEventListener("install", (event) => {
 self.addEventListener("activate", (event) => {
   const remove = async () => {
     const names = await caches.keys();
-    await Promise.all(names.filter((name) => name.startsWith("rrgate-") && name !== CACHE).map((name) => caches.delete(name)));
+    await Promise.all(
+      names.filter((name) => name.startsWith("rrgate-") && name !== CACHE).map((name) => caches.delete(name)),
+    );
     await self.clients.claim();
   };
   event.waitUntil(remove());

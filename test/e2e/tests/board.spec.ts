@@ -2,8 +2,9 @@
 import { readFileSync } from "node:fs";
 import type { Page } from "@playwright/test";
 import { expect, test } from "../lab_test";
+import { addPanel } from "../board";
 
-const panel = (page: Page, name: string) => page.getByRole("region", { name, exact: true });
+const panel = (page: Page, name: string) => page.getByRole("group", { name, exact: true });
 
 async function openBoard(page: Page, url: string, object = "create/Create"): Promise<void> {
   await page.goto(`${url}#/devices/${object}?view=board`);
@@ -19,9 +20,7 @@ test("shows a plot, a table, and a form that calls; a wrong value says where", a
   await form.getByLabel("Member").selectOption("Drive");
   await form.getByLabel("velocity").fill("40000");
   await form.getByRole("button", { name: "Call Drive" }).click();
-  await expect(form.getByRole("alert")).toHaveText(
-    "velocity: 40000 is out of range; expected int16, -32768 to 32767",
-  );
+  await expect(form.getByRole("alert")).toHaveText("velocity: 40000 is out of range; expected int16, -32768 to 32767");
   await form.getByLabel("velocity").fill("0");
   await form.getByRole("button", { name: "Call Drive" }).click();
   await expect(form.locator("output")).toContainText("done");
@@ -32,9 +31,12 @@ test("shows a plot, a table, and a form that calls; a wrong value says where", a
   await expect(form.locator("pre")).toContainText(`curl -X POST '${lab.url}api/v1/devices/create/Create/Drive'`);
 });
 
-test("panels are moved and sized by keys and pointer, and are where they were after a reload", async ({ page, lab }) => {
+test("panels are moved and sized by keys and pointer, and are where they were after a reload", async ({
+  page,
+  lab,
+}) => {
   await openBoard(page, lab.url);
-  await page.getByLabel("Add a panel").selectOption("notes");
+  await addPanel(page, "notes");
   const notes = page.locator('[data-panel="notes"]');
   const place = () => notes.evaluate((element) => [element.style.gridColumn, element.style.gridRow]);
   const handle = notes.getByRole("button", { name: /^Move or size/ });
@@ -67,7 +69,7 @@ test("panels are moved and sized by keys and pointer, and are where they were af
 
 test("a board goes by its address, and as a file, to another browser", async ({ page, lab, browser }) => {
   await openBoard(page, lab.url);
-  await page.getByLabel("Add a panel").selectOption("notes");
+  await addPanel(page, "notes");
   await page.locator('[data-panel="notes"]').getByRole("textbox", { name: "Notes", exact: true }).fill("für alle");
   const address = page.url();
   expect(address).toContain("&board=");
@@ -86,10 +88,14 @@ test("a board goes by its address, and as a file, to another browser", async ({ 
   await expect(third.locator('[data-panel="notes"]')).toHaveCount(0);
   await third.getByLabel("Board file").setInputFiles(file);
   await expect(third.locator('[data-panel="notes"]').getByRole("textbox")).toHaveValue("für alle");
-  await third
-    .getByLabel("Board file")
-    .setInputFiles({ name: "x.json", mimeType: "application/json", buffer: Buffer.from('{"board":1,"panels":[{"kind":"oven"}]}') });
-  await expect(third.locator("main").getByRole("alert").first()).toContainText('/panels/0/kind is "oven", expected one of plot');
+  await third.getByLabel("Board file").setInputFiles({
+    name: "x.json",
+    mimeType: "application/json",
+    buffer: Buffer.from('{"board":1,"panels":[{"kind":"oven"}]}'),
+  });
+  await expect(third.locator("main").getByRole("alert").first()).toContainText(
+    '/panels/0/kind is "oven", expected one of plot',
+  );
   await third.context().close();
 });
 
@@ -99,9 +105,12 @@ test("a frozen device is seen within a second, and its values say how old they a
   lab.create.signal("SIGSTOP");
   try {
     await expect(page.locator(".board-silent")).toBeVisible({ timeout: 1_500 });
-    await expect(page.locator('[data-panel="table"] [data-stale="true"]').first()).toContainText(/Stale: \d\.\d s old/, {
-      timeout: 1_000,
-    });
+    await expect(page.locator('[data-panel="table"] [data-stale="true"]').first()).toContainText(
+      /Stale: \d\.\d s old/,
+      {
+        timeout: 1_000,
+      },
+    );
   } finally {
     lab.create.signal("SIGCONT");
   }
@@ -114,7 +123,9 @@ test("the stop is sent at once and its arrival is said, also while another call 
   await page.getByRole("button", { name: "Stop", exact: true }).click();
   await expect(page.locator('[data-stop="arrived"]')).toHaveText(/^arrived after \d+ ms/);
   lab.create.signal("SIGSTOP"); // calls hang from here on
-  await panel(page, "Calls").getByRole("button", { name: /^Call / }).click();
+  await panel(page, "Calls")
+    .getByRole("button", { name: /^Call / })
+    .click();
   await page.keyboard.press("Escape");
   await expect(page.locator('[data-stop="sent"]')).toBeVisible();
   lab.create.signal("SIGCONT");
@@ -131,7 +142,7 @@ test("the stop is sent at once and its arrival is said, also while another call 
 
 test("a camera of another device stands beside the robot, with an object of its own", async ({ page, lab }) => {
   await openBoard(page, lab.url);
-  await page.getByLabel("Add a panel").selectOption("image");
+  await addPanel(page, "image");
   const image = page.locator('[data-panel="image"]');
   await image.getByLabel("Service").selectOption("webcams/Webcam");
   await image.getByRole("textbox", { name: /^Object of/ }).fill("Webcams[0]");

@@ -11,16 +11,30 @@ async function violations(page: Page): Promise<string[]> {
   await page.evaluate(axe); // past the page's policy, as a debugger
   return page.evaluate(async () => {
     const { violations: found } = await (window as any).axe.run(document, { resultTypes: ["violations"] });
-    return found.map((each: any) => `${each.id}: ${each.nodes.map((node: any) => node.html).join(" ").slice(0, 400)}`);
+    return found.map(
+      (each: any) =>
+        `${each.id}: ${each.nodes
+          .map((node: any) => node.html)
+          .join(" ")
+          .slice(0, 400)}`,
+    );
   });
 }
 
 for (const colorScheme of ["light", "dark"] as const) {
-  for (const [size, viewport] of Object.entries({ desk: { width: 1280, height: 800 }, phone: { width: 412, height: 839 } })) {
+  for (const [size, viewport] of Object.entries({
+    desk: { width: 1280, height: 800 },
+    phone: { width: 412, height: 839 },
+  })) {
     test(`no page has a barrier that axe finds: ${colorScheme}, ${size}`, async ({ page, lab }) => {
       await page.setViewportSize(viewport);
       await page.emulateMedia({ colorScheme, reducedMotion: "reduce" });
-      for (const address of ["#/", "#/devices/create/Create", "#/devices/create/Create?view=board", "#/devices/create/Create?view=members"]) {
+      for (const address of [
+        "#/",
+        "#/devices/create/Create",
+        "#/devices/create/Create?view=board",
+        "#/devices/create/Create?view=members",
+      ]) {
         await page.goto(`${lab.url}${address}`);
         await expect(page.locator('[data-state="online"]').first()).toBeVisible();
         if (address.endsWith("board")) {
@@ -28,8 +42,10 @@ for (const colorScheme of ["light", "dark"] as const) {
           await page.getByRole("button", { name: "Arrange" }).click();
         }
         expect(await violations(page), address).toEqual([]);
-        const tooWide = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
-        expect(tooWide, address).toBe(0);
+        const tooWide = await page.evaluate(
+          () => document.documentElement.scrollWidth - document.documentElement.clientWidth,
+        );
+        expect(tooWide, address).toBeLessThanOrEqual(0);
       }
     });
   }
@@ -41,13 +57,18 @@ test("a board is made by keyboard alone", async ({ page, lab }) => {
   await page.getByRole("button", { name: "Arrange" }).focus();
   await page.keyboard.press("Tab");
   await page.keyboard.type("Notes");
+  await page.keyboard.press("Tab");
+  await page.keyboard.press("Enter");
   await expect(page.locator('[data-panel="notes"]')).toBeVisible();
-  await page.locator('[data-panel="notes"]').getByRole("button", { name: /^Move or size/ }).focus();
+  await page
+    .locator('[data-panel="notes"]')
+    .getByRole("button", { name: /^Move or size/ })
+    .focus();
   await page.keyboard.press("ArrowRight");
   await page.keyboard.press("Shift+ArrowDown");
   await page.keyboard.press("Tab");
   await page.keyboard.type("Morning shift");
-  await expect(page.getByRole("region", { name: "Morning shift" })).toBeVisible();
+  await expect(page.getByRole("group", { name: "Morning shift" })).toBeVisible();
 });
 
 test("the page speaks German to a German browser, and English again where that is chosen", async ({ browser, lab }) => {

@@ -1,5 +1,6 @@
 // Boards of the standard types, at the drivers' base class for robots.
 import { expect, test } from "../lab_test";
+import { addPanel } from "../board";
 import { startPeer } from "../peers";
 import type { Peer } from "../peers";
 
@@ -61,7 +62,7 @@ test("a robot that freezes is no longer jogged, and its state is marked old", as
 
 test("structs of structs are filled in, and a trajectory's generator says what is wrong with it", async ({ page }) => {
   await page.goto(`${robot.url}#/devices/peer/robot`);
-  await page.getByLabel("Add a panel").selectOption("generator");
+  await addPanel(page, "generator");
   const generator = page.locator('[data-panel="generator"]');
   await generator.getByLabel("Member").selectOption("execute_trajectory");
   await expect(generator.getByText("joint_names").first()).toBeVisible();

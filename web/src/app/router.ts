@@ -35,7 +35,12 @@ export function parseRoute(hash: string): Route {
   return { page: "service", device, service, path: steps.map(parseStep), view, board: given.get("board") };
 }
 
-export function formatRoute(device: string, service: string, path: readonly PathStep[] = [], view: View = "auto"): string {
+export function formatRoute(
+  device: string,
+  service: string,
+  path: readonly PathStep[] = [],
+  view: View = "auto",
+): string {
   const segments = [device, service, ...path.map(formatStep)].map(encodeURIComponent);
   return `#/devices/${segments.join("/")}${view === "auto" ? "" : `?view=${view}`}`;
 }

@@ -162,6 +162,7 @@ interface BoardToolsProps {
 
 function BoardTools({ board, name, arranging, setArranging, add, take, reset, fail }: BoardToolsProps) {
   const file = useRef<HTMLInputElement>(null);
+  const [kind, setKind] = useState<PanelKind>("plot");
   const save = (): void =>
     saveFile(
       `${decodeURIComponent(name).replace(/[^\w.-]+/g, "-")}.board.json`,
@@ -170,10 +171,13 @@ function BoardTools({ board, name, arranging, setArranging, add, take, reset, fa
     );
   const open = (chosen: File | undefined): void => {
     if (!chosen) return;
-    chosen.text().then(
-      (text) => take(parseBoard(text)),
-      (error: unknown) => fail((error as Error).message),
-    ).catch((error: unknown) => fail((error as Error).message));
+    chosen
+      .text()
+      .then(
+        (text) => take(parseBoard(text)),
+        (error: unknown) => fail((error as Error).message),
+      )
+      .catch((error: unknown) => fail((error as Error).message));
   };
   return (
     <div class="board-tools">
@@ -181,24 +185,22 @@ function BoardTools({ board, name, arranging, setArranging, add, take, reset, fa
         {arranging ? t("Done") : t("Arrange")}
       </button>
       <label>
-        <span class="unseen">{t("Add a panel")}</span>
+        <span class="unseen">{t("Kind of panel")}</span>
         <select
           class="field"
-          value=""
-          onChange={(event) => {
-            const kind = PANEL_KINDS.find((each) => each === event.currentTarget.value);
-            event.currentTarget.value = "";
-            if (kind) add(kind);
-          }}
+          value={kind}
+          onChange={(event) => setKind(PANEL_KINDS.find((each) => each === event.currentTarget.value) ?? "plot")}
         >
-          <option value="">{t("Add a panel")}</option>
-          {PANEL_KINDS.map((kind) => (
-            <option key={kind} value={kind}>
-              {t(KINDS[kind].title)}
+          {PANEL_KINDS.map((each) => (
+            <option key={each} value={each}>
+              {t(KINDS[each].title)}
             </option>
           ))}
         </select>
       </label>
+      <button class="button" type="button" onClick={() => add(kind)}>
+        {t("Add panel")}
+      </button>
       <button class="button button-quiet" type="button" onClick={save}>
         {t("Save file")}
       </button>
@@ -222,4 +224,3 @@ function BoardTools({ board, name, arranging, setArranging, add, take, reset, fa
     </div>
   );
 }
-

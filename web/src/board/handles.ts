@@ -13,7 +13,12 @@ const STEPS: Readonly<Record<string, readonly [number, number]>> = {
   ArrowDown: [0, 1],
 };
 
-export function handleKey(event: KeyboardEvent, panel: Place, move: Change, step: (dx: number, dy: number) => void): void {
+export function handleKey(
+  event: KeyboardEvent,
+  panel: Place,
+  move: Change,
+  step: (dx: number, dy: number) => void,
+): void {
   const [dx, dy] = STEPS[event.key] ?? [0, 0];
   if (dx === 0 && dy === 0) return;
   event.preventDefault();

@@ -32,13 +32,14 @@ export function PanelFrame({ panel, link, place, services, arranging, move, step
   const { object, last, failure } = useObject(link, panel.from, panel.from === "" ? path : panel.object);
   const count = last?.definitions.length ?? 0;
   const definitions = useMemo(() => new Definitions(last?.definitions ?? []), [last, count]);
-  const shown = useLoaded(panel.kind);
+  const Shown = useLoaded(panel.kind);
   const name = nameOf(panel);
   const [device = place.device, service = place.service] =
     panel.from === "" ? [] : panel.from.split("/").map(decodeURIComponent);
   const drag = useDrag(panel, move);
   return (
-    <section
+    <div
+      role="group"
       class={`board-panel ${arranging ? "is-arranged" : ""}`}
       aria-label={name}
       data-panel={panel.kind}
@@ -76,10 +77,7 @@ export function PanelFrame({ panel, link, place, services, arranging, move, step
           <h2>
             {name}
             {(panel.from !== "" || panel.object !== "") && (
-              <small>
-                {" "}
-                {[panel.from === "" ? "" : device, panel.object].filter(Boolean).join(" · ")}
-              </small>
+              <small> {[panel.from === "" ? "" : device, panel.object].filter(Boolean).join(" · ")}</small>
             )}
           </h2>
         )}
@@ -112,10 +110,9 @@ export function PanelFrame({ panel, link, place, services, arranging, move, step
       )}
       <div class="panel-body">
         <Failure text={failure} />
-        {last && shown && (
+        {last && Shown && (
           <Guard key={panel.kind}>
-            <Body
-              shown={shown}
+            <Shown
               object={object}
               members={last.members}
               definitions={definitions}
@@ -129,7 +126,7 @@ export function PanelFrame({ panel, link, place, services, arranging, move, step
         {!last && failure === null && <span class="bone" aria-hidden="true" />}
       </div>
       {arranging && <span class="panel-corner" aria-hidden="true" {...drag.size} />}
-    </section>
+    </div>
   );
 }
 
@@ -137,10 +134,6 @@ export function nameOf(panel: Panel): string {
   if (panel.title !== "") return t(panel.title); // titles of presets are known
   const member = textIn(panel.settings, "member");
   return member === "" ? t(KINDS[panel.kind].title) : member;
-}
-
-function Body({ shown: Shown, ...props }: PanelProps & { shown: ComponentType<PanelProps> }) {
-  return <Shown {...props} />;
 }
 
 /** A panel's code, when a board has one. */

@@ -147,7 +147,10 @@ function hasNumbers(member: Member, object: Described): boolean {
   const { base, container } = parseType(member.type);
   if (container !== "none") return false;
   if (isNumeric(base)) return true;
-  return !isPicture(member, object) && structOf(member, object)?.fields.some(({ type }) => isNumeric(parseType(type).base)) === true;
+  return (
+    !isPicture(member, object) &&
+    structOf(member, object)?.fields.some(({ type }) => isNumeric(parseType(type).base)) === true
+  );
 }
 
 function isThere(settings: Settings | undefined, members: readonly Member[]): boolean {

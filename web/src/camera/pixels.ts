@@ -46,7 +46,9 @@ export function readPicture(value: unknown): Frame {
   const step = Number(info["step"]) || width * layout.bytes;
   const needed = step * (height - 1) + width * layout.bytes;
   if (step < width * layout.bytes || data.length < needed)
-    throw new Error(`the picture has ${data.length} bytes in rows of ${step}; expected ${needed} for ${width} by ${height}`);
+    throw new Error(
+      `the picture has ${data.length} bytes in rows of ${step}; expected ${needed} for ${width} by ${height}`,
+    );
   const rgba = layout.channels
     ? colours(data, width, height, step, layout.bytes, layout.channels)
     : greys(data, width, height, step, layout);

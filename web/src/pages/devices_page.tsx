@@ -88,7 +88,8 @@ function headline(state: GatewayState): string {
   if (state.kind === "loading") return t("Asking the gateway for its devices");
   if (state.kind === "away") return t("The gateway does not answer since {0}", clockTime(state.since));
   const online = state.devices.filter((device) => device.state === "online").length;
-  return state.devices.length === 0 ? t("No devices configured")
+  return state.devices.length === 0
+    ? t("No devices configured")
     : t("{0} of {1} devices online", online, state.devices.length);
 }
 

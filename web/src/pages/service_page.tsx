@@ -56,7 +56,11 @@ export function ServicePage({ route, list }: { route: ServiceRoute; list: Device
 }
 
 function Views({ route, shown, first, drives }: { route: ServiceRoute; shown: View; first: View; drives: boolean }) {
-  const views: [View, string][] = [...(drives ? ([["drive", t("Drive")]] as [View, string][]) : []), ["board", t("Board")], ["members", t("All members")]];
+  const views: [View, string][] = [
+    ...(drives ? ([["drive", t("Drive")]] as [View, string][]) : []),
+    ["board", t("Board")],
+    ["members", t("All members")],
+  ];
   return (
     <nav class="tabs" aria-label={t("Views of this service")}>
       {views.map(([view, name]) => (

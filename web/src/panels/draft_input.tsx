@@ -27,7 +27,14 @@ export function DraftInput(props: DraftInputProps) {
   return draft.kind === "text" ? <WordInput {...props} shape={shape} text={draft.text} /> : null;
 }
 
-function WordInput({ label, type, shape, text, change, documentation }: DraftInputProps & { shape: Shape; text: string }) {
+function WordInput({
+  label,
+  type,
+  shape,
+  text,
+  change,
+  documentation,
+}: DraftInputProps & { shape: Shape; text: string }) {
   const id = useId();
   const changed = (event: Event): void =>
     change({ kind: "text", text: (event.currentTarget as HTMLInputElement).value });

@@ -23,7 +23,9 @@ export default function FormPanel(props: PanelProps) {
   const choices = membersFor("form", members);
   const several = textsIn(settings, "members");
   if (several.length > 0) {
-    const shown = several.map((name) => choices.find((each) => each.name === name)).filter((each) => each !== undefined);
+    const shown = several
+      .map((name) => choices.find((each) => each.name === name))
+      .filter((each) => each !== undefined);
     return (
       <div class="form-panel panel-scroll">
         {shown.map((member) => (

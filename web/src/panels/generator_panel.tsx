@@ -33,7 +33,11 @@ export default function GeneratorPanel(props: PanelProps) {
       <div class="panel-tools">
         <MemberSelect members={choices} chosen={name} choose={(next) => change({ member: next })} />
       </div>
-      {member ? <Run key={name} {...props} member={member} /> : <p class="note">{t("This object has no generators.")}</p>}
+      {member ? (
+        <Run key={name} {...props} member={member} />
+      ) : (
+        <p class="note">{t("This object has no generators.")}</p>
+      )}
     </div>
   );
 }

@@ -4,13 +4,29 @@
 import { enumName, flagNames } from "../values/definitions";
 import type { Definitions } from "../values/definitions";
 
-export interface RobotStateValue {
-  command_mode: number;
-  operational_mode: number;
-  controller_state: number;
-  robot_state_flags: bigint | number;
-  joint_position: Float64Array;
+export interface RobotState {
+  commandMode: number;
+  operationalMode: number;
+  controllerState: number;
+  flags: bigint | number;
+  positions: Float64Array;
 }
+
+/** undefined: nothing came yet. */
+export function readState(value: unknown): RobotState | undefined {
+  if (value === null || typeof value !== "object") return undefined;
+  const state = value as Fields;
+  const { robot_state_flags: flags, joint_position: positions } = state;
+  return {
+    commandMode: Number(state["command_mode"]),
+    operationalMode: Number(state["operational_mode"]),
+    controllerState: Number(state["controller_state"]),
+    flags: typeof flags === "bigint" ? flags : Number(flags),
+    positions: positions instanceof Float64Array ? positions : new Float64Array(),
+  };
+}
+
+type Fields = Readonly<Record<string, unknown>>;
 
 export interface Joint {
   name: string;
@@ -24,20 +40,18 @@ export interface Joint {
 const UNITS: Readonly<Record<number, string>> = { 1: "m", 2: "rad", 3: "°" };
 
 export function jointsOf(info: unknown): Joint[] {
-  const joints = (info as { joint_info?: unknown } | null)?.joint_info;
+  const { joint_info: joints } = (info ?? {}) as Fields;
   if (!Array.isArray(joints)) return [];
-  return joints.map((each, i) => {
-    const { joint_identifier: id, joint_limits: limits, default_units: unit } = (each ?? {}) as {
-      joint_identifier?: { name?: string } | null;
-      joint_limits?: { lower?: number; upper?: number; velocity?: number; reduced_velocity?: number } | null;
-      default_units?: number;
-    };
+  return joints.map((each: unknown, i) => {
+    const { joint_identifier: id, joint_limits: limits, default_units: unit } = (each ?? {}) as Fields;
+    const { name } = (id ?? {}) as Fields;
+    const { lower, upper, velocity, reduced_velocity: reduced } = (limits ?? {}) as Fields;
     return {
-      name: id?.name || `joint ${i + 1}`,
-      unit: UNITS[unit ?? 0] ?? "",
-      low: limits?.lower ?? NaN,
-      high: limits?.upper ?? NaN,
-      fastest: limits?.reduced_velocity || limits?.velocity || 1,
+      name: typeof name === "string" && name !== "" ? name : `joint ${i + 1}`,
+      unit: UNITS[Number(unit)] ?? "",
+      low: Number(lower),
+      high: Number(upper),
+      fastest: Number(reduced) || Number(velocity) || 1,
     };
   });
 }
@@ -49,17 +63,17 @@ const GOOD = /^(ready|enabled|homed)$/;
 
 /** Modes first, then the flags that are set; "estop_button1" as "estop button1". */
 export function stateWords(
-  state: RobotStateValue | undefined,
+  state: RobotState | undefined,
   definitions: Definitions,
   scope: string,
 ): { text: string; kind: WordKind }[] {
   if (!state) return [];
   const flags = definitions.enum("RobotStateFlags", scope);
   const words = [
-    modeName(state.command_mode, "RobotCommandMode", definitions, scope),
-    modeName(state.operational_mode, "RobotOperationalMode", definitions, scope),
-    modeName(state.controller_state, "RobotControllerState", definitions, scope),
-    ...(flags ? flagNames(state.robot_state_flags, flags) : []),
+    modeName(state.commandMode, "RobotCommandMode", definitions, scope),
+    modeName(state.operationalMode, "RobotOperationalMode", definitions, scope),
+    modeName(state.controllerState, "RobotControllerState", definitions, scope),
+    ...(flags ? flagNames(state.flags, flags) : []),
   ];
   return [...new Set(words)]
     .filter((word) => word !== "undefined")

@@ -26,9 +26,7 @@ export default function LocksPanel({ object }: PanelProps) {
   return (
     <div class="locks-panel">
       <p role="status">
-        {held
-          ? t("Locked by this page since {0}.", clockTime(held.since))
-          : t("Not locked by this page.")}
+        {held ? t("Locked by this page since {0}.", clockTime(held.since)) : t("Not locked by this page.")}
       </p>
       <div class="row-line">
         {held ? (

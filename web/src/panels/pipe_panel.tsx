@@ -92,7 +92,9 @@ function SendForm({ object, definitions, scope, name, type }: PanelProps & { nam
       if (!object) throw new Error(t("not connected"));
       const value = valueOf(draft, type, definitions, scope);
       sender.current ??= object.openPipe(name);
-      await (await sender.current.catch((error: unknown) => ((sender.current = null), Promise.reject(error)))).send(value);
+      await (
+        await sender.current.catch((error: unknown) => ((sender.current = null), Promise.reject(error)))
+      ).send(value);
       setSent((count) => count + 1);
     });
   };

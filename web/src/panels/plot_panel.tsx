@@ -34,7 +34,12 @@ export default function PlotPanel(props: PanelProps) {
   const key = JSON.stringify([name, paths]);
   const trace = useMemo(() => new Trace(paths.length), [key]);
   const [paused, setPaused] = useState(false);
-  useEach(object, kind, name, (value, now) => trace.push(now, paths.map((path) => numberAt(value, path) ?? null)));
+  useEach(object, kind, name, (value, now) =>
+    trace.push(
+      now,
+      paths.map((path) => numberAt(value, path) ?? null),
+    ),
+  );
   const type = member?.type ?? "";
   const label = (path: string): string => {
     const unit = unitOf(type, path, definitions, scope);
@@ -149,7 +154,10 @@ function makePlot(box: HTMLElement, labels: readonly string[]): uPlot {
       scales: { x: { time: false } },
       cursor: { drag: { x: true, y: true, uni: 20 } },
       legend: { live: true },
-      axes: [{ ...axis, values: (_, ticks) => ticks.map((s) => `${s} s`) }, { ...axis, size: 56 }],
+      axes: [
+        { ...axis, values: (_, ticks) => ticks.map((s) => `${s} s`) },
+        { ...axis, size: 56 },
+      ],
       series: [
         { label: t("Time"), value: (_, s) => (s === null ? "–" : `${s.toFixed(2)} s`) },
         ...labels.map((label, i) => ({

@@ -8,8 +8,8 @@ import { useAction } from "../members/row";
 import { explain } from "../robot/remote";
 import { Failure } from "../ui/failure";
 import { formatNumber } from "../values/format";
-import { jointsOf, modeName, stateWords } from "./joints";
-import type { Joint, RobotStateValue } from "./joints";
+import { jointsOf, modeName, readState, stateWords } from "./joints";
+import type { Joint } from "./joints";
 import { JogButton } from "./jog_button";
 import { numberIn } from "./panel";
 import type { PanelProps } from "./panel";
@@ -20,7 +20,7 @@ const WIRE = "robot_state";
 export default function RobotPanel({ object, members, definitions, scope, settings, change }: PanelProps) {
   const isRobot = members.some(({ name }) => name === WIRE) && members.some(({ name }) => name === "jog_joint");
   const look = useFeed(object, isRobot ? "wire" : null, WIRE);
-  const state = look.value as RobotStateValue | undefined;
+  const state = readState(look.value);
   const [joints, setJoints] = useState<readonly Joint[]>([]);
   const [failure, setFailure] = useState<string | null>(null);
   const acting = useAction();
@@ -36,13 +36,13 @@ export default function RobotPanel({ object, members, definitions, scope, settin
   }, [object, isRobot]);
   if (!isRobot) return <p class="note">{t("This object is no robot of the standard types.")}</p>;
 
-  const mode = state ? modeName(state.command_mode, "RobotCommandMode", definitions, scope) : "";
+  const mode = state ? modeName(state.commandMode, "RobotCommandMode", definitions, scope) : "";
   const setMode = (number: number): void =>
     acting.run(async () => {
       if (number !== 0) await object?.set("command_mode", 0); // a robot changes its mode only from halt
       await object?.set("command_mode", number);
     });
-  const positions = state?.joint_position ?? new Float64Array();
+  const positions = state?.positions ?? new Float64Array();
   const jog = (index: number, direction: number): Promise<unknown> => {
     const velocity = new Float64Array(positions.length);
     velocity[index] = direction * (percent / 100) * (joints[index]?.fastest || 1);
@@ -59,7 +59,13 @@ export default function RobotPanel({ object, members, definitions, scope, settin
         ))}
       </ul>
       <div class="row-line" role="group" aria-label={t("Mode")}>
-        <button class="button" type="button" aria-pressed={mode === "halt"} disabled={!object} onClick={() => setMode(0)}>
+        <button
+          class="button"
+          type="button"
+          aria-pressed={mode === "halt"}
+          disabled={!object}
+          onClick={() => setMode(0)}
+        >
           {t("Halt")}
         </button>
         <button
@@ -115,7 +121,9 @@ export default function RobotPanel({ object, members, definitions, scope, settin
         })}
       </ol>
       {!canJog && object && (
-        <p class="note">{look.stale === null ? t("Choose Jog to move joints by hand.") : t("No jogging on old values.")}</p>
+        <p class="note">
+          {look.stale === null ? t("Choose Jog to move joints by hand.") : t("No jogging on old values.")}
+        </p>
       )}
       <Freshness look={look} isLive={object !== null} />
     </div>

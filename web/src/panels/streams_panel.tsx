@@ -21,7 +21,7 @@ export default function StreamsPanel({ place }: PanelProps) {
   const lost = subscriptionsOf(useStore(list.state)) ?? [];
   const now = performance.now();
   return (
-    <div class="panel-scroll" tabIndex={0} role="region" aria-label={t("Streams")}>
+    <div class="panel-scroll" tabIndex={0} role="group" aria-label={t("Streams")}>
       <table class="values streams">
         <thead>
           <tr>

@@ -33,7 +33,7 @@ export default function TablePanel({ object, members, settings, change, definiti
           JSON
         </button>
       </div>
-      <div class={`panel-scroll ${look.stale === null ? "" : "is-stale"}`} tabIndex={0} role="region" aria-label={name}>
+      <div class={`panel-scroll ${look.stale === null ? "" : "is-stale"}`} tabIndex={0} role="group" aria-label={name}>
         {asJson ? (
           <pre class="json">{look.value === undefined ? "" : shortJson(look.value)}</pre>
         ) : (

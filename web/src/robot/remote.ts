@@ -80,7 +80,7 @@ export function remoteOf(object: RemoteObject): Remote {
     read: async (name, position, count) => member(name).read(position, count),
     write: async (name, position, value) => member(name).write(position, value),
     openPipe: async (name) => member(name).connect(-1, {}),
-    generate: (name, args) => member(name)(...args) as AsyncGenerator<unknown, void, unknown>,
+    generate: (name, args) => member(name)(...args),
     lock: async (kind) => info.lock(kind),
     unlock: async () => info.unlock(),
     ping: async (timeout) => {

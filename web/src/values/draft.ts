@@ -20,7 +20,12 @@ export type Shape =
   | { kind: "bool" }
   | { kind: "uuid" }
   | { kind: "enum"; names: readonly string[] }
-  | { kind: "struct"; name: string; scope: string; fields: readonly { name: string; type: string; documentation: string }[] }
+  | {
+      kind: "struct";
+      name: string;
+      scope: string;
+      fields: readonly { name: string; type: string; documentation: string }[];
+    }
   | { kind: "list"; item: string }
   | { kind: "map"; keys: "int32" | "string"; item: string };
 
@@ -125,7 +130,7 @@ export function draftOf(value: unknown, type: string, definitions: Definitions, 
             }))
           : [],
     };
-  if (shape.kind === "uuid") return { kind: "text", text: formatUuid((value as { uuid_bytes?: unknown })?.uuid_bytes) };
+  if (shape.kind === "uuid") return { kind: "text", text: formatUuid(uuidBytes(value)) };
   if (shape.kind === "enum") {
     const found = definitions.enum(parseType(type).base, scope);
     return { kind: "text", text: (found && enumName(value, found)) ?? String(value) };
@@ -159,11 +164,21 @@ function enumValue(text: string, type: string, definitions: Definitions, scope: 
 }
 
 export function readUuid(text: string): Uint8Array {
-  const digits = text.trim().replaceAll("-", "").replace(/^\{|\}$/g, "");
+  const digits = text
+    .trim()
+    .replaceAll("-", "")
+    .replace(/^\{|\}$/g, "");
   if (digits === "") return new Uint8Array(16);
   if (!/^[0-9a-f]{32}$/i.test(digits))
-    throw new Error(`"${text}" is no UUID; expected 32 hexadecimal digits such as 39b513e7-21b9-4b49-8654-7537473030eb`);
+    throw new Error(
+      `"${text}" is no UUID; expected 32 hexadecimal digits such as 39b513e7-21b9-4b49-8654-7537473030eb`,
+    );
   return Uint8Array.from({ length: 16 }, (_, i) => Number.parseInt(digits.slice(2 * i, 2 * i + 2), 16));
+}
+
+/** Of a com.robotraconteur.uuid.UUID. */
+export function uuidBytes(value: unknown): unknown {
+  return (value as Record<string, unknown> | null)?.["uuid_bytes"];
 }
 
 export function formatUuid(bytes: unknown): string {
@@ -196,7 +211,13 @@ function isWord(base: string): boolean {
 /** The type of one element of a list or map. */
 function bare(type: TypeText): string {
   const sizes = type.sizes.join(",");
-  const brackets = { none: "", any: "[]", fixed: `[${sizes}]`, max: `[${sizes}-]`, multidim: sizes ? `[${sizes}]` : "[*]" };
+  const brackets = {
+    none: "",
+    any: "[]",
+    fixed: `[${sizes}]`,
+    max: `[${sizes}-]`,
+    multidim: sizes ? `[${sizes}]` : "[*]",
+  };
   return type.base + brackets[type.array];
 }
 
@@ -204,11 +225,15 @@ function emptyText(type: string): string {
   const { base, array, sizes } = parseType(type);
   if (!isNumeric(base) || isComplex(base)) return "";
   if (array === "none") return "0";
-  return array === "fixed" ? Array(sizes[0] ?? 0).fill("0").join(", ") : "";
+  return array === "fixed"
+    ? Array(sizes[0] ?? 0)
+        .fill("0")
+        .join(", ")
+    : "";
 }
 
 function textOf(value: unknown): string {
   if (value === null || value === undefined) return "";
   if (ArrayBuffer.isView(value)) return Array.from(value as unknown as ArrayLike<number>).join(", ");
-  return typeof value === "object" ? JSON.stringify(jsonOf(value)) : String(value as string);
+  return typeof value === "string" ? value : JSON.stringify(jsonOf(value));
 }

@@ -3,7 +3,7 @@
 
 import { enumName, flagNames } from "./definitions";
 import type { Definitions } from "./definitions";
-import { formatUuid } from "./draft";
+import { formatUuid, uuidBytes } from "./draft";
 import { formatValue } from "./format";
 import { parseType } from "./type_text";
 import { unitOf } from "./units";
@@ -53,7 +53,7 @@ function add(rows: Row[], value: unknown, of: Of, path: string, name: string, no
     }
     return;
   }
-  const uuid = isUuid ? formatUuid((value as { uuid_bytes?: unknown } | null)?.uuid_bytes) : "";
+  const uuid = isUuid ? formatUuid(uuidBytes(value)) : "";
   rows.push({ path, depth, name, text: uuid || words(value, of, path, name), note });
 }
 

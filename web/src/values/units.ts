@@ -28,9 +28,10 @@ export function unitOf(type: string, path: string, definitions: Definitions, sco
     if (!struct || !field) return "";
     [base, within, documentation] = [field.type, struct.scope, field.documentation];
   }
-  const said = /\[([^\]\s]{1,12})\]|\(([a-zA-Zµ°%/²³]{1,6})\)|\bin (mm|cm|m|rad|radians|degrees|deg|s|ms|V|A|N|Nm|Hz|mm\/s|m\/s)\b/.exec(
-    documentation,
-  );
+  const said =
+    /\[([^\]\s]{1,12})\]|\(([a-zA-Zµ°%/²³]{1,6})\)|\bin (mm|cm|m|rad|radians|degrees|deg|s|ms|V|A|N|Nm|Hz|mm\/s|m\/s)\b/.exec(
+      documentation,
+    );
   if (said) return said[1] ?? said[2] ?? said[3] ?? "";
   const last = names[names.length - 1] ?? "";
   const ending = Object.keys(ENDINGS).find((each) => last.toLowerCase().endsWith(each));
