@@ -2,12 +2,17 @@
 
 #include <charconv>
 
+#include "core/member/wire.hpp"
+
 namespace rr {
 
 namespace {
 
 /// What a stored packet takes beside its payload: map node, values, names.
 constexpr std::size_t packet_overhead = 128;
+
+/// Of a packet's elements: the first one in the element that names the endpoint.
+constexpr std::size_t packet_number_element = 1;
 
 std::string pipe_subject(const MemberDefinition& member) {
   return "pipe '" + member.name + "'";
@@ -28,6 +33,11 @@ std::size_t size_of(const Message& message, const MessageElement& element) {
 
 // --- packing ---
 
+void begin_pipe_packets(Message& message, std::string_view path, std::string_view member, bool is_unreliable) {
+  auto& entry = message.begin_entry(EntryType::pipe_packet, path, member);
+  if (is_unreliable) message.header.metadata = entry.metadata = unreliable_metadata;
+}
+
 Result<> write_pipe_packet(Message& message, std::int32_t index, std::uint32_t number, const Value& value,
                            bool wants_ack, const MemberDefinition& member, const TypeRegistry& types) {
   // Packets are named by decimal text, also in version 4; the message keeps the text.
@@ -44,6 +54,28 @@ Result<> write_pipe_packet(Message& message, std::int32_t index, std::uint32_t n
   if (wants_ack) message.add_scalar("requestack", DataType::uint32_t, std::uint32_t{1});
   message.end_nested();
   return {};
+}
+
+Result<SharedMessage*> SharedPipePacket::message(std::string_view path, const MemberDefinition& member,
+                                                 bool is_unreliable, std::int32_t index, std::uint32_t number,
+                                                 const TypeRegistry& types) {
+  if (path != path_ || is_unreliable != is_unreliable_ || index != index_) {
+    message_.message.clear();
+    message_.forget_encoded();
+    path_ = path;
+    is_unreliable_ = is_unreliable;
+    index_ = index;
+  }
+  number_ = number;
+  return message_.pack([&](Message& message) -> Result<> {
+    begin_pipe_packets(message, path_, member.name, is_unreliable);
+    if (auto written = write_pipe_packet(message, index, number, value_, wants_ack_, member, types); !written)
+      return written;
+    auto& data = message.elements[packet_number_element].data;
+    data = ByteSpan(reinterpret_cast<const std::uint8_t*>(&number_), sizeof(number_));
+    message_.own_number = data;
+    return {};
+  });
 }
 
 Result<std::int32_t> read_pipe_index(const MessageElement& element) {

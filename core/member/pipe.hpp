@@ -4,17 +4,47 @@
 #include <map>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "core/types/pack.hpp"
+#include "core/wire/shared_message.hpp"
 
 namespace rr {
 
 /// What a client asks for when any index will do.
 inline constexpr std::int32_t any_pipe_index = -1;
 
+/// Begins the entry of packets in an empty message.
+void begin_pipe_packets(Message& message, std::string_view path, std::string_view member, bool is_unreliable);
 /// Adds one packet for the endpoint `index` to the last entry. Several endpoints may share an entry.
 Result<> write_pipe_packet(Message& message, std::int32_t index, std::uint32_t number, const Value& value,
                            bool wants_ack, const MemberDefinition& member, const TypeRegistry& types);
+
+/// A value on its way to many endpoints of a pipe; packed and encoded once for those in a row that differ in nothing
+/// but the packet's number.
+class SharedPipePacket {
+ public:
+  /// `value` is borrowed.
+  explicit SharedPipePacket(const Value& value, bool wants_ack = false) : value_(value), wants_ack_(wants_ack) {}
+  SharedPipePacket(const SharedPipePacket&) = delete;
+  SharedPipePacket& operator=(const SharedPipePacket&) = delete;
+
+  const Value& value() const { return value_; }
+  /// The packet for one endpoint, until the next call. `path` and `member` are borrowed as long. Errors   those of
+  /// pack().
+  Result<SharedMessage*> message(std::string_view path, const MemberDefinition& member, bool is_unreliable,
+                                 std::int32_t index, std::uint32_t number, const TypeRegistry& types);
+
+ private:
+  const Value& value_;
+  bool wants_ack_;
+  std::uint32_t number_ = 0;
+  // whom message_ is for
+  std::string path_;
+  bool is_unreliable_ = false;
+  std::int32_t index_ = 0;
+  SharedMessage message_;
+};
 
 struct PipePacket {
   std::uint32_t number = 0;

@@ -24,4 +24,10 @@ bool glob_matches(std::string_view pattern, std::string_view text) {
   return pattern.find_first_not_of('*', at) == std::string_view::npos;
 }
 
+bool glob_leads_on(std::string_view pattern, std::string_view beginning) {
+  for (std::size_t size = 0; size <= pattern.size(); ++size)
+    if (glob_matches(pattern.substr(0, size), beginning)) return true;
+  return false;
+}
+
 }  // namespace rr

@@ -180,6 +180,14 @@ bool Packer::pack_list(const FieldPath& path, const Value& value, PackOne pack_o
   return end_nested();
 }
 
+/// By key. A type of its own: the lambdas of a template would be a sort each.
+struct KeyBefore {
+  template <class Item>
+  bool operator()(const Item* a, const Item* b) const {
+    return a->first < b->first;
+  }
+};
+
 template <class Map, class PackOne>
 bool Packer::pack_map(const FieldPath& path, const Value& value, DataType type, PackOne pack_one) {
   if (value.is_null()) return add_leaf(path, DataType::void_t, 0, {});
@@ -196,7 +204,7 @@ bool Packer::pack_map(const FieldPath& path, const Value& value, DataType type, 
   }
   std::vector<const Item*> sorted;
   for (const auto& item : map->items) sorted.push_back(&item);
-  std::sort(sorted.begin(), sorted.end(), [](const Item* a, const Item* b) { return a->first < b->first; });
+  std::sort(sorted.begin(), sorted.end(), KeyBefore());
   for (std::size_t i = 0; i < sorted.size(); ++i) {
     const auto& [key, item] = *sorted[i];
     if (i > 0 && sorted[i - 1]->first == key)

@@ -92,12 +92,9 @@ Result<> TypeRegistry::add(const std::vector<std::string>& texts, RobdefMode mod
   }
   if (added.empty()) return {};
 
-  // The verifier fills in resolved types, so it gets copies of what is in use already.
-  auto known = copy_imports(added);
   std::vector<ServiceDefinition*> set;
-  for (auto& definition : known) set.push_back(&definition);
   for (const auto& definition : added) set.push_back(definition.get());
-  auto findings = verify_service_definitions(set, mode);
+  auto findings = verify_service_definitions(set, known_imports(added), mode);
   std::erase_if(findings, [&](const Diagnostic& finding) {
     return finding.severity == Severity::warning && find_service(finding.service);
   });
@@ -114,17 +111,17 @@ Result<> TypeRegistry::add(const std::vector<std::string>& texts, RobdefMode mod
   return {};
 }
 
-std::deque<ServiceDefinition> TypeRegistry::copy_imports(const Definitions& importers) const {
-  std::deque<ServiceDefinition> copies;
+std::vector<const ServiceDefinition*> TypeRegistry::known_imports(const Definitions& importers) const {
+  std::vector<const ServiceDefinition*> known;
   std::unordered_set<std::string_view> seen;
-  const auto copy_from = [&](const ServiceDefinition& importer) {
+  const auto add_from = [&](const ServiceDefinition& importer) {
     for (const auto& import : importer.imports)
       if (const auto* found = find_service(import.name); found && seen.insert(found->name).second)
-        copies.push_back(*found);
+        known.push_back(found);
   };
-  for (const auto& importer : importers) copy_from(*importer);
-  for (std::size_t i = 0; i < copies.size(); ++i) copy_from(copies[i]);
-  return copies;
+  for (const auto& importer : importers) add_from(*importer);
+  for (std::size_t i = 0; i < known.size(); ++i) add_from(*known[i]);
+  return known;
 }
 
 const ServiceDefinition* TypeRegistry::find_service(std::string_view name) const {

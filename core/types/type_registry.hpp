@@ -1,7 +1,6 @@
 // The verified definitions that values and objects are checked against. Layer: types.
 #pragma once
 
-#include <deque>
 #include <functional>
 #include <memory>
 #include <string>
@@ -41,8 +40,8 @@ class TypeRegistry {
     std::size_t operator()(std::string_view text) const { return std::hash<std::string_view>{}(text); }
   };
 
-  /// Copies of what is there already and `importers` import, imports of imports included.
-  std::deque<ServiceDefinition> copy_imports(const Definitions& importers) const;
+  /// What is there already and `importers` import, imports of imports included.
+  std::vector<const ServiceDefinition*> known_imports(const Definitions& importers) const;
 
   template <class Definition>
   using Index = std::unordered_map<std::string, const Definition*, TextHash, std::equal_to<>>;

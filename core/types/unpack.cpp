@@ -200,6 +200,14 @@ bool Unpacker::unpack_list(const FieldPath& path, const MessageElement& element,
   return true;
 }
 
+/// By key. A type of its own: the lambdas of a template would be a sort each.
+struct ItemBefore {
+  template <class Item>
+  bool operator()(const Item& a, const Item& b) const {
+    return a.first < b.first;
+  }
+};
+
 template <class Map, class UnpackOne>
 bool Unpacker::unpack_map(const FieldPath& path, const MessageElement& element, Value& out, UnpackOne unpack_one) {
   constexpr auto type = std::is_same_v<Map, MapInt32> ? DataType::map_int32_t : DataType::map_string_t;
@@ -213,9 +221,8 @@ bool Unpacker::unpack_map(const FieldPath& path, const MessageElement& element, 
     if (!read_key(path, child, key) || !unpack_one(step_to(path, key), child, value)) return false;
   }
   using Item = typename decltype(map.items)::value_type;
-  const auto is_before = [](const Item& a, const Item& b) { return a.first < b.first; };
-  if (!std::is_sorted(map.items.begin(), map.items.end(), is_before))
-    std::sort(map.items.begin(), map.items.end(), is_before);
+  if (!std::is_sorted(map.items.begin(), map.items.end(), ItemBefore()))
+    std::sort(map.items.begin(), map.items.end(), ItemBefore());
   const auto twice = std::adjacent_find(map.items.begin(), map.items.end(),
                                         [](const Item& a, const Item& b) { return a.first == b.first; });
   if (twice != map.items.end())

@@ -1,5 +1,6 @@
 // Unpacking of structures, pods and named arrays.
 #include <algorithm>
+#include <functional>
 
 #include "core/types/multidim.hpp"
 #include "core/types/unpacker.hpp"
@@ -33,8 +34,10 @@ class FieldFinder {
     is_indexed_ = true;
     for (const auto& child : children_)
       if (child.key_kind == KeyKind::name) index_.push_back(&child);
-    std::stable_sort(index_.begin(), index_.end(),
-                     [](const MessageElement* a, const MessageElement* b) { return a->name < b->name; });
+    // Equal names stay in wire order, which is address order: a stable_sort is three times the code.
+    std::sort(index_.begin(), index_.end(), [](const MessageElement* a, const MessageElement* b) {
+      return a->name != b->name ? a->name < b->name : std::less<>()(a, b);
+    });
   }
 
   const ElementRange& children_;

@@ -46,13 +46,14 @@ Bytes EncodedMessage::to_bytes() const {
   return bytes;
 }
 
-void EncodedMessage::assign(const EncodedMessage& other, std::uint16_t message_id) {
+void EncodedMessage::assign(const EncodedMessage& other, std::uint16_t message_id, ByteSpan marked) {
   size_ = other.size_;
   scratch_ = other.scratch_;
   slices_ = other.slices_;
   owners_ = other.owners_;
   message_id_at_ = other.message_id_at_;
   std::memcpy(scratch_.data() + message_id_at_, &message_id, sizeof(message_id));
+  if (!marked.empty()) std::memcpy(scratch_.data() + other.marked_at_, marked.data(), marked.size());
   std::size_t at = 0;
   for (auto& slice : slices_) {
     if (slice.data() != other.scratch_.data() + at) continue;  // a payload

@@ -67,8 +67,11 @@ class EncodedMessage {
   const std::vector<ByteSpan>& slices() const { return slices_; }
   /// All bytes in one piece (a copy), for tests and small messages.
   Bytes to_bytes() const;
-  /// Becomes a copy of a version-4 message that has a MessageID, with another one. Referenced payloads are shared.
-  void assign(const EncodedMessage& other, std::uint16_t message_id);
+  /// Encodings from now on remember where they have the bytes of this element, which is not referenced; null: of none.
+  void mark(const std::uint8_t* data) { marked_ = data; }
+  /// Becomes a copy of a version-4 message that has a MessageID, with another one, and with other bytes of the marked
+  /// element. Referenced payloads are shared.
+  void assign(const EncodedMessage& other, std::uint16_t message_id, ByteSpan marked = {});
   void clear();
 
  private:
@@ -78,7 +81,9 @@ class EncodedMessage {
   std::vector<ByteSpan> slices_;
   std::vector<std::shared_ptr<const void>> owners_;
   std::size_t message_id_at_ = 0;  ///< in scratch_; version 4
-  EncodePlan plan_;                ///< kept for its capacity only
+  const std::uint8_t* marked_ = nullptr;
+  std::size_t marked_at_ = 0;  ///< in scratch_
+  EncodePlan plan_;            ///< kept for its capacity only
 };
 
 struct EncodeOptions {

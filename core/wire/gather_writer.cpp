@@ -8,6 +8,7 @@ void GatherWriter::begin(std::size_t message_size, std::size_t gathered_size) {
 }
 
 void GatherWriter::payload(ByteSpan view) {
+  if (view.data() == out_.marked_) out_.marked_at_ = at_;
   if (!is_gathered(view)) return bytes(view);
   close_slice();
   out_.slices_.push_back(view);

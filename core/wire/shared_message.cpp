@@ -11,11 +11,12 @@ Result<> SharedMessage::encode(const EncodeOptions& options, EncodedMessage& out
   const auto mode = options.string_table;
   auto& encoded = encoded_[(mode.local ? 1u : 0u) + (mode.standard ? 2u : 0u)];
   if (encoded.size() == 0) {
+    encoded.mark(own_number.data());
     if (auto done = rr::encode(message, options, encoded); !done) return done;
   } else if (auto checked = check_message_size(encoded.size(), options); !checked) {
     return checked.error();
   }
-  out.assign(encoded, header.message_id);
+  out.assign(encoded, header.message_id, own_number);
   return {};
 }
 

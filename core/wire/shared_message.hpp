@@ -9,11 +9,13 @@
 
 namespace rr {
 
-/// Encoded once for all receivers to whom it differs in nothing but MessageID: those of version 4 who are sent it
-/// without addresses. Build `message` first, then set its header to each receiver in turn.
+/// Encoded once for all receivers to whom it differs in nothing but MessageID and one number: those of version 4 who
+/// are sent it without addresses. Build `message` first, then set its header to each receiver in turn.
 class SharedMessage {
  public:
   Message message;
+  /// The data of an element, which the owner of these bytes sets to each receiver in turn as well; empty: of none.
+  ByteSpan own_number;
 
   /// Has `write(message)` fill in the message, unless that is done already; where it fails the message stays empty.
   template <class Write>

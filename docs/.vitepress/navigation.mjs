@@ -25,6 +25,7 @@ export const makeSidebar = (decisions) => [
   ]),
   group("For operators", [
     ["Operating a gateway", "/deploy"],
+    ["The dashboard", "/dashboard"],
     ["Devices from the command line", "/command-line"],
     ["Shared devices", "/shared-sessions"],
     ["Leases", "/leases"],

@@ -62,7 +62,7 @@ class CompleteOnce {
     if (result)
       finish(nullptr, std::move(*result));
     else
-      fail(std::move(result.error()));
+      fail(result.error());
   }
   void fail(Error error) const {
     const auto failure = std::make_exception_ptr(ClientException(std::move(error)));

@@ -82,7 +82,7 @@ Result<std::optional<Value>> take_step(F& function, Parameter&&... parameter) {
 
 /// A step as an answer: the end, and whatever else is no value, is an error.
 inline Result<Value> step_answer(Result<std::optional<Value>> step) {
-  if (!step) return std::move(step.error());
+  if (!step) return step.error();
   if (!*step) return make_error(ErrorCode::stop_iteration, {});
   return std::move(**step);
 }

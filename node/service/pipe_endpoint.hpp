@@ -18,7 +18,8 @@ inline constexpr std::int32_t no_backlog_limit = -1;
 /// What an endpoint needs of its client.
 class PipeSender {
  public:
-  virtual Result<std::uint32_t> send_pipe_packet(PipeId id, const Value& value, bool wants_ack) = 0;
+  virtual Result<std::uint32_t> send_pipe_packet(PipeId id, const Value& value) = 0;
+  virtual Result<std::uint32_t> send_pipe_packet(PipeId id, SharedPipePacket& packet) = 0;
   virtual void close_pipe(PipeId id) = 0;
   virtual std::size_t queued_bytes() const = 0;
 
@@ -68,7 +69,7 @@ class PipeEndpoint {
   explicit PipeEndpoint(State state) : state_(std::make_shared<State>(std::move(state))) {}
 
   /// Returns whether it was sent.
-  bool broadcast(const Value& value, std::int32_t max_backlog) const;
+  bool broadcast(SharedPipePacket& packet, std::int32_t max_backlog) const;
   void acknowledge(std::span<const std::uint32_t> numbers) const;
 
   std::shared_ptr<State> state_;

@@ -283,8 +283,14 @@ void ServiceClient::handle(const PipeClosed& closed, Now) {
   end_pipe(closed.id, true);
 }
 
-Result<std::uint32_t> ServiceClient::send_pipe_packet(PipeId id, const Value& value, bool wants_ack) {
-  auto sent = session_.send_pipe_packet(id, value, read_clocks(), wants_ack);
+Result<std::uint32_t> ServiceClient::send_pipe_packet(PipeId id, const Value& value) {
+  auto sent = session_.send_pipe_packet(id, value, read_clocks());
+  settle();
+  return sent;
+}
+
+Result<std::uint32_t> ServiceClient::send_pipe_packet(PipeId id, SharedPipePacket& packet) {
+  auto sent = session_.send_pipe_packet(id, packet, read_clocks());
   settle();
   return sent;
 }

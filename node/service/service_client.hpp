@@ -96,7 +96,8 @@ class ServiceClient final : public SessionDriver<ServiceSession>, private PipeSe
   void handle(const ClientGone& gone, Now now);
 
   // PipeSender: from endpoints
-  Result<std::uint32_t> send_pipe_packet(PipeId id, const Value& value, bool wants_ack) override;
+  Result<std::uint32_t> send_pipe_packet(PipeId id, const Value& value) override;
+  Result<std::uint32_t> send_pipe_packet(PipeId id, SharedPipePacket& packet) override;
   void close_pipe(PipeId id) override;
   std::size_t queued_bytes() const override { return session_.queued_bytes(); }
   void end_pipe(PipeId id, bool tells_handler);

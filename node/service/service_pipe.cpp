@@ -29,8 +29,9 @@ std::size_t Object::broadcast(std::string_view pipe, const Value& value, std::in
   if (found == members_.end()) return 0;
   // Endpoints that are lost while they are sent to leave the list meanwhile.
   const auto endpoints = found->second.endpoints;
+  SharedPipePacket packet(value, max_backlog != no_backlog_limit);
   return static_cast<std::size_t>(std::count_if(endpoints.begin(), endpoints.end(), [&](const PipeEndpoint& endpoint) {
-    return endpoint.broadcast(value, max_backlog);
+    return endpoint.broadcast(packet, max_backlog);
   }));
 }
 

@@ -63,7 +63,7 @@ template <class T>
 awaitable<void> run_attempt(std::shared_ptr<Race<T>> race, Runner<T> runner) {
   auto result = co_await runner.run();
   if (!result)
-    race->failures.emplace_back(std::move(runner.name), std::move(result.error()));
+    race->failures.emplace_back(std::move(runner.name), result.error());
   else if (!race->winner)
     race->winner.emplace(std::move(*result));  // one that comes too late goes, with what it has opened
   race->changed.cancel();

@@ -16,6 +16,14 @@ bool fits(const std::vector<std::string>& patterns, std::string_view text) {
                                          [&](const auto& pattern) { return rr::glob_matches(pattern, text); });
 }
 
+/// Whether the patterns fit an object, or any below it.
+bool leads_to(const std::vector<std::string>& patterns, std::string_view path) {
+  if (fits(patterns, path)) return true;
+  const auto below = std::string(path) + ".";
+  return std::any_of(patterns.begin(), patterns.end(),
+                     [&](const auto& pattern) { return rr::glob_leads_on(pattern, below); });
+}
+
 /// Whether the patterns fit every text there is.
 bool fits_all(const std::vector<std::string>& patterns) {
   const auto is_stars = [](const std::string& pattern) {
@@ -74,8 +82,9 @@ rr::Result<> AccessRules::check(const Identity& who, const AccessRequest& what) 
   if (what.verb == Verb::read && what.member.empty())
     return sees(who, what.device, given(what.service), given(what.path)) ? rr::Result<>() : denied(who, describe(what));
   for (const auto& rule : rules_)
-    if (gives(rule, what.verb) && is_for(rule, who) && fits(rule.devices, what.device) &&
-        fits(rule.services, what.service) && fits(rule.paths, what.path) && fits(rule.members, what.member))
+    if ((gives(rule, what.verb) || (what.is_shape && gives(rule, Verb::write))) && is_for(rule, who) &&
+        fits(rule.devices, what.device) && fits(rule.services, what.service) && fits(rule.paths, what.path) &&
+        fits(rule.members, what.member))
       return {};
   return denied(who, describe(what));
 }
@@ -104,10 +113,11 @@ bool AccessRules::sees_any(const Identity& who) const {
 bool AccessRules::sees(const Identity& who, std::string_view device, std::optional<std::string_view> service,
                        std::optional<std::string_view> path) const {
   if (is_open() || (!has_rules() && who.is_proven())) return true;
+  if (!path) path = service;  // its root object: all others are below
   return std::any_of(rules_.begin(), rules_.end(), [&](const AccessRule& rule) {
     return std::any_of(rule.may.begin(), rule.may.end(), is_device_verb) && is_for(rule, who) &&
            fits(rule.devices, device) && (!service || fits(rule.services, *service)) &&
-           (!path || fits(rule.paths, *path));
+           (!path || leads_to(rule.paths, *path));
   });
 }
 

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/robdef/model/service_definition.hpp"
 #include "core/support/error.hpp"
 #include "server/access/identity.hpp"
 
@@ -27,6 +28,11 @@ constexpr bool is_device_verb(Verb verb) {
   return verb <= Verb::lock;
 }
 
+/// What it takes to connect a wire or a pipe: where clients only send, nobody hears anything by it.
+inline Verb verb_to_connect(const rr::MemberDefinition& member) {
+  return member.direction() == rr::MemberDirection::writeonly ? Verb::write : Verb::subscribe;
+}
+
 /// What somebody wants. Borrowed for the call.
 struct AccessRequest {
   std::string_view device = {};   ///< its name in the gateway; empty for the gateway itself
@@ -34,6 +40,7 @@ struct AccessRequest {
   std::string_view path = {};     ///< of the object, as Robot Raconteur says it: "Create.axes[2]"; empty: the service
   std::string_view member = {};   ///< empty: the object as such
   Verb verb = Verb::read;         ///< to read a device, a service or an object as such is to know of it
+  bool is_shape = false;          ///< to read how large a memory is: also for those who may write it
 };
 
 /// Gives everybody who has one of the roles all of `may` on whatever fits one pattern of each list. Patterns have '*'
@@ -59,14 +66,15 @@ class AccessRules {
   AccessRules(std::vector<AccessRule> rules, bool needs_login)
       : rules_(std::move(rules)), needs_login_(needs_login || !rules_.empty()) {}
 
-  /// Whoever may do anything within a device, a service or an object may read it as such.
+  /// Whoever may do anything within a device, a service or an object may read it as such: also to what is below the
+  /// object, since it is on the way there.
   /// Errors   permission_denied: a sentence that says who may not do what, for the client.
   [[nodiscard]] rr::Result<> check(const Identity& who, const AccessRequest& what) const;
   /// Whether somebody may do all of device_verbs to everything of a device: only then can his bytes pass unread.
   /// Errors   permission_denied.
   [[nodiscard]] rr::Result<> check_whole_device(const Identity& who, std::string_view device) const;
-  /// Whether there is anything of a device, of a service of it, of an object of that, that somebody may do something
-  /// to.
+  /// Whether there is anything of a device, of a service of it, of an object of that or of one below it, that somebody
+  /// may do something to.
   bool sees(const Identity& who, std::string_view device, std::optional<std::string_view> service = {},
             std::optional<std::string_view> path = {}) const;
   /// Whether there is any device at all that somebody may do something to.

@@ -5,7 +5,9 @@
 
 #include "node/platform/secret_file.hpp"
 #include "node/platform/text_file.hpp"
+#include "node/tls/digest.hpp"
 #include "server/access/access_text.hpp"
+#include "server/access/base64url.hpp"
 #include "server/cli/cert.hpp"
 #include "server/cli/command.hpp"
 #include "server/cli/first_login.hpp"
@@ -33,6 +35,10 @@ std::string reason_to_keep(const fs::path& file) {
   return {};
 }
 
+/// With it sign-ins outlive the gateway's restart.
+constexpr const char* ticket_key_name = "tickets.key";
+constexpr std::size_t ticket_key_bytes = 48;
+
 nlohmann::ordered_json make_config(const fs::path& folder, const std::string& certificate) {
   auto config = nlohmann::ordered_json::object();
   config["listen"] = {"0.0.0.0:8443"};
@@ -40,6 +46,7 @@ nlohmann::ordered_json make_config(const fs::path& folder, const std::string& ce
   config["tls"]["certificates"] = {{{"cert", "tls/" + certificate + ".pem"}, {"key", "tls/" + certificate + ".key"}}};
   auto& access = config["access"];
   access["users_file"] = "users";
+  access["ticket_key_file"] = ticket_key_name;
   if (folder == service_folder) access["audit_file"] = std::string(service_log_folder) + "/audit.jsonl";
   access["rules"] = {
       {{"roles", {"viewer", "operator"}}, {"may", {"read", "subscribe"}}},
@@ -62,7 +69,7 @@ int init(const InitOptions& options) {
   const auto file = folder / "gateway.json";
   if (const auto reason = reason_to_keep(file); !reason.empty())
     return report_failure("init", file.string() + ": " + reason + "; nothing was written");
-  for (const auto* each : {"users", "tls"}) {
+  for (const auto* each : {"users", ticket_key_name, "tls"}) {
     std::error_code error;
     if (fs::exists(folder / each, error))
       return report_failure("init", (folder / each).string() + ": is there already; nothing was written");
@@ -74,6 +81,9 @@ int init(const InitOptions& options) {
 
   const auto password = write_first_user(folder / "users", user);
   if (!password) return report_failure("init", password.error().message);
+  const auto key = encode_base64url(rr::random_bytes(ticket_key_bytes));
+  if (const auto done = rr::write_secret(folder / ticket_key_name, key, false, rr::SecretReaders::folder_group); !done)
+    return report_failure("init", done.error().message);
   const auto config = make_config(folder, names.front()).dump(2) + "\n";
   if (const auto done = rr::write_secret(file, config, true, rr::SecretReaders::folder_group); !done)
     return report_failure("init", done.error().message);

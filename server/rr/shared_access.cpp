@@ -6,7 +6,7 @@ namespace rrgate {
 
 namespace {
 
-Verb verb_of(rr::EntryType type) {
+Verb verb_of(rr::EntryType type, const rr::MemberDefinition* member) {
   switch (type) {
     case rr::EntryType::property_set_req:
     case rr::EntryType::memory_write:
@@ -19,11 +19,12 @@ Verb verb_of(rr::EntryType type) {
       return Verb::call;
     case rr::EntryType::event_req:
     case rr::EntryType::callback_call_req:
+      return Verb::subscribe;
     case rr::EntryType::pipe_connect_req:
     case rr::EntryType::pipe_disconnect_req:
     case rr::EntryType::wire_connect_req:
     case rr::EntryType::wire_disconnect_req:
-      return Verb::subscribe;
+      return member ? verb_to_connect(*member) : Verb::subscribe;
     case rr::EntryType::client_session_op_req:
       return Verb::lock;
     default:
@@ -64,7 +65,7 @@ std::string_view event_of(rr::LockCommand command) {
   }
 }
 
-/// What is not about a member, but about a service as such. An object that is looked for may be on the way to another.
+/// What is not about a member, but about a service or an object of it as such.
 bool is_about_service(rr::EntryType type) {
   switch (type) {
     case rr::EntryType::null:
@@ -102,7 +103,9 @@ rr::Result<> SessionRights::admit_to_service(Standing& asker, const rr::MemberAc
   const auto& rules = access_.state().rules;
   if (device.empty() && rules.sees_any(asker.identity())) return {};
   const bool is_told = wanted.type != rr::EntryType::null;
-  auto allowed = asker.check({.device = device, .service = service}, is_told ? Recorded::each_time : Recorded::never);
+  AccessRequest request{.device = device, .service = service};
+  if (wanted.type == rr::EntryType::object_type_name) request.path = wanted.path;
+  auto allowed = asker.check(request, is_told ? Recorded::each_time : Recorded::never);
   if (allowed || wanted.user || asker.identity().is_proven() || !access_.authenticator()) return allowed;
   // The same for a service that is not there.
   return rr::make_error(rr::ErrorCode::authentication_error,
@@ -124,13 +127,14 @@ rr::Result<> SessionRights::admit(const rr::MemberAccess& wanted) {
   request.service = service;
   request.path = wanted.path;
   if (wanted.member) request.member = wanted.member->name;
-  request.verb = verb_of(wanted.type);
+  request.verb = verb_of(wanted.type, wanted.member);
+  request.is_shape = wanted.type == rr::EntryType::memory_get_param;
   return asker.check(request, recorded_of(wanted.type));
 }
 
 AuditEntryPtr SessionRights::begin(const rr::MemberAccess& admitted) {
   if (!admitted.member || recorded_of(admitted.type) != Recorded::each_time) return nullptr;
-  AccessRequest what{.path = admitted.path, .member = admitted.member->name, .verb = verb_of(admitted.type)};
+  AccessRequest what{.path = admitted.path, .member = admitted.member->name, .verb = verb_of(admitted.type, admitted.member)};
   return begin(what, admitted.user, {});
 }
 

@@ -184,7 +184,7 @@ void SharedClient::refuse_pipe(rr::PipeId id, const rr::Error& error) {
   settle();
 }
 
-void SharedClient::receive_packet(rr::PipeId id, const rr::Value& packet) {
+void SharedClient::receive_packet(rr::PipeId id, rr::SharedPipePacket& packet) {
   const auto sent = session_.send_pipe_packet(id, packet, rr::read_clocks());
   if (!sent && sent.error().code == rr::ErrorCode::out_of_system_resource) return end_too_slow(sent.error());
   settle();

@@ -105,7 +105,7 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   void close_wire(const std::string& path, const rr::MemberDefinition& wire) override;
   void accept_pipe(rr::PipeId id) override;
   void refuse_pipe(rr::PipeId id, const rr::Error& error) override;
-  void receive_packet(rr::PipeId id, const rr::Value& packet) override;
+  void receive_packet(rr::PipeId id, rr::SharedPipePacket& packet) override;
   bool is_behind() const override { return is_behind_; }
   void acknowledge_packets(rr::PipeId id, std::span<const std::uint32_t> numbers) override;
   void close_pipe(rr::PipeId id) override;

@@ -22,36 +22,16 @@ constexpr std::size_t max_running = 64;
 /// What the client may take to answer the device.
 constexpr std::chrono::seconds answer_time{10};
 
-rr::OrderedJson to_json(const Target& target, const rr::Value& value, const rr::JsonForm& form) {
-  return value_or_throw(rr::value_to_json(value, target.member->type, target.types(), form, target.member->name));
-}
-
-std::string path_of(const Target& target) {
-  return target.member ? target.path() + "." + target.member->name : target.path();
-}
-
-/// Throws   rr::Exception: the path leads to something else.
-const rr::MemberDefinition& expect_member(const Target& target, std::string_view operation,
-                                          std::initializer_list<rr::MemberKind> kinds) {
-  const auto* member = target.member;
-  if (member && std::find(kinds.begin(), kinds.end(), member->kind) != kinds.end()) return *member;
-  refuse(rr::ErrorCode::invalid_operation, rr::quote(path_of(target)) + " is a " +
-                                               (member ? std::string(member_kind_name(member->kind)) : "object") +
-                                               "; \"" + std::string(operation) + "\" is not for that");
-}
-
-void expect_direction(const rr::MemberDefinition& member, rr::MemberDirection never) {
-  if (member.direction() != never) return;
-  const bool is_read_only = never == rr::MemberDirection::readonly;
-  refuse(is_read_only ? rr::ErrorCode::read_only_member : rr::ErrorCode::write_only_member,
-         rr::quote(member.name) + (is_read_only ? " can only be read" : " can only be written"));
-}
-
 bool takes_values(const rr::MemberDefinition& function) {
   return !function.parameters.empty() && function.parameters.back().type.container == rr::ContainerKind::generator;
 }
 
 }  // namespace
+
+template <auto Answer>
+rr::awaitable<rr::OrderedJson> JsonOperations::pass_on(JsonRequestPtr request, TargetPtr target) {
+  return Answer(std::move(request), std::move(target), place_.form);
+}
 
 struct JsonOperations::Ask {
   Ask(TargetPtr of, rr::ClientConnection::CallbackReply to, const asio::any_io_executor& executor,
@@ -64,10 +44,10 @@ struct JsonOperations::Ask {
 };
 
 const JsonOperations::Operation JsonOperations::operations[] = {
-    {"describe", Verb::read, &JsonOperations::describe},
-    {"get", Verb::read, &JsonOperations::get},
-    {"set", Verb::write, &JsonOperations::set},
-    {"call", Verb::call, &JsonOperations::call},
+    {"describe", Verb::read, &JsonOperations::pass_on<&describe_target>},
+    {"get", Verb::read, &JsonOperations::pass_on<&get_value>},
+    {"set", Verb::write, &JsonOperations::pass_on<&set_value>},
+    {"call", Verb::call, &JsonOperations::pass_on<&call_function>},
     {"open", Verb::call, &JsonOperations::open},
     {"next", Verb::call, &JsonOperations::next, {.has_target = false}},
     {"close", Verb::call, &JsonOperations::close, {.has_target = false, .is_free = true}},
@@ -80,16 +60,19 @@ const JsonOperations::Operation JsonOperations::operations[] = {
      {.needs_own = true, .keeps_order = true, .is_free = true, .recorded = Recorded::first_time}},
     {"callback", Verb::subscribe, &JsonOperations::callback, {.needs_own = true}},
     {"answer", Verb::subscribe, &JsonOperations::answer, {.has_target = false, .is_free = true}},
-    {"shape", Verb::read, &JsonOperations::shape},
-    {"read", Verb::read, &JsonOperations::read},
-    {"write", Verb::write, &JsonOperations::write},
-    {"lock", Verb::lock, &JsonOperations::lock, {.needs_own = true}},
-    {"unlock", Verb::lock, &JsonOperations::unlock, {.needs_own = true}},
-    {"lease", Verb::lock, &JsonOperations::lease, {.needs_own = true}},
-    {"renew", Verb::lock, &JsonOperations::renew, {.needs_own = true, .is_free = true, .recorded = Recorded::never}},
+    {"shape", Verb::read, &JsonOperations::pass_on<&get_shape>, {.asks_shape = true}},
+    {"read", Verb::read, &JsonOperations::pass_on<&read_memory>},
+    {"write", Verb::write, &JsonOperations::pass_on<&write_memory>},
+    {"lock", Verb::lock, &JsonOperations::pass_on<&lock_object>, {.needs_own = true}},
+    {"unlock", Verb::lock, &JsonOperations::pass_on<&unlock_object>, {.needs_own = true}},
+    {"lease", Verb::lock, &JsonOperations::pass_on<&lease_object>, {.needs_own = true}},
+    {"renew",
+     Verb::lock,
+     &JsonOperations::pass_on<&renew_lease>,
+     {.needs_own = true, .is_free = true, .recorded = Recorded::never}},
     {"release",
      Verb::lock,
-     &JsonOperations::release,
+     &JsonOperations::pass_on<&release_lease>,
      {.needs_own = true, .is_free = true, .recorded = Recorded::never}},
     {"login", Verb::read, &JsonOperations::login, {.has_target = false, .keeps_order = true}},
 };
@@ -141,7 +124,7 @@ rr::awaitable<void> JsonOperations::take(const std::string& message) {
                    asio::detached);
 }
 
-rr::awaitable<void> JsonOperations::run(std::shared_ptr<JsonOperations> self, RequestPtr request,
+rr::awaitable<void> JsonOperations::run(std::shared_ptr<JsonOperations> self, JsonRequestPtr request,
                                         [[maybe_unused]] Passes passes, [[maybe_unused]] MemoryBudget::Charge memory) {
   std::optional<rr::Error> error;
   rr::OrderedJson result;
@@ -164,14 +147,14 @@ rr::awaitable<void> JsonOperations::run(std::shared_ptr<JsonOperations> self, Re
   }
 }
 
-rr::awaitable<rr::OrderedJson> JsonOperations::perform(RequestPtr request) {
+rr::awaitable<rr::OrderedJson> JsonOperations::perform(JsonRequestPtr request) {
   const auto name = request->text("op", "");
   const auto* operation = find_operation(name);
   if (!operation) refuse(rr::ErrorCode::invalid_argument, "no operation \"op\": " + rr::quote(name));
   TargetPtr target;
   if (!operation->traits.has_target) co_return co_await (this->*operation->perform)(request, target);
   target = co_await find(request, *operation);
-  const CallLog logged(place_.trace, place_.device->config().name, operation->name, path_of(*target));
+  const CallLog logged(place_.trace, place_.device->config().name, operation->name, name_of(*target));
   const auto entry = admit(*target, *operation);
   rr::OrderedJson result;
   std::optional<rr::Error> error;
@@ -185,11 +168,12 @@ rr::awaitable<rr::OrderedJson> JsonOperations::perform(RequestPtr request) {
   co_return result;
 }
 
-rr::awaitable<JsonOperations::TargetPtr> JsonOperations::find(RequestPtr request, const Operation& operation) {
+rr::awaitable<TargetPtr> JsonOperations::find(JsonRequestPtr request, const Operation& operation) {
   auto segments = place_.segments;
   for (auto& segment : value_or_throw(split_path(request->text("path", "")))) segments.push_back(std::move(segment));
   auto used = co_await client();
-  auto target = value_or_throw(co_await find_target(used, segments));
+  LookJudge may_look = [standing = place_.standing](const AccessRequest& object) { return standing->check(object); };
+  auto target = value_or_throw(co_await find_target(used, segments, std::move(may_look)));
   // Packets to a client come on the endpoint on which it has sent: nobody else's.
   const bool is_two_way = target->member && target->member->kind == rr::MemberKind::pipe &&
                           target->member->direction() == rr::MemberDirection::both;
@@ -214,7 +198,8 @@ rr::awaitable<JsonOperations::TargetPtr> JsonOperations::find(RequestPtr request
 }
 
 AuditEntryPtr JsonOperations::admit(const Target& target, const Operation& operation) {
-  const auto wanted = access_request(target, operation.verb);
+  auto wanted = access_request(target, operation.verb);
+  wanted.is_shape = operation.traits.asks_shape;
   auto begun = place_.standing->check_and_begin(wanted, place_.trace, operation.traits.recorded,
                                                 operation.verb == Verb::lock ? operation.name : std::string_view());
   if (begun) return std::move(*begun);
@@ -246,122 +231,7 @@ void JsonOperations::stop() {
   own_.reset();
 }
 
-// --- what is over with its answer ---
-
-rr::awaitable<rr::OrderedJson> JsonOperations::describe(RequestPtr, TargetPtr target) {
-  if (target->member) refuse(rr::ErrorCode::invalid_operation, rr::quote(path_of(*target)) + " is no object");
-  co_return describe_object(*target);
-}
-
-rr::awaitable<rr::OrderedJson> JsonOperations::get(RequestPtr, TargetPtr target) {
-  const auto& member = expect_member(*target, "get", {rr::MemberKind::property, rr::MemberKind::wire});
-  expect_direction(member, rr::MemberDirection::writeonly);
-  rr::Value value;
-  if (member.kind == rr::MemberKind::property)
-    value = co_await target->ask(rr::CallKind::property_get);
-  else
-    value = co_await target->ask(rr::CallKind::peek_in);
-  co_return to_json(*target, value, place_.form);
-}
-
-rr::awaitable<rr::OrderedJson> JsonOperations::set(RequestPtr request, TargetPtr target) {
-  const auto& member = expect_member(*target, "set", {rr::MemberKind::property, rr::MemberKind::wire});
-  expect_direction(member, rr::MemberDirection::readonly);
-  auto value =
-      value_or_throw(rr::value_from_json(request->at("value"), member.type, target->types(), place_.form, member.name));
-  if (member.kind == rr::MemberKind::property)
-    co_await target->ask(rr::CallKind::property_set, std::move(value));
-  else
-    co_await target->ask(rr::CallKind::poke_out, std::move(value));
-  co_return nullptr;
-}
-
-rr::awaitable<rr::OrderedJson> JsonOperations::call(RequestPtr request, TargetPtr target) {
-  const auto& member = expect_member(*target, "call", {rr::MemberKind::function});
-  if (member.is_generator())
-    refuse(rr::ErrorCode::invalid_operation, rr::quote(member.name) + " is a generator; use \"open\"");
-  static const auto none = rr::Json::object();
-  const auto* given = request->find("args");
-  auto called = target->request(rr::CallKind::function);
-  called.arguments = value_or_throw(arguments_from_json(given ? *given : none, member, target->types(), place_.form));
-  const auto value = co_await target->client->ask(std::move(called));
-  co_return to_json(*target, value, place_.form);
-}
-
-rr::awaitable<rr::OrderedJson> JsonOperations::shape(RequestPtr, TargetPtr target) {
-  expect_member(*target, "shape", {rr::MemberKind::memory});
-  const auto sizes = co_await memory_shape(*target);
-  co_return rr::OrderedJson(sizes);
-}
-
-rr::awaitable<rr::OrderedJson> JsonOperations::read(RequestPtr request, TargetPtr target) {
-  const auto& member = expect_member(*target, "read", {rr::MemberKind::memory});
-  expect_direction(member, rr::MemberDirection::writeonly);
-  const auto sizes = co_await memory_shape(*target);
-  const auto offset = request->numbers("offset", sizes.size());
-  const auto count = request->numbers("count", sizes.size());
-  const auto items = co_await read_items(*target, sizes, offset, count);
-  co_return to_json(*target, items, place_.form);
-}
-
-rr::awaitable<rr::OrderedJson> JsonOperations::write(RequestPtr request, TargetPtr target) {
-  const auto& member = expect_member(*target, "write", {rr::MemberKind::memory});
-  expect_direction(member, rr::MemberDirection::readonly);
-  const auto sizes = co_await memory_shape(*target);
-  auto part = target->request(rr::CallKind::memory_write);
-  part.range.position = request->numbers("offset", sizes.size()).value_or(Shape(sizes.size(), 0));
-  part.arguments.push_back(value_or_throw(
-      rr::value_from_json(request->at("value"), member.type, target->types(), place_.form, member.name)));
-  co_await target->client->ask(std::move(part));
-  co_return nullptr;
-}
-
-rr::awaitable<rr::OrderedJson> JsonOperations::lock(RequestPtr request, TargetPtr target) {
-  if (target->member) refuse(rr::ErrorCode::invalid_operation, "objects are locked, not their members");
-  const auto kind = request->text("kind", "client");
-  if (kind != "client" && kind != "user")
-    refuse(rr::ErrorCode::invalid_argument, "\"kind\" is " + rr::quote(kind) + ", expected \"client\" or \"user\"");
-  const auto command = kind == "user" ? rr::LockCommand::lock_for_user : rr::LockCommand::lock_for_client;
-  auto path = target->path();
-  co_await target->client->lock(command, std::move(path));
-  co_return nullptr;
-}
-
-rr::awaitable<rr::OrderedJson> JsonOperations::unlock(RequestPtr, TargetPtr target) {
-  auto path = target->path();
-  co_await target->client->lock(rr::LockCommand::unlock, std::move(path));
-  co_return nullptr;
-}
-
-rr::awaitable<rr::OrderedJson> JsonOperations::lease(RequestPtr request, TargetPtr target) {
-  if (target->member) refuse(rr::ErrorCode::invalid_operation, "leases are of objects, not of their members");
-  const auto& deadman = request->at("deadman");
-  if (!deadman.is_number_unsigned() || deadman.get<std::uint64_t>() > std::uint64_t(longest_deadman.count()))
-    refuse(rr::ErrorCode::invalid_argument,
-           "\"deadman\" is the milliseconds without renewal until the lease ends, at most " +
-               std::to_string(longest_deadman.count()));
-  const auto* takeover = request->find("takeover");
-  if (takeover && !takeover->is_boolean()) refuse(rr::ErrorCode::invalid_argument, "\"takeover\" is true or false");
-  const bool takes_over = takeover && takeover->get<bool>();
-  auto path = target->path();
-  co_await target->client->lock(takes_over ? rr::LockCommand::take_lease : rr::LockCommand::acquire_lease,
-                                std::move(path), milliseconds(deadman.get<std::int64_t>()));
-  co_return nullptr;
-}
-
-rr::awaitable<rr::OrderedJson> JsonOperations::renew(RequestPtr, TargetPtr target) {
-  auto path = target->path();
-  co_await target->client->lock(rr::LockCommand::renew_lease, std::move(path));
-  co_return nullptr;
-}
-
-rr::awaitable<rr::OrderedJson> JsonOperations::release(RequestPtr, TargetPtr target) {
-  auto path = target->path();
-  co_await target->client->lock(rr::LockCommand::release_lease, std::move(path));
-  co_return nullptr;
-}
-
-rr::awaitable<rr::OrderedJson> JsonOperations::login(RequestPtr request, TargetPtr) {
+rr::awaitable<rr::OrderedJson> JsonOperations::login(JsonRequestPtr request, TargetPtr) {
   if (own_ || !open_.empty() || running_ > 1)
     refuse(rr::ErrorCode::invalid_operation, "\"login\" comes first: others are under way, or something is open");
   auto key = place_.key;
@@ -387,13 +257,11 @@ std::string JsonOperations::reserve(const JsonRequest& request) {
   return id;
 }
 
-rr::awaitable<rr::OrderedJson> JsonOperations::open(RequestPtr request, TargetPtr target) {
+rr::awaitable<rr::OrderedJson> JsonOperations::open(JsonRequestPtr request, TargetPtr target) {
   const auto& member = expect_member(*target, "open", {rr::MemberKind::function});
   if (!member.is_generator())
     refuse(rr::ErrorCode::invalid_operation, rr::quote(member.name) + " is no generator; use \"call\"");
-  static const auto none = rr::Json::object();
-  const auto* given = request->find("args");
-  auto arguments = value_or_throw(arguments_from_json(given ? *given : none, member, target->types(), place_.form));
+  auto arguments = arguments_of(*request, *target, place_.form);
   const auto id = reserve(*request);
   Generator generator{target, target->client->next_generator()};
   auto opening = target->request(rr::CallKind::generator_open);
@@ -424,15 +292,15 @@ JsonOperations::Generator& JsonOperations::generator_of(const JsonRequest& reque
   return *generator;
 }
 
-rr::awaitable<rr::OrderedJson> JsonOperations::next(RequestPtr request, TargetPtr) {
+rr::awaitable<rr::OrderedJson> JsonOperations::next(JsonRequestPtr request, TargetPtr) {
   const auto [target, generator] = generator_of(*request);
-  const auto& member = *target->member;
+  value_or_throw(place_.standing->check(access_request(*target, Verb::call), Recorded::never));
   auto step = target->request(rr::CallKind::generator_next);
   step.generator = generator;
-  if (takes_values(member))
-    step.arguments.push_back(
-        value_or_throw(rr::value_from_json(request->at("value"), member.parameters.back().type, target->types(),
-                                           place_.form, member.parameters.back().name)));
+  if (takes_values(*target->member)) {
+    const auto& taken = target->member->parameters.back();
+    step.arguments.push_back(value_of(*request, *target, taken.type, taken.name, place_.form));
+  }
   rr::Value value;
   std::optional<rr::Error> error;
   try {
@@ -453,7 +321,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::next(RequestPtr request, TargetPt
   co_return out;
 }
 
-rr::awaitable<rr::OrderedJson> JsonOperations::end_generator(RequestPtr request, rr::CallKind how) {
+rr::awaitable<rr::OrderedJson> JsonOperations::end_generator(JsonRequestPtr request, rr::CallKind how) {
   const auto [target, generator] = generator_of(*request);
   open_.erase(request->at("generator").dump());
   auto end = target->request(how);
@@ -462,11 +330,11 @@ rr::awaitable<rr::OrderedJson> JsonOperations::end_generator(RequestPtr request,
   co_return nullptr;
 }
 
-rr::awaitable<rr::OrderedJson> JsonOperations::close(RequestPtr request, TargetPtr) {
+rr::awaitable<rr::OrderedJson> JsonOperations::close(JsonRequestPtr request, TargetPtr) {
   return end_generator(request, rr::CallKind::generator_close);
 }
 
-rr::awaitable<rr::OrderedJson> JsonOperations::abort(RequestPtr request, TargetPtr) {
+rr::awaitable<rr::OrderedJson> JsonOperations::abort(JsonRequestPtr request, TargetPtr) {
   return end_generator(request, rr::CallKind::generator_abort);
 }
 
@@ -492,7 +360,7 @@ std::string sample_text(const std::string& id, const Sample& sample, const Targe
 
 }  // namespace
 
-rr::awaitable<rr::OrderedJson> JsonOperations::subscribe(RequestPtr request, TargetPtr target) {
+rr::awaitable<rr::OrderedJson> JsonOperations::subscribe(JsonRequestPtr request, TargetPtr target) {
   const auto& member =
       expect_member(*target, "subscribe", {rr::MemberKind::event, rr::MemberKind::wire, rr::MemberKind::pipe});
   expect_direction(member, rr::MemberDirection::writeonly);
@@ -527,7 +395,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::subscribe(RequestPtr request, Tar
   co_return nullptr;
 }
 
-rr::awaitable<rr::OrderedJson> JsonOperations::unsubscribe(RequestPtr request, TargetPtr) {
+rr::awaitable<rr::OrderedJson> JsonOperations::unsubscribe(JsonRequestPtr request, TargetPtr) {
   const auto found = open_.find(request->at("subscription").dump());
   if (found == open_.end() || std::holds_alternative<Generator>(found->second))
     refuse(rr::ErrorCode::invalid_argument, "\"subscription\" is not the id of one that is open");
@@ -536,16 +404,16 @@ rr::awaitable<rr::OrderedJson> JsonOperations::unsubscribe(RequestPtr request, T
   co_return nullptr;
 }
 
-rr::awaitable<rr::OrderedJson> JsonOperations::send(RequestPtr request, TargetPtr target) {
+rr::awaitable<rr::OrderedJson> JsonOperations::send(JsonRequestPtr request, TargetPtr target) {
   const auto& member = expect_member(*target, "send", {rr::MemberKind::wire, rr::MemberKind::pipe});
   expect_direction(member, rr::MemberDirection::readonly);
-  auto value =
-      value_or_throw(rr::value_from_json(request->at("value"), member.type, target->types(), place_.form, member.name));
+  auto value = value_of(*request, *target, member.type, member.name, place_.form);
   const std::pair key(target->path(), member.name);
   if (!senders_.contains(key)) {
     if (senders_.size() >= max_open)
       refuse(rr::ErrorCode::out_of_system_resource,
              "this WebSocket sends on " + std::to_string(max_open) + " wires and pipes already");
+    value_or_throw(place_.standing->check(access_request(*target, verb_to_connect(*target->member)), Recorded::never));
     SampleHandler nothing = [](const SamplePtr&, const rr::Error*) {};
     auto place = target->place();
     auto listening = value_or_throw(co_await target->client->listen(std::move(place), 0, std::move(nothing)));
@@ -560,7 +428,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::send(RequestPtr request, TargetPt
 
 // --- the device asks ---
 
-rr::awaitable<rr::OrderedJson> JsonOperations::callback(RequestPtr request, TargetPtr target) {
+rr::awaitable<rr::OrderedJson> JsonOperations::callback(JsonRequestPtr request, TargetPtr target) {
   expect_member(*target, "callback", {rr::MemberKind::callback});
   const auto id = reserve(*request);
   const auto asked = std::make_shared<Target>(*target);
@@ -606,7 +474,7 @@ void JsonOperations::ask(const std::string& id, const TargetPtr& target, std::sp
   outbox_->add("{\"callback\":" + id + "," + rr::write_json(question).substr(1));
 }
 
-rr::awaitable<rr::OrderedJson> JsonOperations::answer(RequestPtr request, TargetPtr) {
+rr::awaitable<rr::OrderedJson> JsonOperations::answer(JsonRequestPtr request, TargetPtr) {
   const auto& number = request->at("call");
   const auto found = asks_.find(number.is_number_integer() ? number.get<std::int64_t>() : 0);
   if (found == asks_.end())

@@ -9,9 +9,8 @@
 
 #include "node/transport/watchdog.hpp"
 #include "server/access/standing.hpp"
-#include "server/http/endpoints/object_request.hpp"
+#include "server/socket/json_members.hpp"
 #include "server/socket/json_outbox.hpp"
-#include "server/socket/json_request.hpp"
 #include "server/state/http_access.hpp"
 
 namespace rrgate {
@@ -38,13 +37,12 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
   void stop();
 
  private:
-  using TargetPtr = std::shared_ptr<Target>;
-  using RequestPtr = std::shared_ptr<const JsonRequest>;
-  using Perform = rr::awaitable<rr::OrderedJson> (JsonOperations::*)(RequestPtr request, TargetPtr target);
+  using Perform = rr::awaitable<rr::OrderedJson> (JsonOperations::*)(JsonRequestPtr request, TargetPtr target);
   struct Traits {
     bool has_target = true;    ///< the request names an object or a member by its path
     bool needs_own = false;    ///< to be a client of its own
     bool keeps_order = false;  ///< the next message waits for it
+    bool asks_shape = false;   ///< see AccessRequest::is_shape
     bool is_free = false;      ///< of bounds on requests: packets, and what ends something
     Recorded recorded = Recorded::each_time;
   };
@@ -71,42 +69,33 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
   struct Ask;
 
   using Passes = std::shared_ptr<const HttpAccess::Passes>;
-  static rr::awaitable<void> run(std::shared_ptr<JsonOperations> self, RequestPtr request, Passes passes,
+  static rr::awaitable<void> run(std::shared_ptr<JsonOperations> self, JsonRequestPtr request, Passes passes,
                                  MemoryBudget::Charge memory);
-  rr::awaitable<rr::OrderedJson> perform(RequestPtr request);
-  rr::awaitable<TargetPtr> find(RequestPtr request, const Operation& operation);
+  rr::awaitable<rr::OrderedJson> perform(JsonRequestPtr request);
+  rr::awaitable<TargetPtr> find(JsonRequestPtr request, const Operation& operation);
   /// Throws   rr::Exception: there is no right to it, or it can't be recorded.
   AuditEntryPtr admit(const Target& target, const Operation& operation);
   rr::awaitable<std::shared_ptr<ValueClient>> client();
   void tell_error(const std::string& id, const rr::Error& error);
 
-  rr::awaitable<rr::OrderedJson> describe(RequestPtr request, TargetPtr target);
-  rr::awaitable<rr::OrderedJson> get(RequestPtr request, TargetPtr target);
-  rr::awaitable<rr::OrderedJson> set(RequestPtr request, TargetPtr target);
-  rr::awaitable<rr::OrderedJson> call(RequestPtr request, TargetPtr target);
-  rr::awaitable<rr::OrderedJson> open(RequestPtr request, TargetPtr target);
-  rr::awaitable<rr::OrderedJson> next(RequestPtr request, TargetPtr);
-  rr::awaitable<rr::OrderedJson> close(RequestPtr request, TargetPtr);
-  rr::awaitable<rr::OrderedJson> abort(RequestPtr request, TargetPtr);
-  rr::awaitable<rr::OrderedJson> subscribe(RequestPtr request, TargetPtr target);
-  rr::awaitable<rr::OrderedJson> unsubscribe(RequestPtr request, TargetPtr);
-  rr::awaitable<rr::OrderedJson> send(RequestPtr request, TargetPtr target);
-  rr::awaitable<rr::OrderedJson> callback(RequestPtr request, TargetPtr target);
-  rr::awaitable<rr::OrderedJson> answer(RequestPtr request, TargetPtr);
-  rr::awaitable<rr::OrderedJson> shape(RequestPtr request, TargetPtr target);
-  rr::awaitable<rr::OrderedJson> read(RequestPtr request, TargetPtr target);
-  rr::awaitable<rr::OrderedJson> write(RequestPtr request, TargetPtr target);
-  rr::awaitable<rr::OrderedJson> lock(RequestPtr request, TargetPtr target);
-  rr::awaitable<rr::OrderedJson> unlock(RequestPtr request, TargetPtr target);
-  rr::awaitable<rr::OrderedJson> lease(RequestPtr request, TargetPtr target);
-  rr::awaitable<rr::OrderedJson> renew(RequestPtr request, TargetPtr target);
-  rr::awaitable<rr::OrderedJson> release(RequestPtr request, TargetPtr target);
-  rr::awaitable<rr::OrderedJson> login(RequestPtr request, TargetPtr);
+  /// To a function of json_members.hpp.
+  template <auto Answer>
+  rr::awaitable<rr::OrderedJson> pass_on(JsonRequestPtr request, TargetPtr target);
+  rr::awaitable<rr::OrderedJson> open(JsonRequestPtr request, TargetPtr target);
+  rr::awaitable<rr::OrderedJson> next(JsonRequestPtr request, TargetPtr);
+  rr::awaitable<rr::OrderedJson> close(JsonRequestPtr request, TargetPtr);
+  rr::awaitable<rr::OrderedJson> abort(JsonRequestPtr request, TargetPtr);
+  rr::awaitable<rr::OrderedJson> subscribe(JsonRequestPtr request, TargetPtr target);
+  rr::awaitable<rr::OrderedJson> unsubscribe(JsonRequestPtr request, TargetPtr);
+  rr::awaitable<rr::OrderedJson> send(JsonRequestPtr request, TargetPtr target);
+  rr::awaitable<rr::OrderedJson> callback(JsonRequestPtr request, TargetPtr target);
+  rr::awaitable<rr::OrderedJson> answer(JsonRequestPtr request, TargetPtr);
+  rr::awaitable<rr::OrderedJson> login(JsonRequestPtr request, TargetPtr);
 
   /// Takes the request's id for what it opens. Throws   rr::Exception: no id, one that is in use, too many.
   std::string reserve(const JsonRequest& request);
   Generator& generator_of(const JsonRequest& request);
-  rr::awaitable<rr::OrderedJson> end_generator(RequestPtr request, rr::CallKind how);
+  rr::awaitable<rr::OrderedJson> end_generator(JsonRequestPtr request, rr::CallKind how);
   /// The device asks.
   void ask(const std::string& id, const TargetPtr& target, std::span<const rr::Value> arguments,
            rr::ClientConnection::CallbackReply reply);

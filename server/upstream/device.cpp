@@ -209,7 +209,7 @@ rr::awaitable<void> Device::watch() {
       config_.url = std::move(reached->url);
       result = std::move(reached->answer);
     } else {
-      result = std::move(reached.error());
+      result = reached.error();
     }
     is_circle_ = has_come_back_ && !result;
     if (is_circle_) result = rr::make_error(rr::ErrorCode::connection_error, circle);

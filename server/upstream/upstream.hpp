@@ -67,7 +67,7 @@ class UpstreamClient {
   virtual void close_wire(const std::string& path, const rr::MemberDefinition& wire) = 0;
   virtual void accept_pipe(rr::PipeId id) = 0;
   virtual void refuse_pipe(rr::PipeId id, const rr::Error& error) = 0;
-  virtual void receive_packet(rr::PipeId id, const rr::Value& packet) = 0;
+  virtual void receive_packet(rr::PipeId id, rr::SharedPipePacket& packet) = 0;
   /// Whether much waits for its stream: what it has joined should be sent no faster than it reads. It says with
   /// Upstream::caught_up() that this is over.
   virtual bool is_behind() const = 0;
@@ -262,6 +262,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   void pipe_attached(PipeNumber number, const std::string& path, const std::string& member,
                      const rr::Result<rr::Value>& result, bool is_first);
   void drop_pipe(PipeNumber number);
+  void end_endpoint(const EndpointKey& endpoint);
   std::vector<PipeNumber> pipes_of(const UpstreamClient& client) const;
   /// Lets the device go on, or not, as the slowest client of the pipe can take it.
   void pace_pipe(PipeNumber number);
@@ -299,6 +300,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   std::map<PipeNumber, Pipe> pipes_;
   std::map<MemberKey, PipeNumber> shared_pipes_;
   std::map<EndpointKey, PipeNumber> endpoints_;
+  std::uint64_t endpoints_left_ = 0;  ///< how many ever have: while none does, nobody has to be looked up in endpoints_
   PipeNumber last_pipe_ = 0;
   std::map<std::pair<UpstreamClient*, rr::GeneratorId>, Generator> generators_;
   std::vector<OpenCall> calls_;                         ///< of functions, oldest first

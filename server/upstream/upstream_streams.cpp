@@ -216,8 +216,11 @@ void Upstream::attach_pipe(PipeNumber number) {
     const auto at = self->pipes_.find(number);
     if (at == self->pipes_.end()) return;
     const auto endpoints = at->second.endpoints;  // they may leave
+    const auto left = self->endpoints_left_;
+    rr::SharedPipePacket shared(packet);
     for (const auto& endpoint : endpoints)
-      if (self->endpoints_.contains(endpoint)) endpoint.first->receive_packet(endpoint.second, packet);
+      if (self->endpoints_left_ == left || self->endpoints_.contains(endpoint))
+        endpoint.first->receive_packet(endpoint.second, shared);
     self->pace_pipe(number);
   };
   handlers.acknowledged = [weak, number](std::span<const std::uint32_t> numbers) {
@@ -248,7 +251,7 @@ void Upstream::pipe_attached(PipeNumber number, const std::string& path, const s
     if (!is_first && !connection_) return;  // lost again: the next attempt will do
     const auto endpoints = pipe.endpoints;
     if (!is_first) return drop_pipe(number);
-    for (const auto& endpoint : endpoints) endpoints_.erase(endpoint);
+    for (const auto& endpoint : endpoints) end_endpoint(endpoint);
     shared_pipes_.erase({pipe.path, pipe.member->name});
     pipes_.erase(found);
     for (const auto& endpoint : endpoints)
@@ -269,7 +272,7 @@ void Upstream::leave_pipe(UpstreamClient& client, rr::PipeId id) {
   if (known == endpoints_.end()) return;
   const auto number = known->second;
   const auto found = pipes_.find(number);
-  endpoints_.erase(known);
+  end_endpoint(endpoint);
   auto& pipe = found->second;
   std::erase(pipe.endpoints, endpoint);
   if (!pipe.endpoints.empty()) return pace_pipe(number);
@@ -279,6 +282,10 @@ void Upstream::leave_pipe(UpstreamClient& client, rr::PipeId id) {
   pipes_.erase(found);
 }
 
+void Upstream::end_endpoint(const EndpointKey& endpoint) {
+  endpoints_left_ += endpoints_.erase(endpoint);
+}
+
 void Upstream::drop_pipe(PipeNumber number) {
   const auto dropped = pipes_.extract(number);
   if (!dropped) return;
@@ -286,7 +293,7 @@ void Upstream::drop_pipe(PipeNumber number) {
   if (const auto known = shared_pipes_.find({pipe.path, pipe.member->name});
       known != shared_pipes_.end() && known->second == number)
     shared_pipes_.erase(known);
-  for (const auto& endpoint : pipe.endpoints) endpoints_.erase(endpoint);
+  for (const auto& endpoint : pipe.endpoints) end_endpoint(endpoint);
   for (const auto& endpoint : pipe.endpoints)
     if (has(*endpoint.first)) endpoint.first->close_pipe(endpoint.second);
 }

@@ -279,8 +279,9 @@ void ValueClient::refuse_pipe(rr::PipeId id, const rr::Error& error) {
   if (const auto refused = pipes_.extract(id)) joined(refused.mapped(), error);
 }
 
-void ValueClient::receive_packet(rr::PipeId id, const rr::Value& packet) {
-  if (const auto found = pipes_.find(id); found != pipes_.end()) publish(Key(found->second), Sample{0, {}, {packet}});
+void ValueClient::receive_packet(rr::PipeId id, rr::SharedPipePacket& packet) {
+  if (const auto found = pipes_.find(id); found != pipes_.end())
+    publish(Key(found->second), Sample{0, {}, {packet.value()}});
 }
 
 void ValueClient::close_pipe(rr::PipeId id) {

@@ -135,7 +135,7 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   void close_wire(const std::string& path, const rr::MemberDefinition& wire) override;
   void accept_pipe(rr::PipeId id) override;
   void refuse_pipe(rr::PipeId id, const rr::Error& error) override;
-  void receive_packet(rr::PipeId id, const rr::Value& packet) override;
+  void receive_packet(rr::PipeId id, rr::SharedPipePacket& packet) override;
   bool is_behind() const override { return false; }
   void acknowledge_packets(rr::PipeId, std::span<const std::uint32_t>) override {}
   void close_pipe(rr::PipeId id) override;

@@ -55,6 +55,11 @@ export class Program {
     await ended;
   }
 
+  /** Such as SIGSTOP: it is there, and answers nothing. */
+  signal(signal: NodeJS.Signals): void {
+    this.#child?.kill(signal);
+  }
+
   /** Waits for the process to write what `pattern` finds. */
   async waitForOutput(pattern: RegExp, withinMs = 30_000): Promise<RegExpExecArray> {
     const giveUp = Date.now() + withinMs;

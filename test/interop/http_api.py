@@ -62,7 +62,10 @@ class Stream:
     def next(self):
         fields = {}
         while True:
-            line = self.response.readline().decode().rstrip("\n")
+            line = self.response.readline().decode()
+            if not line:
+                raise EOFError("the stream has ended")
+            line = line.rstrip("\n")
             if not line and "data" in fields:
                 return fields.get("id"), fields.get("event"), json.loads(fields["data"])
             name, colon, value = line.partition(": ")

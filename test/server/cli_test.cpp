@@ -1,9 +1,13 @@
 #include <catch2/catch.hpp>
 
+#include "server/access/access.hpp"
 #include "server/cli/command.hpp"
+#include "server/config/config.hpp"
 #include "server/config/version.hpp"
 #include "server/log/log.hpp"
 #include "test/server/support/command_run.hpp"
+#include "test/support/folder.hpp"
+#include "test/support/print.hpp"
 
 using namespace rrgate;
 
@@ -82,4 +86,25 @@ TEST_CASE("log lines quote what strangers wrote") {
   CHECK(format_log_text("x", {{"name", "a\nlevel=error"}}) == "x name='a\\x0alevel=error'");
   CHECK(format_log_json("x", {{"name", "a\"\n\\"}, {"n", 7}}) == R"("event":"x","name":"a\"\u000a\\","n":7)");
   CHECK(format_log_text("x", {{"name", std::string(1000, 'y')}}).size() < 400);
+}
+
+TEST_CASE("init: the configuration has a key of its own, so that sign-ins outlive a restart") {
+  const test::Folder folder;
+  const auto config = folder.path("gateway.json");
+  REQUIRE(test::run_command("init", {std::filesystem::path(config).parent_path().string()}).code == 0);
+  const auto read = load_config(config);
+  REQUIRE(read.findings.empty());
+  const auto first = load_access(read.config.access);
+  REQUIRE(first);
+  CHECK((*first)->ticket_key.size() >= 48);
+  CHECK(load_access(read.config.access).value()->ticket_key == (*first)->ticket_key);
+  using std::filesystem::perms;
+  const auto mode = std::filesystem::status(folder.path("tickets.key")).permissions();
+  CHECK((mode & (perms::others_all | perms::group_write)) == perms::none);
+
+  const test::Folder other;
+  other.write("tickets.key", "somebody's");
+  const auto again = test::run_command("init", {std::filesystem::path(other.path("x")).parent_path().string()});
+  CHECK(again.code == 1);
+  CHECK_THAT(again.errors, Catch::Contains("tickets.key: is there already; nothing was written"));
 }

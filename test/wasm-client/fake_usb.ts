@@ -1,7 +1,7 @@
 // A navigator.usb with devices that are not there: WebUSB's rules and errors as Chromium has them, the simulated device of
 // test/core/hardware (usb_device/test_usb_device.cpp) behind them. Runs in Node and in pages.
-import { JsValues } from "../../wasm-client/dist/js_values.js";
-import type { CoreExports, Handle } from "../../wasm-client/dist/js_values.js";
+import { JsValues } from "../../wasm-client/dist/internal.js";
+import type { CoreExports, Handle } from "../../wasm-client/dist/internal.js";
 import type {
   WebUsb,
   WebUsbConfiguration,

@@ -1,6 +1,6 @@
 // Slips of those who call: each is told at once, and disturbs nothing else.
 import { connect, ErrorCode, subscribe } from "../../wasm-client/dist/node.js";
-import { platform } from "../../wasm-client/dist/platform.js";
+import { platform } from "../../wasm-client/dist/internal.js";
 import type { RemoteObject } from "../../wasm-client/dist/node.js";
 import { failure, TestService } from "./service.js";
 
@@ -89,7 +89,7 @@ it("says what a URL looks like", async () => {
 it("says why the core could not be loaded, in a class of its own, and tries again", async () => {
   vi.resetModules(); // so that nothing is loaded yet
   const fresh = await import("../../wasm-client/dist/node.js");
-  const own = (await import("../../wasm-client/dist/platform.js")) as { platform: typeof platform };
+  const own = (await import("../../wasm-client/dist/internal.js")) as { platform: typeof platform };
   const { loadWasm } = own.platform;
   own.platform.loadWasm = () => Promise.reject(new Error("404 Not Found"));
   const attempt = () => fresh.connect("ws://test.example/?service=test", { transport: service.transport });

@@ -21,8 +21,8 @@
 // Service "test", node "test.service", attribute site = "dock".
 import { readFileSync } from "node:fs";
 import { connect } from "../../wasm-client/dist/node.js";
-import { JsValues } from "../../wasm-client/dist/js_values.js";
-import type { CoreExports, Handle } from "../../wasm-client/dist/js_values.js";
+import { JsValues } from "../../wasm-client/dist/internal.js";
+import type { CoreExports, Handle } from "../../wasm-client/dist/internal.js";
 import type { ConnectOptions, OpenTransport, RemoteObject, TransportListener } from "../../wasm-client/dist/node.js";
 
 /* eslint-disable @typescript-eslint/naming-convention -- names of C++ */

@@ -1,5 +1,5 @@
 // URLs of services.
-import { parseServiceUrl } from "../../wasm-client/dist/url.js";
+import { parseServiceUrl } from "../../wasm-client/dist/internal.js";
 
 const parse = (text: string, base?: string) => {
   const { address, service, nodeId, nodeName } = parseServiceUrl(text, base);

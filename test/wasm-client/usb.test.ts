@@ -435,7 +435,7 @@ describe("a session that is up", () => {
 describe("the stream below", () => {
   /** The transport that connect() uses, without a session on it. */
   async function open(listener: Partial<TransportListener> = {}): Promise<Transport> {
-    const { openUsb } = await import("../../wasm-client/dist/usb_devices.js");
+    const { openUsb } = await import("../../wasm-client/dist/internal.js");
     let opened!: () => void;
     const isOpen = new Promise<void>((resolve) => (opened = resolve));
     const silent = { opened, received: () => undefined, closed: () => undefined };

@@ -94,6 +94,7 @@ describe("addresses", () => {
       service: "Create",
       path: [],
       view: "auto",
+      board: null,
     });
     expect(parseRoute("#/else")).toEqual({ page: "unknown", address: "/else" });
     expect(parseRoute("#/devices/%")).toEqual({ page: "unknown", address: "/devices/%" });
@@ -110,8 +111,13 @@ describe("addresses", () => {
       service: "W",
       path,
       view: "auto",
+      board: null,
     });
     expect(parseRoute(formatRoute("c", "C", [], "members"))).toMatchObject({ view: "members" });
+    expect(parseRoute(`${formatRoute("c", "C", [], "board")}&board=e30`)).toMatchObject({
+      view: "board",
+      board: "e30",
+    });
   });
 });
 

@@ -1,5 +1,5 @@
 // Puts what CMake's preset "wasm" built beside the compiled TypeScript. Part of `npm run build`.
-import { copyFile, mkdir } from "node:fs/promises";
+import { copyFile, mkdir, readFile, writeFile } from "node:fs/promises";
 
 const from = new URL("../../build/wasm/wasm-client/", import.meta.url);
 const to = new URL("../dist/", import.meta.url);
@@ -14,3 +14,14 @@ for (const [file, place] of [
     );
   });
 }
+
+// The same with the core in the script, for where no second file can be served.
+const core = await readFile(new URL("rrgate.wasm", to), "base64");
+await writeFile(
+  new URL("inline.js", to),
+  `import { init } from "./index.js";
+export * from "./index.js";
+init({ wasm: () => Uint8Array.from(atob("${core}"), (c) => c.charCodeAt(0)) });
+`,
+);
+await writeFile(new URL("inline.d.ts", to), `export * from "./index.js";\n`);

@@ -7,7 +7,7 @@ import type { OpenTransport, Transport } from "./transport.js";
 import type { ObjectInfo, RemoteObject } from "./types.js";
 import { parseServiceUrl } from "./url.js";
 import { openUsb } from "./usb_devices.js";
-import { Core } from "./wasm_module.js";
+import { Core, preload } from "./wasm_module.js";
 import type { KnownDefinitions } from "./wasm_module.js";
 import { openWebsocket } from "./websocket.js";
 import { checkSignal } from "./within.js";
@@ -43,6 +43,9 @@ export interface ConnectOptions extends Proof {
 const defaultConnectTimeout = 30_000;
 const defaultRequestTimeout = 15_000;
 
+/** A root object; `await using` ends its session. */
+export type Client<T> = T & { readonly $: ObjectInfo } & AsyncDisposable;
+
 /** What stays from one connection of a subscription to the next. */
 export interface Memory {
   known: KnownDefinitions;
@@ -61,7 +64,7 @@ export interface Memory {
 export function connect<T = RemoteObject>(
   url: string | URL | UrlSource,
   options: ConnectOptions = {},
-): Promise<T & { readonly $: ObjectInfo }> {
+): Promise<Client<T>> {
   return connectWith<T>(url, options);
 }
 
@@ -70,7 +73,7 @@ export async function connectWith<T>(
   url: string | URL | UrlSource,
   options: ConnectOptions,
   memory?: Memory,
-): Promise<T & { readonly $: ObjectInfo }> {
+): Promise<Client<T>> {
   const { signal } = options;
   checkSignal(signal);
   signal?.throwIfAborted();
@@ -81,6 +84,7 @@ export async function connectWith<T>(
     throw makeError("InvalidArgument", "found a password or credentials without username");
   }
 
+  void preload().catch(() => undefined); // while the socket opens; Core.create() says what is wrong
   const attempt = new Attempt();
   const abort = () => attempt.fail(signal?.reason);
   signal?.addEventListener("abort", abort, { once: true });
@@ -115,7 +119,7 @@ export async function connectWith<T>(
     const session = attempt.begin(core, requestTimeout);
     if (memory) session.onClose(() => (memory.known = core.knownDefinitions()));
     const type = await attempt.unlessFailed(session.start());
-    return new ObjectTree(session).root(service, type) as T & { readonly $: ObjectInfo };
+    return new ObjectTree(session).root(service, type) as Client<T>;
   } catch (error) {
     attempt.fail(error);
     throw error;

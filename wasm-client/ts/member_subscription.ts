@@ -1,7 +1,10 @@
 // Wires and pipes that outlive connections. Layer: wasm-client/ts. Source: sessions spec section 2.17.
 import type { Clock } from "./clock.js";
+import { asyncDispose } from "./dispose.js";
 import { callSafely, makeError } from "./errors.js";
 import { ValueQueue } from "./members/queue.js";
+import { ValueStore } from "./store.js";
+import type { Store } from "./store.js";
 import type { Subscription } from "./subscribe.js";
 import type { CallOptions, Losses, PipeEndpoint, RemoteObject, RrValue, WireConnection, WireTime } from "./types.js";
 
@@ -19,15 +22,19 @@ export interface PipeSubscriptionOptions extends MemberSubscriptionOptions {
 const retryMs = 2_500;
 
 interface Connection {
+  close(): Promise<unknown>;
+}
+
+/** Of wires and pipes. */
+interface Stream extends Connection {
   send(value: unknown): Promise<void>;
   losses(options?: CallOptions): Promise<Losses | undefined>;
-  close(): Promise<void>;
 }
 
 /** Follows a subscription from one connection to the next, and connects its member there. */
-abstract class MemberSubscription<C extends Connection> implements AsyncIterable<RrValue> {
+abstract class MemberSubscription<C extends Connection, V> implements AsyncIterable<V> {
   protected connection: C | undefined;
-  readonly #loops = new Set<ValueQueue<RrValue>>();
+  readonly #loops = new Set<ValueQueue<V>>();
   readonly #failed = new Set<(error: unknown) => void>();
   readonly #stops: (() => void)[];
   #stopWaiting: (() => void) | undefined;
@@ -54,22 +61,8 @@ abstract class MemberSubscription<C extends Connection> implements AsyncIterable
     return () => void this.#failed.delete(failed);
   }
 
-  /**
-   * Sends over the connection that is up.
-   * @throws RobotRaconteurError InvalidOperation (rejects) while there is none: nothing is kept for later.
-   */
-  send(value: unknown): Promise<void> {
-    if (this.connection) return this.connection.send(value);
-    return Promise.reject(makeError("InvalidOperation", `${this.member}: is not connected at the moment`));
-  }
-
-  /** Of the connection that is up; undefined while there is none, and where the service keeps no account of it. */
-  async losses(options?: CallOptions): Promise<Losses | undefined> {
-    return this.connection?.losses(options);
-  }
-
   /** Leaving the loop closes this subscription of the member. */
-  [Symbol.asyncIterator](): AsyncIterator<RrValue, undefined> {
+  [Symbol.asyncIterator](): AsyncIterator<V, undefined> {
     const queue = this.makeQueue(() => {
       this.#loops.delete(queue);
       void this.close();
@@ -84,13 +77,17 @@ abstract class MemberSubscription<C extends Connection> implements AsyncIterable
     return (this.#closed ??= this.#end());
   }
 
-  protected abstract makeQueue(onReturn: () => void): ValueQueue<RrValue>;
+  [asyncDispose](): Promise<void> {
+    return this.close();
+  }
+
+  protected abstract makeQueue(onReturn: () => void): ValueQueue<V>;
   /** Connects the member of `object`. */
   protected abstract connect(object: RemoteObject): Promise<C>;
   /** Takes what comes until the connection ends. */
   protected abstract follow(connection: C): Promise<void>;
 
-  protected receive(value: RrValue): void {
+  protected receive(value: V): void {
     for (const loop of [...this.#loops]) loop.push(value);
   }
 
@@ -124,9 +121,25 @@ abstract class MemberSubscription<C extends Connection> implements AsyncIterable
   }
 }
 
+abstract class StreamSubscription<C extends Stream, V> extends MemberSubscription<C, V> {
+  /**
+   * Sends over the connection that is up.
+   * @throws RobotRaconteurError InvalidOperation (rejects) while there is none: nothing is kept for later.
+   */
+  send(value: unknown): Promise<void> {
+    if (this.connection) return this.connection.send(value);
+    return Promise.reject(makeError("InvalidOperation", `${this.member}: is not connected at the moment`));
+  }
+
+  /** Of the connection that is up; undefined while there is none, and where the service keeps no account of it. */
+  async losses(options?: CallOptions): Promise<Losses | undefined> {
+    return this.connection?.losses(options);
+  }
+}
+
 /** The newest value of a wire, by arrival. */
-export class WireSubscription extends MemberSubscription<WireConnection> {
-  #value: RrValue | undefined;
+export class WireSubscription<T = RrValue> extends StreamSubscription<WireConnection<T, unknown>, T> {
+  readonly #value = new ValueStore<T | undefined>(undefined);
   #time: WireTime | undefined;
 
   /** Use Subscription.wire(). */
@@ -135,7 +148,12 @@ export class WireSubscription extends MemberSubscription<WireConnection> {
   }
 
   /** The newest value; it stays while there is no connection. */
-  get value(): RrValue | undefined {
+  get value(): T | undefined {
+    return this.#value.getSnapshot();
+  }
+
+  /** The newest value, to follow and to hand to a page's framework. It stays after close(). */
+  get store(): Store<T | undefined> {
     return this.#value;
   }
 
@@ -143,29 +161,29 @@ export class WireSubscription extends MemberSubscription<WireConnection> {
     return this.#time;
   }
 
-  protected makeQueue(onReturn: () => void): ValueQueue<RrValue> {
-    const queue = new ValueQueue<RrValue>(1, onReturn);
-    if (this.#value !== undefined) queue.push(this.#value);
+  protected makeQueue(onReturn: () => void): ValueQueue<T> {
+    const queue = new ValueQueue<T>(1, onReturn);
+    if (this.value !== undefined) queue.push(this.value);
     return queue;
   }
 
-  protected async connect(object: RemoteObject): Promise<WireConnection> {
-    const connection = object.$.member(this.member).connect() as WireConnection;
+  protected async connect(object: RemoteObject): Promise<WireConnection<T, unknown>> {
+    const connection = object.$.member(this.member).connect() as WireConnection as WireConnection<T, unknown>;
     await connection.ready;
     return connection;
   }
 
-  protected async follow(connection: WireConnection): Promise<void> {
+  protected async follow(connection: WireConnection<T, unknown>): Promise<void> {
     for await (const value of connection) {
-      this.#value = value;
       this.#time = connection.time;
+      this.#value.set(value);
       this.receive(value);
     }
   }
 }
 
 /** All packets of a pipe, in order for each connection. */
-export class PipeSubscription extends MemberSubscription<PipeEndpoint> {
+export class PipeSubscription<T = RrValue> extends StreamSubscription<PipeEndpoint<T, unknown>, T> {
   readonly #limit: number;
 
   /** Use Subscription.pipe(). */
@@ -174,17 +192,49 @@ export class PipeSubscription extends MemberSubscription<PipeEndpoint> {
     this.#limit = options.limit ?? 10_000;
   }
 
-  protected makeQueue(onReturn: () => void): ValueQueue<RrValue> {
-    return new ValueQueue<RrValue>(this.#limit, onReturn, () =>
+  protected makeQueue(onReturn: () => void): ValueQueue<T> {
+    return new ValueQueue<T>(this.#limit, onReturn, () =>
       makeError("OutOfSystemResource", `${this.#limit} packets of pipe ${this.member} wait and nobody takes them`),
     );
   }
 
-  protected async connect(object: RemoteObject): Promise<PipeEndpoint> {
-    return object.$.member(this.member).connect(-1);
+  protected async connect(object: RemoteObject): Promise<PipeEndpoint<T, unknown>> {
+    return (await object.$.member(this.member).connect(-1)) as PipeEndpoint<T, unknown>;
   }
 
-  protected async follow(endpoint: PipeEndpoint): Promise<void> {
+  protected async follow(endpoint: PipeEndpoint<T, unknown>): Promise<void> {
     for await (const packet of endpoint) this.receive(packet);
+  }
+}
+
+interface Occurrences<A> extends Connection {
+  readonly loop: AsyncIterator<A>;
+}
+
+/** The occurrences of an event, each as the array of its arguments. */
+export class EventSubscription<A extends unknown[] = RrValue[]> extends MemberSubscription<Occurrences<A>, A> {
+  readonly #limit: number;
+
+  /** Use Subscription.event(). */
+  constructor(subscription: Subscription<unknown>, clock: Clock, member: string, options: PipeSubscriptionOptions) {
+    super(subscription, clock, member, options.path ?? "*");
+    this.#limit = options.limit ?? 10_000;
+  }
+
+  protected makeQueue(onReturn: () => void): ValueQueue<A> {
+    return new ValueQueue<A>(this.#limit, onReturn, () =>
+      makeError("OutOfSystemResource", `${this.#limit} events ${this.member} wait and nobody takes them`),
+    );
+  }
+
+  protected connect(object: RemoteObject): Promise<Occurrences<A>> {
+    const event = object.$.member(this.member) as Partial<AsyncIterable<A>>;
+    const loop = event[Symbol.asyncIterator]?.();
+    if (!loop) return Promise.reject(makeError("MemberNotFound", `${this.member} of ${object.$.type} is no event`));
+    return Promise.resolve({ loop, close: async () => loop.return?.() });
+  }
+
+  protected async follow({ loop }: Occurrences<A>): Promise<void> {
+    for (let step = await loop.next(); !step.done; step = await loop.next()) this.receive(step.value);
   }
 }

@@ -1,4 +1,5 @@
 // Objects of a service, built from the definition that the service sent. Layer: wasm-client/ts.
+import { asyncDispose } from "./dispose.js";
 import { callSafely, makeError } from "./errors.js";
 import type { RobotRaconteurError } from "./errors.js";
 import { makeCallback } from "./members/callback.js";
@@ -57,7 +58,7 @@ export class ObjectTree {
 
   root(path: string, type: string): RemoteObject {
     const released: (() => void)[] = [];
-    const object = this.#build(path, type, released);
+    const object = this.#build(path, type, released, true);
     this.#objects.set(path, { object: Promise.resolve(object), released });
     return object;
   }
@@ -89,7 +90,7 @@ export class ObjectTree {
     }
   }
 
-  #build(path: string, type: string, released: (() => void)[]): RemoteObject {
+  #build(path: string, type: string, released: (() => void)[], isRoot = false): RemoteObject {
     const session = this.#session;
     const members = (session.look((core) => core.members(path)) ?? []).map(freezeInfo);
     const handles = new Map<string, DynamicMember>();
@@ -104,6 +105,7 @@ export class ObjectTree {
     }
     Object.defineProperty(object, "$", { value: new Info(this, session, type, path, members, handles, released) });
     Object.defineProperty(object, Symbol.toStringTag, { value: type });
+    if (isRoot) Object.defineProperty(object, asyncDispose, { value: () => session.close() });
     return Object.freeze(object) as RemoteObject;
   }
 }

@@ -3,14 +3,27 @@
 import { Backoff, systemClock } from "./clock.js";
 import type { Clock } from "./clock.js";
 import { connectWith } from "./connect.js";
-import type { ConnectOptions, Memory, UrlSource } from "./connect.js";
+import type { Client, ConnectOptions, Memory, UrlSource } from "./connect.js";
+import { asyncDispose } from "./dispose.js";
 import { callSafely, makeError } from "./errors.js";
 import type { RobotRaconteurError } from "./errors.js";
 import { findServices } from "./find_services.js";
 import type { ServiceQuery } from "./find_services.js";
-import { PipeSubscription, WireSubscription } from "./member_subscription.js";
+import { EventSubscription, PipeSubscription, WireSubscription } from "./member_subscription.js";
 import type { MemberSubscriptionOptions, PipeSubscriptionOptions } from "./member_subscription.js";
-import type { CallOptions, ObjectInfo, RemoteObject } from "./types.js";
+import { ValueStore } from "./store.js";
+import type { Store } from "./store.js";
+import type {
+  ArgumentsOf,
+  CallbackLike,
+  CallOptions,
+  EventLike,
+  MembersLike,
+  PacketOf,
+  PipeLike,
+  RemoteObject,
+  WireLike,
+} from "./types.js";
 import { parseServiceUrl } from "./url.js";
 import { checkSignal } from "./within.js";
 
@@ -27,8 +40,15 @@ export interface SubscribeOptions extends ConnectOptions {
   random?: (() => number) | undefined;
 }
 
+/** What a subscription is doing. `reason`: why the last attempt failed, or the last connection was lost. */
+export type SubscriptionState =
+  | { readonly status: "connecting"; readonly reason?: unknown }
+  | { readonly status: "connected" }
+  /** `nextTry`: as Date.now() has it; retryNow() goes before it. */
+  | { readonly status: "waiting"; readonly reason: unknown; readonly nextTry: number }
+  | { readonly status: "closed" };
+
 type Way = string | URL | UrlSource;
-type Client<T> = T & { readonly $: ObjectInfo };
 
 /**
  * Stays connected to a service: connects, and connects again after each loss, until close().
@@ -67,6 +87,8 @@ export class Subscription<T = RemoteObject> {
   #client: Client<T> | undefined;
   #stopWaiting: (() => void) | undefined;
   #closed: Promise<void> | undefined;
+  #reason: unknown;
+  readonly #state = new ValueStore<SubscriptionState>(Object.freeze({ status: "connecting" }));
   readonly #connected = new Set<(client: Client<T>) => void>();
   readonly #lost = new Set<(reason: RobotRaconteurError) => void>();
   readonly #failed = new Set<(error: unknown, url: string) => void>();
@@ -96,6 +118,11 @@ export class Subscription<T = RemoteObject> {
 
   get isClosed(): boolean {
     return this.#closed !== undefined;
+  }
+
+  /** What it is doing, to look at, to follow and to hand to a page's framework. */
+  get state(): Store<SubscriptionState> {
+    return this.#state;
   }
 
   /**
@@ -164,18 +191,66 @@ export class Subscription<T = RemoteObject> {
   }
 
   /** The newest value of a wire, over all connections. `options.path`: of the object, "*" for the root. */
-  wire(member: string, options: MemberSubscriptionOptions = {}): WireSubscription {
+  wire<K extends MembersLike<T, WireLike>>(
+    member: K,
+    options?: MemberSubscriptionOptions & { path?: "*" | undefined },
+  ): WireSubscription<PacketOf<T, K>>;
+  wire(member: string, options: MemberSubscriptionOptions): WireSubscription;
+  wire(member: string, options: MemberSubscriptionOptions = {}): unknown {
     return new WireSubscription(this as Subscription<unknown>, this.#clock, member, options);
   }
 
   /** The packets of a pipe, over all connections; those that the service sends meanwhile are not there. */
-  pipe(member: string, options: PipeSubscriptionOptions = {}): PipeSubscription {
+  pipe<K extends MembersLike<T, PipeLike>>(
+    member: K,
+    options?: PipeSubscriptionOptions & { path?: "*" | undefined },
+  ): PipeSubscription<PacketOf<T, K>>;
+  pipe(member: string, options: PipeSubscriptionOptions): PipeSubscription;
+  pipe(member: string, options: PipeSubscriptionOptions = {}): unknown {
     return new PipeSubscription(this as Subscription<unknown>, this.#clock, member, options);
+  }
+
+  /** The occurrences of an event, over all connections; those that nobody was connected for are not there. */
+  event<K extends MembersLike<T, EventLike>>(
+    member: K,
+    options?: PipeSubscriptionOptions & { path?: "*" | undefined },
+  ): EventSubscription<ArgumentsOf<T, K>>;
+  event(member: string, options: PipeSubscriptionOptions): EventSubscription;
+  event(member: string, options: PipeSubscriptionOptions = {}): unknown {
+    return new EventSubscription(this as Subscription<unknown>, this.#clock, member, options);
+  }
+
+  /**
+   * Answers a callback of the root object, on each connection.
+   * @returns a function that ends it. A member that is missing, or no callback, is told to onFailed().
+   */
+  callback<K extends MembersLike<T, CallbackLike>>(
+    member: K,
+    handler: T[K] extends { handler: infer H } ? NonNullable<H> : never,
+  ): () => void {
+    const setHandler = (client: Client<T> | undefined, to: typeof handler | null) => {
+      if (client) (client.$.member(member) as { handler: unknown }).handler = to;
+    };
+    const stop = this.onConnected((client) => {
+      try {
+        setHandler(client, handler);
+      } catch (error) {
+        this.#tellFailed(error, "");
+      }
+    });
+    return () => {
+      stop();
+      if (this.#client?.$.state === "connected") setHandler(this.#client, null);
+    };
   }
 
   /** Ends the connection and all attempts. Repeated calls do nothing. */
   close(): Promise<void> {
     return (this.#closed ??= this.#end());
+  }
+
+  [asyncDispose](): Promise<void> {
+    return this.close();
   }
 
   /** For what belongs to this subscription: calls once when it is closed. */
@@ -188,6 +263,8 @@ export class Subscription<T = RemoteObject> {
     this.#client = undefined;
     this.#stopWaiting?.();
     this.#ending.abort(closedError());
+    this.#become({ status: "closed" });
+    this.#state.end();
     await Promise.resolve(); // whoever closes has the promise before anybody hears of it
     for (const ended of [...this.#ended]) callSafely(ended);
     for (const listeners of [this.#connected, this.#lost, this.#failed, this.#waiting, this.#ended]) listeners.clear();
@@ -197,6 +274,8 @@ export class Subscription<T = RemoteObject> {
   /** One attempt: the first URL that works. Without any, the next attempt follows after a while. */
   async #connect(): Promise<void> {
     this.#stopWaiting = undefined;
+    if (!this.isClosed && this.#state.getSnapshot().status !== "connecting")
+      this.#become({ status: "connecting", reason: this.#reason });
     const { signal: _, ...options } = this.#options;
     const { signal } = this.#ending;
     for (const url of await this.#ways()) {
@@ -226,6 +305,7 @@ export class Subscription<T = RemoteObject> {
 
   #tellFailed(error: unknown, way: Way): void {
     if (this.isClosed) return;
+    this.#reason = error;
     const url = typeof way === "function" ? "" : String(way);
     for (const failed of [...this.#failed]) callSafely(() => failed(error, url));
   }
@@ -233,11 +313,14 @@ export class Subscription<T = RemoteObject> {
   #take(client: Client<T>): void {
     if (this.isClosed) return void client.$.close();
     this.#client = client;
+    this.#reason = undefined;
     this.#backoff.reset();
+    this.#become({ status: "connected" });
     client.$.onClose((reason) => {
       if (this.#client !== client) return;
       this.#client = undefined;
       const why = reason ?? makeError("ConnectionError", "the client was closed by this side");
+      this.#reason = why;
       for (const lost of [...this.#lost]) callSafely(() => lost(why));
       this.#retry();
     });
@@ -248,7 +331,12 @@ export class Subscription<T = RemoteObject> {
     if (this.isClosed) return;
     const wait = this.#backoff.next();
     this.#stopWaiting = this.#clock.after(wait, () => void this.#connect());
+    this.#become({ status: "waiting", reason: this.#reason, nextTry: Date.now() + wait });
     for (const waiting of [...this.#waiting]) callSafely(() => waiting(wait));
+  }
+
+  #become(state: SubscriptionState): void {
+    this.#state.set(Object.freeze(state));
   }
 
   #on<F>(listeners: Set<F>, listener: F): () => void {

@@ -1,4 +1,5 @@
 // The public types: what a connected object and its members look like. Layer: wasm-client/ts.
+/// <reference lib="esnext.disposable" preserve="true" />
 import type { RobotRaconteurError } from "./errors.js";
 
 export type NumericArray =
@@ -207,7 +208,7 @@ export interface Losses {
  * A connected wire. Iterating gives the newest value each time; values that came in between are skipped. Leaving the
  * loop closes the connection.
  */
-export interface WireConnection<T = RrValue, S = T> extends AsyncIterable<T> {
+export interface WireConnection<T = RrValue, S = T> extends AsyncIterable<T>, AsyncDisposable {
   /** The newest value; undefined before the first. */
   readonly value: T | undefined;
   readonly time: WireTime | undefined;
@@ -246,7 +247,7 @@ export interface PipeSendOptions extends CallOptions {
  * One end of a pipe. Iterating gives every packet, in order, from the first; leaving the loop closes the endpoint. A
  * second loop shares the packets with the first.
  */
-export interface PipeEndpoint<T = RrValue, S = T> extends AsyncIterable<T> {
+export interface PipeEndpoint<T = RrValue, S = T> extends AsyncIterable<T>, AsyncDisposable {
   /** As agreed with the service. */
   readonly index: number;
   readonly isClosed: boolean;
@@ -335,3 +336,44 @@ export interface DynamicMember extends AsyncIterable<RrValue[]> {
 
 /** A connected object: its members by name, and `$`. */
 export type RemoteObject = { readonly $: ObjectInfo } & { readonly [member: string]: DynamicMember };
+
+/** The names of the members of `T` that are like `M`; of an object without known types every name. */
+export type MembersLike<T, M> = string extends keyof T
+  ? string
+  : { [K in keyof T]: T[K] extends M ? K : never }[keyof T] & string;
+
+export interface WireLike {
+  connect(...args: never[]): { readonly ready: unknown } & AsyncIterable<unknown>;
+}
+
+export interface PipeLike {
+  connect(...args: never[]): Promise<AsyncIterable<unknown>>;
+}
+
+export interface EventLike {
+  on(listener: never): () => void;
+}
+
+export interface CallbackLike {
+  handler: unknown;
+}
+
+/** What comes from the wire or pipe `K` of `T`. */
+export type PacketOf<T, K> = string extends keyof T
+  ? RrValue
+  : K extends keyof T
+    ? T[K] extends { connect(...args: never[]): infer C }
+      ? Awaited<C> extends AsyncIterable<infer V>
+        ? V
+        : never
+      : never
+    : never;
+
+/** The arguments of the event `K` of `T`. */
+export type ArgumentsOf<T, K> = string extends keyof T
+  ? RrValue[]
+  : K extends keyof T
+    ? T[K] extends EventMember<infer A>
+      ? A
+      : never
+    : never;

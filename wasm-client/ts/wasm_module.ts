@@ -111,7 +111,51 @@ interface WasmSession extends CoreExports {
 }
 /* eslint-enable @typescript-eslint/naming-convention */
 
+/** The core's file: where it is, or what is in it. A string may be relative to the page. */
+export type WasmSource = string | URL | BufferSource | WebAssembly.Module;
+
+export interface InitOptions {
+  /** Instead of rrgate.wasm beside the script: where a bundler puts it elsewhere, or has it in the script. */
+  wasm?: WasmSource | Promise<WasmSource> | (() => WasmSource | Promise<WasmSource>) | undefined;
+}
+
+let source: InitOptions["wasm"];
 let compiled: Promise<WebAssembly.Module> | undefined;
+
+/**
+ * Says where the protocol core comes from. Before the first connect(), subscribe() or preload().
+ * @throws RobotRaconteurError InvalidOperation: it is loaded already.
+ */
+export function init({ wasm }: InitOptions): void {
+  if (compiled) throw makeError("InvalidOperation", "init: the protocol core is loaded already; call it first");
+  source = wasm;
+}
+
+/**
+ * Loads the protocol core, for connections to come. Without it the first one does, while its socket opens.
+ * @throws RobotRaconteurError (rejects) SystemResourceError: the file cannot be loaded; a later call tries again.
+ */
+export async function preload(): Promise<void> {
+  await loadCore();
+}
+
+function loadCore(): Promise<WebAssembly.Module> {
+  return (compiled ??= compile().catch((error: unknown) => {
+    compiled = undefined; // the next connect() tries again
+    throw makeError("SystemResourceError", `the protocol core could not be loaded: ${textOf(error)}`);
+  }));
+}
+
+async function compile(): Promise<WebAssembly.Module> {
+  // Written out so that bundlers see it and ship the file.
+  if (source === undefined) return platform.loadWasm(new URL("./rrgate.wasm", import.meta.url));
+  const from = source; // to the compiler, a Module may be a function, too: it has no members
+  const give = async () => (typeof from === "function" ? (from as () => WasmSource | Promise<WasmSource>)() : from);
+  const given = await give();
+  if (given instanceof WebAssembly.Module) return given;
+  if (typeof given === "string") return platform.loadWasm(new URL(given, globalThis.location?.href));
+  return given instanceof URL ? platform.loadWasm(given) : WebAssembly.compile(given);
+}
 
 /**
  * One session of the core, in an instance of its own: its memory goes with it, and a trap in it ends nothing else.
@@ -123,12 +167,7 @@ export class Core {
 
   /** @throws RobotRaconteurError SystemResourceError: the file cannot be loaded; those of options that make no sense. */
   static async create(options: CoreOptions): Promise<Core> {
-    // Written out so that bundlers see it and ship the file.
-    compiled ??= platform.loadWasm(new URL("./rrgate.wasm", import.meta.url)).catch((error: unknown) => {
-      compiled = undefined; // the next connect() tries again
-      throw makeError("SystemResourceError", `the protocol core could not be loaded: ${textOf(error)}`);
-    });
-    const code = await compiled;
+    const code = await loadCore();
     const values = new JsValues();
     const { exports } = await WebAssembly.instantiate(code, values.imports);
     return new Core(values, exports as unknown as WasmSession, options);

@@ -3,6 +3,7 @@
 
 import { render } from "preact";
 import { App } from "./app/app";
+import { loadLanguage } from "./app/language";
 import { watchRoute } from "./app/router";
 import { AccessDesk } from "./gateway/access";
 import { DeviceList } from "./gateway/devices";
@@ -35,4 +36,9 @@ access.start();
 
 const place = document.getElementById("app");
 if (!place) throw new Error("index.html has no element #app");
-render(<App route={watchRoute()} list={list} usb={usb} access={access} session={session} />, place);
+const show = (): void =>
+  render(<App route={watchRoute()} list={list} usb={usb} access={access} session={session} />, place);
+loadLanguage().then(show, show); // in English, where the other texts cannot be had
+
+// For "install", and for the page that says that there is no gateway; browsers have it over HTTPS and on this machine.
+void navigator.serviceWorker?.register("sw.js").catch(() => undefined);

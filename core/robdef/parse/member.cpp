@@ -1,8 +1,8 @@
 #include <utility>
 
-#include "core/robdef/model/constant_value.hpp"
 #include "core/robdef/model/names.hpp"
 #include "core/robdef/model/number_literal.hpp"
+#include "core/robdef/parse/constant_check.hpp"
 #include "core/robdef/parse/statement.hpp"
 #include "core/robdef/parse/type.hpp"
 
@@ -151,27 +151,7 @@ bool parse_constant(StatementReader& reader, bool is_option, ConstantDefinition&
         type_start, type_end, "constant-invalid",
         "found " + quote(out.type.name) + ", expected a number type or string after 'option constant'");
   }
-  std::vector<ConstantIssue> issues;
-  read_constant_value(out.type, out.value_text, issues);
-  bool is_good = true;
-  for (const auto& issue : issues) {
-    const bool is_about_type = issue.from == 0 && issue.to == 0;
-    const auto span = is_about_type ? reader.span(type_start, type_end)
-                                    : reader.span(value_start + issue.from, value_start + issue.to);
-    auto message = "constant " + quote(out.name) + ": " + issue.message;
-    if (issue.is_relaxed) {
-      reader.reporter().relaxed(issue.code, span, std::move(message));
-    } else {
-      reader.reporter().error(issue.code, span, std::move(message));
-      is_good = false;
-    }
-  }
-  if (is_good && (out.type.type == DataType::int8_t || out.type.type == DataType::uint8_t)) {
-    reader.reporter().warning(
-        "interop", reader.span(type_start, type_end),
-        "constant " + quote(out.name) + ": existing peers read 8-bit constants as characters; prefer a wider type");
-  }
-  return is_good;
+  return check_constant(reader, out, {type_start, type_end, value_start});
 }
 
 std::vector<ConstantDefinition> option_constants(const std::vector<OptionDefinition>& options) {

@@ -15,4 +15,9 @@ namespace rr {
 /// Returns  every finding, by definition and line; the set is usable where none is an error.
 std::vector<Diagnostic> verify_service_definitions(std::span<ServiceDefinition* const> set, RobdefMode mode);
 
+/// The same for a set whose imports are in use already: those are not written to.
+/// `known`  verified before, as far as the set imports it. What is found in them is found again.
+std::vector<Diagnostic> verify_service_definitions(std::span<ServiceDefinition* const> set,
+                                                   std::span<const ServiceDefinition* const> known, RobdefMode mode);
+
 }  // namespace rr

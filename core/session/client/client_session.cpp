@@ -111,7 +111,7 @@ void ClientSession::scan_deadlines(Now now) {
       pending_.erase(found);
       continue;
     }
-    if (!abandon_pipe_request(id, now.steady + late_reply_period)) pending_.erase(found);
+    if (!abandon_request(id, now.steady + late_reply_period)) pending_.erase(found);
     if (const auto fetch = fetches_.extract(id)) {
       fail_fetch(fetch.mapped(), std::move(error));
     } else if (state_ == ClientState::connecting) {
@@ -207,12 +207,9 @@ RequestId ClientSession::request_elements(EntryType type, MemberKind kind, std::
   return request(type, kind, path, member, now, write);
 }
 
-namespace {
-constexpr auto no_elements = [](const MemberDefinition&) -> Result<> { return {}; };
-}
-
 RequestId ClientSession::get_property(std::string_view path, std::string_view member, Now now) {
-  return request(EntryType::property_get_req, MemberKind::property, path, member, now, no_elements);
+  return request(EntryType::property_get_req, MemberKind::property, path, member, now,
+                 [](const MemberDefinition&) -> Result<> { return {}; });
 }
 
 RequestId ClientSession::set_property(std::string_view path, std::string_view member, const Value& value, Now now) {
@@ -246,65 +243,9 @@ RequestId ClientSession::find_object(std::string_view path, Now now) {
   return id;
 }
 
-RequestId ClientSession::connect_wire(std::string_view path, std::string_view member, Now now) {
-  const auto id = request(EntryType::wire_connect_req, MemberKind::wire, path, member, now, no_elements);
-  if (const auto found = pending_.find(id); found != pending_.end())
-    wires_[{std::string(path), std::string(member)}] = {.member = found->second.member, .request_id = id};
-  return id;
-}
-
-RequestId ClientSession::disconnect_wire(std::string_view path, std::string_view member, Now now) {
-  if (const auto found = wires_.find(PathMemberView{path, member}); found != wires_.end()) wires_.erase(found);
-  return request(EntryType::wire_disconnect_req, MemberKind::wire, path, member, now, no_elements);
-}
-
-RequestId ClientSession::peek_in_value(std::string_view path, std::string_view member, Now now) {
-  return request(EntryType::wire_peek_in_value_req, MemberKind::wire, path, member, now, no_elements);
-}
-
-RequestId ClientSession::peek_out_value(std::string_view path, std::string_view member, Now now) {
-  return request(EntryType::wire_peek_out_value_req, MemberKind::wire, path, member, now, no_elements);
-}
-
-RequestId ClientSession::poke_out_value(std::string_view path, std::string_view member, const Value& value, Now now) {
-  return request(EntryType::wire_poke_out_value_req, MemberKind::wire, path, member, now,
-                 [&](const MemberDefinition& definition) {
-                   return write_wire_value(outgoing_, value, now.utc, definition, types_);
-                 });
-}
-
-Result<> ClientSession::send_wire(std::string_view path, std::string_view member, const Value& value, Now now) {
-  const auto found = wires_.find(PathMemberView{path, member});
-  if (state_ == ClientState::closed || found == wires_.end() || found->second.state != WireState::connected)
-    return make_error(ErrorCode::invalid_operation, "wire " + quote(member) + " is not connected");
-  if (auto allowed = check_direction(EntryType::wire_packet, *found->second.member); !allowed) return allowed;
-  if (connection_.queued_bytes() >= wire_high_mark) {
-    found->second.waiting = WireValue{now.utc, value};
-    return {};
-  }
-  return send_wire_packet(found->first, found->second, value, now);
-}
-
-Result<> ClientSession::send_wire_packet(const PathMember& key, WireConnection& wire, const Value& value, Now now) {
-  wire.waiting.reset();
-  connection_.begin_message(outgoing_);
-  if (auto written = write_wire_packet(outgoing_, key.path, *wire.member, value, wire.stamp(now.utc), types_); !written)
-    return written;
-  return send_outgoing(now);
-}
-
-void ClientSession::flush_wires(Now now) {
-  for (auto& [key, wire] : wires_) {
-    if (!wire.waiting || state_ == ClientState::closed) continue;
-    const Value value = std::move(wire.waiting->value);
-    // The value was checked when it came in; what can fail here is the connection, and that ends the session elsewhere.
-    if (!send_wire_packet(key, wire, value, now) || connection_.queued_bytes() >= wire_high_mark) return;
-  }
-}
-
 void ClientSession::cancel(RequestId id) {
   if (const auto found = pending_.find(id);
-      found != pending_.end() && abandon_pipe_request(id, found->second.deadline + late_reply_period))
+      found != pending_.end() && abandon_request(id, found->second.deadline + late_reply_period))
     return;
   pending_.erase(id);
   fetches_.erase(id);
@@ -389,6 +330,7 @@ void ClientSession::handle_reply(const Message& message, const MessageEntry& ent
   if (pending.type == EntryType::disconnect_client) return fail(connection_error("closed by this side"));
   if (pending.type == EntryType::pipe_connect_req || pending.type == EntryType::pipe_disconnect_req)
     return handle_pipe_reply(message, entry, id, pending, now);
+  if (pending.is_abandoned) return disconnect_left_wire(entry, pending, now);
   if (pending.memory) return handle_memory_reply(message, entry, id, std::move(pending), now);
   if (entry.error != ErrorCode::none) {
     if (pending.type == EntryType::wire_connect_req)
@@ -433,22 +375,6 @@ Result<Value> ClientSession::read_reply(const Message& message, const MessageEnt
   }
 }
 
-/// The wire that a connect reply is for; none where it was disconnected meanwhile, be it connected anew.
-ClientSession::Wires::iterator ClientSession::find_connecting_wire(const Pending& pending, RequestId id) {
-  const auto found = wires_.find(PathMemberView{pending.path, pending.member->name});
-  return found != wires_.end() && found->second.request_id == id ? found : wires_.end();
-}
-
-void ClientSession::handle_wire_connected(const Pending& pending, RequestId id) {
-  const auto found = find_connecting_wire(pending, id);
-  if (found == wires_.end()) return;
-  auto& wire = found->second;
-  wire.state = WireState::connected;
-  if (!wire.early) return;
-  emit(WireValueReceived{found->first.path, found->first.member, wire.early->time, std::move(wire.early->value)});
-  wire.early.reset();
-}
-
 void ClientSession::handle_event(const Message& message, const MessageEntry& entry) {
   const auto* type = object_type(entry.service_path);
   const auto* member = type ? type->find_member(entry.member_name) : nullptr;
@@ -458,39 +384,11 @@ void ClientSession::handle_event(const Message& message, const MessageEntry& ent
   emit(EventReceived{std::string(entry.service_path), std::string(entry.member_name), std::move(*arguments)});
 }
 
-void ClientSession::handle_wire_packet(const Message& message, const MessageEntry& entry) {
-  const auto found = wires_.find(PathMemberView{entry.service_path, entry.member_name});
-  if (found == wires_.end() || found->second.member->direction() == MemberDirection::writeonly) return;
-  auto& wire = found->second;
-  auto packet = read_wire_value(message, entry, *wire.member, types_);
-  if (!packet || !wire.accept(packet->time)) return;
-  if (wire.state == WireState::connecting) {
-    wire.early = std::move(*packet);
-    return;
-  }
-  emit(WireValueReceived{found->first.path, found->first.member, packet->time, std::move(packet->value)});
-}
-
-void ClientSession::handle_wire_closed(const MessageEntry& entry) {
-  const auto found = wires_.find(PathMemberView{entry.service_path, entry.member_name});
-  // While a connect is not answered, it is the connection before that has ended.
-  if (found == wires_.end() || found->second.state == WireState::connecting) return;
-  emit(WireClosedByService{found->first.path, found->first.member});
-  wires_.erase(found);
-}
-
 void ClientSession::handle_path_released(std::string_view path) {
   if (path == options_.service) return;  // the root cannot be released
   std::erase_if(objects_, [path](const auto& object) { return is_within(object.first, path); });
   std::erase_if(memory_limits_, [path](const auto& memory) { return is_within(memory.first.path, path); });
-  for (auto wire = wires_.begin(); wire != wires_.end();) {
-    if (!is_within(wire->first.path, path)) {
-      ++wire;
-      continue;
-    }
-    emit(WireClosedByService{wire->first.path, wire->first.member});
-    wire = wires_.erase(wire);
-  }
+  release_wires(path);
   release_pipes(path);
   emit(PathReleased{std::string(path)});
 }

@@ -254,8 +254,8 @@ class ClientSession {
     const MemberDefinition* member = nullptr;
     std::string path;  ///< find_object, wires, pipes, session operations: calls, properties allocate nothing here
     TimePoint deadline;
-    std::int32_t pipe_index = 0;                  ///< pipes only
-    bool is_abandoned = false;                    ///< pipes only: nobody waits any more, but the reply must be acted on
+    std::int32_t pipe_index = 0;  ///< pipes only
+    bool is_abandoned = false;    ///< pipes and wires: nobody waits any more, but the reply must be acted on
     GeneratorStep step = GeneratorStep::next;     ///< generator steps only
     std::unique_ptr<MemoryTransfer> memory = {};  ///< memories only
   };
@@ -336,6 +336,9 @@ class ClientSession {
 
   RequestId fail_request(RequestId id, Error error);
   Result<> send_outgoing(Now now, bool is_urgent = false);
+  /// `value`  what the request carries; null: nothing.
+  RequestId request_wire(EntryType type, std::string_view path, std::string_view member, Now now,
+                         const Value* value = nullptr);
   Result<> send_wire_packet(const PathMember& key, WireConnection& wire, const Value& value, Now now);
 
   template <class AddElements>
@@ -351,7 +354,9 @@ class ClientSession {
   Result<Value> read_reply(const Message& message, const MessageEntry& entry, const Pending& pending) const;
   void handle_type_name_reply(const MessageEntry& entry, RequestId id, std::string path, Now now);
   using Wires = std::map<PathMember, WireConnection, PathMemberLess>;
+  void release_wires(std::string_view path);
   Wires::iterator find_connecting_wire(const Pending& pending, RequestId id);
+  void disconnect_left_wire(const MessageEntry& entry, const Pending& pending, Now now);
   void handle_wire_connected(const Pending& pending, RequestId id);
   void handle_event(const Message& message, const MessageEntry& entry);
   void handle_wire_packet(const Message& message, const MessageEntry& entry);
@@ -376,7 +381,7 @@ class ClientSession {
   void release_pipes(std::string_view path);
   void request_silent_disconnect(const std::string& path, const MemberDefinition& member, std::int32_t index, Now now);
   void end_pipe_request(const Pending& pending);
-  bool abandon_pipe_request(RequestId id, TimePoint deadline);
+  bool abandon_request(RequestId id, TimePoint deadline);
   void answer_error(const MessageEntry& entry, const Error& error, Now now);
 
   template <class Happened>

@@ -66,8 +66,7 @@ Result<std::uint32_t> ClientSession::send_pipe_packet(std::string_view path, std
                       "pipe " + quote(member) + ": " + std::to_string(queued_bytes()) +
                           " bytes wait for the stream already; send again when they are fewer");
   connection_.begin_message(outgoing_);
-  auto& entry = outgoing_.begin_entry(EntryType::pipe_packet, pipe->first.path, pipe->first.member);
-  if (state.is_unreliable()) outgoing_.header.metadata = entry.metadata = unreliable_metadata;
+  begin_pipe_packets(outgoing_, pipe->first.path, pipe->first.member, state.is_unreliable());
   const auto number = state.take_number();
   Result<> sent = write_pipe_packet(outgoing_, index, number, value, wants_ack, state.member(), types_);
   if (sent) sent = send_outgoing(now);
@@ -161,13 +160,17 @@ void ClientSession::end_pipe_request(const Pending& pending) {
   if (pipe.endpoints.empty()) pipes_.erase(found);
 }
 
-/// A connect reply that comes later must close its endpoint again, a disconnect must free its index: the request stays,
-/// though nobody waits for it. Returns whether `id` is such a request.
-bool ClientSession::abandon_pipe_request(RequestId id, TimePoint deadline) {
+/// A connect reply that comes later must close its endpoint, or its wire, again, a disconnect must free its index: the
+/// request stays, though nobody waits for it. Returns whether `id` is such a request.
+bool ClientSession::abandon_request(RequestId id, TimePoint deadline) {
   const auto found = pending_.find(id);
   if (found == pending_.end()) return false;
   auto& pending = found->second;
-  if (pending.type != EntryType::pipe_connect_req && pending.type != EntryType::pipe_disconnect_req) return false;
+  if (pending.type == EntryType::wire_connect_req) {
+    if (const auto wire = find_connecting_wire(pending, id); wire != wires_.end()) wires_.erase(wire);
+  } else if (pending.type != EntryType::pipe_connect_req && pending.type != EntryType::pipe_disconnect_req) {
+    return false;
+  }
   pending.is_abandoned = true;
   pending.deadline = deadline;
   earliest_deadline_ = std::min(earliest_deadline_, deadline);

@@ -11,13 +11,15 @@ namespace rr {
 namespace {
 
 /// Which index an endpoint gets beside those in use, as the reference assigns it: the one asked for where it is above
-/// all others, else the next above them; never one below, so that an index is not used again while others live.
+/// all others, else the next above them; never one below, so that an index is not used again while others live. Nor is
+/// one up to `closed` that this side has closed: packets for that endpoint may still be on their way.
 template <class Indices>
-std::optional<std::int32_t> assign_index(std::int32_t asked, const Indices& in_use) {
+std::optional<std::int32_t> assign_index(std::int32_t asked, const Indices& in_use, std::int32_t closed) {
+  const auto last = in_use.empty() ? closed : std::max(closed, in_use.rbegin()->first);
   asked = std::max(asked, any_pipe_index);
-  if (in_use.empty() || in_use.rbegin()->first < asked) return asked == any_pipe_index ? 1 : asked;
-  if (in_use.rbegin()->first == INT32_MAX) return std::nullopt;
-  return in_use.rbegin()->first + 1;
+  if (last < asked || last == any_pipe_index) return asked == any_pipe_index ? 1 : asked;
+  if (last == INT32_MAX) return std::nullopt;
+  return last + 1;
 }
 
 }  // namespace
@@ -38,6 +40,13 @@ void ServiceSession::forget_pipe(PipeId id) {
   ended().pipes.add(pipe->second.ledger);
   if (pipe->second.state.state() == PipeState::connecting) release_pass(pipe->second.request_id);
   pipes_.erase(pipe);
+}
+
+/// This side ends an endpoint that the client may still be sending to.
+void ServiceSession::leave_pipe(PipeId id) {
+  if (const auto* pipe = find_pipe(id); pipe && pipe->index < INT32_MAX)
+    closed_index_ = std::max(closed_index_, pipe->index);
+  forget_pipe(id);
 }
 
 void ServiceSession::accept_pipe(PipeId id, Now now) {
@@ -65,8 +74,33 @@ void ServiceSession::refuse_pipe(PipeId id, const Error& error, Now now) {
 }
 
 Result<std::uint32_t> ServiceSession::send_pipe_packet(PipeId id, const Value& value, Now now, bool wants_ack) {
-  accept_pipe(id, now);
+  return send_numbered(id, now, [&](const ServicePipe& pipe, std::uint32_t number) -> Result<> {
+    connection_.begin_message(outgoing_);
+    begin_pipe_packets(outgoing_, pipe.key->path, pipe.key->member, pipe.is_unreliable);
+    if (auto written =
+            write_pipe_packet(outgoing_, pipe.index, number, value, wants_ack, pipe.state.member(), service_->types());
+        !written)
+      return written;
+    return connection_.send(outgoing_, now);
+  });
+}
+
+Result<std::uint32_t> ServiceSession::send_pipe_packet(PipeId id, SharedPipePacket& packet, Now now) {
+  return send_numbered(id, now, [&](const ServicePipe& pipe, std::uint32_t number) -> Result<> {
+    const auto message =
+        packet.message(pipe.key->path, pipe.state.member(), pipe.is_unreliable, pipe.index, number, service_->types());
+    if (!message) return message.error();
+    return connection_.send(**message, now);
+  });
+}
+
+template <class Send>
+Result<std::uint32_t> ServiceSession::send_numbered(PipeId id, Now now, Send&& send) {
   auto* pipe = find_pipe(id);
+  if (pipe && pipe->state.state() == PipeState::connecting) {
+    accept_pipe(id, now);
+    pipe = find_pipe(id);
+  }
   if (!pipe) return make_error(ErrorCode::invalid_operation, "the pipe endpoint is closed");
   auto& state = pipe->state;
   const auto& member = state.member();
@@ -77,12 +111,8 @@ Result<std::uint32_t> ServiceSession::send_pipe_packet(PipeId id, const Value& v
     return make_error(ErrorCode::out_of_system_resource,
                       "pipe '" + member.name + "': " + std::to_string(queued_bytes()) +
                           " bytes wait for the stream already; send again when they are fewer");
-  connection_.begin_message(outgoing_);
-  auto& entry = outgoing_.begin_entry(EntryType::pipe_packet, pipe->key->path, pipe->key->member);
-  if (state.is_unreliable()) outgoing_.header.metadata = entry.metadata = unreliable_metadata;
   const auto number = state.take_number();
-  Result<> sent = write_pipe_packet(outgoing_, pipe->index, number, value, wants_ack, member, service_->types());
-  if (sent) sent = connection_.send(outgoing_, now);
+  const Result<> sent = send(*pipe, number);
   if (sent) {
     pipe->ledger.note_delivery({});
     return number;
@@ -106,7 +136,7 @@ void ServiceSession::close_pipe(PipeId id, Now now) {
   if (!pipe) return;
   const auto index = pipe->index;
   const auto key = *pipe->key;
-  forget_pipe(id);
+  leave_pipe(id);
   connection_.begin_message(outgoing_);
   outgoing_.begin_entry(EntryType::pipe_closed, key.path, key.member);
   write_pipe_index(outgoing_, index);
@@ -118,7 +148,7 @@ void ServiceSession::release_pipes(std::string_view path) {
   for (const auto& [id, pipe] : pipes_)
     if (is_within(pipe.key->path, path)) released.push_back(id);
   for (const auto id : released) {
-    forget_pipe(id);
+    leave_pipe(id);
     events_.push(PipeClosed{id});
   }
 }
@@ -135,7 +165,7 @@ Result<> ServiceSession::connect_pipe(const Message& message, const MessageEntry
         "this client has " + std::to_string(options_.max_pipe_endpoints) + " pipe endpoints connected already");
   PathMember key{std::string(entry.service_path), std::string(entry.member_name)};
   const auto indices = pipe_indices_.try_emplace(std::move(key)).first;
-  const auto index = assign_index(*asked, indices->second);
+  const auto index = assign_index(*asked, indices->second, closed_index_);
   if (!index)
     return make_error(ErrorCode::out_of_range, "pipe '" + member.name + "': there is no index above those in use");
   const auto id = ++last_pipe_id_;

@@ -314,6 +314,7 @@ Result<> ServiceSession::answer_session_request(const Message& message, const Me
       outgoing_.add_scalar("return", DataType::uint32_t, std::uint32_t{0});
       return {};
     case EntryType::object_type_name: {
+      if (auto admitted = admit(entry.type, entry.service_path, nullptr); !admitted) return admitted;
       const auto found = service_->find_object(entry.service_path);
       if (!found) return found.error();
       outgoing_.add_text("objecttype", found->type->qualified_name);

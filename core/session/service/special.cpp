@@ -155,7 +155,8 @@ Result<> ServiceSession::admit_special(const Message& message, const MessageEntr
     default:
       return {};
   }
-  return admit(entry.type, service_name_of(entry), nullptr);
+  const bool names_object = entry.type == EntryType::object_type_name;
+  return admit(entry.type, names_object ? entry.service_path : service_name_of(entry), nullptr);
 }
 
 Result<> ServiceSession::answer_special(const Message& message, const MessageEntry& entry, Now now) {

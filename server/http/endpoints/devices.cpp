@@ -70,13 +70,15 @@ Response describe_device(const Device& device, const Request& request, const Acc
 }
 
 Response list_subscriptions(GatewayState& gateway, const Identity& asker, const Device& device) {
-  const auto& rules = gateway.access().state().rules;
+  const auto& access = gateway.access();
+  const auto& rules = access.state().rules;
   const bool shows_clients = rules.check(asker, {.verb = Verb::admin}).has_value();
   nlohmann::ordered_json out;
   auto& list = out["subscriptions"] = nlohmann::ordered_json::array();
   gateway.shared().visit_ledgers([&](const SharedDevice& shared, const SharedClient& client, const std::string& path,
                                      const rr::MemberDefinition& member, const rr::Ledger& ledger) {
     if (shared.device().get() != &device) return;
+    if (client.service() && !access.sees(asker, device.config().name, client.service()->name(), path)) return;
     list.push_back({{"client", shows_clients ? nlohmann::ordered_json(client.peer()) : nullptr},
                     {"service", client.service() ? client.service()->name() : std::string()},
                     {"path", path},

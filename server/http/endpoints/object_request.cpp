@@ -109,7 +109,8 @@ rr::awaitable<rr::Result<std::shared_ptr<ValueClient>>> open_session(GatewayStat
 AccessRequest access_request(const Target& target, Verb verb) {
   const auto& upstream = *target.client->upstream();
   const auto member = target.member ? std::string_view(target.member->name) : std::string_view();
-  return {upstream.device().config().name, upstream.service(), target.path(), member, verb};
+  return {upstream.device().config().name,      upstream.service(), target.path(), member, verb,
+          target.is_shape && verb == Verb::read};
 }
 
 rr::JsonForm json_form(const Request& request) {
@@ -230,7 +231,7 @@ rr::awaitable<rr::Value> Target::ask(rr::CallKind kind, rr::Value value) const {
 }
 
 rr::awaitable<rr::Result<std::shared_ptr<Target>>> find_target(std::shared_ptr<ValueClient> client,
-                                                               std::vector<std::string> segments) {
+                                                               std::vector<std::string> segments, LookJudge may_look) {
   const auto upstream = client->upstream();
   const auto target = std::make_shared<Target>();
   target->client = client;
@@ -264,6 +265,9 @@ rr::awaitable<rr::Result<std::shared_ptr<Target>>> find_target(std::shared_ptr<V
       index = segments[i];
     }
     const auto path = rr::child_path(target->path(), name, index);
+    const AccessRequest object{
+        .device = upstream->device().config().name, .service = upstream->service(), .path = path};
+    if (const auto allowed = may_look(object); !allowed) co_return allowed.error();
     try {
       if (!upstream->object_type(path)) co_await client->find_object(path);
     } catch (const rr::Exception& exception) {

@@ -2,6 +2,7 @@
 // Source: service definitions spec section 5.12, "JSON Schema / OpenAPI".
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -94,10 +95,13 @@ class ObjectRequest {
 /// The HTTP status that says best what a Robot Raconteur error says.
 unsigned status_of(rr::ErrorCode code);
 
+/// Whether the asker may look for an object of a service, before the device is asked for it.
+using LookJudge = std::function<rr::Result<>(const AccessRequest& object)>;
+
 /// Walks, in a session that is open, from the root object along `segments`, percent-decoded: objrefs by name, an index
 /// behind those that have one, at last a member or nothing. Errors   object_not_found, member_not_found, those of the
-/// device.
+/// judge and of the device.
 rr::awaitable<rr::Result<std::shared_ptr<Target>>> find_target(std::shared_ptr<ValueClient> client,
-                                                               std::vector<std::string> segments);
+                                                               std::vector<std::string> segments, LookJudge may_look);
 
 }  // namespace rrgate

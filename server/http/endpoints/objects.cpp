@@ -18,18 +18,38 @@ namespace rrgate {
 
 namespace {
 
+/// What a request gets from where its path leads to.
+enum class Answer : std::uint8_t { description, lease, images, topic, generator, member };
+
+Answer answer_to(const ObjectRequest& request, const Target& target) {
+  if (!target.member) return request.option("lease") ? Answer::lease : Answer::description;
+  const auto& member = *target.member;
+  const bool is_topic = member.kind == rr::MemberKind::event || member.kind == rr::MemberKind::pipe ||
+                        (member.kind == rr::MemberKind::wire && member.direction() != rr::MemberDirection::writeonly);
+  const bool is_motion = is_topic && member.kind != rr::MemberKind::event && is_image_type(member.type, target.types());
+  if (is_motion && request.is_read() && request.wants_motion()) return Answer::images;
+  if (is_topic && request.is_read() && request.wants_events()) return Answer::topic;
+  return member.kind == rr::MemberKind::function && member.is_generator() ? Answer::generator : Answer::member;
+}
+
 /// What a request does to a member.
 Verb verb_of(const ObjectRequest& request, const Target& target) {
-  if (!target.member) return request.option("lease") ? Verb::lock : Verb::read;
-  const auto& member = *target.member;
-  const bool writes = request.method() == http::verb::put;
-  switch (member.kind) {
+  switch (answer_to(request, target)) {
+    case Answer::description:
+      return Verb::read;
+    case Answer::lease:
+      return Verb::lock;
+    case Answer::images:
+    case Answer::topic:
+      return Verb::subscribe;
+    default:
+      break;
+  }
+  switch (target.member->kind) {
     case rr::MemberKind::property:
     case rr::MemberKind::memory:
-      return writes ? Verb::write : Verb::read;
     case rr::MemberKind::wire:
-      if (writes) return Verb::write;
-      return request.wants_events() || request.wants_motion() ? Verb::subscribe : Verb::read;
+      return request.method() == http::verb::put ? Verb::write : Verb::read;
     case rr::MemberKind::event:
     case rr::MemberKind::pipe:
       return Verb::subscribe;
@@ -39,32 +59,33 @@ Verb verb_of(const ObjectRequest& request, const Target& target) {
 }
 
 rr::awaitable<void> serve_target(const ObjectRequest& request, const Target& target) {
-  if (!target.member && request.option("lease")) {
-    const auto response = co_await answer_lease(request, target);
-    co_await request.writer().send(response);
-    co_return;
-  }
-  if (!target.member) {
-    auto response = request.method_response("GET, HEAD");
-    if (request.is_read()) {
-      const auto described = describe_object(target);
-      response = co_await request.value_response(described);
+  switch (answer_to(request, target)) {
+    case Answer::description: {
+      auto response = request.method_response("GET, HEAD");
+      if (request.is_read()) {
+        const auto described = describe_object(target);
+        response = co_await request.value_response(described);
+      }
+      co_await request.writer().send(response);
+      break;
     }
-    co_await request.writer().send(response);
-    co_return;
-  }
-  const auto& member = *target.member;
-  const bool is_topic = member.kind == rr::MemberKind::event || member.kind == rr::MemberKind::pipe ||
-                        (member.kind == rr::MemberKind::wire && member.direction() != rr::MemberDirection::writeonly);
-  const bool is_motion = is_topic && member.kind != rr::MemberKind::event && is_image_type(member.type, target.types());
-  if (is_motion && request.is_read() && request.wants_motion()) {
-    co_await stream_images(request, target);
-  } else if (is_topic && request.is_read() && request.wants_events()) {
-    co_await stream_topic(request, target);
-  } else if (member.kind == rr::MemberKind::function && member.is_generator()) {
-    co_await stream_generator(request, target);
-  } else {
-    co_await answer_member(request, target);
+    case Answer::lease: {
+      const auto response = co_await answer_lease(request, target);
+      co_await request.writer().send(response);
+      break;
+    }
+    case Answer::images:
+      co_await stream_images(request, target);
+      break;
+    case Answer::topic:
+      co_await stream_topic(request, target);
+      break;
+    case Answer::generator:
+      co_await stream_generator(request, target);
+      break;
+    case Answer::member:
+      co_await answer_member(request, target);
+      break;
   }
 }
 
@@ -158,6 +179,12 @@ rr::awaitable<void> serve_document(GatewayState& gateway, Device& device, const 
   co_await writer.send(response);
 }
 
+rr::awaitable<void> refuse(GatewayState& gateway, ResponseWriter& writer, const rr::Error& why) {
+  gateway.reject(why);
+  const auto refusal = gateway.http_access().refusal(writer.request(), why);
+  co_await writer.send(refusal);
+}
+
 rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::vector<std::string> segments) {
   const ObjectRequest request(writer, gateway);
   const bool is_about_all = segments.size() == 2 && (is_device_resource(segments[1]) || is_definition(segments[1]));
@@ -211,7 +238,17 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
       if (holder != gateway.lease_holders().end() && holder->second->upstream() == used->upstream())
         used = holder->second;
     }
-    auto found = co_await find_target(std::move(used), std::move(segments));
+    std::optional<rr::Error> unseen;
+    LookJudge may_look = [&](const AccessRequest& object) {
+      auto allowed = gateway.access().check(writer.request().identity, object);
+      if (!allowed) unseen = allowed.error();
+      return allowed;
+    };
+    auto found = co_await find_target(std::move(used), std::move(segments), std::move(may_look));
+    if (unseen) {
+      co_await refuse(gateway, writer, *unseen);
+      co_return;
+    }
     if (found)
       target = *found;
     else
@@ -231,9 +268,7 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
     else if (const auto allowed = gateway.access().check(who, wanted); !allowed)
       begun = allowed.error();
     if (!begun) {
-      gateway.reject(begun.error());
-      const auto refusal = gateway.http_access().refusal(writer.request(), begun.error());
-      co_await writer.send(refusal);
+      co_await refuse(gateway, writer, begun.error());
       co_return;
     }
     entry = std::move(*begun);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <type_traits>
 #include <utility>
 
 #include "node/values/exception.hpp"
@@ -12,7 +13,7 @@ namespace rrgate {
 template <class T>
 T value_or_throw(rr::Result<T> result) {
   if (!result) throw rr::Exception(result.error());
-  return std::move(*result);
+  if constexpr (!std::is_void_v<T>) return std::move(*result);
 }
 
 [[noreturn]] inline void refuse(rr::ErrorCode code, std::string why) {

@@ -151,6 +151,40 @@ void start_again(Loopback& pair, ClientOptions options, ServiceSessionOptions se
 
 }  // namespace
 
+TEST_CASE("a packet for many endpoints is to each the one that it would get alone") {
+  const MemberDefinition member{MemberKind::pipe, "samples", TypeDefinition{.type = DataType::double_t}};
+  const Value value(2.5);
+  const bool wants_ack = GENERATE(false, true);
+  SharedPipePacket packet(value, wants_ack);
+  struct {
+    std::string path;
+    bool is_unreliable;
+    std::int32_t index;
+    std::uint32_t number;
+  } const endpoints[] = {{"arm", false, 1, 7},   {"arm", false, 1, 8},  {"arm", false, 1, 4'000'000'000},
+                         {"arm", false, 21, 21}, {"arm", true, 21, 22}, {"leg", true, 21, 23},
+                         {"arm", false, 1, 9}};
+  std::uint16_t message_id = 0;
+  for (const auto& [path, is_unreliable, index, number] : endpoints) {
+    INFO(path << " " << is_unreliable << " " << index << " " << number);
+    const auto bytes_of = [&](auto& message, auto&& encode_it) {
+      message.header.message_id = ++message_id;
+      message.header.has_routing = message.header.has_endpoints = false;
+      EncodedMessage encoded;
+      REQUIRE(encode_it(encoded));
+      --message_id;
+      return encoded.to_bytes();
+    };
+    Message alone;
+    begin_pipe_packets(alone, path, "samples", is_unreliable);
+    REQUIRE(write_pipe_packet(alone, index, number, value, wants_ack, member, {}));
+    auto& shared = *packet.message(path, member, is_unreliable, index, number, {}).value();
+    CHECK(bytes_of(shared.message, [&](EncodedMessage& out) { return shared.encode({}, out); }) ==
+          bytes_of(alone, [&](EncodedMessage& out) { return encode(alone, {}, out); }));
+    ++message_id;
+  }
+}
+
 TEST_CASE("packets go both ways, with numbers and acknowledgements, in both versions") {
   for (const auto& features : {Features{}, only_version_2()}) {
     Pipe pair("samples", features);

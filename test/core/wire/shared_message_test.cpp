@@ -69,6 +69,22 @@ TEST_CASE("every receiver of a shared message gets the bytes that it would get a
   }
 }
 
+TEST_CASE("every receiver of a shared message gets its own number") {
+  const std::vector<double> values(GENERATE(std::size_t{3}, std::size_t{1000}), 0.5);
+  std::uint32_t number = 0;
+  const ByteSpan bytes(reinterpret_cast<const std::uint8_t*>(&number), sizeof(number));
+  SharedMessage shared;
+  write(shared.message, values);
+  shared.message.add("number", DataType::uint32_t, 1, bytes);
+  shared.own_number = bytes;
+  EncodedMessage sent;
+  for (number = 1; number < 1'000'000; number *= 11) {
+    address(shared.message.header, static_cast<std::uint16_t>(number % 7), false);
+    REQUIRE(shared.encode({}, sent));
+    CHECK(to_hex(sent.to_bytes()) == alone(shared.message, {}));
+  }
+}
+
 TEST_CASE("a shared message keeps what it references for the last of its receivers") {
   auto values = std::make_shared<std::vector<double>>(1000, 0.5);
   const std::weak_ptr<const void> alive = values;

@@ -35,6 +35,11 @@ const Meanings path_meanings{{"**", {"Create", "Create.axes[0]", "Create.axes[1]
                              {"Create.*", {"Create.axes[0]", "Create.axes[1]"}},
                              {"*.axes[1]", {"Create.axes[1]"}},
                              {"Arm", {"Arm"}}};
+/// Objects that are fitted, or on the way to others that are.
+const Meanings path_leads{{"**", {"Create", "Create.axes[0]", "Create.axes[1]", "Arm", "Arm.tool"}},
+                          {"Create.*", {"Create", "Create.axes[0]", "Create.axes[1]"}},
+                          {"*.axes[1]", {"Create", "Create.axes[0]", "Create.axes[1]", "Arm", "Arm.tool"}},
+                          {"Arm", {"Arm"}}};
 const Meanings member_meanings{{"*", {"", "Drive", "DistanceTraveled", "packets"}},
                                {"D*", {"Drive", "DistanceTraveled"}},
                                {"packets", {"packets"}},
@@ -54,12 +59,15 @@ bool model_allows(const std::vector<AccessRule>& rules, const Identity& identity
     for (const auto& role : rule.roles)
       is_for = is_for || (role == "*" && identity.is_proven()) ||
                std::set<std::string>(identity.roles.begin(), identity.roles.end()).contains(role);
-    if (!is_for || !means(device_meanings, rule.devices, device) || !means(service_meanings, rule.services, service) ||
-        !means(path_meanings, rule.paths, path))
+    if (!is_for || !means(device_meanings, rule.devices, device) || !means(service_meanings, rule.services, service))
       continue;
-    // Whoever may do anything to an object may look at it.
-    if (verb == Verb::read && member.empty() && std::any_of(rule.may.begin(), rule.may.end(), is_device_verb))
-      return true;
+    // Whoever may do anything to an object, or to one below it, may look at it.
+    if (verb == Verb::read && member.empty()) {
+      if (means(path_leads, rule.paths, path) && std::any_of(rule.may.begin(), rule.may.end(), is_device_verb))
+        return true;
+      continue;
+    }
+    if (!means(path_meanings, rule.paths, path)) continue;
     if (std::set<Verb>(rule.may.begin(), rule.may.end()).contains(verb) && means(member_meanings, rule.members, member))
       return true;
   }
@@ -120,7 +128,8 @@ TEST_CASE("rights: every verb, path and role, against a plain model of the rules
     for (const auto& device : all_devices) {
       bool has_all = true;
       for (const auto& service : all_services)
-        for (const auto& path : all_paths)
+        for (const auto& path : all_paths) {
+          if (!path.starts_with(service)) continue;
           for (const auto& member : all_members)
             for (const auto verb : all_verbs) {
               const bool expected = model_allows(list, identity, device, service, path, member, verb);
@@ -138,6 +147,7 @@ TEST_CASE("rights: every verb, path and role, against a plain model of the rules
               }
               if (!expected && is_device_verb(verb)) has_all = false;
             }
+        }
       // Bytes that nobody reads pass for those alone who could have done anything.
       if (rules.check_whole_device(identity, device)) REQUIRE(has_all);
     }
@@ -210,7 +220,9 @@ TEST_CASE("rights: a device is seen by those who may do something with it, and b
   CHECK_FALSE(rules.sees(viewer, "arm1", "Create"));
   CHECK_FALSE(rules.sees(viewer, "create", "Arm"));
   CHECK(rules.sees(viewer, "arm1", "Arm", "Arm.tool"));
-  CHECK_FALSE(rules.sees(viewer, "arm1", "Arm", "Arm"));
+  CHECK(rules.sees(viewer, "arm1", "Arm", "Arm"));  // the way to the tool
+  CHECK_FALSE(rules.sees(viewer, "arm1", "Arm", "Arm.tools"));
+  CHECK_FALSE(rules.sees(viewer, "arm1", "Arm", "Arm.axes[0]"));
   CHECK_FALSE(rules.sees(oper, "arm1", "Arm", "Arm.tool"));
 }
 

@@ -1,6 +1,6 @@
 // What programs do with generated types. Compiled, never run: each line marked as an error must be one.
-import { connect, rrValue } from "rrgate-client";
-import type { Complex, RemoteObject, RrValue } from "rrgate-client";
+import { connect, rrValue, subscribe } from "rrgate-client";
+import type { Complex, RemoteObject, RrValue, SubscriptionState } from "rrgate-client";
 import type { SimulatedCreate } from "generated/create.js";
 import type * as declared from "generated/interop.js";
 import { Color } from "generated/interop_module.js";
@@ -105,4 +105,36 @@ export async function every_kind(): Promise<void> {
   await object.$.member("then")(5);
   await object.$.member("toString")();
   await object.operator(1, "", words.enumeration.private);
+}
+
+export async function follow(): Promise<void> {
+  await using robot = subscribe<SimulatedCreate>("ws://localhost/?service=Create");
+  const packets = robot.wire("packets");
+  for await (const packet of packets) packet?.Data.byteLength;
+  packets.store.subscribe((packet) => packet?.Data.byteLength);
+  const bumps = robot.event("Bump");
+  same<typeof bumps extends AsyncIterable<infer A> ? A : never, []>(true);
+  robot.callback("play_callback", (distance, angle) => new Uint8Array([distance, angle]));
+  // @ts-expect-error the callback answers bytes
+  robot.callback("play_callback", () => "song");
+  // @ts-expect-error a function is no wire
+  robot.wire("Drive");
+  // @ts-expect-error there is no such member
+  robot.wire("paket");
+  // @ts-expect-error a wire is no event
+  robot.event("packets");
+  // @ts-expect-error a wire is no pipe
+  robot.pipe("packets");
+  const far: RrValue | undefined = robot.wire("level", { path: "*.part" }).value;
+  const state: SubscriptionState = robot.state.getSnapshot();
+  if (state.status === "waiting") same<typeof state.nextTry, number>(true);
+
+  await using interop = subscribe<words.Object_>("ws://localhost/?service=words");
+  for await (const samples of interop.pipe("samples")) samples.subarray(1);
+
+  const dynamic = subscribe("ws://localhost/?service=any");
+  for await (const value of dynamic.wire("anything")) same<typeof value, RrValue>(true);
+  for await (const [first] of dynamic.event("anything")) same<typeof first, RrValue | undefined>(true);
+  await dynamic.close();
+  void far;
 }

@@ -1,4 +1,5 @@
 // Pipes: every packet, in order. Layer: wasm-client/ts/members. Source: sessions spec section 2.11.
+import { asyncDispose } from "../dispose.js";
 import { callSafely, makeError } from "../errors.js";
 import type {
   CallOptions,
@@ -152,6 +153,10 @@ class Endpoint implements PipeEndpoint {
     if (this.#isOver) queueMicrotask(() => callSafely(() => closed()));
     else this.#closers.add(closed);
     return () => void this.#closers.delete(closed);
+  }
+
+  [asyncDispose](): Promise<void> {
+    return this.close();
   }
 
   close(): Promise<void> {

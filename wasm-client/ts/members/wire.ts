@@ -1,4 +1,5 @@
 // Wires: the newest value wins. Layer: wasm-client/ts/members. Source: sessions spec section 2.12.
+import { asyncDispose } from "../dispose.js";
 import { makeError } from "../errors.js";
 import type { CallOptions, Losses, RrValue, WireConnection, WireMember, WireTime } from "../types.js";
 import { checkSignal } from "../within.js";
@@ -152,6 +153,10 @@ class Connection implements WireConnection {
 
   losses(options?: CallOptions): Promise<Losses | undefined> {
     return lossesOf(this.wire.context, options);
+  }
+
+  [asyncDispose](): Promise<void> {
+    return this.close();
   }
 
   close(): Promise<void> {

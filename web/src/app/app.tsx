@@ -2,6 +2,8 @@
 // Layer: web/app.
 
 import { useEffect, useRef, useState } from "preact/hooks";
+import { chooseLanguage, language, LANGUAGES, t } from "./language";
+import type { Language } from "./language";
 import { useStore } from "./store";
 import type { Store } from "./store";
 import { formatRoute, formatStep } from "./router";
@@ -32,7 +34,7 @@ export function App({ route, list, usb, access, session }: AppParts) {
   const who = useStore(session.who);
   const [asked, setAsked] = useState(false);
   const isForm = mustSignIn(who) || (asked && who?.user === null);
-  const title = isForm ? "Sign in" : titleOf(where);
+  const title = isForm ? t("Sign in") : titleOf(where);
   const first = useRef(true);
   useEffect(() => {
     document.title = title === "" ? "rrgate" : `${title} · rrgate`;
@@ -43,7 +45,7 @@ export function App({ route, list, usb, access, session }: AppParts) {
   return (
     <>
       <a class="skip" href="#main" onClick={(event) => (event.preventDefault(), main.current?.focus())}>
-        Skip to content
+        {t("Skip to content")}
       </a>
       <header class="head">
         <a class="brand" href="#/">
@@ -52,6 +54,7 @@ export function App({ route, list, usb, access, session }: AppParts) {
         </a>
         <Crumbs route={where} />
         <Account session={session} ask={() => setAsked(true)} />
+        <LanguageSelect />
         <ThemeButton />
       </header>
       <main id="main" ref={main} tabIndex={-1}>
@@ -83,7 +86,7 @@ function Crumbs({ route }: { route: Route }) {
     })),
   ];
   return (
-    <nav class="crumbs" aria-label="Where you are">
+    <nav class="crumbs" aria-label={t("Where you are")}>
       <ol>
         {links.map(({ text, href }) => (
           <li key={text}>{href === null ? <span aria-current="page">{text}</span> : <a href={href}>{text}</a>}</li>
@@ -110,6 +113,25 @@ function ThemeButton() {
   );
 }
 
+function LanguageSelect() {
+  return (
+    <label>
+      <span class="unseen">{t("Language")}</span>
+      <select
+        class="field language"
+        value={language}
+        onChange={(event) => chooseLanguage(event.currentTarget.value as Language)}
+      >
+        {Object.entries(LANGUAGES).map(([each, name]) => (
+          <option key={each} value={each} lang={each}>
+            {name}
+          </option>
+        ))}
+      </select>
+    </label>
+  );
+}
+
 function UnknownPage({ address }: { address: string }) {
   return (
     <div class="page page-narrow">
@@ -126,8 +148,8 @@ function UnknownPage({ address }: { address: string }) {
 }
 
 function titleOf(route: Route): string {
-  if (route.page === "devices") return "Devices";
-  if (route.page === "unknown") return "No such page";
+  if (route.page === "devices") return t("Devices");
+  if (route.page === "unknown") return t("No such page");
   const last = route.path[route.path.length - 1];
   return last ? `${formatStep(last)} of ${route.device}` : route.device;
 }

@@ -1,4 +1,4 @@
-// Addresses of the pages: `#/` and `#/devices/<device>/<service>[/<object>...][?view=members]`.
+// Addresses of the pages: `#/` and `#/devices/<device>/<service>[/<object>...][?view=members|board][&board=...]`.
 // Layer: web/app. A fragment, so that any static file server can hold the page.
 
 import { Store } from "./store";
@@ -9,9 +9,13 @@ export interface PathStep {
   index: string | null;
 }
 
+/** "auto": what fits the object best. */
+export type View = "auto" | "drive" | "board" | "members";
+const VIEWS: readonly string[] = ["drive", "board", "members"];
+
 export type Route =
   | { page: "devices" }
-  | { page: "service"; device: string; service: string; path: PathStep[]; view: "auto" | "members" }
+  | { page: "service"; device: string; service: string; path: PathStep[]; view: View; board: string | null }
   | { page: "unknown"; address: string };
 
 export function parseRoute(hash: string): Route {
@@ -26,22 +30,33 @@ export function parseRoute(hash: string): Route {
   if (segments.length === 0) return { page: "devices" };
   const [kind, device, service, ...steps] = segments;
   if (kind !== "devices" || !device || !service) return { page: "unknown", address };
-  const view = new URLSearchParams(query).get("view") === "members" ? "members" : "auto";
-  return { page: "service", device, service, path: steps.map(parseStep), view };
+  const given = new URLSearchParams(query);
+  const view = VIEWS.includes(given.get("view") ?? "") ? (given.get("view") as View) : "auto";
+  return { page: "service", device, service, path: steps.map(parseStep), view, board: given.get("board") };
 }
 
-export function formatRoute(device: string, service: string, path: readonly PathStep[] = [], view = "auto"): string {
+export function formatRoute(
+  device: string,
+  service: string,
+  path: readonly PathStep[] = [],
+  view: View = "auto",
+): string {
   const segments = [device, service, ...path.map(formatStep)].map(encodeURIComponent);
-  return `#/devices/${segments.join("/")}${view === "members" ? "?view=members" : ""}`;
+  return `#/devices/${segments.join("/")}${view === "auto" ? "" : `?view=${view}`}`;
 }
 
 export function formatStep(step: PathStep): string {
   return step.index === null ? step.member : `${step.member}[${step.index}]`;
 }
 
-function parseStep(segment: string): PathStep {
+export function parseStep(segment: string): PathStep {
   const match = /^([^[]+)\[(.*)\]$/s.exec(segment);
   return match ? { member: match[1] ?? "", index: match[2] ?? "" } : { member: segment, index: null };
+}
+
+/** The steps of an object's path: at the dots that are not within brackets, since a key may have some. */
+export function splitSteps(path: string): string[] {
+  return path.match(/[^.[\]]+(\[[^\]]*\])?/g) ?? [];
 }
 
 /** The current page; follows the address bar. */

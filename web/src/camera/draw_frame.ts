@@ -1,11 +1,11 @@
 // Draws a camera's frame.
 // Layer: web/camera.
 
-import { readFrame } from "./frame";
+import { readPicture } from "./pixels";
 
 /** @returns the size in words. @throws Error when the value is no picture. */
 export async function drawFrame(canvas: HTMLCanvasElement | null, value: unknown): Promise<string> {
-  const frame = readFrame(value);
+  const frame = readPicture(value);
   const bitmap = frame.encoded ? await createImageBitmap(new Blob([frame.encoded])) : null;
   const width = bitmap?.width ?? frame.width;
   const height = bitmap?.height ?? frame.height;

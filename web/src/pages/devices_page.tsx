@@ -1,6 +1,7 @@
 // The first page: which devices are behind this gateway or plugged into this computer, how they are, and what they offer.
 // Layer: web/pages.
 
+import { t } from "../app/language";
 import { useNow, useStore } from "../app/store";
 import { formatRoute } from "../app/router";
 import { devicesOf } from "../gateway/devices";
@@ -18,7 +19,7 @@ export function DevicesPage({ list, usb, access }: { list: DeviceList; usb: UsbD
   const devices = devicesOf(state);
   return (
     <div class="page page-narrow">
-      <h1>Devices</h1>
+      <h1>{t("Devices")}</h1>
       <GatewayStrip state={state} />
       {state.kind === "loading" && <LoadingRows />}
       {devices && devices.length === 0 && state.kind === "known" && <NoDevices />}
@@ -84,10 +85,12 @@ function GatewayStrip({ state }: { state: GatewayState }) {
 }
 
 function headline(state: GatewayState): string {
-  if (state.kind === "loading") return "Asking the gateway for its devices";
-  if (state.kind === "away") return `The gateway does not answer since ${clockTime(state.since)}`;
+  if (state.kind === "loading") return t("Asking the gateway for its devices");
+  if (state.kind === "away") return t("The gateway does not answer since {0}", clockTime(state.since));
   const online = state.devices.filter((device) => device.state === "online").length;
-  return state.devices.length === 0 ? "No devices configured" : `${online} of ${state.devices.length} devices online`;
+  return state.devices.length === 0
+    ? t("No devices configured")
+    : t("{0} of {1} devices online", online, state.devices.length);
 }
 
 function AwayDetail({ state }: { state: GatewayState & { kind: "away" } }) {

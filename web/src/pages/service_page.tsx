@@ -1,9 +1,13 @@
 // One service of one device: keeps it connected, and shows the robot's page where the object is a Create, else its members.
 // Layer: web/pages.
 
+import type { ComponentType } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
+import { t } from "../app/language";
 import { formatRoute } from "../app/router";
-import type { PathStep, Route } from "../app/router";
+import type { PathStep, Route, View } from "../app/router";
+import { recallBoard } from "../board/board";
+import { hasPreset } from "../board/presets";
 import { useStore } from "../app/store";
 import { devicesOf, relayUrl } from "../gateway/devices";
 import type { DeviceList } from "../gateway/devices";
@@ -13,6 +17,7 @@ import { Link } from "../robot/link";
 import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
 import { isCreate } from "../robot/robot_model";
+import { walk } from "../robot/walk";
 import { LinkStrip } from "../ui/link_strip";
 import { ObjectView } from "./object_view";
 import { RobotPage } from "./robot_page";
@@ -25,31 +30,22 @@ export function ServicePage({ route, list }: { route: ServiceRoute; list: Device
   const link = useLink(device, service, list, !isMissing);
   const robot = useRobot(link, device, service, list);
   const drives = robot && path.length === 0;
+  const first = useFirstView(link, route, drives);
+  const shown = view === "auto" || (view === "drive" && !drives) ? first : view;
   return (
-    <div class={`page ${drives && view === "auto" ? "page-wide" : "page-narrow"}`}>
+    <div class={`page ${shown === "members" ? "page-narrow" : "page-wide"}`}>
       <div class="service-head">
         <h1 class="place-name">{device}</h1>
         {link && <LinkStrip link={link} list={list} device={device} service={service} />}
-        {drives && (
-          <nav class="tabs" aria-label="Views of this service">
-            <a href={formatRoute(device, service)} aria-current={view === "auto" ? "page" : undefined}>
-              Drive
-            </a>
-            <a
-              href={formatRoute(device, service, [], "members")}
-              aria-current={view === "members" ? "page" : undefined}
-            >
-              All members
-            </a>
-          </nav>
-        )}
+        {link && <Views route={route} shown={shown} first={first} drives={drives} />}
       </div>
       {drives && link && (
-        <div hidden={view !== "auto"}>
-          <RobotPage link={link} list={list} device={device} shown={view === "auto"} />
+        <div hidden={shown !== "drive"}>
+          <RobotPage link={link} list={list} device={device} shown={shown === "drive"} />
         </div>
       )}
-      {link && (!drives || view === "members") && <MembersPage link={link} route={route} path={path} />}
+      {link && shown === "board" && <LoadedBoard link={link} route={route} list={list} />}
+      {link && shown === "members" && <MembersPage link={link} route={route} path={path} />}
       {isMissing && (
         <p class="empty">
           The gateway has no device of this name. If one comes, it opens here by itself. <a href="#/">All devices</a>
@@ -57,6 +53,56 @@ export function ServicePage({ route, list }: { route: ServiceRoute; list: Device
       )}
     </div>
   );
+}
+
+function Views({ route, shown, first, drives }: { route: ServiceRoute; shown: View; first: View; drives: boolean }) {
+  const views: [View, string][] = [
+    ...(drives ? ([["drive", t("Drive")]] as [View, string][]) : []),
+    ["board", t("Board")],
+    ["members", t("All members")],
+  ];
+  return (
+    <nav class="tabs" aria-label={t("Views of this service")}>
+      {views.map(([view, name]) => (
+        <a
+          key={view}
+          href={formatRoute(route.device, route.service, route.path, view === first ? "auto" : view)}
+          aria-current={view === shown ? "page" : undefined}
+        >
+          {name}
+        </a>
+      ))}
+    </nav>
+  );
+}
+
+/** What an address without a view shows: the demo robot's page, a board that was made or is known to fit, else all members. */
+function useFirstView(link: Link | null, route: ServiceRoute, drives: boolean): View {
+  const [isKnown, setKnown] = useState(false);
+  const isMade = useRef(recallBoard([route.device, route.service].map(encodeURIComponent).join("/")) !== null).current;
+  useEffect(() => {
+    if (!link) return;
+    const look = (): void => {
+      const state = link.state.value;
+      if (state.kind === "online") setKnown(hasPreset(state.remote.type));
+    };
+    look();
+    return link.state.watch(look);
+  }, [link]);
+  if (drives) return "drive";
+  return route.path.length === 0 && (isKnown || isMade) ? "board" : "members";
+}
+
+/** The board's code, once a board is looked at. */
+function LoadedBoard(props: { link: Link; route: ServiceRoute; list: DeviceList }) {
+  const [Shown, setShown] = useState<ComponentType<typeof props> | null>(null);
+  useEffect(() => {
+    import("../board/board_page").then(
+      ({ default: shown }) => setShown(() => shown),
+      () => undefined, // the strip says that the gateway is away
+    );
+  }, []);
+  return Shown && <Shown {...props} />;
 }
 
 /** Whether the gateway knows no such device, and knew none since the page was opened: one that goes away stays shown. */
@@ -145,15 +191,4 @@ function MembersPage({ link, route, path }: { link: Link; route: ServiceRoute; p
   return (
     <ObjectView key={`${key}:${found.object.type}`} object={found.object} live={found.of === remote} route={route} />
   );
-}
-
-async function walk(root: Remote, path: readonly PathStep[]): Promise<Remote> {
-  let object = root;
-  for (const { member, index } of path) {
-    const declared = object.members.find((m) => m.name === member && m.kind === "objref");
-    if (!declared) throw new Error(`${object.type} has no object "${member}"`);
-    const byNumber = /(\{int32\}|\[\])$/.test(declared.type);
-    object = await object.child(member, index === null ? undefined : byNumber ? Number(index) : index);
-  }
-  return object;
 }

@@ -13,10 +13,12 @@ export interface Remote {
   /** Qualified object type, such as `experimental.create.Create`. */
   readonly type: string;
   readonly members: readonly Member[];
+  /** The texts of the definitions known so far. */
+  readonly definitions: readonly string[];
   has(name: string, kind: MemberKind): boolean;
   call(name: string, args: readonly unknown[], options?: CallOptions): Promise<unknown>;
   get(name: string): Promise<unknown>;
-  set(name: string, value: unknown): Promise<void>;
+  set(name: string, value: unknown, options?: CallOptions): Promise<void>;
   /** Values of a wire from now on, the newest only; ends with the connection or with `signal`. */
   wire(name: string, signal: AbortSignal): AsyncGenerator<unknown, void>;
   poke(name: string, value: unknown): Promise<void>;
@@ -25,11 +27,25 @@ export interface Remote {
   /** Items of a memory in each dimension. */
   dimensions(memory: string): Promise<number[]>;
   read(memory: string, position: readonly number[], count: readonly number[]): Promise<unknown>;
+  write(memory: string, position: readonly number[], value: unknown): Promise<void>;
+  /** An endpoint to send with; what it receives is not read. */
+  openPipe(name: string): Promise<Sender>;
+  /** A run of a generator function. */
+  generate(name: string, args: readonly unknown[]): AsyncGenerator<unknown, void, unknown>;
+  lock(kind: "user" | "client"): Promise<void>;
+  unlock(): Promise<void>;
+  /** Asks the device for something small: whether it still answers. Nothing is asked of an object that has nothing small. */
+  ping(timeoutMs: number): Promise<void>;
   /** Answers a callback by `handler`. @returns a function that stops answering. */
   answer(name: string, handler: (...args: unknown[]) => unknown): () => void;
   /** @returns a function that unsubscribes. */
   on(name: string, heard: (...args: unknown[]) => void): () => void;
   child(name: string, index?: string | number): Promise<Remote>;
+}
+
+export interface Sender {
+  send(value: unknown): Promise<void>;
+  close(): Promise<void>;
 }
 
 /** One sentence for any failure; errors of a device keep the name of their Robot Raconteur exception. */
@@ -51,14 +67,27 @@ export function remoteOf(object: RemoteObject): Remote {
   return {
     type: info.type,
     members: info.members,
+    get definitions() {
+      return info.types;
+    },
     has: (name, kind) => info.members.some((m) => m.name === name && m.kind === kind),
     call: async (name, args, options) => member(name)(...args, ...(options ? [options] : [])),
     get: async (name) => member(name).get(),
-    set: async (name, value) => member(name).set(value),
+    set: async (name, value, options) => member(name).set(value, options),
     wire: (name, signal) => valuesOf(() => member(name).connect({ signal }), signal),
     pipe: (name, signal) => valuesOf(() => member(name).connect(-1, { signal }), signal),
     dimensions: async (name) => member(name).dimensions(),
     read: async (name, position, count) => member(name).read(position, count),
+    write: async (name, position, value) => member(name).write(position, value),
+    openPipe: async (name) => member(name).connect(-1, {}),
+    generate: (name, args) => member(name)(...args),
+    lock: async (kind) => info.lock(kind),
+    unlock: async () => info.unlock(),
+    ping: async (timeout) => {
+      const small = smallest(info.members);
+      if (small?.kind === "wire") await member(small.name).peek({ timeout });
+      else if (small) await member(small.name).get({ timeout });
+    },
     answer: (name, handler) => {
       const callback = member(name);
       callback.handler = handler;
@@ -69,6 +98,17 @@ export function remoteOf(object: RemoteObject): Remote {
     child: async (name, index) =>
       remoteOf(await (index === undefined ? member(name).get<RemoteObject>() : member(name).get(index))),
   };
+}
+
+/** A wire to peek at, or a property to read, whose value is a word. */
+function smallest(members: readonly Member[]): Member | undefined {
+  const readable = members.filter(({ modifiers }) => !modifiers.includes("writeonly"));
+  const words = readable.filter(({ type }) => /^(double|single|bool|u?int(8|16|32|64)|\w*[mM]ode)$/.test(type));
+  return (
+    words.find(({ kind }) => kind === "property") ??
+    words.find(({ kind }) => kind === "wire") ??
+    readable.find(({ kind }) => kind === "wire")
+  );
 }
 
 /** Leaving the loop, or `signal`, closes the wire's connection or the pipe's endpoint. */

@@ -1,6 +1,7 @@
 // Says plainly whether the page is connected: always there, always the same height, so nothing jumps.
 // Layer: web/ui.
 
+import { t } from "../app/language";
 import { useNow, useStore } from "../app/store";
 import { devicesOf } from "../gateway/devices";
 import type { DeviceList, GatewayState } from "../gateway/devices";
@@ -24,7 +25,7 @@ export function LinkStrip({ link, list, device, service }: LinkStripProps) {
     <section class={`link-strip link-${badge}`} aria-label="Connection" data-link={state.kind}>
       <StateBadge
         state={badge}
-        text={{ online: "connected", connecting: "connecting", offline: "not connected" }[badge]}
+        text={t({ online: "connected", connecting: "connecting", offline: "not connected" }[badge])}
       />
       <div class="link-words">
         {/* Only what changes rarely is announced; the seconds beside it are for the eye. */}
@@ -36,16 +37,16 @@ export function LinkStrip({ link, list, device, service }: LinkStripProps) {
         </p>
       </div>
       <button class="button" type="button" hidden={!lost} onClick={() => link.retryNow()}>
-        Try now
+        {t("Try now")}
       </button>
     </section>
   );
 }
 
 function headline(state: LinkState, device: string, service: string): string {
-  if (state.kind === "connecting") return `Connecting to ${device}, service ${service}`;
-  if (state.kind === "online") return `Connected to ${device} since ${clockTime(state.since)}`;
-  return `No connection to ${device} since ${clockTime(state.since)}`;
+  if (state.kind === "connecting") return t("Connecting to {0}, service {1}", device, service);
+  if (state.kind === "online") return t("Connected to {0} since {1}", device, clockTime(state.since));
+  return t("No connection to {0} since {1}", device, clockTime(state.since));
 }
 
 function detail(state: LinkState, device: string): string {

@@ -84,7 +84,6 @@ class Simulation {
     int sent = 0, received = 0;
     double peer = 0;  ///< the stream of the service's end, once known
     bool is_closing = false;
-    bool is_left = false;  ///< the service closes it: nothing more is sent
     std::set<std::uint32_t> unacknowledged = {};
   };
   struct ServicePipe {
@@ -120,7 +119,7 @@ class Simulation {
     bool is_connected = false, is_closed = false;
     std::map<RequestId, Request> requests = {};
     std::map<std::pair<std::string, std::int32_t>, ClientPipe> pipes = {};
-    bool wants_wire = false, has_wire = false, is_wire_left = false;
+    bool wants_wire = false, has_wire = false;
     double in_value = 0, out_sent = 0;  ///< last of this connection of the wire; 0: none
     RequestId wire_request = 0;
     std::size_t events = 0;         ///< of `told` that have come

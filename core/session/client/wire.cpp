@@ -1,0 +1,133 @@
+// Wires of a client session. Layer: session. Source: sessions spec section 2.12.
+#include <functional>
+#include <utility>
+
+#include "core/member/member_table.hpp"
+#include "core/session/client/client_session.hpp"
+
+namespace rr {
+
+// --- asked ---
+
+RequestId ClientSession::request_wire(EntryType type, std::string_view path, std::string_view member, Now now,
+                                      const Value* value) {
+  const auto write = [&](const MemberDefinition& definition) -> Result<> {
+    if (!value) return {};
+    return write_wire_value(outgoing_, *value, now.utc, definition, types_);
+  };
+  return request_elements(type, MemberKind::wire, path, member, now, std::ref(write));
+}
+
+RequestId ClientSession::connect_wire(std::string_view path, std::string_view member, Now now) {
+  const auto id = request_wire(EntryType::wire_connect_req, path, member, now);
+  if (const auto found = pending_.find(id); found != pending_.end())
+    wires_[{std::string(path), std::string(member)}] = {.member = found->second.member, .request_id = id};
+  return id;
+}
+
+RequestId ClientSession::disconnect_wire(std::string_view path, std::string_view member, Now now) {
+  if (const auto found = wires_.find(PathMemberView{path, member}); found != wires_.end()) wires_.erase(found);
+  return request_wire(EntryType::wire_disconnect_req, path, member, now);
+}
+
+RequestId ClientSession::peek_in_value(std::string_view path, std::string_view member, Now now) {
+  return request_wire(EntryType::wire_peek_in_value_req, path, member, now);
+}
+
+RequestId ClientSession::peek_out_value(std::string_view path, std::string_view member, Now now) {
+  return request_wire(EntryType::wire_peek_out_value_req, path, member, now);
+}
+
+RequestId ClientSession::poke_out_value(std::string_view path, std::string_view member, const Value& value, Now now) {
+  return request_wire(EntryType::wire_poke_out_value_req, path, member, now, &value);
+}
+
+Result<> ClientSession::send_wire(std::string_view path, std::string_view member, const Value& value, Now now) {
+  const auto found = wires_.find(PathMemberView{path, member});
+  if (state_ == ClientState::closed || found == wires_.end() || found->second.state != WireState::connected)
+    return make_error(ErrorCode::invalid_operation, "wire " + quote(member) + " is not connected");
+  if (auto allowed = check_direction(EntryType::wire_packet, *found->second.member); !allowed) return allowed;
+  if (connection_.queued_bytes() >= wire_high_mark) {
+    found->second.waiting = WireValue{now.utc, value};
+    return {};
+  }
+  return send_wire_packet(found->first, found->second, value, now);
+}
+
+Result<> ClientSession::send_wire_packet(const PathMember& key, WireConnection& wire, const Value& value, Now now) {
+  wire.waiting.reset();
+  connection_.begin_message(outgoing_);
+  if (auto written = write_wire_packet(outgoing_, key.path, *wire.member, value, wire.stamp(now.utc), types_); !written)
+    return written;
+  return send_outgoing(now);
+}
+
+void ClientSession::flush_wires(Now now) {
+  for (auto& [key, wire] : wires_) {
+    if (!wire.waiting || state_ == ClientState::closed) continue;
+    const Value value = std::move(wire.waiting->value);
+    // The value was checked when it came in; what can fail here is the connection, and that ends the session elsewhere.
+    if (!send_wire_packet(key, wire, value, now) || connection_.queued_bytes() >= wire_high_mark) return;
+  }
+}
+
+// --- received ---
+
+/// The wire that a connect reply is for; none where it was disconnected meanwhile, be it connected anew.
+ClientSession::Wires::iterator ClientSession::find_connecting_wire(const Pending& pending, RequestId id) {
+  const auto found = wires_.find(PathMemberView{pending.path, pending.member->name});
+  return found != wires_.end() && found->second.request_id == id ? found : wires_.end();
+}
+
+void ClientSession::handle_wire_connected(const Pending& pending, RequestId id) {
+  const auto found = find_connecting_wire(pending, id);
+  if (found == wires_.end()) return;
+  auto& wire = found->second;
+  wire.state = WireState::connected;
+  if (!wire.early) return;
+  emit(WireValueReceived{found->first.path, found->first.member, wire.early->time, std::move(wire.early->value)});
+  wire.early.reset();
+}
+
+/// A wire that came too late is one that nobody wants, unless it was connected anew: that is the same connection.
+void ClientSession::disconnect_left_wire(const MessageEntry& entry, const Pending& pending, Now now) {
+  if (entry.error != ErrorCode::none || wires_.contains(PathMemberView{pending.path, pending.member->name})) return;
+  begin_request(EntryType::wire_disconnect_req, pending.path, pending.member->name);
+  send_outgoing(now);  // its reply is nobody's
+}
+
+void ClientSession::handle_wire_packet(const Message& message, const MessageEntry& entry) {
+  const auto found = wires_.find(PathMemberView{entry.service_path, entry.member_name});
+  if (found == wires_.end() || found->second.member->direction() == MemberDirection::writeonly) return;
+  auto& wire = found->second;
+  auto packet = read_wire_value(message, entry, *wire.member, types_);
+  if (!packet) return;
+  if (wire.state == WireState::connecting) {
+    // It may be of the connection before, whose time stamps say nothing of this one's: a clock may have been set back.
+    wire.early = std::move(*packet);
+    return;
+  }
+  if (!wire.accept(packet->time)) return;
+  emit(WireValueReceived{found->first.path, found->first.member, packet->time, std::move(packet->value)});
+}
+
+void ClientSession::handle_wire_closed(const MessageEntry& entry) {
+  const auto found = wires_.find(PathMemberView{entry.service_path, entry.member_name});
+  // While a connect is not answered, it is the connection before that has ended.
+  if (found == wires_.end() || found->second.state == WireState::connecting) return;
+  emit(WireClosedByService{found->first.path, found->first.member});
+  wires_.erase(found);
+}
+
+void ClientSession::release_wires(std::string_view path) {
+  for (auto wire = wires_.begin(); wire != wires_.end();) {
+    if (!is_within(wire->first.path, path)) {
+      ++wire;
+      continue;
+    }
+    emit(WireClosedByService{wire->first.path, wire->first.member});
+    wire = wires_.erase(wire);
+  }
+}
+
+}  // namespace rr

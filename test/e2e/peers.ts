@@ -1,0 +1,26 @@
+// Devices in Python, each behind a gateway of its own.
+import { existsSync } from "node:fs";
+import path from "node:path";
+import { freePort, Program, repositoryRoot, startGateway, webRoot } from "./processes";
+
+export interface Peer {
+  url: string;
+  device: Program;
+  stop(): Promise<void>;
+}
+
+/** `script`: in the repository; it takes its port and writes what `ready` finds. The device is called "peer". */
+export async function startPeer(script: string, service: string, ready: RegExp, more: object = {}): Promise<Peer> {
+  const python = process.env["RRGATE_PYTHON"] ?? path.join(repositoryRoot, "build/deps/venv/bin/python");
+  if (!existsSync(python)) throw new Error(`${python} is missing: ./dev setup makes it, or name one in RRGATE_PYTHON`);
+  const port = await freePort();
+  const device = new Program(python, [path.join(repositoryRoot, script), String(port)]);
+  device.start();
+  await device.waitForOutput(ready);
+  const gateway = await startGateway("peer", `rr+tcp://127.0.0.1:${port}/?service=${service}`, webRoot, more);
+  const stop = async () => {
+    await gateway.program.kill("SIGTERM");
+    await device.kill();
+  };
+  return { url: gateway.url, device, stop };
+}

@@ -1,0 +1,156 @@
+// The board of an object: panels that are added, arranged by pointer and keyboard, and found again.
+import { readFileSync } from "node:fs";
+import type { Page } from "@playwright/test";
+import { expect, test } from "../lab_test";
+import { addPanel } from "../board";
+
+const panel = (page: Page, name: string) => page.getByRole("group", { name, exact: true });
+
+async function openBoard(page: Page, url: string, object = "create/Create"): Promise<void> {
+  await page.goto(`${url}#/devices/${object}?view=board`);
+  await expect(page.locator(".board-panel").first()).toBeVisible();
+}
+
+test("shows a plot, a table, and a form that calls; a wrong value says where", async ({ page, lab }) => {
+  await openBoard(page, lab.url);
+  await expect(page.locator('[data-panel="plot"] .u-wrap canvas').first()).toBeVisible();
+  await expect(page.locator('[data-panel="plot"] .freshness').first()).toContainText("a second");
+  await expect(page.locator('[data-panel="table"] [data-value="heading"]').first()).toHaveText(/^-?\d/);
+  const form = panel(page, "Calls");
+  await form.getByLabel("Member").selectOption("Drive");
+  await form.getByLabel("velocity").fill("40000");
+  await form.getByRole("button", { name: "Call Drive" }).click();
+  await expect(form.getByRole("alert")).toHaveText("velocity: 40000 is out of range; expected int16, -32768 to 32767");
+  await form.getByLabel("velocity").fill("0");
+  await form.getByRole("button", { name: "Call Drive" }).click();
+  await expect(form.locator("output")).toContainText("done");
+  await form.getByText("History: 1").click();
+  await expect(form.getByRole("button", { name: "0,0" })).toBeVisible();
+  await form.getByText("Copy as code").click();
+  await form.getByRole("button", { name: "curl" }).click();
+  await expect(form.locator("pre")).toContainText(`curl -X POST '${lab.url}api/v1/devices/create/Create/Drive'`);
+});
+
+test("panels are moved and sized by keys and pointer, and are where they were after a reload", async ({
+  page,
+  lab,
+}) => {
+  await openBoard(page, lab.url);
+  await addPanel(page, "notes");
+  const notes = page.locator('[data-panel="notes"]');
+  const place = () => notes.evaluate((element) => [element.style.gridColumn, element.style.gridRow]);
+  const handle = notes.getByRole("button", { name: /^Move or size/ });
+  await handle.focus();
+  await notes.getByRole("textbox", { name: "Notes", exact: true }).fill("call Vera at 12");
+  await handle.focus();
+  for (let i = 0; i < 40; i++) await page.keyboard.press("ArrowUp");
+  const before = await place();
+  await page.keyboard.press("Shift+ArrowRight");
+  const [wider] = await place();
+  expect(Number(wider?.split("span ")[1])).toBe(Number(before[0]?.split("span ")[1]) + 1);
+
+  await handle.scrollIntoViewIfNeeded();
+  const from = await handle.boundingBox();
+  if (!from) throw new Error("the handle has no place on the page");
+  const plot = await page.locator('[data-panel="plot"]').first().boundingBox();
+  await page.mouse.move(from.x + 5, from.y + 5);
+  await page.mouse.down();
+  await page.mouse.move(from.x + 305, from.y + 105, { steps: 8 });
+  await page.mouse.up();
+  const after = await place();
+  expect(after).not.toEqual([wider, before[1]]);
+  expect(plot).not.toBeNull();
+
+  await page.getByRole("button", { name: "Done" }).click();
+  await page.reload();
+  await expect(notes.getByRole("textbox")).toHaveValue("call Vera at 12");
+  expect(await place()).toEqual(after);
+});
+
+test("a board goes by its address, and as a file, to another browser", async ({ page, lab, browser }) => {
+  await openBoard(page, lab.url);
+  await addPanel(page, "notes");
+  await page.locator('[data-panel="notes"]').getByRole("textbox", { name: "Notes", exact: true }).fill("für alle");
+  const address = page.url();
+  expect(address).toContain("&board=");
+  const saved = page.waitForEvent("download");
+  await page.getByRole("button", { name: "Save file" }).click();
+  const file = await (await saved).path();
+  expect(JSON.parse(readFileSync(file, "utf8"))).toMatchObject({ board: 1 });
+
+  const other = await (await browser.newContext()).newPage();
+  await other.goto(address);
+  await expect(other.locator('[data-panel="notes"]').getByRole("textbox")).toHaveValue("für alle");
+  await other.context().close();
+
+  const third = await (await browser.newContext()).newPage();
+  await openBoard(third, lab.url);
+  await expect(third.locator('[data-panel="notes"]')).toHaveCount(0);
+  await third.getByLabel("Board file").setInputFiles(file);
+  await expect(third.locator('[data-panel="notes"]').getByRole("textbox")).toHaveValue("für alle");
+  await third.getByLabel("Board file").setInputFiles({
+    name: "x.json",
+    mimeType: "application/json",
+    buffer: Buffer.from('{"board":1,"panels":[{"kind":"oven"}]}'),
+  });
+  await expect(third.locator("main").getByRole("alert").first()).toContainText(
+    '/panels/0/kind is "oven", expected one of plot',
+  );
+  await third.context().close();
+});
+
+test("a frozen device is seen within a second, and its values say how old they are", async ({ page, lab }) => {
+  await openBoard(page, lab.url);
+  await expect(page.locator('[data-panel="plot"] .freshness').first()).toContainText("a second");
+  lab.create.signal("SIGSTOP");
+  try {
+    await expect(page.locator(".board-silent")).toBeVisible({ timeout: 1_500 });
+    await expect(page.locator('[data-panel="table"] [data-stale="true"]').first()).toContainText(
+      /Stale: \d\.\d s old/,
+      {
+        timeout: 1_000,
+      },
+    );
+  } finally {
+    lab.create.signal("SIGCONT");
+  }
+  await expect(page.locator(".board-silent")).toBeHidden();
+  await expect(page.locator('[data-panel="table"] [data-stale="true"]')).toHaveCount(0);
+});
+
+test("the stop is sent at once and its arrival is said, also while another call hangs", async ({ page, lab }) => {
+  await openBoard(page, lab.url);
+  await page.getByRole("button", { name: "Stop", exact: true }).click();
+  await expect(page.locator('[data-stop="arrived"]')).toHaveText(/^arrived after \d+ ms/);
+  lab.create.signal("SIGSTOP"); // calls hang from here on
+  await panel(page, "Calls")
+    .getByRole("button", { name: /^Call / })
+    .click();
+  await page.keyboard.press("Escape");
+  await expect(page.locator('[data-stop="sent"]')).toBeVisible();
+  lab.create.signal("SIGCONT");
+  await expect(page.locator('[data-stop="arrived"]')).toBeVisible();
+  await lab.create.kill();
+  await page.keyboard.press("Escape");
+  await expect(page.locator('[data-stop="failed"]')).toContainText("NOT STOPPED", { timeout: 5_000 });
+  lab.create.start();
+  await lab.waitUntilOnline();
+  await expect(page.locator('[data-link="online"]')).toBeVisible({ timeout: 30_000 });
+  await page.keyboard.press("Escape");
+  await expect(page.locator('[data-stop="arrived"]')).toBeVisible();
+});
+
+test("a camera of another device stands beside the robot, with an object of its own", async ({ page, lab }) => {
+  await openBoard(page, lab.url);
+  await addPanel(page, "image");
+  const image = page.locator('[data-panel="image"]');
+  await image.getByLabel("Service").selectOption("webcams/Webcam");
+  await image.getByRole("textbox", { name: /^Object of/ }).fill("Webcams[0]");
+  await image.getByRole("textbox", { name: /^Object of/ }).press("Enter");
+  await image.getByLabel("Member").selectOption("FrameStream");
+  await image.getByRole("button", { name: "Start stream" }).click();
+  await expect(image.locator(".panel-foot")).toContainText("320 × 240");
+  await image.getByLabel("Member").selectOption("CaptureFrame");
+  await image.getByRole("button", { name: "Take" }).click();
+  await expect(image.locator(".panel-foot")).toContainText("320 × 240");
+});

@@ -1,0 +1,44 @@
+// Names that JavaScript calls by itself, and texts and documentation full of HTML: no panel breaks, nothing runs.
+import { expect, test } from "../lab_test";
+import { addPanel } from "../board";
+import { startPeer } from "../peers";
+import type { Peer } from "../peers";
+
+let hostile: Peer;
+
+test.beforeAll(async () => {
+  hostile = await startPeer("test/e2e/peers/hostile.py", "hostile", /rr\+tcp/);
+});
+test.afterAll(async () => hostile.stop());
+
+test("every panel shows a hostile service, and runs nothing of it", async ({ page }) => {
+  await page.goto(`${hostile.url}#/devices/peer/hostile?view=board`);
+  const of = (kind: string) => page.locator(`[data-panel="${kind}"]`).first();
+  const html = `<img src=x onerror="document.title='broken in'">`;
+  await expect(of("plot").locator(".freshness")).toContainText("a second");
+  await expect(of("table").locator('[data-value="toString"]')).toContainText(html);
+  await expect(of("table").locator('[data-value="hasOwnProperty"]')).toHaveText("prototype");
+  await expect(of("log")).toContainText("<img src=x onerror=");
+  await of("form").getByLabel("Member").selectOption("toString");
+  await of("form").getByRole("button", { name: "Call toString" }).click();
+  await expect(of("form").locator("output")).toContainText("ms");
+  await of("form").getByText("Copy as code").click();
+  await of("form").getByRole("button", { name: "JavaScript" }).click();
+  await expect(of("form").locator("pre")).toContainText('member("toString")');
+  await of("memory").getByRole("button", { name: "Read", exact: true }).click();
+  await expect(of("memory").locator("[data-memory]")).toContainText("3c 69 6d 67");
+  await of("generator").getByRole("button", { name: "Run" }).click();
+  await expect(of("generator").getByRole("list").getByText(html).first()).toBeVisible();
+  await expect(of("generator").getByRole("status")).toHaveText("ended");
+  for (const kind of ["image", "pipe", "robot", "locks", "streams"]) {
+    await addPanel(page, kind);
+    await expect(of(kind).locator(".panel-body")).not.toBeEmpty();
+  }
+  await of("locks").getByRole("button", { name: "Lock for this page" }).click();
+  await expect(of("locks")).toContainText(/Locked by this page since|RobotRaconteur/);
+  await expect(page.locator("main img")).toHaveCount(0);
+  await expect(page).toHaveTitle("peer · rrgate");
+  await page.goto(`${hostile.url}#/devices/peer/hostile?view=members`);
+  await expect(page.locator('[data-member="then"]')).toContainText("<img src=x");
+  await expect(page).toHaveTitle("peer · rrgate");
+});

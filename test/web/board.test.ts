@@ -1,0 +1,304 @@
+// The board without a browser: where panels stand, what a file may hold, drafts, definitions, paces.
+import { packBoard, parseBoard, recallBoard, unpackBoard, writeBoard } from "../../web/src/board/board";
+import { findRoom, nudge, put, settle } from "../../web/src/board/layout";
+import type { Placed } from "../../web/src/board/layout";
+import { hasPreset, presetFor } from "../../web/src/board/presets";
+import { Pace } from "../../web/src/live/pace";
+import { splitSteps } from "../../web/src/app/router";
+import { asCode } from "../../web/src/panels/code";
+import { hexLines, greyPicture } from "../../web/src/panels/bytes";
+import { Trace, toCsv } from "../../web/src/panels/trace";
+import { readPicture } from "../../web/src/camera/pixels";
+import type { Member } from "../../web/src/robot/remote";
+import { Definitions, flagNames, scopeOf } from "../../web/src/values/definitions";
+import { draftOf, formatUuid, makeDraft, readUuid, valueOf } from "../../web/src/values/draft";
+import { numberAt, numberPaths } from "../../web/src/values/paths";
+import { rowsOf } from "../../web/src/values/rows";
+import { unitOf } from "../../web/src/values/units";
+
+const text = `service com.example.arm
+stdver 0.10
+import com.robotraconteur.uuid
+using com.robotraconteur.uuid.UUID
+using com.robotraconteur.uuid.UUID as Name
+enum Mode
+    off = -1,
+    halt, jog = 0x10,
+    run
+end
+enum ArmStateFlags
+    unknown = 0, error = 0x1, ready = 0x2, high = 0x40000
+end
+struct Pose
+    ## Where it is [mm]
+    field double x
+    field double[3] q
+    field Mode mode
+end
+struct Arm
+    field Pose pose
+    field Pose{list} path
+    field double{string} limits
+    field UUID id
+    field Name other
+    field uint64 arm_state_flags
+    field uint8[] __proto__
+    field Arm{list} inner
+end
+object Robot
+    property double then
+end
+`;
+const uuid = `service com.robotraconteur.uuid
+namedarray UUID
+    field uint8[16] uuid_bytes
+end`;
+const definitions = new Definitions([text, uuid]);
+const scope = "com.example.arm";
+
+describe("definitions", () => {
+  test("have structs, enums with their numbers, and the documentation of fields", () => {
+    expect(definitions.struct("Arm", scope)?.fields.map(({ name }) => name)).toContain("__proto__");
+    expect([...(definitions.enum("Mode", scope)?.values ?? [])]).toEqual([
+      ["off", -1],
+      ["halt", 0],
+      ["jog", 16],
+      ["run", 17],
+    ]);
+    expect(definitions.struct("Name", scope)?.name).toBe("com.robotraconteur.uuid.UUID");
+    expect(definitions.struct("constructor", scope)).toBeUndefined();
+    expect(unitOf("Arm", "pose.x", definitions, scope)).toBe("mm");
+    expect(unitOf("Arm", "__proto__", definitions, scope)).toBe("");
+    expect(scopeOf("a.b.C")).toBe("a.b");
+  });
+
+  test("name the flags that are set, and the rest as a number", () => {
+    const flags = definitions.flags("arm_state_flags", scope);
+    expect(flags && flagNames(0x40003n, flags)).toEqual(["error", "ready", "high"]);
+    expect(flags && flagNames(9, flags)).toEqual(["error", "0x8"]);
+    expect(definitions.flags("arm_state", scope)).toBeUndefined();
+  });
+});
+
+describe("drafts", () => {
+  test("become values of their types, and back", () => {
+    const draft = makeDraft("Arm", definitions, scope);
+    if (draft.kind !== "struct" || draft.fields === null) throw new Error("no struct");
+    const pose = draft.fields.get("pose");
+    if (pose?.kind !== "struct") throw new Error("no pose");
+    pose.fields?.set("mode", { kind: "text", text: "jog" }).set("q", { kind: "text", text: "1, 2, 3" });
+    draft.fields.set("limits", {
+      kind: "map",
+      entries: [{ key: "__proto__", value: { kind: "text", text: "2.5" } }],
+    });
+    draft.fields.set("id", { kind: "text", text: "39b513e7-21b9-4b49-8654-7537473030eb" });
+    draft.fields.set("__proto__", { kind: "text", text: "7" });
+    const value = valueOf(draft, "Arm", definitions, scope) as Record<string, any>;
+    expect(value["pose"]["mode"]).toBe(16);
+    expect(Array.from(value["pose"]["q"] as Float64Array)).toEqual([1, 2, 3]);
+    expect([...value["limits"]]).toEqual([["__proto__", 2.5]]);
+    expect(Object.getPrototypeOf(value)).toBeNull();
+    expect(Array.from(value["__proto__"] as Uint8Array)).toEqual([7]);
+    expect(formatUuid(value["id"].uuid_bytes)).toBe("39b513e7-21b9-4b49-8654-7537473030eb");
+    const again = draftOf(value, "Arm", definitions, scope);
+    expect(again.kind === "struct" && again.fields?.get("id")).toEqual(draft.fields.get("id"));
+    expect(({} as Record<string, unknown>)["7"]).toBeUndefined();
+  });
+
+  test("say which field is wrong", () => {
+    const draft = makeDraft("Pose", definitions, scope);
+    if (draft.kind !== "struct") throw new Error("no struct");
+    draft.fields?.set("mode", { kind: "text", text: "fly" });
+    expect(() => valueOf(draft, "Pose", definitions, scope)).toThrow(
+      'mode: "fly" is no Mode; expected one of off, halt, jog, run',
+    );
+    expect(() => readUuid("12")).toThrow('"12" is no UUID');
+  });
+});
+
+describe("tables and plots", () => {
+  const value = {
+    pose: { x: 1.5, q: Float64Array.of(1, 2, 3), mode: 16 },
+    path: null,
+    limits: new Map([["a", 1]]),
+    id: { uuid_bytes: readUuid("39b513e7-21b9-4b49-8654-7537473030eb") },
+    arm_state_flags: 3n,
+  };
+
+  test("name enums and flags, write UUIDs, and add units", () => {
+    const rows = Object.fromEntries(rowsOf(value, "Arm", definitions, scope).map((row) => [row.path, row.text]));
+    expect(rows).toMatchObject({
+      "pose.x": "1.5 mm",
+      "pose.mode": "jog",
+      id: "39b513e7-21b9-4b49-8654-7537473030eb",
+      arm_state_flags: "error, ready",
+    });
+  });
+
+  test("find numbers by path, and own fields only", () => {
+    expect(numberPaths(value)).toEqual(expect.arrayContaining(["pose.x", "pose.q[2]", 'limits["a"]']));
+    expect(numberAt(value, "pose.q[2]")).toBe(3);
+    expect(numberAt(value, 'limits["a"]')).toBe(1);
+    expect(numberAt(value, "pose.constructor.length")).toBeUndefined();
+    expect(numberAt(7, "")).toBe(7);
+  });
+
+  test("keep what a window shows, and write a file that no spreadsheet runs", () => {
+    const trace = new Trace(2);
+    for (let i = 0; i <= 10; i++) trace.push(i * 1000, [i, null]);
+    expect(trace.window(3)[0]).toEqual([-3, -2, -1, 0]);
+    expect(toCsv(["time_s", '=A1,"x"'], new Trace(1))).toBe(`time_s,"'=A1,""x"""\n`);
+    expect(toCsv(["t", "a", "b"], trace).split("\n")[2]).toBe("1,1,");
+  });
+});
+
+describe("a pace", () => {
+  test("is stale after three periods, and never where there is none", () => {
+    const pace = new Pace();
+    for (let t = 0; t <= 1000; t += 200) pace.hear(t);
+    expect(pace.periodMs).toBe(200);
+    expect(pace.isStale(1590)).toBe(false);
+    expect(pace.isStale(1610)).toBe(true);
+    expect(pace.rate(1610)).toBe(0);
+    const once = new Pace();
+    once.hear(0);
+    expect(once.isStale(1e6)).toBe(false);
+  });
+});
+
+describe("the layout", () => {
+  const panels: Placed[] = [
+    { id: "a", x: 0, y: 0, w: 6, h: 4 },
+    { id: "b", x: 6, y: 0, w: 6, h: 4 },
+    { id: "c", x: 0, y: 4, w: 12, h: 3 },
+  ];
+  const overlaps = (all: readonly Placed[]): number =>
+    all.flatMap((a) =>
+      all.filter((b) => a.id < b.id && a.x < b.x + b.w && b.x < a.x + a.w && a.y < b.y + b.h && b.y < a.y + a.h),
+    ).length;
+
+  test("makes room for what is moved, and nothing overlaps or floats", () => {
+    const moved = put(panels, "c", { y: 0 });
+    expect(overlaps(moved)).toBe(0);
+    expect(moved.find(({ id }) => id === "c")?.y).toBe(0);
+    expect(moved.find(({ id }) => id === "a")?.y).toBe(3);
+    expect(put(panels, "a", { w: 99, h: 0, x: -5 }).find(({ id }) => id === "a")).toMatchObject({ x: 0, w: 12, h: 3 });
+    expect(settle([{ id: "x", x: 3, y: 50, w: 2, h: 3 }])[0]?.y).toBe(0);
+  });
+
+  test("changes places with what is below, step by step", () => {
+    let now = panels;
+    for (let i = 0; i < 8; i++) now = nudge(now, "c", 0, -1);
+    expect(now.find(({ id }) => id === "c")?.y).toBe(0);
+    for (let i = 0; i < 12; i++) now = nudge(now, "c", 0, 1);
+    expect(now.find(({ id }) => id === "c")?.y).toBe(4);
+    expect(overlaps(now)).toBe(0);
+  });
+
+  test("finds the first free place", () => {
+    expect(findRoom(panels, { w: 4, h: 4 })).toEqual({ x: 0, y: 7, w: 4, h: 4 });
+    expect(findRoom([], { w: 40, h: 4 })).toEqual({ x: 0, y: 0, w: 12, h: 4 });
+  });
+});
+
+describe("a board", () => {
+  const board = parseBoard(
+    '{"board":1,"stop":{"call":"halt"},"panels":[{"kind":"notes","x":0,"y":9,"w":3,"h":5,"title":"für","settings":{"text":"a"}}]}',
+  );
+
+  test("goes through an address and comes back, settled", () => {
+    expect(board.panels[0]?.y).toBe(0);
+    const packed = packBoard(board);
+    expect(packed).toMatch(/^[\w-]+$/);
+    expect(writeBoard(unpackBoard(packed))).toEqual(writeBoard(board));
+    expect(() => unpackBoard("%%%")).toThrow("the board in it is cut off or changed");
+  });
+
+  test("is refused with what is wrong, where, and what was expected", () => {
+    for (const [file, words] of [
+      ["[]", "the file is [], expected an object { … }"],
+      ['{"board":2}', 'field "board" is 2, expected 1'],
+      [
+        '{"board":1,"panels":[{"kind":"notes","x":-1,"y":0,"w":1,"h":1}]}',
+        "/panels/0/x is -1, expected a whole number from 0",
+      ],
+      ['{"board":1,"panels":[],"stop":{"call":1}}', "/stop/call is 1, expected the name of a function"],
+      ["{", "the file is no JSON"],
+    ] as const)
+      expect(() => parseBoard(file), file).toThrow(words);
+  });
+
+  test("that this browser keeps and cannot read any more is no board", () => {
+    expect(recallBoard("x", { getItem: () => "{}" })).toBeNull();
+    expect(recallBoard("x", { getItem: () => JSON.stringify(writeBoard(board)) })?.stop?.call).toBe("halt");
+  });
+
+  test("starts from the type where it is known, else from the members", () => {
+    const member = (name: string, kind: Member["kind"], type: string): Member => ({
+      name,
+      kind,
+      type,
+      parameters: [],
+      modifiers: [],
+      documentation: "",
+    });
+    const members = [
+      member("pose", "wire", "Pose"),
+      member("halt", "function", "void"),
+      member("then", "property", "double"),
+    ];
+    const made = presetFor({ type: "com.example.arm.Robot", members, definitions, scope });
+    expect(made.panels.map(({ kind }) => kind)).toEqual(["plot", "table", "form", "table"]);
+    expect(made.stop).toEqual({ call: "halt", args: [] });
+    expect(hasPreset("__proto__") || hasPreset("constructor")).toBe(false);
+    const tool = "com.robotraconteur.robotics.tool.Tool";
+    expect(
+      presetFor({ type: tool, members: [member("open", "function", "void")], definitions, scope }).panels,
+    ).toHaveLength(1);
+    expect(hasPreset(tool)).toBe(true);
+  });
+
+  test("leads to objects by steps whose keys may have dots", () => {
+    expect(splitSteps("Webcams[0].lens")).toEqual(["Webcams[0]", "lens"]);
+    expect(splitSteps("tools[left.hand].tip")).toEqual(["tools[left.hand]", "tip"]);
+  });
+});
+
+test("code quotes what comes from the device", () => {
+  const member: Member = {
+    name: "Drive",
+    kind: "function",
+    type: "void",
+    parameters: [{ name: "__proto__", type: "string" }],
+    modifiers: [],
+    documentation: "",
+  };
+  const place = { device: "it's", service: "a b", object: "Arms[x.y]" };
+  expect(asCode("curl", "http://h/", place, member, ["'; rm -rf /"])).toBe(
+    `curl -X POST 'http://h/api/v1/devices/it'\\''s/a%20b/Arms/x.y/Drive' \\\n  -H 'Content-Type: application/json' -d '{"__proto__":"'\\''; rm -rf /"}'`,
+  );
+  expect(asCode("JavaScript", "http://h/", place, member, [1])).toContain('robot.$.find("*.Arms[x.y]")');
+  expect(asCode("Python", "https://h/", { ...place, object: "" }, member, [true, null])).toContain(
+    "robot.Drive(True, None)",
+  );
+});
+
+test("memories are shown as bytes and as grey values", () => {
+  expect(hexLines(Uint8Array.from([0x41, 0, 255]), 16)).toMatch(/^ {6}16 {2}41 00 ff +A\.\.$/);
+  expect(hexLines("x", 0)).toBeNull();
+  const picture = greyPicture({ dims: [1, 2], data: Float64Array.of(-1, 1) });
+  expect(picture && [picture.width, picture.height, ...picture.rgba]).toEqual([2, 1, 0, 0, 0, 255, 255, 255, 255, 255]);
+});
+
+test("pictures of the standard types are read by their encoding", () => {
+  const info = { width: 1, height: 1, step: 3, encoding: 0x1000 };
+  expect([...(readPicture({ image_info: info, data: Uint8Array.of(1, 2, 3) }).rgba ?? [])]).toEqual([1, 2, 3, 255]);
+  const bgr = readPicture({ image_info: { ...info, encoding: 0x1002 }, data: Uint8Array.of(1, 2, 3) });
+  expect([...(bgr.rgba ?? [])]).toEqual([3, 2, 1, 255]);
+  const depth = { image_info: { width: 2, height: 1, step: 4, encoding: 0x4000 }, data: Uint8Array.of(0, 0, 16, 39) };
+  expect([...(readPicture(depth).rgba ?? [])]).toEqual([0, 0, 0, 255, 255, 255, 255, 255]);
+  expect(readPicture({ image_info: info, data: Uint8Array.of(255, 216, 255) }).encoded).not.toBeNull();
+  expect(() => readPicture({ image_info: { ...info, width: 9 }, data: Uint8Array.of(1, 2, 3) })).toThrow(
+    "the picture has 3 bytes",
+  );
+});

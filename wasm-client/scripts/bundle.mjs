@@ -1,0 +1,39 @@
+// The scripts of the package from ts/: one file for pages, small ones beside it for what is loaded later or elsewhere.
+// Usage: node scripts/bundle.mjs [DIRECTORY [--sourcemap]]. Part of `npm run build`.
+import { fileURLToPath } from "node:url";
+import { rolldown } from "rolldown";
+
+const [directory = fileURLToPath(new URL("../dist", import.meta.url)), option] = process.argv.slice(2);
+const source = (name) => fileURLToPath(new URL(`../ts/${name}.ts`, import.meta.url));
+const entries = ["index", "internal", "node", "usb/nodes"];
+/** What all entries have in common: one file of it, whoever loads it. */
+const shared = /\/wasm-client\/ts\/(?!usb\/|(?:index|internal|node)\.ts$)/;
+
+// Bundlers look for files by `new URL("...", import.meta.url)`; not all take the quotes that the minifier prefers. A plugin
+// after it, so that source maps stay right: each quote is one character, too.
+const quotes = {
+  name: "quotes",
+  generateBundle(_, bundle) {
+    for (const file of Object.values(bundle)) {
+      if (file.type === "chunk") file.code = file.code.replace(/\b(new URL|import)\(`([^`$]*)`/g, '$1("$2"');
+    }
+  },
+};
+
+const bundle = await rolldown({
+  input: Object.fromEntries(entries.map((name) => [name, source(name)])),
+  platform: "neutral",
+  external: [/^node:/, "ws"],
+  tsconfig: false,
+  transform: { target: "es2022" },
+  plugins: [quotes],
+});
+await bundle.write({
+  dir: directory,
+  format: "es",
+  minify: true,
+  codeSplitting: { groups: [{ name: "client", test: shared }] },
+  chunkFileNames: "[name].js",
+  sourcemap: option === "--sourcemap",
+});
+await bundle.close();

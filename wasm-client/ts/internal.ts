@@ -1,0 +1,9 @@
+/**
+ * What the tests look at below the public API; not published.
+ * @module
+ */
+export { JsValues } from "./js_values.js";
+export type { CoreExports, Handle } from "./js_values.js";
+export { platform } from "./platform.js";
+export { parseServiceUrl } from "./url.js";
+export { openUsb } from "./usb_devices.js";

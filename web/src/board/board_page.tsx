@@ -1,0 +1,226 @@
+// The board of an object: panels to arrange, kept in the address and in this browser, saved as a file, with the stop in reach.
+// Layer: web/board.
+
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import { t } from "../app/language";
+import { formatRoute, formatStep } from "../app/router";
+import type { Route } from "../app/router";
+import { useStore } from "../app/store";
+import { devicesOf } from "../gateway/devices";
+import type { DeviceList } from "../gateway/devices";
+import { oldness } from "../live/use_feed";
+import { useObject } from "../live/links";
+import { usePulse } from "../live/pulse";
+import { KINDS } from "../panels/panel";
+import type { Link } from "../robot/link";
+import { Failure } from "../ui/failure";
+import { saveFile } from "../ui/save_file";
+import { Definitions, scopeOf } from "../values/definitions";
+import { keepBoard, makeId, packBoard, PANEL_KINDS, parseBoard, recallBoard, unpackBoard, writeBoard } from "./board";
+import type { Board, Panel, PanelKind } from "./board";
+import { findRoom, inOrder, nudge, put, settle } from "./layout";
+import { PanelFrame } from "./panel_frame";
+import { presetFor } from "./presets";
+import { StopButton } from "./stop";
+import "../styles/board.css";
+
+type ServiceRoute = Route & { page: "service" };
+
+export default function BoardPage({ link, route, list }: { link: Link; route: ServiceRoute; list: DeviceList }) {
+  const path = route.path.map(formatStep).join(".");
+  const key = boardKey(route);
+  const { object, last, failure } = useObject(link, "", path);
+  const preset = useMemo(() => {
+    if (!last) return null;
+    return presetFor({
+      type: last.type,
+      members: last.members,
+      definitions: new Definitions(last.definitions),
+      scope: scopeOf(last.type),
+    });
+  }, [last?.type]);
+  const { board, trouble, setBoard, setTrouble } = useBoard(key, route, preset);
+  const [arranging, setArranging] = useState(false);
+  const silent = usePulse(object);
+  const services = useServices(list);
+  if (!board) return failure === null ? <Waiting /> : <Failure text={failure} />;
+  const setPanels = (panels: readonly Panel[]): void => setBoard({ ...board, panels });
+  const add = (kind: PanelKind): void => {
+    const { w, h } = KINDS[kind];
+    const place = findRoom(board.panels, { w, h });
+    setPanels([...board.panels, { id: makeId(), kind, title: "", from: "", object: "", settings: {}, ...place }]);
+    setArranging(true);
+  };
+  const update = (id: string, change: Partial<Panel>): void =>
+    setPanels(board.panels.map((panel) => (panel.id === id ? { ...panel, ...change } : panel)));
+  return (
+    <div class="board-page">
+      <div class="board-bar">
+        {board.stop && <StopButton object={object} stop={board.stop} />}
+        {silent !== null && (
+          <p class="failure board-silent" role="alert">
+            {t("The device has not answered for {0}.", oldness(silent))}
+          </p>
+        )}
+        <BoardTools
+          board={board}
+          name={key}
+          arranging={arranging}
+          setArranging={setArranging}
+          add={add}
+          take={(next) => (setBoard(next), setTrouble(null))}
+          reset={() => preset && setBoard(preset, true)}
+          fail={setTrouble}
+        />
+      </div>
+      <Failure text={trouble ?? failure} />
+      <div class="board">
+        {inOrder(board.panels).map((panel) => (
+          <PanelFrame
+            key={panel.id}
+            panel={panel}
+            link={link}
+            place={{ device: route.device, service: route.service, object: path }}
+            services={services}
+            arranging={arranging}
+            move={(place) => setPanels(put(board.panels, panel.id, place))}
+            step={(dx, dy) => setPanels(nudge(board.panels, panel.id, dx, dy))}
+            update={(change) => update(panel.id, change)}
+            remove={() => setPanels(settle(board.panels.filter(({ id }) => id !== panel.id)))}
+          />
+        ))}
+      </div>
+      {board.panels.length === 0 && <p class="empty">{t("This board is empty. Add a panel above.")}</p>}
+    </div>
+  );
+}
+
+function Waiting() {
+  return (
+    <div class="members-loading" aria-hidden="true">
+      <span class="bone" />
+      <span class="bone" />
+    </div>
+  );
+}
+
+export function boardKey({ device, service, path }: ServiceRoute): string {
+  return [device, service, ...path.map(formatStep)].map(encodeURIComponent).join("/");
+}
+
+interface BoardState {
+  board: Board | null;
+  trouble: string | null;
+  /** `isPreset`: it is not worth keeping. */
+  setBoard: (board: Board, isPreset?: boolean) => void;
+  setTrouble: (text: string | null) => void;
+}
+
+/** From the address, else from this browser, else the preset; changes go to both. */
+function useBoard(key: string, route: ServiceRoute, preset: Board | null): BoardState {
+  const [chosen, setChosen] = useState<{ key: string; board: Board } | null>(null);
+  const [trouble, setTrouble] = useState<string | null>(null);
+  useEffect(() => {
+    setTrouble(null);
+    let found: Board | null = null;
+    if (route.board !== null) {
+      try {
+        found = unpackBoard(route.board);
+      } catch (error) {
+        setTrouble((error as Error).message);
+      }
+    }
+    found ??= recallBoard(key);
+    setChosen(found && { key, board: found });
+  }, [key, route.board]);
+  const setBoard = (board: Board, isPreset = false): void => {
+    setChosen({ key, board });
+    keepBoard(key, isPreset ? null : board);
+    const address = formatRoute(route.device, route.service, route.path, "board");
+    history.replaceState(null, "", isPreset ? address : `${address}&board=${packBoard(board)}`);
+  };
+  return { board: chosen?.key === key ? chosen.board : preset, trouble, setBoard, setTrouble };
+}
+
+/** "device/service" of all that the gateway has. */
+function useServices(list: DeviceList): string[] {
+  return (devicesOf(useStore(list.state)) ?? []).flatMap(({ name, services }) =>
+    services.map((service) => `${encodeURIComponent(name)}/${encodeURIComponent(service.name)}`),
+  );
+}
+
+interface BoardToolsProps {
+  board: Board;
+  name: string;
+  arranging: boolean;
+  setArranging: (on: boolean) => void;
+  add: (kind: PanelKind) => void;
+  take: (board: Board) => void;
+  reset: () => void;
+  fail: (text: string) => void;
+}
+
+function BoardTools({ board, name, arranging, setArranging, add, take, reset, fail }: BoardToolsProps) {
+  const file = useRef<HTMLInputElement>(null);
+  const [kind, setKind] = useState<PanelKind>("plot");
+  const save = (): void =>
+    saveFile(
+      `${decodeURIComponent(name).replace(/[^\w.-]+/g, "-")}.board.json`,
+      "application/json",
+      `${JSON.stringify(writeBoard(board), null, 2)}\n`,
+    );
+  const open = (chosen: File | undefined): void => {
+    if (!chosen) return;
+    chosen
+      .text()
+      .then(
+        (text) => take(parseBoard(text)),
+        (error: unknown) => fail((error as Error).message),
+      )
+      .catch((error: unknown) => fail((error as Error).message));
+  };
+  return (
+    <div class="board-tools">
+      <button class="button" type="button" aria-pressed={arranging} onClick={() => setArranging(!arranging)}>
+        {arranging ? t("Done") : t("Arrange")}
+      </button>
+      <label>
+        <span class="unseen">{t("Kind of panel")}</span>
+        <select
+          class="field"
+          value={kind}
+          onChange={(event) => setKind(PANEL_KINDS.find((each) => each === event.currentTarget.value) ?? "plot")}
+        >
+          {PANEL_KINDS.map((each) => (
+            <option key={each} value={each}>
+              {t(KINDS[each].title)}
+            </option>
+          ))}
+        </select>
+      </label>
+      <button class="button" type="button" onClick={() => add(kind)}>
+        {t("Add panel")}
+      </button>
+      <button class="button button-quiet" type="button" onClick={save}>
+        {t("Save file")}
+      </button>
+      <button class="button button-quiet" type="button" onClick={() => file.current?.click()}>
+        {t("Open file")}
+      </button>
+      <input
+        ref={file}
+        type="file"
+        accept=".json,application/json"
+        hidden
+        aria-label={t("Board file")}
+        onChange={(event) => {
+          open(event.currentTarget.files?.[0]);
+          event.currentTarget.value = "";
+        }}
+      />
+      <button class="button button-quiet" type="button" onClick={reset}>
+        {t("As at first")}
+      </button>
+    </div>
+  );
+}

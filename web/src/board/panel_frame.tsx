@@ -1,0 +1,164 @@
+// The frame of a panel: its name, its handles while the board is arranged, and what it shows.
+// Layer: web/board.
+
+import { Component } from "preact";
+import type { ComponentChildren, ComponentType } from "preact";
+import { useEffect, useMemo, useState } from "preact/hooks";
+import { t } from "../app/language";
+import { useObject } from "../live/links";
+import { KINDS, textIn } from "../panels/panel";
+import type { PanelProps } from "../panels/panel";
+import type { Link } from "../robot/link";
+import { Failure } from "../ui/failure";
+import { Definitions, scopeOf } from "../values/definitions";
+import type { Panel, PanelKind } from "./board";
+import { handleKey, useDrag } from "./handles";
+import type { Change } from "./handles";
+
+export interface PanelFrameProps {
+  panel: Panel;
+  link: Link;
+  place: { device: string; service: string; object: string };
+  services: readonly string[];
+  arranging: boolean;
+  move: Change;
+  step: (dx: number, dy: number) => void;
+  update: (change: Partial<Panel>) => void;
+  remove: () => void;
+}
+
+export function PanelFrame({ panel, link, place, services, arranging, move, step, update, remove }: PanelFrameProps) {
+  const path = [place.object, panel.object].filter((each) => each !== "" && panel.from === "").join(".");
+  const { object, last, failure } = useObject(link, panel.from, panel.from === "" ? path : panel.object);
+  const count = last?.definitions.length ?? 0;
+  const definitions = useMemo(() => new Definitions(last?.definitions ?? []), [last, count]);
+  const Shown = useLoaded(panel.kind);
+  const name = nameOf(panel);
+  const [device = place.device, service = place.service] =
+    panel.from === "" ? [] : panel.from.split("/").map(decodeURIComponent);
+  const drag = useDrag(panel, move);
+  return (
+    <div
+      role="group"
+      class={`board-panel ${arranging ? "is-arranged" : ""}`}
+      aria-label={name}
+      data-panel={panel.kind}
+      style={{
+        gridColumn: `${panel.x + 1} / span ${panel.w}`,
+        gridRow: `${panel.y + 1} / span ${panel.h}`,
+        "--rows": String(panel.h),
+      }}
+    >
+      <header class="panel-head">
+        {arranging ? (
+          <>
+            <button
+              class="panel-handle"
+              type="button"
+              aria-label={t("Move or size {0}: arrow keys, with Shift to size", name)}
+              onKeyDown={(event) => handleKey(event, panel, move, step)}
+              {...drag.move}
+            >
+              <span aria-hidden="true">⠿</span>
+            </button>
+            <input
+              class="panel-title-input"
+              aria-label={t("Name of {0}", name)}
+              value={panel.title}
+              placeholder={name}
+              onInput={(event) => update({ title: event.currentTarget.value })}
+            />
+            <button class="button button-quiet" type="button" onClick={remove}>
+              {t("Remove")}
+              <span class="unseen"> {name}</span>
+            </button>
+          </>
+        ) : (
+          <h2>
+            {name}
+            {(panel.from !== "" || panel.object !== "") && (
+              <small> {[panel.from === "" ? "" : device, panel.object].filter(Boolean).join(" · ")}</small>
+            )}
+          </h2>
+        )}
+      </header>
+      {arranging && (
+        <div class="panel-source">
+          <label>
+            <span class="unseen">{t("Service")}</span>
+            <select
+              class="field"
+              value={panel.from}
+              onChange={(event) => update({ from: event.currentTarget.value, settings: {} })}
+            >
+              <option value="">{t("this service")}</option>
+              {[...new Set([...services, ...(panel.from === "" ? [] : [panel.from])])].map((each) => (
+                <option key={each} value={each}>
+                  {each.split("/").map(decodeURIComponent).join(" / ")}
+                </option>
+              ))}
+            </select>
+          </label>
+          <input
+            class="field"
+            aria-label={t("Object of {0}", name)}
+            placeholder={t("object, such as Webcams[0]")}
+            defaultValue={panel.object}
+            onChange={(event) => update({ object: event.currentTarget.value.trim() })}
+          />
+        </div>
+      )}
+      <div class="panel-body">
+        <Failure text={failure} />
+        {last && Shown && (
+          <Guard key={panel.kind}>
+            <Shown
+              object={object}
+              members={last.members}
+              definitions={definitions}
+              scope={scopeOf(last.type)}
+              place={{ device, service, object: panel.from === "" ? path : panel.object }}
+              settings={panel.settings}
+              change={(settings) => update({ settings })}
+            />
+          </Guard>
+        )}
+        {!last && failure === null && <span class="bone" aria-hidden="true" />}
+      </div>
+      {arranging && <span class="panel-corner" aria-hidden="true" {...drag.size} />}
+    </div>
+  );
+}
+
+export function nameOf(panel: Panel): string {
+  if (panel.title !== "") return t(panel.title); // titles of presets are known
+  const member = textIn(panel.settings, "member");
+  return member === "" ? t(KINDS[panel.kind].title) : member;
+}
+
+/** A panel's code, when a board has one. */
+function useLoaded(kind: PanelKind): ComponentType<PanelProps> | null {
+  const [loaded, setLoaded] = useState<{ kind: PanelKind; shown: ComponentType<PanelProps> } | null>(null);
+  useEffect(() => {
+    let isCurrent = true;
+    KINDS[kind].load().then(
+      ({ default: shown }) => isCurrent && setLoaded({ kind, shown }),
+      () => undefined, // the strip above says that the gateway is away
+    );
+    return () => void (isCurrent = false);
+  }, [kind]);
+  return loaded?.kind === kind ? loaded.shown : null;
+}
+
+/** What fails in one panel leaves the others as they are. */
+class Guard extends Component<{ children: ComponentChildren }, { failure: string | null }> {
+  override state = { failure: null };
+
+  static override getDerivedStateFromError(error: unknown): { failure: string } {
+    return { failure: (error as Error).message };
+  }
+
+  override render() {
+    return this.state.failure === null ? this.props.children : <Failure text={this.state.failure} />;
+  }
+}

@@ -1,0 +1,163 @@
+// The board that an object starts with: of the standard types by hand, of all others by what its members are.
+// Layer: web/board, pure.
+
+import type { Member } from "../robot/remote";
+import type { Definitions } from "../values/definitions";
+import { isNumeric, parseType } from "../values/type_text";
+import { makeId } from "./board";
+import type { Board, Panel, PanelKind, Settings, StopCall } from "./board";
+import { settle } from "./layout";
+
+export interface Described {
+  type: string;
+  members: readonly Member[];
+  definitions: Definitions;
+  scope: string;
+}
+
+type Spec = [kind: PanelKind, x: number, y: number, w: number, h: number, settings?: Settings, title?: string];
+
+const ROBOT = "com.robotraconteur.robotics.robot.Robot";
+const STANDARD: Readonly<Record<string, { stop: StopCall | null; panels: readonly Spec[] }>> = {
+  [ROBOT]: {
+    stop: { call: "halt", args: [], set: { property: "command_mode", value: 0 } },
+    panels: [
+      ["robot", 0, 0, 7, 13],
+      ["plot", 7, 0, 5, 8, { member: "robot_state" }],
+      ["form", 7, 8, 5, 5, { members: ["enable", "disable", "reset_errors"] }, "Power"],
+      ["table", 0, 13, 5, 9, { member: "robot_state" }],
+      ["form", 5, 13, 4, 9, { member: "speed_ratio" }],
+      ["log", 9, 13, 3, 9],
+    ],
+  },
+  ["com.robotraconteur.imaging.Camera"]: {
+    stop: null,
+    panels: [
+      ["image", 0, 0, 8, 12, { member: "frame_stream_compressed", start: "start_streaming" }],
+      ["form", 8, 0, 4, 6, { members: ["start_streaming", "stop_streaming", "trigger"] }, "Streaming"],
+      ["table", 8, 6, 4, 6, { member: "camera_state" }],
+      ["form", 0, 12, 4, 7, { member: "trigger_mode" }],
+      ["table", 4, 12, 4, 7, { member: "camera_info" }],
+      ["streams", 8, 12, 4, 7],
+    ],
+  },
+  ["com.robotraconteur.robotics.tool.Tool"]: {
+    stop: { call: "halt", args: [] },
+    panels: [
+      ["form", 0, 0, 4, 10, { members: ["open", "close", "setf_command", "halt"] }, "Tool"],
+      ["plot", 4, 0, 8, 10, { member: "tool_state", paths: ["position", "command"] }],
+      ["table", 0, 10, 6, 7, { member: "tool_state" }],
+      ["form", 6, 10, 6, 7, { members: ["enable", "disable", "reset_errors", "home"] }, "Power"],
+    ],
+  },
+  ["com.robotraconteur.servo.Servo"]: {
+    stop: { call: "halt", args: [] },
+    panels: [
+      ["plot", 0, 0, 8, 10, { member: "position" }],
+      ["table", 8, 0, 4, 10, { member: "servo_state" }],
+      ["form", 0, 10, 4, 8, { member: "mode" }],
+      ["form", 4, 10, 4, 8, { member: "position_command" }],
+      ["form", 8, 10, 4, 8, { member: "trapezoidal_move" }],
+    ],
+  },
+  ["com.robotraconteur.sensor.Sensor"]: {
+    stop: null,
+    panels: [
+      ["plot", 0, 0, 8, 10, { member: "sensor_value" }],
+      ["table", 8, 0, 4, 10, { member: "sensor_value" }],
+      ["table", 0, 10, 6, 7, { member: "sensor_info" }],
+      ["streams", 6, 10, 6, 7],
+    ],
+  },
+};
+
+/** Whether the type is known, so that its board is worth showing first. */
+export function hasPreset(type: string): boolean {
+  return Object.hasOwn(STANDARD, type);
+}
+
+export function presetFor(object: Described): Board {
+  const standard = hasPreset(object.type) ? STANDARD[object.type] : undefined;
+  if (!standard) return { panels: settle(byMembers(object)), stop: stopFor(object) };
+  const panels = standard.panels
+    .filter(([, , , , , settings]) => isThere(settings, object.members))
+    .map((spec) => makePanel(spec));
+  return { panels: settle(panels), stop: standard.stop };
+}
+
+const STOPS = /^(halt|stop|e_?stop|emergency_stop|abort)$/i;
+
+/** A function that says that it stops, or the demo robot's. */
+function stopFor({ type, members }: Described): StopCall | null {
+  const found = members.find(
+    (each) => each.kind === "function" && each.parameters.length === 0 && STOPS.test(each.name),
+  );
+  if (found) return { call: found.name, args: [] };
+  return /^experimental\.\w*create\w*\./.test(type) && members.some(({ name }) => name === "Drive")
+    ? { call: "Drive", args: [0, 0] }
+    : null;
+}
+
+const MOST_PLOTS = 4;
+const MOST_TABLES = 4;
+
+function byMembers(object: Described): Panel[] {
+  const panels: Panel[] = [];
+  const columns = [0, 0, 0]; // the heights so far
+  const add = (kind: PanelKind, h: number, settings: Settings = {}, title = ""): void => {
+    const column = columns.indexOf(Math.min(...columns));
+    panels.push(makePanel([kind, column * 4, columns[column] ?? 0, 4, h, settings, title]));
+    columns[column] = (columns[column] ?? 0) + h;
+  };
+  const wires = object.members.filter((each) => each.kind === "wire" && !each.modifiers.includes("writeonly"));
+  for (const { name } of object.members.filter((each) => isPicture(each, object)).slice(0, 2))
+    add("image", 9, { member: name });
+  for (const { name } of wires.filter((each) => hasNumbers(each, object)).slice(0, MOST_PLOTS))
+    add("plot", 8, { member: name });
+  const structs = wires.filter((each) => structOf(each, object) !== undefined && !isPicture(each, object));
+  for (const { name } of structs.slice(0, MOST_TABLES)) add("table", 8, { member: name });
+  if (object.members.some(({ kind, type }) => kind === "function" && !type.endsWith("{generator}")))
+    add("form", 8, {}, "Calls");
+  const property = object.members.find((each) => each.kind === "property" && !each.modifiers.includes("writeonly"));
+  if (property) add("table", 6, { member: property.name });
+  if (object.members.some(({ kind }) => kind === "event")) add("log", 6);
+  if (object.members.some(({ kind }) => kind === "memory")) add("memory", 9);
+  if (object.members.some(({ type }) => type.endsWith("{generator}"))) add("generator", 8);
+  if (panels.length === 0) add("notes", 5);
+  return panels;
+}
+
+function structOf(member: Member, { definitions, scope }: Described) {
+  return definitions.struct(parseType(member.type).base, scope);
+}
+
+/** By the names of the fields: bytes, with a width and a height here or in an inner struct. */
+export function isPicture(member: Member, object: Described): boolean {
+  if (!["wire", "pipe"].includes(member.kind) || member.modifiers.includes("writeonly")) return false;
+  const struct = structOf(member, object);
+  if (!struct?.fields.some(({ name, type }) => name === "data" && type.startsWith("uint8["))) return false;
+  const names = struct.fields.flatMap(({ name, type }) => [
+    name,
+    ...(object.definitions.struct(parseType(type).base, struct.scope)?.fields.map((inner) => inner.name) ?? []),
+  ]);
+  return names.includes("width") && names.includes("height");
+}
+
+function hasNumbers(member: Member, object: Described): boolean {
+  const { base, container } = parseType(member.type);
+  if (container !== "none") return false;
+  if (isNumeric(base)) return true;
+  return (
+    !isPicture(member, object) &&
+    structOf(member, object)?.fields.some(({ type }) => isNumeric(parseType(type).base)) === true
+  );
+}
+
+function isThere(settings: Settings | undefined, members: readonly Member[]): boolean {
+  const named = settings?.["member"] ?? (settings?.["members"] as readonly string[] | undefined)?.[0];
+  return named === undefined || members.some(({ name }) => name === named);
+}
+
+function makePanel([kind, x, y, w, h, settings = {}, title = ""]: Spec): Panel {
+  return { id: makeId(), kind, title, from: "", object: "", x, y, w, h, settings };
+}

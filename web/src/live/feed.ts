@@ -1,0 +1,98 @@
+// What comes from one member of one object: one connection, however many panels look at it.
+// Layer: web/live.
+
+import { explain } from "../robot/remote";
+import type { Remote } from "../robot/remote";
+import { Pace } from "./pace";
+
+export type FeedKind = "wire" | "pipe" | "property" | "event";
+
+const PROPERTY_MS = 500;
+
+export class Feed {
+  readonly pace = new Pace();
+  readonly heard = new Set<(value: unknown, now: number) => void>();
+  newest: unknown = undefined;
+  failure: string | null = null;
+  #stop: AbortController | null = null;
+
+  constructor(
+    readonly object: Remote,
+    readonly kind: FeedKind,
+    readonly member: string,
+  ) {}
+
+  start(): void {
+    const stop = new AbortController();
+    this.#stop = stop;
+    this.#run(stop.signal).catch((error: unknown) => {
+      if (!stop.signal.aborted) this.failure = explain(error);
+    });
+  }
+
+  stop(): void {
+    this.#stop?.abort();
+    this.#stop = null;
+  }
+
+  async #run(signal: AbortSignal): Promise<void> {
+    const { object, kind, member } = this;
+    if (kind === "event") {
+      const off = object.on(member, (...args) => this.#take(args));
+      signal.addEventListener("abort", off, { once: true });
+      return;
+    }
+    if (kind === "property") return this.#poll(signal);
+    const values = kind === "wire" ? object.wire(member, signal) : object.pipe(member, signal);
+    for await (const value of values) this.#take(value);
+    if (!signal.aborted) throw new Error("the device closed it");
+  }
+
+  async #poll(signal: AbortSignal): Promise<void> {
+    while (!signal.aborted) {
+      const begun = performance.now();
+      try {
+        if (!document.hidden) this.#take(await this.object.get(this.member));
+        this.failure = null;
+      } catch (error) {
+        this.failure = explain(error);
+      }
+      await new Promise((resolve) => setTimeout(resolve, Math.max(50, PROPERTY_MS - (performance.now() - begun))));
+    }
+  }
+
+  #take(value: unknown): void {
+    if (this.#stop === null) return;
+    const now = performance.now();
+    this.newest = value;
+    this.pace.hear(now);
+    for (const heard of this.heard) heard(value, now);
+  }
+}
+
+const feeds = new Map<Remote, Map<string, { feed: Feed; users: number }>>();
+
+/** Joins whoever looks at it already. */
+export function openFeed(object: Remote, kind: FeedKind, member: string): { feed: Feed; close: () => void } {
+  const ofObject = feeds.get(object) ?? new Map<string, { feed: Feed; users: number }>();
+  feeds.set(object, ofObject);
+  const key = `${kind} ${member}`;
+  const entry = ofObject.get(key) ?? { feed: new Feed(object, kind, member), users: 0 };
+  ofObject.set(key, entry);
+  if (entry.users++ === 0) entry.feed.start();
+  let isOpen = true;
+  const close = (): void => {
+    if (!isOpen) return;
+    isOpen = false;
+    if (--entry.users > 0) return;
+    entry.feed.stop();
+    ofObject.delete(key);
+    if (ofObject.size === 0) feeds.delete(object);
+  };
+  return { feed: entry.feed, close };
+}
+
+/** All that this page follows now. */
+export function openFeeds(): Feed[] {
+  return [...feeds.values()].flatMap((ofObject) => [...ofObject.values()].map(({ feed }) => feed));
+}

@@ -1,0 +1,70 @@
+// Connections to services other than the page's own: one for each, however many panels show it.
+// Layer: web/live.
+
+import { useEffect, useState } from "preact/hooks";
+import { Store, useStore } from "../app/store";
+import { relayUrl } from "../gateway/devices";
+import { session } from "../gateway/session";
+import { isUsb, usbUrl } from "../gateway/usb_devices";
+import { Link } from "../robot/link";
+import type { LinkState } from "../robot/link";
+import { explain } from "../robot/remote";
+import type { Remote } from "../robot/remote";
+import { parseStep, splitSteps } from "../app/router";
+import { walk } from "../robot/walk";
+
+const links = new Map<string, { link: Link; users: number }>();
+const nowhere = new Store<LinkState>({ kind: "connecting" });
+
+function openLink(place: string): { link: Link; close: () => void } {
+  const [device = "", service = ""] = place.split("/").map(decodeURIComponent);
+  const url = relayUrl(device, service);
+  const entry = links.get(place) ?? {
+    link: new Link(isUsb(device) ? usbUrl(device, service) : () => session.withTicket(url)),
+    users: 0,
+  };
+  links.set(place, entry);
+  entry.users++;
+  const close = (): void => {
+    if (--entry.users > 0) return;
+    entry.link.dispose();
+    links.delete(place);
+  };
+  return { link: entry.link, close };
+}
+
+/** The object at `path` ("Webcams[0].lens") of the page's service, or of another one ("device/service"). */
+export function useObject(
+  own: Link,
+  from: string,
+  path: string,
+): { object: Remote | null; last: Remote | null; failure: string | null } {
+  const [other, setOther] = useState<Link | null>(null);
+  useEffect(() => {
+    if (from === "") return setOther(null);
+    const { link, close } = openLink(from);
+    setOther(link);
+    return close;
+  }, [from]);
+  const state = useStore(from === "" ? own.state : (other?.state ?? nowhere));
+  const root = state.kind === "online" ? state.remote : null;
+  const [found, setFound] = useState<{ object: Remote; root: Remote; path: string } | null>(null);
+  const [failure, setFailure] = useState<string | null>(null);
+  useEffect(() => {
+    if (!root) return;
+    let isCurrent = true;
+    setFailure(null);
+    const steps = path === "" ? [] : splitSteps(path).map(parseStep);
+    walk(root, steps).then(
+      (object) => isCurrent && setFound({ object, root, path }),
+      (error: unknown) => isCurrent && setFailure(explain(error)),
+    );
+    return () => void (isCurrent = false);
+  }, [root, path]);
+  const isThere = found !== null && found.root === root && found.path === path;
+  return {
+    object: isThere ? found.object : null,
+    last: found?.path === path ? found.object : null,
+    failure: failure ?? (from !== "" && state.kind === "lost" ? state.reason : null),
+  };
+}

@@ -1,0 +1,94 @@
+// Feeds in components: followed while shown, looked at ten times a second.
+// Layer: web/live.
+
+import { useEffect, useRef, useState } from "preact/hooks";
+import type { Remote } from "../robot/remote";
+import { openFeed } from "./feed";
+import type { Feed, FeedKind } from "./feed";
+import { span } from "../ui/words";
+import { t } from "../app/language";
+
+const LOOK_MS = 100;
+
+export interface Look {
+  feed: Feed | null;
+  value: unknown;
+  failure: string | null;
+  /** How old the value is, once it is; null while new ones come. */
+  stale: string | null;
+  /** A second; 0 where nothing regular comes. */
+  rate: number;
+}
+
+const NOTHING: Look = { feed: null, value: undefined, failure: null, stale: null, rate: 0 };
+
+/** The newest of a member, at most ten times a second. What was known stays, and ages, when `object` goes. */
+export function useFeed(object: Remote | null, kind: FeedKind | null, member: string): Look {
+  const [look, setLook] = useState<Look>(NOTHING);
+  const last = useRef<Feed | null>(null);
+  useEffect(() => {
+    if (!object || kind === null) return;
+    const { feed, close } = openFeed(object, kind, member);
+    last.current = feed;
+    return close;
+  }, [object, kind, member]);
+  useEffect(() => {
+    const timer = setInterval(() => {
+      const feed = last.current;
+      if (!feed || feed.member !== member) return;
+      const next = lookAt(feed, object !== null, performance.now());
+      setLook((old) =>
+        old.value === next.value &&
+        old.failure === next.failure &&
+        old.stale === next.stale &&
+        Math.round(old.rate) === Math.round(next.rate)
+          ? old
+          : next,
+      );
+    }, LOOK_MS);
+    return () => clearInterval(timer);
+  }, [object, member]);
+  return look;
+}
+
+/** Calls `heard` with each value. */
+export function useEach(
+  object: Remote | null,
+  kind: FeedKind | null,
+  member: string,
+  heard: (value: unknown, now: number) => void,
+): Feed | null {
+  const latest = useRef(heard);
+  latest.current = heard;
+  const [feed, setFeed] = useState<Feed | null>(null);
+  useEffect(() => {
+    if (!object || kind === null) return;
+    const opened = openFeed(object, kind, member);
+    const hear = (value: unknown, now: number): void => latest.current(value, now);
+    opened.feed.heard.add(hear);
+    setFeed(opened.feed);
+    return () => {
+      opened.feed.heard.delete(hear);
+      opened.close();
+    };
+  }, [object, kind, member]);
+  return feed;
+}
+
+/** `isLive`: whether there is a connection; without one, everything is old. */
+export function lookAt(feed: Feed, isLive: boolean, now: number): Look {
+  const age = feed.pace.ageMs(now);
+  const isStale = age !== null && (feed.pace.isStale(now) || (!isLive && age > 250));
+  return {
+    feed,
+    value: feed.newest,
+    failure: feed.failure,
+    stale: isStale ? t("{0} old", oldness(age)) : null,
+    rate: feed.pace.rate(now),
+  };
+}
+
+/** `0.4 s`, `12 s`, `3 min`. */
+export function oldness(ms: number): string {
+  return ms < 9950 ? `${(ms / 1000).toFixed(1)} s` : span(ms);
+}

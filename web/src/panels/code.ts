@@ -1,0 +1,95 @@
+// What a form does, as code: for a page, a shell, and a Python program.
+// Layer: web/panels, pure. Names and values are quoted: they come from the device.
+
+import { parseStep, splitSteps } from "../app/router";
+import type { Member } from "../robot/remote";
+import { jsonOf } from "../values/draft";
+
+export type CodeLanguage = "JavaScript" | "curl" | "Python";
+
+export interface CodePlace {
+  device: string;
+  service: string;
+  /** "" for the root, else "Webcams[0]". */
+  object: string;
+}
+
+/** `base`: of the gateway, with a slash at its end. */
+export function asCode(
+  language: CodeLanguage,
+  base: string,
+  place: CodePlace,
+  member: Member,
+  values: readonly unknown[],
+): string {
+  if (language === "curl") return curl(base, place, member, values);
+  const url = `${base.replace(/^http/, "ws")}devices/${encodeURIComponent(place.device)}?service=${encodeURIComponent(place.service)}`;
+  return language === "Python" ? python(url, place, member, values) : javaScript(url, place, member, values);
+}
+
+function javaScript(url: string, { object }: CodePlace, member: Member, values: readonly unknown[]): string {
+  const args = values.map((value) => JSON.stringify(jsonOf(value))).join(", ");
+  const verb = { function: "", property: ".set", wire: ".poke" }[member.kind as "function" | "property" | "wire"];
+  const found = object === "" ? "" : `const object = await robot.$.find(${JSON.stringify(`*.${object}`)});\n`;
+  return [
+    'import { connect } from "rrgate-client";',
+    `const robot = await connect(${JSON.stringify(url)});`,
+    `${found}console.log(await ${object === "" ? "robot" : "object"}.$.member(${JSON.stringify(member.name)})${verb}(${args}));`,
+  ].join("\n");
+}
+
+function curl(base: string, place: CodePlace, member: Member, values: readonly unknown[]): string {
+  const steps = [place.device, place.service, ...httpSteps(place.object), member.name].map(encodeURIComponent);
+  const isCall = member.kind === "function";
+  const named = Object.create(null) as Record<string, unknown>;
+  member.parameters.forEach(({ name }, i) => (named[name] = jsonOf(values[i])));
+  const body = JSON.stringify(isCall ? named : jsonOf(values[0]));
+  return `curl -X ${isCall ? "POST" : "PUT"} ${shell(`${base}api/v1/devices/${steps.join("/")}`)} \\\n  -H 'Content-Type: application/json' -d ${shell(body)}`;
+}
+
+function python(url: string, { object }: CodePlace, member: Member, values: readonly unknown[]): string {
+  const args = values.map(pythonValue).join(", ");
+  const target = splitSteps(object)
+    .map(parseStep)
+    .reduce((at, { member: step, index }) => {
+      const key = index === null ? "" : /^\d+$/.test(index) ? index : JSON.stringify(index);
+      return `${at}.get_${step}(${key})`;
+    }, "robot");
+  const done =
+    member.kind === "function"
+      ? `print(${target}.${member.name}(${args}))`
+      : member.kind === "property"
+        ? `${target}.${member.name} = ${args}`
+        : `${target}.${member.name}.PokeOutValue(${args})`;
+  return [
+    "from RobotRaconteur.Client import *",
+    `robot = RRN.ConnectService(${JSON.stringify(`rr+${url}`)})`,
+    done,
+  ].join("\n");
+}
+
+function pythonValue(value: unknown): string {
+  if (value === null || value === undefined) return "None";
+  if (typeof value === "boolean") return value ? "True" : "False";
+  if (typeof value === "number" && !Number.isFinite(value)) return `float("${String(value).toLowerCase()}")`;
+  if (value instanceof Map)
+    return `{${[...(value as Map<unknown, unknown>)].map(([key, item]) => `${JSON.stringify(key)}: ${pythonValue(item)}`).join(", ")}}`;
+  if (ArrayBuffer.isView(value) || Array.isArray(value))
+    return `[${Array.from(value as ArrayLike<unknown>, pythonValue).join(", ")}]`;
+  if (typeof value === "object")
+    return `{${Object.entries(value)
+      .map(([key, item]) => `${JSON.stringify(key)}: ${pythonValue(item)}`)
+      .join(", ")}}`;
+  return typeof value === "bigint" ? String(value) : JSON.stringify(value);
+}
+
+/** "Webcams[0].lens" as steps of a URL: Webcams, 0, lens. */
+function httpSteps(object: string): string[] {
+  return splitSteps(object)
+    .map(parseStep)
+    .flatMap(({ member, index }) => (index === null ? [member] : [member, index]));
+}
+
+function shell(text: string): string {
+  return `'${text.replaceAll("'", `'\\''`)}'`;
+}

@@ -1,0 +1,236 @@
+// Calls, properties to set, values to send: fields from the types, what came back, what was done before, and the same as code.
+// Layer: web/panels.
+
+import { useEffect, useState } from "preact/hooks";
+import { t } from "../app/language";
+import { useAction } from "../members/row";
+import type { Member } from "../robot/remote";
+import { Failure } from "../ui/failure";
+import { clockTime } from "../ui/words";
+import { draftOf, jsonOf, makeDraft, valueOf } from "../values/draft";
+import type { Draft } from "../values/draft";
+import { rowsOf } from "../values/rows";
+import { asCode } from "./code";
+import type { CodeLanguage } from "./code";
+import { DraftInput } from "./draft_input";
+import { membersFor, textIn, textsIn } from "./panel";
+import type { PanelProps } from "./panel";
+import { MemberSelect } from "./parts";
+
+/** One member by choice, or a row of them where the settings name several. */
+export default function FormPanel(props: PanelProps) {
+  const { members, settings, change } = props;
+  const choices = membersFor("form", members);
+  const several = textsIn(settings, "members");
+  if (several.length > 0) {
+    const shown = several
+      .map((name) => choices.find((each) => each.name === name))
+      .filter((each) => each !== undefined);
+    return (
+      <div class="form-panel panel-scroll">
+        {shown.map((member) => (
+          <MemberForm key={member.name} {...props} member={member} />
+        ))}
+      </div>
+    );
+  }
+  const name = textIn(settings, "member") || choices[0]?.name || "";
+  const member = choices.find((each) => each.name === name);
+  return (
+    <div class="form-panel panel-scroll">
+      <div class="panel-tools">
+        <MemberSelect members={choices} chosen={name} choose={(next) => change({ ...settings, member: next })} />
+      </div>
+      {member && <MemberForm key={`${member.kind} ${member.name}`} {...props} member={member} withMore />}
+    </div>
+  );
+}
+
+interface Input {
+  name: string;
+  type: string;
+}
+
+interface Done {
+  time: number;
+  drafts: readonly Draft[];
+  words: string;
+  rows: { name: string; text: string }[];
+  tookMs: number;
+}
+
+const MOST_DONE = 20;
+
+interface MemberFormProps extends PanelProps {
+  member: Member;
+  /** History and code, too. */
+  withMore?: boolean;
+}
+
+function MemberForm({ object, member, definitions, scope, place, withMore = false }: MemberFormProps) {
+  const inputs = inputsOf(member);
+  const fresh = (): Draft[] => inputs.map(({ type }) => makeDraft(type, definitions, scope));
+  const [drafts, setDrafts] = useState<readonly Draft[]>(fresh);
+  const [done, setDone] = useState<readonly Done[]>([]);
+  const doing = useAction();
+  useEffect(() => setDrafts(fresh()), [definitions]); // types may be known only now
+  const values = (): unknown[] =>
+    inputs.map(({ name, type }, i) => {
+      try {
+        return valueOf(drafts[i] ?? makeDraft(type, definitions, scope), type, definitions, scope);
+      } catch (error) {
+        throw new Error(`${name}: ${(error as Error).message}`, { cause: error });
+      }
+    });
+  const submit = (event: Event): void => {
+    event.preventDefault();
+    doing.run(async () => {
+      if (!object) throw new Error(t("not connected"));
+      const given = values();
+      const begun = performance.now();
+      const result =
+        member.kind === "function"
+          ? await object.call(member.name, given)
+          : member.kind === "property"
+            ? await object.set(member.name, given[0])
+            : await object.poke(member.name, given[0]);
+      const hasResult = member.kind === "function" && member.type !== "void";
+      const entry: Done = {
+        time: Date.now(),
+        drafts,
+        words: JSON.stringify(jsonOf(given)).slice(1, -1),
+        rows: hasResult ? rowsOf(result, member.type, definitions, scope) : [],
+        tookMs: performance.now() - begun,
+      };
+      setDone((old) => [entry, ...old.slice(0, MOST_DONE - 1)]);
+    });
+  };
+  const read = (): void =>
+    doing.run(async () => {
+      if (object) setDrafts([draftOf(await object.get(member.name), member.type, definitions, scope)]);
+    });
+  const word = member.kind === "function" ? t("Call") : member.kind === "property" ? t("Set") : t("Send");
+  const [newest] = done;
+  return (
+    <form class="member-form" onSubmit={submit} data-form={member.name}>
+      {member.documentation !== "" && withMore && <p class="note row-documentation">{member.documentation}</p>}
+      {inputs.map(({ name, type }, i) => (
+        <DraftInput
+          key={name}
+          label={name}
+          type={type}
+          definitions={definitions}
+          scope={scope}
+          draft={drafts[i] ?? makeDraft(type, definitions, scope)}
+          change={(next) => setDrafts(inputs.map((_, at) => (at === i ? next : (drafts[at] as Draft))))}
+        />
+      ))}
+      <div class="row-line">
+        <button class="button" type="submit" disabled={!object || doing.busy}>
+          {word} {member.name}
+        </button>
+        {member.kind === "property" && !member.modifiers.includes("writeonly") && (
+          <button class="button button-quiet" type="button" disabled={!object || doing.busy} onClick={read}>
+            {t("Read")}
+            <span class="unseen"> {member.name}</span>
+          </button>
+        )}
+        {doing.busy && <span class="note">{t("under way …")}</span>}
+        {newest && !doing.busy && (
+          <output class="form-result">
+            {newest.rows.length === 0 ? t("done") : newest.rows.length === 1 ? newest.rows[0]?.text : ""}{" "}
+            <small class="took">{newest.tookMs.toFixed(1)} ms</small>
+          </output>
+        )}
+      </div>
+      {newest && newest.rows.length > 1 && (
+        <table class="values">
+          <tbody>
+            {newest.rows.map((row, i) => (
+              <tr key={i}>
+                <th scope="row">{row.name}</th>
+                <td>{row.text}</td>
+              </tr>
+            ))}
+          </tbody>
+        </table>
+      )}
+      <Failure text={doing.failure} />
+      {withMore && done.length > 0 && <History done={done} take={setDrafts} />}
+      {withMore && <Code member={member} values={values} place={place} />}
+    </form>
+  );
+}
+
+function History({ done, take }: { done: readonly Done[]; take: (drafts: readonly Draft[]) => void }) {
+  return (
+    <details>
+      <summary>{t("History: {0}", done.length)}</summary>
+      <ol class="history">
+        {done.map(({ time, words, drafts }, i) => (
+          <li key={i}>
+            <time>{clockTime(time)}</time>{" "}
+            <button class="button button-quiet" type="button" onClick={() => take(drafts)}>
+              {words || t("without arguments")}
+            </button>
+          </li>
+        ))}
+      </ol>
+    </details>
+  );
+}
+
+const LANGUAGES: readonly CodeLanguage[] = ["JavaScript", "curl", "Python"];
+
+function Code({
+  member,
+  values,
+  place,
+}: {
+  member: Member;
+  values: () => readonly unknown[];
+  place: PanelProps["place"];
+}) {
+  const [shown, setShown] = useState<{ language: CodeLanguage; text: string; isCopied: boolean } | null>(null);
+  const show = (language: CodeLanguage): void => {
+    let text: string;
+    try {
+      text = asCode(language, new URL(".", document.baseURI).href, place, member, values());
+    } catch (error) {
+      return setShown({ language, text: (error as Error).message, isCopied: false });
+    }
+    setShown({ language, text, isCopied: false });
+    navigator.clipboard?.writeText(text).then(
+      () => setShown({ language, text, isCopied: true }),
+      () => undefined, // the text is there to be selected
+    );
+  };
+  return (
+    <details>
+      <summary>{t("Copy as code")}</summary>
+      <div class="row-line">
+        {LANGUAGES.map((language) => (
+          <button
+            key={language}
+            class="button button-quiet"
+            type="button"
+            aria-pressed={shown?.language === language}
+            onClick={() => show(language)}
+          >
+            {language}
+          </button>
+        ))}
+        {shown?.isCopied && <span class="note">{t("copied")}</span>}
+      </div>
+      {shown && (
+        <pre class="json" tabIndex={0}>
+          {shown.text}
+        </pre>
+      )}
+    </details>
+  );
+}
+
+function inputsOf(member: Member): readonly Input[] {
+  return member.kind === "function" ? member.parameters : [{ name: member.name, type: member.type }];
+}

@@ -1,0 +1,122 @@
+// A part of a memory: as numbers, bytes, or grey values; and a form to write one item or more.
+// Layer: web/panels.
+
+import { useEffect, useRef, useState } from "preact/hooks";
+import { t } from "../app/language";
+import { useAction } from "../members/row";
+import { Failure } from "../ui/failure";
+import { formatValue } from "../values/format";
+import { parseInput } from "../values/parse";
+import { hexLines, greyPicture } from "./bytes";
+import { membersFor, textIn } from "./panel";
+import type { PanelProps } from "./panel";
+import { MemberSelect } from "./parts";
+
+type View = "array" | "hex" | "image";
+const VIEWS: readonly View[] = ["hex", "array", "image"];
+const AT_FIRST = 256;
+
+export default function MemoryPanel({ object, members, settings, change }: PanelProps) {
+  const choices = membersFor("memory", members);
+  const name = textIn(settings, "member") || choices[0]?.name || "";
+  const member = choices.find((each) => each.name === name);
+  const view = VIEWS.find((each) => each === textIn(settings, "view")) ?? "hex";
+  const [size, setSize] = useState<readonly number[]>([]);
+  const [position, setPosition] = useState("0");
+  const [count, setCount] = useState(String(AT_FIRST));
+  const [text, setText] = useState("");
+  const [value, setValue] = useState<unknown>(undefined);
+  const acting = useAction();
+  useEffect(() => {
+    setValue(undefined);
+    if (!object || !member) return;
+    acting.run(async () => {
+      const found = await object.dimensions(name);
+      setSize(found);
+      setPosition(found.map(() => 0).join(", "));
+      setCount(found.map((items) => Math.min(items, found.length === 1 ? AT_FIRST : 32)).join(", "));
+    });
+  }, [object, name]);
+  const numbers = (given: string): number[] => Array.from(parseInput(given, "uint32[]") as ArrayLike<number>);
+  const read = (): void =>
+    acting.run(async () => setValue(await object?.read(name, numbers(position), numbers(count))));
+  const write = (event: Event): void => {
+    event.preventDefault();
+    acting.run(async () => {
+      await object?.write(name, numbers(position), parseInput(text, member?.type ?? ""));
+      setValue(await object?.read(name, numbers(position), numbers(count)));
+    });
+  };
+  const off = !object || !member || acting.busy;
+  return (
+    <div class="memory-panel panel-scroll">
+      <div class="panel-tools">
+        <MemberSelect members={choices} chosen={name} choose={(next) => change({ ...settings, member: next })} />
+        <label>
+          <span class="unseen">{t("Shown as")}</span>
+          <select
+            class="field"
+            value={view}
+            onChange={(event) => change({ ...settings, member: name, view: event.currentTarget.value })}
+          >
+            {VIEWS.map((each) => (
+              <option key={each} value={each}>
+                {t(each)}
+              </option>
+            ))}
+          </select>
+        </label>
+      </div>
+      <form class="row-line row-form" onSubmit={(event) => (event.preventDefault(), read())}>
+        <TextField label={t("Position")} text={position} change={setPosition} />
+        <TextField label={t("Items")} text={count} change={setCount} />
+        <button class="button" type="submit" disabled={off}>
+          {t("Read")}
+        </button>
+        <p class="note">{size.length === 0 ? "" : t("{0} items", size.join(" × "))}</p>
+      </form>
+      <Failure text={acting.failure} />
+      {value !== undefined && <Shown value={value} view={view} from={numbers(position)[0] ?? 0} />}
+      {member && !member.modifiers.includes("readonly") && (
+        <form class="row-line row-form" onSubmit={write}>
+          <TextField label={t("New items")} text={text} change={setText} />
+          <button class="button" type="submit" disabled={off}>
+            {t("Write")}
+          </button>
+        </form>
+      )}
+    </div>
+  );
+}
+
+function TextField({ label, text, change }: { label: string; text: string; change: (text: string) => void }) {
+  return (
+    <label class="value-input">
+      <span class="value-label">{label}</span>
+      <input class="field" type="text" value={text} onInput={(event) => change(event.currentTarget.value)} />
+    </label>
+  );
+}
+
+function Shown({ value, view, from }: { value: unknown; view: View; from: number }) {
+  if (view === "image") return <Picture value={value} />;
+  return (
+    <pre class="json" tabIndex={0} data-memory>
+      {view === "hex" ? (hexLines(value, from) ?? formatValue(value)) : formatValue(value)}
+    </pre>
+  );
+}
+
+function Picture({ value }: { value: unknown }) {
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const picture = greyPicture(value);
+  useEffect(() => {
+    const place = canvas.current;
+    if (!place || !picture) return;
+    place.width = picture.width;
+    place.height = picture.height;
+    place.getContext("2d")?.putImageData(new ImageData(picture.rgba, picture.width, picture.height), 0, 0);
+  });
+  if (!picture) return <p class="note">{t("These items are no numbers that can be shown as a picture.")}</p>;
+  return <canvas ref={canvas} class="memory-picture" role="img" aria-label={t("The items as grey values")} />;
+}

@@ -1,0 +1,109 @@
+// What every panel is given, and which kinds there are; each is loaded when a board has one.
+// Layer: web/panels.
+
+import type { ComponentType } from "preact";
+import type { PanelKind, Settings } from "../board/board";
+import type { Member, MemberKind, Remote } from "../robot/remote";
+import type { Definitions } from "../values/definitions";
+
+export interface PanelProps {
+  /** The panel's object; null while there is no connection. */
+  object: Remote | null;
+  /** What was last known of it, also without connection. */
+  members: readonly Member[];
+  definitions: Definitions;
+  /** The definition in which the types of its members are named. */
+  scope: string;
+  /** Address of the object for examples of code. */
+  place: { device: string; service: string; object: string };
+  settings: Settings;
+  change: (settings: Settings) => void;
+}
+
+interface KindOfPanel {
+  title: string;
+  load: () => Promise<{ default: ComponentType<PanelProps> }>;
+  /** In cells of the board. */
+  w: number;
+  h: number;
+  /** Kinds of members that it shows; empty: none is chosen. */
+  members: readonly MemberKind[];
+  /** Of these, those that it can show. */
+  fits?: (member: Member) => boolean;
+}
+
+const notWriteOnly = (member: Member): boolean => !member.modifiers.includes("writeonly");
+const isGenerator = (member: Member): boolean =>
+  [member.type, ...member.parameters.map(({ type }) => type)].some((type) => type.endsWith("{generator}"));
+
+export const KINDS: Readonly<Record<PanelKind, KindOfPanel>> = {
+  plot: {
+    title: "Plot",
+    load: () => import("./plot_panel"),
+    w: 6,
+    h: 8,
+    members: ["wire", "property", "pipe"],
+    fits: notWriteOnly,
+  },
+  table: {
+    title: "Values",
+    load: () => import("./table_panel"),
+    w: 4,
+    h: 8,
+    members: ["wire", "property", "pipe"],
+    fits: notWriteOnly,
+  },
+  image: {
+    title: "Image",
+    load: () => import("./image_panel"),
+    w: 6,
+    h: 9,
+    members: ["pipe", "wire", "function", "property"],
+    fits: (member) => notWriteOnly(member) && member.parameters.length === 0,
+  },
+  form: {
+    title: "Form",
+    load: () => import("./form_panel"),
+    w: 4,
+    h: 8,
+    members: ["function", "property", "wire"],
+    fits: (member) => !isGenerator(member) && (member.kind !== "wire" || !member.modifiers.includes("readonly")),
+  },
+  log: { title: "Events", load: () => import("./log_panel"), w: 4, h: 6, members: [] },
+  robot: { title: "Joints", load: () => import("./robot_panel"), w: 6, h: 10, members: [] },
+  pipe: { title: "Pipe", load: () => import("./pipe_panel"), w: 4, h: 7, members: ["pipe"] },
+  memory: { title: "Memory", load: () => import("./memory_panel"), w: 6, h: 9, members: ["memory"] },
+  generator: {
+    title: "Generator",
+    load: () => import("./generator_panel"),
+    w: 4,
+    h: 8,
+    members: ["function"],
+    fits: isGenerator,
+  },
+  streams: { title: "Streams", load: () => import("./streams_panel"), w: 6, h: 6, members: [] },
+  locks: { title: "Lock", load: () => import("./locks_panel"), w: 3, h: 5, members: [] },
+  notes: { title: "Notes", load: () => import("./notes_panel"), w: 3, h: 5, members: [] },
+};
+
+/** The members of an object that a panel can show. */
+export function membersFor(kind: PanelKind, members: readonly Member[]): Member[] {
+  const { members: kinds, fits = () => true } = KINDS[kind];
+  return members.filter((member) => kinds.includes(member.kind) && fits(member));
+}
+
+/** A text of the settings; "" where there is none. */
+export function textIn(settings: Settings, name: string): string {
+  const value = Object.hasOwn(settings, name) ? settings[name] : undefined;
+  return typeof value === "string" ? value : "";
+}
+
+export function textsIn(settings: Settings, name: string): string[] {
+  const value = Object.hasOwn(settings, name) ? settings[name] : undefined;
+  return Array.isArray(value) ? value.filter((each): each is string => typeof each === "string") : [];
+}
+
+export function numberIn(settings: Settings, name: string, otherwise: number): number {
+  const value = Object.hasOwn(settings, name) ? settings[name] : undefined;
+  return typeof value === "number" && Number.isFinite(value) ? value : otherwise;
+}

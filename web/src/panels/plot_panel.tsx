@@ -1,0 +1,182 @@
+// Numbers over time: any of wires, properties and pipes, by their path; pause, zoom, cursor, and a file of what is shown.
+// Layer: web/panels. Drawn by uPlot.
+
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import uPlot from "uplot";
+import "uplot/dist/uPlot.min.css";
+import { t } from "../app/language";
+import { onColoursChanged } from "../app/theme";
+import { readPalette } from "../chart/palette";
+import { useEach, useFeed } from "../live/use_feed";
+import { unitOf } from "../values/units";
+import { numberAt, numberPaths } from "../values/paths";
+import { saveFile } from "../ui/save_file";
+import { membersFor, numberIn, textIn, textsIn } from "./panel";
+import type { PanelProps } from "./panel";
+import { feedKindOf, Freshness, MemberSelect } from "./parts";
+import { Trace, toCsv } from "./trace";
+
+const DRAW_MS = 100;
+const AT_FIRST = 4;
+const WINDOWS = [10, 30, 120, 600];
+
+export default function PlotPanel(props: PanelProps) {
+  const { object, members, settings, change, definitions, scope } = props;
+  const choices = membersFor("plot", members);
+  const name = textIn(settings, "member") || choices[0]?.name || "";
+  const member = choices.find((each) => each.name === name);
+  const seconds = numberIn(settings, "seconds", 30);
+  const kind = feedKindOf(member);
+  const look = useFeed(object, kind, name);
+  const available = useMemo(() => numberPaths(look.value), [look.feed, look.value === undefined]);
+  const chosen = textsIn(settings, "paths");
+  const paths = chosen.length > 0 ? chosen : preferred(available).slice(0, AT_FIRST);
+  const key = JSON.stringify([name, paths]);
+  const trace = useMemo(() => new Trace(paths.length), [key]);
+  const [paused, setPaused] = useState(false);
+  useEach(object, kind, name, (value, now) =>
+    trace.push(
+      now,
+      paths.map((path) => numberAt(value, path) ?? null),
+    ),
+  );
+  const type = member?.type ?? "";
+  const label = (path: string): string => {
+    const unit = unitOf(type, path, definitions, scope);
+    const shown = path === "" ? name : path;
+    return unit === "" ? shown : `${shown} [${unit}]`;
+  };
+  const save = (): void =>
+    saveFile(`${name}.csv`, "text/csv", toCsv(["time_s", ...paths.map((path) => path || name)], trace));
+  const pick = (path: string, on: boolean): void =>
+    change({ ...settings, member: name, paths: on ? [...paths, path] : paths.filter((each) => each !== path) });
+  return (
+    <div class="plot-panel">
+      <div class="panel-tools">
+        <MemberSelect members={choices} chosen={name} choose={(next) => change({ seconds, member: next })} />
+        <label>
+          <span class="unseen">{t("Time shown")}</span>
+          <select
+            class="field"
+            value={String(seconds)}
+            onChange={(event) => change({ ...settings, seconds: Number(event.currentTarget.value) })}
+          >
+            {WINDOWS.map((each) => (
+              <option key={each} value={String(each)}>
+                {each} s
+              </option>
+            ))}
+          </select>
+        </label>
+        <button class="button button-quiet" type="button" aria-pressed={paused} onClick={() => setPaused(!paused)}>
+          {paused ? t("Go on") : t("Pause")}
+        </button>
+        <button class="button button-quiet" type="button" onClick={save}>
+          CSV
+        </button>
+      </div>
+      <Canvas key={key} trace={trace} labels={paths.map(label)} seconds={seconds} paused={paused || object === null} />
+      <div class="panel-foot">
+        <Freshness look={look} isLive={object !== null} />
+        <details class="series-choice">
+          <summary>{t("Series: {0}", paths.length)}</summary>
+          <ul>
+            {[...new Set([...available, ...paths])].map((path) => (
+              <li key={path}>
+                <label>
+                  <input
+                    type="checkbox"
+                    checked={paths.includes(path)}
+                    onChange={(event) => pick(path, event.currentTarget.checked)}
+                  />{" "}
+                  {label(path)}
+                </label>
+              </li>
+            ))}
+          </ul>
+        </details>
+      </div>
+    </div>
+  );
+}
+
+/** Clocks and counters tell little as lines. */
+function preferred(paths: readonly string[]): readonly string[] {
+  const telling = paths.filter((path) => !/(^|\.)(ts|seqno|seconds|nanoseconds|device_time)\b|flags|units/.test(path));
+  return telling.length > 0 ? telling : paths;
+}
+
+interface CanvasProps {
+  trace: Trace;
+  labels: readonly string[];
+  seconds: number;
+  paused: boolean;
+}
+
+function Canvas({ trace, labels, seconds, paused }: CanvasProps) {
+  const place = useRef<HTMLDivElement>(null);
+  const latest = useRef({ seconds, paused });
+  latest.current = { seconds, paused };
+  useEffect(() => {
+    const box = place.current;
+    if (!box) return;
+    let plot = makePlot(box, labels);
+    const draw = (): void => {
+      if (latest.current.paused || document.hidden) return;
+      plot.setData(trace.window(latest.current.seconds) as uPlot.AlignedData);
+    };
+    const fit = new ResizeObserver(() => plot.setSize(sizeOf(box, plot)));
+    fit.observe(box);
+    const unwatch = onColoursChanged(() => {
+      plot.destroy();
+      plot = makePlot(box, labels);
+      plot.setData(trace.window(latest.current.seconds) as uPlot.AlignedData);
+    });
+    const timer = setInterval(draw, DRAW_MS);
+    draw();
+    return () => {
+      clearInterval(timer);
+      unwatch();
+      fit.disconnect();
+      plot.destroy();
+    };
+  }, [trace]);
+  return <div ref={place} class="plot-canvas" role="img" aria-label={t("Plot of {0}", labels.join(", "))} />;
+}
+
+function makePlot(box: HTMLElement, labels: readonly string[]): uPlot {
+  const palette = readPalette(box);
+  const axis = { stroke: palette.inkSoft, grid: { stroke: palette.line, width: 1 }, ticks: { stroke: palette.line } };
+  const plot = new uPlot(
+    {
+      width: Math.max(box.clientWidth, 40),
+      height: Math.max(box.clientHeight - 40, 60),
+      scales: { x: { time: false } },
+      cursor: { drag: { x: true, y: true, uni: 20 } },
+      legend: { live: true },
+      axes: [
+        { ...axis, values: (_, ticks) => ticks.map((s) => `${s} s`) },
+        { ...axis, size: 56 },
+      ],
+      series: [
+        { label: t("Time"), value: (_, s) => (s === null ? "–" : `${s.toFixed(2)} s`) },
+        ...labels.map((label, i) => ({
+          label,
+          stroke: palette.series[i % palette.series.length] ?? palette.accent,
+          width: 1.75,
+          spanGaps: true,
+          value: (_: uPlot, value: number | null) => (value === null ? "–" : String(Number(value.toPrecision(6)))),
+        })),
+      ],
+    },
+    [[], ...labels.map(() => [])] as unknown as uPlot.AlignedData,
+    box,
+  );
+  requestAnimationFrame(() => box.isConnected && plot.setSize(sizeOf(box, plot)));
+  return plot;
+}
+
+function sizeOf(box: HTMLElement, plot: uPlot): { width: number; height: number } {
+  const legend = plot.root.querySelector<HTMLElement>(".u-legend")?.offsetHeight ?? 0;
+  return { width: Math.max(box.clientWidth, 40), height: Math.max(box.clientHeight - legend, 60) };
+}

@@ -1,0 +1,150 @@
+// A standard robot: what its flags say, where its joints are within their limits, and jogging them while a button is held.
+// Layer: web/panels. Source: com.robotraconteur.robotics.robot.
+
+import { useEffect, useState } from "preact/hooks";
+import { t } from "../app/language";
+import { useFeed } from "../live/use_feed";
+import { useAction } from "../members/row";
+import { explain } from "../robot/remote";
+import { Failure } from "../ui/failure";
+import { formatNumber } from "../values/format";
+import { jointsOf, modeName, readState, stateWords } from "./joints";
+import type { Joint } from "./joints";
+import { JogButton } from "./jog_button";
+import { numberIn } from "./panel";
+import type { PanelProps } from "./panel";
+import { Freshness } from "./parts";
+
+const WIRE = "robot_state";
+
+export default function RobotPanel({ object, members, definitions, scope, settings, change }: PanelProps) {
+  const isRobot = members.some(({ name }) => name === WIRE) && members.some(({ name }) => name === "jog_joint");
+  const look = useFeed(object, isRobot ? "wire" : null, WIRE);
+  const state = readState(look.value);
+  const [joints, setJoints] = useState<readonly Joint[]>([]);
+  const [failure, setFailure] = useState<string | null>(null);
+  const acting = useAction();
+  const percent = numberIn(settings, "percent", 10);
+  useEffect(() => {
+    if (!object || !isRobot) return;
+    let isCurrent = true;
+    object.get("robot_info").then(
+      (info) => isCurrent && setJoints(jointsOf(info)),
+      (error: unknown) => isCurrent && setFailure(explain(error)),
+    );
+    return () => void (isCurrent = false);
+  }, [object, isRobot]);
+  if (!isRobot) return <p class="note">{t("This object is no robot of the standard types.")}</p>;
+
+  const mode = state ? modeName(state.commandMode, "RobotCommandMode", definitions, scope) : "";
+  const setMode = (number: number): void =>
+    acting.run(async () => {
+      if (number !== 0) await object?.set("command_mode", 0); // a robot changes its mode only from halt
+      await object?.set("command_mode", number);
+    });
+  const positions = state?.positions ?? new Float64Array();
+  const jog = (index: number, direction: number): Promise<unknown> => {
+    const velocity = new Float64Array(positions.length);
+    velocity[index] = direction * (percent / 100) * (joints[index]?.fastest || 1);
+    return object?.call("jog_joint", [velocity, JOG_SECONDS, false], { timeout: 2000 }) ?? Promise.resolve();
+  };
+  const canJog = object !== null && mode === "jog" && look.stale === null;
+  return (
+    <div class="robot-panel panel-scroll">
+      <ul class="robot-words" aria-label={t("State")}>
+        {stateWords(state, definitions, scope).map(({ text, kind }) => (
+          <li key={text} class={`word-${kind}`}>
+            {text}
+          </li>
+        ))}
+      </ul>
+      <div class="row-line" role="group" aria-label={t("Mode")}>
+        <button
+          class="button"
+          type="button"
+          aria-pressed={mode === "halt"}
+          disabled={!object}
+          onClick={() => setMode(0)}
+        >
+          {t("Halt")}
+        </button>
+        <button
+          class="button"
+          type="button"
+          aria-pressed={mode === "jog"}
+          disabled={!object || acting.busy}
+          onClick={() => setMode(1)}
+        >
+          {t("Jog")}
+        </button>
+        <label class="jog-speed">
+          {t("Speed")}{" "}
+          <input
+            type="range"
+            min={1}
+            max={100}
+            value={percent}
+            onInput={(event) => change({ ...settings, percent: Number(event.currentTarget.value) })}
+          />{" "}
+          <output>{percent} %</output>
+        </label>
+      </div>
+      <Failure text={failure ?? acting.failure} />
+      <ol class={`joints ${look.stale === null ? "" : "is-stale"}`}>
+        {Array.from(positions, (position, i) => {
+          const joint = joints[i] ?? { name: t("Joint {0}", i + 1), unit: "", low: NaN, high: NaN, fastest: 1 };
+          return (
+            <li key={i} data-joint={i}>
+              <span class="joint-name">{joint.name}</span>
+              <JogButton
+                label={t("{0} back", joint.name)}
+                sign="−"
+                enabled={canJog}
+                jog={() => jog(i, -1)}
+                stop={() => jog(i, 0)}
+                fail={setFailure}
+              />
+              <JointBar joint={joint} position={position} />
+              <JogButton
+                label={t("{0} forward", joint.name)}
+                sign="+"
+                enabled={canJog}
+                jog={() => jog(i, 1)}
+                stop={() => jog(i, 0)}
+                fail={setFailure}
+              />
+              <span class="joint-value" data-position={i}>
+                {formatNumber(Number(position.toFixed(4)))} {joint.unit}
+              </span>
+            </li>
+          );
+        })}
+      </ol>
+      {!canJog && object && (
+        <p class="note">
+          {look.stale === null ? t("Choose Jog to move joints by hand.") : t("No jogging on old values.")}
+        </p>
+      )}
+      <Freshness look={look} isLive={object !== null} />
+    </div>
+  );
+}
+
+const JOG_SECONDS = 0.4; // the robot stops by itself when no more commands come
+
+function JointBar({ joint, position }: { joint: Joint; position: number }) {
+  const has = Number.isFinite(joint.low) && joint.high > joint.low;
+  return (
+    <meter
+      class="joint-bar"
+      aria-label={joint.name}
+      min={has ? joint.low : -1}
+      max={has ? joint.high : 1}
+      low={has ? joint.low + 0.05 * (joint.high - joint.low) : -1}
+      high={has ? joint.high - 0.05 * (joint.high - joint.low) : 1}
+      optimum={has ? (joint.low + joint.high) / 2 : 0}
+      value={has ? position : 0}
+      title={has ? t("{0} to {1}", formatNumber(joint.low), formatNumber(joint.high)) : t("no limits known")}
+    />
+  );
+}

@@ -1,0 +1,239 @@
+// A value while it is typed in: the same shape as its type, with texts where the value has words.
+// Layer: web/values, pure. Maps and arrays instead of objects, so that a field may have any name.
+
+import type { Definitions } from "./definitions";
+import { enumName } from "./definitions";
+import { parseInput } from "./parse";
+import { isComplex, isNumeric, parseType } from "./type_text";
+import type { TypeText } from "./type_text";
+
+export type Draft =
+  | { kind: "text"; text: string }
+  /** In the order of the definition; null where the whole struct is. */
+  | { kind: "struct"; fields: Map<string, Draft> | null }
+  | { kind: "list"; items: Draft[] }
+  | { kind: "map"; entries: { key: string; value: Draft }[] };
+
+/** What a type looks like to who types it in. */
+export type Shape =
+  | { kind: "text"; type: string }
+  | { kind: "bool" }
+  | { kind: "uuid" }
+  | { kind: "enum"; names: readonly string[] }
+  | {
+      kind: "struct";
+      name: string;
+      scope: string;
+      fields: readonly { name: string; type: string; documentation: string }[];
+    }
+  | { kind: "list"; item: string }
+  | { kind: "map"; keys: "int32" | "string"; item: string };
+
+const MOST_DEPTH = 8; // a struct may contain itself, by a list
+
+export function shapeOf(type: string, definitions: Definitions, scope: string): Shape {
+  const parsed = parseType(type);
+  if (parsed.container === "list" || parsed.container === "generator") return { kind: "list", item: bare(parsed) };
+  if (parsed.container !== "none") return { kind: "map", keys: parsed.container, item: bare(parsed) };
+  if (parsed.base === "bool" && parsed.array === "none") return { kind: "bool" };
+  const struct = isWord(parsed.base) ? undefined : definitions.struct(parsed.base, scope);
+  if (struct && parsed.array === "none") {
+    if (struct.name === "com.robotraconteur.uuid.UUID") return { kind: "uuid" };
+    return { kind: "struct", name: struct.name, scope: struct.scope, fields: struct.fields };
+  }
+  if (struct && parsed.array !== "multidim") return { kind: "list", item: parsed.base };
+  const names = definitions.enum(parsed.base, scope);
+  if (names && parsed.array === "none") return { kind: "enum", names: [...names.values.keys()] };
+  return { kind: "text", type };
+}
+
+/** An empty value. */
+export function makeDraft(type: string, definitions: Definitions, scope: string, depth = 0): Draft {
+  const shape = shapeOf(type, definitions, scope);
+  switch (shape.kind) {
+    case "struct":
+      return {
+        kind: "struct",
+        fields:
+          depth >= MOST_DEPTH
+            ? null
+            : new Map(
+                shape.fields.map(({ name, type: of }) => [name, makeDraft(of, definitions, shape.scope, depth + 1)]),
+              ),
+      };
+    case "list":
+      return { kind: "list", items: [] };
+    case "map":
+      return { kind: "map", entries: [] };
+    case "enum":
+      return { kind: "text", text: shape.names[0] ?? "" };
+    case "bool":
+      return { kind: "text", text: "false" };
+    case "uuid":
+    case "text":
+      return { kind: "text", text: emptyText(type) };
+  }
+}
+
+/** @throws Error with the path to what is wrong, what was found and what was expected. */
+export function valueOf(draft: Draft, type: string, definitions: Definitions, scope: string): unknown {
+  const shape = shapeOf(type, definitions, scope);
+  if (shape.kind === "struct" && draft.kind === "struct") {
+    if (draft.fields === null) return null;
+    const value = Object.create(null) as Record<string, unknown>;
+    for (const { name, type: of } of shape.fields) {
+      const field = draft.fields.get(name) ?? makeDraft(of, definitions, shape.scope);
+      value[name] = at(name, () => valueOf(field, of, definitions, shape.scope));
+    }
+    return value;
+  }
+  if (shape.kind === "list" && draft.kind === "list")
+    return draft.items.map((item, i) => at(`[${i}]`, () => valueOf(item, shape.item, definitions, scope)));
+  if (shape.kind === "map" && draft.kind === "map") {
+    const entries = draft.entries.map(({ key, value }): [string | number, unknown] => [
+      shape.keys === "string" ? key : (at("key", () => parseInput(key, "int32")) as number),
+      at(key, () => valueOf(value, shape.item, definitions, scope)),
+    ]);
+    return new Map(entries);
+  }
+  if (draft.kind !== "text") throw new Error(`found a ${draft.kind}, expected ${type}`);
+  if (shape.kind === "uuid") return { ["uuid_bytes"]: readUuid(draft.text) };
+  if (shape.kind === "enum") return enumValue(draft.text, type, definitions, scope);
+  if (type === "varvalue") return draft.text.trim() === "" ? null : plainJson(draft.text);
+  return parseInput(draft.text, type);
+}
+
+/** A value of the device, to be changed and sent back. */
+export function draftOf(value: unknown, type: string, definitions: Definitions, scope: string): Draft {
+  const shape = shapeOf(type, definitions, scope);
+  if (shape.kind === "struct") {
+    if (value === null || typeof value !== "object") return { kind: "struct", fields: null };
+    const of = value as Record<string, unknown>;
+    return {
+      kind: "struct",
+      fields: new Map(shape.fields.map((f) => [f.name, draftOf(of[f.name], f.type, definitions, shape.scope)])),
+    };
+  }
+  if (shape.kind === "list")
+    return {
+      kind: "list",
+      items: Array.isArray(value) ? value.map((item) => draftOf(item, shape.item, definitions, scope)) : [],
+    };
+  if (shape.kind === "map")
+    return {
+      kind: "map",
+      entries:
+        value instanceof Map
+          ? [...value].map(([key, item]) => ({
+              key: String(key),
+              value: draftOf(item, shape.item, definitions, scope),
+            }))
+          : [],
+    };
+  if (shape.kind === "uuid") return { kind: "text", text: formatUuid(uuidBytes(value)) };
+  if (shape.kind === "enum") {
+    const found = definitions.enum(parseType(type).base, scope);
+    return { kind: "text", text: (found && enumName(value, found)) ?? String(value) };
+  }
+  return { kind: "text", text: textOf(value) };
+}
+
+/** As JSON of the gateway's HTTP API, for examples of code. */
+export function jsonOf(value: unknown): unknown {
+  if (typeof value === "bigint") return Number(value);
+  if (ArrayBuffer.isView(value)) return Array.from(value as unknown as ArrayLike<number | bigint>, jsonOf);
+  if (Array.isArray(value)) return value.map(jsonOf);
+  if (value instanceof Map) return objectOf([...value].map(([key, item]) => [String(key), jsonOf(item)]));
+  if (value !== null && typeof value === "object")
+    return objectOf(Object.entries(value).map(([key, item]) => [key, jsonOf(item)]));
+  return value;
+}
+
+function objectOf(entries: readonly (readonly [string, unknown])[]): object {
+  const made = Object.create(null) as Record<string, unknown>;
+  for (const [key, value] of entries) made[key] = value;
+  return made;
+}
+
+function enumValue(text: string, type: string, definitions: Definitions, scope: string): number {
+  const found = definitions.enum(parseType(type).base, scope)?.values;
+  const value = found?.get(text.trim());
+  if (value !== undefined) return value;
+  if (/^-?\d+$/.test(text.trim())) return Number(text);
+  throw new Error(`"${text}" is no ${type}; expected one of ${[...(found?.keys() ?? [])].slice(0, 8).join(", ")}`);
+}
+
+export function readUuid(text: string): Uint8Array {
+  const digits = text
+    .trim()
+    .replaceAll("-", "")
+    .replace(/^\{|\}$/g, "");
+  if (digits === "") return new Uint8Array(16);
+  if (!/^[0-9a-f]{32}$/i.test(digits))
+    throw new Error(
+      `"${text}" is no UUID; expected 32 hexadecimal digits such as 39b513e7-21b9-4b49-8654-7537473030eb`,
+    );
+  return Uint8Array.from({ length: 16 }, (_, i) => Number.parseInt(digits.slice(2 * i, 2 * i + 2), 16));
+}
+
+/** Of a com.robotraconteur.uuid.UUID. */
+export function uuidBytes(value: unknown): unknown {
+  return (value as Record<string, unknown> | null)?.["uuid_bytes"];
+}
+
+export function formatUuid(bytes: unknown): string {
+  if (!(bytes instanceof Uint8Array) || bytes.length !== 16) return "";
+  const digits = Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("");
+  return digits.replace(/^(.{8})(.{4})(.{4})(.{4})/, "$1-$2-$3-$4-");
+}
+
+function plainJson(text: string): unknown {
+  try {
+    return JSON.parse(text);
+  } catch {
+    return text;
+  }
+}
+
+function at<T>(where: string, make: () => T): T {
+  try {
+    return make();
+  } catch (error) {
+    const text = (error as Error).message;
+    throw new Error(`${where}${text.startsWith("[") ? "" : ": "}${text}`, { cause: error });
+  }
+}
+
+function isWord(base: string): boolean {
+  return isNumeric(base) || isComplex(base) || base === "string" || base === "varvalue" || base === "varobject";
+}
+
+/** The type of one element of a list or map. */
+function bare(type: TypeText): string {
+  const sizes = type.sizes.join(",");
+  const brackets = {
+    none: "",
+    any: "[]",
+    fixed: `[${sizes}]`,
+    max: `[${sizes}-]`,
+    multidim: sizes ? `[${sizes}]` : "[*]",
+  };
+  return type.base + brackets[type.array];
+}
+
+function emptyText(type: string): string {
+  const { base, array, sizes } = parseType(type);
+  if (!isNumeric(base) || isComplex(base)) return "";
+  if (array === "none") return "0";
+  return array === "fixed"
+    ? Array(sizes[0] ?? 0)
+        .fill("0")
+        .join(", ")
+    : "";
+}
+
+function textOf(value: unknown): string {
+  if (value === null || value === undefined) return "";
+  if (ArrayBuffer.isView(value)) return Array.from(value as unknown as ArrayLike<number>).join(", ");
+  return typeof value === "string" ? value : JSON.stringify(jsonOf(value));
+}
