@@ -134,7 +134,8 @@ rr::Result<> SessionRights::admit(const rr::MemberAccess& wanted) {
 
 AuditEntryPtr SessionRights::begin(const rr::MemberAccess& admitted) {
   if (!admitted.member || recorded_of(admitted.type) != Recorded::each_time) return nullptr;
-  AccessRequest what{.path = admitted.path, .member = admitted.member->name, .verb = verb_of(admitted.type, admitted.member)};
+  AccessRequest what{
+      .path = admitted.path, .member = admitted.member->name, .verb = verb_of(admitted.type, admitted.member)};
   return begin(what, admitted.user, {});
 }
 

@@ -45,7 +45,9 @@ it("is not for a page that nobody looks at", async () => {
 it("calls functions urgently, with arguments and options as otherwise", async () => {
   expect(Object.keys(robot.$.urgent)).toEqual(["drive", "who", "count"]);
   expect(await robot.$.urgent["drive"]!(3, { timeout: 1000 })).toBe(3);
-  expect((await failure(Promise.resolve(robot.$.urgent["drive"]!(1, 2, 3)))).name).toBe("RobotRaconteur.InvalidArgument");
+  expect((await failure(Promise.resolve(robot.$.urgent["drive"]!(1, 2, 3)))).name).toBe(
+    "RobotRaconteur.InvalidArgument",
+  );
   expect("speed" in robot.$.urgent).toBe(false);
 });
 

@@ -17,7 +17,7 @@ let create: Program;
 let gateway: { program: Program; url: string };
 let robot: Client.RemoteObject;
 /** When the robot was heard of with each speed that is not that before. */
-let speeds: { at: number; speed: number }[] = [];
+const speeds: { at: number; speed: number }[] = [];
 
 test.beforeAll(async () => {
   const site = mkdtempSync(path.join(tmpdir(), "rrgate-site-"));
@@ -97,7 +97,8 @@ test("a main thread that hangs stops the robot", async ({ page }) => {
   expect(await stoppedAfter(began)).toBeLessThan(soon);
   await expect.poll(() => lost(page)).toContain(`its holder has not renewed it for ${deadman} ms`);
   const late = await page.evaluate(async () => {
-    const { driven } = (window as unknown as { lab: { driven: { Drive(...way: number[]): Promise<void> } } }).lab;
+    const { driven } = (window as unknown as { lab: { driven: Record<"Drive", (...way: number[]) => Promise<void>> } })
+      .lab;
     return driven.Drive(50, 32767).catch((error: Error) => error.message);
   });
   expect(late).toContain("has ended");

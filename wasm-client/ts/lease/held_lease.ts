@@ -6,7 +6,6 @@ import { Info } from "../object.js";
 import type { Session } from "../session.js";
 import type { CallOptions, Lease, LeaseOptions, RemoteObject } from "../types.js";
 
-/* eslint-disable-next-line @typescript-eslint/naming-convention -- numbers of rr::LeaseCommand */
 const Command = { acquire: 0, takeOver: 1, renew: 2, release: 3 } as const;
 const renewalsPerDeadman = 3;
 const defaultDeadman = 1000;
