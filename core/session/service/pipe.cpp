@@ -44,8 +44,10 @@ void ServiceSession::forget_pipe(PipeId id) {
 
 /// This side ends an endpoint that the client may still be sending to.
 void ServiceSession::leave_pipe(PipeId id) {
-  if (const auto* pipe = find_pipe(id); pipe && pipe->index < INT32_MAX)
-    closed_index_ = std::max(closed_index_, pipe->index);
+  if (const auto* pipe = find_pipe(id); pipe && pipe->index < INT32_MAX) {
+    auto& closed = closed_indices_.try_emplace(*pipe->key, any_pipe_index).first->second;
+    closed = std::max(closed, pipe->index);
+  }
   forget_pipe(id);
 }
 
@@ -148,9 +150,10 @@ void ServiceSession::release_pipes(std::string_view path) {
   for (const auto& [id, pipe] : pipes_)
     if (is_within(pipe.key->path, path)) released.push_back(id);
   for (const auto id : released) {
-    leave_pipe(id);
+    forget_pipe(id);
     events_.push(PipeClosed{id});
   }
+  std::erase_if(closed_indices_, [path](const auto& closed) { return is_within(closed.first.path, path); });
 }
 
 // --- received ---
@@ -165,7 +168,9 @@ Result<> ServiceSession::connect_pipe(const Message& message, const MessageEntry
         "this client has " + std::to_string(options_.max_pipe_endpoints) + " pipe endpoints connected already");
   PathMember key{std::string(entry.service_path), std::string(entry.member_name)};
   const auto indices = pipe_indices_.try_emplace(std::move(key)).first;
-  const auto index = assign_index(*asked, indices->second, closed_index_);
+  const auto closed = closed_indices_.find(indices->first);
+  const auto index =
+      assign_index(*asked, indices->second, closed == closed_indices_.end() ? any_pipe_index : closed->second);
   if (!index)
     return make_error(ErrorCode::out_of_range, "pipe '" + member.name + "': there is no index above those in use");
   const auto id = ++last_pipe_id_;
