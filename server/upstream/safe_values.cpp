@@ -56,7 +56,7 @@ rr::Result<SafeRequest> read_action(const SafeAction& action, const rr::EntityDe
 
 }  // namespace
 
-SafeValues::SafeValues(std::string device, std::string service, const std::vector<SafeAction>& actions)
+SafeValues::SafeValues(std::string device, std::string_view service, const std::vector<SafeAction>& actions)
     : device_(std::move(device)) {
   for (const auto& action : actions)
     if (rr::is_within(action.path, service)) items_.push_back({action, misfit(action, "not checked yet")});

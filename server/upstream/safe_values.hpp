@@ -27,7 +27,7 @@ struct SafeRequest {
 class SafeValues : public std::enable_shared_from_this<SafeValues> {
  public:
   /// Those of `actions` that are about the service.
-  SafeValues(std::string device, std::string service, const std::vector<SafeAction>& actions);
+  SafeValues(std::string device, std::string_view service, const std::vector<SafeAction>& actions);
 
   /// A session with the device is open: what the configuration says is held against what the device declares, and what
   /// could not be sent before is sent.

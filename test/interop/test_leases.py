@@ -195,7 +195,7 @@ def test_a_gateway_that_stops_leaves_the_device_safe(site):
         drives(page, arm)
         page.ask("lease", deadman=60000)
         site.gateway.stop()
-        assert is_safe(arm)
+        assert wait_for(lambda: is_safe(arm)) < SOON
 
 
 def test_an_operator_takes_a_lease_over_and_all_of_it_is_recorded(node, tmp_path):

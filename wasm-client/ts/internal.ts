@@ -7,3 +7,4 @@ export type { CoreExports, Handle } from "./js_values.js";
 export { platform } from "./platform.js";
 export { parseServiceUrl } from "./url.js";
 export { openUsb } from "./usb_devices.js";
+export { openWebsocket } from "./websocket.js";

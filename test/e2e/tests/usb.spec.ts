@@ -9,7 +9,7 @@ import { makeUsbSite } from "../usb_site";
 
 const script = `
 import { connect, listUsbDevices, requestUsbDevice } from "./index.js";
-import { openWebsocket } from "./websocket.js";
+import { openWebsocket } from "./internal.js";
 import { FakeUsb, FakeUsbDevice } from "./fake_usb.js";
 
 const relay = new URL("/devices/big?service=interop", location);

@@ -10,7 +10,7 @@ const granted = [];
 const usb = new EventTarget();
 usb.getDevices = async () => [...granted];
 usb.requestDevice = async () => {
-  const { openWebsocket } = await import("/usb-test/websocket.js");
+  const { openWebsocket } = await import("/usb-test/internal.js");
   const { FakeUsbDevice } = await import("/usb-test/fake_usb.js");
   const { devices } = await (await fetch("/api/v1/devices")).json();
   const code = await WebAssembly.compile(await (await fetch("/usb-test/test_usb_device.wasm")).arrayBuffer());
