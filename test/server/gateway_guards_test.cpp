@@ -117,8 +117,7 @@ TEST_CASE("refusals and failures have each header that guards browsers, once") {
   check(500, head_of(gateway, "POST /api/v1/access/requests/" + id + "/approve", shows + "Content-Length: 0\r\n"));
 }
 
-TEST_CASE(
-    "the files of a page have a policy of their own, and so has their 304; what else is answered has the strict one") {
+TEST_CASE("a page's files and their 304 have a policy of their own, all other answers the strict one") {
   const Folder files;
   files.write("web/index.html", "<!doctype html>");
   files.write("web/main.js", "1");
