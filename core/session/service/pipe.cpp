@@ -10,6 +10,9 @@ namespace rr {
 
 namespace {
 
+/// Objects come and go: of more members than these nobody remembers which indices were closed.
+constexpr std::size_t max_closed_indices = 1000;
+
 /// Which index an endpoint gets beside those in use, as the reference assigns it: the one asked for where it is above
 /// all others, else the next above them; never one below, so that an index is not used again while others live. Nor is
 /// one up to `closed` that this side has closed: packets for that endpoint may still be on their way.
@@ -47,6 +50,7 @@ void ServiceSession::leave_pipe(PipeId id) {
   if (const auto* pipe = find_pipe(id); pipe && pipe->index < INT32_MAX) {
     auto& closed = closed_indices_.try_emplace(*pipe->key, any_pipe_index).first->second;
     closed = std::max(closed, pipe->index);
+    if (closed_indices_.size() > max_closed_indices) closed_indices_.erase(closed_indices_.begin());
   }
   forget_pipe(id);
 }
@@ -150,10 +154,9 @@ void ServiceSession::release_pipes(std::string_view path) {
   for (const auto& [id, pipe] : pipes_)
     if (is_within(pipe.key->path, path)) released.push_back(id);
   for (const auto id : released) {
-    forget_pipe(id);
+    leave_pipe(id);
     events_.push(PipeClosed{id});
   }
-  std::erase_if(closed_indices_, [path](const auto& closed) { return is_within(closed.first.path, path); });
 }
 
 // --- received ---

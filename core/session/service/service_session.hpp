@@ -436,7 +436,7 @@ class ServiceSession {
   PipeId last_pipe_id_ = 0;
   std::map<PipeId, ServicePipe> pipes_;                             ///< mostly none or one
   std::map<PathMember, PipeIndices, PathMemberLess> pipe_indices_;  ///< the same pipes
-  /// Of each member the highest that this side has closed, for as long as the object lives.
+  /// Of each member the highest that this side has closed.
   std::map<PathMember, std::int32_t, PathMemberLess> closed_indices_;
   std::vector<std::pair<std::int32_t, std::uint32_t>> pipe_acks_;  ///< index and number, to be sent; reused
   Fifo<ServiceEvent> events_;
