@@ -278,18 +278,19 @@ class Site:
             self.findings.break_("gateway", f"has ended with {self.gateway.process.poll()}")
             return
         wait_until(self.is_online, "all devices are online again")
-        self.publisher.stop()
-        value = float(self.tokens.next())
-        wait_until(lambda: self.publish(value), "the device answers again")
         watchers = [client.name for client in self.clients if isinstance(client, (Watcher, Program))]
 
-        def have_converged():
-            return all(self.findings.last_values.get(name) == value for name in watchers)
+        def values():
+            return {name: self.findings.last_values.get(name, 0) for name in watchers}
+        value = float(self.tokens.next())
         try:
-            wait_until(have_converged, "wires have the last value")
+            wait_until(lambda: min(values().values()) > value, "all follow the wire again")
+            self.publisher.stop()
+            value = float(self.tokens.next())
+            wait_until(lambda: self.publish(value), "the device answers again")
+            wait_until(lambda: set(values().values()) == {value}, "wires have the last value")
         except AssertionError as error:
-            seen = {name: self.findings.last_values.get(name) for name in watchers}
-            self.findings.break_("wires", f"{error}, which is {value}: {seen}")
+            self.findings.break_("wires", f"{error}, {value} or newer: {values()}")
         self.end()
         for fault in faults_of_calls(ran(self.device.journal), self.findings.answered):
             self.findings.break_("calls", fault)
