@@ -41,6 +41,7 @@ it("loads what speaks to USB devices when there is one to speak to, and not befo
     expect(read(file), file).not.toMatch(/\bfrom\s*"\.\/usb\//);
   }
   expect(read("client.js")).toContain('import("./usb/nodes.js")');
+  expect(read("client.js")).toContain('import("./definition/definition.js")');
 });
 
 it("loads two scripts in a page", () => {

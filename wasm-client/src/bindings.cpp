@@ -200,6 +200,9 @@ RR_EXPORT(definitions) JsHandle rr_definitions() {
 RR_EXPORT(known_definitions) JsHandle rr_known_definitions() {
   return session->known_definitions().release();
 }
+RR_EXPORT(definition) JsHandle rr_definition(JsHandle name) {
+  return session->definition(JsValue(name)).release();
+}
 RR_EXPORT(members) JsHandle rr_members(JsHandle path) {
   return session->members(JsValue(path)).release();
 }

@@ -417,6 +417,11 @@ JsValue WasmSession::known_definitions() const {
   return known;
 }
 
+JsValue WasmSession::definition(const JsValue& name) const {
+  const auto* definition = session_.types().find_service(text_of(name));
+  return definition ? make_js_definition(*definition) : JsValue::undefined();
+}
+
 JsValue WasmSession::members(const JsValue& path) const {
   const auto* type = session_.object_type(text_of(path));
   return type ? make_js_members(*type) : JsValue::undefined();

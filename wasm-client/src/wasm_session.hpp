@@ -93,6 +93,8 @@ class WasmSession {
   /// {id, name} of the service's node.
   JsValue peer() const;
   JsValue attributes() const;
+  /// See make_js_definition(); undefined where there is none of this name.
+  JsValue definition(const JsValue& name) const;
   /// The texts of all definitions, imports first.
   JsValue definitions() const;
   /// What the service named by a tag, for the option `known` of a later session: [[name, tag, text...]...].

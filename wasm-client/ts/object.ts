@@ -16,6 +16,7 @@ import type { Session } from "./session.js";
 import { checkSignal, within } from "./within.js";
 import type {
   CallOptions,
+  DefinitionInfo,
   DynamicMember,
   Lease,
   LeaseOptions,
@@ -174,6 +175,15 @@ export class Info implements ObjectInfo {
 
   get types(): readonly string[] {
     return (this.#types = this.#session.look((core) => core.definitions()) ?? this.#types);
+  }
+
+  async definition(name = this.type.replace(/\.[^.]*$/, "")): Promise<DefinitionInfo> {
+    const { makeDefinition } = await import("./definition/definition.js");
+    const raw = this.#session.look((core) => core.definition(name) ?? null);
+    if (raw) return makeDefinition(raw, freezeInfo);
+    throw raw === null
+      ? makeError("InvalidArgument", `definition: "${name}" is not known`)
+      : makeError("InvalidOperation", "definition: the session is closed");
   }
 
   get stats(): SessionStats {

@@ -90,6 +90,34 @@ export interface MemberInfo {
   readonly documentation: string;
 }
 
+/** A struct, pod, namedarray or object of a definition. */
+export interface TypeInfo {
+  /** Qualified: "com.example.Pose". */
+  readonly name: string;
+  readonly kind: "struct" | "pod" | "namedarray" | "object";
+  /** Objects: qualified names of the types that it implements. */
+  readonly implements: readonly string[];
+  readonly constants: Readonly<Record<string, RrValue>>;
+  /** Of values their fields, of kind "field". */
+  readonly members: readonly (Omit<MemberInfo, "kind"> & { readonly kind: MemberKind | "field" })[];
+  readonly documentation: string;
+}
+
+/** What a service definition declares. */
+export interface DefinitionInfo {
+  readonly name: string;
+  readonly documentation: string;
+  /** Values by name; int64 and uint64 as bigint, numeric arrays as TypedArray, structs as objects. */
+  readonly constants: Readonly<Record<string, RrValue>>;
+  /** The numbers of each enum by name: `enums.Mode?.run`. */
+  readonly enums: Readonly<Record<string, Readonly<Record<string, number>>>>;
+  /** Qualified names. */
+  readonly exceptions: readonly string[];
+  readonly types: Readonly<Record<string, TypeInfo>>;
+  /** The documentation of constants ("LIMIT", "Robot.LIMIT"), enums and their values ("Mode", "Mode.run"), exceptions. */
+  readonly notes: ReadonlyMap<string, string>;
+}
+
 export interface SessionStats {
   messagesReceived: number;
   messagesSent: number;
@@ -114,6 +142,12 @@ export interface ObjectInfo {
   readonly node: { readonly id: string; readonly name: string };
   /** The texts of all service definitions known so far. */
   readonly types: readonly string[];
+  /**
+   * The constants, enums and types of a definition that the service has sent, with their documentation.
+   * @param name  the definition's, "com.example.robot"; that of the object's type where not given.
+   * @throws RobotRaconteurError (rejects) InvalidArgument (not known), InvalidOperation (the session is closed).
+   */
+  definition(name?: string): Promise<DefinitionInfo>;
   readonly stats: SessionStats;
   /**
    * The functions of the object, as they are called otherwise, but sent past whatever waits to be sent:
@@ -334,8 +368,13 @@ export interface DynamicMember extends AsyncIterable<RrValue[]> {
   write(position: number | readonly number[], value: unknown, options?: CallOptions): Promise<void>;
 }
 
-/** A connected object: its members by name, and `$`. */
-export type RemoteObject = { readonly $: ObjectInfo } & { readonly [member: string]: DynamicMember };
+/**
+ * A connected object: its members by name, and `$`. `RemoteObject<"Drive" | "Bump">` has these for certain, also for a
+ * compiler that asks of every other name whether it is there.
+ */
+export type RemoteObject<M extends string = string> = { readonly $: ObjectInfo } & {
+  readonly [member in M]: DynamicMember;
+};
 
 /** The names of the members of `T` that are like `M`; of an object without known types every name. */
 export type MembersLike<T, M> = string extends keyof T

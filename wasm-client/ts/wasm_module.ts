@@ -5,7 +5,7 @@ import type { ErrorFields } from "./errors.js";
 import { JsValues } from "./js_values.js";
 import type { CoreExports, Handle } from "./js_values.js";
 import { platform } from "./platform.js";
-import type { MemberInfo, RrValue, SessionStats } from "./types.js";
+import type { MemberInfo, RrValue, SessionStats, TypeInfo } from "./types.js";
 
 export interface CoreOptions {
   service: string;
@@ -26,6 +26,31 @@ export interface CoreOptions {
 
 /** For each set of definitions its name, the service's tag for it, and the texts; to be kept, not to be read. */
 export type KnownDefinitions = readonly (readonly string[])[];
+
+export interface RawConstant {
+  name: string;
+  type: string;
+  /** As it stands in the definition. */
+  text: string;
+  documentation: string;
+}
+
+/** See make_js_definition() in src/object_info.hpp. */
+export interface RawDefinition {
+  name: string;
+  documentation: string;
+  constants: RawConstant[];
+  enums: { name: string; values: { name: string; value: number; documentation: string }[]; documentation: string }[];
+  exceptions: { name: string; documentation: string }[];
+  types: {
+    name: string;
+    kind: TypeInfo["kind"];
+    constants: RawConstant[];
+    members: MemberInfo[];
+    implements: string[];
+    documentation: string;
+  }[];
+}
 
 export type CoreEvent =
   | { kind: "connected"; type: string }
@@ -106,6 +131,7 @@ interface WasmSession extends CoreExports {
   attributes(): Handle;
   definitions(): Handle;
   known_definitions(): Handle;
+  definition(name: Handle): Handle;
   members(path: Handle): Handle;
   child_path(parent: Handle, member: Handle, index: Handle): Handle;
 }
@@ -400,6 +426,10 @@ export class Core {
 
   knownDefinitions(): KnownDefinitions {
     return this.#values.take(this.#session.known_definitions()) as KnownDefinitions;
+  }
+
+  definition(name: string): RawDefinition | undefined {
+    return this.#values.take(this.#session.definition(this.#give(name))) as RawDefinition | undefined;
   }
 
   /** Of an object that was found. */
