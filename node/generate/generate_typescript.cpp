@@ -88,7 +88,8 @@ class TypeScriptEmitter {
 
   const DefinitionSet& set_;
   TypeScriptFlavour flavour_;
-  std::map<std::string, std::string> names_ = {};  ///< by qualified name
+  std::map<std::string, std::string> names_ = {};        ///< by qualified name
+  std::map<std::string, std::string> value_names_ = {};  ///< of enums: the type of the names of their values
   std::set<std::string> imports_ = {};
   SourceWriter out_{DocStyle::block};
 };
@@ -110,6 +111,12 @@ std::string TypeScriptEmitter::emit() {
 /// Names stand for themselves; where several definitions have the same, each gets its service in front.
 void TypeScriptEmitter::choose_names() {
   std::multimap<std::string, std::string> services;
+  std::set<std::string> used;
+  const auto choose_unused = [&used](std::string chosen) {
+    while (contains(words_of_the_language, chosen) || contains(used_types, chosen) || !used.insert(chosen).second)
+      chosen += '_';
+    return chosen;
+  };
   for (const auto* definition : set_.in_order()) {
     const auto add = [&](const std::string& name) { services.emplace(name, definition->name); };
     for (const auto& item : definition->enums) add(item.name);
@@ -117,17 +124,19 @@ void TypeScriptEmitter::choose_names() {
     for (const auto& item : definition->entities) add(item.name);
     for (const auto& item : all_constants(*definition)) add(item.name);
   }
-  std::set<std::string> used;
   for (const auto& [name, service] : services) {
     auto chosen = name;
     if (services.count(name) > 1) {
       chosen = service + '_' + name;
       std::replace(chosen.begin(), chosen.end(), '.', '_');
     }
-    while (contains(words_of_the_language, chosen) || contains(used_types, chosen) || !used.insert(chosen).second)
-      chosen += '_';
-    names_.emplace(service + '.' + name, chosen);
+    names_.emplace(service + '.' + name, choose_unused(chosen));
   }
+  for (const auto* definition : set_.in_order())
+    for (const auto& item : definition->enums) {
+      const auto key = definition->name + '.' + item.name;
+      value_names_.emplace(key, choose_unused(names_.at(key) + "Name"));
+    }
 }
 
 void TypeScriptEmitter::emit_definition(const ServiceDefinition& definition) {
@@ -167,6 +176,9 @@ void TypeScriptEmitter::emit_enum(const ServiceDefinition& definition, const Enu
     }
     out_.close("  | " + unknown + ";");
   }
+  std::vector<std::string> names;
+  for (const auto& value : item.values) names.push_back('"' + value.name + '"');
+  out_.line("export type " + value_names_.at(definition.name + '.' + item.name) + " = " + joined(names, " | ") + ";");
   out_.gap();
 }
 
@@ -317,6 +329,8 @@ std::string TypeScriptEmitter::scalar_text(const TypeDefinition& type, Way way) 
     case DataType::structure_t:
       return names_.at(type.qualified_name) + " | null";
     case DataType::enum_t:
+      return names_.at(type.qualified_name) +
+             (way == Way::sent ? " | " + value_names_.at(type.qualified_name) : std::string());
     case DataType::pod_t:
     case DataType::namedarray_t:
       return names_.at(type.qualified_name);

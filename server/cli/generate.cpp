@@ -4,6 +4,7 @@
 #include "node/generate/generate_typescript.hpp"
 #include "node/platform/text_file.hpp"
 #include "server/cli/definition_options.hpp"
+#include "server/cli/remote_service.hpp"
 
 namespace rrgate {
 
@@ -15,7 +16,7 @@ bool is_url(std::string_view operand) {
 
 /// The definitions that a live service sends to its clients.
 DefinitionSet definitions_of_service(const std::string& url) {
-  const auto object = rr::connect(url);
+  const auto object = open_service(remote_address({.url = url}));
   std::vector<std::string> texts;
   for (const auto& definition : object.connection().asynchronous().session().types().definitions())
     texts.push_back(definition->text);
@@ -66,6 +67,8 @@ int run_generator(const GenerateOptions& options) {
     return report_diagnostics(set) ? generate(options, set) : static_cast<int>(exit_failed);
   } catch (const rr::ClientException& failure) {
     return report_failure("generate", options.files.front() + ": " + failure.what());
+  } catch (const NotUnderstood& failure) {
+    return usage_error("generate", options.files.front() + ": " + failure.what());
   }
 }
 

@@ -53,6 +53,8 @@ TEST_CASE("generate ts: types of a live service") {
     owner.add(service);
   });
   CHECK(run_command("generate", {"ts", node.url("Lamp")}).output == lamp_types);
+  const auto web_url = "http" + node.url("Lamp").substr(std::string("rr+tcp").size());
+  CHECK(run_command("generate", {"ts", web_url}).output == lamp_types);
   const auto none = run_command("generate", {"ts", node.url("Candle")});
   CHECK(none.code == exit_failed);
   CHECK_THAT(none.errors, Contains("Candle"));

@@ -59,8 +59,10 @@ export async function values(): Promise<void> {
   interop.changed.on((value, why) => why.repeat(value));
   await interop.p_color.set(Color.green);
   await interop.p_color.set(77);
-  // @ts-expect-error not a value of the enum, and not a number
   await interop.p_color.set("green");
+  // @ts-expect-error not a value of the enum, and not a number
+  await interop.p_color.set("mauve");
+  same<Awaited<ReturnType<typeof interop.p_color.get>>, declared.Color>(true);
   same<typeof Color.blue, -3>(true);
   try {
     await interop.fail("custom", "text");
@@ -136,5 +138,15 @@ export async function follow(): Promise<void> {
   for await (const value of dynamic.wire("anything")) same<typeof value, RrValue>(true);
   for await (const [first] of dynamic.event("anything")) same<typeof first, RrValue | undefined>(true);
   await dynamic.close();
+  // Members that are known by name need no "!" and no "?.".
+  const named = await connect<RemoteObject<"Drive" | "Bump">>("ws://localhost/?service=any");
+  await named.Drive(1, 2);
+  for await (const [side] of named.Bump) same<typeof side, RrValue | undefined>(true);
+  // @ts-expect-error not one of them
+  named.Fly;
+  const { constants, enums } = await named.$.definition();
+  same<typeof constants.LIMIT, RrValue | undefined>(true);
+  const run: number | undefined = enums.Mode?.run;
+  void run;
   void far;
 }
