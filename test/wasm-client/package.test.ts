@@ -7,6 +7,7 @@ const dist = new URL("../../wasm-client/dist/", import.meta.url);
 const manifest = JSON.parse(readFileSync(packageFile, "utf8")) as {
   version: string;
   dependencies?: object;
+  peerDependenciesMeta: object;
   exports: Record<string, string | Record<string, string>>;
 };
 const read = (file: string) => readFileSync(new URL(file, dist), "utf8");
@@ -25,9 +26,9 @@ it("needs no eval, no shared memory, no bundler and nothing of Node in a page", 
   for (const file of scripts.filter((name) => name !== "node.js")) {
     expect(read(file), file).not.toMatch(/\beval\(|new Function\(|SharedArrayBuffer|require\(/);
     expect(read(file), file).not.toMatch(/from "node:|import\("node:|process\./);
-    // What a page resolves by itself: paths.
+    // What a page resolves by itself: paths. And the framework, which is there where its hooks are.
     for (const [, from] of read(file).matchAll(/\b(?:from|import)\s*\(?"([^"]*)"/g))
-      expect(from, file).toMatch(/^\.\.?\//);
+      expect(from, file).toMatch(/^(?:\.\.?\/|(?:react|vue)$)/);
   }
 });
 
@@ -48,6 +49,15 @@ it("loads two scripts in a page", () => {
   const scripts = readdirSync(dist).filter((name) => name.endsWith(".js"));
   expect(scripts.sort()).toEqual(["client.js", "index.js", "inline.js", "internal.js", "node.js"]);
   expect(read("index.js").match(/"\.[^"]*"/g)).toEqual(['"./client.js"']);
+});
+
+it("loads what there is for a framework with that framework alone", () => {
+  for (const [framework, file] of ["react", "svelte", "vue"].map((name) => [name, `${name}/${name}.js`] as const)) {
+    expect(manifest.exports[`./${framework}`], framework).toMatchObject({ default: `./dist/${file}` });
+    expect(read(file)).toContain('"../stores/stores.js"');
+  }
+  expect(read("client.js")).not.toContain("stores.js");
+  expect(manifest.peerDependenciesMeta).toEqual({ react: { optional: true }, vue: { optional: true } });
 });
 
 it("has the files that it exports", () => {

@@ -1,0 +1,57 @@
+// rrgate-client/react in React, strict mode included: it mounts everything twice.
+import { act, createElement, StrictMode } from "react";
+import { Window } from "happy-dom";
+import "../../wasm-client/dist/node.js";
+import { useCall, useDevice, useEvent, useProperty, useWire } from "../../wasm-client/dist/react/react.js";
+import { startDevice, until, url } from "./framework_device.js";
+
+const window = new Window();
+Object.assign(globalThis, { window, document: window.document, ["IS_REACT_ACT_ENVIRONMENT"]: true });
+Object.assign(globalThis, "navigator" in globalThis ? {} : { navigator: window.navigator });
+const { createRoot } = await import("react-dom/client"); // looks for the page when it is loaded
+
+it("shows a device, its wires, properties, events and calls", async () => {
+  const { service, options } = await startDevice();
+  const sides: unknown[] = [];
+  let last: ReturnType<typeof usePanel> | undefined;
+  const usePanel = () => {
+    const device = useDevice(url, options);
+    useEvent(device, "bump", (side) => void sides.push(side));
+    return {
+      device,
+      level: useWire(device, "level"),
+      speed: useProperty(device, "speed"),
+      add: useCall(device, "add"),
+    };
+  };
+  const Panel = () => {
+    last = usePanel();
+    return createElement("p", null, `${last.device.state.status} ${String(last.level)} ${String(last.speed.value)}`);
+  };
+  const root = createRoot(document.body);
+  const shows = (text: string) => act(() => until(() => document.body.textContent === text));
+
+  act(() => root.render(createElement(StrictMode, null, createElement(Panel))));
+  await shows("connected undefined 0");
+  await act(() =>
+    until(
+      () => last?.level === 42,
+      () => last?.device.client?.publish_level?.(42),
+    ),
+  );
+  await shows("connected 42 0");
+  await act(async () => last?.speed.set(2.5));
+  await shows("connected 42 2.5");
+  await act(async () => last?.add.call(5));
+  expect(last?.add).toMatchObject({ value: 5, error: undefined, isBusy: false });
+  await act(() =>
+    until(
+      () => sides.length > 0,
+      () => last?.device.client?.fire_bump?.(3),
+    ),
+  );
+  expect(sides[0]).toBe(3);
+
+  act(() => root.unmount());
+  await until(() => service.isClosed);
+});

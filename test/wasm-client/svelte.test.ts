@@ -1,0 +1,65 @@
+// rrgate-client/svelte with Svelte's own stores: one that derives from ours, and get().
+import { derived, get } from "svelte/store";
+import "../../wasm-client/dist/node.js";
+import { callStore, deviceStore, listen, propertyStore, wireStore } from "../../wasm-client/dist/svelte/svelte.js";
+import { startDevice, until, url } from "./framework_device.js";
+
+it("shows a device while somebody looks at it", async () => {
+  const { service, options } = await startDevice();
+  const device = deviceStore(url, options);
+  const status = derived(device, ({ state }) => state.status);
+  const seen: string[] = [];
+  const stop = status.subscribe((now) => void seen.push(now));
+  await until(() => seen.includes("connected"));
+  const { subscription } = get(device);
+  expect(subscription?.isClosed).toBe(false);
+  stop();
+  await until(() => subscription?.isClosed === true);
+  expect(get(device).client).toBeUndefined();
+  expect(service.isClosed).toBe(true);
+});
+
+it("follows wires, properties, events and calls", async () => {
+  const { options } = await startDevice();
+  const device = deviceStore(url, options);
+  const stops = [device.subscribe(() => undefined)];
+  await until(() => get(device).client !== undefined);
+  const { subscription, client } = get(device);
+
+  const level = wireStore(subscription, "level");
+  const double = derived(level, (value) => 2 * Number(value ?? 0));
+  let shown = 0;
+  stops.push(double.subscribe((value) => void (shown = value)));
+  await until(
+    () => shown === 42,
+    () => client?.publish_level?.(21),
+  );
+
+  const speed = propertyStore(subscription, "speed");
+  let state: { value: unknown; error: unknown; isBusy: boolean } | undefined;
+  stops.push(speed.subscribe((now) => void (state = now)));
+  await until(() => state?.value === 0);
+  await speed.set(2.5);
+  expect(state).toEqual({ value: 2.5, error: undefined, isBusy: false });
+
+  const sides: unknown[] = [];
+  stops.push(listen(subscription, "bump", (side) => void sides.push(side)));
+  await until(
+    () => sides.length > 0,
+    () => client?.fire_bump?.(1),
+  );
+  expect(sides[0]).toBe(1);
+
+  const add = callStore(subscription, "add");
+  expect(await add.call(5)).toBe(5);
+  expect(get(add)).toEqual({ value: 5, error: undefined, isBusy: false });
+  const fail = callStore(subscription, "fail");
+  await expect(fail.call("RobotRaconteur.OperationFailed", "stuck")).rejects.toThrow("stuck");
+  expect(get(fail).error).toMatchObject({ message: "stuck" });
+  stops.forEach((stop) => stop());
+});
+
+it("says that there is no connection instead of waiting for one", async () => {
+  await expect(callStore(undefined, "add").call(5)).rejects.toThrow("add: is not connected");
+  await expect(propertyStore(undefined, "speed").set(5)).rejects.toThrow("speed: is not connected");
+});

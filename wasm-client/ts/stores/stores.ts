@@ -1,0 +1,220 @@
+// What pages show of a device, as stores that live while somebody looks: what the hooks of React, Vue and Svelte stand on.
+// Layer: wasm-client/ts.
+import type { Client } from "../connect.js";
+import { callSafely } from "../errors.js";
+import type { MemberSubscriptionOptions } from "../member_subscription.js";
+import { ValueStore } from "../store.js";
+import type { Store } from "../store.js";
+import { subscribe } from "../subscribe.js";
+import type { SubscribeOptions, Subscription, SubscriptionState } from "../subscribe.js";
+import type { ArgumentsOf, DynamicMember, EventLike, MembersLike, PacketOf, RemoteObject, WireLike } from "../types.js";
+
+/** What React, Svelte and Vue need of a store. */
+export type View<T> = Pick<Store<T>, "getSnapshot" | "subscribe">;
+
+/** A device as a page has it. `client` and `subscription` are there while it is wanted and connected, or wanted. */
+export interface DeviceState<T = RemoteObject> {
+  readonly client: Client<T> | undefined;
+  readonly subscription: Subscription<T> | undefined;
+  readonly state: SubscriptionState;
+}
+
+/** What a member gave last. `error`: why it gave nothing newer. */
+export interface MemberState<V> {
+  readonly value: V | undefined;
+  readonly error: unknown;
+  /** Whether a request is under way. */
+  readonly isBusy: boolean;
+}
+
+export type Urls<T> = Parameters<typeof subscribe<T>>[0];
+
+export interface PropertyLike {
+  get(...args: never[]): Promise<unknown>;
+}
+
+export interface FunctionLike {
+  (...args: never[]): Promise<unknown>;
+}
+
+export type ValueOf<T, K> = string extends keyof T
+  ? PacketOf<T, K>
+  : K extends keyof T
+    ? T[K] extends { get(...args: never[]): Promise<infer V> }
+      ? V
+      : never
+    : never;
+
+export type ParametersOf<T, K> = string extends keyof T
+  ? unknown[]
+  : K extends keyof T
+    ? T[K] extends { (...args: infer A): Promise<unknown>; (...args: never[]): Promise<unknown> }
+      ? A
+      : never
+    : never;
+
+export interface PropertyOptions {
+  /** Milliseconds between two reads; without it, it is read once for each connection, and after refresh(). */
+  every?: number | undefined;
+}
+
+export interface PropertyStore<V> extends View<MemberState<V>> {
+  /** Writes, then reads. @throws RobotRaconteurError (rejects) as set() of the property; InvalidOperation: not connected. */
+  readonly set: (value: unknown) => Promise<void>;
+  /** Reads now. Never rejects: the store has the error. */
+  readonly refresh: () => Promise<void>;
+}
+
+export interface CallStore<A extends unknown[], V> extends View<MemberState<V>> {
+  /** @throws RobotRaconteurError (rejects) as the function does; also kept in the store. */
+  readonly call: (...args: A) => Promise<V>;
+}
+
+/** `start` with the first listener, what it returns soon after the last has gone: not where one comes back at once. */
+class LiveStore<T> implements View<T> {
+  readonly #store: ValueStore<T>;
+  #stop: (() => void) | undefined;
+  #listeners = 0;
+
+  constructor(
+    value: T,
+    private readonly start: () => () => void,
+  ) {
+    this.#store = new ValueStore(value);
+  }
+
+  readonly getSnapshot = (): T => this.#store.getSnapshot();
+
+  readonly subscribe = (listener: (value: T) => void): (() => void) => {
+    this.#listeners += 1;
+    this.#stop ??= this.start();
+    const leave = this.#store.subscribe(listener);
+    let isOver = false;
+    return () => {
+      if (isOver) return;
+      isOver = true;
+      leave();
+      this.#listeners -= 1;
+      queueMicrotask(() => {
+        if (this.#listeners > 0) return;
+        this.#stop?.();
+        this.#stop = undefined;
+      });
+    };
+  };
+
+  show(value: T): void {
+    this.#store.set(value);
+  }
+}
+
+/** Connected while somebody looks. */
+export function deviceStore<T = RemoteObject>(urls: Urls<T>, options?: SubscribeOptions): View<DeviceState<T>> {
+  const none: DeviceState<T> = { client: undefined, subscription: undefined, state: { status: "connecting" } };
+  const store: LiveStore<DeviceState<T>> = new LiveStore(none, () => {
+    const subscription = subscribe<T>(urls, options);
+    const stop = subscription.state.subscribe((state) =>
+      store.show({ client: subscription.defaultClient, subscription, state }),
+    );
+    return () => {
+      stop();
+      store.show(none);
+      void subscription.close();
+    };
+  });
+  return store;
+}
+
+/** The newest value of a wire. */
+export function wireStore<T, K extends MembersLike<T, WireLike>>(
+  device: Subscription<T> | undefined,
+  member: K,
+  options: MemberSubscriptionOptions = {},
+): View<PacketOf<T, K> | undefined> {
+  type V = PacketOf<T, K> | undefined;
+  const store: LiveStore<V> = new LiveStore<V>(undefined, () => {
+    if (!device) return () => undefined;
+    const wire = device.wire(member, options);
+    const stop = wire.store.subscribe((value) => store.show(value as V));
+    return () => {
+      stop();
+      void wire.close();
+    };
+  });
+  return store;
+}
+
+/** Calls `listener` for each occurrence. @returns a function that ends it. */
+export function listen<T, K extends MembersLike<T, EventLike>>(
+  device: Subscription<T> | undefined,
+  member: K,
+  listener: (...args: ArgumentsOf<T, K>) => void,
+): () => void {
+  if (!device) return () => undefined;
+  const event = device.event(member);
+  void (async () => {
+    for await (const args of event) callSafely(() => listener(...args));
+  })().catch(() => undefined);
+  return () => void event.close();
+}
+
+/** The value of a property, read for each connection. */
+export function propertyStore<T = RemoteObject, K extends MembersLike<T, PropertyLike> = MembersLike<T, PropertyLike>>(
+  device: Subscription<T> | undefined,
+  member: K,
+  { every }: PropertyOptions = {},
+): PropertyStore<ValueOf<T, K>> {
+  type V = ValueOf<T, K>;
+  const store: LiveStore<MemberState<V>> = new LiveStore<MemberState<V>>(idle, () => {
+    const stop = device?.onConnected(() => void refresh());
+    const timer = every === undefined ? undefined : setInterval(() => device?.defaultClient && void refresh(), every);
+    return () => {
+      stop?.();
+      clearInterval(timer);
+    };
+  });
+  const refresh = () => ask<V>(store, async () => (await connected(device, member)).get()).catch(() => undefined);
+  const set = async (value: unknown) => {
+    await (await connected(device, member)).set(value);
+    await refresh();
+  };
+  return Object.assign(store, { set, refresh: refresh as () => Promise<void> });
+}
+
+/** A function, and what became of its last call. */
+export function callStore<T = RemoteObject, K extends MembersLike<T, FunctionLike> = MembersLike<T, FunctionLike>>(
+  device: Subscription<T> | undefined,
+  member: K,
+): CallStore<ParametersOf<T, K>, unknown> {
+  const store = new LiveStore<MemberState<unknown>>(idle, () => () => undefined);
+  const call = (...args: ParametersOf<T, K>) => ask(store, async () => (await connected(device, member))(...args));
+  return Object.assign(store, { call });
+}
+
+const idle = { value: undefined, error: undefined, isBusy: false };
+
+/** Rejects where there is no connection: nothing is kept for later. */
+async function connected<T>(device: Subscription<T> | undefined, member: string): Promise<DynamicMember> {
+  const client = device?.defaultClient;
+  if (!client) throw new Error(`${member}: is not connected at the moment`);
+  return Promise.resolve(client.$.member(member));
+}
+
+/** The newest request counts. */
+const newest = new WeakMap<object, symbol>();
+
+async function ask<V>(store: LiveStore<MemberState<V>>, request: () => Promise<unknown>): Promise<V> {
+  const own = Symbol();
+  newest.set(store, own);
+  const tell = (state: MemberState<V>) => newest.get(store) === own && store.show(state);
+  const { value } = store.getSnapshot();
+  tell({ value, error: undefined, isBusy: true });
+  try {
+    const given = (await request()) as V;
+    tell({ value: given, error: undefined, isBusy: false });
+    return given;
+  } catch (error) {
+    tell({ value, error, isBusy: false });
+    throw error;
+  }
+}
