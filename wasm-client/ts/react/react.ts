@@ -32,7 +32,7 @@ const useStore = <T>(store: View<T>): T => useSyncExternalStore(store.subscribe,
  */
 export function useDevice<T = RemoteObject>(urls: Urls<T>, options?: SubscribeOptions): DeviceState<T> {
   const key = typeof urls === "string" || urls instanceof URL || Array.isArray(urls) ? String(urls) : urls;
-  // eslint-disable-next-line react-hooks/exhaustive-deps -- `key` stands for `urls`
+  // `key` stands for `urls`.
   return useStore(useMemo(() => deviceStore<T>(urls, options), [key]));
 }
 
