@@ -21,14 +21,18 @@ def draw(results):
     for mark in ticks(low, high):
         x = x_of(mark)
         parts.append(f'<path d="M{x:.1f} {TOP}V{height - BOTTOM}" stroke="#ccc"/>'
-                     f'<text x="{x:.1f}" y="{height - 12}" text-anchor="middle">{mark:g} µs</text>')
+                     f'<text x="{x:.1f}" y="{height - 12}" text-anchor="middle">{words(mark)}</text>')
     for number, (name, times) in enumerate(results.items()):
         y = TOP + ROW * number
         parts.append(f'<text x="{LEFT - 8}" y="{y + 17}" text-anchor="end">{html.escape(name)}</text>')
-        parts += cells(times, low, high, y)
+        parts += ['<g fill="#0b5cad">', *cells(times, low, high, y), "</g>"]
         x = x_of(times[len(times) // 2])
         parts.append(f'<path d="M{x:.1f} {y + 3}v{ROW - 6}" stroke="#c00" stroke-width="2"><title>median {times[len(times) // 2]:.1f} µs</title></path>')
     return "\n".join([*parts, "</svg>", ""])
+
+
+def words(microseconds):
+    return f"{microseconds:g} µs" if microseconds < 1000 else f"{microseconds / 1000:g} ms"
 
 
 def ticks(low, high):
@@ -41,5 +45,5 @@ def cells(times, low, high, y):
     for time in times:
         counts[min(CELLS - 1, max(0, int(CELLS * (math.log10(time) - low) / (high - low))))] += 1
     width, top = (RIGHT - LEFT) / CELLS, max(counts)
-    return [f'<rect x="{LEFT + i * width:.1f}" y="{y + 3}" width="{width:.1f}" height="{ROW - 6}" fill="#0b5cad" '
-            f'fill-opacity="{max(0.06, (count / top) ** 0.5):.2f}"/>' for i, count in enumerate(counts) if count]
+    return [f'<path d="M{LEFT + i * width:.1f} {y + 3}h{width:.1f}v{ROW - 6}h-{width:.1f}" opacity="{(count / top) ** 0.5:.2f}"/>'
+            for i, count in enumerate(counts) if count > top / 2000]
