@@ -87,17 +87,19 @@ JsonOperations::JsonOperations(GatewayState& gateway, JsonSocketPlace place, std
     : gateway_(gateway), place_(std::move(place)), outbox_(std::move(outbox)) {}
 
 rr::awaitable<void> JsonOperations::take(const std::string& message) {
+  const bool is_large = message.size() > large_json_bytes;
+  const auto measure = [&message] { return rr::memory_of_json(message); };
   auto memory = gateway_.memory().charge(place_.from.network);
-  if (!memory.has_room(least_room) || !memory.resize(rr::json_growth * message.size()))
+  if (!memory.has_room(least_room) || !memory.resize(is_large ? co_await gateway_.workers().run(measure) : measure()))
     co_return tell_error("null", rr::make_error(rr::ErrorCode::out_of_system_resource,
                                                 "the gateway has no memory left for a message of " +
                                                     std::to_string(message.size()) + " bytes; try again in a moment"));
   const auto parse = [&message] { return JsonRequest::from_text(message); };
   rr::Result<JsonRequest> read = rr::Error();
-  if (message.size() <= large_json_bytes)
-    read = parse();
-  else
+  if (is_large)
     read = co_await gateway_.workers().run(parse);
+  else
+    read = parse();
   if (!read) co_return tell_error("null", read.error());
   const auto request = std::make_shared<const JsonRequest>(std::move(*read));
   if (running_ >= max_running)
