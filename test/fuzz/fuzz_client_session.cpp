@@ -1,7 +1,9 @@
 // A hostile device against a client session: replies, packets, events and questions of every kind in any order, with
 // any elements, their bytes bent, between those of a service that behaves; meanwhile the client asks, sends and waits.
 // An input that begins as a message does ('R') is said as it is, once the session is open.
+#include <memory>
 #include <set>
+#include <string>
 #include <vector>
 
 #include "test/core/session/loopback.hpp"
@@ -13,6 +15,74 @@ using namespace rr;
 using namespace rr::test;
 
 constexpr std::size_t most_held = 48u << 20;
+
+/// Small: each input has it parsed anew by the client.
+const std::string small_definition = R"(service experimental.loopback
+stdver 0.10
+struct Pose
+  field double x
+  field double[] joints
+end
+object Tool
+  property double speed
+end
+object Arm
+  property double speed
+  property Pose pose
+  function double add(double a, double b)
+  function int32{generator} count()
+  event bumped(int32 side, string what)
+  objref Tool tool
+  objref Tool{string} tools
+  wire double torque
+  wire Pose state [readonly]
+  pipe double samples
+  memory int16[*] grid
+  callback double ask(string question)
+end
+)";
+
+/// A client and a service that behaves, joined in memory.
+class Between {
+ public:
+  Between() {
+    static const auto types = [] {
+      auto made = std::make_shared<TypeRegistry>();
+      made->add({small_definition}, RobdefMode::strict).value();
+      return made;
+    }();
+    directory_
+        .add(HostedService::make("arm", std::make_shared<PlainObject>("experimental.loopback.Arm"), types).value())
+        .value();
+    ClientOptions options;
+    options.connection.self = {client_id, "test.client"};
+    options.service = "arm";
+    client = std::make_unique<ClientSession>(options, now);
+    service = std::make_unique<ServiceSession>(directory_, ServiceSessionOptions{}, now);
+  }
+
+  void pump() {
+    while (carry(*client, *service) || carry(*service, *client)) {
+    }
+  }
+  template <class From, class To>
+  bool carry(From& from, To& to) {
+    Bytes bytes;
+    for (const auto slice : from.poll_transmit()) bytes.insert(bytes.end(), slice.begin(), slice.end());
+    if (bytes.empty()) return false;
+    from.handle_transmitted(bytes.size(), now);
+    to.handle_bytes(bytes, now);
+    return true;
+  }
+
+ private:
+  ServiceDirectory directory_{{service_id, "test.service"}};
+
+ public:
+  Now now{TimePoint{} + std::chrono::hours(1), {1'700'000'000, 0}};
+  std::unique_ptr<ClientSession> client;
+  std::unique_ptr<ServiceSession> service;
+};
 
 class HostileDevice {
  public:
@@ -74,10 +144,10 @@ class HostileDevice {
 
   /// What the client has asked for goes to the service, which answers as it should.
   void answer_well() {
-    between_.carry(client(), *between_.service, 1u << 20);
+    between_.carry(client(), *between_.service);
     while (auto event = between_.service->poll_event())
       if (auto* called = std::get_if<Called>(&*event)) between_.service->reply(called->id, Value(1.0), between_.now);
-    between_.carry(*between_.service, client(), 1u << 20);
+    between_.carry(*between_.service, client());
     poll();
   }
 
@@ -160,7 +230,8 @@ class HostileDevice {
   }
 
   void pass(std::chrono::milliseconds time) {
-    between_.advance(time);
+    between_.now.steady += time;
+    between_.now.utc.seconds += time.count() / 1000;
     if (client().poll_timeout() > between_.now.steady) return;
     client().handle_timeout(between_.now);
     poll();
@@ -176,7 +247,7 @@ class HostileDevice {
   }
 
   Choices choices_;
-  Loopback between_;
+  Between between_;
   std::set<RequestId> open_;
   bool is_closed_ = false;
 };
