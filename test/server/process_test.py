@@ -159,12 +159,12 @@ class Demo(Files):
         self.assertEqual(result.returncode, 1)
         self.assertIn("Nobody", result.stderr)
 
-    def test_the_robot_is_relayed_and_the_cameras_are_shared(self):
+    def test_the_robot_and_the_cameras_are_shared(self):
         url = self.start()
         with urllib.request.urlopen(url + "api/v1/devices", timeout=10) as answer:
             devices = json.load(answer)["devices"]
         self.assertEqual([(each["name"], each["mode"], each["state"]) for each in devices],
-                         [("create", "relay", "online"), ("webcams", "shared", "online")])
+                         [("create", "shared", "online"), ("webcams", "shared", "online")])
 
 
     def test_what_can_be_simulated_is_listed(self):
