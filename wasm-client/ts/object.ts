@@ -177,13 +177,8 @@ export class Info implements ObjectInfo {
     return (this.#types = this.#session.look((core) => core.definitions()) ?? this.#types);
   }
 
-  async definition(name = this.type.replace(/\.[^.]*$/, "")): Promise<DefinitionInfo> {
-    const { makeDefinition } = await import("./definition/definition.js");
-    const raw = this.#session.look((core) => core.definition(name) ?? null);
-    if (raw) return makeDefinition(raw, freezeInfo);
-    throw raw === null
-      ? makeError("InvalidArgument", `definition: "${name}" is not known`)
-      : makeError("InvalidOperation", "definition: the session is closed");
+  async definition(name?: string): Promise<DefinitionInfo> {
+    return (await import("./definition/definition.js")).definition(this.#session, this.type, name);
   }
 
   get stats(): SessionStats {
@@ -285,7 +280,7 @@ export class Info implements ObjectInfo {
   }
 }
 
-function freezeInfo(info: MemberInfo): MemberInfo {
+export function freezeInfo(info: MemberInfo): MemberInfo {
   info.parameters.forEach((parameter) => Object.freeze(parameter));
   Object.freeze(info.parameters);
   Object.freeze(info.modifiers);

@@ -1,12 +1,24 @@
 // What a service definition declares, as values. Loaded when it is asked for. Layer: wasm-client/ts.
 // Source: service definitions spec sections 5.1..5.6.
-import type { DefinitionInfo, MemberInfo, NumericArray, RrValue, TypeInfo } from "../types.js";
+import { makeError } from "../errors.js";
+import { freezeInfo } from "../object.js";
+import type { Session } from "../session.js";
+import type { DefinitionInfo, NumericArray, RrValue, TypeInfo } from "../types.js";
 import type { RawConstant, RawDefinition } from "../wasm_module.js";
 
 type Constants = DefinitionInfo["constants"];
 
+/** See ObjectInfo.definition(). */
+export function definition(session: Session, type: string, name = type.replace(/\.[^.]*$/, "")): DefinitionInfo {
+  const raw = session.look((core) => core.definition(name) ?? null);
+  if (raw) return makeDefinition(raw);
+  throw raw === null
+    ? makeError("InvalidArgument", `definition: "${name}" is not known`)
+    : makeError("InvalidOperation", "definition: the session is closed");
+}
+
 /** As the core gives it; constants still as they are written. */
-export function makeDefinition(raw: RawDefinition, freezeMember: (info: MemberInfo) => MemberInfo): DefinitionInfo {
+function makeDefinition(raw: RawDefinition): DefinitionInfo {
   const notes = new Map<string, string>();
   const note = (name: string, { documentation }: { documentation: string }) => {
     if (documentation !== "") notes.set(name, tidy(documentation));
@@ -28,7 +40,7 @@ export function makeDefinition(raw: RawDefinition, freezeMember: (info: MemberIn
           kind: type.kind,
           implements: Object.freeze(type.implements),
           constants: constantsOf(type.constants),
-          members: Object.freeze(type.members.map(freezeMember)),
+          members: Object.freeze(type.members.map(freezeInfo)),
           documentation: tidy(type.documentation),
         }),
       ]),
