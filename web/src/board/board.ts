@@ -12,6 +12,7 @@ export const PANEL_KINDS = [
   "log",
   "robot",
   "scene",
+  "teleop",
   "pipe",
   "memory",
   "generator",

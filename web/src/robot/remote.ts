@@ -3,7 +3,15 @@
 // Layer: web/robot. Beside link.ts and gateway/usb_devices.ts the only file that imports `rrgate-client`.
 
 import { lease, RobotRaconteurError } from "rrgate-client";
-import type { CallOptions, DynamicMember, Lease, LeaseOptions, MemberInfo, MemberKind, RemoteObject } from "rrgate-client";
+import type {
+  CallOptions,
+  DynamicMember,
+  Lease,
+  LeaseOptions,
+  MemberInfo,
+  MemberKind,
+  RemoteObject,
+} from "rrgate-client";
 
 export type Member = MemberInfo;
 export type { MemberKind };
@@ -76,8 +84,7 @@ export function remoteOf(object: RemoteObject): Remote {
     },
     has: (name, kind) => info.members.some((m) => m.name === name && m.kind === kind),
     call: async (name, args, options) => member(name)(...args, ...(options ? [options] : [])),
-    urgent: async (name, args, options) =>
-      member(name) && info.urgent[name]?.(...args, ...(options ? [options] : [])),
+    urgent: async (name, args, options) => member(name) && info.urgent[name]?.(...args, ...(options ? [options] : [])),
     lease: async (options) => lease(object, options),
     get: async (name) => member(name).get(),
     set: async (name, value, options) => member(name).set(value, options),
