@@ -15,6 +15,7 @@ export default defineConfig({
     assetsInlineLimit: 0, // the wasm file stays a file of its own; data: URLs would need a wider policy
     modulePreload: { polyfill: false }, // every browser that runs the target below knows it
     target: "es2022",
+    chunkSizeWarningLimit: 600, // three.js, which is loaded with the first 3-D panel
   },
   // Pre-bundling would move the module away from the `rrgate.wasm` that it finds by import.meta.url.
   optimizeDeps: { exclude: ["rrgate-client"] },

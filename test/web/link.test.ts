@@ -55,6 +55,21 @@ describe("link", () => {
     expect(subscription.retryNow).toHaveBeenCalledOnce();
     expect(link.state.value).toMatchObject({ kind: "lost", retryAt: 1_000_000 });
   });
+  it("is lost while the gateway says that the device is away, and anew when it is back", () => {
+    const { link, tell } = setup();
+    link.setAway("refused");
+    expect(link.state.value.kind).toBe("connecting");
+    tell("connected", client);
+    const before = link.state.value;
+    link.setAway("refused");
+    expect(link.state.value).toMatchObject({ kind: "lost", reason: "refused" });
+    link.setAway(null);
+    expect(link.state.value.kind).toBe("online");
+    expect(link.state.value).not.toBe(before);
+    tell("lost", new Error("closed"));
+    link.setAway(null);
+    expect(link.state.value).toMatchObject({ kind: "lost", reason: "closed" });
+  });
   it("ends with the page", () => {
     const { link, subscription } = setup();
     link.dispose();

@@ -61,6 +61,7 @@ test("the page comes compressed, with tags of its own, and in less than half of 
       expect([again.status, again.body.length]).toEqual([304, 0]);
     }
   }
+  expect(sizes.br).toBeLessThan(200_000);
   expect(sizes.br).toBeLessThan(sizes.identity * 0.4);
   expect(sizes.gzip).toBeLessThan(sizes.identity * 0.5);
 });

@@ -91,8 +91,8 @@ test("a gamepad drives once one is in control, past its dead zone", async ({ pag
   expect(await speedOf(lab)).toBe(0);
   await page.locator('[data-panel="teleop"]').getByRole("button", { name: "Take control" }).click();
   await expectSpeed(lab, 0.05);
-  await push(0.55);
-  await expectSpeed(lab, 0.025);
+  await push(0.54);
+  await expectSpeed(lab, 0.024);
   await push(0.08);
   await expectSpeed(lab, 0);
   await push(1);

@@ -57,6 +57,9 @@ class PlanarRobot(AbstractRobot):
         self._last_robot_state = self._last_joint_state = self._last_endpoint_state = now
         self._enabled = self._ready = True
         self._operational_mode = self._robot_operational_mode["cobot"]
+        first, second = self._joint_position[0], np.sum(self._joint_position)
+        tip = [0.5 * np.cos(first) + 0.4 * np.cos(second), 0.5 * np.sin(first) + 0.4 * np.sin(second), 0.1]
+        self._endpoint_pose = [self._geometry_util.xyz_rpy_to_pose(tip, [0, 0, second])]
         super()._run_timestep(now)
 
     def _send_robot_command(self, now, joint_pos_cmd, joint_vel_cmd):

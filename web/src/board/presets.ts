@@ -25,9 +25,10 @@ const STANDARD: Readonly<Record<string, { stop: StopCall | null; panels: readonl
       ["robot", 0, 0, 7, 13],
       ["plot", 7, 0, 5, 8, { member: "robot_state" }],
       ["form", 7, 8, 5, 5, { members: ["enable", "disable", "reset_errors"] }, "Power"],
-      ["table", 0, 13, 5, 9, { member: "robot_state" }],
-      ["form", 5, 13, 4, 9, { member: "speed_ratio" }],
-      ["log", 9, 13, 3, 9],
+      ["scene", 0, 13, 5, 10, { member: "robot_state" }],
+      ["table", 5, 13, 4, 10, { member: "robot_state" }],
+      ["form", 9, 13, 3, 5, { member: "speed_ratio" }],
+      ["log", 9, 18, 3, 5],
     ],
   },
   ["com.robotraconteur.imaging.Camera"]: {

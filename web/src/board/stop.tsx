@@ -3,7 +3,7 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
-import { stopNow } from "../robot/control";
+import { stopNow, tellStop } from "../robot/control";
 import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
 import { clockTime } from "../ui/words";
@@ -22,6 +22,7 @@ export function StopButton({ object, stop }: { object: Remote | null; stop: Stop
   const latest = useRef(object);
   latest.current = object;
   const send = (): void => {
+    tellStop();
     const at = performance.now();
     const device = latest.current;
     if (!device) return setState({ kind: "failed", why: t("not connected: nothing was sent") });

@@ -2,6 +2,7 @@
 // Layer: web/panels.
 
 import { useEffect, useRef, useState } from "preact/hooks";
+import { onStop } from "../robot/control";
 import { explain } from "../robot/remote";
 
 const REPEAT_MS = 100;
@@ -38,11 +39,13 @@ export function JogButton({ label, sign, enabled, jog, stop, fail }: JogButtonPr
     };
     send();
     const timer = setInterval(send, REPEAT_MS);
+    const forget = onStop(letGo);
     window.addEventListener("blur", letGo);
     document.addEventListener("visibilitychange", letGo);
     return () => {
       isOver = true;
       clearInterval(timer);
+      forget();
       window.removeEventListener("blur", letGo);
       document.removeEventListener("visibilitychange", letGo);
       // At once, and not behind a command that hangs.

@@ -3,7 +3,7 @@
 
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
-import { stopNow } from "../robot/control";
+import { onStop, stopNow } from "../robot/control";
 import { Driver, DRIVE_TIMEOUT_MS } from "../robot/driver";
 import { explain } from "../robot/remote";
 import { ControlLine, useControl } from "../ui/control_line";
@@ -223,11 +223,13 @@ function useSticks(driver: Driver<Deflection>, enabled: boolean, mayPoll: () => 
       actions.poll();
       frame = requestAnimationFrame(look);
     });
+    const forget = onStop(actions.letGo);
     window.addEventListener("blur", actions.letGo);
     window.addEventListener("pagehide", actions.letGo);
     document.addEventListener("visibilitychange", hidden);
     return () => {
       cancelAnimationFrame(frame);
+      forget();
       window.removeEventListener("blur", actions.letGo);
       window.removeEventListener("pagehide", actions.letGo);
       document.removeEventListener("visibilitychange", hidden);
@@ -286,7 +288,7 @@ function AxesForm({ axes, inputs, change }: AxesFormProps) {
             aria-label={t("Number of axis {0}", i + 1)}
             placeholder="velocity[0]"
             value={axis.path}
-            onChange={(event) => set(i, { path: event.currentTarget.value.trim() })}
+            onInput={(event) => set(i, { path: event.currentTarget.value.trim() })}
           />
           <input
             class="field"
@@ -294,7 +296,7 @@ function AxesForm({ axes, inputs, change }: AxesFormProps) {
             step="any"
             aria-label={t("Scale of axis {0}", i + 1)}
             value={axis.scale}
-            onChange={(event) => set(i, { scale: event.currentTarget.valueAsNumber || 0 })}
+            onInput={(event) => set(i, { scale: event.currentTarget.valueAsNumber || 0 })}
           />
           <input
             class="field"
@@ -304,7 +306,7 @@ function AxesForm({ axes, inputs, change }: AxesFormProps) {
             step={0.05}
             aria-label={t("Dead zone of axis {0}", i + 1)}
             value={axis.deadZone}
-            onChange={(event) => set(i, { deadZone: event.currentTarget.valueAsNumber || 0 })}
+            onInput={(event) => set(i, { deadZone: event.currentTarget.valueAsNumber || 0 })}
           />
           <button class="button button-quiet" type="button" onClick={() => change(axes.filter((_, at) => at !== i))}>
             {t("Remove")}

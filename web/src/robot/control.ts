@@ -120,3 +120,16 @@ export async function stopNow(
     await lease.release();
   }
 }
+
+const stopping = new EventTarget();
+
+/** Somebody asked for a stop: whatever is held down drives no more. */
+export function tellStop(): void {
+  stopping.dispatchEvent(new Event("stop"));
+}
+
+/** @returns a function that hears no more. */
+export function onStop(heard: () => void): () => void {
+  stopping.addEventListener("stop", heard);
+  return () => stopping.removeEventListener("stop", heard);
+}

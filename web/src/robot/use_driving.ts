@@ -2,6 +2,7 @@
 // Layer: web/robot.
 
 import { useCallback, useEffect, useRef, useState } from "preact/hooks";
+import { onStop } from "./control";
 import { Holds } from "./holds";
 import { commandFor, directionOfKey } from "./steering";
 import type { Direction, DriveCommand } from "./steering";
@@ -81,7 +82,9 @@ export function useDriving(driver: Driver<DriveCommand>, speed: number, enabled:
       [document, "focusin", (event: FocusEvent) => takesKeys(event.target) && letGo()],
     ] as const;
     for (const [target, name, heard] of listeners) target.addEventListener(name, heard as EventListener);
+    const forget = onStop(letGo);
     return () => {
+      forget();
       for (const [target, name, heard] of listeners) target.removeEventListener(name, heard as EventListener);
       letGo();
     };

@@ -1,0 +1,99 @@
+// The 3-D panel, at the drivers' base class for robots: its picture, and its numbers against those of the driver.
+import type { Page } from "@playwright/test";
+import { addPanel } from "../board";
+import launch from "../chromium.json" with { type: "json" };
+import { expect, test } from "../lab_test";
+import { startPeer } from "../peers";
+import type { Peer } from "../peers";
+
+test.use({
+  launchOptions: {
+    executablePath: process.env["CHROMIUM"] ?? launch.executablePath,
+    args: [...launch.args, "--enable-unsafe-swiftshader"],
+  },
+});
+
+let robot: Peer;
+
+test.beforeAll(async () => {
+  robot = await startPeer("test/interop/peers/standard_robot.py", "robot", /ready/);
+});
+test.afterAll(async () => robot.stop());
+
+const panel = (page: Page) => page.locator('[data-panel="scene"]');
+const frame = (page: Page, name: string) => panel(page).locator(`[data-frame="${name}"]`);
+
+async function numbersOf(page: Page, name: string): Promise<number[]> {
+  const text = await frame(page, name).innerText();
+  return (text.split(": ")[1] ?? "").split(" ").slice(0, 3).map(Number);
+}
+
+test("a robot's joints stand as a chain where the driver says, and the picture moves with them", async ({ page }) => {
+  await page.goto(`${robot.url}#/devices/peer/robot`);
+  await panel(page).getByText("2 frames").click();
+  await expect(frame(page, "planar")).toHaveText("planar: 0.900 0.000 0.100 m");
+  await expect(frame(page, "kin_chain_tcp[0]")).toHaveText("kin_chain_tcp[0]: 0.900 0.000 0.100 m");
+  await page.getByRole("button", { name: "Jog", exact: true }).click();
+  const forward = page.getByRole("button", { name: "joint_1 forward" });
+  await expect(forward).toBeEnabled();
+  const canvas = panel(page).locator("canvas");
+  const before = await canvas.screenshot();
+  await forward.focus();
+  await page.keyboard.down("Space");
+  await expect(async () => expect((await numbersOf(page, "planar"))[1]).toBeGreaterThan(0.05)).toPass();
+  await page.keyboard.up("Space");
+  await expect(async () => {
+    const [ours, theirs] = [await numbersOf(page, "planar"), await numbersOf(page, "kin_chain_tcp[0]")];
+    ours.forEach((each, i) => expect(Math.abs(each - (theirs[i] ?? NaN))).toBeLessThan(0.002));
+  }).toPass();
+  expect((await canvas.screenshot()).equals(before)).toBe(false);
+});
+
+test("it is looked at from other sides, by buttons and by dragging", async ({ page }) => {
+  await page.goto(`${robot.url}#/devices/peer/robot`);
+  await expect(panel(page).getByText("2 frames")).toBeVisible();
+  const canvas = panel(page).locator("canvas");
+  await canvas.scrollIntoViewIfNeeded();
+  const pictures = [await canvas.screenshot()];
+  for (const name of ["From above", "From the side"]) {
+    await panel(page).getByRole("button", { name }).click();
+    await expect(async () => {
+      const now = await canvas.screenshot();
+      expect(pictures.some((each) => each.equals(now))).toBe(false);
+      pictures.push(now);
+    }).toPass();
+  }
+  const box = await canvas.boundingBox();
+  if (!box) throw new Error("the canvas has no place on the page");
+  await page.mouse.move(box.x + 60, box.y + 60);
+  await page.mouse.down();
+  await page.mouse.move(box.x + 120, box.y + 100, { steps: 4 });
+  await page.mouse.up();
+  await expect(async () =>
+    expect((await canvas.screenshot()).equals(pictures.at(-1) ?? Buffer.of())).toBe(false),
+  ).toPass();
+});
+
+test("a browser without 3-D pictures says so, and has the numbers", async ({ page }) => {
+  await page.addInitScript(() => {
+    const { getContext } = HTMLCanvasElement.prototype;
+    HTMLCanvasElement.prototype.getContext = function (this: HTMLCanvasElement, kind: string, ...more: unknown[]) {
+      return kind.startsWith("webgl") ? null : getContext.call(this, kind as "2d", ...(more as []));
+    } as typeof getContext;
+  });
+  await page.goto(`${robot.url}#/devices/peer/robot`);
+  await expect(panel(page).getByRole("alert")).toContainText("This browser draws no 3-D pictures");
+  await panel(page).getByText("2 frames").click();
+  await expect(frame(page, "planar")).toHaveText(/^planar: 0\.\d{3} /);
+});
+
+test("three.js is loaded with the first 3-D panel of a board, not before", async ({ page, lab }) => {
+  const scripts: string[] = [];
+  page.on("request", (request) => void (request.resourceType() === "script" && scripts.push(request.url())));
+  await page.goto(`${lab.url}#/devices/webcams/Webcam?view=board`);
+  await expect(page.getByLabel("Kind of panel")).toBeVisible();
+  expect(scripts.filter((each) => each.includes("scene_panel"))).toEqual([]);
+  await addPanel(page, "scene");
+  await expect(panel(page).locator("canvas")).toBeVisible();
+  expect(scripts.filter((each) => each.includes("scene_panel"))).toHaveLength(1);
+});

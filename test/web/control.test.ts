@@ -1,0 +1,83 @@
+import { Control, stopNow } from "../../web/src/robot/control";
+import { ErrorCode, RobotRaconteurError } from "../../wasm-client/dist/index.js";
+import { Driver } from "../../web/src/robot/driver";
+
+const failed = (code: keyof typeof ErrorCode, message: string) =>
+  Object.assign(Object.create(RobotRaconteurError.prototype) as RobotRaconteurError, {
+    code: ErrorCode[code],
+    message,
+  });
+
+/** A gateway in the hands of the test. */
+function setup(answer: () => Promise<unknown> = () => Promise.resolve()) {
+  const losers: ((reason: Error) => void)[] = [];
+  const held = {
+    onLost: (lost: (reason: Error) => void) => losers.push(lost),
+    release: vi.fn(() => Promise.resolve()),
+  };
+  const lease = vi.fn(async () => (await answer(), held));
+  const object = { lease } as never;
+  return { control: new Control(object), object, lease, held, lose: (reason: Error) => losers.at(-1)?.(reason) };
+}
+
+describe("control", () => {
+  it("is asked for once, however many commands wait for it", async () => {
+    const { control, lease } = setup();
+    await Promise.all([control.begin(), control.begin()]);
+    await control.begin();
+    expect(lease).toHaveBeenCalledOnce();
+    expect(control.mayCommand).toBe(true);
+  });
+  it("that is lost begins by hand alone", async () => {
+    const { control, lose } = setup();
+    await control.begin();
+    lose(failed("InvalidOperation", "the lease of Create has ended: it was taken over by vera"));
+    expect(control.state.value).toMatchObject({ kind: "lost", byOthers: true });
+    await expect(control.begin()).rejects.toThrow("taken over by vera");
+    await control.take(true);
+    expect(control.mayCommand).toBe(true);
+  });
+  it("needs no lease where nobody gives any, and says what else is wrong", async () => {
+    const free = setup(() => Promise.reject(failed("NotImplementedError", "none")));
+    await free.control.begin();
+    expect(free.control.state.value).toEqual({ kind: "free" });
+    const refused = setup(() => Promise.reject(failed("AuthenticationError", "no right")));
+    await expect(refused.control.begin()).rejects.toThrow("no right");
+    expect(refused.control.state.value).toMatchObject({ kind: "lost", byOthers: false });
+  });
+  it("is given back when the last panel is gone", async () => {
+    const { control, held } = setup();
+    const uses = [control.use(), control.use()];
+    await control.begin();
+    uses[0]?.();
+    expect(held.release).not.toHaveBeenCalled();
+    uses[1]?.();
+    expect(held.release).toHaveBeenCalledOnce();
+  });
+  it("is taken over by a stop that somebody asked for, and not by one that follows a key", async () => {
+    const { object, lease, held } = setup();
+    const refused = () => Promise.reject(failed("ObjectLockedError", "held by vera"));
+    await stopNow(object, false, refused);
+    expect(lease).not.toHaveBeenCalled();
+    await stopNow(object, true, refused);
+    expect(lease).toHaveBeenCalledWith({ takeover: true, timeout: 2_000 });
+    expect(held.release).toHaveBeenCalledOnce();
+    await expect(stopNow(object, true, () => Promise.reject(new Error("away")))).rejects.toThrow("away");
+  });
+  it("that comes after the key was let go moves nothing", async () => {
+    let give: () => void = () => undefined;
+    const { control } = setup(() => new Promise<void>((resolve) => (give = resolve)));
+    const sent: number[] = [];
+    const driver = new Driver<number>({ rest: 0, same: Object.is, onError: () => undefined });
+    driver.setConnection({ send: async (command) => void sent.push(command), right: control });
+    driver.want(5);
+    driver.want(0);
+    give();
+    await vi.waitFor(() => expect(control.mayCommand).toBe(true));
+    await Promise.resolve();
+    expect(sent).toEqual([]);
+    driver.want(5);
+    expect(sent).toEqual([5]);
+    driver.dispose();
+  });
+});

@@ -1,0 +1,73 @@
+import {
+  AT_REST,
+  commandOf,
+  deflectionOfGamepad,
+  deflectionOfKeys,
+  readAxes,
+  together,
+  worthOf,
+} from "../../web/src/panels/teleop";
+import type { Axis } from "../../web/src/panels/teleop";
+import { Definitions } from "../../web/src/values/definitions";
+
+const nothing = new Definitions([]);
+const twist = new Definitions([
+  "service a.b\nstruct Vector\nfield double x\nend\nstruct Twist\nfield Vector linear\nfield double[2] turn\nend\n",
+]);
+const up: Axis = { stick: "left-y", path: "velocity", scale: 200, deadZone: 0.1 };
+const full = { ...AT_REST, "left-y": 1 };
+
+describe("teleop", () => {
+  it("does nothing in the dead zone, and goes evenly from there to the scale", () => {
+    const worth = (y: number) => worthOf(up, { ...AT_REST, "left-y": y });
+    expect([worth(0.1), worth(-0.05), worth(1), worth(-1)].map(Math.abs)).toEqual([0, 0, 200, 200]);
+    expect(worth(-0.55)).toBeCloseTo(-100);
+  });
+  it("adds keys, pointers and gamepad up to full", () => {
+    const keys = deflectionOfKeys(new Set(["KeyW", "KeyA", "ArrowLeft", "ArrowRight", "toString"]));
+    expect(keys).toEqual({ "left-x": -1, "left-y": 1, "right-x": 0, "right-y": 0 });
+    expect(together(keys, deflectionOfGamepad([0.5, -1, 0, 0.25, 1]))).toEqual({
+      "left-x": -0.5,
+      "left-y": 1,
+      "right-x": 0,
+      "right-y": -0.25,
+    });
+    expect(deflectionOfGamepad([Number.NaN])["left-x"]).toBe(0);
+  });
+  it("sets arguments by name, whole numbers rounded, beside the neutral ones", () => {
+    const inputs = [
+      { name: "velocity", type: "int16" },
+      { name: "radius", type: "int16" },
+    ];
+    const neutral = [
+      { kind: "text", text: "0" },
+      { kind: "text", text: "32767" },
+    ] as const;
+    const mapping = { axes: [{ ...up, scale: 33.4 }], neutral };
+    expect(commandOf(mapping, inputs, full, nothing, "")).toEqual([33, 32767]);
+    expect(commandOf(mapping, inputs, AT_REST, nothing, "")).toEqual([0, 32767]);
+  });
+  it("reaches fields of structs and elements of arrays, with or without the name of the wire", () => {
+    const inputs = [{ name: "command", type: "Twist" }];
+    const axes = [
+      { ...up, path: "command.linear.x", scale: 2 },
+      { ...up, path: "turn[1]", scale: -1 },
+    ];
+    const [value] = commandOf({ axes, neutral: [] }, inputs, full, twist, "a.b") as [
+      { linear: { x: number }; turn: Float64Array },
+    ];
+    expect([value.linear.x, ...value.turn]).toEqual([2, 0, -1]);
+  });
+  it("says which path leads to no number, and touches nothing that is not the value's own", () => {
+    const inputs = [{ name: "command", type: "Twist" }];
+    for (const path of ["", "linear", "linear.y", "turn[2]", "__proto__.x", "constructor.name", "turn.length"])
+      expect(() => commandOf({ axes: [{ ...up, path }], neutral: [] }, inputs, full, twist, "a.b"), path).toThrow(
+        `"${path}" is no number of Twist command`,
+      );
+  });
+  it("takes from a file what are axes", () => {
+    const axes = [up, null, 3, { stick: "middle", path: "x" }, { stick: "left-x", path: "y", scale: "9", deadZone: 7 }];
+    expect(readAxes({ axes })).toEqual([up, { stick: "left-x", path: "y", scale: 1, deadZone: 0.9 }]);
+    expect(readAxes({ axes: "none" })).toEqual([]);
+  });
+});

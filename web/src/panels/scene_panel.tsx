@@ -1,0 +1,111 @@
+// Poses and frames of a value in space, and the joints of a standard robot as a chain; the same as numbers below.
+// Layer: web/panels.
+
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import { t } from "../app/language";
+import { onColoursChanged } from "../app/theme";
+import { readPalette } from "../chart/palette";
+import { useFeed } from "../live/use_feed";
+import { explain } from "../robot/remote";
+import { Failure } from "../ui/failure";
+import { chainsOf, framesIn, posesOf } from "../values/frames";
+import type { Chain } from "../values/frames";
+import { readState } from "./joints";
+import { membersFor, textIn } from "./panel";
+import type { PanelProps } from "./panel";
+import { feedKindOf, Freshness, MemberSelect } from "./parts";
+import { Picture } from "./scene";
+
+export default function ScenePanel({ object, members, settings, change }: PanelProps) {
+  const choices = membersFor("scene", members);
+  const usual = choices.find(({ name }) => name === "robot_state") ?? choices[0];
+  const name = textIn(settings, "member") || usual?.name || "";
+  const look = useFeed(object, feedKindOf(choices.find((each) => each.name === name)), name);
+  const [chains, setChains] = useState<readonly Chain[]>([]);
+  const [failure, setFailure] = useState<string | null>(null);
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const picture = useRef<Picture | null>(null);
+
+  useEffect(() => {
+    if (!object?.has("robot_info", "property")) return;
+    let isOver = false;
+    object.get("robot_info").then(
+      (info) => !isOver && setChains(chainsOf(info)),
+      (error: unknown) => !isOver && setFailure(explain(error)),
+    );
+    return () => void (isOver = true);
+  }, [object]);
+  useEffect(() => {
+    const element = canvas.current;
+    if (!element) return;
+    try {
+      picture.current = new Picture(element);
+    } catch (error) {
+      setFailure(t("This browser draws no 3-D pictures: {0}", explain(error)));
+      return;
+    }
+    const colour = (): void => picture.current?.colour(readPalette(element));
+    colour();
+    const unwatch = onColoursChanged(colour);
+    return () => {
+      unwatch();
+      picture.current?.dispose();
+      picture.current = null;
+    };
+  }, []);
+
+  const { carried, frames } = useMemo(() => {
+    const positions = readState(look.value)?.positions;
+    return {
+      carried: positions?.length ? chains.map((chain) => ({ name: chain.name, poses: posesOf(chain, positions) })) : [],
+      frames: framesIn(look.value),
+    };
+  }, [look.value, chains]);
+  useEffect(
+    () =>
+      picture.current?.show(
+        carried.map(({ poses }) => poses),
+        frames,
+      ),
+    [carried, frames],
+  );
+  const told = [...carried.flatMap(({ name, poses }) => poses.slice(-1).map((pose) => ({ name, pose }))), ...frames];
+
+  return (
+    <div class="scene-panel">
+      <div class="panel-tools">
+        <MemberSelect members={choices} chosen={name} choose={(next) => change({ ...settings, member: next })} />
+        <button class="button button-quiet" type="button" onClick={() => picture.current?.look("corner")}>
+          {t("Whole")}
+        </button>
+        <button class="button button-quiet" type="button" onClick={() => picture.current?.look("above")}>
+          {t("From above")}
+        </button>
+        <button class="button button-quiet" type="button" onClick={() => picture.current?.look("front")}>
+          {t("From the front")}
+        </button>
+        <button class="button button-quiet" type="button" onClick={() => picture.current?.look("side")}>
+          {t("From the side")}
+        </button>
+      </div>
+      <Failure text={failure} />
+      <canvas
+        ref={canvas}
+        class={`scene ${look.stale === null ? "" : "is-stale"}`}
+        role="img"
+        aria-label={t("{0} in space", name)}
+      />
+      <details class="frames">
+        <summary>{told.length === 1 ? t("1 frame") : t("{0} frames", told.length)}</summary>
+        <ul>
+          {told.map((frame) => (
+            <li key={frame.name} data-frame={frame.name}>
+              {frame.name}: {frame.pose.at.map((each) => each.toFixed(3)).join(" ")} m
+            </li>
+          ))}
+        </ul>
+      </details>
+      <Freshness look={look} isLive={object !== null} />
+    </div>
+  );
+}
