@@ -1,6 +1,7 @@
 // A shared device on the first page: its mode, its clients, and what each of them listens to and has lost.
 import type { Browser, Page } from "@playwright/test";
 import { expect, test } from "../lab_test";
+import { startGateway, webRoot } from "../processes";
 import type { Lab } from "../processes";
 
 const rowOf = (page: Page, device: string) => page.locator(`[data-device="${device}"]`);
@@ -21,14 +22,20 @@ test("says which device is relayed and which is shared, and how many clients eac
   browser,
 }) => {
   await page.goto(lab.url);
-  await expect(rowOf(page, "create")).toContainText("Moderelay");
   await expect(rowOf(page, "webcams")).toContainText("Modeshared");
-  await expect(rowOf(page, "create").locator("details")).toHaveCount(0);
   await expect(rowOf(page, "webcams")).toContainText(/Clients\d/);
   const before = Number(/Clients\s*(\d+)/.exec(await rowOf(page, "webcams").innerText())?.[1] ?? NaN);
   const viewer = await watchCamera(browser, lab);
   await expect(rowOf(page, "webcams")).toContainText(`Clients${before + 1}`);
   await viewer.close();
+  const relay = await startGateway("create", lab.createUrl, webRoot);
+  try {
+    await page.goto(relay.url);
+    await expect(rowOf(page, "create")).toContainText("Moderelay");
+    await expect(rowOf(page, "create").locator("details")).toHaveCount(0);
+  } finally {
+    await relay.program.kill();
+  }
 });
 
 test("lists the pipes of two viewers as they go on, by keyboard alone", async ({ page, lab, browser }) => {
