@@ -78,6 +78,8 @@ void add_get(Commands& commands);
 void add_set(Commands& commands);
 void add_call(Commands& commands);
 void add_watch(Commands& commands);
+void add_record(Commands& commands);
+void add_export(Commands& commands);
 void add_ping(Commands& commands);
 void add_bench(Commands& commands);
 void add_top(Commands& commands);
