@@ -79,6 +79,7 @@ void add_set(Commands& commands);
 void add_call(Commands& commands);
 void add_watch(Commands& commands);
 void add_record(Commands& commands);
+void add_replay(Commands& commands);
 void add_export(Commands& commands);
 void add_ping(Commands& commands);
 void add_bench(Commands& commands);

@@ -25,6 +25,7 @@ int run_command_line(std::vector<std::string> words) {
   add_call(commands);
   add_watch(commands);
   add_record(commands);
+  add_replay(commands);
   add_export(commands);
   add_ping(commands);
   add_bench(commands);

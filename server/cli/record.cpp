@@ -36,6 +36,12 @@ struct RecordOptions : RemoteOptions {
   bool replaces = false;
 };
 
+[[noreturn]] void throw_failure(const rr::Error& error) {
+  if (error.code == rr::ErrorCode::invalid_argument) throw NotUnderstood(error.message);  // of --members
+  if (error.code == rr::ErrorCode::system_resource_error) throw std::runtime_error(error.message);  // of the file
+  throw rr::ClientException(error);
+}
+
 /// Records until its time is over, somebody ends it, or the file can't be written.
 class RecordRun {
  public:
@@ -59,7 +65,7 @@ class RecordRun {
     io_.restart();
     io_.run_for(std::chrono::milliseconds(500));
     if (const auto closed = writer_.close(); !closed && !failure_) failure_ = closed.error();
-    if (failure_) throw rr::ClientException(*failure_);
+    if (failure_) throw_failure(*failure_);
   }
   double seconds() const { return begin_ ? std::chrono::duration<double>(steady_clock::now() - *begin_).count() : 0; }
 
@@ -136,7 +142,7 @@ int run_record(const RecordOptions& options) {
     how.kept_files = options.kept_files;
     how.library = "rrgate " + std::string(version);
     auto writer = RecordingWriter::create(options.output, how);
-    if (!writer) throw rr::ClientException(writer.error());
+    if (!writer) throw_failure(writer.error());
     RecordRun run(options, *writer);
     try {
       run.run();

@@ -23,7 +23,7 @@ object Robot
     wire Pose pose [readonly]
     event moved(Pose pose, int32 count)
     property uint8[] picture
-    property double*[2,2] matrix
+    property double[2,2] matrix
 end
 )";
 
