@@ -6,6 +6,7 @@
 #include <cerrno>
 #include <system_error>
 
+#include "core/support/hex.hpp"
 #include "core/wire/byte_reader.hpp"
 
 namespace rrgate {
@@ -33,6 +34,12 @@ std::string_view opcode_name(McapOpcode opcode) {
     default:
       return "record";
   }
+}
+
+std::string hex(std::string_view bytes) {
+  std::string out;
+  for (const char byte : bytes) out += (out.empty() ? "" : " ") + rr::hex_text(static_cast<unsigned char>(byte), 2);
+  return out.empty() ? "nothing" : out;
 }
 
 bool has_content(McapOpcode opcode) {
@@ -80,8 +87,7 @@ rr::Result<McapReader> McapReader::open(const std::string& path) {
                           path + ": can't be read: " + std::generic_category().message(errno));
   magic.resize(static_cast<std::size_t>(out.file_.gcount()));
   if (magic != mcap_magic)
-    return malformed(path + ": is no MCAP file: begins with " + rr::quote(magic) + ", expected " +
-                     rr::quote(mcap_magic));
+    return malformed(path + ": is no MCAP file: begins with " + hex(magic) + ", expected " + hex(mcap_magic));
   out.size_ = static_cast<std::uint64_t>(end);
   out.at_ = mcap_magic.size();
   return out;

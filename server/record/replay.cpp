@@ -22,12 +22,19 @@ struct Address {
 
 /// For the node behind `number` others; port 0 stays.
 Address address_of(const std::string& text, std::size_t number) {
-  auto url = rr::parse_url(text, rr::ServiceInUrl::optional);
-  if (!url) throw std::invalid_argument(url.error().message);
-  if (url->port != 0) url->port = static_cast<std::uint16_t>(url->port + number);
-  const bool is_any = url->host == "0.0.0.0" || url->host == "::";
-  const auto host = is_any ? "127.0.0.1" : url->host.find(':') == std::string::npos ? url->host : "[" + url->host + "]";
-  return {url->scheme + "://" + rr::format_host_port(url->host, url->port), url->scheme + "://" + host};
+  const auto begin = text.find("://");
+  const auto scheme = text.substr(0, begin);
+  auto rest = begin == std::string::npos ? std::string() : text.substr(begin + 3);
+  if (rest.ends_with('/')) rest.pop_back();
+  auto place = rr::parse_host_port(rest);
+  if (scheme != "rr+tcp" || !place)
+    throw std::invalid_argument("listen on " + rr::quote(text) + ": expected \"rr+tcp://HOST:PORT\"");
+  if (place->port != 0) place->port = static_cast<std::uint16_t>(place->port + number);
+  const bool is_any = place->host == "0.0.0.0" || place->host == "::";
+  const auto host = is_any                                       ? "127.0.0.1"
+                    : place->host.find(':') == std::string::npos ? place->host
+                                                                 : "[" + place->host + "]";
+  return {scheme + "://" + rr::format_host_port(place->host, place->port), scheme + "://" + host};
 }
 
 rr::Exception out_of_range(std::string what) {

@@ -114,7 +114,7 @@ TEST_CASE("files that are none say what was found and what was expected") {
   CHECK_THAT(read(folder.path("none.mcap")).error, Catch::Contains("none.mcap: can't be read: No such file"));
   CHECK_THAT(read(folder.write("short", "\x89MCA")).error, Catch::Contains("is no MCAP file: begins with"));
   CHECK_THAT(read(folder.write("text", "hello, this is text")).error,
-             Catch::Contains("\"hello, t\"") || Catch::Contains("'hello, t'"));
+             Catch::Contains("begins with 68 65 6c 6c 6f 2c 20 74, expected 89 4d 43 41 50 30 0d 0a"));
   auto bytes = folder.read(std::filesystem::path(write_sample(folder, 4)).filename().string());
   const auto changed = bytes.find(R"({"value":2})");
   bytes[changed + 3] = 'V';
