@@ -37,7 +37,7 @@ struct RecordOptions : RemoteOptions {
 };
 
 [[noreturn]] void throw_failure(const rr::Error& error) {
-  if (error.code == rr::ErrorCode::invalid_argument) throw NotUnderstood(error.message);  // of --members
+  if (error.code == rr::ErrorCode::invalid_argument) throw NotUnderstood(error.message);            // of --members
   if (error.code == rr::ErrorCode::system_resource_error) throw std::runtime_error(error.message);  // of the file
   throw rr::ClientException(error);
 }

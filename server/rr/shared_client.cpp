@@ -350,7 +350,7 @@ rr::awaitable<void> SharedClient::log_in_at_device(std::shared_ptr<SharedClient>
 }
 
 void SharedClient::move_to(std::shared_ptr<Upstream> upstream) {
-  home_->acknowledge_all(*this);
+  home_->end_sent_pipes(*this);
   if (!service_) return;  // it has gone
   home_->remove(*this);
   home_ = std::move(upstream);

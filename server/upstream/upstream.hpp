@@ -184,8 +184,9 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
                          std::optional<std::uint32_t> wants_ack);
   /// The client is not behind any more.
   void caught_up(UpstreamClient& client);
-  /// Nothing will be heard any more of the client's packets that are on their way: it waits for none of them.
-  void acknowledge_all(UpstreamClient& client);
+  /// Which of the packets that are on their way will arrive nobody knows: the endpoints that the client has sent on
+  /// end.
+  void end_sent_pipes(UpstreamClient& client);
 
  private:
   using MemberKey = std::pair<std::string, std::string>;  // path, member
@@ -217,6 +218,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
     std::vector<EndpointKey> endpoints;
     std::int32_t index = 0;
     PipeState state = PipeState::detached;
+    bool has_sent = false;                                       ///< packets of its client are with the device
     bool is_held = false;                                        ///< a client is behind: the device hears nothing of it
     std::map<std::uint32_t, std::uint32_t> unacknowledged = {};  ///< number at the device -> that of the one client
   };
@@ -262,6 +264,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   void pipe_attached(PipeNumber number, const std::string& path, const std::string& member,
                      const rr::Result<rr::Value>& result, bool is_first);
   void drop_pipe(PipeNumber number);
+  void end_pipe(UpstreamClient& client, rr::PipeId id);
   void end_endpoint(const EndpointKey& endpoint);
   std::vector<PipeNumber> pipes_of(const UpstreamClient& client) const;
   /// Lets the device go on, or not, as the slowest client of the pipe can take it.

@@ -225,7 +225,7 @@ void Upstream::lost(const rr::Error& reason) {
   }
   const auto clients = clients_;  // they may leave
   for (auto* client : clients)
-    if (has(*client)) acknowledge_all(*client);
+    if (has(*client)) end_sent_pipes(*client);
   locks_->handle_lost(*this);
   device_->note_trouble();
   tell_lost(lost_error());

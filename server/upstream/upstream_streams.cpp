@@ -312,14 +312,28 @@ rr::Result<> Upstream::send_pipe(UpstreamClient& client, rr::PipeId id, const rr
       {{"device", device_->config().name},
        {"pipe", pipe.path + "." + pipe.member->name},
        {"error", sent.error().message}});
+  end_pipe(client, id);
+  return sent;
+}
+
+void Upstream::end_pipe(UpstreamClient& client, rr::PipeId id) {
   leave_pipe(client, id);
   client.close_pipe(id);
-  return sent;
+}
+
+void Upstream::end_sent_pipes(UpstreamClient& client) {
+  std::vector<rr::PipeId> sent;
+  const EndpointKey first(&client, 0);
+  for (auto it = endpoints_.lower_bound(first); it != endpoints_.end() && it->first.first == &client; ++it)
+    if (pipes_.at(it->second).has_sent) sent.push_back(it->first.second);
+  for (const auto id : sent)
+    if (endpoints_.contains({&client, id})) end_pipe(client, id);
 }
 
 rr::Result<> Upstream::pass_on(Pipe& pipe, const EndpointKey& endpoint, const rr::Value& packet,
                                std::optional<std::uint32_t> wants_ack) {
   const auto connection = connection_;  // it may be lost
+  pipe.has_sent = true;
   if (!wants_ack) return connection->send_pipe(pipe.path, pipe.member->name, pipe.index, packet);
   const auto known = endpoint;
   const auto sent = connection->send_pipe_for_ack(pipe.path, pipe.member->name, pipe.index, packet);
@@ -352,17 +366,6 @@ std::vector<Upstream::PipeNumber> Upstream::pipes_of(const UpstreamClient& clien
   for (auto it = endpoints_.lower_bound(first); it != endpoints_.end() && it->first.first == &client; ++it)
     numbers.push_back(it->second);
   return numbers;
-}
-
-void Upstream::acknowledge_all(UpstreamClient& client) {
-  for (const auto number : pipes_of(client)) {
-    const auto found = pipes_.find(number);
-    if (found == pipes_.end() || found->second.unacknowledged.empty()) continue;
-    std::vector<std::uint32_t> numbers;
-    for (const auto& [there, here] : std::exchange(found->second.unacknowledged, {})) numbers.push_back(here);
-    const auto endpoint = found->second.endpoints.front();
-    endpoint.first->acknowledge_packets(endpoint.second, numbers);
-  }
 }
 
 // --- credit ---

@@ -42,8 +42,9 @@ MORE_DESCRIPTORS = 8
 class Line:
     """A TCP forwarder that can be cut, stalled and slowed."""
 
-    def __init__(self, port):
-        self._target = port
+    def __init__(self, target):
+        """`target`: gives the port."""
+        self._target = target
         self._sockets = set()
         self._flowing = threading.Event()
         self._flowing.set()
@@ -59,7 +60,7 @@ class Line:
             except OSError:
                 return
             try:
-                server = socket.create_connection(("127.0.0.1", self._target), 5)
+                server = socket.create_connection(("127.0.0.1", self._target()), 5)
                 server.settimeout(None)
             except OSError:
                 client.close()
@@ -107,14 +108,15 @@ class Line:
 
 
 class Device:
-    """Of the reference, on a port of its own for all its lives."""
+    """Of the reference, on another port in each of its lives: it does not listen on one that was closed a minute ago."""
 
     def __init__(self, folder):
-        self._folder, self.port = folder, free_port()
+        self._folder = folder
         self.journal = folder / "journal"
         self.start()
 
     def start(self):
+        self.port = free_port()
         self.process = Background([sys.executable, PEERS / "chaos_device.py", self.journal, f"--robotraconteur-tcp-port={self.port}"],
                                   self._folder / "device.log")
         self.process.next_line()
@@ -214,7 +216,7 @@ class Site:
         self.findings, self.tokens = Findings(), Tokens()
         self.device = Device(folder)
         self.ours, url = start_service(folder)
-        self.line = Line(self.device.port)
+        self.line = Line(lambda: self.device.port)
         self.clock = folder / "clock" if FAKETIME.exists() else None
         if self.clock:
             self.clock.write_text("+0")
@@ -222,7 +224,7 @@ class Site:
         self.gateway = Gateway(folder, [
             {"name": "shared", "url": through, "mode": "shared", "login": {"username": "gateway", "password": "secret"}},
             {"name": "relayed", "url": through}, {"name": "ours", "url": url, "mode": "shared"}], self.clock)
-        self.front = Line(self.gateway.port)
+        self.front = Line(lambda: self.gateway.port)
         self.clients = []
 
     @property
@@ -276,18 +278,19 @@ class Site:
             self.findings.break_("gateway", f"has ended with {self.gateway.process.poll()}")
             return
         wait_until(self.is_online, "all devices are online again")
-        self.publisher.stop()
-        value = float(self.tokens.next())
-        wait_until(lambda: self.publish(value), "the device answers again")
         watchers = [client.name for client in self.clients if isinstance(client, (Watcher, Program))]
 
-        def have_converged():
-            return all(self.findings.last_values.get(name) == value for name in watchers)
+        def values():
+            return {name: self.findings.last_values.get(name, 0) for name in watchers}
+        value = float(self.tokens.next())
         try:
-            wait_until(have_converged, "wires have the last value")
+            wait_until(lambda: min(values().values()) > value, "all follow the wire again")
+            self.publisher.stop()
+            value = float(self.tokens.next())
+            wait_until(lambda: self.publish(value), "the device answers again")
+            wait_until(lambda: set(values().values()) == {value}, "wires have the last value")
         except AssertionError as error:
-            seen = {name: self.findings.last_values.get(name) for name in watchers}
-            self.findings.break_("wires", f"{error}, which is {value}: {seen}")
+            self.findings.break_("wires", f"{error}, {value} or newer: {values()}")
         self.end()
         for fault in faults_of_calls(ran(self.device.journal), self.findings.answered):
             self.findings.break_("calls", fault)

@@ -250,6 +250,39 @@ def test_clients_stay_when_the_device_goes(node, tmp_path):
         service.stop()
 
 
+def test_who_has_sent_on_a_pipe_hears_that_the_device_went(node, tmp_path):
+    """Packets may have been lost on their way; an endpoint on which nothing was sent goes on."""
+    service, url = start_service(tmp_path)
+    line = Tap(port_of(url))
+    gateway, port = start_gateway(tmp_path, f"rr+tcp://127.0.0.1:{line.port}/?service=interop", device={"mode": "shared"},
+                                  retry={"min_ms": 50, "max_ms": 200})
+    try:
+        root = node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop")
+        doubled, closed = [News(), News()], News()
+        sent, silent = root.doubled.Connect(-1), root.doubled.Connect(-1)
+        for endpoint, news in zip((sent, silent), doubled, strict=True):
+            endpoint.PacketReceivedEvent += lambda endpoint, news=news: news.add(endpoint.ReceivePacket())
+            endpoint.PipeEndpointClosedCallback = lambda endpoint: closed.add(endpoint.Index)
+        sent.SendPacket(1.0)
+        doubled[0].wait_for(lambda value: value == 2.0)
+        line.cut()
+        closed.wait_for(lambda index: index == sent.Index)
+
+        def is_back():
+            try:
+                return root.version == "1"
+            except RR.ConnectionException:
+                return False
+        gateway.wait_until(is_back)
+        silent.SendPacket(3.0)
+        doubled[1].wait_for(lambda value: value == 6.0)
+        node.DisconnectService(root)
+    finally:
+        gateway.stop()
+        line.close()
+        service.stop()
+
+
 def test_sessions_may_end_by_themselves_when_the_gateway_stops(node, tmp_path):
     service, url = start_service(tmp_path)
     gateway, port = start_gateway(tmp_path, url, device={"mode": "shared"}, timeouts={"drain_ms": 60_000})

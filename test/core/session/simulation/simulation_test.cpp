@@ -38,10 +38,10 @@ TEST_CASE("what both sides were told holds, however the network and the clocks b
     const auto fault = play(seed, deeds);
     if (!fault.empty()) FAIL_CHECK(fault);
   }
-  // That much has happened that the above means something.
+  // That much has happened that the above means something: each deed in every tenth run or more.
   for (std::size_t i = 0; i < deeds.size(); ++i) {
     CAPTURE(i, deeds[i]);
-    CHECK(deeds[i] > seeds / 5);
+    CHECK(deeds[i] >= seeds / 10);
   }
 }
 
