@@ -38,7 +38,7 @@ class Device:
         self.axis = Axis()
 
     def get_axes(self, index):
-        return self.axis
+        return self.axis, "experimental.recorded.Axis"
 
     def tell(self, number):
         node = RR.RobotRaconteurNode.s
