@@ -27,6 +27,7 @@ export const makeSidebar = (decisions) => [
     ["Operating a gateway", "/deploy"],
     ["The dashboard", "/dashboard"],
     ["Devices from the command line", "/command-line"],
+    ["Record and replay", "/recording"],
     ["Shared devices", "/shared-sessions"],
     ["Leases", "/leases"],
     ["Discovery", "/discovery"],

@@ -158,22 +158,31 @@ void Object::call_callback(ClientId client, std::string_view callback, const std
                                 arguments, std::move(done));
 }
 
-WirePacket Object::pack_in_value(std::string_view wire, const Value& value) const {
+WirePacket Object::pack_in_value(std::string_view wire, const Value& value, std::optional<TimeSpec> time) const {
   const MemberDefinition& member = require_member(wire, MemberKind::wire);
   if (member.direction() == MemberDirection::writeonly)
     refuse(type_name() + "." + member.name + " is writeonly: the service sends nothing on it");
   const Now now = read_clocks();
-  WirePacket packet({}, member, value, now.utc, now.steady);
+  WirePacket packet({}, member, value, time.value_or(now.utc), now.steady);
   if (const auto packed = packet.message(*service_.types_); !packed)
     refuse(type_name() + "." + member.name + ": " + packed.error().message);
   return packet;
 }
 
 void Object::set_wire(std::string_view wire, Value value) {
+  set_in_value(wire, std::move(value), std::nullopt);
+}
+
+void Object::set_wire(std::string_view wire, Value value, TimeSpec time) {
+  set_in_value(wire, std::move(value), time);
+}
+
+void Object::set_in_value(std::string_view wire, Value value, std::optional<TimeSpec> time) {
   auto newest = std::make_shared<const Value>(std::move(value));
-  WirePacket packet = pack_in_value(wire, *newest);
+  WirePacket packet = pack_in_value(wire, *newest, time);
   Member& mine = members_[&packet.member()];
   mine.own_in_values.clear();
+  mine.in_time = time;
   mine.in_value = newest;
   if (!service_.host_) return;
   for (const std::string& path : paths()) {
@@ -260,8 +269,7 @@ std::vector<std::string> Object::missing_handlers() const {
 Result<std::shared_ptr<ServiceObject>> Object::find_child(const MemberDefinition& objref,
                                                           const std::optional<std::string>& index) {
   const auto found = members_.find(&objref);
-  if (found == members_.end() || !found->second.find)
-    return make_error(ErrorCode::not_implemented_error, "objref '" + objref.name + "' has no handler");
+  if (found == members_.end() || !found->second.find) return no_handler("objref", objref);
   std::shared_ptr<Object> child;
   try {
     child = found->second.find(index ? std::string_view(*index) : std::string_view{});
@@ -283,10 +291,7 @@ std::optional<Result<Value>> Object::answer(Called& called, const BeginLate& beg
     handler.start(std::move(called.arguments), begin_late());
     return std::nullopt;
   };
-  const auto missing = [&](std::string_view what) {
-    return make_error(ErrorCode::not_implemented_error,
-                      std::string(what) + " '" + called.member->name + "' has no handler");
-  };
+  const auto missing = [&](std::string_view what) { return no_handler(what, *called.member); };
   const auto found = members_.find(called.member);
   Member* mine = found == members_.end() ? nullptr : &found->second;
   switch (called.kind) {
@@ -324,7 +329,7 @@ std::optional<Result<Value>> Object::answer(Called& called, const BeginLate& beg
 Result<Generator> Object::open_generator(const Called& called) {
   const auto found = members_.find(called.member);
   if (found != members_.end() && found->second.generator.open) return found->second.generator.open(called.arguments);
-  return make_error(ErrorCode::not_implemented_error, "generator '" + called.member->name + "' has no handler");
+  return no_handler("generator", *called.member);
 }
 
 void Object::receive_wire(const WireReceived& received) {
@@ -338,6 +343,18 @@ const Value* Object::in_value(const MemberDefinition& wire, ClientId client) con
   if (found == members_.end()) return nullptr;
   const auto own = found->second.own_in_values.find(client);
   return own != found->second.own_in_values.end() ? &own->second : found->second.in_value.get();
+}
+
+std::optional<TimeSpec> Object::in_time(const MemberDefinition& wire, ClientId client) const {
+  const auto found = members_.find(&wire);
+  if (found == members_.end() || found->second.own_in_values.contains(client)) return std::nullopt;
+  return found->second.in_time;
+}
+
+Error Object::no_handler(std::string_view what, const MemberDefinition& member) const {
+  const auto& why = service_.why_partly_;
+  return make_error(ErrorCode::not_implemented_error,
+                    std::string(what) + " '" + member.name + "'" + (why.empty() ? " has no handler" : ": " + why));
 }
 
 // --- Service ---
@@ -398,7 +415,7 @@ std::shared_ptr<HostedService> Service::attach(ServiceHost& host) {
   if (hosted_) refuse("service " + rr::quote(name_) + " was added to a node before");
   std::string missing;
   for (const std::weak_ptr<Object>& weak : objects_)
-    if (const auto object = weak.lock())
+    if (const auto object = weak.lock(); object && why_partly_.empty())
       for (const std::string& handler : object->missing_handlers()) missing += (missing.empty() ? "" : ", ") + handler;
   if (!missing.empty()) refuse("service " + rr::quote(name_) + ": no handler for " + missing);
   auto hosted = HostedService::make(name_, root_, types_, attributes_);

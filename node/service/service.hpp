@@ -160,6 +160,9 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   /// Sets a wire's InValue: sent to every client that has connected it, to later ones when they connect, and to peeks.
   /// Throws   std::invalid_argument: no such wire, one that is writeonly, a value that does not fit its type.
   void set_wire(std::string_view wire, Value value);
+  /// The same, with the time that clients get with it: of what is played back or passed on. A client that has had a
+  /// later one gets a time just above that.
+  void set_wire(std::string_view wire, Value value, TimeSpec time);
   /// Sets the InValue of one client alone, in place of the one that all have: for its peeks and for when it connects
   /// the wire later, too. Until set_wire() sets that of all again. Nothing happens where the client is gone. Throws as
   /// set_wire().
@@ -200,6 +203,7 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
     Handler set;
     Handler wire_received;
     std::shared_ptr<const Value> in_value = {};                          ///< wires: what clients receive
+    std::optional<TimeSpec> in_time = {};                                ///< wires: what set_wire() was given
     std::map<ClientId, Value> own_in_values = {};                        ///< wires: what single clients do instead
     std::optional<Value> out_value = {};                                 ///< wires: the newest that a client sent
     std::function<std::shared_ptr<Object>(std::string_view)> find = {};  ///< objrefs
@@ -237,8 +241,12 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
   Result<> receive_packet(const MemberDefinition& pipe, const PipeEndpoint& endpoint, const Value& packet);
   void close_pipe(const MemberDefinition& pipe, const PipeEndpoint& endpoint, bool tells_handler);
   /// Throws as set_wire().
-  WirePacket pack_in_value(std::string_view wire, const Value& value) const;
+  WirePacket pack_in_value(std::string_view wire, const Value& value, std::optional<TimeSpec> time = {}) const;
+  void set_in_value(std::string_view wire, Value value, std::optional<TimeSpec> time);
   const Value* in_value(const MemberDefinition& wire, ClientId client) const;
+  /// Of in_value(), where it is known.
+  std::optional<TimeSpec> in_time(const MemberDefinition& wire, ClientId client) const;
+  Error no_handler(std::string_view what, const MemberDefinition& member) const;
   void forget_client(ClientId client);
 
   Service& service_;
@@ -294,6 +302,9 @@ class Service {
 
   /// Who may use the service, and how users log in. Before Node::add().
   void set_security(SecurityPolicy policy);
+
+  /// Members may stay without handler: clients get NotImplementedError with this reason. Before Node::add().
+  void serve_partly(std::string why) { why_partly_ = std::move(why); }
 
   /// Which client's request is being handled; 0 outside of handlers.
   ClientId current_client() const { return host_ ? host_->current_client() : 0; }
@@ -362,6 +373,7 @@ class Service {
   std::map<ClientId, std::set<std::weak_ptr<Object>, std::owner_less<>>> objects_of_clients_;
   MapString attributes_;
   SecurityPolicy security_;
+  std::string why_partly_;  ///< empty: each member needs its handler
   std::shared_ptr<HostedService> hosted_;
   ServiceHost* host_ = nullptr;
   std::function<void(ClientId)> on_connected_;

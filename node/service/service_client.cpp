@@ -221,8 +221,12 @@ void ServiceClient::answer_login(LoginId id, Result<AuthenticatedUser> result) {
 void ServiceClient::handle(const WireConnected& connected, Now now) {
   if (const auto [wire, is_new] = wires_.insert({connected.path, connected.member->name}); is_new)
     owner_->follow_wire(id_, *wire);
-  const Value* value = static_cast<Object&>(*connected.object).in_value(*connected.member, id_);
-  if (value) (void)session_.send_wire(connected.path, *connected.member, *value, now);  // checked when it was set
+  const auto& object = static_cast<Object&>(*connected.object);
+  const Value* value = object.in_value(*connected.member, id_);
+  if (!value) return;
+  const auto time = object.in_time(*connected.member, id_).value_or(now.utc);
+  WirePacket packet(connected.path, *connected.member, *value, time, now.steady);
+  (void)session_.send_wire(packet, now);  // checked when it was set
 }
 
 void ServiceClient::handle(const WireReceived& received, Now) {

@@ -102,8 +102,7 @@ Result<Value> ask_memory(const MemoryHandlers& memory, const Called& called) {
 
 std::optional<Result<Value>> Object::answer_memory(Called& called, const BeginLate& begin_late) {
   const auto found = members_.find(called.member);
-  if (found == members_.end() || !found->second.memory)
-    return make_error(ErrorCode::not_implemented_error, "memory '" + called.member->name + "' has no handler");
+  if (found == members_.end() || !found->second.memory) return no_handler("memory", *called.member);
   const auto memory = found->second.memory;
   const MemoryShape dimensions = memory->dimensions();
   if (called.kind == CallKind::memory_dimensions) return Value(dimensions);

@@ -24,6 +24,9 @@ int run_command_line(std::vector<std::string> words) {
   add_set(commands);
   add_call(commands);
   add_watch(commands);
+  add_record(commands);
+  add_replay(commands);
+  add_export(commands);
   add_ping(commands);
   add_bench(commands);
   add_top(commands);

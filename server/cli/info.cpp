@@ -2,6 +2,7 @@
 #include <iostream>
 
 #include "core/session/service_path.hpp"
+#include "server/cli/recording_file.hpp"
 #include "server/cli/remote_service.hpp"
 
 namespace rrgate {
@@ -118,6 +119,7 @@ struct InfoOptions : RemoteOptions {
 };
 
 int info(const InfoOptions& options) {
+  if (is_recording_file(options.url)) return print_recording(options.url, options.is_json);
   return run_remote("info", options.url, [&] {
     const auto address = remote_address(options);
     const auto root = open_service(address);
@@ -158,8 +160,10 @@ int robdef(const RemoteOptions& options) {
 }  // namespace
 
 void add_info(Commands& commands) {
-  const auto [app, options] = commands.add("info", "Say what an object is and has", info);
-  add_url(app, options)->required();
+  const auto [app, options] = commands.add("info", "Say what an object is and has, or a recording", info);
+  app.add_option("URL", options.url, "A service, as \"rrgate ls\" prints it, or a file of \"rrgate record\"")
+      ->required()
+      ->option_text(" ");
   app.add_option("OBJECT", options.object, "Path of an object or member; the service's root without it")
       ->option_text(" ");
   add_json(app, options);

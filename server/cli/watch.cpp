@@ -4,6 +4,7 @@
 #include <iomanip>
 #include <iostream>
 
+#include "server/cli/csv.hpp"
 #include "server/cli/remote_service.hpp"
 #include "server/json/arguments.hpp"
 
@@ -35,15 +36,6 @@ std::string time_text(bool is_short) {
   char fraction[8];
   std::snprintf(fraction, sizeof(fraction), ".%03d", static_cast<int>(ms));
   return std::string(text, size) + fraction + (is_short ? "" : "Z");
-}
-
-std::string csv_cell(const rr::Json& value) {
-  if (!value.is_string()) return value.is_null() ? "" : value.dump();
-  const auto& text = value.get_ref<const std::string&>();
-  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
-  std::string out = "\"";
-  for (const char each : text) out += each == '"' ? std::string("\"\"") : std::string(1, each);
-  return out + "\"";
 }
 
 /// Prints what comes, and counts it.

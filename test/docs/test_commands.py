@@ -13,6 +13,7 @@ from shell import Shell, commands_of, looks_like, trace
 # What a page takes for granted, beside the blocks that are run.
 BEFORE = {
     "docs/command-line.md": ["python -m reynard_the_robot --quiet", "export REYNARD='rr+tcp://localhost:29200/?service=reynard'"],
+    "docs/recording.md": ["python -m reynard_the_robot --quiet"],
     "README.md": ["rrgate demo"],
     "docs/http-api.md": ["rrgate demo"],
     "docs/start.md": ["rrgate demo", "python -m reynard_the_robot --quiet"],

@@ -1,0 +1,13 @@
+// What a recording holds, for people. Layer: server/cli.
+#pragma once
+
+#include <string>
+
+namespace rrgate {
+
+/// Whether a word of the command line is a file and no URL.
+bool is_recording_file(const std::string& text);
+/// Prints what the file holds. Returns an exit code.
+int print_recording(const std::string& path, bool is_json);
+
+}  // namespace rrgate

@@ -1,0 +1,80 @@
+// rrgate replay: a recording as devices. Layer: server/cli.
+#include "server/record/replay.hpp"
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <chrono>
+#include <iostream>
+
+#include "server/cli/command.hpp"
+
+namespace rrgate {
+
+namespace {
+
+struct ReplayCommandOptions {
+  std::string file;
+  std::string listen = "rr+tcp://127.0.0.1:0";
+  double speed = 1;
+  double start = 0;
+  bool loops = false;
+  bool is_paused = false;
+  bool keeps_ids = false;
+};
+
+void serve(Replay& replay, boost::asio::io_context& io, const ReplayCommandOptions& options) {
+  auto& player = replay.player();
+  player.set_speed(options.speed);
+  player.set_loops(options.loops);
+  player.seek(options.start);
+  if (!options.is_paused) player.play();
+  for (const auto& url : replay.urls()) std::cout << "rrgate replay: " << url << std::endl;
+  bool is_over = false;
+  boost::asio::signal_set signals(io, SIGINT, SIGTERM);
+  signals.async_wait([&is_over](const auto& error, int) {
+    if (!error) is_over = true;
+  });
+  while (!is_over) io.run_one();
+  replay.stop();
+  io.run_for(std::chrono::milliseconds(500));
+}
+
+int run_replay(const ReplayCommandOptions& options) {
+  auto recording = Recording::open(options.file);
+  if (!recording) return report_failure("replay", recording.error().message);
+  if (!recording->cut().empty())
+    std::cerr << "rrgate replay: " << options.file << " was cut: " << recording->cut()
+              << "; all before that is played\n";
+  ReplayOptions how;
+  how.listen = options.listen;
+  how.keeps_ids = options.keeps_ids;
+  how.report = [](const std::string& problem) { std::cerr << "rrgate replay: " << problem << "\n"; };
+  try {
+    boost::asio::io_context io(1);
+    Replay replay(io, std::move(*recording), how);
+    serve(replay, io, options);
+    return exit_ok;
+  } catch (const std::exception& failure) {
+    return report_failure("replay", failure.what());
+  }
+}
+
+}  // namespace
+
+void add_replay(Commands& commands) {
+  const auto [app, options] = commands.add("replay", "Serve a recording as the devices that were recorded", run_replay);
+  app.add_option("FILE", options.file, "A file of \"rrgate record\"")->required()->option_text(" ");
+  app.add_option("--speed", options.speed, "2 is twice as fast as it was recorded")
+      ->check(CLI::Range(Player::min_speed, Player::max_speed))
+      ->option_text("N [1]");
+  app.add_option("--start", options.start, "Where to begin, in seconds since the first message")
+      ->check(CLI::Range(0.0, 1e10))
+      ->option_text("SECONDS [0]");
+  app.add_flag("--loop", options.loops, "Begin again after the last message");
+  app.add_flag("--paused", options.is_paused, "Wait until a client of the service \"replay\" calls play");
+  app.add_option("--listen", options.listen, "Of the first node; others take the ports behind it")
+      ->option_text("URL [rr+tcp://127.0.0.1:0]");
+  app.add_flag("--keep-ids", options.keeps_ids, "Take the NodeIDs that were recorded; those nodes must not run");
+}
+
+}  // namespace rrgate

@@ -1,0 +1,210 @@
+#include "server/record/recording.hpp"
+
+#include <algorithm>
+#include <array>
+#include <ctime>
+
+#include "core/support/node_id.hpp"
+
+namespace rrgate {
+
+namespace {
+
+rr::Error malformed(std::string what) {
+  return rr::make_error(rr::ErrorCode::data_serialization_error, std::move(what));
+}
+
+/// Texts that a record of ours has.
+class RecordedTexts {
+ public:
+  explicit RecordedTexts(const McapTexts& texts) : texts_(texts) {}
+
+  /// Empty where it is missing: see missing().
+  std::string text(const std::string& key) {
+    const auto found = texts_.find(key);
+    if (found != texts_.end()) return found->second;
+    if (problem_.empty()) problem_ = "has no metadata " + rr::quote(key) + ": was it recorded by rrgate?";
+    return {};
+  }
+  template <class T>
+  T json(const std::string& key) {
+    const auto content = rr::read_json(text(key));
+    if (!problem_.empty()) return {};
+    try {
+      if (content) return content->get<T>();
+      problem_ = "metadata " + rr::quote(key) + ": " + content.error().message;
+    } catch (const rr::Json::exception& mismatch) {
+      problem_ = "metadata " + rr::quote(key) + ": " + mismatch.what();
+    }
+    return {};
+  }
+  void fail(std::string what) {
+    if (problem_.empty()) problem_ = std::move(what);
+  }
+  const std::string& problem() const { return problem_; }
+
+ private:
+  const McapTexts& texts_;
+  std::string problem_;
+};
+
+constexpr std::array recorded_kinds{rr::MemberKind::wire, rr::MemberKind::pipe, rr::MemberKind::event,
+                                    rr::MemberKind::property};
+
+}  // namespace
+
+rr::Result<Recording> Recording::open(const std::string& path) {
+  auto reader = McapReader::open(path);
+  if (!reader) return reader.error();
+  Recording out(std::move(*reader));
+  for (;;) {
+    auto record = out.reader_.next();
+    if (!record) return record.error();
+    if (!*record) break;
+    if (auto taken = out.take(**record); !taken) return out.reader_.error_in(**record, taken.error().message);
+  }
+  if (out.services_.empty())
+    return malformed(path + ": holds no service: has no metadata " + rr::quote(recorded_service_name) +
+                     "; was it recorded by rrgate?");
+  for (const auto& [channel, member] : out.members_) {
+    const auto is_its_service = [&, label = &member.service](const auto& service) { return service.label == *label; };
+    if (std::none_of(out.services_.begin(), out.services_.end(), is_its_service))
+      return malformed(path + ": channel " + rr::quote(member.topic) + " is of service " + rr::quote(member.service) +
+                       ", which the file does not hold");
+  }
+  return out;
+}
+
+rr::Result<> Recording::take(const McapRecord& record) {
+  switch (record.opcode) {
+    case McapOpcode::channel:
+      return take_channel(record);
+    case McapOpcode::metadata:
+      return take_service(record);
+    case McapOpcode::chunk:
+      return take_chunk(record);
+    case McapOpcode::message:
+      return malformed("stands outside of a chunk; \"mcap convert\" puts it into one");
+    default:
+      return {};
+  }
+}
+
+rr::Result<> Recording::take_channel(const McapRecord& record) {
+  const auto channel = parse_mcap_channel(record.content);
+  if (!channel) return channel.error();
+  RecordedTexts texts(channel->metadata);
+  RecordedMember member{channel->id, channel->topic, texts.text("service"), texts.text("object"), texts.text("member")};
+  const auto kind_text = texts.text("kind");
+  const auto kind = std::find_if(recorded_kinds.begin(), recorded_kinds.end(),
+                                 [&](rr::MemberKind each) { return rr::member_kind_name(each) == kind_text; });
+  if (kind == recorded_kinds.end())
+    texts.fail("kind " + rr::quote(kind_text) + ", expected wire, pipe, event or property");
+  else
+    member.kind = *kind;
+  if (channel->encoding != "json") texts.fail("messages are " + rr::quote(channel->encoding) + ", expected \"json\"");
+  if (const auto type = channel->metadata.find("type"); type != channel->metadata.end()) member.type = type->second;
+  if (!texts.problem().empty()) return malformed(rr::quote(channel->topic) + " " + texts.problem());
+  members_.emplace(channel->id, std::move(member));
+  return {};
+}
+
+rr::Result<> Recording::take_service(const McapRecord& record) {
+  const auto metadata = parse_mcap_metadata(record.content);
+  if (!metadata) return metadata.error();
+  if (metadata->name != recorded_service_name) return {};
+  RecordedTexts texts(metadata->texts);
+  RecordedService service{texts.text("label"), texts.text("url"), texts.text("service"), texts.text("type")};
+  service.node.name = texts.text("node_name");
+  const auto id = rr::parse_node_id(texts.text("node_id"));
+  if (id)
+    service.node.id = *id;
+  else
+    texts.fail("node_id: " + id.error().message);
+  service.attributes = texts.json<rr::OrderedJson>("attributes");
+  service.definitions = texts.json<std::vector<std::string>>("definitions");
+  service.objects = texts.json<std::map<std::string, std::string>>("objects");
+  if (!texts.problem().empty()) return malformed(texts.problem());
+  services_.push_back(std::move(service));
+  return {};
+}
+
+rr::Result<> Recording::take_chunk(const McapRecord& record) {
+  auto records = McapChunkReader::open(record);
+  if (!records) return records.error();
+  RecordedChunk chunk{record.offset};
+  for (;;) {
+    const auto inner = records->next();
+    if (!inner) return inner.error();
+    if (!*inner) break;
+    if ((*inner)->opcode == McapOpcode::channel) {
+      if (auto taken = take_channel(**inner); !taken) return taken;
+    }
+    if ((*inner)->opcode != McapOpcode::message) continue;
+    const auto message = parse_mcap_message((*inner)->content);
+    if (!message) return message.error();
+    const auto member = members_.find(message->channel);
+    if (member == members_.end())
+      return malformed("message at byte " + std::to_string((*inner)->offset) + " of it: is of channel " +
+                       std::to_string(message->channel) + ", which was not told before");
+    chunk.first = chunk.message_count == 0 ? message->log_time : std::min(chunk.first, message->log_time);
+    chunk.last = std::max(chunk.last, message->log_time);
+    ++chunk.message_count;
+    ++chunk.message_counts[message->channel];
+    ++member->second.message_count;
+  }
+  if (chunk.message_count == 0) return {};
+  begin_ = chunks_.empty() ? chunk.first : std::min(begin_, chunk.first);
+  end_ = std::max(end_, chunk.last);
+  message_count_ += chunk.message_count;
+  chunks_.push_back(std::move(chunk));
+  return {};
+}
+
+rr::Result<Recording::Messages> Recording::read(const RecordedChunk& chunk) {
+  const auto record = reader_.read_at(chunk.offset);
+  if (!record) return record.error();
+  Messages out{rr::Bytes(record->content.begin(), record->content.end()), {}};
+  auto whole = *record;
+  whole.content = out.bytes;
+  auto records = McapChunkReader::open(whole);
+  if (!records) return reader_.error_in(whole, records.error().message);
+  for (;;) {
+    const auto inner = records->next();
+    if (!inner) return reader_.error_in(whole, inner.error().message);
+    if (!*inner) break;
+    if ((*inner)->opcode != McapOpcode::message) continue;
+    const auto message = parse_mcap_message((*inner)->content);
+    if (!message) return reader_.error_in(whole, message.error().message);
+    if (!members_.contains(message->channel)) return reader_.error_in(whole, "has changed since it was opened");
+    out.messages.push_back(*message);
+  }
+  return out;
+}
+
+rr::Result<rr::Json> Recording::read_document(const McapMessage& message) const {
+  auto document = rr::read_json(rr::as_text(message.data));
+  const auto& member = members_.at(message.channel);
+  std::string problem;
+  if (!document)
+    problem = document.error().message;
+  else if (!document->is_object())
+    problem = std::string("is ") + document->type_name() + ", expected an object";
+  else if (member.kind != rr::MemberKind::event && !document->contains("value"))
+    problem = "has no \"value\"";
+  if (problem.empty()) return document;
+  return malformed(path() + ": " + member.topic + ", message " + std::to_string(message.sequence) + ": " + problem);
+}
+
+std::string mcap_time_text(McapTime time) {
+  const auto seconds = static_cast<std::time_t>(time / 1'000'000'000u);
+  std::tm parts{};
+  ::gmtime_r(&seconds, &parts);
+  char text[40];
+  const auto size = std::strftime(text, sizeof(text), "%Y-%m-%dT%H:%M:%S", &parts);
+  char fraction[16];
+  std::snprintf(fraction, sizeof(fraction), ".%09dZ", static_cast<int>(time % 1'000'000'000u));
+  return std::string(text, size) + fraction;
+}
+
+}  // namespace rrgate

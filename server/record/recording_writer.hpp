@@ -1,0 +1,101 @@
+// Recordings of Robot Raconteur services as MCAP files. Layer: server/record.
+//
+// A file holds all that showing and replaying it takes. Each service is a metadata record "robotraconteur.service": its
+// URL, node, type, attributes and definitions. Each member is a channel with the topic "/SERVICE/path/member", whose
+// metadata name the service, the object and the member; its messages are JSON as the gateway writes it: {"value": ...}
+// of wires, pipes and properties, the arguments by name of events.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/session/connection.hpp"
+#include "core/types/type_registry.hpp"
+#include "server/json/json.hpp"
+#include "server/record/mcap_writer.hpp"
+
+namespace rrgate {
+
+/// Name of the metadata record of a service.
+inline constexpr const char* recorded_service_name = "robotraconteur.service";
+
+struct RecordedService {
+  std::string label;  ///< by which the file knows it: the service's name, and where that is taken a number behind it
+  std::string url;
+  std::string service;
+  std::string type;  ///< of the root object
+  rr::NodeIdentity node;
+  rr::OrderedJson attributes = rr::OrderedJson::object();  ///< a varvalue{string}
+  std::vector<std::string> definitions;                    ///< imports before importers
+  std::map<std::string, std::string> objects;              ///< service path -> qualified type, the root's included
+};
+
+struct RecordingOptions {
+  std::uint64_t max_bytes = 0;     ///< of one file, about; then the next one begins. 0: no limit
+  std::uint32_t kept_files = 0;    ///< the oldest go when there are more. 0: all stay
+  std::string library = "rrgate";  ///< what the file says it was written by
+};
+
+/// Errors of all   those of McapWriter.
+class RecordingWriter {
+ public:
+  static rr::Result<RecordingWriter> create(const std::string& path, RecordingOptions options = {});
+
+  /// A label that no other service of the recording has.
+  std::string free_label(const std::string& service) const;
+  rr::Result<> add_service(const RecordedService& service);
+  /// `object_path`  one of the service's objects. `place`  how the topic names it: "axes/0", empty for the root.
+  /// Returns  the channel, for write().
+  rr::Result<std::uint16_t> add_member(const RecordedService& service, const std::string& object_path,
+                                       const std::string& place, const rr::MemberDefinition& member,
+                                       const rr::TypeRegistry& types);
+  /// `sent`  when the device sent it; where that is not known, it is taken to be now.
+  rr::Result<> write(std::uint16_t channel, const rr::OrderedJson& message, std::optional<rr::TimeSpec> sent,
+                     rr::TimeSpec now);
+  rr::Result<> flush() { return writer_.flush(); }
+  rr::Result<> close() { return writer_.close(); }
+
+  std::uint64_t message_count() const { return finished_messages_ + writer_.message_count(); }
+  /// Of all files.
+  std::uint64_t size() const { return finished_bytes_ + writer_.size(); }
+  /// The file that is written now.
+  const std::string& path() const { return writer_.path(); }
+  const std::vector<std::string>& topics() const { return topics_; }
+
+ private:
+  struct Channel {
+    std::string topic;
+    std::string schema_name;
+    std::string schema;
+    McapTexts metadata;
+    std::uint32_t sequence = 0;
+  };
+  RecordingWriter(std::string path, RecordingOptions options, McapWriter writer)
+      : first_path_(std::move(path)), options_(std::move(options)), writer_(std::move(writer)), paths_{first_path_} {}
+  rr::Result<> put_channel(const Channel& channel);
+  rr::Result<> begin_next_file();
+
+  std::string first_path_;
+  RecordingOptions options_;
+  McapWriter writer_;
+  std::vector<std::string> paths_;  ///< of files that are there
+  std::uint32_t file_number_ = 1;
+  std::vector<McapTexts> services_;
+  std::vector<Channel> channels_;
+  std::vector<std::string> topics_;
+  std::map<std::string, std::uint16_t> schemas_;  ///< of the file at hand: text -> id
+  McapTime newest_ = 0;
+  std::uint64_t finished_messages_ = 0;
+  std::uint64_t finished_bytes_ = 0;
+};
+
+/// The schema of a member's messages, without references and choices, as tools read it that plot numbers. Text and
+/// numbers that may stand for one another are told as what they are most: NaN has the type "number" as well.
+rr::OrderedJson recorded_schema(const rr::MemberDefinition& member, const rr::TypeRegistry& types);
+
+/// 0 for times before 1970.
+McapTime to_mcap_time(rr::TimeSpec time);
+
+}  // namespace rrgate

@@ -1,0 +1,262 @@
+"""Recordings: of a device of the real package, read by the mcap package, and replayed to the real package."""
+import base64
+import csv
+import io
+import json
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from mcap.exceptions import McapError
+from mcap.reader import make_reader
+from mcap.records import Channel, Message
+from mcap.stream_reader import StreamReader
+
+from gateways import RRGATE, Gateway
+from processes import BUILD, ROOT, Background, free_port
+
+REPLAY_DEADLINE = 20.0  # seconds
+
+
+def rrgate(*arguments, code=0):
+    done = subprocess.run([RRGATE, *map(str, arguments)], capture_output=True, text=True, timeout=60)
+    assert done.returncode == code, (done.returncode, done.stdout, done.stderr)
+    return done.stdout if code == 0 else done.stderr
+
+
+def wait_for(is_so, seconds=REPLAY_DEADLINE):
+    deadline = time.monotonic() + seconds
+    while not is_so():
+        assert time.monotonic() < deadline, "not within the deadline"
+        time.sleep(0.02)
+
+
+def messages(path):
+    """(topic, time stamp in ns, document) of each message, as the mcap package reads them."""
+    with open(path, "rb") as file:
+        return [(channel.topic, message.publish_time, json.loads(message.data))
+                for _, channel, message in make_reader(file, validate_crcs=True).iter_messages(log_time_order=False)]
+
+
+@pytest.fixture(scope="module")
+def create(tmp_path_factory):
+    port = free_port()
+    robot = Background([BUILD / "examples" / "demo" / "rrgate-demo-create", "--port", port],
+                       tmp_path_factory.mktemp("create") / "log")
+    url = f"rr+tcp://127.0.0.1:{port}/?service=Create"
+    robot.wait_until(lambda: subprocess.run([RRGATE, "info", url], capture_output=True).returncode == 0)
+    yield url
+    robot.stop()
+
+
+@pytest.fixture
+def device(tmp_path):
+    """One of the real package."""
+    port = free_port()
+    process = Background([sys.executable, ROOT / "test" / "interop" / "peers" / "recorded_device.py", port], tmp_path / "log")
+    process.next_line()
+    yield f"rr+tcp://127.0.0.1:{port}/?service=device"
+    process.stop()
+
+
+@pytest.fixture(scope="module")
+def of_create(node, create, tmp_path_factory):
+    """A recording of the robot that drives an arc."""
+    path = tmp_path_factory.mktemp("recording") / "create.mcap"
+    recording = subprocess.Popen([RRGATE, "record", create, "-o", str(path), "--duration", "2", "--interval", "0.25"])
+    driver = node.ConnectService(create)  # the robot stops when it goes
+    driver.Drive(200, 500)
+    assert recording.wait(30) == 0
+    node.DisconnectService(driver)
+    return path
+
+
+class Replay:
+    """rrgate replay, and the service that controls it."""
+
+    def __init__(self, node, folder, path, *more):
+        self.process = Background([RRGATE, "replay", path, *more], folder / "replay.log")
+        self.url = self.process.next_line().removeprefix("rrgate replay: ")
+        self.control = node.ConnectService(self.url.split("?")[0] + "?service=replay")
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        assert self.process.stop() == 0
+
+
+def test_a_recording_is_an_mcap_file_as_its_own_package_reads_it(of_create):
+    with open(of_create, "rb") as file:
+        summary = make_reader(file).get_summary()
+    topics = {channel.topic: channel for channel in summary.channels.values()}
+    assert {"/Create/state", "/Create/packets", "/Create/DistanceTraveled", "/Create/Bump"} <= set(topics)
+    counts = summary.statistics.channel_message_counts
+    assert counts[topics["/Create/state"].id] > 20 and counts[topics["/Create/DistanceTraveled"].id] >= 4
+    found = messages(of_create)
+    assert len(found) == summary.statistics.message_count == sum(counts.values())
+    states = [document["value"] for topic, _, document in found if topic == "/Create/state"]
+    assert states[0].keys() >= {"x", "y", "heading"} and states[-1]["x"] != states[0]["x"]
+
+
+def test_each_message_is_what_its_schema_says(of_create):
+    import jsonschema
+    with open(of_create, "rb") as file:
+        for schema, channel, message in make_reader(file).iter_messages():
+            assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
+            text = schema.data.decode()
+            assert '"$ref"' not in text and '"oneOf"' not in text
+            jsonschema.validate(json.loads(message.data), json.loads(text))
+
+
+def test_a_file_that_was_cut_is_read_up_to_where_it_ends(of_create, tmp_path):
+    whole, bytes_of_it = messages(of_create), of_create.read_bytes()
+    cut, counts = tmp_path / "cut.mcap", []
+    for part in (0.3, 0.4, 0.5, 0.6):  # the rest is the summary
+        cut.write_bytes(bytes_of_it[:int(len(bytes_of_it) * part)])
+        found, channels = [], {}
+        try:
+            for record in StreamReader(open(cut, "rb")).records:
+                if isinstance(record, Channel):
+                    channels[record.id] = record.topic
+                if isinstance(record, Message):
+                    found.append((channels[record.channel_id], record.publish_time, json.loads(record.data)))
+        except (McapError, EOFError):
+            pass  # it says that the end is missing
+        assert found == whole[:len(found)]
+        told = json.loads(rrgate("info", cut, "--json"))
+        assert told["messages"] >= len(found) and "ends at byte" in told["cut"]
+        counts.append(told["messages"])
+    assert counts == sorted(counts) and counts[0] > 0
+    assert json.loads(rrgate("info", of_create, "--json"))["cut"] is None
+
+
+def test_the_real_package_sees_a_replay_as_it_was(node, of_create, tmp_path):
+    """Values of wires in their order and with their time stamps, each of them; properties as they were."""
+    recorded = {topic: [(stamp, document["value"]) for name, stamp, document in messages(of_create) if name == topic]
+                for topic in ("/Create/state", "/Create/packets", "/Create/DistanceTraveled")}
+    with Replay(node, tmp_path, of_create, "--paused") as replay:
+        robot = node.ConnectService(replay.url)
+        states, packets = [], []
+
+        def follow(wire, seen, value_of):
+            connection = wire.Connect()
+            connection.WireValueChanged += lambda _, value, at: seen.append((at.seconds * 10**9 + at.nanoseconds, value_of(value)))
+            return connection
+
+        def state_of(value):
+            return {name: getattr(value, name) for name in recorded["/Create/state"][0][1]}
+
+        connections = [follow(robot.state, states, state_of), follow(robot.packets, packets, lambda value: {
+            "ID": value.ID, "Data": base64.b64encode(bytes(value.Data)).decode()})]
+        replay.control.play()
+        wait_for(lambda: len(states) == len(recorded["/Create/state"]) and len(packets) == len(recorded["/Create/packets"]))
+        assert states == recorded["/Create/state"]
+        assert packets == recorded["/Create/packets"]
+        assert robot.DistanceTraveled == recorded["/Create/DistanceTraveled"][-1][1]
+        with pytest.raises(Exception, match="is not in the recording: this is a replay"):
+            robot.Drive(100, 100)
+        for connection in connections:
+            connection.Close()
+
+
+def test_a_replay_is_steered_by_any_client(node, of_create, tmp_path):
+    states = [document["value"] for name, _, document in messages(of_create) if name == "/Create/state"]
+    with Replay(node, tmp_path, of_create, "--paused", "--speed", "50") as replay:
+        base = replay.url.split("?")[0]
+        control = base + "?service=replay"
+        duration = json.loads(rrgate("get", control, "state", "--json"))["duration"]
+        rrgate("call", control, "seek", duration)
+        assert json.loads(rrgate("get", replay.url, "state", "--json"))["x"] == pytest.approx(states[-1]["x"], abs=0.05)
+        rrgate("call", control, "seek", "0.5")
+        rrgate("call", control, "step", "1")
+        told = json.loads(rrgate("get", control, "state", "--json"))
+        assert 0.5 <= told["position"] < 0.8 and told["speed"] == 50 and told["playing"] is False
+        rrgate("set", control, "loop", "true")
+        rrgate("call", control, "play")
+        assert len(rrgate("watch", replay.url, "state", "--count", "200").splitlines()) == 200
+
+
+def test_a_device_of_the_real_package_is_recorded_and_replayed_to_its_client(node, device, tmp_path):
+    """Pipes, events, properties, and the wire of an object below the root."""
+    path = tmp_path / "device.mcap"
+    recording = Background([RRGATE, "record", device, "-o", path, "--members", "*,axes/3/*", "--interval", "0.1"], tmp_path / "record.log")
+
+    def recorded(topic):
+        table = subprocess.run([RRGATE, "export", path, "--csv", "--member", topic], capture_output=True, text=True).stdout
+        return max(0, table.count("\n") - 1)
+
+    wait_for(lambda: recorded("gain") > 0)
+    for number in (1, 2, 3):
+        rrgate("call", device, "tell", number)
+    wait_for(lambda: recorded("said") == 3)
+    recording.process.send_signal(signal.SIGINT)
+    assert recording.process.wait(10) == 0
+    recording.stop()
+    found = messages(path)
+    said = [document for topic, _, document in found if topic == "/device/said"]
+    assert said == [{"text": 'hello, "you"', "number": number} for number in (1, 2, 3)]
+    angles = [(stamp, document["value"]) for topic, stamp, document in found if topic == "/device/axes/3/angle"]
+    with Replay(node, tmp_path, path, "--paused") as replay:
+        client, heard, poses, turned = node.ConnectService(replay.url), [], [], []
+        client.said += lambda text, number: heard.append({"text": text, "number": number})
+
+        def receive(endpoint):
+            while endpoint.Available:
+                pose = endpoint.ReceivePacket()
+                poses.append((list(pose.position), pose.name))
+
+        client.poses.Connect(-1).PacketReceivedEvent += receive
+        wire = client.get_axes(3).angle.Connect()
+        wire.WireValueChanged += lambda _, value, at: turned.append((at.seconds * 10**9 + at.nanoseconds, value))
+        replay.control.play()
+        wait_for(lambda: len(heard) == 3 and len(poses) == 3 and len(turned) == len(angles))
+        assert heard == said
+        assert poses == [([number, 0.5, -1e-300], f"pose \u00e4 {number}") for number in (1, 2, 3)]
+        assert turned == angles and [value for _, value in angles] == [0.1, 0.2, pytest.approx(0.3)]
+        wait_for(lambda: client.gain == 3)
+
+
+def test_a_replay_stands_behind_a_gateway_as_the_device_did(node, of_create, tmp_path):
+    with Replay(node, tmp_path, of_create, "--loop") as replay:
+        gateway = Gateway(tmp_path, {"devices": [{"name": "create", "url": replay.url, "mode": "shared"}]})
+        gateway.wait_for("device online")
+        url = f"http://127.0.0.1:{gateway.port}/devices/create?service=Create"
+        assert len(rrgate("watch", url, "state", "--count", "3").splitlines()) == 3
+        gateway.process.stop()
+
+
+def test_a_member_is_exported_as_a_table(of_create, tmp_path):
+    states = [(stamp, document["value"]) for name, stamp, document in messages(of_create) if name == "/Create/state"]
+    header, *rows = csv.reader(io.StringIO(rrgate("export", of_create, "--csv", "--member", "state")))
+    assert header[0] == "time" and set(header[1:]) == {f"/{name}" for name in states[0][1]}
+    assert [{name[1:]: float(cell) for name, cell in zip(header[1:], row[1:])} for row in rows] == [
+        {name: float(number) for name, number in state.items()} for _, state in states]
+    assert rows[0][0].endswith(f".{states[0][0] % 10**9:09d}Z")
+    rrgate("export", of_create, "--csv", "--member", "/Create/DistanceTraveled", "-o", tmp_path / "way.csv")
+    assert (tmp_path / "way.csv").read_text().startswith("time,value\n")
+    assert "--member takes one of: " in rrgate("export", of_create, "--csv", code=2)
+    assert "no one member 'nonesuch'" in rrgate("export", of_create, "--csv", "--member", "nonesuch", code=2)
+
+
+def test_a_long_recording_goes_on_in_further_files_and_the_oldest_go(create, tmp_path):
+    rrgate("record", create, "-o", tmp_path / "run.mcap", "--members", "state", "--duration", "3", "--max-size", "0.008", "--keep", "2")
+    files = sorted(tmp_path.glob("run*.mcap"))
+    assert len(files) == 2 and all(file.name != "run.mcap" for file in files)
+    assert all(len(messages(file)) > 0 for file in files)
+
+
+def test_mistakes_are_told(create, of_create, tmp_path):
+    path = tmp_path / "a.mcap"
+    assert "is there already; --force replaces it" in rrgate("record", create, "-o", of_create, "--duration", "1", code=2)
+    assert "Connection refused" in rrgate("record", f"rr+tcp://127.0.0.1:{free_port()}/?service=a", "-o", path, code=3)
+    assert "/no/such/a.mcap: can't be written: No such file" in rrgate("record", create, "-o", "/no/such/a.mcap", code=1)
+    told = rrgate("record", create, "-o", path, "--members", "nonesuch", code=2)
+    assert "'nonesuch': no member to record; " in told and "DistanceTraveled" in told
+    assert not path.exists()
+    path.write_text("no recording")
+    for command in ("info", "replay"):
+        assert "is no MCAP file: begins with" in rrgate(command, path, code=1)
+    assert "can't be read: No such file" in rrgate("info", tmp_path / "none.mcap", code=1)

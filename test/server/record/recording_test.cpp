@@ -1,0 +1,164 @@
+#include <catch2/catch.hpp>
+
+#include "server/record/recording.hpp"
+#include "test/support/folder.hpp"
+#include "test/support/print.hpp"
+
+using namespace rrgate;
+
+namespace {
+
+constexpr const char* definition = R"(service com.x
+stdver 0.10
+enum Mode
+    idle = 0,
+    busy = 1
+end
+struct Pose
+    field double[3] position
+    field Mode mode
+    field Pose{list} history
+end
+object Robot
+    wire Pose pose [readonly]
+    event moved(Pose pose, int32 count)
+    property uint8[] picture
+    property double[2,2] matrix
+end
+)";
+
+struct Recorded {
+  rr::TypeRegistry types;
+  RecordedService service;
+  const rr::EntityDefinition* robot = nullptr;
+
+  Recorded() {
+    REQUIRE(types.add({definition}, rr::RobdefMode::strict));
+    robot = types.find_entity("com.x.Robot");
+    service.service = "Robot";
+    service.url = "rr+tcp://h:1/?service=Robot";
+    service.type = "com.x.Robot";
+    service.node.name = "my.robot";
+    service.definitions = {definition};
+    service.objects = {{"Robot", "com.x.Robot"}};
+  }
+  std::uint16_t add(RecordingWriter& writer, const char* member) {
+    return writer.add_member(service, "Robot", "", *robot->find_member(member), types).value();
+  }
+};
+
+rr::OrderedJson value(int number) {
+  return {{"value", number}};
+}
+
+std::vector<std::string> documents(Recording& recording) {
+  std::vector<std::string> out;
+  for (const auto& chunk : recording.chunks()) {
+    const auto read = recording.read(chunk).value();
+    for (const auto& message : read.messages) out.push_back(recording.read_document(message).value().dump());
+  }
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("a recording tells its services, members, definitions and messages") {
+  const test::Folder folder;
+  Recorded robot;
+  auto writer = RecordingWriter::create(folder.path("a.mcap")).value();
+  robot.service.label = writer.free_label("Robot");
+  CHECK(robot.service.label == "Robot");
+  REQUIRE(writer.add_service(robot.service));
+  CHECK(writer.free_label("Robot") == "Robot-2");
+  const auto pose = robot.add(writer, "pose");
+  const auto moved = robot.add(writer, "moved");
+  REQUIRE(writer.write(pose, value(1), rr::TimeSpec{5, 6}, {10, 0}));
+  REQUIRE(writer.write(moved, {{"pose", nullptr}, {"count", 3}}, {}, {9, 0}));  // the clock was set back
+  REQUIRE(writer.close());
+
+  auto recording = Recording::open(writer.path()).value();
+  REQUIRE(recording.services().size() == 1);
+  CHECK(recording.services()[0].definitions == std::vector<std::string>{definition});
+  CHECK(recording.services()[0].node.name == "my.robot");
+  CHECK(recording.services()[0].objects.at("Robot") == "com.x.Robot");
+  REQUIRE(recording.members().size() == 2);
+  CHECK(recording.members().at(pose).topic == "/Robot/pose");
+  CHECK(recording.members().at(pose).type == "Pose");
+  CHECK(recording.members().at(moved).kind == rr::MemberKind::event);
+  CHECK(recording.members().at(moved).message_count == 1);
+  CHECK(recording.begin() == 10'000'000'000u);
+  CHECK(recording.end() == 10'000'000'000u);
+  CHECK(mcap_time_text(recording.begin()) == "1970-01-01T00:00:10.000000000Z");
+  CHECK(documents(recording) == std::vector<std::string>{R"({"value":1})", R"({"count":3,"pose":null})"});
+  CHECK(recording.read(recording.chunks()[0]).value().messages[0].publish_time == 5'000'000'006u);
+}
+
+TEST_CASE("a file that is large enough is followed by the next, which stands for itself; the oldest go") {
+  const test::Folder folder;
+  Recorded robot;
+  RecordingOptions options;
+  options.max_bytes = 20'000;
+  options.kept_files = 2;
+  auto writer = RecordingWriter::create(folder.path("a.mcap"), options).value();
+  robot.service.label = "Robot";
+  REQUIRE(writer.add_service(robot.service));
+  const auto pose = robot.add(writer, "pose");
+  for (int i = 0; i < 1000; ++i) REQUIRE(writer.write(pose, value(i), {}, {i, 0}));
+  REQUIRE(writer.close());
+  CHECK(writer.message_count() == 1000);
+  CHECK(!std::filesystem::exists(folder.path("a.mcap")));
+  auto last = Recording::open(writer.path()).value();
+  CHECK(documents(last).back() == R"({"value":999})");
+  CHECK(last.services().at(0).type == "com.x.Robot");
+  CHECK(last.size() < 22'000);
+  std::size_t files = 0;
+  for ([[maybe_unused]] const auto& each :
+       std::filesystem::directory_iterator(std::filesystem::path(writer.path()).parent_path()))
+    ++files;
+  CHECK(files == 2);
+}
+
+TEST_CASE("schemas have no references and no choices, as tools read them that plot") {
+  const Recorded robot;
+  const auto pose = recorded_schema(*robot.robot->find_member("pose"), robot.types);
+  const auto text = pose.dump();
+  CHECK(text.find("$ref") == std::string::npos);
+  CHECK(text.find("oneOf") == std::string::npos);
+  const auto& fields = pose["properties"]["value"]["properties"];
+  CHECK(fields["position"]["items"]["type"] == "number");
+  CHECK(fields["mode"]["type"] == "string");
+  CHECK(fields["history"]["type"] == "array");
+  CHECK(recorded_schema(*robot.robot->find_member("moved"), robot.types)["properties"]["count"]["type"] == "integer");
+  const auto picture = recorded_schema(*robot.robot->find_member("picture"), robot.types)["properties"]["value"];
+  CHECK(picture["contentEncoding"] == "base64");
+  const auto matrix = recorded_schema(*robot.robot->find_member("matrix"), robot.types)["properties"]["value"];
+  CHECK(matrix["properties"]["dims"]["type"] == "array");
+}
+
+TEST_CASE("what is no recording says so") {
+  const test::Folder folder;
+  auto writer = McapWriter::create(folder.path("other.mcap"), "another").value();
+  REQUIRE(writer.close());
+  CHECK_THAT(Recording::open(writer.path()).error().message,
+             Catch::Contains("other.mcap: holds no service: has no metadata"));
+  auto foreign = McapWriter::create(folder.path("foreign.mcap"), "another").value();
+  REQUIRE(foreign.add_channel("/camera", "ros1", 0, {}));
+  REQUIRE(foreign.close());
+  CHECK_THAT(Recording::open(foreign.path()).error().message,
+             Catch::Contains("channel at byte") && Catch::Contains("/camera") && Catch::Contains("has no metadata"));
+}
+
+TEST_CASE("a message that is not what it should be names its place") {
+  const test::Folder folder;
+  Recorded robot;
+  auto writer = RecordingWriter::create(folder.path("a.mcap")).value();
+  robot.service.label = "Robot";
+  REQUIRE(writer.add_service(robot.service));
+  const auto pose = robot.add(writer, "pose");
+  REQUIRE(writer.write(pose, {{"other", 1}}, {}, {1, 0}));
+  REQUIRE(writer.close());
+  auto recording = Recording::open(writer.path()).value();
+  const auto read = recording.read(recording.chunks().at(0)).value();
+  CHECK_THAT(recording.read_document(read.messages[0]).error().message,
+             Catch::Contains("a.mcap: /Robot/pose, message 0: has no \"value\""));
+}

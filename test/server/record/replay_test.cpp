@@ -1,0 +1,329 @@
+#include "server/record/replay.hpp"
+
+#include <boost/asio/executor_work_guard.hpp>
+#include <catch2/catch.hpp>
+#include <future>
+#include <thread>
+
+#include "server/record/recorder.hpp"
+#include "test/node/node/node_fixture.hpp"
+#include "test/support/folder.hpp"
+#include "test/support/print.hpp"
+
+using namespace rrgate;
+
+namespace {
+
+constexpr const char* definition = R"(service com.dev
+stdver 0.10
+object Axis
+    wire double angle [readonly]
+end
+object Dev
+    wire int32 count [readonly]
+    wire int32 wanted [writeonly]
+    pipe string words [readonly]
+    event said(string what)
+    property int32 gain
+    function void go()
+    function double{generator} steps()
+    objref Axis{string} axes
+    memory double[] samples
+end
+)";
+
+constexpr int values = 5;
+
+/// A device that tells something of each of its members, each time it is asked to.
+struct Device {
+  std::shared_ptr<rr::Service> service = rr::Service::from_text({definition}, "Dev", "Dev");
+  std::shared_ptr<rr::Object> axis = service->make_object("Axis");
+  std::int32_t gain = 0;
+  std::unique_ptr<rr::RunningNode> node;
+
+  Device() {
+    service->property("gain").get([this] { return gain; }).set([this](std::int32_t value) { gain = value; });
+    service->function("go", [] {});
+    service->generator("steps", [] { return rr::Generator{}; });
+    service->objref("axes", [this](std::string_view index) { return index == "x y" ? axis : nullptr; });
+    node = std::make_unique<rr::RunningNode>([this](rr::Node& added) { added.add(service); }, rr::NodeOptions{},
+                                             "dev.node");
+  }
+  void tell(std::int32_t number) {
+    node->ask([&](rr::Node&) {
+      gain = number;
+      service->set_wire("count", number);
+      (void)service->pipe("words").broadcast("w" + std::to_string(number));
+      service->fire("said", "s" + std::to_string(number));
+      axis->set_wire("angle", number * 0.5);
+      return 0;
+    });
+  }
+};
+
+/// Runs `io` until it is so, for five seconds at most.
+template <class Is>
+bool run_until(boost::asio::io_context& io, const Is& is) {
+  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(5);
+  while (!is() && std::chrono::steady_clock::now() < until) {
+    io.restart();
+    io.run_one_for(std::chrono::milliseconds(20));
+  }
+  return is();
+}
+
+struct Recorded {
+  std::string path;
+  std::vector<std::string> problems = {};
+  rr::Result<> begun = {};
+};
+
+Recorded record(const test::Folder& folder, const std::vector<std::string>& members) {
+  Device device;
+  boost::asio::io_context io(1);
+  auto writer = RecordingWriter::create(folder.path("dev.mcap")).value();
+  Recorded out{writer.path()};
+  bool has_begun = false;
+  Recorder::Listener listener;
+  listener.begun = [&](const rr::Result<>& outcome) {
+    out.begun = outcome;
+    has_begun = true;
+  };
+  listener.problem = [&](const std::string& problem) { out.problems.push_back(problem); };
+  listener.failed = [&](const rr::Error& error) { out.problems.push_back(error.message); };
+  const RecorderOptions how{members, std::chrono::milliseconds(1)};
+  const auto recorder = std::make_shared<Recorder>(io, writer, how, listener);
+  recorder->start(device.node->url("Dev"), {});
+  REQUIRE(run_until(io, [&] { return has_begun; }));
+  for (std::int32_t i = 1; out.begun && i <= values; ++i) {
+    const auto before = writer.message_count();
+    device.tell(i);
+    run_until(io, [&] { return writer.message_count() > before + 10; });  // four, and readings of the property
+  }
+  recorder->close();
+  run_until(io, [] { return false; });
+  REQUIRE(writer.close());
+  return out;
+}
+
+/// A replay on a thread of its own.
+class RunningReplay {
+ public:
+  explicit RunningReplay(const std::string& path) {
+    ReplayOptions options;
+    options.report = [this](const std::string& problem) { problems_.push_back(problem); };
+    replay_.emplace(io_, Recording::open(path).value(), options);
+    thread_ = std::thread([this] { io_.run(); });
+  }
+  ~RunningReplay() {
+    boost::asio::post(io_, [this] { replay_->stop(); });
+    boost::asio::post(io_, [this] { work_.reset(); });
+    thread_.join();
+  }
+  const std::string& url() const { return replay_->urls().at(0); }
+  std::string control_url() const { return url().substr(0, url().find('?')) + "?service=replay"; }
+  const std::vector<std::string>& problems() const { return problems_; }
+
+ private:
+  boost::asio::io_context io_{1};
+  boost::asio::executor_work_guard<boost::asio::io_context::executor_type> work_{io_.get_executor()};
+  std::vector<std::string> problems_;
+  std::optional<Replay> replay_;
+  std::thread thread_;
+};
+
+using Stamped = std::pair<rr::TimeSpec, double>;
+
+/// Of a channel of the file.
+std::vector<Stamped> recorded_values(const std::string& path, const std::string& topic) {
+  auto recording = Recording::open(path).value();
+  std::vector<Stamped> out;
+  for (const auto& chunk : recording.chunks()) {
+    const auto read = recording.read(chunk).value();
+    for (const auto& message : read.messages)
+      if (recording.members().at(message.channel).topic == topic)
+        out.push_back({{static_cast<std::int64_t>(message.publish_time / 1'000'000'000u),
+                        static_cast<std::int32_t>(message.publish_time % 1'000'000'000u)},
+                       recording.read_document(message).value()["value"].get<double>()});
+  }
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("what was recorded is replayed: the same values, in their order, with their time stamps") {
+  const test::Folder folder;
+  const auto recorded = record(folder, {"*", "axes/x%20y/*"});
+  CHECK(recorded.problems.empty());
+  const auto counts = recorded_values(recorded.path, "/Dev/count");
+  const auto angles = recorded_values(recorded.path, "/Dev/axes/x y/angle");
+  REQUIRE(counts.size() == values);
+  REQUIRE(angles.size() == values);
+
+  const RunningReplay replay(recorded.path);
+  auto dev = rr::connect(replay.url());
+  auto control = rr::connect(replay.control_url());
+  CHECK(dev.type_name() == "com.dev.Dev");
+  std::vector<Stamped> heard_counts;
+  std::vector<Stamped> heard_angles;
+  std::vector<std::string> words;
+  std::vector<std::string> said;
+  // Each value, not the newest alone: as a program that reads in time.
+  auto& connection = dev.connection();
+  const auto axis = dev.object("axes", "x y");
+  const auto follow = [&](const rr::RemoteObject& object, const std::string& wire, std::vector<Stamped>& heard) {
+    connection.wait_for([&](rr::ClientConnection& session, auto done) {
+      session.connect_wire(
+          object.path(), wire,
+          [&heard](const rr::Value& value, rr::TimeSpec time) { heard.emplace_back(time, *value.to<double>()); },
+          std::move(done));
+    });
+  };
+  follow(dev, "count", heard_counts);
+  follow(axis, "angle", heard_angles);
+  dev.connect_pipe("words", [&](const rr::Value& word) { words.emplace_back(*word.to_text()); });
+  dev.on_event("said", [&](std::span<const rr::Value> arguments) { said.emplace_back(*arguments.front().to_text()); });
+  control.call("play");
+  connection.run_until([&] { return heard_angles.size() == values && said.size() == values && words.size() == values; },
+                       std::chrono::seconds(10));
+  CHECK(heard_counts == counts);
+  CHECK(heard_angles == angles);
+  CHECK(words == std::vector<std::string>{"w1", "w2", "w3", "w4", "w5"});
+  CHECK(said == std::vector<std::string>{"s1", "s2", "s3", "s4", "s5"});
+  control.call("step", Player::max_step);  // what is left: readings of the property
+  CHECK(dev.get("gain").to<double>().value() == recorded_values(recorded.path, "/Dev/gain").back().second);
+  CHECK(replay.problems().empty());
+}
+
+TEST_CASE("members that were not recorded say that this is a replay") {
+  const test::Folder folder;
+  const auto recorded = record(folder, {"count", "gain"});
+  const RunningReplay replay(recorded.path);
+  auto dev = rr::connect(replay.url());
+  const auto refusal = [&](const auto& ask) {
+    const auto error = rr::error_of(ask);
+    CHECK(error.code == rr::ErrorCode::not_implemented_error);
+    CHECK_THAT(error.message, Catch::Contains("is not in the recording: this is a replay of " + recorded.path));
+  };
+  refusal([&] { dev.call("go"); });
+  refusal([&] { dev.set("gain", 3); });
+  refusal([&] { dev.object("axes", "x y"); });
+  refusal([&] { dev.generator("steps"); });
+  refusal([&] { (void)dev.memory("samples").dimensions(); });
+  CHECK(rr::error_of([&] { dev.get("gain"); }).code == rr::ErrorCode::value_not_set);
+  CHECK(rr::error_of([&] { dev.peek_in("count"); }).code == rr::ErrorCode::value_not_set);
+}
+
+TEST_CASE("a replay is moved, stepped, sped up and played again, and time stamps go on") {
+  const test::Folder folder;
+  const auto recorded = record(folder, {"count"});
+  const auto counts = recorded_values(recorded.path, "/Dev/count");
+  const RunningReplay replay(recorded.path);
+  auto dev = rr::connect(replay.url());
+  auto control = rr::connect(replay.control_url());
+  std::vector<Stamped> heard;
+  dev.connect_wire("count",
+                   [&](const rr::Value& value, rr::TimeSpec time) { heard.emplace_back(time, *value.to<double>()); });
+  const auto wait_for = [&](double value) {
+    return dev.connection().run_until([&] { return !heard.empty() && heard.back().second == value; },
+                                      std::chrono::seconds(5));
+  };
+  const auto field = [&](const char* name) {
+    const auto state = control.peek_in("state");
+    return *state.get_if<rr::Structure>()->find(name);
+  };
+  control.call("step", 1u);
+  REQUIRE(wait_for(1));
+  control.call("step", 1u);
+  REQUIRE(wait_for(2));
+  CHECK(heard == std::vector<Stamped>(counts.begin(), counts.begin() + 2));
+  const auto duration = *field("duration").to<double>();
+  control.call("seek", duration);
+  REQUIRE(wait_for(4));  // what it was before the last message
+  control.call("step", 10u);
+  REQUIRE(wait_for(5));
+  CHECK(*field("position").to<double>() == Approx(duration));
+  CHECK(!*field("playing").to<bool>());
+
+  control.call("seek", 0.0);
+  control.set("speed", 100.0);
+  const auto before = heard.back().first;
+  heard.clear();
+  control.call("play");
+  REQUIRE(wait_for(5));
+  CHECK(std::is_sorted(heard.begin(), heard.end()));
+  CHECK(heard.front().first > before);
+
+  control.set("loop", true);
+  heard.clear();
+  control.call("play");
+  REQUIRE(wait_for(1));
+  REQUIRE(wait_for(5));
+  REQUIRE(wait_for(1));  // again
+  control.call("pause");
+  CHECK(!*field("playing").to<bool>());
+  CHECK(*field("loop").to<bool>());
+
+  CHECK_THAT(rr::error_of([&] { control.call("seek", -1.0); }).message, Catch::Contains("expected 0 to"));
+  CHECK_THAT(rr::error_of([&] { control.set("speed", 0.0); }).message, Catch::Contains("expected 0.001 to 1000"));
+  CHECK_THAT(rr::error_of([&] { control.call("step", 10'001u); }).message, Catch::Contains("expected 10000 at most"));
+  CHECK(control.get("file").to_text().value() == recorded.path);
+}
+
+TEST_CASE("what can't be recorded is told, and the rest recorded") {
+  const test::Folder folder;
+  const auto some = record(folder, {"count", "nonesuch", "axes/y/angle", "go"});
+  REQUIRE(some.begun);
+  REQUIRE(some.problems.size() == 3);
+  CHECK_THAT(some.problems[0], Catch::Contains("nonesuch: no member to record; com.dev.Dev has: count, words, said"));
+  CHECK_THAT(some.problems[1], Catch::Contains("axes/y/angle: "));
+  const test::Folder other;
+  const auto none = record(other, {"axes/x"});
+  REQUIRE(!none.begun);
+  CHECK_THAT(none.begun.error().message, Catch::Contains("'axes/x': objref 'axes' needs an index"));
+}
+
+TEST_CASE("a recording whose parts do not go together is not served") {
+  const test::Folder folder;
+  rr::TypeRegistry types;
+  REQUIRE(types.add({definition}, rr::RobdefMode::strict));
+  const auto refusal = [&](const std::function<void(RecordedService&)>& spoil) {
+    auto writer = RecordingWriter::create(folder.path("bad.mcap")).value();
+    RecordedService service{"Dev", "rr+tcp://h/?service=Dev", "Dev", "com.dev.Dev"};
+    service.definitions = {definition};
+    service.objects = {{"Dev", "com.dev.Dev"}, {"Dev.axes[x]", "com.dev.Axis"}};
+    const auto* angle = types.find_entity("com.dev.Axis")->find_member("angle");
+    const auto before = service;
+    spoil(service);
+    REQUIRE(writer.add_service(service));
+    REQUIRE(writer.add_member(before, "Dev.axes[x]", "axes/x", *angle, types));
+    REQUIRE(writer.close());
+    boost::asio::io_context io;
+    try {
+      const Replay replay(io, Recording::open(writer.path()).value(), {});
+    } catch (const std::exception& problem) {
+      return std::string(problem.what());
+    }
+    return std::string("served");
+  };
+  CHECK(refusal([](auto&) {}) == "served");
+  {
+    boost::asio::io_context io;
+    ReplayOptions options;
+    for (const auto* listen : {"rr+tcp:/1", "rr+tcp://127.0.0.1", "rr+local:///", "tcp://127.0.0.1:1"}) {
+      options.listen = listen;
+      CHECK_THROWS_WITH(Replay(io, Recording::open(folder.path("bad.mcap")).value(), options),
+                        Catch::Contains("expected \"rr+tcp://HOST:PORT\""));
+    }
+  }
+  CHECK_THAT(refusal([](auto& service) { service.definitions = {"service com.dev\nobject Dev\n"}; }),
+             Catch::Contains("bad.mcap: service \"Dev\"") || Catch::Contains("bad.mcap: service 'Dev'"));
+  CHECK_THAT(refusal([](auto& service) { service.type = "com.dev.Other"; }), Catch::Contains("com.dev.Other"));
+  CHECK_THAT(refusal([](auto& service) { service.objects.erase("Dev.axes[x]"); }),
+             Catch::Contains("Dev.axes[x]") && Catch::Contains("is not in the recording"));
+  CHECK_THAT(refusal([](auto& service) { service.objects["Dev.nonesuch[x]"] = "com.dev.Axis"; }),
+             Catch::Contains("nonesuch"));
+  CHECK_THAT(refusal([](auto& service) { service.objects["Dev.axes[x].axes[y]"] = "com.dev.Axis"; }),
+             Catch::Contains("axes"));
+  CHECK_THAT(refusal([](auto& service) { service.node.name = "not a name"; }), Catch::Contains("not a name"));
+}
