@@ -46,12 +46,14 @@ Bytes build_bytes(const nlohmann::json& vector) {
   if (vector.contains("hex")) return from_hex(vector["hex"].get<std::string>());
   Bytes bytes;
   for (const auto& part : vector["recipe"]) {
-    if (part.contains("nested_lists"))
+    if (part.contains("nested_lists")) {
       append(bytes, nested_lists(part["nested_lists"], vector["version"]));
-    else if (part.contains("repeat"))
-      for (std::size_t i = 0; i < part["count"]; ++i) append(bytes, from_hex(part["repeat"].get<std::string>()));
-    else
+    } else if (part.contains("repeat")) {
+      const auto repeated = from_hex(part["repeat"].get<std::string>());
+      for (auto left = part["count"].get<std::size_t>(); left > 0; --left) append(bytes, repeated);
+    } else {
       append(bytes, from_hex(part["hex"].get<std::string>()));
+    }
   }
   return bytes;
 }
