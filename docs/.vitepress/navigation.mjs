@@ -29,6 +29,7 @@ export const makeSidebar = (decisions) => [
     ["Devices from the command line", "/command-line"],
     ["Shared devices", "/shared-sessions"],
     ["Leases", "/leases"],
+    ["Devices for agents", "/mcp"],
     ["Discovery", "/discovery"],
   ]),
   group("Security", [
