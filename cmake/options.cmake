@@ -10,6 +10,12 @@ if(PROJECT_IS_TOP_LEVEL)
     "$<BUILD_INTERFACE:-Wall;-Wextra;-Wpedantic;-Wshadow;-Wconversion;-Wno-sign-conversion;-Wno-missing-field-initializers>")
 endif()
 
+# Where functions of other libraries are is looked up at the start, and cannot be written over afterwards. Compilers of Debian
+# make programs that lie anywhere in memory by themselves; test/server/process_test.py checks what came of both.
+if(NOT EMSCRIPTEN)
+  target_link_options(rr_options INTERFACE "$<BUILD_INTERFACE:-Wl,-z,relro,-z,now,-z,noexecstack>")
+endif()
+
 set(RR_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize= (address,undefined or thread)")
 if(RR_SANITIZE)
   target_compile_options(rr_options INTERFACE -fsanitize=${RR_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)

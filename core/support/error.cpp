@@ -7,6 +7,7 @@
 #endif
 
 #include "core/support/hex.hpp"
+#include "core/support/utf8.hpp"
 
 namespace rr {
 
@@ -129,13 +130,17 @@ void throw_exception_from_error(const Error& error, const boost::source_location
 
 std::string quote(std::string_view text, std::size_t limit) {
   std::string out = "'";
-  for (const char character : text.substr(0, limit)) {
-    const auto byte = static_cast<unsigned char>(character);
-    if (byte < 0x20 || byte == 0x7f) {
+  for (auto rest = text.substr(0, limit); !rest.empty();) {
+    const auto size = utf8_character_size(rest);
+    const auto byte = static_cast<unsigned char>(rest.front());
+    const bool is_c1 = size == 2 && byte == 0xc2 && static_cast<unsigned char>(rest[1]) < 0xa0;
+    if (size == 0 || byte < 0x20 || byte == 0x7f || is_c1) {
       out += "\\x" + hex_text(byte, 2);
+      rest.remove_prefix(1);
     } else {
-      if (character == '\'' || character == '\\') out += '\\';
-      out += character;
+      if (byte == '\'' || byte == '\\') out += '\\';
+      out += rest.substr(0, size);
+      rest.remove_prefix(size);
     }
   }
   out += '\'';

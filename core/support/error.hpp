@@ -88,7 +88,7 @@ using Result = boost::system::result<T, Error>;
 /// Called by Result::value() when it holds an error: a programming mistake in core, which checks first.
 [[noreturn]] void throw_exception_from_error(const Error& error, const boost::source_location& location);
 
-/// Untrusted text for a message: quoted, control characters escaped, cut after `limit` bytes.
+/// Untrusted text for a message: quoted, cut after `limit` bytes; control characters and what is no UTF-8 escaped.
 std::string quote(std::string_view text, std::size_t limit = 60);
 
 inline Error make_error(ErrorCode code, std::string message) {

@@ -1,13 +1,8 @@
 #include "core/support/utf8.hpp"
 
-#include <cstddef>
-
 namespace rr {
 
-namespace {
-
-/// Bytes of the character that `text` begins with; 0: it begins with none.
-std::size_t character_size(std::string_view text) {
+std::size_t utf8_character_size(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const auto first = byte(0);
   if (first < 0x80) return 1;
@@ -21,11 +16,9 @@ std::size_t character_size(std::string_view text) {
   return size;
 }
 
-}  // namespace
-
 bool is_utf8(std::string_view text) {
   while (!text.empty()) {
-    const std::size_t size = character_size(text);
+    const std::size_t size = utf8_character_size(text);
     if (size == 0) return false;
     text.remove_prefix(size);
   }

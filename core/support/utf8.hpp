@@ -1,11 +1,15 @@
 // UTF-8: whether text is, and code points as. Layer: support. Source: Unicode 15, table 3-7; RFC 3629.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
 
 namespace rr {
+
+/// Bytes of the character that `text`, which is not empty, begins with; 0: it begins with none.
+std::size_t utf8_character_size(std::string_view text);
 
 /// The shortest form of each character, no surrogates, nothing above U+10FFFF. Empty text is UTF-8.
 bool is_utf8(std::string_view text);

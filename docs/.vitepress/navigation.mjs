@@ -53,6 +53,7 @@ export const makeSidebar = (decisions) => [
   group("Help", [
     ["Troubleshooting", "/troubleshooting"],
     ["Comparison", "/comparison"],
+    ["Benchmarks", "/benchmarks"],
   ]),
   group(
     "Inside",

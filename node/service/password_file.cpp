@@ -79,6 +79,12 @@ Result<> PasswordFileAuthenticator::check_node(const LoginAttempt& attempt, cons
   return {};
 }
 
+std::vector<std::string> PasswordFileAuthenticator::names() const {
+  std::vector<std::string> out;
+  for (const auto& [name, user] : users_) out.push_back(name);
+  return out;
+}
+
 std::optional<PasswordFileAuthenticator::Entry> PasswordFileAuthenticator::find(std::string_view name) const {
   const auto found = users_.find(name);
   if (found == users_.end()) return std::nullopt;

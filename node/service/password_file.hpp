@@ -46,6 +46,7 @@ class PasswordFileAuthenticator final : public Authenticator {
   };
   /// nullopt: there is no user of this name.
   std::optional<Entry> find(std::string_view name) const;
+  std::vector<std::string> names() const;
 
  private:
   struct User {

@@ -193,6 +193,30 @@ void Access::record_tokens(const AccessState& before, const AccessState& now) {
       tell("token_changed", name, roles);
 }
 
+void Access::record_users(const AccessState& before, const AccessState& now) {
+  using Users = rr::PasswordFileAuthenticator;
+  const auto tell = [this](std::string_view event, const std::string& name, const Users::Entry& of,
+                           bool is_other = false) {
+    const auto detail = name + ": roles " + format_roles(of.privileges) + (is_other ? ", another password" : "");
+    record({.event = event, .detail = detail});
+  };
+  const auto find = [](const AccessState& state, const std::string& name) {
+    return state.users ? state.users->find(name) : std::nullopt;
+  };
+  if (before.users)
+    for (const auto& name : before.users->names())
+      if (!find(now, name)) tell("user_removed", name, *find(before, name));
+  if (!now.users) return;
+  for (const auto& name : now.users->names()) {
+    const auto is = *find(now, name);
+    const auto was = find(before, name);
+    if (!was)
+      tell("user_added", name, is);
+    else if (was->hash != is.hash || was->privileges != is.privileges)
+      tell("user_changed", name, is, was->hash != is.hash);
+  }
+}
+
 void Access::take(AccessStatePtr next) {
   if (next->ticket_key != state_->ticket_key) {
     const auto key = next->ticket_key.empty() ? rr::random_bytes(min_ticket_key) : next->ticket_key;
@@ -233,6 +257,7 @@ void Access::reload(bool is_forced) {
         {{"error", loaded.error().message}});
     return;
   }
+  record_users(*state_, **loaded);
   record_tokens(*state_, **loaded);
   take(std::move(*loaded));
   if (has_files) log(LogLevel::info, "users and rights read anew", {{"files", seen_.size()}});
@@ -343,6 +368,7 @@ std::optional<Identity> Access::renew(const Identity& who) const {
       break;
     }
     case Proof::jwt:
+    case Proof::oidc:
       if (!state_->jwt) return std::nullopt;
       break;
     case Proof::certificate:
@@ -360,13 +386,22 @@ void Access::record_refusal(const AuditEvent& event) {
     record(event);
 }
 
+void Access::record_too_much(const Identity& who, const AccessRequest* what, std::string_view why) {
+  if (too_much_.note(network_name_of(who.client), std::chrono::steady_clock::now()))
+    record({.event = "refused", .who = &who, .what = what, .detail = why, .outcome = Outcome::refused});
+}
+
 void Access::tend_audit(bool is_forced) {
-  for (const auto& [network, count] : refusals_.take(std::chrono::steady_clock::now(), is_forced)) {
-    Identity strangers;
-    strangers.client = network.empty() ? "other networks" : network;
-    const auto detail = std::to_string(count) + " more within a minute";
-    record({.event = "refusals", .who = &strangers, .detail = detail, .outcome = Outcome::refused});
-  }
+  const auto tell = [&](RefusalDigest& digest, const std::string& why) {
+    for (const auto& [network, count] : digest.take(std::chrono::steady_clock::now(), is_forced)) {
+      Identity clients;
+      clients.client = network.empty() ? "other networks" : network;
+      const auto detail = std::to_string(count) + " more within a minute" + why;
+      record({.event = "refusals", .who = &clients, .detail = detail, .outcome = Outcome::refused});
+    }
+  };
+  tell(refusals_, "");
+  tell(too_much_, ", asked for too often");
   const auto state = audit_->state();
   const bool is_failing = !state.failure.empty();
   if (is_failing == std::exchange(is_failing_, is_failing)) return;

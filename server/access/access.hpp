@@ -110,6 +110,9 @@ class Access {
   void record(const AuditEvent& event) { audit_->add(event); }
   /// The same for what was refused: of those who have not proven who they are, one of a network a minute.
   void record_refusal(const AuditEvent& event);
+  /// The same for what was asked for too often, also of those who have proven who they are. `what`  null: not known
+  /// yet.
+  void record_too_much(const Identity& who, const AccessRequest* what, std::string_view why);
   /// Writes how many refusals were left out, where a minute is over, and tells the gateway's log where the audit log
   /// can't be written, or can again. To be called now and then.
   void tend_audit(bool is_forced = false);
@@ -120,7 +123,8 @@ class Access {
 
   explicit Access(const AccessConfig& config, const rr::Bytes& key);
   void take(AccessStatePtr next);
-  /// What has come into the tokens file, and what has gone from it.
+  /// What has come into the users file, and what has gone from it; the same of the tokens file.
+  void record_users(const AccessState& before, const AccessState& now);
   void record_tokens(const AccessState& before, const AccessState& now);
 
   AccessStatePtr state_;
@@ -132,6 +136,7 @@ class Access {
   Tickets tickets_;
   SignIns sign_ins_;
   RefusalDigest refusals_;
+  RefusalDigest too_much_;
   bool is_failing_ = false;  ///< the audit log, as far as the log has been told
 };
 

@@ -1,6 +1,7 @@
 #include "server/access/audit_file.hpp"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -93,12 +94,19 @@ rr::Result<> AuditFile::reopen() {
   if (!opened) return opened.error();
   struct stat about {};
   ::fstat(*opened, &about);
+  const bool is_regular = S_ISREG(about.st_mode);
+  if (is_regular && head_ < 0)
+    if (const auto head = open_file(config_.file + ".head", O_RDWR)) head_ = *head;
+  // Whoever adds to it without knowing of the other breaks the chain of both.
+  if (is_regular && ::flock(head_ >= 0 ? head_ : *opened, LOCK_EX | LOCK_NB) != 0) {
+    ::close(*opened);
+    return rr::make_error(rr::ErrorCode::io_error, "audit file " + rr::quote(config_.file, 200) +
+                                                       ": another gateway writes it; expected one for each file");
+  }
   if (const int old = std::exchange(file_, *opened); old >= 0) ::close(old);
-  is_regular_ = S_ISREG(about.st_mode);
+  is_regular_ = is_regular;
   size_ = is_regular_ ? static_cast<std::uint64_t>(about.st_size) : 0;
   if (size_ == 0) is_new_ = begins_line_ = true;
-  if (!is_regular_ || head_ >= 0) return {};
-  if (const auto head = open_file(config_.file + ".head", O_RDWR)) head_ = *head;
   return {};
 }
 

@@ -15,8 +15,9 @@ namespace rrgate {
 /// the last record: what is cut off the end of FILE is missed when it is verified, and by the next start.
 class AuditFile {
  public:
-  /// Opens the file with mode 0600, made where it is not there, and finds where its chain has got to.
-  /// Errors   io_error: can't be opened.
+  /// Opens the file with mode 0600, made where it is not there, and finds where its chain has got to. While it is open,
+  /// no other process can.
+  /// Errors   io_error: can't be opened, or another gateway has it open.
   static rr::Result<AuditFile> open(const AuditConfig& config);
   AuditFile() = default;
   AuditFile(AuditFile&& other) noexcept { *this = std::move(other); }

@@ -15,13 +15,14 @@ enum class Proof : std::uint8_t {
   none,         ///< anonymous
   password,     ///< of the users file: HTTP Basic, a login of Robot Raconteur
   token,        ///< an API token
-  jwt,          ///< a JSON Web Token
+  jwt,          ///< a JSON Web Token, by a key of the gateway's files
   certificate,  ///< of a TLS client
   proxy,        ///< a trusted proxy says so
+  oidc,         ///< a JSON Web Token, by a key that its issuer publishes
 };
 
 constexpr std::string_view to_string(Proof proof) {
-  constexpr std::string_view names[] = {"none", "password", "token", "jwt", "certificate", "proxy"};
+  constexpr std::string_view names[] = {"none", "password", "token", "jwt", "certificate", "proxy", "oidc"};
   return names[static_cast<std::size_t>(proof)];
 }
 

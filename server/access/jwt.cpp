@@ -159,6 +159,7 @@ rr::Result<JwtVerifier> JwtVerifier::from_published(std::string_view text, JwtCl
   auto out = from_jwks(text, std::move(claims));
   if (!out) return out;
   std::erase_if(out->keys_, [](const Key& key) { return key.key.algorithm() == rr::SignatureAlgorithm::hs256; });
+  out->proof_ = Proof::oidc;
   if (out->keys_.empty()) return unusable_key_set("no key can be used: a secret that is published is none");
   return out;
 }
@@ -218,7 +219,7 @@ rr::Result<Identity> JwtVerifier::verify(std::string_view token, std::chrono::sy
   if (user && user->is_string()) out.name = user->get<std::string>();
   if (out.name.empty()) return refused("it names no user (" + rr::quote(claims_.user_claim) + ")");
   out.roles = out.proven_roles = read_roles(find_claim(*claims, claims_.roles_claim));
-  out.proof = Proof::jwt;
+  out.proof = proof_;
   out.ends = end_of(*claims);
   return out;
 }

@@ -53,6 +53,7 @@ class JwtVerifier {
   rr::Result<> check_signature(std::string_view signed_part, std::string_view header, rr::ByteSpan signature) const;
 
   JwtClaims claims_;
+  Proof proof_ = Proof::jwt;
   std::vector<Key> keys_;
 };
 

@@ -34,7 +34,8 @@ struct DemoDevice {
   std::string_view name;
   std::string_view program;
   std::string_view service;
-  DeviceMode mode = DeviceMode::relay;
+  LeaseConfig leases = {};
+  std::vector<CallbackRule> callbacks = {};
   std::string path = {};
   std::uint16_t port = 0;
   std::vector<std::string> arguments = {};
@@ -57,9 +58,14 @@ struct DemoSystem {
 
 /// The first is the one that is run where none is named.
 std::vector<DemoSystem> list_systems() {
-  // The robot stops when the client that drives it is gone: it must see each client. Frames are the same for all.
-  const DemoDevice create{"create", "rrgate-demo-create", "Create"};
-  const DemoDevice webcams{"webcams", "rrgate-demo-webcams", "Webcam", DeviceMode::shared};
+  // Whoever drives it under a lease and goes away leaves a robot that stands.
+  const LeaseConfig leases{true,
+                           {{"Create.StartStreaming", LeaseNeed::never}},
+                           {{SafeAction::Kind::call, "Create", "Drive", "[0, 0]"}},
+                           {"*"}};
+  const DemoDevice create{
+      "create", "rrgate-demo-create", "Create", leases, {{"Create.play_callback", CallbackPolicy::first}}};
+  const DemoDevice webcams{"webcams", "rrgate-demo-webcams", "Webcam"};
   return {{"create", "a mobile robot in a room, and two cameras that ride on it", {create, webcams}},
           {"webcams", "two cameras that stand in a room", {webcams}}};
 }
@@ -230,7 +236,9 @@ Config make_config(const std::vector<DemoDevice>& devices, std::uint16_t port, c
   }
   for (const auto& device : devices) {
     DeviceConfig each{std::string(device.name), rr::parse_url(device.url()).value()};
-    each.mode = device.mode;
+    each.mode = DeviceMode::shared;
+    each.leases = device.leases;
+    each.callbacks = device.callbacks;
     config.devices.push_back(std::move(each));
   }
   config.retry.min = milliseconds(200);

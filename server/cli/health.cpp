@@ -75,7 +75,7 @@ int ask_health(const HealthOptions& options) {
 
 void add_health(Commands& commands) {
   const auto [app, options] = commands.add("health", "Ask a running gateway whether it is well", ask_health);
-  app.add_option("HOST:PORT", options.address, "Where it listens")
+  app.add_option("ADDRESS", options.address, "Where it listens")
       ->capture_default_str()
       ->option_text("[127.0.0.1:8080]");
   app.add_flag("--ready", options.asks_ready, "Whether it also reaches its devices");

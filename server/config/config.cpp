@@ -8,6 +8,7 @@
 #include <set>
 #include <sstream>
 
+#include "core/support/glob.hpp"
 #include "node/http/origin.hpp"
 #include "node/transport/schemes.hpp"
 #include "server/config/access_options.hpp"
@@ -452,6 +453,31 @@ std::vector<OptionInfo> config_options() {
   Config config;
   read_config(root, config);
   return options;
+}
+
+namespace {
+
+/// "Create.arm[0].stop" as "Create.arm.0.stop".
+std::string dotted(std::string_view place) {
+  std::string out;
+  for (const auto c : place)
+    if (c != ']') out += c == '[' ? '.' : c;
+  return out;
+}
+
+}  // namespace
+
+LeaseNeed LeaseConfig::need_of(std::string_view member) const {
+  const auto rule = std::find_if(members.begin(), members.end(),
+                                 [&](const auto& each) { return rr::glob_matches(each.member, member); });
+  return rule == members.end() ? LeaseNeed::covered : rule->need;
+}
+
+bool LeaseConfig::is_urgent(std::string_view place) const {
+  const auto name = dotted(place);
+  const auto rule = std::find_if(members.begin(), members.end(),
+                                 [&](const auto& each) { return rr::glob_matches(dotted(each.member), name); });
+  return is_offered && rule != members.end() && rule->need == LeaseNeed::never;
 }
 
 }  // namespace rrgate

@@ -7,6 +7,7 @@
 #include "server/access/standing.hpp"
 #include "server/front/refused_client.hpp"
 #include "server/front/serve_shared_client.hpp"
+#include "server/http/endpoints/objects.hpp"
 #include "server/http/response_writer.hpp"
 #include "server/log/log.hpp"
 #include "server/mcp/mcp_endpoint.hpp"
@@ -329,7 +330,10 @@ rr::awaitable<Continuation> serve_http_client(GatewayState& gateway, Connection&
     admitted.refusal = refuse_page(gateway, request);
     if (!admitted.refusal) admitted.refusal = require_tls(gateway, request);
     if (!admitted.refusal && !is_refused && is_guarded(request)) {
-      admitted = co_await gateway.http_access().admit(request, connection, config);
+      const auto urgent = find_urgent(gateway, request);
+      const AccessRequest wanted{.device = urgent.device, .service = urgent.service};
+      admitted =
+          co_await gateway.http_access().admit(request, connection, config, urgent.device.empty() ? nullptr : &wanted);
       if (admitted.refusal) gateway.reject(rejection_of(admitted.refusal->status));
     }
     auto memory = gateway.memory().charge(network_name(request.arrival.address));
@@ -359,7 +363,9 @@ rr::awaitable<Continuation> serve_http_client(GatewayState& gateway, Connection&
     if (response.answer_later) {
       const auto standing = std::make_shared<Standing>(gateway.access(), request.identity);
       // Streams, and requests that are not whole yet, end with what the client has shown; what is at work is answered.
-      connection.is_good = [standing, &writer] { return writer.is_at_work() || standing->is_good(); };
+      connection.is_good = [standing, &writer] {
+        return writer.is_at_work() || (standing->is_good() && writer.may_go_on());
+      };
       const Unjudged after{connection};
       co_await response.answer_later(writer);
       if (writer.body_failure()) note_unreadable(gateway, connection, *writer.body_failure());

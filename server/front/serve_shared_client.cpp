@@ -67,6 +67,15 @@ struct SharedPass : rr::RequestPass {
   AuditEntryPtr entry;
 };
 
+/// An emergency stop, and the like: it passes where others are refused because there were too many.
+bool is_urgent(GatewayState& gateway, const std::string& device_name, const rr::MemberAccess& wanted) {
+  const bool is_command = wanted.type == rr::EntryType::function_call_req ||
+                          wanted.type == rr::EntryType::property_set_req ||
+                          wanted.type == rr::EntryType::wire_poke_out_value_req;
+  const auto* device = is_command && wanted.member ? gateway.devices().find(device_name) : nullptr;
+  return device && device->config().leases.is_urgent(std::string(wanted.path) + "." + wanted.member->name);
+}
+
 /// How much a client may ask for, whoever he logs in as meanwhile.
 auto make_entrance(GatewayState& gateway, const SharedNode& node, const Connection& connection,
                    std::shared_ptr<SessionRights> rights) {
@@ -74,19 +83,21 @@ auto make_entrance(GatewayState& gateway, const SharedNode& node, const Connecti
   return [&gateway, &node, memory, rights = std::move(rights), network = connection.network,
           shown = connection.identity.subject()](
              const rr::MemberAccess& wanted) -> rr::Result<std::shared_ptr<rr::RequestPass>> {
-    if (!memory->has_room(least_room))
+    const auto device = node.device_of(wanted.path.substr(0, wanted.path.find('.')));
+    const bool passes = is_urgent(gateway, device, wanted);
+    if (!passes && !memory->has_room(least_room))
       return rr::make_error(rr::ErrorCode::service_error, "the gateway has no memory left; try again in a moment");
     auto out = std::make_shared<SharedPass>();
-    if (const auto& rates = gateway.config().rates; rates.is_bound()) {
+    if (const auto& rates = gateway.config().rates; rates.is_bound() && !passes) {
       const auto user = wanted.user ? subject_of(*wanted.user) : Subject();
       const bool is_ours = user.kind == Subject::Kind::user;
-      const auto device = node.device_of(wanted.path.substr(0, wanted.path.find('.')));
-      auto passes = gateway.http_access().enter(network, is_ours ? user : shown, device, rates);
-      if (!passes) {
+      auto entered = gateway.http_access().enter(network, is_ours ? user : shown, device, rates);
+      if (!entered) {
         gateway.reject(Rejection::rate);
-        return passes.error();
+        rights->record_too_much(wanted, entered.error().message);
+        return entered.error();
       }
-      out->rates = std::move(*passes);
+      out->rates = std::move(*entered);
     }
     out->entry = rights->begin(wanted);
     return out->entry || out->rates ? std::shared_ptr<rr::RequestPass>(std::move(out)) : nullptr;

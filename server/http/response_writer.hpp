@@ -73,6 +73,9 @@ class ResponseWriter {
   const Request& request() const { return request_; }
   /// What this request makes the gateway hold.
   MemoryBudget::Charge& memory() { return memory_; }
+  /// Asked now and then while the response is a stream: whether the client may still have it.
+  void go_on_while(std::function<bool()> is_allowed) { is_allowed_ = std::move(is_allowed); }
+  bool may_go_on() const { return !is_allowed_ || is_allowed_(); }
   boost::asio::any_io_executor executor() { return stream_.executor(); }
   /// Whether the connection may carry another request.
   bool goes_on() const { return request_.message.keep_alive() && !closes_ && !reader_.has_unread_body(); }
@@ -103,6 +106,7 @@ class ResponseWriter {
   std::chrono::milliseconds patience_;
   rr::Deadline slow_;
   std::function<void(unsigned status)> on_begin_;
+  std::function<bool()> is_allowed_;
   bool is_streamed_ = false;
   std::shared_ptr<Watch> watch_;
 };

@@ -1,5 +1,6 @@
 #include "server/json/json.hpp"
 
+#include <array>
 #include <boost/json/basic_parser_impl.hpp>
 #include <boost/json/src.hpp>
 #include <charconv>
@@ -71,6 +72,22 @@ struct TextHandler {
 };
 
 }  // namespace
+
+std::size_t memory_of_json(std::string_view text) {
+  constexpr auto costs = [] {
+    std::array<std::uint8_t, 256> of{};
+    of.fill(heap::byte);
+    of[','] = heap::item;
+    of['['] = heap::array;
+    of['{'] = heap::object;
+    of[':'] = heap::pair;
+    of['"'] = heap::text / 2 + heap::byte;
+    return of;
+  }();
+  std::size_t bytes = heap::document;
+  for (const auto c : text) bytes += costs[static_cast<std::uint8_t>(c)];
+  return bytes;
+}
 
 Result<Json> read_json(std::string_view text) {
   boost::json::parse_options options;

@@ -56,6 +56,17 @@ class JsonBuilder {
   std::string why_;
 };
 
+/// Bytes of the heap that parts of a document take at most, on 64-bit machines.
+namespace heap {
+inline constexpr std::size_t item = 3 * sizeof(Json);  ///< an array has room for twice as many when it has just grown
+inline constexpr std::size_t array = sizeof(Json::array_t) + 32;  ///< and its first item's place
+inline constexpr std::size_t object = sizeof(Json::object_t) + 8;
+inline constexpr std::size_t pair = 40 + sizeof(std::pair<std::string, Json>);  ///< a node of the map
+inline constexpr std::size_t text = sizeof(std::string) + 8;                    ///< of any length, beside its bytes
+inline constexpr std::size_t byte = 3;                                          ///< of a text that comes in pieces
+inline constexpr std::size_t document = 512;                                    ///< its root, the levels that are open
+}  // namespace heap
+
 inline Error unreadable_document(std::string_view kind, std::string why) {
   return make_error(ErrorCode::data_serialization_error, std::string(kind) + " " + std::move(why));
 }

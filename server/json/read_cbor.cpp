@@ -1,4 +1,5 @@
 // Reads CBOR. Layer: json. Source: RFC 8949.
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -12,12 +13,31 @@ namespace {
 
 enum class CborType : std::uint8_t { natural, negative, bytes, text, array, map, tag, simple };
 
+constexpr std::uint8_t open_ended = 31;
+
 /// The first byte of an item and the number in or behind it: a value, a length, a tag.
 struct CborHead {
   CborType type;
   std::uint8_t detail;
   std::uint64_t number;
 };
+
+/// Whether there is a head at `at`, which is then behind it.
+bool read_cbor_head(ByteSpan bytes, std::size_t& at, CborHead& head) {
+  if (at == bytes.size()) return false;
+  const auto first = bytes[at++];
+  head = {static_cast<CborType>(first >> 5), static_cast<std::uint8_t>(first & 31), 0};
+  if (head.detail < 24) {
+    head.number = head.detail;
+    return true;
+  }
+  if (head.detail == open_ended) return true;
+  if (head.detail > 27) return false;
+  const std::size_t size = std::size_t{1} << (head.detail - 24);
+  if (size > bytes.size() - at) return false;
+  for (std::size_t i = 0; i < size; ++i) head.number = head.number << 8 | bytes[at++];
+  return true;
+}
 
 double half_precision(std::uint64_t bits) {
   const int exponent = static_cast<int>(bits >> 10 & 31);
@@ -40,7 +60,6 @@ class CborReader {
   Result<Json> read();
 
  private:
-  static constexpr std::uint8_t open_ended = 31;
   static constexpr std::uint8_t break_byte = 0xff;
 
   struct Level {
@@ -178,19 +197,7 @@ bool CborReader::take_break() {
 
 bool CborReader::read_head(CborHead& head) {
   item_at_ = at_;
-  if (at_ == bytes_.size()) return fail_here();
-  const auto first = bytes_[at_++];
-  head = {static_cast<CborType>(first >> 5), static_cast<std::uint8_t>(first & 31), 0};
-  if (head.detail < 24) {
-    head.number = head.detail;
-    return true;
-  }
-  if (head.detail == open_ended) return true;
-  if (head.detail > 27) return fail_here();
-  const std::size_t size = std::size_t{1} << (head.detail - 24);
-  if (size > bytes_.size() - at_) return fail_here();
-  for (std::size_t i = 0; i < size; ++i) head.number = head.number << 8 | bytes_[at_++];
-  return true;
+  return read_cbor_head(bytes_, at_, head) || fail_here();
 }
 
 template <class Out>
@@ -218,6 +225,24 @@ bool CborReader::read_bytes(const CborHead& head, std::optional<std::uint64_t> t
 }
 
 }  // namespace
+
+std::size_t memory_of_cbor(ByteSpan bytes) {
+  std::size_t held = heap::document;
+  CborHead head;
+  for (std::size_t at = 0; read_cbor_head(bytes, at, head);) {
+    held += heap::item;
+    if (head.type == CborType::array) held += heap::array;
+    if (head.type == CborType::map) held += heap::object;
+    if (head.type != CborType::text && head.type != CborType::bytes) continue;
+    // A key takes a pair's place, which has room for its value too.
+    held += std::max(heap::text, heap::pair - heap::item);
+    if (head.detail == open_ended) continue;
+    if (head.number > bytes.size() - at) break;
+    held += heap::byte * static_cast<std::size_t>(head.number);
+    at += static_cast<std::size_t>(head.number);
+  }
+  return held;
+}
 
 Result<Json> read_cbor(ByteSpan bytes) {
   return CborReader(bytes).read();

@@ -262,8 +262,7 @@ rr::awaitable<void> answer_mcp(GatewayState& gateway, ResponseWriter& writer) {
         writer.request(), rr::make_error(rr::ErrorCode::permission_denied, "you may use nothing here"));
   if (!refused) refused = co_await writer.read_body(largest_message);
   auto room = writer.memory().sibling();
-  if (!refused && !room.resize(rr::json_growth * writer.request().message.body().size()))
-    refused = no_memory_response();
+  if (!refused && !room.resize(rr::memory_of_json(writer.request().message.body()))) refused = no_memory_response();
   if (refused) {
     co_await writer.send(*refused);
     co_return;

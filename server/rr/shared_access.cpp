@@ -139,6 +139,15 @@ AuditEntryPtr SessionRights::begin(const rr::MemberAccess& admitted) {
   return begin(what, admitted.user, {});
 }
 
+void SessionRights::record_too_much(const rr::MemberAccess& admitted, std::string_view why) {
+  const auto service = admitted.path.substr(0, admitted.path.find('.'));
+  const auto device = node_.device_of(service);
+  AccessRequest what{.device = device, .service = service, .path = admitted.path};
+  if (admitted.member) what.member = admitted.member->name;
+  what.verb = verb_of(admitted.type, admitted.member);
+  access_.record_too_much(standing_of(admitted.user).identity(), &what, why);
+}
+
 AuditEntryPtr SessionRights::begin_lock(const rr::LockWanted& wanted, const rr::AuthenticatedUser* user) {
   return begin({.path = wanted.path, .verb = Verb::lock}, user, event_of(wanted.command));
 }

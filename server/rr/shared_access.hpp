@@ -20,6 +20,8 @@ class SessionRights {
   [[nodiscard]] rr::Result<> admit(const rr::MemberAccess& wanted);
   /// What is to be recorded of something that was admitted; see Access::begin().
   AuditEntryPtr begin(const rr::MemberAccess& admitted);
+  /// Of what was admitted, but asked for too often.
+  void record_too_much(const rr::MemberAccess& admitted, std::string_view why);
   AuditEntryPtr begin_lock(const rr::LockWanted& wanted, const rr::AuthenticatedUser* user);
   bool has_role(std::string_view role, const rr::AuthenticatedUser* user) {
     return standing_of(user).identity().has_role(role);

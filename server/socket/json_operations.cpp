@@ -87,41 +87,56 @@ JsonOperations::JsonOperations(GatewayState& gateway, JsonSocketPlace place, std
     : gateway_(gateway), place_(std::move(place)), outbox_(std::move(outbox)) {}
 
 rr::awaitable<void> JsonOperations::take(const std::string& message) {
+  const bool is_large = message.size() > large_json_bytes;
+  const auto measure = [&message] { return rr::memory_of_json(message); };
   auto memory = gateway_.memory().charge(place_.from.network);
-  if (!memory.has_room(least_room) || !memory.resize(rr::json_growth * message.size()))
+  if (!memory.has_room(least_room) || !memory.resize(is_large ? co_await gateway_.workers().run(measure) : measure()))
     co_return tell_error("null", rr::make_error(rr::ErrorCode::out_of_system_resource,
                                                 "the gateway has no memory left for a message of " +
                                                     std::to_string(message.size()) + " bytes; try again in a moment"));
   const auto parse = [&message] { return JsonRequest::from_text(message); };
   rr::Result<JsonRequest> read = rr::Error();
-  if (message.size() <= large_json_bytes)
-    read = parse();
-  else
+  if (is_large)
     read = co_await gateway_.workers().run(parse);
+  else
+    read = parse();
   if (!read) co_return tell_error("null", read.error());
   const auto request = std::make_shared<const JsonRequest>(std::move(*read));
-  if (running_ >= max_running)
+  const auto* name = request->find("op");
+  const auto* operation = name && name->is_string() ? find_operation(name->get_ref<const std::string&>()) : nullptr;
+  const bool passes = operation && is_urgent(*request, *operation);
+  if (running_ >= max_running && !passes)
     co_return tell_error(request->id(),
                          rr::make_error(rr::ErrorCode::out_of_system_resource,
                                         "more than " + std::to_string(max_running) + " requests are not answered yet"));
-  const auto* name = request->find("op");
-  const auto* operation = name && name->is_string() ? find_operation(name->get_ref<const std::string&>()) : nullptr;
-  Passes passes;
-  if (!operation || !operation->traits.is_free) {
+  Passes held;
+  if (!passes && (!operation || !operation->traits.is_free)) {
     auto entered = gateway_.http_access().enter(place_.from.network, place_.standing->identity().subject(),
                                                 place_.device->config().name, gateway_.config().rates);
     if (!entered) {
       gateway_.reject(Rejection::rate);
+      gateway_.access().record_too_much(place_.standing->identity(), nullptr, entered.error().message);
       co_return outbox_->add(json_refusal(request->id(), entered.error(), 1));
     }
-    passes = std::move(*entered);
+    held = std::move(*entered);
   }
   ++running_;
   if (operation && operation->traits.keeps_order)
-    co_await run(shared_from_this(), request, std::move(passes), std::move(memory));
+    co_await run(shared_from_this(), request, std::move(held), std::move(memory));
   else
-    asio::co_spawn(place_.device->executor(), run(shared_from_this(), request, std::move(passes), std::move(memory)),
+    asio::co_spawn(place_.device->executor(), run(shared_from_this(), request, std::move(held), std::move(memory)),
                    asio::detached);
+}
+
+bool JsonOperations::is_urgent(const JsonRequest& request, const Operation& operation) const {
+  if (operation.verb != Verb::call && operation.verb != Verb::write) return false;
+  const auto* path = request.find("path");
+  auto place = place_.key.service;
+  for (const auto& segment : place_.segments) place += "." + segment;
+  const auto rest = split_path(path && path->is_string() ? path->get_ref<const std::string&>() : std::string());
+  if (!rest) return false;
+  for (const auto& segment : *rest) place += "." + segment;
+  return place_.device->config().leases.is_urgent(place);
 }
 
 rr::awaitable<void> JsonOperations::run(std::shared_ptr<JsonOperations> self, JsonRequestPtr request,
@@ -391,7 +406,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::subscribe(JsonRequestPtr request,
     value_or_throw(std::move(listening));
     co_return nullptr;
   }
-  open_[id] = Subscription{std::move(*listening)};
+  open_[id] = Subscription{std::move(*listening), target->path(), member.name};
   co_return nullptr;
 }
 
@@ -426,10 +441,39 @@ rr::awaitable<rr::OrderedJson> JsonOperations::send(JsonRequestPtr request, Targ
   co_return nullptr;
 }
 
+void JsonOperations::review() {
+  for (auto it = open_.begin(); it != open_.end();) {
+    const auto* open = std::get_if<Subscription>(&it->second);
+    rr::Result<> allowed;
+    if (open)
+      allowed = place_.standing->check({.device = place_.device->config().name,
+                                        .service = place_.key.service,
+                                        .path = open->path,
+                                        .member = open->member,
+                                        .verb = Verb::subscribe},
+                                       Recorded::never);
+    if (allowed) {
+      ++it;
+      continue;
+    }
+    for (auto ask = asks_.begin(); ask != asks_.end();) {
+      const auto asked = ask->second;
+      const bool is_of_it = asked->target->path() == open->path && asked->target->member->name == open->member;
+      ask = is_of_it ? asks_.erase(ask) : std::next(ask);
+      if (is_of_it) asked->reply(allowed.error());
+    }
+    auto news = rr::OrderedJson::object();
+    rr::add_key(news, "state") = "ended";
+    rr::add_key(news, "detail") = allowed.error().message;
+    outbox_->add(news_of(it->first, std::move(news)));
+    it = open_.erase(it);
+  }
+}
+
 // --- the device asks ---
 
 rr::awaitable<rr::OrderedJson> JsonOperations::callback(JsonRequestPtr request, TargetPtr target) {
-  expect_member(*target, "callback", {rr::MemberKind::callback});
+  const auto& member = expect_member(*target, "callback", {rr::MemberKind::callback});
   const auto id = reserve(*request);
   const auto asked = std::make_shared<Target>(*target);
   asked->client.reset();
@@ -446,7 +490,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::callback(JsonRequestPtr request, 
     value_or_throw(std::move(answering));
     co_return nullptr;
   }
-  open_[id] = Subscription{std::move(*answering)};
+  open_[id] = Subscription{std::move(*answering), target->path(), member.name};
   co_return nullptr;
 }
 

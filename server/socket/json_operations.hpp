@@ -33,6 +33,8 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
 
   /// Does what one message asks for. Waits for what has to keep its order; the rest goes on beside it.
   rr::awaitable<void> take(const std::string& message);
+  /// Ends subscriptions and callbacks that the client has no right to any more.
+  void review();
   /// Ends what is open. What is under way ends by itself, and answers nobody.
   void stop();
 
@@ -58,6 +60,8 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
   /// What a request has opened; named by its id.
   struct Subscription {
     ValueClient::ListenerPtr listener;
+    std::string path;  ///< of the object
+    std::string member;
   };
   struct Generator {
     TargetPtr target;
@@ -76,6 +80,8 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
   /// Throws   rr::Exception: there is no right to it, or it can't be recorded.
   AuditEntryPtr admit(const Target& target, const Operation& operation);
   rr::awaitable<std::shared_ptr<ValueClient>> client();
+  /// See LeaseConfig::is_urgent().
+  bool is_urgent(const JsonRequest& request, const Operation& operation) const;
   void tell_error(const std::string& id, const rr::Error& error);
 
   /// To a function of json_members.hpp.

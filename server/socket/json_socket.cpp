@@ -34,6 +34,8 @@ class JsonSocket : public std::enable_shared_from_this<JsonSocket> {
         operations_(std::make_shared<JsonOperations>(gateway, place, outbox_)),
         written_(stream_->executor(), asio::steady_timer::time_point::max()) {}
 
+  /// Ends what the client has no right to any more.
+  void review() { operations_->review(); }
   /// Ends it soon.
   void stop(rr::EndReason reason) {
     if (std::exchange(is_over_, true)) return;
@@ -129,7 +131,10 @@ rr::awaitable<void> serve_json_socket(GatewayState& gateway, Connection& connect
   const auto device = place->device->config().name;
   connection.device = place->device.get();
   connection.stop = [socket](rr::EndReason reason) { socket->stop(std::move(reason)); };
-  connection.is_good = [standing = place->standing] { return standing->is_good(); };
+  connection.is_good = [standing = place->standing, socket] {
+    socket->review();
+    return standing->is_good();
+  };
   log(LogLevel::info, "client connected", {{"device", device}, {"peer", connection.client}, {"as", "json"}});
 
   const auto reason = co_await socket->run();

@@ -160,13 +160,18 @@ Response HttpAccess::too_much(std::string_view what) {
 }
 
 rr::awaitable<HttpAccess::Admitted> HttpAccess::admit(Request& request, const Connection& connection,
-                                                      const Config& config) {
+                                                      const Config& config, const AccessRequest* urgent) {
   Admitted out;
+  const auto refuse = [&](const std::string& of) {
+    out.refusal = too_much(of);
+    access_.record_too_much(request.identity, nullptr, "too many requests " + of);
+  };
   const auto network = network_name(request.arrival.address);
   const auto& of_client = config.rates.client;
   out.client = clients_.enter(network, of_client.per_second, of_client.at_once, std::chrono::steady_clock::now());
-  if (!out.client) {
-    out.refusal = too_much("from " + network);
+  if (!out.client && !urgent) {
+    request.identity.client = request.arrival.peer;
+    refuse("from " + network);
     co_return out;
   }
   const auto& of_user = config.rates.user;
@@ -176,13 +181,15 @@ rr::awaitable<HttpAccess::Admitted> HttpAccess::admit(Request& request, const Co
     co_return out;
   }
   request.identity = std::move(*identity);
-  if (!request.identity.is_proven()) co_return out;
+  const bool passes = urgent && access_.state().rules.check(request.identity, *urgent);
+  if (!out.client && !passes) refuse("from " + network);
+  if (!request.identity.is_proven() || out.refusal) co_return out;
   if (!request.identity.sign_in.empty())
     if (const auto next = access_.sign_ins().extend(sign_in_cookie(request), std::chrono::system_clock::now()))
       out.cookie = format_sign_in_cookie(request.arrival, *next);
   out.user = users_.enter(request.identity.subject().key(), of_user.per_second, of_user.at_once,
                           std::chrono::steady_clock::now());
-  if (!out.user) out.refusal = too_much("of " + rr::quote(request.identity.name));
+  if (!out.user && !passes) refuse("of " + rr::quote(request.identity.name));
   co_return out;
 }
 

@@ -51,7 +51,9 @@ class HttpAccess {
     std::string cookie = {};  ///< to go on with, for Set-Cookie; empty: the one that was shown, or none
   };
   /// Finds out who sends a request, which is noted in it, and whether he asks for too much.
-  rr::awaitable<Admitted> admit(Request& request, const Connection& connection, const Config& config);
+  /// `urgent`  what it does to a device though it be too much, if he has any right there; null: not so.
+  rr::awaitable<Admitted> admit(Request& request, const Connection& connection, const Config& config,
+                                const AccessRequest* urgent);
   std::optional<RateGate::Pass> enter_device(const std::string& device, const Rates& rates);
   static Response too_much(std::string_view what);
   struct Passes {

@@ -88,11 +88,7 @@ rr::Result<> ServiceLocks::check_packet(const UpstreamClient& client, std::strin
 }
 
 LeaseNeed ServiceLocks::need_of(std::string_view path, const rr::MemberDefinition& member) const {
-  const auto name = std::string(path) + "." + member.name;
-  const auto& rules = device_.config().leases.members;
-  const auto rule =
-      std::find_if(rules.begin(), rules.end(), [&](const auto& each) { return rr::glob_matches(each.member, name); });
-  return rule == rules.end() ? LeaseNeed::covered : rule->need;
+  return device_.config().leases.need_of(std::string(path) + "." + member.name);
 }
 
 bool ServiceLocks::is_urgent(std::string_view path, const rr::MemberDefinition& member) const {

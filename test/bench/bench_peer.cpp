@@ -1,14 +1,15 @@
 // The other side of the call benchmark, each in a process of its own. Prints its port as JSON; runs until it is ended.
 //
-//   bench_peer service    a node with service "interop": a function that does nothing, and one that takes its time
-//   bench_peer echo       the yardstick: answers requests of a known size with replies of a known size; a client begins
-//                         with both sizes (two uint32)
+//   bench_peer service      a node with service "interop": a function that does nothing, and one that takes its time
+//   bench_peer echo [PATH]  the yardstick: answers requests of a known size with replies of a known size; a client
+//                           begins with both sizes (two uint32); by TCP, or by a local socket
 #include <array>
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/local/stream_protocol.hpp>
 #include <boost/asio/read.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/asio/write.hpp>
@@ -18,6 +19,7 @@
 #include <exception>
 #include <string_view>
 #include <thread>
+#include <type_traits>
 #include <vector>
 
 #include "node/service/node.hpp"
@@ -55,9 +57,10 @@ void serve() {
   node.run();
 }
 
-asio::awaitable<void> echo(tcp::socket socket) {
+template <class Socket>
+asio::awaitable<void> echo(Socket socket) {
   try {
-    socket.set_option(tcp::no_delay(true));
+    if constexpr (std::is_same_v<Socket, tcp::socket>) socket.set_option(tcp::no_delay(true));
     std::array<std::uint32_t, 2> sizes{};
     co_await asio::async_read(socket, asio::buffer(sizes), asio::use_awaitable);
     std::vector<std::uint8_t> request(sizes[0]);
@@ -70,7 +73,8 @@ asio::awaitable<void> echo(tcp::socket socket) {
   }
 }
 
-asio::awaitable<void> accept(tcp::acceptor& acceptor) {
+template <class Acceptor>
+asio::awaitable<void> accept(Acceptor& acceptor) {
   for (;;)
     asio::co_spawn(acceptor.get_executor(), echo(co_await acceptor.async_accept(asio::use_awaitable)), asio::detached);
 }
@@ -83,17 +87,27 @@ void run_echo() {
   io.run();
 }
 
+void run_echo(const char* path) {
+  asio::io_context io{1};
+  asio::local::stream_protocol::acceptor acceptor(io, path);
+  asio::co_spawn(io, accept(acceptor), asio::detached);
+  say_port(0);
+  io.run();
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  const std::string_view role = argc == 2 ? argv[1] : "";
+  const std::string_view role = argc > 1 ? argv[1] : "";
   try {
-    if (role == "service") {
+    if (role == "service" && argc == 2) {
       serve();
-    } else if (role == "echo") {
+    } else if (role == "echo" && argc == 2) {
       run_echo();
+    } else if (role == "echo" && argc == 3) {
+      run_echo(argv[2]);
     } else {
-      std::fprintf(stderr, "usage: bench_peer service|echo\n");
+      std::fprintf(stderr, "usage: bench_peer service | echo [PATH]\n");
       return 2;
     }
   } catch (const std::exception& error) {

@@ -142,8 +142,19 @@ export class Lab {
         listen: [`127.0.0.1:${gatewayPort}`],
         web_root: webRoot,
         devices: [
-          { name: "create", url: this.createUrl },
-          { name: "webcams", url: webcamsUrl, mode: "shared" }, // as `rrgate demo` has them
+          // As `rrgate demo` has them.
+          {
+            name: "create",
+            url: this.createUrl,
+            mode: "shared",
+            leases: {
+              members: [{ member: "Create.StartStreaming", lease: "never" }],
+              safe: [{ call: "Create.Drive", arguments: [0, 0] }],
+              takeover: ["*"],
+            },
+            callbacks: [{ member: "Create.play_callback", answer: "first" }],
+          },
+          { name: "webcams", url: webcamsUrl, mode: "shared" },
         ],
       }),
     );

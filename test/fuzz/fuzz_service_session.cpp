@@ -1,94 +1,16 @@
 // A hostile client against a service session: requests, packets and answers of every kind in any order, with any
 // elements, their bytes bent; between them the application answers, sends and closes, and time passes.
-#include <algorithm>
-#include <cstdio>
-#include <cstdlib>
 #include <deque>
-#include <string_view>
 #include <vector>
 
 #include "core/session/service/service_session.hpp"
 #include "test/core/session/loopback.hpp"
+#include "test/fuzz/hostile_peer.hpp"
 
 namespace {
 
 using namespace rr;
-
-void require(bool holds, const char* rule) {
-  if (holds) return;
-  std::fprintf(stderr, "broken: %s\n", rule);
-  std::abort();
-}
-
-/// The input as a row of choices; zeros behind its end.
-class Choices {
- public:
-  Choices(const std::uint8_t* data, std::size_t size) : left_(data, size) {}
-  bool empty() const { return left_.empty(); }
-  std::uint8_t byte() {
-    if (left_.empty()) return 0;
-    const auto first = left_.front();
-    left_ = left_.subspan(1);
-    return first;
-  }
-  ByteSpan bytes(std::size_t most) {
-    const auto taken = left_.first(std::min(most, left_.size()));
-    left_ = left_.subspan(taken.size());
-    return taken;
-  }
-  std::string_view text(std::size_t most) { return as_text(bytes(most)); }
-  /// One of `words`, or what the input says instead.
-  template <std::size_t size>
-  std::string_view word(const std::string_view (&words)[size]) {
-    const auto chosen = byte();
-    return chosen < 0xf0 ? words[chosen % size] : text(chosen & 0x0f);
-  }
-
- private:
-  ByteSpan left_;
-};
-
-constexpr std::string_view paths[] = {"arm",          "arm.tool",     "arm.tools[a]",
-                                      "arm.slots[1]", "arm.anything", "arm.tools[none]"};
-constexpr std::string_view members[] = {"speed",
-                                        "pose",
-                                        "add",
-                                        "stop",
-                                        "count",
-                                        "scale",
-                                        "sink",
-                                        "bumped",
-                                        "torque",
-                                        "state",
-                                        "samples",
-                                        "data",
-                                        "grid",
-                                        "log",
-                                        "poses",
-                                        "orders",
-                                        "quick",
-                                        "ask",
-                                        "notice",
-                                        "name",
-                                        "notes",
-                                        "archive",
-                                        "status",
-                                        "MonitorEnter",
-                                        "MonitorContinueEnter",
-                                        "MonitorExit",
-                                        "RequestObjectLock",
-                                        "RequestClientObjectLock",
-                                        "ReleaseObjectLock",
-                                        "AuthenticateUser",
-                                        "LogoutUser",
-                                        "Length",
-                                        "Dimensions",
-                                        "DimCount",
-                                        "MaxTransferSize"};
-constexpr std::string_view elements[] = {
-    "value",      "left",   "a",         "b",       "index",        "packettime",    "packet",   "memorypos",
-    "count",      "data",   "parameter", "timeout", "servicename",  "clientversion", "username", "credentials",
-    "unreliable", "return", "1",         "2",       "packetnumber", "requestack"};
+using namespace rr::test;
 
 class HostileClient {
  public:
@@ -138,44 +60,9 @@ class HostileClient {
     for (int entries = 1 + (choices_.byte() == 0xff); entries > 0; --entries) {
       message.begin_entry(type, choices_.word(paths), choices_.word(members), choices_.byte());
       if (type == EntryType::connect_client) message.add_text("servicename", "arm");
-      add_elements(message, choices_.byte() % 4, 0);
+      add_elements(message, choices_, choices_.byte() % 4);
     }
-    EncodedMessage encoded;
-    if (!encode(message, {}, encoded)) return;
-    Bytes bytes;
-    for (const auto slice : encoded.slices()) bytes.insert(bytes.end(), slice.begin(), slice.end());
-    for (auto bends = choices_.byte(); bends >= 0xf0; bends = choices_.byte())
-      bytes[(choices_.byte() * 256u + choices_.byte()) % bytes.size()] = choices_.byte();
-    deliver(bytes);
-  }
-
-  void add_elements(Message& message, std::size_t count, std::size_t depth) {
-    for (; count > 0; --count) {
-      const auto name = choices_.word(elements);
-      switch (choices_.byte() % 8) {
-        case 0:
-          message.add_scalar(name, DataType::double_t, 1.5);
-          break;
-        case 1:
-          message.add_scalar(name, DataType::int32_t, static_cast<std::int32_t>(choices_.byte()) - 2);
-          break;
-        case 2:
-          message.add_scalar(name, DataType::uint32_t, static_cast<std::uint32_t>(choices_.byte()));
-          break;
-        case 3:
-          message.add_scalar(name, DataType::uint64_t, static_cast<std::uint64_t>(choices_.byte()));
-          break;
-        case 4:
-          message.add_text(name, choices_.text(choices_.byte() % 16));
-          break;
-        default:
-          if (depth > 3) break;
-          message.begin_nested(name, static_cast<DataType>(101 + choices_.byte() % 12),
-                               choices_.byte() % 2 ? "experimental.loopback.Pose" : "");
-          add_elements(message, choices_.byte() % 4, depth + 1);
-          message.end_nested();
-      }
-    }
+    deliver(bent_bytes(message, choices_));
   }
 
   void deliver(ByteSpan bytes) {

@@ -18,6 +18,7 @@ import websockets.sync.client
 from directions import PEERS
 from gateways import RRGATE, Gateway, make_web_certificates, rrgate
 from http_api import BASE, JSON_PROTOCOL, Stream, ask, is_alive, open_websocket, schemathesis, upgrade_status
+from json_sockets import Socket
 from news import under_load
 from processes import Background
 from users import PASSWORDS, RULES, basic, bearer, make_users
@@ -870,6 +871,30 @@ def test_users_and_rights_are_read_anew_and_sessions_go_on(device, tmp_path):
             assert ask(gateway.port, "GET", BASE + "/p_double", headers=basic("carol", "new")).status == 401
         assert is_alive(link)
         link.close()
+
+
+def test_who_loses_a_right_loses_within_a_second_what_is_open_by_it(device, tmp_path):
+    make_users(tmp_path)
+    access = {"users_file": "users", "rules": RULES}
+    with running(tmp_path, device, access) as gateway, Socket(gateway.port, additional_headers=basic("vera")) as page, \
+            Socket(gateway.port, additional_headers=basic("root")) as other:
+        opened = [page.open("subscribe", "changed"), page.open("callback", "ask")]
+        kept = other.open("subscribe", "changed")
+        stream = Stream(gateway.port, "/changed", headers=basic("vera"), base=BASE)
+        assert ask(gateway.port, "POST", BASE + "/fire", {"count": 1}, basic("root")).status == 200
+        stream.next()
+        gateway.write({**gateway.config, "access": {**access, "rules": [{"roles": ["viewer"], "may": ["read"]}, *RULES[1:]]}})
+        gateway.wait_for("configuration read anew")
+        begin = time.monotonic()
+        for number in opened:
+            assert "may not subscribe" in page.next(subscription=number, state="ended")["detail"]
+        with pytest.raises((EOFError, OSError)):
+            while True:
+                stream.next()
+        assert time.monotonic() - begin < 1
+        assert ask(gateway.port, "POST", BASE + "/fire", {"count": 1}, basic("root")).status == 200
+        other.next(subscription=kept, number=2)
+        assert isinstance(page.ask("get", "p_double"), float)
 
 
 def test_who_loses_his_rights_gets_the_answer_to_what_is_at_work(own_service, tmp_path):

@@ -125,6 +125,25 @@ def test_others_are_refused_on_every_face_and_may_read(site, gateway):
         wait_for(lambda: arm.seen_target == 5)
 
 
+def test_a_stop_passes_where_others_are_refused_for_rates(node, tmp_path):
+    site = Site(tmp_path, node, {"leases": LEASES}, rates={"client": {"per_second": 2}, "device": {"per_second": 2}}, asked_from="127.0.0.9")
+    try:
+        native = site.connect("plain")
+        with Socket(site.port, PLAIN) as page:
+            page.send("get", "speed")
+            wait_for(lambda: ask(site.port, "GET", PLAIN + "/speed").status == 429)
+            for _ in range(20):
+                assert ask(site.port, "POST", PLAIN + "/finish", {}).status == 200
+                page.ask("call", "finish")
+                native.finish()
+            is_slow = [page.next(id=page.send("get", "speed")).get("error", {}).get("retry_after") for _ in range(20)]
+            assert is_slow.count(1) > 10
+            assert any(is_refused(RR.OutOfSystemResourceException, lambda: native.speed) for _ in range(20))
+            assert any(ask(site.port, "GET", PLAIN + "/finish").status == 429 for _ in range(20))  # no command
+    finally:
+        site.stop()
+
+
 KILLED = """
 import sys, time
 import RobotRaconteur as RR

@@ -1,12 +1,17 @@
 """Strangers who make the gateway hold what they send and do not read, while others go on: memory is counted, and bounded."""
 import concurrent.futures
+import http.client
 import json
+import os
 import socket
+import subprocess
+import sys
 import time
 
 import pytest
 import RobotRaconteur as RR
 
+from directions import PEERS
 from gateways import running
 from http_api import BASE, Stream, ask
 from json_sockets import Socket
@@ -180,3 +185,45 @@ def test_events_that_are_kept_count(gateway):
         stream.next()
     assert 0 < kept == gateway.metrics()["rrgate_memory_budget_used_bytes"]  # 256 of them
     stream.close()
+
+
+CROWD = int(os.environ.get("RR_CROWD", 2000))  # connections; 10,000 where the machine lets one process have so many descriptors
+MOST_EACH = 16_000  # bytes, as docs/deploy.md says
+MOST_ADDED = 0.02  # s, of the 99th of 100 answers
+
+
+def p99_of_answers(connection, count=400):
+    times = []
+    for _ in range(count):
+        begin = time.perf_counter()
+        connection.request("POST", BASE + "/add", json.dumps({"left": 1, "right": 2}), {"Content-Type": "application/json"})
+        answer = connection.getresponse()
+        assert (answer.status, json.loads(answer.read())) == (200, {"result": 3})
+        times.append(time.perf_counter() - begin)
+        time.sleep(0.002)
+    return sorted(times)[count * 99 // 100]
+
+
+def test_a_crowd_of_strangers_costs_little_memory_and_those_inside_little_time(tmp_path):
+    device, url = start_service(tmp_path)
+    config = {"devices": [{"name": "interop", "url": url, "mode": "shared"}], "limits": {"clients": CROWD + 100, "clients_per_address": CROWD // 50}}
+    with running(tmp_path, config) as gateway:
+        gateway.wait_for("device online", device="interop")
+        assert add(gateway, 1, 2) == 3
+        before = gateway.metrics()["process_resident_memory_bytes"]
+        inside = http.client.HTTPConnection("127.0.0.1", gateway.port, timeout=20)
+        quiet = p99_of_answers(inside)
+        flood = subprocess.Popen([sys.executable, PEERS / "flood.py", str(gateway.port), str(CROWD), "50"],
+                                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        try:
+            # Others use the machine as well: the best of three rounds counts.
+            added = []
+            while len(added) < 3 and (not added or min(added) > MOST_ADDED):
+                added.append(p99_of_answers(inside) - quiet)
+            assert flood.stdout.readline() == "all have come\n"
+            metrics = gateway.metrics()
+        finally:
+            flood.communicate()
+    device.stop()
+    assert min(added) < MOST_ADDED, (quiet, added)
+    assert metrics["process_resident_memory_bytes"] - before < CROWD * MOST_EACH + 8_000_000

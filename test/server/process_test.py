@@ -31,6 +31,17 @@ def wait_for_port(port):
     raise AssertionError(f"nobody listens at {port}")
 
 
+class Hardening(unittest.TestCase):
+    def test_the_program_lies_anywhere_in_memory_and_nothing_in_it_is_both_written_and_run(self):
+        parts = subprocess.run(["readelf", "--wide", "--file-header", "--program-headers", "--dynamic", RRGATE], check=True,
+                               capture_output=True, text=True, env={**os.environ, "LC_ALL": "C"}).stdout
+        self.assertRegex(parts, r"Type: +DYN \(Position-Independent Executable file\)")
+        self.assertIn("GNU_RELRO", parts)
+        self.assertRegex(parts, r"FLAGS_1\) +Flags: NOW PIE")
+        self.assertRegex(parts, r"GNU_STACK .* RW +0x")
+        self.assertNotRegex(parts, r"LOAD .* RWE ")
+
+
 class Files(unittest.TestCase):
     def setUp(self):
         self.folder = tempfile.TemporaryDirectory()
@@ -148,12 +159,12 @@ class Demo(Files):
         self.assertEqual(result.returncode, 1)
         self.assertIn("Nobody", result.stderr)
 
-    def test_the_robot_is_relayed_and_the_cameras_are_shared(self):
+    def test_the_robot_and_the_cameras_are_shared(self):
         url = self.start()
         with urllib.request.urlopen(url + "api/v1/devices", timeout=10) as answer:
             devices = json.load(answer)["devices"]
         self.assertEqual([(each["name"], each["mode"], each["state"]) for each in devices],
-                         [("create", "relay", "online"), ("webcams", "shared", "online")])
+                         [("create", "shared", "online"), ("webcams", "shared", "online")])
 
 
     def test_what_can_be_simulated_is_listed(self):

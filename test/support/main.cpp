@@ -10,19 +10,21 @@
 
 namespace {
 
+using Listener = Catch::TestEventListenerBase;
+
 /// Looks at each way through a test case, with the sections that lie on it. (Catch2's own --warn NoAssertions asks for
 /// an assertion within every innermost section, where those behind it may be meant.)
-class Assertions : public Catch::TestEventListenerBase {
+class Assertions : public Listener {
  public:
-  using TestEventListenerBase::TestEventListenerBase;
+  using Listener::Listener;
   static inline bool are_missing = false;
 
   void testCaseStarting(const Catch::TestCaseInfo& test) override {
-    TestEventListenerBase::testCaseStarting(test);
+    Listener::testCaseStarting(test);
     way_ = test.name;
   }
   void sectionStarting(const Catch::SectionInfo& section) override {
-    TestEventListenerBase::sectionStarting(section);
+    Listener::sectionStarting(section);
     if (depth_++ > 0) way_ += " / " + section.name;
   }
   void sectionEnded(const Catch::SectionStats& stats) override {
@@ -33,7 +35,7 @@ class Assertions : public Catch::TestEventListenerBase {
       }
       way_ = stats.sectionInfo.name;
     }
-    TestEventListenerBase::sectionEnded(stats);
+    Listener::sectionEnded(stats);
   }
 
  private:

@@ -8,6 +8,7 @@ import { nameNotes, songAfter } from "../../web/src/robot/song";
 import {
   commandFor,
   directionOfKey,
+  sameCommand,
   SPIN_LEFT,
   SPIN_RIGHT,
   STOP,
@@ -98,6 +99,9 @@ describe("driver", () => {
     fail: (error: Error) => Promise<void>;
   }
 
+  const makeDriver = (onError: (error: unknown) => void = () => undefined) =>
+    new Driver<DriveCommand>({ rest: STOP, same: sameCommand, onError });
+
   function connection(): { calls: Call[]; send: (command: DriveCommand) => Promise<void> } {
     const calls: Call[] = [];
     const settle = async (action: () => void): Promise<void> => {
@@ -117,8 +121,8 @@ describe("driver", () => {
 
   it("has one moving command in flight, and the newest wish replaces those that wait", async () => {
     const { calls, send } = connection();
-    const driver = new Driver(() => undefined);
-    driver.setConnection(send);
+    const driver = makeDriver();
+    driver.setConnection({ send });
     driver.want(GO);
     driver.want(BACK);
     driver.want(TURN);
@@ -128,8 +132,8 @@ describe("driver", () => {
   });
   it("sends a stop at once, past a command that is never answered", () => {
     const { calls, send } = connection();
-    const driver = new Driver(() => undefined);
-    driver.setConnection(send);
+    const driver = makeDriver();
+    driver.setConnection({ send });
     driver.want(GO);
     driver.want(TURN);
     vi.advanceTimersByTime(1000);
@@ -139,8 +143,8 @@ describe("driver", () => {
   });
   it("sends nothing more to a robot at rest", async () => {
     const { calls, send } = connection();
-    const driver = new Driver(() => undefined);
-    driver.setConnection(send);
+    const driver = makeDriver();
+    driver.setConnection({ send });
     driver.want(GO);
     driver.want(STOP);
     await calls[0]?.answer();
@@ -151,8 +155,8 @@ describe("driver", () => {
   });
   it("drives on only when the stop before is answered", async () => {
     const { calls, send } = connection();
-    const driver = new Driver(() => undefined);
-    driver.setConnection(send);
+    const driver = makeDriver();
+    driver.setConnection({ send });
     driver.want(GO);
     driver.want(STOP);
     driver.want(TURN);
@@ -163,8 +167,8 @@ describe("driver", () => {
   });
   it("stops once more where a moving command is answered after the stop that followed it", async () => {
     const { calls, send } = connection();
-    const driver = new Driver(() => undefined);
-    driver.setConnection(send);
+    const driver = makeDriver();
+    driver.setConnection({ send });
     driver.want(GO);
     driver.want(STOP);
     await calls[1]?.answer();
@@ -175,8 +179,8 @@ describe("driver", () => {
   });
   it("stops a robot that others move when somebody asks for it, until the robot answers", async () => {
     const { calls, send } = connection();
-    const driver = new Driver(() => undefined);
-    driver.setConnection(send);
+    const driver = makeDriver();
+    driver.setConnection({ send });
     driver.stop();
     expect(calls.map((c) => c.command)).toEqual([STOP]);
     await calls[0]?.fail(new Error("timeout"));
@@ -188,8 +192,8 @@ describe("driver", () => {
   });
   it("repeats a held command, and not a stop", async () => {
     const { calls, send } = connection();
-    const driver = new Driver(() => undefined);
-    driver.setConnection(send);
+    const driver = makeDriver();
+    driver.setConnection({ send });
     driver.want(GO);
     await calls[0]?.answer();
     vi.advanceTimersByTime(450);
@@ -197,29 +201,29 @@ describe("driver", () => {
   });
   it("stops a robot that was moving when its connection broke, as soon as there is one again", async () => {
     const { calls, send } = connection();
-    const driver = new Driver(() => undefined);
-    driver.setConnection(send);
+    const driver = makeDriver();
+    driver.setConnection({ send });
     driver.want(GO);
     await calls[0]?.answer();
     driver.setConnection(null);
     driver.want(GO);
     expect(calls).toHaveLength(1);
     const again = connection();
-    driver.setConnection(again.send);
+    driver.setConnection(again);
     expect(again.calls.map((c) => c.command)).toEqual([STOP]);
   });
   it("leaves a robot alone that it never moved: somebody else may be driving", () => {
     const { calls, send } = connection();
-    const driver = new Driver(() => undefined);
-    driver.setConnection(send);
+    const driver = makeDriver();
+    driver.setConnection({ send });
     driver.want(STOP);
     expect(calls).toHaveLength(0);
   });
   it("stops after a failed command, and tries a failed stop again", async () => {
     const { calls, send } = connection();
     const errors: unknown[] = [];
-    const driver = new Driver((error) => errors.push(error));
-    driver.setConnection(send);
+    const driver = makeDriver((error) => errors.push(error));
+    driver.setConnection({ send });
     driver.want(GO);
     await calls[0]?.fail(new Error("timeout"));
     expect(calls.map((c) => c.command)).toEqual([GO, STOP]);
@@ -235,8 +239,8 @@ describe("driver", () => {
   it("does not mind the answers of a connection that is gone", async () => {
     const { calls, send } = connection();
     const errors: unknown[] = [];
-    const driver = new Driver((error) => errors.push(error));
-    driver.setConnection(send);
+    const driver = makeDriver((error) => errors.push(error));
+    driver.setConnection({ send });
     driver.want(GO);
     driver.setConnection(null);
     await calls[0]?.fail(new Error("connection lost"));

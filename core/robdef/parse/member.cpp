@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <utility>
 
 #include "core/robdef/model/names.hpp"
@@ -28,6 +29,10 @@ bool parse_parameters(StatementReader& reader, std::vector<ParameterDefinition>&
   if (!reader.accept('(')) return reader.fail("'(' and the parameters");
   reader.skip_blanks();
   if (reader.accept(')')) return true;
+  // Room for all at once: "a a," takes 4 bytes, what it becomes 136, and three times that in a growing vector.
+  const auto ahead = reader.ahead();
+  const auto commas = static_cast<std::size_t>(std::count(ahead.begin(), ahead.end(), ','));
+  out.reserve(std::min(commas, ahead.size() / 4) + 1);
   while (true) {
     reader.skip_blanks();
     if (!parse_parameter(reader, out.emplace_back())) return false;

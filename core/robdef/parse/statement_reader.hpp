@@ -22,6 +22,7 @@ class StatementReader {
   bool is_end() const { return position_ >= text_.size(); }
   /// NUL at the end: the text itself holds none.
   char peek() const { return is_end() ? '\0' : text_[position_]; }
+  std::string_view ahead() const { return text_.substr(position_); }
   std::string_view text(std::size_t from, std::size_t to) const { return text_.substr(from, to - from); }
   SourceSpan span(std::size_t from, std::size_t to) const { return line_->span(from, to); }
 

@@ -180,7 +180,7 @@ rr::awaitable<Response> judge_sign_in(GatewayState& gateway, const Request& requ
     const auto error = rr::make_error(rr::ErrorCode::authentication_error, "a sign-in needs a password or a token");
     co_return http_access.refusal(request, error);
   }
-  if (who.proof != Proof::password && who.proof != Proof::token && who.proof != Proof::jwt)
+  if (who.proof != Proof::password && who.proof != Proof::token && who.proof != Proof::jwt && who.proof != Proof::oidc)
     co_return problem_response(409, "a certificate, or a proxy, shows with each request who you are");
   const auto now = Clock::now();
   const auto cookie = gateway.access().sign_ins().begin(who, now);

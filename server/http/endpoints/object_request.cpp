@@ -153,13 +153,17 @@ rr::awaitable<rr::Result<rr::Json>> ObjectRequest::body() const {
   if (!is_cbor && !equals_ignoring_case(type, "application/json"))
     co_return rr::make_error(rr::ErrorCode::invalid_argument,
                              "Content-Type is " + rr::quote(type) + ", expected application/json or application/cbor");
+  const bool is_large = text.size() > large_json_bytes;
+  const auto measure = [&text, is_cbor] {
+    return is_cbor ? rr::memory_of_cbor(rr::as_bytes(text)) : rr::memory_of_json(text);
+  };
   auto room = writer_.memory().sibling();
-  if (!room.resize(rr::json_growth * text.size()))
+  if (!room.resize(is_large ? co_await gateway_.workers().run(measure) : measure()))
     co_return rr::make_error(rr::ErrorCode::out_of_system_resource,
                              "the gateway has no memory left for what a document of " + std::to_string(text.size()) +
                                  " bytes becomes; try again in a moment");
   const auto read = [&text, is_cbor] { return is_cbor ? rr::read_cbor(rr::as_bytes(text)) : rr::read_json(text); };
-  if (text.size() <= large_json_bytes) co_return read();
+  if (!is_large) co_return read();
   co_return co_await gateway_.workers().run(read);
 }
 

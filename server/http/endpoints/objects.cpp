@@ -4,6 +4,7 @@
 
 #include "node/http/origin.hpp"
 #include "node/tls/digest.hpp"
+#include "server/access/standing.hpp"
 #include "server/http/endpoints/call_log.hpp"
 #include "server/http/endpoints/device_documents.hpp"
 #include "server/http/endpoints/devices.hpp"
@@ -89,19 +90,30 @@ rr::awaitable<void> serve_target(const ObjectRequest& request, const Target& tar
   }
 }
 
+constexpr std::string_view objects_prefix = "/api/v1/devices/";
+
+/// `segments`  device, service, and those of a member.
+bool is_urgent_member(const Device& device, const std::vector<std::string>& segments) {
+  std::string place = segments[1];
+  for (std::size_t i = 2; i < segments.size(); ++i) place += "." + segments[i];
+  return device.config().leases.is_urgent(place);
+}
+
 /// Why a request for a device, or a service of it, goes no further: there is no right to anything of it, it is not
 /// there, or it is asked for too much. Rights come first: strangers are not told what there is. nullopt: go on, with
 /// the pass.
 std::optional<Response> refuse_device(GatewayState& gateway, const Request& request, const std::string& device,
                                       const std::string& service, std::optional<RateGate::Pass>& pass) {
-  if (const auto allowed = gateway.access().check(request.identity, {.device = device, .service = service}); !allowed) {
+  const AccessRequest asked{.device = device, .service = service};
+  if (const auto allowed = gateway.access().check(request.identity, asked); !allowed) {
     gateway.reject(Rejection::forbidden);
     return gateway.http_access().refusal(request, allowed.error());
   }
   if (!gateway.devices().find(device)) return no_such_device(device);
   pass = gateway.http_access().enter_device(device, gateway.config().rates);
-  if (pass) return std::nullopt;
+  if (pass || !find_urgent(gateway, request).device.empty()) return std::nullopt;
   gateway.reject(Rejection::rate);
+  gateway.access().record_too_much(request.identity, &asked, "too many requests to the device");
   return HttpAccess::too_much("to device " + rr::quote(device));
 }
 
@@ -272,6 +284,10 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
       co_return;
     }
     entry = std::move(*begun);
+    if (wanted.verb == Verb::subscribe)
+      writer.go_on_while([standing = std::make_shared<Standing>(gateway.access(), who), target] {
+        return standing->check(access_request(*target, Verb::subscribe), Recorded::never).has_value();
+      });
   }
   if (entry)
     writer.on_begin([&entry, &error](unsigned status) {
@@ -322,6 +338,16 @@ rr::awaitable<void> answer(GatewayState& gateway, ResponseWriter& writer, std::s
 }
 
 }  // namespace
+
+UrgentCommand find_urgent(GatewayState& gateway, const Request& request) {
+  const auto method = request.message.method();
+  const auto path = request.path();
+  if ((method != http::verb::post && method != http::verb::put) || !path.starts_with(objects_prefix)) return {};
+  const auto segments = split_path(path.substr(objects_prefix.size()));
+  const auto* device = segments && segments->size() > 2 ? gateway.devices().find(segments->front()) : nullptr;
+  return device && is_urgent_member(*device, *segments) ? UrgentCommand{(*segments)[0], (*segments)[1]}
+                                                        : UrgentCommand();
+}
 
 Handler objects_endpoint(GatewayState& gateway) {
   return [&gateway](const Request&, std::string_view rest) {

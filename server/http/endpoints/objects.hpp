@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <string>
 #include <string_view>
 
 #include "server/http/router.hpp"
@@ -14,6 +15,13 @@ inline constexpr std::array<std::string_view, 5> device_resources = {"subscripti
                                                                      "thing-description.json", "types.d.ts"};
 
 /// "DEVICE", "DEVICE/SERVICE" and what is below, for all methods.
+/// Whether a request commands a member of a device that is urgent (LeaseConfig::is_urgent()), and of which service.
+struct UrgentCommand {
+  std::string device = {};  ///< empty: it does not
+  std::string service = {};
+};
+UrgentCommand find_urgent(GatewayState& gateway, const Request& request);
+
 Handler objects_endpoint(GatewayState& gateway);
 
 }  // namespace rrgate

@@ -277,6 +277,45 @@ TEST_CASE("tokens that are made and revoked are recorded when their file is read
   CHECK(lines[1]["detail"] == "new: roles viewer,operator");
 }
 
+TEST_CASE("users that come, go or change are recorded when their file is read anew, without passwords") {
+  Files files;
+  const auto bob = Files::user("bob", "one", "viewer");
+  files.write("users", Files::user("alice", "one", "viewer") + bob + Files::user("carol", "one", "viewer"));
+  Access access(with_users(files));
+  REQUIRE(access.load());
+  files.write("users", Files::user("alice", "two", "viewer") + bob + Files::user("dave", "one", "viewer,operator"));
+  access.reload(false);
+  const auto lines = files.audit(access);
+  REQUIRE(lines.size() == 3);
+  CHECK(lines[0]["event"] == "user_removed");
+  CHECK(lines[0]["detail"] == "carol: roles viewer");
+  CHECK(lines[1]["event"] == "user_changed");
+  CHECK(lines[1]["detail"] == "alice: roles viewer, another password");
+  CHECK(lines[2]["event"] == "user_added");
+  CHECK(lines[2]["detail"] == "dave: roles viewer,operator");
+}
+
+TEST_CASE("what is asked for too often is recorded once of a network and minute, and the sum of it") {
+  Files files;
+  files.write("users", Files::user("alice", "one", "viewer"));
+  {
+    Access access(with_users(files));
+    REQUIRE(access.load());
+    const auto alice = access.logged_in(log_in(access, "alice", "one").value(), "192.0.2.1:1");
+    for (int i = 0; i < 1000; ++i) access.record_too_much(alice, &a_write, "too many requests of 'alice'");
+    access.record_too_much(access.anonymous("192.0.2.2:1"), nullptr, "too many requests from 192.0.2.2");
+    const auto lines = files.audit(access);
+    REQUIRE(lines.size() == 2);
+    CHECK(lines[0]["event"] == "refused");
+    CHECK(lines[0]["user"] == "alice");
+    CHECK(lines[0]["member"] == "speed");
+    CHECK(lines[0]["detail"] == "too many requests of 'alice'");
+    CHECK(lines[1]["client"] == "192.0.2.2:1");
+    access.tend_audit(true);
+  }
+  CHECK(files.audit().back()["detail"] == "999 more within a minute, asked for too often");
+}
+
 TEST_CASE("another configuration holds for the next request; one whose audit file can't be opened for none") {
   Files files;
   files.write("users", Files::user("alice", "one", "viewer"));

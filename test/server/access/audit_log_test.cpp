@@ -76,6 +76,33 @@ std::vector<AuditFinding> findings_of(const std::vector<std::string>& files) {
 
 }  // namespace
 
+TEST_CASE("one gateway writes an audit file, also behind a rotation and when it was read anew; the next one goes on") {
+  const Folder folder;
+  const AuditConfig config{.file = folder.file(), .max_bytes = 600};
+  {
+    AuditLog log;
+    REQUIRE(log.open(config));
+    const auto is_refused = [&] {
+      AuditLog other;
+      const auto opened = other.open(config);
+      return !opened && opened.error().message.ends_with("another gateway writes it; expected one for each file");
+    };
+    CHECK(is_refused());
+    const auto who = alice();
+    for (int i = 0; i < 5; ++i) log.add({.event = "write", .who = &who});
+    REQUIRE(log.flush(std::chrono::seconds(10)));
+    REQUIRE(fs::exists(folder.file("audit.1")));
+    CHECK(is_refused());
+    REQUIRE(log.open(config));
+    REQUIRE(log.reopen());
+    CHECK(is_refused());
+    AuditLog beside;
+    CHECK(beside.open({.file = folder.file("beside")}));
+  }
+  AuditLog next;
+  CHECK(next.open(config));
+}
+
 TEST_CASE("a record of the audit log says who did what, when") {
   const auto who = alice();
   const AccessRequest what{"create", "Create", "Create.axes[0]", "speed", Verb::write};

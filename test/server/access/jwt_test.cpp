@@ -161,6 +161,7 @@ TEST_CASE("JWT: a key set that is published has no secrets, and may lack the key
   const auto verify = JwtVerifier::from_published(jwks({signer.jwk("1"), secret_key}), {});
   REQUIRE(verify);
   CHECK(refusal(*verify, signer.sign(claims(), {{"kid", "1"}})) == "taken");
+  CHECK(verify->verify(signer.sign(claims()), now).value().proof == Proof::oidc);
   CHECK(refusal(*verify, JwtSigner("HS256", secret).sign(claims(), {{"kid", "s"}})) != "taken");
   CHECK_FALSE(JwtVerifier::from_published(jwks({secret_key}), {}));
   CHECK(verify->misses_key_of(signer.sign(claims(), {{"kid", "2"}})));

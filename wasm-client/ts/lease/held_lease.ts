@@ -46,9 +46,12 @@ function limitCalls(session: Session, path: string, timeout: number): () => void
   return () => void ofSession.delete(path);
 }
 
-/** Services that know no leases do not say so. */
+/** Services that know no leases do not say so: those with users don't know the request, others have no use for any. */
 function explain(error: unknown): unknown {
-  if (!(error instanceof RobotRaconteurError) || error.code !== ErrorCode.ProtocolError) return error;
+  if (!(error instanceof RobotRaconteurError)) return error;
+  const knowsNoUsers =
+    error.code === ErrorCode.InvalidOperation && error.message.includes("authentication not activated");
+  if (!knowsNoUsers && error.code !== ErrorCode.ProtocolError) return error;
   return makeError("NotImplementedError", "there is no gateway that gives leases: the device is used without one");
 }
 

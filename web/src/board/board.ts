@@ -11,6 +11,7 @@ export const PANEL_KINDS = [
   "form",
   "log",
   "robot",
+  "teleop",
   "pipe",
   "memory",
   "generator",

@@ -3,6 +3,7 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
+import { stopNow } from "../robot/control";
 import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
 import { clockTime } from "../ui/words";
@@ -26,9 +27,9 @@ export function StopButton({ object, stop }: { object: Remote | null; stop: Stop
     if (!device) return setState({ kind: "failed", why: t("not connected: nothing was sent") });
     setState({ kind: "sent", at });
     // Nothing is waited for: a call that hangs does not hold this one up, and each press sends again.
-    const ways = [device.call(stop.call, stop.args, { timeout: TIMEOUT_MS })];
+    const ways = [device.urgent(stop.call, stop.args, { timeout: TIMEOUT_MS })];
     if (stop.set) ways.push(device.set(stop.set.property, stop.set.value, { timeout: TIMEOUT_MS }));
-    firstToArrive(ways).then(
+    stopNow(device, true, () => firstToArrive(ways)).then(
       () => setState({ kind: "arrived", tookMs: performance.now() - at, time: Date.now() }),
       (error: unknown) => setState({ kind: "failed", why: explain(error) }),
     );

@@ -6,16 +6,20 @@ import { useStore } from "../app/store";
 import { CameraView } from "../camera/camera_view";
 import { RobotChart } from "../chart/robot_chart";
 import type { DeviceList } from "../gateway/devices";
+import { stopNow } from "../robot/control";
 import { Driver, DRIVE_TIMEOUT_MS } from "../robot/driver";
 import type { Link } from "../robot/link";
 import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
 import { RobotModel } from "../robot/robot_model";
+import { sameCommand, STOP } from "../robot/steering";
+import type { DriveCommand } from "../robot/steering";
 import { BumpLog } from "../robot_view/bump_log";
 import { DrivePanel } from "../robot_view/drive_panel";
 import { PoseLine } from "../robot_view/pose_line";
 import { SongBox } from "../robot_view/song_box";
 import { ValuesPanel } from "../robot_view/values_panel";
+import { useControl } from "../ui/control_line";
 import { useAge } from "../ui/use_age";
 
 export interface RobotPageProps {
@@ -31,22 +35,29 @@ export function RobotPage({ link, list, device, shown }: RobotPageProps) {
   const remote = state.kind === "online" ? state.remote : null;
   const model = useMemo(() => new RobotModel(), []);
   const [driveFailure, setDriveFailure] = useState<string | null>(null);
-  const driver = useMemo(() => new Driver((error) => setDriveFailure(`Drive: ${explain(error)}`)), []);
+  const { control, isOpen } = useControl(remote);
+  const driver = useMemo(() => {
+    const onError = (error: unknown): void => setDriveFailure(`Drive: ${explain(error)}`);
+    return new Driver({ rest: STOP, same: sameCommand, onError });
+  }, []);
 
   useEffect(() => {
-    if (!remote) return;
+    if (!remote || !control) return;
     const stop = new AbortController();
     model.attach(remote, stop.signal);
     setDriveFailure(null);
-    driver.setConnection(async ({ velocity, radius }) => {
-      await remote.call("Drive", [velocity, radius], { timeout: DRIVE_TIMEOUT_MS });
+    const send = async (command: DriveCommand, insists: boolean): Promise<void> => {
+      const given = [command.velocity, command.radius];
+      if (!sameCommand(command, STOP)) await remote.call("Drive", given, { timeout: DRIVE_TIMEOUT_MS });
+      else await stopNow(remote, insists, () => remote.urgent("Drive", given, { timeout: DRIVE_TIMEOUT_MS }));
       setDriveFailure(null);
-    });
+    };
+    driver.setConnection({ send, right: control });
     return () => {
       driver.dispose();
       stop.abort();
     };
-  }, [remote, model, driver]);
+  }, [remote, control, model, driver]);
 
   const live = remote !== null;
   const poseAge = useAge(() => model.heardAt("pose"));
@@ -77,7 +88,8 @@ export function RobotPage({ link, list, device, shown }: RobotPageProps) {
       </section>
       <DrivePanel
         driver={driver}
-        enabled={live && shown}
+        control={control}
+        enabled={live && shown && isOpen}
         lost={state.kind === "lost"}
         failure={driveFailure}
         device={device}

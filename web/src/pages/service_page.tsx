@@ -124,6 +124,8 @@ function useLink(device: string, service: string, list: DeviceList, isWanted: bo
     const unwatch = list.state.watch((gateway) => {
       const known = gateway.kind === "known" && gateway.devices.find((d) => d.name === device);
       const isOnline = known !== false && known?.state === "online";
+      if (known && known.state === "offline") made.setAway(known.lastError ?? "offline");
+      if (isOnline) made.setAway(null);
       if (isOnline && !wasOnline) made.retryNow();
       wasOnline = isOnline;
     });

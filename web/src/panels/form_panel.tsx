@@ -13,7 +13,7 @@ import { rowsOf } from "../values/rows";
 import { asCode } from "./code";
 import type { CodeLanguage } from "./code";
 import { DraftInput } from "./draft_input";
-import { membersFor, textIn, textsIn } from "./panel";
+import { inputsOf, membersFor, textIn, textsIn } from "./panel";
 import type { PanelProps } from "./panel";
 import { MemberSelect } from "./parts";
 
@@ -44,11 +44,6 @@ export default function FormPanel(props: PanelProps) {
       {member && <MemberForm key={`${member.kind} ${member.name}`} {...props} member={member} withMore />}
     </div>
   );
-}
-
-interface Input {
-  name: string;
-  type: string;
 }
 
 interface Done {
@@ -229,8 +224,4 @@ function Code({
       )}
     </details>
   );
-}
-
-function inputsOf(member: Member): readonly Input[] {
-  return member.kind === "function" ? member.parameters : [{ name: member.name, type: member.type }];
 }

@@ -10,8 +10,8 @@ export interface JogButtonProps {
   label: string;
   sign: string;
   enabled: boolean;
-  /** Moves for a moment; called again and again. */
-  jog: () => Promise<unknown>;
+  /** Moves for a moment; called again and again. `isHeld`: whether it is still wanted, after a wait. */
+  jog: (isHeld: () => boolean) => Promise<unknown>;
   stop: () => Promise<unknown>;
   fail: (text: string | null) => void;
 }
@@ -29,7 +29,7 @@ export function JogButton({ label, sign, enabled, jog, stop, fail }: JogButtonPr
       if (isWaiting || isOver) return; // no queue of commands that are old when they are carried out
       isWaiting = true;
       latest.current
-        .jog()
+        .jog(() => !isOver)
         .then(
           () => !isOver && latest.current.fail(null),
           (error: unknown) => (latest.current.fail(explain(error)), letGo()),

@@ -36,6 +36,9 @@ const notWriteOnly = (member: Member): boolean => !member.modifiers.includes("wr
 const isGenerator = (member: Member): boolean =>
   [member.type, ...member.parameters.map(({ type }) => type)].some((type) => type.endsWith("{generator}"));
 
+const takesValues = (member: Member): boolean =>
+  !isGenerator(member) && (member.kind !== "function" || member.parameters.length > 0);
+
 export const KINDS: Readonly<Record<PanelKind, KindOfPanel>> = {
   plot: {
     title: "Plot",
@@ -71,6 +74,14 @@ export const KINDS: Readonly<Record<PanelKind, KindOfPanel>> = {
   },
   log: { title: "Events", load: () => import("./log_panel"), w: 4, h: 6, members: [] },
   robot: { title: "Joints", load: () => import("./robot_panel"), w: 6, h: 10, members: [] },
+  teleop: {
+    title: "Teleop",
+    load: () => import("./teleop_panel"),
+    w: 4,
+    h: 12,
+    members: ["function", "wire", "property"],
+    fits: (member) => takesValues(member) && !member.modifiers.includes("readonly"),
+  },
   pipe: { title: "Pipe", load: () => import("./pipe_panel"), w: 4, h: 7, members: ["pipe"] },
   memory: { title: "Memory", load: () => import("./memory_panel"), w: 6, h: 9, members: ["memory"] },
   generator: {
@@ -90,6 +101,11 @@ export const KINDS: Readonly<Record<PanelKind, KindOfPanel>> = {
 export function membersFor(kind: PanelKind, members: readonly Member[]): Member[] {
   const { members: kinds, fits = () => true } = KINDS[kind];
   return members.filter((member) => kinds.includes(member.kind) && fits(member));
+}
+
+/** What is given to a member: a function's arguments, or the one value of the others. */
+export function inputsOf(member: Member): readonly { name: string; type: string }[] {
+  return member.kind === "function" ? member.parameters : [{ name: member.name, type: member.type }];
 }
 
 /** A text of the settings; "" where there is none. */

@@ -5,7 +5,9 @@ import { useEffect, useState } from "preact/hooks";
 import { t } from "../app/language";
 import { useFeed } from "../live/use_feed";
 import { useAction } from "../members/row";
+import { stopNow } from "../robot/control";
 import { explain } from "../robot/remote";
+import { ControlLine, useControl } from "../ui/control_line";
 import { Failure } from "../ui/failure";
 import { formatNumber } from "../values/format";
 import { jointsOf, modeName, readState, stateWords } from "./joints";
@@ -24,6 +26,7 @@ export default function RobotPanel({ object, members, definitions, scope, settin
   const [joints, setJoints] = useState<readonly Joint[]>([]);
   const [failure, setFailure] = useState<string | null>(null);
   const acting = useAction();
+  const { control, isOpen } = useControl(object);
   const percent = numberIn(settings, "percent", 10);
   useEffect(() => {
     if (!object || !isRobot) return;
@@ -39,16 +42,23 @@ export default function RobotPanel({ object, members, definitions, scope, settin
   const mode = state ? modeName(state.commandMode, "RobotCommandMode", definitions, scope) : "";
   const setMode = (number: number): void =>
     acting.run(async () => {
+      if (number !== 0) await control?.begin();
       if (number !== 0) await object?.set("command_mode", 0); // a robot changes its mode only from halt
       await object?.set("command_mode", number);
     });
   const positions = state?.positions ?? new Float64Array();
-  const jog = (index: number, direction: number): Promise<unknown> => {
+  const jogBy = (way: "call" | "urgent", index: number, direction: number): Promise<unknown> => {
     const velocity = new Float64Array(positions.length);
     velocity[index] = direction * (percent / 100) * (joints[index]?.fastest || 1);
-    return object?.call("jog_joint", [velocity, JOG_SECONDS, false], { timeout: 2000 }) ?? Promise.resolve();
+    return object?.[way]("jog_joint", [velocity, JOG_SECONDS, false], { timeout: 2000 }) ?? Promise.resolve();
   };
-  const canJog = object !== null && mode === "jog" && look.stale === null;
+  const jog = async (index: number, direction: number, isHeld: () => boolean): Promise<void> => {
+    await control?.begin();
+    if (isHeld()) await jogBy("call", index, direction);
+  };
+  const halt = (index: number): Promise<unknown> =>
+    object ? stopNow(object, false, () => jogBy("urgent", index, 0)) : Promise.resolve();
+  const canJog = object !== null && isOpen && mode === "jog" && look.stale === null;
   return (
     <div class="robot-panel panel-scroll">
       <ul class="robot-words" aria-label={t("State")}>
@@ -89,6 +99,7 @@ export default function RobotPanel({ object, members, definitions, scope, settin
           <output>{percent} %</output>
         </label>
       </div>
+      <ControlLine control={control} />
       <Failure text={failure ?? acting.failure} />
       <ol class={`joints ${look.stale === null ? "" : "is-stale"}`}>
         {Array.from(positions, (position, i) => {
@@ -100,8 +111,8 @@ export default function RobotPanel({ object, members, definitions, scope, settin
                 label={t("{0} back", joint.name)}
                 sign="−"
                 enabled={canJog}
-                jog={() => jog(i, -1)}
-                stop={() => jog(i, 0)}
+                jog={(isHeld) => jog(i, -1, isHeld)}
+                stop={() => halt(i)}
                 fail={setFailure}
               />
               <JointBar joint={joint} position={position} />
@@ -109,8 +120,8 @@ export default function RobotPanel({ object, members, definitions, scope, settin
                 label={t("{0} forward", joint.name)}
                 sign="+"
                 enabled={canJog}
-                jog={() => jog(i, 1)}
-                stop={() => jog(i, 0)}
+                jog={(isHeld) => jog(i, 1, isHeld)}
+                stop={() => halt(i)}
                 fail={setFailure}
               />
               <span class="joint-value" data-position={i}>

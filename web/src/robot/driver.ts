@@ -2,52 +2,68 @@
 // Layer: web/robot. A stop goes out at once, past whatever is unanswered. A moving command waits for the answers to all
 // others, and a newer one replaces it meanwhile: a robot that answers late is never sent old wishes.
 
-import { isStop, sameCommand, STOP } from "./steering";
-import type { DriveCommand } from "./steering";
+/** Settles when the robot has answered, or after DRIVE_TIMEOUT_MS. `insists`: somebody asked for a stop, whoever moves the robot. */
+export type Send<Command> = (command: Command, insists: boolean) => Promise<void>;
 
-/** Settles when the robot has answered, or after DRIVE_TIMEOUT_MS. */
-export type SendDrive = (command: DriveCommand) => Promise<void>;
+export interface Means<Command> {
+  send: Send<Command>;
+  /** The right to command, which moving needs and stopping does not. */
+  right?: { readonly mayCommand: boolean; begin: () => Promise<void> };
+}
+
+export interface DriverOptions<Command> {
+  /** What stops. */
+  rest: Command;
+  same: (a: Command, b: Command) => boolean;
+  /** Hears of each command that failed; the driver itself keeps only the wish to stop. */
+  onError: (error: unknown) => void;
+  /** What is held is repeated, for a device that stops by itself when commands cease. */
+  repeatMs?: number;
+}
 
 export const DRIVE_TIMEOUT_MS = 2_000;
-const REPEAT_MS = 400; // what is held is repeated, for a device that stops by itself when commands cease
+const REPEAT_MS = 400;
 
-export class Driver {
-  #send: SendDrive | null = null;
-  #wanted: DriveCommand = STOP;
-  #sent: DriveCommand = STOP;
+export class Driver<Command> {
+  #means: Means<Command> | null = null;
+  #wanted: Command;
+  #sent: Command;
   /** From a moving command on, until a stop is answered while no moving command is under way. */
   #mayMove = false;
+  #insists = false;
   #unanswered = { moves: 0, stops: 0 };
   #repeat: ReturnType<typeof setInterval> | undefined;
-  readonly #onError: (error: unknown) => void;
+  readonly #options: DriverOptions<Command>;
 
-  /** `onError` hears of each command that failed; the driver itself keeps only the wish to stop. */
-  constructor(onError: (error: unknown) => void) {
-    this.#onError = onError;
+  constructor(options: DriverOptions<Command>) {
+    this.#options = options;
+    this.#wanted = this.#sent = options.rest;
   }
 
-  /** A connection came (a function) or went (null). A robot that may still move is told to stop first. */
-  setConnection(send: SendDrive | null): void {
-    this.#send = send;
-    this.#wanted = STOP;
+  /** A connection came or went (null). A robot that may still move is told to stop first. */
+  setConnection(means: Means<Command> | null): void {
+    this.#means = means;
+    this.#wanted = this.#options.rest;
     this.#unanswered = { moves: 0, stops: 0 };
     this.#rest();
-    if (this.#mayMove) this.#transmit(STOP);
+    if (this.#mayMove) this.#transmit(this.#options.rest);
   }
 
   /** Sets what the robot should do now. A robot that this page has not moved is not told to stop: others may drive it. */
-  want(command: DriveCommand): void {
-    if (!this.#send || sameCommand(command, this.#wanted)) return;
+  want(command: Command): void {
+    if (!this.#means || this.#options.same(command, this.#wanted)) return;
     this.#wanted = command;
-    if (isStop(command) || this.#isAnswered) this.#transmit(command);
+    this.#insists = false;
+    if (!this.#isStop(command)) this.#move();
+    else if (this.#mayMove) this.#transmit(command);
   }
 
   /** Somebody asked for a stop: sent whoever moves the robot, and again until it is answered. */
   stop(): void {
-    if (!this.#send) return;
-    this.#wanted = STOP;
-    this.#mayMove = true;
-    this.#transmit(STOP);
+    if (!this.#means) return;
+    this.#wanted = this.#options.rest;
+    this.#insists = this.#mayMove = true;
+    this.#transmit(this.#options.rest);
   }
 
   /** Whether the robot may move by a command of this page's. */
@@ -57,7 +73,7 @@ export class Driver {
 
   /** Stops the robot and forgets the connection. */
   dispose(): void {
-    this.want(STOP);
+    this.want(this.#options.rest);
     this.setConnection(null);
   }
 
@@ -65,35 +81,56 @@ export class Driver {
     return this.#unanswered.moves + this.#unanswered.stops === 0;
   }
 
+  #isStop(command: Command): boolean {
+    return this.#options.same(command, this.#options.rest);
+  }
+
+  /** Sends what is wanted by then, once this page may and all is answered. */
+  #move(): void {
+    const means = this.#means;
+    if (!means || !this.#isAnswered) return;
+    if (!means.right || means.right.mayCommand) return this.#transmit(this.#wanted);
+    means.right.begin().then(
+      () => means === this.#means && !this.#isStop(this.#wanted) && means.right?.mayCommand && this.#move(),
+      (error: unknown) => {
+        if (means !== this.#means) return;
+        this.#wanted = this.#options.rest;
+        this.#options.onError(error);
+      },
+    );
+  }
+
   #rest(): void {
     clearInterval(this.#repeat);
     this.#repeat = undefined;
   }
 
-  #transmit(command: DriveCommand): void {
-    const send = this.#send;
-    if (!send) return;
+  #transmit(command: Command): void {
+    const means = this.#means;
+    if (!means) return;
+    const isStop = this.#isStop(command);
     this.#sent = command;
-    this.#unanswered[isStop(command) ? "stops" : "moves"] += 1;
-    if (!isStop(command)) this.#mayMove = true; // it may, even if the answer never comes
-    this.#repeat ??= setInterval(() => this.#isAnswered && this.#transmit(this.#wanted), REPEAT_MS);
-    send(command).then(
-      () => this.#settle(send, command, null),
-      (error: unknown) => this.#settle(send, command, error),
+    this.#unanswered[isStop ? "stops" : "moves"] += 1;
+    if (!isStop) this.#mayMove = true; // it may, even if the answer never comes
+    const again = (): void => void (this.#isAnswered && this.#transmit(this.#wanted));
+    this.#repeat ??= setInterval(again, this.#options.repeatMs ?? REPEAT_MS);
+    means.send(command, this.#insists).then(
+      () => this.#settle(means, isStop, null),
+      (error: unknown) => this.#settle(means, isStop, error),
     );
   }
 
-  #settle(send: SendDrive, command: DriveCommand, error: unknown): void {
-    if (send !== this.#send) return; // an answer of a connection that is gone
-    this.#unanswered[isStop(command) ? "stops" : "moves"] -= 1;
+  #settle(means: Means<Command>, isStop: boolean, error: unknown): void {
+    if (means !== this.#means) return; // an answer of a connection that is gone
+    this.#unanswered[isStop ? "stops" : "moves"] -= 1;
     if (error !== null) {
-      this.#wanted = STOP;
-      this.#onError(error);
-    } else if (isStop(command) && this.#unanswered.moves === 0) {
+      this.#wanted = this.#options.rest;
+      this.#options.onError(error);
+    } else if (isStop && this.#unanswered.moves === 0) {
       this.#mayMove = false;
     }
     if (!this.#isAnswered) return;
-    if (isStop(this.#wanted) && !this.#mayMove) this.#rest();
-    else if (!sameCommand(this.#sent, this.#wanted)) this.#transmit(this.#wanted);
+    if (this.#isStop(this.#wanted) && !this.#mayMove) this.#rest();
+    else if (!this.#options.same(this.#sent, this.#wanted)) this.#transmit(this.#wanted);
   }
 }

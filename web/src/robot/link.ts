@@ -2,7 +2,7 @@
 // Layer: web/robot.
 
 import { subscribe } from "rrgate-client";
-import type { UrlSource } from "rrgate-client";
+import type { RemoteObject, UrlSource } from "rrgate-client";
 import { Store } from "../app/store";
 import { explain, remoteOf } from "./remote";
 import type { Remote } from "./remote";
@@ -18,16 +18,37 @@ const LIMITS = { timeout: 10_000, longestRetry: 10_000 };
 export class Link {
   readonly state = new Store<LinkState>({ kind: "connecting" });
   readonly #subscription;
+  #client: RemoteObject | null = null;
+  #isAway = false;
 
   /** Starts connecting at once. `follow`: for tests. */
   constructor(url: string | UrlSource, follow: typeof subscribe = subscribe) {
     this.#subscription = follow(url, LIMITS);
     this.#subscription.onConnected((client) => {
-      this.state.value = { kind: "online", since: Date.now(), remote: remoteOf(client) };
+      this.#client = client;
+      this.#isAway = false;
+      this.#connect(client);
     });
-    this.#subscription.onLost((reason) => this.#lose(explain(reason)));
+    this.#subscription.onLost((reason) => {
+      this.#client = null;
+      this.#lose(explain(reason));
+    });
     this.#subscription.onFailed((error) => this.#lose(explain(error)));
     this.#subscription.onWaiting((ms) => this.#putOff(Date.now() + ms));
+  }
+
+  /**
+   * What the gateway says of the device: it keeps the sessions of a shared one while that is away. `reason`: why it is; null: it is
+   * there.
+   */
+  setAway(reason: string | null): void {
+    if (reason !== null && this.state.value.kind === "online") {
+      this.#isAway = true;
+      this.#lose(reason);
+    } else if (reason === null && this.#isAway && this.#client) {
+      this.#isAway = false;
+      this.#connect(this.#client);
+    }
   }
 
   /** Connects now instead of at the end of the wait; nothing happens while online or connecting. */
@@ -38,6 +59,11 @@ export class Link {
 
   dispose(): void {
     void this.#subscription.close();
+  }
+
+  /** Anew for those who look: what they had asked the device for is gone. */
+  #connect(client: RemoteObject): void {
+    this.state.value = { kind: "online", since: Date.now(), remote: remoteOf(client) };
   }
 
   #lose(reason: string): void {

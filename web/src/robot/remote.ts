@@ -2,8 +2,16 @@
 // and checked here, once, instead of being cast all over the pages.
 // Layer: web/robot. Beside link.ts and gateway/usb_devices.ts the only file that imports `rrgate-client`.
 
-import { RobotRaconteurError } from "rrgate-client";
-import type { CallOptions, DynamicMember, MemberInfo, MemberKind, RemoteObject } from "rrgate-client";
+import { lease, RobotRaconteurError } from "rrgate-client";
+import type {
+  CallOptions,
+  DynamicMember,
+  Lease,
+  LeaseOptions,
+  MemberInfo,
+  MemberKind,
+  RemoteObject,
+} from "rrgate-client";
 
 export type Member = MemberInfo;
 export type { MemberKind };
@@ -17,6 +25,10 @@ export interface Remote {
   readonly definitions: readonly string[];
   has(name: string, kind: MemberKind): boolean;
   call(name: string, args: readonly unknown[], options?: CallOptions): Promise<unknown>;
+  /** Past whatever waits to be sent. */
+  urgent(name: string, args: readonly unknown[], options?: CallOptions): Promise<unknown>;
+  /** The right to command the object. @throws (rejects) NotImplementedError where nobody gives any. */
+  lease(options: LeaseOptions): Promise<Lease>;
   get(name: string): Promise<unknown>;
   set(name: string, value: unknown, options?: CallOptions): Promise<void>;
   /** Values of a wire from now on, the newest only; ends with the connection or with `signal`. */
@@ -72,6 +84,8 @@ export function remoteOf(object: RemoteObject): Remote {
     },
     has: (name, kind) => info.members.some((m) => m.name === name && m.kind === kind),
     call: async (name, args, options) => member(name)(...args, ...(options ? [options] : [])),
+    urgent: async (name, args, options) => member(name) && info.urgent[name]?.(...args, ...(options ? [options] : [])),
+    lease: async (options) => lease(object, options),
     get: async (name) => member(name).get(),
     set: async (name, value, options) => member(name).set(value, options),
     wire: (name, signal) => valuesOf(() => member(name).connect({ signal }), signal),

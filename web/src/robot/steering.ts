@@ -26,10 +26,6 @@ export function commandFor(held: ReadonlySet<Direction>, speed: number): DriveCo
   return { velocity: ahead * speed, radius: left === 0 ? STRAIGHT : left * TURN_RADIUS };
 }
 
-export function isStop(command: DriveCommand): boolean {
-  return command.velocity === 0;
-}
-
 export function sameCommand(a: DriveCommand, b: DriveCommand): boolean {
   return a.velocity === b.velocity && a.radius === b.radius;
 }

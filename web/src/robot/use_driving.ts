@@ -4,7 +4,7 @@
 import { useCallback, useEffect, useRef, useState } from "preact/hooks";
 import { Holds } from "./holds";
 import { commandFor, directionOfKey } from "./steering";
-import type { Direction } from "./steering";
+import type { Direction, DriveCommand } from "./steering";
 import type { Driver } from "./driver";
 
 export interface Driving {
@@ -18,7 +18,7 @@ export interface Driving {
 const NOTHING: ReadonlySet<Direction> = new Set();
 
 /** While `enabled`, follows the keyboard of the whole page; `press` and `release` are for buttons. */
-export function useDriving(driver: Driver, speed: number, enabled: boolean): Driving {
+export function useDriving(driver: Driver<DriveCommand>, speed: number, enabled: boolean): Driving {
   const holds = useRef(new Holds()).current;
   const [held, setHeld] = useState(NOTHING);
   const latest = useRef({ speed, enabled });

@@ -2,23 +2,26 @@
 // Layer: web/robot_view.
 
 import { useState } from "preact/hooks";
+import type { Control } from "../robot/control";
 import type { Driver } from "../robot/driver";
 import { SPEED_MAX, SPEED_MIN } from "../robot/steering";
-import type { Direction } from "../robot/steering";
+import type { Direction, DriveCommand } from "../robot/steering";
 import { useDriving } from "../robot/use_driving";
 import type { Driving } from "../robot/use_driving";
+import { ControlLine } from "../ui/control_line";
 import { Failure } from "../ui/failure";
 import { ArrowIcon } from "../ui/icons";
 
 export interface DrivePanelProps {
-  driver: Driver;
+  driver: Driver<DriveCommand>;
+  control: Control | null;
   enabled: boolean;
   lost: boolean;
   failure: string | null;
   device: string;
 }
 
-export function DrivePanel({ driver, enabled, lost, failure, device }: DrivePanelProps) {
+export function DrivePanel({ driver, control, enabled, lost, failure, device }: DrivePanelProps) {
   const [speed, setSpeed] = useState(200);
   const driving = useDriving(driver, speed, enabled);
   return (
@@ -51,6 +54,7 @@ export function DrivePanel({ driver, enabled, lost, failure, device }: DrivePane
         />
         <output for="speed">{speed} mm/s</output>
       </div>
+      <ControlLine control={control} />
       <p class="note drive-note">
         {lost
           ? `Driving is off: no connection to ${device}. It comes back by itself.`

@@ -35,7 +35,7 @@ function collect(value: unknown, path: string, found: string[], depth: number): 
 }
 
 /** Names as texts, indices as numbers. */
-function stepsOf(path: string): (string | number)[] {
+export function stepsOf(path: string): (string | number)[] {
   const steps: (string | number)[] = [];
   for (const [, name, index, key] of path.matchAll(/\.?([A-Za-z_]\w*)|\[(-?\d+)\]|\[("(?:[^"\\]|\\.)*")\]/g)) {
     if (name !== undefined) steps.push(name);

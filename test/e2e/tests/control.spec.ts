@@ -1,0 +1,89 @@
+// The right to command, as the pages show it: taken with the first command, refused, taken over, lost, given back.
+import type { Page } from "@playwright/test";
+import { expect, openRobot, putAtStart, test, waitUntilDriving, waitUntilStopped } from "../lab_test";
+import { startGateway, webRoot } from "../processes";
+
+const control = (page: Page) => page.locator("[data-control]");
+const forward = (page: Page) => page.getByRole("button", { name: "Forward" });
+
+test.beforeEach(async ({ page, lab }) => {
+  await openRobot(page, lab);
+  await putAtStart(page);
+});
+
+test("the first command takes control, which can be given back", async ({ page }) => {
+  await expect(control(page)).toHaveAttribute("data-control", "idle");
+  await page.keyboard.down("ArrowUp");
+  await waitUntilDriving(page);
+  await page.keyboard.up("ArrowUp");
+  await waitUntilStopped(page);
+  await expect(control(page)).toContainText("You are in control since");
+  await page.getByRole("button", { name: "Give back" }).click();
+  await expect(control(page)).toHaveAttribute("data-control", "idle");
+});
+
+test("who has control keeps others out until they take over, who is told then and stops", async ({
+  page,
+  context,
+  lab,
+}) => {
+  await page.keyboard.down("ArrowUp");
+  await waitUntilDriving(page);
+  const other = await context.newPage();
+  await openRobot(other, lab);
+  await other.keyboard.down("ArrowDown");
+  await expect(control(other)).toHaveAttribute("data-control", "lost");
+  await other.keyboard.up("ArrowDown");
+  await waitUntilDriving(other);
+  await expect(forward(other)).toBeDisabled();
+
+  await other.getByRole("button", { name: "Take over" }).click();
+  await expect(control(other)).toHaveAttribute("data-control", "held");
+  await waitUntilStopped(other);
+  await expect(control(page)).toContainText("taken over");
+  await expect(forward(page)).toBeDisabled();
+  await expect(forward(other)).toBeEnabled();
+  await other.close();
+});
+
+test("Stop stops a robot that another page has in control", async ({ page, context, lab }) => {
+  const other = await context.newPage();
+  await openRobot(other, lab);
+  await other.bringToFront();
+  await other.keyboard.down("ArrowUp");
+  await waitUntilDriving(other);
+  await page.getByRole("button", { name: "Stop" }).click();
+  await waitUntilStopped(page, 1_000);
+  await expect(control(other)).toHaveAttribute("data-control", "lost");
+  await other.close();
+});
+
+test("a page that hangs while it drives is out of control and stays so until it is taken by hand", async ({ page }) => {
+  await page.keyboard.down("ArrowUp");
+  await waitUntilDriving(page);
+  await page.evaluate(() => {
+    const until = Date.now() + 1500;
+    while (Date.now() < until);
+  });
+  await expect(control(page)).toContainText("has not renewed it");
+  await waitUntilStopped(page);
+  await expect(forward(page)).toBeDisabled();
+  await page.keyboard.up("ArrowUp");
+  await page.getByRole("button", { name: "Take" }).click();
+  await expect(control(page)).toHaveAttribute("data-control", "held");
+  await expect(forward(page)).toBeEnabled();
+});
+
+test("a robot without leases is driven without one, and the page says so", async ({ page, lab }) => {
+  const { program, url } = await startGateway("create", lab.createUrl, webRoot);
+  try {
+    await openRobot(page, { url });
+    await page.keyboard.down("ArrowUp");
+    await waitUntilDriving(page);
+    await page.keyboard.up("ArrowUp");
+    await waitUntilStopped(page);
+    await expect(page.getByText("Nobody gives leases of it")).toBeVisible();
+  } finally {
+    await program.kill();
+  }
+});

@@ -1,0 +1,102 @@
+// The teleop panel at the demo robot: what the robot was told is read at the robot.
+import type { Page } from "@playwright/test";
+import { expect, test } from "../lab_test";
+import type { Lab } from "../processes";
+import { addPanel } from "../board";
+
+const pad = (page: Page) => page.locator(".teleop-pad");
+const command = (page: Page) => page.locator('[data-teleop="command"]');
+
+async function speedOf(lab: Lab): Promise<number> {
+  const state = (await (await fetch(`${lab.url}api/v1/devices/create/Create/state`)).json()) as { velocity: number };
+  return state.velocity;
+}
+
+const expectSpeed = (lab: Lab, speed: number) =>
+  expect.poll(() => speedOf(lab), { intervals: [20], timeout: 5_000 }).toBeCloseTo(speed, 3);
+
+test.beforeEach(async ({ page, lab }) => {
+  await page.addInitScript(() => {
+    Object.assign(window, { pads: [] });
+    navigator.getGamepads = () => (window as unknown as { pads: Gamepad[] }).pads;
+  });
+  await page.goto(`${lab.url}#/devices/create/Create?view=board`);
+  await addPanel(page, "teleop");
+  const panel = page.locator('[data-panel="teleop"]');
+  await panel.getByLabel("Member").selectOption("Drive");
+  await panel.getByRole("button", { name: "Add axis" }).click();
+  await panel.getByLabel("Number of axis 1").fill("speed");
+  await panel.getByLabel("Number of axis 1").blur();
+  await expect(panel.getByRole("alert")).toContainText('"speed" is no number of int16 velocity, int16 radius');
+  await panel.getByLabel("Number of axis 1").fill("velocity");
+  await panel.getByLabel("Scale of axis 1").fill("50");
+  await panel.getByLabel("radius at rest").fill("32767");
+  await panel.getByLabel("radius at rest").blur();
+  await expect(command(page)).toHaveText("0,32767");
+});
+
+test("a key drives while it is held, and letting go stops at once", async ({ page, lab }) => {
+  await pad(page).focus();
+  await page.keyboard.down("KeyW");
+  await expect(command(page)).toHaveText("50,32767");
+  await expectSpeed(lab, 0.05);
+  await expect(page.locator('[data-panel="teleop"] [data-control="held"]')).toBeVisible();
+  await page.keyboard.up("KeyW");
+  await expectSpeed(lab, 0);
+});
+
+const ends: Readonly<Record<string, (page: Page) => Promise<unknown>>> = {
+  "the pad loses the keyboard": (page) => page.getByRole("button", { name: "Done" }).focus(),
+  "the window loses the keyboard": (page) => page.evaluate(() => window.dispatchEvent(new Event("blur"))),
+  "a shortcut begins": (page) => page.keyboard.down("Control"),
+  "Rest is pressed": (page) => pad(page).getByRole("button", { name: "Rest" }).click(),
+  "Escape is pressed": (page) => page.keyboard.press("Escape"),
+  "control is given back": (page) =>
+    page.locator('[data-panel="teleop"]').getByRole("button", { name: "Give back" }).click(),
+  "the panel is removed": (page) => page.getByRole("button", { name: "Remove Drive" }).click(),
+};
+
+for (const [what, end] of Object.entries(ends)) {
+  test(`a held key no longer drives when ${what}`, async ({ page, lab }) => {
+    await pad(page).getByRole("button", { name: "Rest" }).focus(); // a part of the pad has the keyboard
+    await page.keyboard.down("KeyS");
+    await expectSpeed(lab, -0.05);
+    await end(page);
+    await expectSpeed(lab, 0);
+    await page.waitForTimeout(300); // three repetitions of what is held
+    expect(await speedOf(lab)).toBe(0);
+  });
+}
+
+test("a stick on the screen drives as far as it is pushed, and springs back", async ({ page, lab }) => {
+  const box = (await page.getByLabel("Left stick").boundingBox())!;
+  await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+  await page.mouse.down();
+  await page.mouse.move(box.x + box.width / 2, box.y);
+  await expectSpeed(lab, 0.05);
+  await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+  await expectSpeed(lab, 0);
+  await page.mouse.move(box.x + box.width / 2, box.y + 3 * box.height);
+  await expectSpeed(lab, -0.05);
+  await page.mouse.up();
+  await expectSpeed(lab, 0);
+});
+
+test("a gamepad drives once one is in control, past its dead zone", async ({ page, lab }) => {
+  const push = (up: number) =>
+    page.evaluate((y) => Object.assign(window, { pads: [{ connected: true, axes: [0, -y, 0, 0] }] }), up);
+  await push(1);
+  await expect(page.locator('[data-gamepad="true"]')).toBeVisible();
+  await page.waitForTimeout(200);
+  expect(await speedOf(lab)).toBe(0);
+  await page.locator('[data-panel="teleop"]').getByRole("button", { name: "Take control" }).click();
+  await expectSpeed(lab, 0.05);
+  await push(0.55);
+  await expectSpeed(lab, 0.025);
+  await push(0.08);
+  await expectSpeed(lab, 0);
+  await push(1);
+  await expectSpeed(lab, 0.05);
+  await page.evaluate(() => Object.assign(window, { pads: [] })); // it is unplugged
+  await expectSpeed(lab, 0);
+});

@@ -1,0 +1,43 @@
+// A stick on the screen: drag its knob, let go and it is back in the middle.
+// Layer: web/panels.
+
+import { useRef } from "preact/hooks";
+
+export interface StickProps {
+  label: string;
+  x: number;
+  y: number;
+  /** Right and up are positive, -1 to 1; (0, 0) when it is let go. */
+  move: (x: number, y: number) => void;
+}
+
+export function StickPad({ label, x, y, move }: StickProps) {
+  const held = useRef<number | null>(null);
+  const follow = (event: PointerEvent): void => {
+    if (held.current !== event.pointerId) return;
+    const box = (event.currentTarget as Element).getBoundingClientRect();
+    const at = (offset: number, size: number): number => Math.min(1, Math.max(-1, (2 * offset) / size - 1));
+    move(at(event.clientX - box.left, box.width), -at(event.clientY - box.top, box.height));
+  };
+  return (
+    <div
+      class="stick"
+      role="img"
+      aria-label={label}
+      onPointerDown={(event) => {
+        if (event.button !== 0) return;
+        event.currentTarget.setPointerCapture(event.pointerId);
+        held.current = event.pointerId;
+        follow(event);
+      }}
+      onPointerMove={follow}
+      onLostPointerCapture={() => {
+        held.current = null;
+        move(0, 0);
+      }}
+      onContextMenu={(event) => event.preventDefault()}
+    >
+      <span class="stick-knob" style={{ left: `${50 + 50 * x}%`, top: `${50 - 50 * y}%` }} aria-hidden="true" />
+    </div>
+  );
+}

@@ -1,0 +1,336 @@
+// Drives a function, wire or property by keys, sticks on the screen and a gamepad; letting go sends the neutral value at once.
+// Layer: web/panels.
+
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import { t } from "../app/language";
+import { stopNow } from "../robot/control";
+import { Driver, DRIVE_TIMEOUT_MS } from "../robot/driver";
+import { explain } from "../robot/remote";
+import { ControlLine, useControl } from "../ui/control_line";
+import { Failure } from "../ui/failure";
+import { jsonOf } from "../values/draft";
+import { DraftInput } from "./draft_input";
+import { inputsOf, membersFor, textIn } from "./panel";
+import type { PanelProps } from "./panel";
+import { MemberSelect } from "./parts";
+import { StickPad } from "./stick";
+import {
+  AT_REST,
+  commandOf,
+  deflectionOfGamepad,
+  deflectionOfKeys,
+  isStickKey,
+  readAxes,
+  readNeutral,
+  STICKS,
+  together,
+} from "./teleop";
+import type { Axis, Deflection } from "./teleop";
+
+const REPEAT_MS = 100;
+
+export default function TeleopPanel(props: PanelProps) {
+  const { object, members, definitions, scope, settings, change } = props;
+  const choices = membersFor("teleop", members);
+  const name = textIn(settings, "member") || choices[0]?.name || "";
+  const member = choices.find((each) => each.name === name);
+  const inputs = useMemo(() => (member ? inputsOf(member) : []), [member]);
+  const mapping = useMemo(
+    () => ({ axes: readAxes(settings), neutral: readNeutral(settings, inputs, definitions, scope) }),
+    [settings, inputs, definitions, scope],
+  );
+  const [isNew] = useState(mapping.axes.length === 0);
+  const [failure, setFailure] = useState<string | null>(null);
+  const { control, isOpen } = useControl(object);
+
+  const driver = useMemo(
+    () =>
+      new Driver<Deflection>({
+        rest: AT_REST,
+        same: (a, b) => STICKS.every((stick) => a[stick] === b[stick]),
+        onError: (error) => setFailure(explain(error)),
+        repeatMs: REPEAT_MS,
+      }),
+    [],
+  );
+  const latest = useRef({ member, mapping, definitions, scope });
+  latest.current = { member, mapping, definitions, scope };
+  useEffect(() => {
+    if (!object || !control || !member) return;
+    let by = latest.current;
+    const send = async (deflection: Deflection, insists: boolean): Promise<void> => {
+      if (latest.current.member === member) by = latest.current; // else it is the old one that is told to rest
+      const given = commandOf(by.mapping, inputsOf(member), deflection, by.definitions, by.scope);
+      const isRest = deflection === AT_REST;
+      const way = async (): Promise<unknown> => {
+        if (member.kind === "function")
+          return object[isRest ? "urgent" : "call"](member.name, given, { timeout: DRIVE_TIMEOUT_MS });
+        if (member.kind === "wire") return object.poke(member.name, given[0]);
+        return object.set(member.name, given[0], { timeout: DRIVE_TIMEOUT_MS });
+      };
+      await (isRest ? stopNow(object, insists, way) : way());
+      setFailure(null);
+    };
+    driver.setConnection({ send, right: control });
+    return () => driver.dispose();
+  }, [object, control, member, driver]);
+
+  const enabled = object !== null && isOpen && mapping.axes.length > 0;
+  const { shown, pad, sticks, hasGamepad } = useSticks(driver, enabled, () => control?.mayCommand === true);
+  const setAxes = (axes: readonly Axis[]): void => change({ ...settings, axes });
+  return (
+    <div class="teleop panel-scroll">
+      <div class="panel-tools">
+        <MemberSelect members={choices} chosen={name} choose={(next) => change({ member: next, axes: [] })} />
+      </div>
+      <ControlLine control={control} />
+      <div
+        class={`teleop-pad ${enabled ? "" : "is-off"}`}
+        role="application"
+        aria-label={t("Sticks: W, A, S, D and the arrow keys")}
+        aria-disabled={!enabled}
+        tabIndex={0}
+        {...pad}
+      >
+        <StickPad label={t("Left stick")} x={shown["left-x"]} y={shown["left-y"]} move={sticks.left} />
+        <button
+          class="pad-stop"
+          type="button"
+          disabled={!object || !member}
+          onPointerDown={() => driver.stop()}
+          onClick={() => driver.stop()}
+        >
+          {t("Rest")}
+        </button>
+        <StickPad label={t("Right stick")} x={shown["right-x"]} y={shown["right-y"]} move={sticks.right} />
+      </div>
+      <p class="note" data-gamepad={hasGamepad}>
+        {hasGamepad
+          ? t("A gamepad drives while you are in control.")
+          : t("Click here for the keys. Press a button of a gamepad to use it.")}
+      </p>
+      <Sent {...{ mapping, inputs, definitions, scope, shown }} />
+      <Failure text={failure} />
+      <details open={isNew}>
+        <summary>{t("Axes")}</summary>
+        <AxesForm axes={mapping.axes} inputs={inputs} change={setAxes} />
+        {inputs.map(({ name: label, type }, i) => {
+          const draft = mapping.neutral[i];
+          if (draft?.kind !== "text") return null;
+          return (
+            <DraftInput
+              key={label}
+              label={t("{0} at rest", label)}
+              type={type}
+              definitions={definitions}
+              scope={scope}
+              draft={draft}
+              change={(next) =>
+                change({
+                  ...settings,
+                  neutral: mapping.neutral.map((each, at) => {
+                    const chosen = at === i ? next : each;
+                    return chosen.kind === "text" ? chosen.text : null;
+                  }),
+                })
+              }
+            />
+          );
+        })}
+      </details>
+    </div>
+  );
+}
+
+type Shown = Pick<PanelProps, "definitions" | "scope"> & {
+  mapping: Parameters<typeof commandOf>[0];
+  inputs: Parameters<typeof commandOf>[1];
+  shown: Deflection;
+};
+
+/** What the sticks are worth just now, or what is wrong with the axes. */
+function Sent({ mapping, inputs, definitions, scope, shown }: Shown) {
+  let text: string;
+  try {
+    text = JSON.stringify(jsonOf(commandOf(mapping, inputs, shown, definitions, scope))).slice(1, -1);
+  } catch (error) {
+    return <Failure text={(error as Error).message} />;
+  }
+  return (
+    <p class="note">
+      <code data-teleop="command">{text}</code>
+    </p>
+  );
+}
+
+/** All that moves the sticks; in doubt they are at rest. */
+function useSticks(driver: Driver<Deflection>, enabled: boolean, mayPoll: () => boolean) {
+  const [shown, setShown] = useState<Deflection>(AT_REST);
+  const [hasGamepad, setHasGamepad] = useState(false);
+  const held = useRef({ keys: new Set<string>(), pointers: AT_REST, gamepad: AT_REST }).current;
+  const latest = useRef({ enabled, mayPoll });
+  latest.current = { enabled, mayPoll };
+  const actions = useMemo(() => {
+    const apply = (): void => {
+      const all = together(deflectionOfKeys(held.keys), held.pointers, held.gamepad);
+      const isRest = !latest.current.enabled || STICKS.every((stick) => all[stick] === 0);
+      driver.want(isRest ? AT_REST : all);
+      setShown(isRest ? AT_REST : all);
+    };
+    const letGo = (): void => {
+      held.keys.clear();
+      held.pointers = held.gamepad = AT_REST;
+      apply();
+    };
+    const stick = (side: "left" | "right") => (x: number, y: number) => {
+      held.pointers = { ...held.pointers, [`${side}-x`]: x, [`${side}-y`]: y };
+      apply();
+    };
+    const keyDown = (event: KeyboardEvent): void => {
+      if (event.ctrlKey || event.metaKey || event.altKey) return letGo(); // a shortcut; its key-up may never come
+      if (!isStickKey(event.code)) return;
+      event.preventDefault(); // arrows would scroll
+      if (event.repeat) return;
+      held.keys.add(event.code);
+      apply();
+    };
+    const keyUp = (event: KeyboardEvent): void => {
+      if (event.key === "Meta") return letGo(); // macOS tells no key-up of keys that were held with it
+      if (held.keys.delete(event.code)) apply();
+    };
+    const poll = (): void => {
+      const found = (navigator.getGamepads?.() ?? []).find((each) => each?.connected) ?? null;
+      setHasGamepad(found !== null);
+      const before = held.gamepad;
+      const counts = found !== null && latest.current.mayPoll() && document.hasFocus();
+      held.gamepad = counts ? withoutDrift(deflectionOfGamepad(found.axes)) : AT_REST;
+      if (STICKS.some((each) => before[each] !== held.gamepad[each])) apply();
+    };
+    return {
+      letGo,
+      poll,
+      pad: { onKeyDown: keyDown, onKeyUp: keyUp, onFocusOut: letGo },
+      left: stick("left"),
+      right: stick("right"),
+    };
+  }, [driver, held]);
+  useEffect(() => {
+    if (!enabled) actions.letGo();
+  }, [enabled, actions]);
+  useEffect(() => {
+    const hidden = (): void => void (document.hidden && actions.letGo());
+    let frame = requestAnimationFrame(function look() {
+      actions.poll();
+      frame = requestAnimationFrame(look);
+    });
+    window.addEventListener("blur", actions.letGo);
+    window.addEventListener("pagehide", actions.letGo);
+    document.addEventListener("visibilitychange", hidden);
+    return () => {
+      cancelAnimationFrame(frame);
+      window.removeEventListener("blur", actions.letGo);
+      window.removeEventListener("pagehide", actions.letGo);
+      document.removeEventListener("visibilitychange", hidden);
+      actions.letGo();
+    };
+  }, [actions]);
+  return { shown, hasGamepad, pad: actions.pad, sticks: { left: actions.left, right: actions.right } };
+}
+
+/** A stick that nobody touches trembles around 0. Steps of 1/50 keep it from sending each tremble. */
+function withoutDrift(deflection: Deflection): Deflection {
+  const step = (value: number): number => (Math.abs(value) < 0.05 ? 0 : Math.round(value * 50) / 50);
+  return {
+    "left-x": step(deflection["left-x"]),
+    "left-y": step(deflection["left-y"]),
+    "right-x": step(deflection["right-x"]),
+    "right-y": step(deflection["right-y"]),
+  };
+}
+
+interface AxesFormProps {
+  axes: readonly Axis[];
+  inputs: readonly { name: string; type: string }[];
+  change: (axes: readonly Axis[]) => void;
+}
+
+function AxesForm({ axes, inputs, change }: AxesFormProps) {
+  const set = (index: number, part: Partial<Axis>): void =>
+    change(axes.map((axis, i) => (i === index ? { ...axis, ...part } : axis)));
+  const names: Readonly<Record<Axis["stick"], string>> = {
+    "left-x": t("left stick, right"),
+    "left-y": t("left stick, up"),
+    "right-x": t("right stick, right"),
+    "right-y": t("right stick, up"),
+  };
+  return (
+    <ol class="axes">
+      {axes.map((axis, i) => (
+        <li key={i} class="row-line">
+          <select
+            class="field"
+            aria-label={t("Stick of axis {0}", i + 1)}
+            value={axis.stick}
+            onChange={(event) =>
+              set(i, { stick: STICKS.find((each) => each === event.currentTarget.value) ?? "left-y" })
+            }
+          >
+            {STICKS.map((each) => (
+              <option key={each} value={each}>
+                {names[each]}
+              </option>
+            ))}
+          </select>
+          <input
+            class="field"
+            aria-label={t("Number of axis {0}", i + 1)}
+            placeholder="velocity[0]"
+            value={axis.path}
+            onChange={(event) => set(i, { path: event.currentTarget.value.trim() })}
+          />
+          <input
+            class="field"
+            type="number"
+            step="any"
+            aria-label={t("Scale of axis {0}", i + 1)}
+            value={axis.scale}
+            onChange={(event) => set(i, { scale: event.currentTarget.valueAsNumber || 0 })}
+          />
+          <input
+            class="field"
+            type="number"
+            min={0}
+            max={0.9}
+            step={0.05}
+            aria-label={t("Dead zone of axis {0}", i + 1)}
+            value={axis.deadZone}
+            onChange={(event) => set(i, { deadZone: event.currentTarget.valueAsNumber || 0 })}
+          />
+          <button class="button button-quiet" type="button" onClick={() => change(axes.filter((_, at) => at !== i))}>
+            {t("Remove")}
+            <span class="unseen"> {t("axis {0}", i + 1)}</span>
+          </button>
+        </li>
+      ))}
+      <li>
+        <button
+          class="button"
+          type="button"
+          onClick={() =>
+            change([
+              ...axes,
+              {
+                stick: STICKS[[1, 0, 2, 3][axes.length % 4] ?? 1] ?? "left-y",
+                path: inputs[0]?.name ?? "",
+                scale: 1,
+                deadZone: 0.1,
+              },
+            ])
+          }
+        >
+          {t("Add axis")}
+        </button>
+      </li>
+    </ol>
+  );
+}

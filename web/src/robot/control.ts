@@ -1,0 +1,122 @@
+// The right of this page to command an object: taken with the first command, kept for as long as the page is alive and
+// looked at, and given back with a button. Layer: web/robot.
+// Where no gateway gives leases, commands need none. Who has lost it takes it again by hand: a key that is still held down
+// must not go on by itself.
+
+import { ErrorCode, RobotRaconteurError } from "rrgate-client";
+import type { Lease } from "rrgate-client";
+import { t } from "../app/language";
+import { Store } from "../app/store";
+import { explain } from "./remote";
+import type { Remote } from "./remote";
+
+export type ControlState =
+  | { kind: "idle" }
+  | { kind: "taking" }
+  | { kind: "held"; since: number }
+  /** Nobody gives leases of this object. */
+  | { kind: "free" }
+  | { kind: "lost"; reason: string; byOthers: boolean };
+
+/** Without a renewal for so long the gateway makes the device safe; renewed three times as often. */
+export const DEADMAN_MS = 500;
+
+export class Control {
+  readonly state = new Store<ControlState>({ kind: "idle" });
+  readonly #object: Pick<Remote, "lease">;
+  #lease: Lease | null = null;
+  #users = 0;
+  #taking: Promise<void> | null = null;
+
+  constructor(object: Pick<Remote, "lease">) {
+    this.#object = object;
+  }
+
+  get mayCommand(): boolean {
+    return this.state.value.kind === "held" || this.state.value.kind === "free";
+  }
+
+  /** For a first command. @throws (rejects) where others have it, and where it was lost. */
+  async begin(): Promise<void> {
+    const { value } = this.state;
+    if (value.kind === "lost") throw new Error(value.reason);
+    if (!this.mayCommand) await this.take();
+  }
+
+  /** By hand. `takeover`: from whoever has it. @throws (rejects) with why not, which the state says, too. */
+  async take(takeover = false): Promise<void> {
+    this.#taking ??= this.#ask(takeover).finally(() => (this.#taking = null));
+    return this.#taking;
+  }
+
+  /** Until all who use it have called the function that is returned: it is given back then. */
+  use(): () => void {
+    this.#users += 1;
+    return () => {
+      this.#users -= 1;
+      if (this.#users === 0 && this.#lease) this.release().catch(() => undefined); // ends with its session, too
+    };
+  }
+
+  async release(): Promise<void> {
+    const lease = this.#lease;
+    this.#lease = null;
+    this.state.value = { kind: "idle" };
+    await lease?.release();
+  }
+
+  async #ask(takeover: boolean): Promise<void> {
+    this.state.value = { kind: "taking" };
+    try {
+      const lease = await this.#object.lease({ deadman: DEADMAN_MS, takeover, timeout: 2_000 });
+      this.#lease = lease;
+      this.state.value = { kind: "held", since: Date.now() };
+      lease.onLost((reason) => lease === this.#lease && this.#lose(reason));
+    } catch (error) {
+      if (codeOf(error) === ErrorCode.NotImplementedError) this.state.value = { kind: "free" };
+      else {
+        this.#lose(error);
+        throw error;
+      }
+    }
+  }
+
+  #lose(reason: unknown): void {
+    this.#lease = null;
+    const byOthers = codeOf(reason) === ErrorCode.ObjectLockedError || /taken over/.test(explain(reason));
+    this.state.value = { kind: "lost", reason: t("You are not in control: {0}", explain(reason)), byOthers };
+  }
+}
+
+function codeOf(error: unknown): number | undefined {
+  return error instanceof RobotRaconteurError ? error.code : undefined;
+}
+
+const controls = new WeakMap<Remote, Control>();
+
+/** One for all panels that show the object. */
+export function controlOf(object: Remote): Control {
+  const found = controls.get(object) ?? new Control(object);
+  controls.set(object, found);
+  return found;
+}
+
+/**
+ * A stop that is refused because somebody else has the lease: what this page commanded has been made safe by the gateway when
+ * the lease went. Who `insists` takes it over, where one may, so that the gateway makes the device safe once more, and leaves it
+ * free. @throws (rejects) with what `stop` failed with.
+ */
+export async function stopNow(
+  object: Pick<Remote, "lease">,
+  insists: boolean,
+  stop: () => Promise<unknown>,
+): Promise<void> {
+  try {
+    await stop();
+  } catch (error) {
+    if (codeOf(error) !== ErrorCode.ObjectLockedError) throw error;
+    if (!insists) return;
+    const lease = await object.lease({ takeover: true, timeout: 2_000 }).catch(() => Promise.reject(error));
+    await lease.release();
+  }
+}

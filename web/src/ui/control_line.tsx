@@ -1,0 +1,55 @@
+// Who commands: taken, given back, lost. Layer: web/ui.
+
+import { useEffect, useMemo } from "preact/hooks";
+import { t } from "../app/language";
+import { Store, useStore } from "../app/store";
+import { controlOf } from "../robot/control";
+import type { Control, ControlState } from "../robot/control";
+import type { Remote } from "../robot/remote";
+import { clockTime } from "./words";
+
+export interface InControl {
+  control: Control | null;
+  /** False after it was lost, until it is taken by hand. */
+  isOpen: boolean;
+}
+
+const NOBODY = new Store<ControlState>({ kind: "idle" });
+
+export function useControl(object: Remote | null): InControl {
+  const control = useMemo(() => (object ? controlOf(object) : null), [object]);
+  useEffect(() => control?.use(), [control]);
+  const { kind } = useStore(control?.state ?? NOBODY);
+  return { control, isOpen: control !== null && kind !== "lost" };
+}
+
+export function ControlLine({ control }: { control: Control | null }) {
+  const state = useStore(control?.state ?? NOBODY);
+  if (state.kind === "free") return <p class="control-line note">{t("Nobody gives leases of it: all may command.")}</p>;
+  const take = (takeover: boolean): void => void control?.take(takeover).catch(() => undefined); // the state says why not
+  return (
+    <div class="control-line" data-control={state.kind}>
+      {state.kind === "held" ? (
+        <button class="button" type="button" onClick={() => void control?.release().catch(() => undefined)}>
+          {t("Give back")}
+        </button>
+      ) : (
+        <button
+          class="button"
+          type="button"
+          disabled={!control || state.kind === "taking"}
+          onClick={() => take(state.kind === "lost" && state.byOthers)}
+        >
+          {state.kind === "lost" && state.byOthers ? t("Take over") : t("Take control")}
+        </button>
+      )}
+      <p role="status" class={state.kind === "lost" ? "failure" : "note"}>
+        {state.kind === "held"
+          ? t("You are in control since {0}.", clockTime(state.since))
+          : state.kind === "lost"
+            ? state.reason
+            : t("Your first command takes control.")}
+      </p>
+    </div>
+  );
+}
