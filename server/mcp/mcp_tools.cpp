@@ -297,7 +297,11 @@ rr::awaitable<rr::OrderedJson> McpTools::read_resource(const std::string& uri) {
         std::make_shared<const JsonRequest>(value_or_throw(JsonRequest::from_json(std::move(arguments))));
     const auto target = co_await find(request);
     admit(*target, Verb::read);
-    out = target->member ? co_await read_target(request, target) : describe_for_agent(gateway_, who(), *target, "");
+    // g++ 12 destroys the result twice where one side of ?: waits.
+    if (target->member)
+      out = co_await read_target(request, target);
+    else
+      out = describe_for_agent(gateway_, who(), *target, "");
   }
   co_return out;
 }
