@@ -16,7 +16,7 @@ core/types core/member core/session core/session/client core/session/service cor
 node/platform node/tls node/transport node/http node/driver node/values node/client node/service node/discovery
 node/subscribe node/generate
 server/log server/json server/limits server/access server/http server/record server/config server/upstream server/rr server/state server/relay
-server/http/endpoints server/socket server/front server/gateway server/cli server
+server/http/endpoints server/socket server/mcp server/front server/gateway server/cli server
 """.split()
 
 # Folders that stand beside each other, and know nothing of each other.

@@ -30,6 +30,7 @@ export const makeSidebar = (decisions) => [
     ["Record and replay", "/recording"],
     ["Shared devices", "/shared-sessions"],
     ["Leases", "/leases"],
+    ["Devices for agents", "/mcp"],
     ["Discovery", "/discovery"],
   ]),
   group("Security", [

@@ -46,8 +46,9 @@ enum class Face : std::uint8_t {
   rest,       ///< requests of HTTP
   stream,     ///< event and image streams of HTTP
   json,       ///< JSON over a WebSocket
+  mcp,        ///< the Model Context Protocol
 };
-inline constexpr std::string_view face_names[] = {"", "native", "websocket", "rest", "stream", "json"};
+inline constexpr std::string_view face_names[] = {"", "native", "websocket", "rest", "stream", "json", "mcp"};
 
 constexpr std::string_view to_string(Face face) {
   return face_names[static_cast<std::size_t>(face)];

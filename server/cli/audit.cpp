@@ -204,7 +204,7 @@ void add_audit(Commands& commands) {
       ->check(CLI::IsMember({"ok", "error", "refused"}))
       ->option_text("OUTCOME");
   add_filter("--face", options.face, "native, websocket, rest, stream or json")
-      ->check(CLI::IsMember({"native", "websocket", "rest", "stream", "json"}))
+      ->check(CLI::IsMember({"native", "websocket", "rest", "stream", "json", "mcp"}))
       ->option_text("FACE");
   app.add_flag("--follow", options.follows, "Go on with what is added, until Ctrl-C")->excludes(verifies);
   app.add_flag("--json", options.as_json, "Records as they are in the file")->excludes(verifies);

@@ -315,6 +315,11 @@ void read_retry(ObjectReader& in, Retry& retry) {
   in.duration("online_ms", retry.online, {50, hour_ms});
 }
 
+void read_mcp(ObjectReader& in, McpConfig& mcp) {
+  mcp.is_enabled = true;
+  in.duration("longest_wait_ms", mcp.longest_wait, {1000, hour_ms});
+}
+
 void read_config(ObjectReader& in, Config& config) {
   std::string schema;  // for editors
   in.text("$schema", schema);
@@ -357,6 +362,7 @@ void read_config(ObjectReader& in, Config& config) {
   in.object("rates", [&](ObjectReader& part) { read_rates(part, config.rates); });
   in.object("timeouts", [&](ObjectReader& part) { read_timeouts(part, config.timeouts); });
   in.object("retry", [&](ObjectReader& part) { read_retry(part, config.retry); });
+  in.object("mcp", [&](ObjectReader& part) { read_mcp(part, config.mcp); });
   in.object("log", [&](ObjectReader& part) {
     part.choice("level", config.log.level, {"trace", "debug", "info", "warning", "error"});
     part.choice("format", config.log.format, {"text", "json"});

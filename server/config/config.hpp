@@ -223,6 +223,14 @@ struct Discover {
   bool operator==(const Discover&) const = default;
 };
 
+/// The devices for agents, by the Model Context Protocol.
+struct McpConfig {
+  bool is_enabled = false;           ///< there where the configuration has "mcp"
+  milliseconds longest_wait{60000};  ///< for an event
+
+  bool operator==(const McpConfig&) const = default;
+};
+
 struct Config {
   std::vector<rr::HostPort> listen;
   std::vector<DeviceConfig> devices;
@@ -241,6 +249,7 @@ struct Config {
   Timeouts timeouts;
   Retry retry;
   LogConfig log;
+  McpConfig mcp;
 
   bool operator==(const Config&) const = default;
 };

@@ -10,6 +10,7 @@
 #include "server/http/endpoints/objects.hpp"
 #include "server/http/response_writer.hpp"
 #include "server/log/log.hpp"
+#include "server/mcp/mcp_endpoint.hpp"
 #include "server/relay/client_relay.hpp"
 #include "server/socket/json_socket.hpp"
 #include "server/state/http_access.hpp"
@@ -259,8 +260,13 @@ Response stopping_response() {
 /// Whether it matters who asks. The page itself and how the gateway is are no secrets.
 bool is_guarded(const Request& request) {
   const auto path = request.path();
-  return asks_for_websocket(request) || path == "/metrics" || path.starts_with("/api/") ||
+  return asks_for_websocket(request) || path == "/metrics" || path == mcp_path || path.starts_with("/api/") ||
          path.starts_with(devices_prefix);
+}
+
+Face face_of(const Request& request) {
+  if (asks_for_websocket(request)) return is_json_socket(request) ? Face::json : Face::websocket;
+  return request.path() == mcp_path ? Face::mcp : Face::rest;
 }
 
 /// What is refused when there is no memory left; how the gateway is can be asked all the same.
@@ -319,9 +325,7 @@ rr::awaitable<Continuation> serve_http_client(GatewayState& gateway, Connection&
     request.arrival = see_through_proxies(request, connection.peer, config.proxy.trust);
     take_base_path(request, config.base_path);
     const bool is_refused = gateway.is_stopping() && !is_answered_while_stopping(request);
-    request.identity.face = !asks_for_websocket(request) ? Face::rest
-                            : is_json_socket(request)    ? Face::json
-                                                         : Face::websocket;
+    request.identity.face = face_of(request);
     HttpAccess::Admitted admitted;
     admitted.refusal = refuse_page(gateway, request);
     if (!admitted.refusal) admitted.refusal = require_tls(gateway, request);

@@ -13,7 +13,7 @@
 #include "node/transport/accept_all.hpp"
 #include "server/config/access_options.hpp"
 #include "server/front/front_door.hpp"
-#include "server/http/endpoints/routes.hpp"
+#include "server/gateway/routes.hpp"
 #include "server/log/log.hpp"
 
 namespace rrgate {

@@ -112,24 +112,24 @@ OrderedJson item_schema(const TypeDefinition& type) {
           {"description", "column-major: the first index is the fastest"}};
 }
 
-OrderedJson fields_schema(const EntityDefinition& entity) {
+OrderedJson fields_schema(const EntityDefinition& entity, NoteDocumentation note) {
   OrderedJson out{{"type", "object"}};
   auto& properties = out["properties"] = OrderedJson::object();
   auto required = OrderedJson::array();
   for (const auto& member : entity.members) {
     auto schema = type_schema(member.type);
-    if (!member.documentation.empty()) schema["description"] = member.documentation;
+    if (!member.documentation.empty()) note(schema, member.documentation);
     add_key(properties, member.name) = std::move(schema);
     required.push_back(member.name);
   }
   if (!required.empty()) out["required"] = std::move(required);
   out["additionalProperties"] = false;
-  if (!entity.documentation.empty()) out["description"] = entity.documentation;
+  if (!entity.documentation.empty()) note(out, entity.documentation);
   out["x-rr-type"] = entity.qualified_name;
   return out;
 }
 
-OrderedJson enum_schema(const EnumDefinition& definition, const std::string& qualified_name) {
+OrderedJson enum_schema(const EnumDefinition& definition, const std::string& qualified_name, NoteDocumentation note) {
   auto names = OrderedJson::array();
   auto values = OrderedJson::object();
   for (const auto& value : definition.values) {
@@ -139,8 +139,12 @@ OrderedJson enum_schema(const EnumDefinition& definition, const std::string& qua
   OrderedJson out{{"anyOf", {{{"type", "string"}, {"enum", std::move(names)}}, integer(-2147483648LL, 2147483647)}}};
   out["x-rr-type"] = qualified_name;
   out["x-rr-values"] = std::move(values);
-  if (!definition.documentation.empty()) out["description"] = definition.documentation;
+  if (!definition.documentation.empty()) note(out, definition.documentation);
   return out;
+}
+
+void describe_by(OrderedJson& schema, const std::string& documentation) {
+  schema["description"] = documentation;
 }
 
 }  // namespace
@@ -170,15 +174,22 @@ OrderedJson type_schema(const TypeDefinition& type) {
   return out;
 }
 
+std::optional<OrderedJson> named_type_schema(const TypeRegistry& types, const std::string& qualified_name,
+                                             NoteDocumentation note) {
+  if (const auto* definition = types.find_enum(qualified_name)) return enum_schema(*definition, qualified_name, note);
+  if (const auto* entity = types.find_entity(qualified_name)) return fields_schema(*entity, note);
+  return std::nullopt;
+}
+
 OrderedJson named_type_schemas(const TypeRegistry& types) {
   auto out = OrderedJson::object();
   for (const auto& definition : types.definitions()) {
     for (const auto& each : definition->enums) {
       const auto name = definition->name + "." + each.name;
-      add_key(out, name) = enum_schema(each, name);
+      add_key(out, name) = enum_schema(each, name, describe_by);
     }
     for (const auto& entity : definition->entities)
-      if (entity.kind != EntityKind::object) add_key(out, entity.qualified_name) = fields_schema(entity);
+      if (entity.kind != EntityKind::object) add_key(out, entity.qualified_name) = fields_schema(entity, describe_by);
   }
   return out;
 }

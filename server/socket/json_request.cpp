@@ -18,11 +18,15 @@ bool is_id(const rr::Json& json) {
 }  // namespace
 
 rr::Result<JsonRequest> JsonRequest::from_text(std::string_view message) {
-  const auto refused = [](std::string why) { return rr::make_error(rr::ErrorCode::invalid_argument, std::move(why)); };
   auto json = rr::read_json(message);
   if (!json) return json.error();
-  if (!json->is_object()) return refused("a message is an object {\"id\": ..., \"op\": ...}");
-  JsonRequest request(std::move(*json));
+  return from_json(std::move(*json));
+}
+
+rr::Result<JsonRequest> JsonRequest::from_json(rr::Json message) {
+  const auto refused = [](std::string why) { return rr::make_error(rr::ErrorCode::invalid_argument, std::move(why)); };
+  if (!message.is_object()) return refused("a message is an object {\"id\": ..., \"op\": ...}");
+  JsonRequest request(std::move(message));
   const auto* id = request.find("id");
   if (!id || id->is_null()) return request;
   if (!is_id(*id))

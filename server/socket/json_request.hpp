@@ -17,6 +17,9 @@ class JsonRequest {
   /// Errors   data_serialization_error: no JSON; invalid_argument: no object, or its id is none.
   static rr::Result<JsonRequest> from_text(std::string_view message);
 
+  /// The same of what is read already.
+  static rr::Result<JsonRequest> from_json(rr::Json message);
+
   /// As JSON; "null" without one.
   const std::string& id() const { return id_; }
   /// Null where it is not there.

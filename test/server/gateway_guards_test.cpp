@@ -5,7 +5,7 @@
 #include <set>
 
 #include "server/gateway/gateway.hpp"
-#include "server/http/endpoints/routes.hpp"
+#include "server/gateway/routes.hpp"
 #include "test/server/support/test_gateway.hpp"
 #include "test/support/folder.hpp"
 

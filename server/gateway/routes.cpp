@@ -1,4 +1,4 @@
-#include "server/http/endpoints/routes.hpp"
+#include "server/gateway/routes.hpp"
 
 #include "server/http/endpoints/access.hpp"
 #include "server/http/endpoints/dashboard.hpp"
@@ -10,6 +10,7 @@
 #include "server/http/endpoints/metrics.hpp"
 #include "server/http/endpoints/objects.hpp"
 #include "server/http/response_writer.hpp"
+#include "server/mcp/mcp_endpoint.hpp"
 
 namespace rrgate {
 
@@ -57,6 +58,8 @@ std::vector<Route> list_routes(GatewayState& gateway) {
       {post, "/api/v1/access/requests", with_body(ask_endpoint(gateway))},
       {get, "/api/v1/access/requests", requests_endpoint(gateway)},
       {post, "/api/v1/access/requests/*", with_body(request_endpoint(gateway))},
+      {post, std::string(mcp_path), mcp_endpoint(gateway)},
+      {get, std::string(mcp_path), no_mcp_stream_endpoint()},
       {get, "/api/*", no_such_api_endpoint()},
       {get, "/devices/*", device_endpoint(gateway)},
       {get, "/docs", to_documentation_endpoint()},

@@ -1,4 +1,4 @@
-// The list of everything that HTTP answers. Layer: server/http/endpoints.
+// The list of everything that HTTP answers. Layer: server/gateway.
 #pragma once
 
 #include "server/http/router.hpp"

@@ -1,0 +1,20 @@
+// The Model Context Protocol: devices for agents, by JSON-RPC in requests of HTTP. Layer: server/mcp. See docs/mcp.md.
+// Source: modelcontextprotocol.io, revisions 2025-03-26 to 2026-07-28, "Streamable HTTP".
+#pragma once
+
+#include <string_view>
+
+#include "server/http/router.hpp"
+
+namespace rrgate {
+
+class GatewayState;
+
+inline constexpr std::string_view mcp_path = "/mcp";
+
+/// Answers one message of a client. Nothing is kept between two of them.
+Handler mcp_endpoint(GatewayState& gateway);
+/// 405: the gateway sends nothing that no request has asked for.
+Handler no_mcp_stream_endpoint();
+
+}  // namespace rrgate

@@ -1,0 +1,107 @@
+// The Model Context Protocol, with requests as any client may send them.
+#include <catch2/catch.hpp>
+
+#include "server/access/api_tokens.hpp"
+#include "server/json/json.hpp"
+#include "server/mcp/mcp_describe.hpp"
+#include "test/server/support/test_gateway.hpp"
+#include "test/support/folder.hpp"
+
+using namespace rrgate;
+using namespace rrgate::test;
+
+namespace {
+
+struct Told {
+  unsigned status = 0;
+  rr::Json json = {};
+};
+
+Told tell(TestGateway& gateway, const std::string& body, const std::string& lines = {}) {
+  TestClient client(gateway.port());
+  client.send("POST /mcp HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: " +
+              std::to_string(body.size()) + "\r\n" + lines + "\r\n" + body);
+  const auto response = client.receive_response();
+  return {static_cast<unsigned>(response.status), rr::Json::parse(response.body, nullptr, false)};
+}
+
+std::string request(const std::string& method, const std::string& params = "{}") {
+  return R"({"jsonrpc": "2.0", "id": 7, "method": ")" + method + R"(", "params": )" + params + "}";
+}
+
+void enable(Config& config) {
+  config.mcp.is_enabled = true;
+}
+
+}  // namespace
+
+TEST_CASE("agents: tools are the same whatever devices there are, and all of them only read") {
+  TestGateway none(0, enable);
+  TestGateway two(2, enable);
+  const auto tools = tell(none, request("tools/list")).json["result"]["tools"];
+  CHECK(tools == tell(two, request("tools/list")).json["result"]["tools"]);
+  REQUIRE(tools.size() == 4);
+  for (const auto& tool : tools) CHECK(tool["annotations"]["readOnlyHint"] == true);
+}
+
+TEST_CASE("agents: a message that is none is refused with what was expected, and its id is told") {
+  TestGateway gateway(0, enable);
+  const auto code = [](const Told& told) { return told.json["error"]["code"].get<int>(); };
+  CHECK(code(tell(gateway, "{")) == -32700);
+  CHECK(code(tell(gateway, "[]")) == -32600);
+  CHECK(code(tell(gateway, R"({"jsonrpc": "2.0", "id": {}, "method": "ping"})")) == -32600);
+  CHECK(code(tell(gateway, request("nothing"))) == -32601);
+  CHECK(code(tell(gateway, request("tools/call", R"({"name": "nothing"})"))) == -32602);
+  CHECK(code(tell(gateway, request("tools/call", R"({"name": "devices", "arguments": []})"))) == -32602);
+  CHECK(code(tell(gateway, request("resources/read", R"({"uri": "file:///etc/passwd"})"))) == -32002);
+  CHECK(tell(gateway, request("nothing")).json["id"] == 7);
+  const auto modern = "MCP-Protocol-Version: 2026-07-28\r\n";
+  const auto mismatch = tell(gateway, request("ping"), std::string(modern) + "Mcp-Method: tools/list\r\n");
+  CHECK(mismatch.status == 400);
+  CHECK(code(mismatch) == -32020);
+  CHECK(tell(gateway, request("ping"), std::string(modern) + "Mcp-Method: ping\r\n").json["result"]["resultType"] ==
+        "complete");
+}
+
+TEST_CASE("agents: who has no right to anything is refused, and others see what they have a right to") {
+  const Folder files;
+  const auto token = make_api_token();
+  const auto stranger = make_api_token();
+  const auto tokens = files.write(
+      "tokens", "mind " + hash_api_token(token) + " agent _\nother " + hash_api_token(stranger) + " nobody _\n");
+  TestGateway gateway(2, [&](Config& config) {
+    enable(config);
+    config.access.tokens_file = tokens;
+    config.access.rules = {{.roles = {"agent"}, .devices = {"x"}, .may = {Verb::read}}};
+  });
+  const auto shows = [](const std::string& secret) { return "Authorization: Bearer " + secret + "\r\n"; };
+  CHECK(tell(gateway, request("ping")).status == 401);
+  CHECK(tell(gateway, request("ping"), shows(stranger)).status == 403);
+  const auto devices = tell(gateway, request("tools/call", R"({"name": "devices"})"), shows(token));
+  const auto& list = devices.json["result"]["structuredContent"]["devices"];
+  REQUIRE(list.size() == 1);
+  CHECK(list[0]["name"] == "x");
+  // The same words whether the device is there or not.
+  const auto refused = [&](const std::string& device) {
+    const auto arguments = R"({"name": "read", "arguments": {"device": ")" + device + R"(", "path": "a/b"}})";
+    return tell(gateway, request("tools/call", arguments), shows(token))
+        .json["result"]["structuredContent"]["error"]["name"];
+  };
+  CHECK(refused("y") == "RobotRaconteur.PermissionDenied");
+  CHECK(refused("z") == "RobotRaconteur.PermissionDenied");
+}
+
+TEST_CASE("agents: lists come in pages, and long texts of devices are cut between characters") {
+  CHECK(page_of(120, "").next == "50");
+  CHECK(page_of(120, "100").last == 120);
+  CHECK(page_of(120, "100").next.empty());
+  CHECK(page_of(50, "").next.empty());
+  for (const auto* wrong : {"x", "-1", "121", "5x"}) CHECK_THROWS(page_of(120, wrong));
+  CHECK(bounded_text("short") == "short");
+  std::string long_text = "a";
+  for (int i = 0; i < 1000; ++i) long_text += "\xC3\xA4";
+  const auto cut = bounded_text(long_text);
+  CHECK(cut.size() < 1050);
+  CHECK(cut.substr(0, 999) == long_text.substr(0, 999));
+  CHECK(cut.find("bytes more") != std::string::npos);
+}
