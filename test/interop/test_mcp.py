@@ -62,6 +62,12 @@ def value(port, tool, **arguments):
     return result.structured_content
 
 
+def without_device(json_value):
+    if isinstance(json_value, dict):
+        return {key: without_device(each) for key, each in json_value.items() if key != "from_device"}
+    return [without_device(each) for each in json_value] if isinstance(json_value, list) else json_value
+
+
 def post(port, body, headers={}):
     return ask(port, "POST", "/mcp", body, headers)
 
@@ -147,14 +153,16 @@ def test_what_a_hostile_device_says_stands_under_from_device_alone(hostile):
 
     tools, resources, *answers = with_agent(hostile[0], everything)
     assert ORDER not in tools + resources
-    assert sum(json.dumps(each).count(ORDER) for each in answers) >= 6
-
-    def without_device(json_value):
-        if isinstance(json_value, dict):
-            return {key: without_device(each) for key, each in json_value.items() if key != "from_device"}
-        return [without_device(each) for each in json_value] if isinstance(json_value, list) else json_value
-
+    assert ORDER in json.dumps(answers)
     assert ORDER not in json.dumps(without_device(answers))
+
+
+def test_documentation_is_something_that_the_device_says(site):
+    """Of the gateway's own service: the package keeps that of its services to itself."""
+    described = value(site.port, "describe", device="gateway", path="gateway")
+    said = [each["from_device"] for each in described["members"] if "from_device" in each]
+    assert said
+    assert not [text for text in said if text in json.dumps(without_device(described))]
 
 
 def test_an_agent_waits_for_an_event(hostile):

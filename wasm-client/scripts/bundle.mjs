@@ -5,9 +5,22 @@ import { rolldown } from "rolldown";
 
 const [directory = fileURLToPath(new URL("../dist", import.meta.url)), option] = process.argv.slice(2);
 const source = (name) => fileURLToPath(new URL(`../ts/${name}.ts`, import.meta.url));
-const entries = ["index", "internal", "definition/definition", "lease/held_lease", "node", "react/react", "services/find_services", "stores/stores", "svelte/svelte", "usb/nodes", "vue/vue"];
+const entries = [
+  "index",
+  "internal",
+  "definition/definition",
+  "lease/held_lease",
+  "node",
+  "react/react",
+  "services/find_services",
+  "stores/stores",
+  "svelte/svelte",
+  "usb/nodes",
+  "vue/vue",
+];
 /** What all entries have in common: one file of it, whoever loads it. */
-const shared = /\/wasm-client\/ts\/(?!usb\/|lease\/|definition\/|react\/|services\/|stores\/|svelte\/|vue\/|(?:index|internal|node)\.ts$)/;
+const shared =
+  /\/wasm-client\/ts\/(?!usb\/|lease\/|definition\/|react\/|services\/|stores\/|svelte\/|vue\/|(?:index|internal|node)\.ts$)/;
 
 // Bundlers look for files by `new URL("...", import.meta.url)`; not all take the quotes that the minifier prefers. A plugin
 // after it, so that source maps stay right: each quote is one character, too.
