@@ -54,6 +54,17 @@ function withoutInline(html) {
     });
 }
 
+/** Columns of tables are aligned by classes (theme/style.css) instead of styles. */
+function alignByClass(markdown) {
+  for (const rule of ["th_open", "td_open"])
+    markdown.renderer.rules[rule] = (tokens, index, options, _environment, renderer) => {
+      const token = tokens[index];
+      const aligned = /^text-align:(\w+)$/.exec(token.attrGet("style") ?? "");
+      if (aligned) token.attrs = [...token.attrs.filter(([name]) => name !== "style"), ["class", `align-${aligned[1]}`]];
+      return renderer.renderToken(tokens, index, options);
+    };
+}
+
 export default defineConfig({
   title: "rrgate",
   description: "A gateway between Robot Raconteur devices and the web",
@@ -68,7 +79,7 @@ export default defineConfig({
     ["link", { rel: "icon", href: `${base}icon.svg` }],
     ["link", { rel: "stylesheet", href: `${base}code.css` }],
   ],
-  markdown: { codeTransformers: [styles.transformer()], anchor: { slugify } },
+  markdown: { codeTransformers: [styles.transformer()], anchor: { slugify }, config: alignByClass },
   themeConfig: {
     sidebar,
     outline: [2, 3],

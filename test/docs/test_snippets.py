@@ -15,7 +15,7 @@ from pages import ROOT, blocks, find, unknown
 from processes import BUILD
 
 RRGATE = BUILD / "server" / "rrgate"
-LANGUAGES = {"", "cmake", "cpp", "http", "html", "js", "json", "python", "sh", "ts", "txt"}
+LANGUAGES = {"", "cmake", "cpp", "http", "html", "js", "json", "jsx", "python", "sh", "svelte", "ts", "txt", "vue"}
 
 
 def of(*languages):
@@ -39,6 +39,28 @@ def test_languages_are_known():
 @pytest.mark.parametrize("block", of("js"))
 def test_javascript(block, tmp_path):
     check_javascript(block.text, tmp_path)
+
+
+# By the compilers of the frameworks, which the client's own tests use.
+COMPILERS = {
+    "jsx": 'import { transformWithOxc } from "vite"; await transformWithOxc(text, "block.jsx");',
+    "vue": """
+import { compileScript, compileTemplate, parse } from "vue/compiler-sfc";
+const { descriptor, errors } = parse(text);
+if (errors.length) throw errors[0];
+const { bindings } = compileScript(descriptor, { id: "block" });
+const { errors: wrong } = compileTemplate({ id: "block", source: descriptor.template.content, filename: "block.vue",
+  compilerOptions: { bindingMetadata: bindings } });
+if (wrong.length) throw wrong[0];""",
+    "svelte": 'import { compile } from "svelte/compiler"; compile(text, { filename: "block.svelte" });',
+}
+
+
+@pytest.mark.parametrize("block", of(*COMPILERS))
+def test_component(block):
+    done = run("node", "--input-type=module", "-e", f"const text = {json.dumps(block.text)};\n{COMPILERS[block.language]}",
+               cwd=ROOT / "wasm-client")
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("block", of("html"))

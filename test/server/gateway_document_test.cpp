@@ -4,9 +4,9 @@
 #include <set>
 
 #include "server/gateway/gateway.hpp"
+#include "server/gateway/routes.hpp"
 #include "server/http/endpoints/access.hpp"
 #include "server/http/endpoints/objects.hpp"
-#include "server/gateway/routes.hpp"
 #include "server/json/json.hpp"
 
 using namespace rrgate;
