@@ -2,6 +2,7 @@
 import base64
 import json
 import os
+import platform
 import pathlib
 import re
 import signal
@@ -40,6 +41,13 @@ class Hardening(unittest.TestCase):
         self.assertRegex(parts, r"FLAGS_1\) +Flags: NOW PIE")
         self.assertRegex(parts, r"GNU_STACK .* RW +0x")
         self.assertNotRegex(parts, r"LOAD .* RWE ")
+
+    def test_what_is_written_beyond_a_buffer_ends_the_program(self):
+        names = subprocess.run(["readelf", "--wide", "--dyn-syms", "--notes", RRGATE], check=True, capture_output=True, text=True).stdout
+        self.assertIn(" __stack_chk_fail@", names)
+        self.assertRegex(names, r" __\w+_chk@")
+        if platform.machine() == "x86_64":
+            self.assertRegex(names, r"x86 feature: IBT, SHSTK")
 
 
 class Files(unittest.TestCase):

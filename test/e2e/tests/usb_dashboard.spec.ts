@@ -2,6 +2,7 @@
 import path from "node:path";
 import type { Page } from "@playwright/test";
 import { expect, test } from "../lab_test";
+import { startGateway, webRoot } from "../processes";
 import { makeUsbSite } from "../usb_site";
 
 /** A navigator.usb whose one device leads to the robot; the user chooses it when asked. */
@@ -43,8 +44,10 @@ async function fakeUsb(page: Page): Promise<void> {
 }
 
 test("a USB device is chosen, listed and driven, and goes when it is unplugged", async ({ page, lab }) => {
+  // The device answers by its own node; a shared one would by the gateway's.
+  const gateway = await startGateway("create", lab.createUrl, webRoot);
   await fakeUsb(page);
-  await page.goto(lab.url);
+  await page.goto(gateway.url);
   await expect(page.locator('[data-device="create"] [data-state="online"]')).toBeVisible();
   await page.getByRole("button", { name: "Connect USB device" }).click();
   const row = page.locator('[data-device^="usb:"]');
@@ -54,9 +57,10 @@ test("a USB device is chosen, listed and driven, and goes when it is unplugged",
   await expect(page.getByRole("button", { name: "Forward" })).toBeEnabled();
   await page.evaluate("unplug()");
   await expect(page.locator('[data-link="lost"]')).toContainText(/unplugged|is gone|may use no USB device/);
-  await page.goto(`${lab.url}#/`);
+  await page.goto(`${gateway.url}#/`);
   await expect(page.locator('[data-device="create"]')).toBeVisible();
   await expect(row).toHaveCount(0);
+  await gateway.program.kill();
 });
 
 test("where there is no WebUSB, nothing offers it", async ({ page, lab }) => {
