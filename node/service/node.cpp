@@ -82,7 +82,7 @@ struct Repeat {
 
 void repeat(const std::shared_ptr<Repeat>& job) {
   job->timer.async_wait([job](const error_code&) {
-    if (!job->is_stopped) job->work();
+    if (!job->is_stopped) job->work();  // throws nothing
     if (job->is_stopped) return;
     const auto late = std::chrono::steady_clock::now() - job->timer.expiry();
     job->timer.expires_at(job->timer.expiry() + job->period * std::max<std::int64_t>(1, late / job->period + 1));
@@ -221,10 +221,18 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   void every(std::chrono::nanoseconds period, std::function<void()> work) {
     if (period <= std::chrono::nanoseconds::zero())
       throw std::invalid_argument("Node::every: the period must be longer than nothing");
-    const auto job = std::make_shared<Repeat>(io_, period, std::move(work));
+    auto guarded = [this, work = std::move(work)] { run_handler("every", work); };
+    const auto job = std::make_shared<Repeat>(io_, period, std::move(guarded));
     job->timer.expires_after(period);
     repeats_.push_back(job);
     repeat(job);
+  }
+
+  void post(std::function<void()> work) {
+    asio::post(io_, [this, alive = std::weak_ptr(alive_), work = std::move(work)] {
+      if (alive.expired()) return work();  // the node's io_context is somebody else's, and outlives it
+      run_handler("post", work);
+    });
   }
 
   std::vector<std::string> listen_urls() const {
@@ -329,6 +337,17 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
 
  private:
   using Arrival = std::shared_ptr<asio::cancellation_signal>;
+
+  /// `what`  the function that the work was given to.
+  void run_handler(const char* what, const std::function<void()>& work) {
+    const std::weak_ptr alive = alive_;
+    try {
+      work();
+    } catch (...) {
+      if (alive.expired()) throw;  // there is nobody to report it
+      report(describe_failure("Node", what, handler_error(std::current_exception())));
+    }
+  }
 
   /// Clients that are lost while they are sent to, or by what handlers do then, leave clients_ meanwhile.
   template <class F>
@@ -472,7 +491,7 @@ void Node::stop() {
   implementation_->stop();
 }
 void Node::post(std::function<void()> work) {
-  asio::post(implementation_->io(), std::move(work));
+  implementation_->post(std::move(work));
 }
 void Node::every(std::chrono::nanoseconds period, std::function<void()> work) {
   implementation_->every(period, std::move(work));

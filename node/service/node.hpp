@@ -81,7 +81,7 @@ class Node {
   /// Closes the listeners and tells the clients that their services end; run() returns when they are gone, after half a
   /// second at the latest.
   void stop();
-  /// Runs `work` on the node's thread.
+  /// Runs `work` on the node's thread. What it throws is reported (NodeOptions::report); so is what every() runs.
   void post(std::function<void()> work);
   /// Runs `work` again and again, `period` apart, until the node stops. Does not drift; what could not run in time
   /// because something else took too long is left out.

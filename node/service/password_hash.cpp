@@ -9,6 +9,8 @@
 #include <optional>
 #include <vector>
 
+#include "node/tls/base64.hpp"
+
 namespace rr {
 
 namespace {
@@ -25,29 +27,22 @@ const unsigned char* bytes_of(std::string_view text) {
   return reinterpret_cast<const unsigned char*>(text.data());
 }
 
-std::string encode_base64(std::string_view bytes) {
-  std::string text((bytes.size() + 2) / 3 * 4 + 1, '\0');
-  const int size = EVP_EncodeBlock(bytes_of(text), bytes_of(bytes), static_cast<int>(bytes.size()));
-  text.resize(static_cast<std::size_t>(size));
-  while (!text.empty() && text.back() == '=') text.pop_back();
+// Without padding, as hashes are written.
+
+std::string encode_unpadded(std::string_view bytes) {
+  auto text = encode_base64(as_bytes(bytes));
+  text.erase(text.find_last_not_of('=') + 1);
   return text;
 }
 
 /// At least `min_size` bytes.
-std::optional<std::string> decode_base64(std::string_view text, std::size_t min_size) {
-  if (text.size() % 4 == 1 || text.size() > 1024) return std::nullopt;
-  for (const char c : text)
-    if (!((c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '+' || c == '/'))
-      return std::nullopt;
-  const std::size_t size = text.size() * 3 / 4;
+std::optional<std::string> decode_unpadded(std::string_view text, std::size_t min_size) {
+  if (text.size() > 1024 || text.ends_with('=')) return std::nullopt;
   std::string padded(text);
-  while (padded.size() % 4 != 0) padded.push_back('=');
-  std::string bytes(padded.size() / 4 * 3, '\0');
-  if (EVP_DecodeBlock(bytes_of(bytes), bytes_of(std::string_view(padded)), static_cast<int>(padded.size())) < 0)
-    return std::nullopt;
-  bytes.resize(size);
-  if (bytes.size() < min_size) return std::nullopt;
-  return bytes;
+  padded.append((4 - text.size() % 4) % 4, '=');
+  const auto bytes = decode_base64(padded);
+  if (!bytes || bytes->size() < min_size) return std::nullopt;
+  return std::string(bytes->begin(), bytes->end());
 }
 
 bool take(std::string_view& text, std::string_view word) {
@@ -126,8 +121,8 @@ Result<PasswordHash> PasswordHash::parse(std::string_view text) {
     return fail;
   const auto end_of_salt = text.find('$');
   if (end_of_salt == std::string_view::npos) return fail;
-  const auto salt = decode_base64(text.substr(0, end_of_salt), 8);
-  const auto hash = decode_base64(text.substr(end_of_salt + 1), hash_size);
+  const auto salt = decode_unpadded(text.substr(0, end_of_salt), 8);
+  const auto hash = decode_unpadded(text.substr(end_of_salt + 1), hash_size);
   if (!salt || !hash || hash->size() != hash_size) return fail;
   if (!is_affordable(cost))
     return make_error(ErrorCode::invalid_argument,
@@ -158,7 +153,7 @@ bool PasswordHash::matches(std::string_view password) const {
 std::string PasswordHash::text() const {
   if (scheme_ == PasswordScheme::md5) return format_hex(hash_);
   return std::string(scrypt_prefix) + "ln=" + std::to_string(cost_.ln) + ",r=" + std::to_string(cost_.r) +
-         ",p=" + std::to_string(cost_.p) + "$" + encode_base64(salt_) + "$" + encode_base64(hash_);
+         ",p=" + std::to_string(cost_.p) + "$" + encode_unpadded(salt_) + "$" + encode_unpadded(hash_);
 }
 
 }  // namespace rr

@@ -8,10 +8,10 @@
 #include <set>
 #include <sstream>
 
-#include "core/support/glob.hpp"
 #include "node/http/origin.hpp"
 #include "node/transport/schemes.hpp"
 #include "server/config/access_options.hpp"
+#include "server/config/lease_options.hpp"
 #include "server/config/object_reader.hpp"
 
 namespace rrgate {
@@ -116,55 +116,6 @@ void read_callback_rule(ObjectReader& in, CallbackRule& rule) {
   rule.policy = answer == "first" ? CallbackPolicy::first
                 : answer == "all" ? CallbackPolicy::all
                                   : CallbackPolicy::owner;
-}
-
-void read_lease_rule(ObjectReader& in, LeaseRule& rule) {
-  in.required_text("member", [&](const std::string& text) -> std::string {
-    rule.member = text;
-    return {};
-  });
-  std::string need = "covered";
-  in.choice("lease", need, {"required", "covered", "never"});
-  rule.need = need == "required" ? LeaseNeed::required : need == "never" ? LeaseNeed::never : LeaseNeed::covered;
-}
-
-void read_safe_action(ObjectReader& in, SafeAction& action) {
-  std::size_t kinds = 0;
-  const auto target = [&](const char* key, SafeAction::Kind kind) {
-    std::string text;
-    in.text(key, text);
-    if (text.empty()) return;
-    ++kinds;
-    action.kind = kind;
-    const auto dot = text.rfind('.');
-    if (dot == std::string::npos || dot == 0 || dot + 1 == text.size())
-      return in.finding(key, "found " + rr::quote(text) + ", expected path.member, as \"Create.Drive\"");
-    action.path = text.substr(0, dot);
-    action.member = text.substr(dot + 1);
-  };
-  target("call", SafeAction::Kind::call);
-  target("wire", SafeAction::Kind::wire);
-  target("property", SafeAction::Kind::property);
-  if (kinds != 1) in.finding("call", "expected one of call, wire and property: what is safe to do");
-  std::string arguments;
-  std::string value;
-  in.json("arguments", "array", arguments);
-  in.json("value", "", value);
-  const bool is_call = action.kind == SafeAction::Kind::call;
-  if (is_call && !value.empty()) in.finding("value", "calls have arguments, an array");
-  if (!is_call && !arguments.empty()) in.finding("arguments", "wires and properties have a value");
-  if (!is_call && value.empty()) in.finding("value", "missing; expected what is safe to write");
-  action.json = !is_call ? value : arguments.empty() ? "[]" : arguments;
-}
-
-void read_leases(ObjectReader& in, LeaseConfig& leases) {
-  leases.is_offered = true;
-  in.objects("members", false, [&](ObjectReader& item) { read_lease_rule(item, leases.members.emplace_back()); });
-  in.objects("safe", false, [&](ObjectReader& item) { read_safe_action(item, leases.safe.emplace_back()); });
-  in.texts("takeover", false, [&](const std::string& text) -> std::string {
-    leases.takeover.push_back(text);
-    return text.empty() ? "empty; expected a role, or \"*\"" : "";
-  });
 }
 
 void read_node(ObjectReader& in, NodeConfig& node) {
@@ -453,31 +404,6 @@ std::vector<OptionInfo> config_options() {
   Config config;
   read_config(root, config);
   return options;
-}
-
-namespace {
-
-/// "Create.arm[0].stop" as "Create.arm.0.stop".
-std::string dotted(std::string_view place) {
-  std::string out;
-  for (const auto c : place)
-    if (c != ']') out += c == '[' ? '.' : c;
-  return out;
-}
-
-}  // namespace
-
-LeaseNeed LeaseConfig::need_of(std::string_view member) const {
-  const auto rule = std::find_if(members.begin(), members.end(),
-                                 [&](const auto& each) { return rr::glob_matches(each.member, member); });
-  return rule == members.end() ? LeaseNeed::covered : rule->need;
-}
-
-bool LeaseConfig::is_urgent(std::string_view place) const {
-  const auto name = dotted(place);
-  const auto rule = std::find_if(members.begin(), members.end(),
-                                 [&](const auto& each) { return rr::glob_matches(dotted(each.member), name); });
-  return is_offered && rule != members.end() && rule->need == LeaseNeed::never;
 }
 
 }  // namespace rrgate

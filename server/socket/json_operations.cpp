@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
-#include <boost/asio/post.hpp>
 
 #include "server/http/endpoints/call_log.hpp"
 #include "server/http/endpoints/large_json.hpp"
 #include "server/http/endpoints/member_values.hpp"
+#include "server/log/log.hpp"
 
 namespace rrgate {
 
@@ -19,11 +19,13 @@ namespace {
 constexpr std::size_t max_open = 256;
 /// Requests that are not answered yet.
 constexpr std::size_t max_running = 64;
-/// What the client may take to answer the device.
-constexpr std::chrono::seconds answer_time{10};
 
-bool takes_values(const rr::MemberDefinition& function) {
-  return !function.parameters.empty() && function.parameters.back().type.container == rr::ContainerKind::generator;
+/// What has ended a request: also what is nobody's intention, as a lack of memory, whose text is not for the client.
+rr::Error error_of(const std::exception_ptr& thrown) {
+  auto error = rr::handler_error(thrown);
+  if (!rr::is_unhandled(error)) return error;
+  log(LogLevel::error, "request of a JSON socket failed", {{"error", error.message}});
+  return rr::make_error(rr::ErrorCode::internal_error, "the gateway could not do it");
 }
 
 }  // namespace
@@ -32,16 +34,6 @@ template <auto Answer>
 rr::awaitable<rr::OrderedJson> JsonOperations::pass_on(JsonRequestPtr request, TargetPtr target) {
   return Answer(std::move(request), std::move(target), place_.form);
 }
-
-struct JsonOperations::Ask {
-  Ask(TargetPtr of, rr::ClientConnection::CallbackReply to, const asio::any_io_executor& executor,
-      std::function<void()> expired)
-      : target(std::move(of)), reply(std::move(to)), limit(executor, std::move(expired)) {}
-
-  TargetPtr target;
-  rr::ClientConnection::CallbackReply reply;
-  rr::Deadline limit;
-};
 
 const JsonOperations::Operation JsonOperations::operations[] = {
     {"describe", Verb::read, &JsonOperations::pass_on<&describe_target>},
@@ -84,13 +76,26 @@ const JsonOperations::Operation* JsonOperations::find_operation(std::string_view
 }
 
 JsonOperations::JsonOperations(GatewayState& gateway, JsonSocketPlace place, std::shared_ptr<JsonOutbox> outbox)
-    : gateway_(gateway), place_(std::move(place)), outbox_(std::move(outbox)) {}
+    : gateway_(gateway),
+      place_(std::move(place)),
+      outbox_(std::move(outbox)),
+      questions_(place_.device->executor(), place_.form, outbox_) {}
 
 rr::awaitable<void> JsonOperations::take(const std::string& message) {
   const bool is_large = message.size() > large_json_bytes;
   const auto measure = [&message] { return rr::memory_of_json(message); };
   auto memory = gateway_.memory().charge(place_.from.network);
-  if (!memory.has_room(least_room) || !memory.resize(is_large ? co_await gateway_.workers().run(measure) : measure()))
+  bool has_room = memory.has_room(least_room);
+  if (has_room) {
+    // Named: g++ 12 destroys twice what a co_await within ?: gives.
+    std::size_t needed = 0;
+    if (is_large)
+      needed = co_await gateway_.workers().run(measure);
+    else
+      needed = measure();
+    has_room = memory.resize(needed);
+  }
+  if (!has_room)
     co_return tell_error("null", rr::make_error(rr::ErrorCode::out_of_system_resource,
                                                 "the gateway has no memory left for a message of " +
                                                     std::to_string(message.size()) + " bytes; try again in a moment"));
@@ -142,24 +147,23 @@ bool JsonOperations::is_urgent(const JsonRequest& request, const Operation& oper
 rr::awaitable<void> JsonOperations::run(std::shared_ptr<JsonOperations> self, JsonRequestPtr request,
                                         [[maybe_unused]] Passes passes, [[maybe_unused]] MemoryBudget::Charge memory) {
   std::optional<rr::Error> error;
-  rr::OrderedJson result;
+  std::string answer;
   try {
-    result = co_await self->perform(request);
-  } catch (const rr::Exception& exception) {
-    error = exception.error();
+    const auto result = co_await self->perform(request);
+    const auto write = [&request, &result] { return json_answer(request->id(), result); };
+    const bool is_wanted = request->id() != "null";
+    if (is_wanted && held_bytes(result) <= large_json_bytes)
+      answer = write();
+    else if (is_wanted)
+      answer = co_await self->gateway_.workers().run(write);
+  } catch (...) {
+    error = error_of(std::current_exception());
   }
   --self->running_;
-  if (error) {
+  if (error)
     self->tell_error(request->id(), *error);
-  } else if (request->id() != "null") {
-    const auto write = [&request, &result] { return json_answer(request->id(), result); };
-    std::string answer;
-    if (held_bytes(result) <= large_json_bytes)
-      answer = write();
-    else
-      answer = co_await self->gateway_.workers().run(write);
+  else if (!answer.empty())
     self->outbox_->add(std::move(answer));
-  }
 }
 
 rr::awaitable<rr::OrderedJson> JsonOperations::perform(JsonRequestPtr request) {
@@ -175,8 +179,8 @@ rr::awaitable<rr::OrderedJson> JsonOperations::perform(JsonRequestPtr request) {
   std::optional<rr::Error> error;
   try {
     result = co_await (this->*operation->perform)(request, target);
-  } catch (const rr::Exception& exception) {
-    error = exception.error();
+  } catch (...) {
+    error = error_of(std::current_exception());
   }
   if (entry) entry->finish(error ? rr::Result<>(*error) : rr::Result<>());
   if (error) throw rr::Exception(std::move(*error));
@@ -241,8 +245,7 @@ void JsonOperations::stop() {
   for (auto& [id, open] : std::exchange(open_, {}))
     if (const auto* generator = std::get_if<Generator>(&open)) generator->target->client->drop_generator(generator->id);
   senders_.clear();
-  const auto gone = rr::make_error(rr::ErrorCode::operation_aborted, "the client has gone");
-  for (const auto& [number, asked] : std::exchange(asks_, {})) asked->reply(gone);
+  questions_.end_all();
   own_.reset();
 }
 
@@ -270,87 +273,6 @@ std::string JsonOperations::reserve(const JsonRequest& request) {
            "this WebSocket has " + std::to_string(max_open) + " subscriptions, generators and callbacks already");
   open_[id] = Opening{};
   return id;
-}
-
-rr::awaitable<rr::OrderedJson> JsonOperations::open(JsonRequestPtr request, TargetPtr target) {
-  const auto& member = expect_member(*target, "open", {rr::MemberKind::function});
-  if (!member.is_generator())
-    refuse(rr::ErrorCode::invalid_operation, rr::quote(member.name) + " is no generator; use \"call\"");
-  auto arguments = arguments_of(*request, *target, place_.form);
-  const auto id = reserve(*request);
-  Generator generator{target, target->client->next_generator()};
-  auto opening = target->request(rr::CallKind::generator_open);
-  opening.generator = generator.id;
-  opening.arguments = std::move(arguments);
-  std::optional<rr::Error> error;
-  try {
-    co_await target->client->ask(std::move(opening));
-  } catch (const rr::Exception& exception) {
-    error = exception.error();
-  }
-  if (error) {
-    open_.erase(id);
-    throw rr::Exception(*error);
-  }
-  if (is_stopped_) {  // nobody will close it
-    target->client->drop_generator(generator.id);
-    co_return nullptr;
-  }
-  open_[id] = std::move(generator);
-  co_return nullptr;
-}
-
-JsonOperations::Generator& JsonOperations::generator_of(const JsonRequest& request) {
-  const auto found = open_.find(request.at("generator").dump());
-  auto* generator = found == open_.end() ? nullptr : std::get_if<Generator>(&found->second);
-  if (!generator) refuse(rr::ErrorCode::invalid_argument, "\"generator\" is not the id of one that is open");
-  return *generator;
-}
-
-rr::awaitable<rr::OrderedJson> JsonOperations::next(JsonRequestPtr request, TargetPtr) {
-  const auto [target, generator] = generator_of(*request);
-  value_or_throw(place_.standing->check(access_request(*target, Verb::call), Recorded::never));
-  auto step = target->request(rr::CallKind::generator_next);
-  step.generator = generator;
-  if (takes_values(*target->member)) {
-    const auto& taken = target->member->parameters.back();
-    step.arguments.push_back(value_of(*request, *target, taken.type, taken.name, place_.form));
-  }
-  rr::Value value;
-  std::optional<rr::Error> error;
-  try {
-    value = co_await target->client->ask(std::move(step));
-  } catch (const rr::Exception& exception) {
-    error = exception.error();
-  }
-  auto out = rr::OrderedJson::object();
-  if (error) {
-    const bool has_ended = error->code == rr::ErrorCode::stop_iteration;
-    if (has_ended || error->code == rr::ErrorCode::operation_aborted) open_.erase(request->at("generator").dump());
-    if (!has_ended) throw rr::Exception(*error);
-    rr::add_key(out, "done") = true;
-    co_return out;
-  }
-  rr::add_key(out, "value") = to_json(*target, value, place_.form);
-  rr::add_key(out, "done") = false;
-  co_return out;
-}
-
-rr::awaitable<rr::OrderedJson> JsonOperations::end_generator(JsonRequestPtr request, rr::CallKind how) {
-  const auto [target, generator] = generator_of(*request);
-  open_.erase(request->at("generator").dump());
-  auto end = target->request(how);
-  end.generator = generator;
-  co_await target->client->ask(std::move(end));
-  co_return nullptr;
-}
-
-rr::awaitable<rr::OrderedJson> JsonOperations::close(JsonRequestPtr request, TargetPtr) {
-  return end_generator(request, rr::CallKind::generator_close);
-}
-
-rr::awaitable<rr::OrderedJson> JsonOperations::abort(JsonRequestPtr request, TargetPtr) {
-  return end_generator(request, rr::CallKind::generator_abort);
 }
 
 namespace {
@@ -456,12 +378,7 @@ void JsonOperations::review() {
       ++it;
       continue;
     }
-    for (auto ask = asks_.begin(); ask != asks_.end();) {
-      const auto asked = ask->second;
-      const bool is_of_it = asked->target->path() == open->path && asked->target->member->name == open->member;
-      ask = is_of_it ? asks_.erase(ask) : std::next(ask);
-      if (is_of_it) asked->reply(allowed.error());
-    }
+    questions_.end_of(open->path, open->member, allowed.error());
     auto news = rr::OrderedJson::object();
     rr::add_key(news, "state") = "ended";
     rr::add_key(news, "detail") = allowed.error().message;
@@ -480,9 +397,9 @@ rr::awaitable<rr::OrderedJson> JsonOperations::callback(JsonRequestPtr request, 
   rr::ClientConnection::LateCallbackHandler handler = [weak = weak_from_this(), id, asked](
                                                           std::span<const rr::Value> arguments, const auto& reply) {
     if (const auto self = weak.lock())
-      self->ask(id, asked, arguments, reply);
+      self->questions_.ask(id, asked, arguments, reply);
     else
-      reply(rr::make_error(rr::ErrorCode::operation_aborted, "the client has gone"));
+      reply(client_gone());
   };
   auto answering = target->client->answer_callback(target->place(), std::move(handler));
   if (!answering || is_stopped_ || !open_.contains(id)) {
@@ -494,54 +411,8 @@ rr::awaitable<rr::OrderedJson> JsonOperations::callback(JsonRequestPtr request, 
   co_return nullptr;
 }
 
-void JsonOperations::ask(const std::string& id, const TargetPtr& target, std::span<const rr::Value> arguments,
-                         rr::ClientConnection::CallbackReply reply) {
-  auto args = arguments_to_json(arguments, *target->member, target->types(), place_.form);
-  if (!args) return reply(args.error());
-  if (asks_.size() >= max_running)
-    return reply(rr::make_error(rr::ErrorCode::out_of_system_resource,
-                                "the client has " + std::to_string(max_running) + " questions to answer already"));
-  const auto number = ++last_ask_;
-  const auto executor = place_.device->executor();
-  const auto expired = [this, number, executor] {
-    const auto late = asks_.extract(number);
-    if (!late) return;
-    late.mapped()->reply(rr::make_error(rr::ErrorCode::operation_timeout, "the client has not answered in time"));
-    asio::post(executor, [kept = late.mapped()] {});  // this function is part of it
-  };
-  const auto asked = std::make_shared<Ask>(target, std::move(reply), executor, expired);
-  asked->limit.arm(answer_time);
-  asks_[number] = asked;
-  auto question = rr::OrderedJson::object();
-  rr::add_key(question, "call") = number;
-  rr::add_key(question, "args") = std::move(*args);
-  outbox_->add("{\"callback\":" + id + "," + rr::write_json(question).substr(1));
-}
-
 rr::awaitable<rr::OrderedJson> JsonOperations::answer(JsonRequestPtr request, TargetPtr) {
-  const auto& number = request->at("call");
-  const auto found = asks_.find(number.is_number_integer() ? number.get<std::int64_t>() : 0);
-  if (found == asks_.end())
-    refuse(rr::ErrorCode::invalid_argument, "\"call\" is no question that waits; perhaps its time is over");
-  const auto asked = found->second;
-  asks_.erase(found);
-  const auto& member = *asked->target->member;
-  if (const auto* error = request->find("error")) {
-    const auto text = [&](const char* name) {
-      const auto item = error->is_object() ? error->find(name) : error->end();
-      return error->is_object() && item != error->end() && item->is_string() ? item->get<std::string>() : "";
-    };
-    const auto name = text("name");
-    asked->reply(name.empty() ? rr::make_error(rr::ErrorCode::operation_failed, text("message"))
-                              : rr::declared_error(name, text("message")));
-    co_return nullptr;
-  }
-  static const rr::Json none;
-  const auto* result = request->find("result");
-  const auto value =
-      rr::value_from_json(result ? *result : none, member.type, asked->target->types(), place_.form, member.name);
-  asked->reply(value);
-  value_or_throw(value);
+  questions_.answer(*request);
   co_return nullptr;
 }
 

@@ -7,10 +7,10 @@
 #include <variant>
 #include <vector>
 
-#include "node/transport/watchdog.hpp"
 #include "server/access/standing.hpp"
 #include "server/socket/json_members.hpp"
 #include "server/socket/json_outbox.hpp"
+#include "server/socket/json_questions.hpp"
 #include "server/state/http_access.hpp"
 
 namespace rrgate {
@@ -69,8 +69,6 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
   };
   struct Opening {};
   using Open = std::variant<Opening, Subscription, Generator>;
-  /// A question of the device that the client has not answered yet.
-  struct Ask;
 
   using Passes = std::shared_ptr<const HttpAccess::Passes>;
   static rr::awaitable<void> run(std::shared_ptr<JsonOperations> self, JsonRequestPtr request, Passes passes,
@@ -102,9 +100,6 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
   std::string reserve(const JsonRequest& request);
   Generator& generator_of(const JsonRequest& request);
   rr::awaitable<rr::OrderedJson> end_generator(JsonRequestPtr request, rr::CallKind how);
-  /// The device asks.
-  void ask(const std::string& id, const TargetPtr& target, std::span<const rr::Value> arguments,
-           rr::ClientConnection::CallbackReply reply);
 
   GatewayState& gateway_;
   JsonSocketPlace place_;
@@ -112,8 +107,7 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
   std::shared_ptr<ValueClient> own_;  ///< once something needs it; then everything uses it
   std::map<std::string, Open> open_;
   std::map<std::pair<std::string, std::string>, ValueClient::ListenerPtr> senders_;  ///< hold what is sent on
-  std::map<std::int64_t, std::shared_ptr<Ask>> asks_;
-  std::int64_t last_ask_ = 0;
+  JsonQuestions questions_;
   std::size_t running_ = 0;
   bool is_stopped_ = false;
 };

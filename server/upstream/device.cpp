@@ -7,7 +7,6 @@
 #include <boost/asio/detached.hpp>
 #include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
-#include <random>
 
 #include "core/session/connection.hpp"
 #include "core/support/random.hpp"
@@ -48,17 +47,17 @@ rr::awaitable<rr::Result<Reached>> probe_any(std::vector<rr::ConnectionUrl> urls
   co_return co_await rr::race(std::move(runners), rr::candidate_stagger, nothing);
 }
 
+/// Many gateways, or many devices of one, must not look in step: 75 to 125 percent.
+milliseconds around(milliseconds wait) {
+  return rr::random_between(wait * 3 / 4, wait * 5 / 4);
+}
+
 bool is_secure(const rr::ConnectionUrl& url) {
   const auto* scheme = rr::find_url_scheme(url.scheme);
   return scheme && scheme->is_secure;
 }
 
 }  // namespace
-
-milliseconds with_jitter(milliseconds wait) {
-  static thread_local std::minstd_rand random(std::random_device{}());
-  return wait * std::uniform_int_distribution<int>(75, 125)(random) / 100;
-}
 
 std::string_view to_string(DeviceState state) {
   switch (state) {
@@ -80,6 +79,7 @@ Device::Device(const asio::any_io_executor& executor, DeviceConfig config, const
            : is_secure(config_.url) ? std::make_shared<TlsFiles>(config_.tls)
                                     : nullptr),
       retry_(whole.retry),
+      backoff_(retry_.min, retry_.max),
       look_id_(rr::random_node_id()),
       wake_(executor) {}
 
@@ -174,7 +174,9 @@ void Device::become(const DeviceConfig& config, const Config& whole) {
   config_.shares_reads = config.shares_reads;
   dial_options_.timeout = whole.timeouts.connect;
   dial_options_.send_stall = whole.timeouts.send_stall;
+  if (retry_ == whole.retry) return;
   retry_ = whole.retry;
+  backoff_ = rr::Backoff(retry_.min, retry_.max);
 }
 
 std::optional<Device::Seat> Device::take_seat() {
@@ -197,7 +199,6 @@ void Device::start() {
 }
 
 rr::awaitable<void> Device::watch() {
-  auto backoff = retry_.min;
   while (!is_stopping_) {
     looks_again_ = false;
     has_come_back_ = false;
@@ -214,9 +215,9 @@ rr::awaitable<void> Device::watch() {
     is_circle_ = has_come_back_ && !result;
     if (is_circle_) result = rr::make_error(rr::ErrorCode::connection_error, circle);
     note(result);
+    if (result) backoff_.reset();
     const auto looked = std::chrono::steady_clock::now();
-    wake_.expires_at(looked + with_jitter(result ? retry_.online : backoff));
-    backoff = result ? retry_.min : std::min(backoff * 2, retry_.max);
+    wake_.expires_at(looked + (result ? around(retry_.online) : backoff_.next()));
     while (!is_stopping_) {
       // Looking again on demand keeps the shortest wait too, or a crowd of clients would make this loop spin.
       if (looks_again_) wake_.expires_at(std::min(wake_.expiry(), looked + retry_.min));

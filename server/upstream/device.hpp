@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/session/connection.hpp"
+#include "node/driver/backoff.hpp"
 #include "node/transport/dial.hpp"
 #include "server/config/config.hpp"
 #include "server/config/tls_files.hpp"
@@ -26,9 +27,6 @@ struct LeaseNews;
 
 enum class DeviceState { connecting, online, offline };
 std::string_view to_string(DeviceState state);
-
-/// Many gateways, or many devices of one, must not knock in step: 75 to 125 percent.
-milliseconds with_jitter(milliseconds wait);
 
 /// One device. Looks at it from time to time; connects clients to it. Those who use it over a wait hold a Seat.
 class Device : public std::enable_shared_from_this<Device> {
@@ -133,6 +131,7 @@ class Device : public std::enable_shared_from_this<Device> {
   std::shared_ptr<TlsFiles> tls_;                        ///< null: the URL wants none
   std::list<boost::asio::cancellation_signal> dialing_;  ///< what stop() ends
   Retry retry_;
+  rr::Backoff backoff_;         ///< between looks at it while it does not answer
   const rr::NodeId look_id_;    ///< the node that looks come from: none but they have it
   bool has_come_back_ = false;  ///< the look that is on its way
   bool is_circle_ = false;      ///< the last look came back, and was not answered

@@ -78,6 +78,7 @@ void Upstream::remove(UpstreamClient& client, std::function<void()> left) {
     if (left) left();
     return;
   }
+  ++clients_left_;
   std::erase_if(calls_, [&](const OpenCall& call) { return call.client == &client; });
   for (auto it = endpoints_.lower_bound({&client, 0}); it != endpoints_.end() && it->first.first == &client;)
     leave_pipe(client, (it++)->first.second);
@@ -149,9 +150,7 @@ void Upstream::watch_object(const std::string& path, const rr::EntityDefinition&
                               const auto self = weak.lock();
                               if (!self) return;
                               rr::EventPacket packet(path, member, arguments);
-                              const auto clients = self->clients_;  // they may leave
-                              for (auto* client : clients)
-                                if (self->has(*client)) client->receive_event(packet);
+                              self->for_each_client([&](UpstreamClient& client) { client.receive_event(packet); });
                             });
     } else if (member.kind == rr::MemberKind::callback) {
       connection_->on_callback_later(
@@ -180,9 +179,7 @@ void Upstream::look_up_again() {
       for (const auto& [number, pipe] : self->pipes_)
         if (pipe.path == path) pipes.push_back(number);
       for (const auto number : pipes) self->attach_pipe(number);
-      const auto clients = self->clients_;  // they may leave
-      for (auto* client : clients)
-        if (self->has(*client)) client->found_again(path);
+      self->for_each_client([&](UpstreamClient& client) { client.found_again(path); });
     });
   }
 }
@@ -200,9 +197,7 @@ void Upstream::handle_released(const std::string& path) {
   std::erase_if(generators_, [&](const auto& each) { return rr::is_within(each.second.path, path); });
   locks_->handle_released(path);
   if (on_released_) on_released_(path);
-  const auto clients = clients_;
-  for (auto* client : clients)
-    if (has(*client)) client->release_path(path);
+  for_each_client([&](UpstreamClient& client) { client.release_path(path); });
 }
 
 // --- requests ---
@@ -323,13 +318,14 @@ void Upstream::answer_generator(UpstreamClient& client, const rr::Called& called
                                 Completion done) {
   const std::pair key(&client, called.generator);
   const auto& name = called.member->name;
+  const auto life = client.life();  // once it has ended, its address may be another client's
   if (called.kind == rr::CallKind::generator_open) {
-    auto opened = [weak = weak_from_this(), key, path, name,
+    auto opened = [weak = weak_from_this(), key, life, path, name,
                    done = std::move(done)](rr::Result<rr::Value> index) mutable {
       const auto self = weak.lock();
       if (index && self && self->connection_) {
         const auto number = index->to<std::int32_t>().value();
-        if (self->has(*key.first))
+        if (!life.expired() && self->has(*key.first))
           self->generators_[key] = {path, name, number};
         else
           self->connection_->close_generator(path, name, number, ignore_result);
@@ -345,8 +341,8 @@ void Upstream::answer_generator(UpstreamClient& client, const rr::Called& called
   }
   const auto index = found->second.index;
   if (called.kind == rr::CallKind::generator_next) {
-    auto stepped = [weak = weak_from_this(), key, done = std::move(done)](rr::Result<rr::Value> value) {
-      if (const auto self = weak.lock(); self && !value) self->generators_.erase(key);
+    auto stepped = [weak = weak_from_this(), key, life, done = std::move(done)](rr::Result<rr::Value> value) {
+      if (const auto self = weak.lock(); self && !value && !life.expired()) self->generators_.erase(key);
       done(std::move(value));
     };
     std::optional<rr::Value> parameter;

@@ -196,6 +196,18 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
     UpstreamClient* client = nullptr;
     std::uint64_t count = 0;  ///< Wire::count of the newest that it was sent
   };
+  /// A wire's value as the turns send it: encoded once for all of them.
+  struct Outgoing {
+    Outgoing(const std::string& path, const rr::MemberDefinition& member, rr::WireValue its_value,
+             rr::TimePoint arrived, std::uint64_t its_count)
+        : value(std::move(its_value)), packet(path, member, value.value, value.time, arrived), count(its_count) {}
+    Outgoing(const Outgoing&) = delete;
+    Outgoing& operator=(const Outgoing&) = delete;
+
+    const rr::WireValue value;
+    rr::WirePacket packet;
+    const std::uint64_t count;  ///< Wire::count of it
+  };
   struct Wire {
     Wire(std::string its_path, const rr::MemberDefinition& its_member)
         : path(std::move(its_path)), member(its_member) {}
@@ -206,6 +218,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
     std::size_t next = 0;  ///< before the follower whose turn it is
     std::optional<rr::WireValue> newest;
     rr::TimePoint arrived;               ///< of the newest
+    std::optional<Outgoing> outgoing;    ///< while hand_out() is at it
     std::uint64_t count = 0;             ///< values that have come
     std::optional<rr::Value> out_value;  ///< the newest that could not be sent yet
     bool is_attached = false;
@@ -239,6 +252,14 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   rr::awaitable<rr::Result<>> log_in(std::shared_ptr<rr::ClientConnection> connection);
   /// Whether the client is there still: what is told to one may end it.
   bool has(const UpstreamClient& client) const;
+  /// Calls `tell` for each client that is there still when it is its turn.
+  template <class F>
+  void for_each_client(F&& tell) {
+    const auto clients = clients_;
+    const auto left = clients_left_;
+    for (auto* client : clients)
+      if (clients_left_ == left || has(*client)) tell(*client);
+  }
   static rr::awaitable<void> run(std::shared_ptr<Upstream> self, Retry retry, std::function<rr::Result<>()> is_used);
   /// Until it is lost or closed; returns whether it has had no clients for too long instead.
   rr::awaitable<bool> watch_use();
@@ -284,7 +305,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   std::uint64_t number_;  ///< no other upstream has it
   std::shared_ptr<rr::ClientConnection> connection_;
   std::optional<rr::Error> loss_;
-  rr::Error last_error_;  ///< of the last attempt to open it
+  rr::Result<> last_attempt_;  ///< to open it
   std::uint64_t attempts_ = 0;
   std::chrono::milliseconds rests_after_{0};  ///< without clients; 0: never
   bool is_attempting_ = false;
@@ -298,6 +319,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   std::shared_ptr<rr::TypeRegistry> types_;
   std::function<void(const std::string&)> on_released_;
   std::vector<UpstreamClient*> clients_;  ///< in the order in which they came
+  std::uint64_t clients_left_ = 0;        ///< how many ever have: while none does, nobody has to be looked up
   std::set<std::string> objects_;         ///< paths that were found
   std::map<MemberKey, std::shared_ptr<Wire>> wires_;
   std::map<PipeNumber, Pipe> pipes_;

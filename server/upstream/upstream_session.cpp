@@ -1,11 +1,11 @@
 // How a session with a service of a device is opened, kept open, rested and lost. Layer: server/upstream.
-#include <algorithm>
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/use_awaitable.hpp>
 
 #include "node/client/async_object.hpp"
+#include "node/driver/backoff.hpp"
 #include "server/log/log.hpp"
 #include "server/upstream/upstream.hpp"
 
@@ -16,6 +16,9 @@ namespace asio = boost::asio;
 namespace {
 
 constexpr auto wait_token = asio::as_tuple(asio::use_awaitable);
+
+/// So many first waits long a session has to live for the next one to be attempted as soon as after a first failure.
+constexpr int lasting = 10;
 
 using ConnectionPtr = std::shared_ptr<rr::ClientConnection>;
 
@@ -133,21 +136,24 @@ void Upstream::keep_open(Retry retry, std::function<rr::Result<>()> is_used) {
 
 rr::awaitable<void> Upstream::run(std::shared_ptr<Upstream> self, Retry retry, std::function<rr::Result<>()> is_used) {
   const std::string device = self->device_->config().name;
-  auto wait = retry.min;
+  rr::Backoff backoff(retry.min, retry.max);
   while (!self->is_closed_) {
     rr::Result<> done;
     self->is_attempting_ = true;
     if (!self->is_open()) done = co_await self->open();
     if (done && is_used && !self->is_closed_) done = is_used();
     self->is_attempting_ = self->is_waking_ = false;
-    if (!done) self->last_error_ = done.error();
+    self->last_attempt_ = done;
     ++self->attempts_;
     self->attempted_.cancel();
     if (self->is_closed_) break;
     if (done) {
       log(LogLevel::info, "session open", {{"device", device}, {"service", self->service_}});
-      wait = retry.min;
-      if (co_await self->watch_use()) {
+      const auto opened_at = std::chrono::steady_clock::now();
+      const bool may_rest = co_await self->watch_use();
+      // A device that accepts and drops at once is as good as away.
+      if (std::chrono::steady_clock::now() - opened_at >= lasting * retry.min) backoff.reset();
+      if (may_rest) {
         log(LogLevel::info, "session rests", {{"device", device}, {"service", self->service_}});
         co_await self->rest();
         continue;
@@ -161,9 +167,8 @@ rr::awaitable<void> Upstream::run(std::shared_ptr<Upstream> self, Retry retry, s
       log(level, "session can't be opened",
           {{"device", device}, {"service", self->service_}, {"error", done.error().message}});
     }
-    self->wake_.expires_after(with_jitter(wait));
+    self->wake_.expires_after(backoff.next());
     co_await self->wake_.async_wait(wait_token);
-    wait = std::min(wait * 2, retry.max);
   }
 }
 
@@ -200,8 +205,8 @@ rr::awaitable<rr::Result<>> Upstream::opened() {
   wake();
   wake_.cancel();
   while (attempts_ == before && !is_closed_) co_await attempted_.async_wait(wait_token);
-  if (!connection_) co_return last_error_;
-  co_return rr::Result<>();
+  if (connection_) co_return rr::Result<>();
+  co_return last_attempt_ ? lost_error() : last_attempt_.error();  // else it was lost before this one's turn
 }
 
 void Upstream::break_off() {
@@ -223,9 +228,7 @@ void Upstream::lost(const rr::Error& reason) {
     pipe.state = PipeState::detached;
     pipe.is_held = false;
   }
-  const auto clients = clients_;  // they may leave
-  for (auto* client : clients)
-    if (has(*client)) end_sent_pipes(*client);
+  for_each_client([&](UpstreamClient& client) { end_sent_pipes(client); });
   locks_->handle_lost(*this);
   device_->note_trouble();
   tell_lost(lost_error());
@@ -234,9 +237,7 @@ void Upstream::lost(const rr::Error& reason) {
 
 void Upstream::tell_lost(const rr::Error& reason) {
   const auto self = shared_from_this();
-  const auto clients = clients_;  // they may leave
-  for (auto* client : clients)
-    if (has(*client)) client->connection_lost(reason);
+  for_each_client([&](UpstreamClient& client) { client.connection_lost(reason); });
 }
 
 }  // namespace rrgate

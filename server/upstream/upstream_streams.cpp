@@ -102,13 +102,14 @@ void Upstream::hand_out_later(const std::shared_ptr<Wire>& wire) {
 /// One after the other, each the newest that there is at its turn. Not all at once: one read may bring hundreds of
 /// values, of which the last one counts, and everybody else has to get a turn, too.
 void Upstream::hand_out(const std::shared_ptr<Wire>& wire) {
-  const auto newest = *wire->newest;
-  rr::WirePacket packet(wire->path, wire->member, newest.value, newest.time, wire->arrived);
+  if (!wire->outgoing || wire->outgoing->count != wire->count)
+    wire->outgoing.emplace(wire->path, wire->member, *wire->newest, wire->arrived, wire->count);
   std::size_t up_to_date = 0;  // in a row
   for (std::size_t sent = 0; sent < clients_a_turn;) {
     auto& followers = wire->followers;  // they may leave while they are sent to
     if (up_to_date >= followers.size()) {
       wire->is_due = false;
+      wire->outgoing.reset();
       return;
     }
     wire->next = (wire->next + 1) % followers.size();
@@ -121,7 +122,7 @@ void Upstream::hand_out(const std::shared_ptr<Wire>& wire) {
     up_to_date = 0;
     ++sent;
     if (missed > 0) client->note_conflated(wire->path, wire->member, missed);
-    client->receive_wire(packet);
+    client->receive_wire(wire->outgoing->packet);
   }
   hand_out_later(wire);
 }

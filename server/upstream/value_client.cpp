@@ -166,7 +166,8 @@ void ValueClient::joined(const Key& key, const rr::Result<>& result) {
 
 void ValueClient::closed(const Key& key, const rr::Error& reason) {
   const auto found = topics_.find(key);
-  if (found == topics_.end() || found->second.state != TopicState::joined) return;
+  if (found == topics_.end() || found->second.state == TopicState::idle) return;
+  if (found->second.state == TopicState::joining) return joined(key, reason);  // it is not answered any more
   found->second.state = TopicState::idle;
   found->second.error = reason;
   tell(key, &reason);

@@ -1,4 +1,6 @@
 // Handlers that throw: an error for who called, a line in the report, and the connection goes on.
+#include <algorithm>
+#include <atomic>
 #include <catch2/catch.hpp>
 #include <mutex>
 
@@ -208,4 +210,28 @@ TEST_CASE("handlers that throw when a connection opens or ends are reported") {
   CHECK(reports.texts() ==
         std::vector<std::string>{"connecting to 'Fragile': its handler failed: not now",
                                  "the end of 'Fragile': its handler failed: an exception that is no std::exception"});
+}
+
+TEST_CASE("what a node runs by itself may throw anything: it is reported, and the node goes on") {
+  Reports reports;
+  std::atomic<int> rounds = 0;
+  NodeOptions options;
+  options.report = reports.sink();
+  RunningNode device(
+      [&](Node& made) {
+        made.every(1ms, [&] {
+          if (++rounds <= 2) throw std::runtime_error("out of step");
+        });
+      },
+      options);
+  device.ask([](Node& node) {
+    node.post([] { throw 7; });
+    return 0;
+  });
+  while (rounds < 4) CHECK(device.ask([](Node&) { return 7; }) == 7);  // its thread runs
+  auto texts = reports.texts();
+  std::sort(texts.begin(), texts.end());
+  const auto late = "Node 'every': its handler failed: out of step";
+  CHECK(texts == std::vector<std::string>{late, late,
+                                          "Node 'post': its handler failed: an exception that is no std::exception"});
 }

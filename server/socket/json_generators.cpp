@@ -1,0 +1,96 @@
+// Generators that a client of a JSON WebSocket has opened. Layer: server/socket. See docs/http-api.md.
+#include "server/http/endpoints/member_values.hpp"
+#include "server/socket/json_operations.hpp"
+
+namespace rrgate {
+
+namespace {
+
+bool takes_values(const rr::MemberDefinition& function) {
+  return !function.parameters.empty() && function.parameters.back().type.container == rr::ContainerKind::generator;
+}
+
+}  // namespace
+
+rr::awaitable<rr::OrderedJson> JsonOperations::open(JsonRequestPtr request, TargetPtr target) {
+  const auto& member = expect_member(*target, "open", {rr::MemberKind::function});
+  if (!member.is_generator())
+    refuse(rr::ErrorCode::invalid_operation, rr::quote(member.name) + " is no generator; use \"call\"");
+  auto arguments = arguments_of(*request, *target, place_.form);
+  const auto id = reserve(*request);
+  Generator generator{target, target->client->next_generator()};
+  auto opening = target->request(rr::CallKind::generator_open);
+  opening.generator = generator.id;
+  opening.arguments = std::move(arguments);
+  std::optional<rr::Error> error;
+  try {
+    co_await target->client->ask(std::move(opening));
+  } catch (const rr::Exception& exception) {
+    error = exception.error();
+  }
+  if (error) {
+    open_.erase(id);
+    throw rr::Exception(*error);
+  }
+  if (is_stopped_) {  // nobody will close it
+    target->client->drop_generator(generator.id);
+    co_return nullptr;
+  }
+  open_[id] = std::move(generator);
+  co_return nullptr;
+}
+
+JsonOperations::Generator& JsonOperations::generator_of(const JsonRequest& request) {
+  const auto found = open_.find(request.at("generator").dump());
+  auto* generator = found == open_.end() ? nullptr : std::get_if<Generator>(&found->second);
+  if (!generator) refuse(rr::ErrorCode::invalid_argument, "\"generator\" is not the id of one that is open");
+  return *generator;
+}
+
+rr::awaitable<rr::OrderedJson> JsonOperations::next(JsonRequestPtr request, TargetPtr) {
+  const auto [target, generator] = generator_of(*request);
+  value_or_throw(place_.standing->check(access_request(*target, Verb::call), Recorded::never));
+  auto step = target->request(rr::CallKind::generator_next);
+  step.generator = generator;
+  if (takes_values(*target->member)) {
+    const auto& taken = target->member->parameters.back();
+    step.arguments.push_back(value_of(*request, *target, taken.type, taken.name, place_.form));
+  }
+  rr::Value value;
+  std::optional<rr::Error> error;
+  try {
+    value = co_await target->client->ask(std::move(step));
+  } catch (const rr::Exception& exception) {
+    error = exception.error();
+  }
+  auto out = rr::OrderedJson::object();
+  if (error) {
+    const bool has_ended = error->code == rr::ErrorCode::stop_iteration;
+    if (has_ended || error->code == rr::ErrorCode::operation_aborted) open_.erase(request->at("generator").dump());
+    if (!has_ended) throw rr::Exception(*error);
+    rr::add_key(out, "done") = true;
+    co_return out;
+  }
+  rr::add_key(out, "value") = to_json(*target, value, place_.form);
+  rr::add_key(out, "done") = false;
+  co_return out;
+}
+
+rr::awaitable<rr::OrderedJson> JsonOperations::end_generator(JsonRequestPtr request, rr::CallKind how) {
+  const auto [target, generator] = generator_of(*request);
+  open_.erase(request->at("generator").dump());
+  auto end = target->request(how);
+  end.generator = generator;
+  co_await target->client->ask(std::move(end));
+  co_return nullptr;
+}
+
+rr::awaitable<rr::OrderedJson> JsonOperations::close(JsonRequestPtr request, TargetPtr) {
+  return end_generator(request, rr::CallKind::generator_close);
+}
+
+rr::awaitable<rr::OrderedJson> JsonOperations::abort(JsonRequestPtr request, TargetPtr) {
+  return end_generator(request, rr::CallKind::generator_abort);
+}
+
+}  // namespace rrgate

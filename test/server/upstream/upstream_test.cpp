@@ -1,0 +1,146 @@
+// The gateway's session with a device: how it is kept open, and what its clients hear of each other's leaving.
+#include "server/upstream/upstream.hpp"
+
+#include <boost/asio/steady_timer.hpp>
+
+#include "test/server/upstream/upstream_bench.hpp"
+
+using namespace rrgate;
+using namespace rrgate::test;
+using namespace std::chrono_literals;
+
+namespace {
+
+constexpr const char* definition = R"(service test.bench
+stdver 0.10
+object Bench
+    event struck(int32 number)
+    wire double level [readonly]
+    function int32{generator} count()
+end
+)";
+
+struct Counting {
+  std::shared_ptr<const bool> life = std::make_shared<const bool>(true);
+  std::shared_ptr<rr::Service> service = rr::Service::from_text({definition}, "Bench", "bench");
+
+  Counting() {
+    service->generator(
+        "count", [this] { return [next = 0, token = life]() mutable { return std::optional<std::int32_t>(++next); }; });
+  }
+  /// Generators that clients have opened and not closed.
+  long open_generators() const { return life.use_count() - 1; }
+};
+
+/// When a session is opened that is lost at once.
+struct Attempts {
+  std::vector<std::chrono::steady_clock::time_point> times;
+  std::chrono::milliseconds gap(std::size_t after) const {
+    return std::chrono::duration_cast<std::chrono::milliseconds>(times.at(after + 1) - times.at(after));
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a client that leaves while an event is handed out hears nothing of it; all others do") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  bench.open();
+  std::vector<std::string> heard;
+  HearingClient first(bench.upstream);
+  std::optional<HearingClient> second(std::in_place, bench.upstream);
+  HearingClient third(bench.upstream);
+  first.on_event = [&](rr::EventPacket&) {
+    heard.push_back("first");
+    second.reset();
+  };
+  second->on_event = [&](rr::EventPacket&) { heard.push_back("second"); };
+  third.on_event = [&](rr::EventPacket&) { heard.push_back("third"); };
+  device.service->fire("struck", 1);
+  CHECK(bench.run_until([&] { return heard.size() == 2; }));
+  device.service->fire("struck", 2);
+  CHECK(bench.run_until([&] { return heard.size() == 4; }));
+  CHECK(heard == std::vector<std::string>{"first", "third", "first", "third"});
+}
+
+TEST_CASE("a wire's value is packed once, however many turns its clients take") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  bench.open();
+  const auto& wire = *bench.upstream->object_type("bench")->find_member("level");
+  constexpr std::uint16_t mark = 4711;
+  std::size_t packed = 0, received = 0;
+  std::vector<std::unique_ptr<HearingClient>> clients;
+  for (int i = 0; i < 200; ++i) {
+    auto& client = *clients.emplace_back(std::make_unique<HearingClient>(bench.upstream));
+    bench.upstream->join_wire(client, "bench", wire);
+    client.on_wire = [&](rr::WirePacket& packet) {
+      const auto message = packet.message(*bench.upstream->types());
+      REQUIRE(message);
+      auto& id = (*message)->message.header.message_id;
+      if (std::exchange(id, mark) != mark) ++packed;
+      ++received;
+    };
+  }
+  REQUIRE(bench.run_until([&] { return clients.back()->heard.size() == 1; }));
+  for (std::size_t i = 1; i <= 2; ++i) {
+    device.service->set_wire("level", 0.5);
+    REQUIRE(bench.run_until([&] { return received == i * clients.size(); }));
+    CHECK(packed == i);
+  }
+}
+
+TEST_CASE("a session that is lost as soon as it is open says so to those who wait for it") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  bench.upstream->keep_open({10s, 10s, 10s}, [&]() -> rr::Result<> {
+    bench.upstream->break_off();
+    return {};
+  });
+  const auto opened = bench.wait_for(bench.upstream->opened());
+  REQUIRE_FALSE(opened);
+  CHECK(opened.error().code == rr::ErrorCode::connection_error);
+  CHECK_THAT(opened.error().message, Catch::Contains("connection_lost: device 'device'"));
+}
+
+TEST_CASE("a device that drops each session at once is tried ever more rarely, until one has lasted") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  Attempts attempts;
+  constexpr std::size_t lasting = 4;
+  bench.upstream->keep_open({40ms, 10s, 10s}, [&]() -> rr::Result<> {
+    attempts.times.push_back(std::chrono::steady_clock::now());
+    if (attempts.times.size() - 1 != lasting) bench.upstream->break_off();
+    return {};
+  });
+  REQUIRE(bench.run_until([&] { return attempts.times.size() == lasting + 1; }));
+  CHECK(attempts.gap(0) >= 20ms);  // at least half of 40 ms, 80 ms, ...
+  CHECK(attempts.gap(2) >= 80ms);
+  CHECK(attempts.gap(3) >= 160ms);
+  boost::asio::steady_timer while_it_lasts(bench.io, 450ms);
+  bool has_lasted = false;
+  while_it_lasts.async_wait([&](const auto&) { has_lasted = true; });
+  REQUIRE(bench.run_until([&] { return has_lasted; }));
+  const auto lost = std::chrono::steady_clock::now();
+  bench.upstream->break_off();
+  REQUIRE(bench.run_until([&] { return attempts.times.size() == lasting + 2; }));
+  CHECK(attempts.times.back() - lost < 320ms);  // half of what would come next, had it not lasted
+}
+
+TEST_CASE("a generator that opens when its client has gone is nobody else's") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  bench.open();
+  std::optional<HearingClient> client(std::in_place, bench.upstream);
+  const auto* address = &*client;
+  const auto opened = bench.ask(*client, rr::CallKind::generator_open, "bench", "count", 1);
+  client.reset();
+  client.emplace(bench.upstream);
+  REQUIRE(&*client == address);
+  REQUIRE(bench.run_until([&] { return opened->has_value(); }));
+  CHECK(bench.run_until([&] { return device.open_generators() == 0; }));
+  const auto next = bench.ask(*client, rr::CallKind::generator_next, "bench", "count", 1);
+  REQUIRE(bench.run_until([&] { return next->has_value(); }));
+  REQUIRE_FALSE(**next);
+  CHECK((*next)->error().code == rr::ErrorCode::invalid_operation);
+}

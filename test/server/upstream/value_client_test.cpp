@@ -1,0 +1,80 @@
+// Listeners of values: what they hear while a member of the device is joined, and when it ends.
+#include "server/upstream/value_client.hpp"
+
+#include "test/server/upstream/upstream_bench.hpp"
+
+using namespace rrgate;
+using namespace rrgate::test;
+
+namespace {
+
+constexpr const char* definition = R"(service test.rack
+stdver 0.10
+object Part
+    pipe int32 news [readonly]
+    wire int32 level [readonly]
+end
+object Rack
+    objref Part{int32} parts
+end
+)";
+
+const std::string part = "rack.parts[1]";
+
+struct Rack {
+  std::shared_ptr<rr::Service> service = rr::Service::from_text({definition}, "Rack", "rack");
+  UpstreamBench bench;
+  std::shared_ptr<ValueClient> client;
+  std::vector<std::string> heard;
+
+  Rack() : bench(prepared()) {
+    bench.open();
+    REQUIRE(bench.find(part));
+    client = std::make_shared<ValueClient>(bench.upstream, Subject(), Device::Seat(*bench.device),
+                                           MemoryBudget(1'000'000).charge(""));
+  }
+  std::shared_ptr<rr::Service> prepared() {
+    service->objref("parts", [this](std::string_view) { return service->make_object("Part"); });
+    return service;
+  }
+  auto listen(const std::string& member) {
+    MemberPlace place{part, bench.upstream->object_type(part)->find_member(member), bench.upstream->types()};
+    return bench.begin(client->listen(std::move(place), 0, [this](const SamplePtr& sample, const rr::Error* error) {
+      heard.push_back(sample ? "value" : error ? error->message : "back");
+    }));
+  }
+};
+
+}  // namespace
+
+TEST_CASE("joining a member of an object that the device replaces meanwhile fails, and can be tried again") {
+  const std::string member = GENERATE("news", "level");
+  Rack rack;
+  const auto first = rack.listen(member);
+  REQUIRE(rack.bench.run_until([&] { return rack.client->is_used(); }));
+  REQUIRE_FALSE(*first);
+  rack.service->root().release("parts", "1");  // before it hears of the request
+  REQUIRE(rack.bench.run_until([&] { return first->has_value(); }));
+  REQUIRE_FALSE(**first);
+  CHECK_FALSE((*first)->error().message.empty());
+  CHECK_FALSE(rack.client->is_used());
+  REQUIRE(rack.bench.find(part));
+  const auto second = rack.listen(member);
+  REQUIRE(rack.bench.run_until([&] { return second->has_value(); }));
+  CHECK(**second);
+}
+
+TEST_CASE("a member that the device closes is told to its listeners, and joined again by the next one") {
+  const std::string member = GENERATE("news", "level");
+  Rack rack;
+  const auto first = rack.listen(member);
+  REQUIRE(rack.bench.run_until([&] { return first->has_value(); }));
+  REQUIRE(**first);
+  rack.service->root().release("parts", "1");
+  REQUIRE(rack.bench.run_until([&] { return !rack.heard.empty(); }));
+  CHECK(rack.heard.size() == 1);
+  REQUIRE(rack.bench.find(part));
+  const auto second = rack.listen(member);
+  REQUIRE(rack.bench.run_until([&] { return second->has_value(); }));
+  CHECK(**second);
+}
