@@ -2,7 +2,7 @@
 import { packBoard, parseBoard, recallBoard, unpackBoard, writeBoard } from "../../web/src/board/board";
 import { findRoom, nudge, put, settle } from "../../web/src/board/layout";
 import type { Placed } from "../../web/src/board/layout";
-import { hasPreset, presetFor } from "../../web/src/board/presets";
+import { hasPreset, presetFor, stopFor } from "../../web/src/board/presets";
 import { Pace } from "../../web/src/live/pace";
 import { splitSteps } from "../../web/src/app/router";
 import { asCode } from "../../web/src/panels/code";
@@ -10,6 +10,7 @@ import { hexLines, greyPicture } from "../../web/src/panels/bytes";
 import { Trace, toCsv } from "../../web/src/panels/trace";
 import { readPicture } from "../../web/src/camera/pixels";
 import type { Member } from "../../web/src/robot/remote";
+import { ROBOT_STOP } from "../../web/src/robot/stop";
 import { Definitions, flagNames, scopeOf } from "../../web/src/values/definitions";
 import { draftOf, formatUuid, makeDraft, readUuid, valueOf } from "../../web/src/values/draft";
 import { numberAt, numberPaths } from "../../web/src/values/paths";
@@ -250,12 +251,38 @@ describe("a board", () => {
     const made = presetFor({ type: "com.example.arm.Robot", members, definitions, scope });
     expect(made.panels.map(({ kind }) => kind)).toEqual(["plot", "table", "form", "table"]);
     expect(made.stop).toEqual({ call: "halt", args: [] });
-    expect(hasPreset("__proto__") || hasPreset("constructor")).toBe(false);
+    expect(hasPreset("__proto__", definitions) || hasPreset("constructor", definitions)).toBe(false);
     const tool = "com.robotraconteur.robotics.tool.Tool";
     expect(
       presetFor({ type: tool, members: [member("open", "function", "void")], definitions, scope }).panels,
     ).toHaveLength(1);
-    expect(hasPreset(tool)).toBe(true);
+    expect(hasPreset(tool, definitions)).toBe(true);
+  });
+
+  test("fits a type that implements a standard one, however it is named there, and calls nothing that stops nothing", () => {
+    const driver = new Definitions([
+      "service com.example.ur\nusing com.example.base.Arm as A\nobject UR5\nimplements A\nend",
+      "service com.example.base\nobject Arm\nimplements Other\nimplements com.robotraconteur.robotics.robot.Robot\nend\nobject Other\nimplements Arm\nend",
+    ]);
+    const type = "com.example.ur.UR5";
+    expect([...driver.implemented(type)].sort()).toEqual([
+      "com.example.base.Arm",
+      "com.example.base.Other",
+      "com.robotraconteur.robotics.robot.Robot",
+    ]);
+    expect(hasPreset(type, driver)).toBe(true);
+    const halt = (stops: string): Member => ({
+      name: "halt",
+      kind: "function",
+      type: stops,
+      parameters: [],
+      modifiers: [],
+      documentation: "",
+    });
+    const described = { type, definitions: driver, scope: "com.example.ur" };
+    expect(stopFor({ ...described, members: [halt("void")] })).toEqual(ROBOT_STOP);
+    expect(stopFor({ ...described, members: [halt("double{generator}")] })).toBeNull();
+    expect(presetFor({ ...described, members: [halt("void")] }).panels[0]?.kind).toBe("robot");
   });
 
   test("leads to objects by steps whose keys may have dots", () => {

@@ -3,6 +3,7 @@
 
 import { settle } from "./layout";
 import type { Placed } from "./layout";
+import type { StopCall } from "../robot/stop";
 
 export const PANEL_KINDS = [
   "plot",
@@ -33,13 +34,6 @@ export interface Panel extends Placed {
   /** The object: "" for the root, else "Webcams[0]". */
   object: string;
   settings: Settings;
-}
-
-/** What stops the device: a function with its arguments, and a property to set as well: some drivers have only one of them. */
-export interface StopCall {
-  call: string;
-  args: readonly number[];
-  set?: { property: string; value: number };
 }
 
 export interface Board {

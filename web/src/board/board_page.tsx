@@ -44,6 +44,7 @@ export default function BoardPage({ link, route, list }: { link: Link; route: Se
   const silent = usePulse(object);
   const services = useServices(list);
   if (!board) return failure === null ? <Waiting /> : <Failure text={failure} />;
+  const stop = preset?.stop ?? board.stop; // a file may say how to stop what is not known, and nothing else
   const setPanels = (panels: readonly Panel[]): void => setBoard({ ...board, panels });
   const add = (kind: PanelKind): void => {
     const { w, h } = KINDS[kind];
@@ -56,7 +57,7 @@ export default function BoardPage({ link, route, list }: { link: Link; route: Se
   return (
     <div class="board-page">
       <div class="board-bar">
-        {board.stop && <StopButton object={object} stop={board.stop} />}
+        {stop && <StopButton object={object} stop={stop} />}
         {silent !== null && (
           <p class="failure board-silent" role="alert">
             {t("The device has not answered for {0}.", oldness(silent))}

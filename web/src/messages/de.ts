@@ -168,6 +168,9 @@ const german: Readonly<Record<string, string>> = {
   held: "wartet",
   ended: "zu Ende",
   stopped: "gestoppt",
+  "not stopped": "nicht gestoppt",
+  "stopping: the device answers the step under way first":
+    "wird gestoppt: das Gerät beantwortet erst den laufenden Schritt",
   Calls: "Aufrufe",
   Power: "Ein und aus",
   Tool: "Werkzeug",

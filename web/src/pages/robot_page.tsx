@@ -90,6 +90,7 @@ export function RobotPage({ link, list, device, shown }: RobotPageProps) {
         driver={driver}
         control={control}
         enabled={live && shown && isOpen}
+        linked={live}
         lost={state.kind === "lost"}
         failure={driveFailure}
         device={device}

@@ -18,6 +18,7 @@ import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
 import { isCreate } from "../robot/robot_model";
 import { walk } from "../robot/walk";
+import { Definitions } from "../values/definitions";
 import { LinkStrip } from "../ui/link_strip";
 import { ObjectView } from "./object_view";
 import { RobotPage } from "./robot_page";
@@ -84,7 +85,7 @@ function useFirstView(link: Link | null, route: ServiceRoute, drives: boolean): 
     if (!link) return;
     const look = (): void => {
       const state = link.state.value;
-      if (state.kind === "online") setKnown(hasPreset(state.remote.type));
+      if (state.kind === "online") setKnown(hasPreset(state.remote.type, new Definitions(state.remote.definitions)));
     };
     look();
     return link.state.watch(look);

@@ -16,12 +16,14 @@ export interface DrivePanelProps {
   driver: Driver<DriveCommand>;
   control: Control | null;
   enabled: boolean;
+  /** Whether there is a connection: Stop needs nothing else. */
+  linked: boolean;
   lost: boolean;
   failure: string | null;
   device: string;
 }
 
-export function DrivePanel({ driver, control, enabled, lost, failure, device }: DrivePanelProps) {
+export function DrivePanel({ driver, control, enabled, linked, lost, failure, device }: DrivePanelProps) {
   const [speed, setSpeed] = useState(200);
   const driving = useDriving(driver, speed, enabled);
   return (
@@ -33,7 +35,7 @@ export function DrivePanel({ driver, control, enabled, lost, failure, device }: 
         <HoldButton direction="forward" label="Forward" driving={driving} enabled={enabled} />
         <HoldButton direction="left" label="Left" driving={driving} enabled={enabled} />
         {/* At the press already; a click alone is the keyboard's, or a screen reader's. */}
-        <button class="pad-stop" type="button" disabled={!enabled} onPointerDown={driving.stop} onClick={driving.stop}>
+        <button class="pad-stop" type="button" disabled={!linked} onPointerDown={driving.stop} onClick={driving.stop}>
           Stop
         </button>
         <HoldButton direction="right" label="Right" driving={driving} enabled={enabled} />
