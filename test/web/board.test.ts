@@ -1,5 +1,7 @@
 // The board without a browser: where panels stand, what a file may hold, drafts, definitions, paces.
-import { packBoard, parseBoard, recallBoard, unpackBoard, writeBoard } from "../../web/src/board/board";
+import { packBoard, parseBoard, recallBoard, sameBoard, unpackBoard, writeBoard } from "../../web/src/board/board";
+import type { Board } from "../../web/src/board/board";
+import { Keeper } from "../../web/src/board/keeper";
 import { findRoom, nudge, put, settle } from "../../web/src/board/layout";
 import type { Placed } from "../../web/src/board/layout";
 import { hasPreset, presetFor, stopFor } from "../../web/src/board/presets";
@@ -301,12 +303,16 @@ test("code quotes what comes from the device", () => {
     documentation: "",
   };
   const place = { device: "it's", service: "a b", object: "Arms[x.y]" };
-  expect(asCode("curl", "http://h/", place, member, ["'; rm -rf /"])).toBe(
+  const types = { definitions, scope };
+  expect(asCode("curl", "http://h/", place, member, ["'; rm -rf /"], types)).toBe(
     `curl -X POST 'http://h/api/v1/devices/it'\\''s/a%20b/Arms/x.y/Drive' \\\n  -H 'Content-Type: application/json' -d '{"__proto__":"'\\''; rm -rf /"}'`,
   );
-  expect(asCode("JavaScript", "http://h/", place, member, [1])).toContain('robot.$.find("*.Arms[x.y]")');
-  expect(asCode("Python", "https://h/", { ...place, object: "" }, member, [true, null])).toContain(
-    "robot.Drive(True, None)",
+  expect(asCode("JavaScript", "http://h/", place, member, [1], types)).toContain('robot.$.find("*.Arms[x.y]")');
+  expect(asCode("Python", "https://h/", { ...place, object: "" }, member, [true], types)).toContain(
+    "robot.Drive(True)",
+  );
+  expect(asCode("Python", "https://h/", place, { ...member, kind: "wire" }, [null], types)).toContain(
+    'robot.get_Arms("x.y").Drive.PokeOutValue(None)',
   );
 });
 
@@ -328,4 +334,23 @@ test("pictures of the standard types are read by their encoding", () => {
   expect(() => readPicture({ image_info: { ...info, width: 9 }, data: Uint8Array.of(1, 2, 3) })).toThrow(
     "the picture has 3 bytes",
   );
+});
+
+test("a board is written once when it rests, and the address only while it is the board's", () => {
+  vi.useFakeTimers();
+  const written: string[] = [];
+  const write = (text: string) => ({ store: () => written.push(text), show: () => written.push(`#${text}`) });
+  const keeper = new Keeper();
+  for (let i = 0; i < 300; i++) keeper.later(write(String(i)));
+  vi.advanceTimersByTime(10_000);
+  expect(written).toEqual(["299", "#299"]);
+  keeper.later(write("left"));
+  keeper.flush(false);
+  vi.advanceTimersByTime(10_000);
+  expect(written).toEqual(["299", "#299", "left"]);
+  vi.useRealTimers();
+  const [one, other] = ["a", "b"].map((title) =>
+    parseBoard(`{"board":1,"panels":[{"kind":"notes","x":0,"y":0,"w":3,"h":5,"title":"${title}"}]}`),
+  ) as [Board, Board];
+  expect([sameBoard(one, { ...one, panels: [...one.panels] }), sameBoard(one, other)]).toEqual([true, false]);
 });

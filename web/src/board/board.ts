@@ -68,6 +68,11 @@ export function writeBoard({ panels, stop }: Board): object {
   };
 }
 
+/** Whether both are the same for who looks at them. */
+export function sameBoard(a: Board, b: Board): boolean {
+  return a === b || JSON.stringify(writeBoard(a)) === JSON.stringify(writeBoard(b));
+}
+
 /** For an address: letters, digits, "-" and "_". */
 export function packBoard(board: Board): string {
   const bytes = new TextEncoder().encode(JSON.stringify(writeBoard(board)));
