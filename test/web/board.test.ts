@@ -336,18 +336,22 @@ test("pictures of the standard types are read by their encoding", () => {
   );
 });
 
-test("a board is written once when it rests, and the address only while it is the board's", () => {
+test("a board is written at once and then not too often, and the address only while it is the board's", () => {
   vi.useFakeTimers();
   const written: string[] = [];
   const write = (text: string) => ({ store: () => written.push(text), show: () => written.push(`#${text}`) });
   const keeper = new Keeper();
-  for (let i = 0; i < 300; i++) keeper.later(write(String(i)));
+  for (let i = 0; i < 300; i++) keeper.write(write(String(i)));
+  expect([...written, keeper.isKept.value]).toEqual(["0", "#0", false]);
+  vi.advanceTimersByTime(399);
+  expect(written).toHaveLength(2);
   vi.advanceTimersByTime(10_000);
-  expect(written).toEqual(["299", "#299"]);
-  keeper.later(write("left"));
+  expect([...written.splice(0), keeper.isKept.value]).toEqual(["0", "#0", "299", "#299", true]);
+  keeper.write(write("now"));
+  keeper.write(write("left"));
   keeper.flush(false);
   vi.advanceTimersByTime(10_000);
-  expect(written).toEqual(["299", "#299", "left"]);
+  expect(written).toEqual(["now", "#now", "left"]);
   vi.useRealTimers();
   const [one, other] = ["a", "b"].map((title) =>
     parseBoard(`{"board":1,"panels":[{"kind":"notes","x":0,"y":0,"w":3,"h":5,"title":"${title}"}]}`),

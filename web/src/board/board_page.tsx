@@ -50,7 +50,7 @@ export default function BoardPage({ link, route, list }: { link: Link; route: Se
       scope: scopeOf(last.type),
     });
   }, [last?.type]);
-  const { board, trouble, setBoard, setTrouble } = useBoard(key, route, preset);
+  const { board, isKept, trouble, setBoard, setTrouble } = useBoard(key, route, preset);
   const [arranging, setArranging] = useState(false);
   const silent = usePulse(object, useShared(list, route.device));
   const services = useServices(list);
@@ -66,7 +66,7 @@ export default function BoardPage({ link, route, list }: { link: Link; route: Se
   const update = (id: string, change: Partial<Panel>): void =>
     setPanels(board.panels.map((panel) => (panel.id === id ? { ...panel, ...change } : panel)));
   return (
-    <div class="board-page">
+    <div class="board-page" data-kept={isKept}>
       <div class="board-bar">
         {stop && <StopButton object={object} stop={stop} />}
         {silent !== null && (
@@ -122,6 +122,8 @@ export function boardKey({ device, service, path }: ServiceRoute): string {
 }
 
 interface BoardState {
+  /** Whether all changes are in the address and this browser. */
+  isKept: boolean;
   board: Board | null;
   trouble: string | null;
   /** `isPreset`: it is not worth keeping. */
@@ -160,12 +162,12 @@ function useBoard(key: string, route: ServiceRoute, preset: Board | null): Board
     if (!isPreset && shown && sameBoard(shown, board)) return; // a finger that moves within a cell
     setChosen({ key, board });
     const address = formatRoute(route.device, route.service, route.path, "board");
-    keeper.later({
+    keeper.write({
       store: () => keepBoard(key, isPreset ? null : board),
       show: () => history.replaceState(null, "", isPreset ? address : `${address}&board=${packBoard(board)}`),
     });
   };
-  return { board: shown, trouble, setBoard, setTrouble };
+  return { board: shown, isKept: useStore(keeper.isKept), trouble, setBoard, setTrouble };
 }
 
 /** Whether all clients share the gateway's connection to the device. */

@@ -1,7 +1,9 @@
-// Writes what changes with every movement of a finger once, when it rests: browsers limit how often an address may change.
+// Writes what changes with every movement of a finger at once, and then not more often than browsers allow an address to change.
 // Layer: web/board, pure.
 
-const REST_MS = 500;
+import { Store } from "../app/store";
+
+const APART_MS = 400; // WebKit: 100 changes of an address in 30 s
 
 export interface Write {
   /** To this browser's storage. */
@@ -11,14 +13,16 @@ export interface Write {
 }
 
 export class Keeper {
+  /** Whether all is written. */
+  readonly isKept = new Store(true);
   #pending: Write | null = null;
   #timer: ReturnType<typeof setTimeout> | undefined;
 
   /** The newest replaces those that wait. */
-  later(write: Write): void {
+  write(write: Write): void {
     this.#pending = write;
-    clearTimeout(this.#timer);
-    this.#timer = setTimeout(() => this.flush(true), REST_MS);
+    this.isKept.value = false;
+    if (this.#timer === undefined) this.flush(true);
   }
 
   /** Writes now. `isHere`: whether the address is still that of the board. */
@@ -26,7 +30,9 @@ export class Keeper {
     clearTimeout(this.#timer);
     const write = this.#pending;
     this.#pending = null;
+    this.#timer = write ? setTimeout(() => this.flush(true), APART_MS) : undefined;
     write?.store();
     if (isHere) write?.show();
+    this.isKept.value = true;
   }
 }

@@ -53,7 +53,8 @@ export function ServicePage({ route, list }: { route: ServiceRoute; list: Device
       {link && shown === "members" && <MembersPage link={link} route={route} path={path} />}
       {isMissing && (
         <p class="empty">
-          The gateway has no device of this name. If one comes, it opens here by itself. <a href="#/">All devices</a>
+          {t("The gateway has no device of this name. If one comes, it opens here by itself.")}{" "}
+          <a href="#/">{t("All devices")}</a>
         </p>
       )}
     </div>

@@ -26,9 +26,9 @@ export class PythonCode {
       return `{${[...(value as Map<unknown, unknown>)].map(([key, each]) => `${plain(container === "int32" ? Number(key) : key)}: ${this.value(each, item, scope)}`).join(", ")}}`;
     if (base === "varvalue") return varvalue(value);
     const struct = this.#definitions.struct(base, scope);
-    if (!struct && array === "multidim") return this.#grid(value as object);
+    if (!struct && array === "multidim") return this.#grid(value);
     if (!struct) return plain(value);
-    if (struct.kind === "struct") return this.#structure(value as object, struct);
+    if (struct.kind === "struct") return this.#structure(value, struct);
     const items = array === "none" ? [value] : Array.isArray(value) ? (value as unknown[]) : [value];
     return this.#numpy(items as object[], struct);
   }
