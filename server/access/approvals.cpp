@@ -68,7 +68,8 @@ rr::Result<Approval> Approvals::answer(const std::string& id, const Identity& by
     return rr::make_error(rr::ErrorCode::permission_denied, "nobody allows himself what he has asked for");
   asked.state_ = is_allowed ? ApprovalState::allowed : ApprovalState::denied;
   std::erase_if(grants_, [now](const auto& each) { return each.second <= now; });
-  if (is_allowed && grant > std::chrono::minutes(0) && grants_.size() < 1000)
+  const bool is_somebody = !asked.approval_.command.who.subject().is_nobody();  // else it would be for everybody
+  if (is_allowed && is_somebody && grant > std::chrono::minutes(0) && grants_.size() < 1000)
     grants_[key_of(asked.approval_.command)] = now + std::min(grant, longest_grant);
   auto out = asked.approval_;
   asked.wake_();

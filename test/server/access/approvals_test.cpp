@@ -91,6 +91,13 @@ TEST_CASE("approvals: for some minutes the same agent may do the same again, and
   other = drive();
   other.who.credential = "another token of the same name";
   CHECK_FALSE(approvals.is_granted(other, start));
+
+  auto nobody = drive();
+  nobody.who = {};
+  const auto once = *approvals.ask(nobody, ignore, end, start);
+  REQUIRE(approvals.answer(once->approval().id, who("root"), true, minutes(5), start));
+  CHECK(once->state() == ApprovalState::allowed);
+  CHECK_FALSE(approvals.is_granted(nobody, start));
 }
 
 TEST_CASE("approvals: few wait at a time, of one agent fewer, and none that nobody could judge") {
