@@ -7,6 +7,7 @@
 
 #include "node/tls/tls_context.hpp"
 #include "server/access/access.hpp"
+#include "server/access/approvals.hpp"
 #include "server/access/logins.hpp"
 #include "server/config/config.hpp"
 #include "server/config/tls_files.hpp"
@@ -62,6 +63,8 @@ class GatewayState {
   MemoryBudget& memory() { return memory_; }
   /// Who may do what.
   Access& access() { return access_; }
+  /// What agents ask a person for.
+  Approvals& approvals() { return approvals_; }
   /// Who is judged for what he logs in as.
   Logins& logins() { return logins_; }
   /// How clients of HTTP show who they are, and how much they may ask for.
@@ -86,6 +89,7 @@ class GatewayState {
   Config config_;
   MemoryBudget memory_;
   Access access_;
+  Approvals approvals_;
   Logins logins_;
   IssuerKeys issuer_keys_;
   HttpAccess http_access_;
