@@ -127,7 +127,7 @@ rr::Result<> AccessRules::check_whole_device(const Identity& who, std::string_vi
     });
   };
   if (!is_agent(who) && std::all_of(std::begin(device_verbs), std::end(device_verbs), has_all_of)) return {};
-  return denied(who, "do everything to device " + rr::quote(device) +
+  return denied(who, "do everything to " + (device.empty() ? "a device" : "device " + rr::quote(device)) +
                          ", which a connection needs that passes through the gateway unread; with \"mode\": \"shared\" "
                          "of the device rights hold for each member");
 }

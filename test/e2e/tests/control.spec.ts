@@ -58,6 +58,22 @@ test("Stop stops a robot that another page has in control", async ({ page, conte
   await other.close();
 });
 
+test("Stop stops the robot also where control was lost to others", async ({ page, context, lab }) => {
+  const other = await context.newPage();
+  await openRobot(other, lab);
+  await other.bringToFront();
+  await other.keyboard.down("ArrowUp");
+  await waitUntilDriving(other);
+  await page.bringToFront();
+  await page.keyboard.press("ArrowDown");
+  await expect(control(page)).toHaveAttribute("data-control", "lost");
+  await expect(forward(page)).toBeDisabled();
+  await expect(page.getByRole("button", { name: "Stop" })).toBeEnabled();
+  await page.getByRole("button", { name: "Stop" }).click();
+  await waitUntilStopped(page, 1_000);
+  await other.close();
+});
+
 test("a page that hangs while it drives is out of control and stays so until it is taken by hand", async ({ page }) => {
   await page.keyboard.down("ArrowUp");
   await waitUntilDriving(page);

@@ -122,10 +122,18 @@ export async function stopNow(
 }
 
 const stopping = new EventTarget();
+let stops = 0;
 
 /** Somebody asked for a stop: whatever is held down drives no more. */
 export function tellStop(): void {
+  stops += 1;
   stopping.dispatchEvent(new Event("stop"));
+}
+
+/** @returns whether somebody has asked for a stop since: what is done in several steps ends there. */
+export function watchStop(): () => boolean {
+  const before = stops;
+  return () => stops !== before;
 }
 
 /** @returns a function that hears no more. */
