@@ -1,28 +1,12 @@
 #include "server/access/agent_terms.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
-#include <cstdint>
 #include <string_view>
 
 namespace rrgate {
 
 namespace {
-
-/// NaN: it is none. Integers of 64 bits are texts in JSON.
-long double number_of(const rr::OrderedJson& json) {
-  if (json.is_number()) return json.get<long double>();
-  if (!json.is_string()) return NAN;
-  const auto& text = json.get_ref<const std::string&>();
-  const auto read = [&]<class Integer>(Integer number) -> long double {
-    const auto end = text.data() + text.size();
-    const auto [ptr, error] = std::from_chars(text.data(), end, number);
-    return error == std::errc() && ptr == end && std::to_string(number) == text ? static_cast<long double>(number)
-                                                                                : NAN;
-  };
-  return text.starts_with('-') ? read(std::int64_t{}) : read(std::uint64_t{});
-}
 
 /// Whether all numbers at a place below `json` lie within. Of an array each item counts; an empty one has none.
 bool is_within(const rr::OrderedJson& json, std::string_view place, const AgentTerms::Range& range) {
@@ -30,7 +14,8 @@ bool is_within(const rr::OrderedJson& json, std::string_view place, const AgentT
     return !json.empty() &&
            std::all_of(json.begin(), json.end(), [&](const auto& item) { return is_within(item, place, range); });
   if (place.empty()) {
-    const auto number = number_of(json);
+    if (!json.is_number()) return false;  // also no text: what is one may as well be base64
+    const auto number = json.get<double>();
     return std::isfinite(number) && number >= range.least && number <= range.most;
   }
   if (!json.is_object()) return false;

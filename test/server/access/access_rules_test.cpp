@@ -219,12 +219,12 @@ TEST_CASE("agents: what has a limit must be there, be a number, and lie within")
     const AgentTerms terms{.limits = {{place, {-2, 3}}}};
     return terms.check(rr::OrderedJson::parse(json)).has_value();
   };
-  for (const auto* good : {R"({"v": -2})", R"({"v": 3, "w": 99})", R"({"v": 2.5})", R"({"v": "3"})", R"({"v": "-2"})",
-                           R"({"v": [1, 2]})", R"({"v": [[1], [2]]})"})
+  for (const auto* good :
+       {R"({"v": -2})", R"({"v": 3, "w": 99})", R"({"v": 2.5})", R"({"v": [1, 2]})", R"({"v": [[1], [2]]})"})
     CHECK(passes("v", good));
   for (const auto* bad :
        {R"({})", R"({"v": 3.1})", R"({"v": -3})", R"({"v": null})", R"({"v": true})", R"({"v": "NaN"})",
-        R"({"v": "Infinity"})", R"({"v": "4"})", R"({"v": " 3"})", R"({"v": "+3"})", R"({"v": "03"})",
+        R"({"v": "Infinity"})", R"({"v": "3"})", R"({"v": " 3"})", R"({"v": "+3"})", R"({"v": "03"})",
         R"({"v": "1e0"})", R"({"v": ""})", R"({"v": []})", R"({"v": [1, 4]})", R"({"v": [1, []]})",
         R"({"v": {"v": 1}})", R"({"w": 1})", R"({"v": "18446744073709551616"})"})
     CHECK_FALSE(passes("v", bad));
