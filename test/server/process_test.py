@@ -233,6 +233,51 @@ class Serving(Files):
             events = [json.loads(line)["event"] for line in process.stderr]
             self.assertEqual(events[-1], "stopped")
 
+    def fill_log(self, port):
+        """Has the gateway write far more than a pipe holds and the gateway keeps: each character of an origin takes six."""
+        for number in range(60 * 20):  # few of one address are written
+            with socket.create_connection(("127.0.0.1", port), 10, source_address=(f"127.0.1.{1 + number % 60}", 0)) as client:
+                client.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nOrigin: http://" + b"\xe9" * 400 + b"\r\n"
+                               b"Connection: close\r\n\r\n")
+                self.assertTrue(client.recv(64).startswith(b"HTTP/1.1 403 "))
+
+    def test_a_log_that_nobody_reads_stops_nothing(self):
+        process, port = self.start()
+        self.fill_log(port)
+
+        def ask(path):
+            with urllib.request.urlopen(f"http://127.0.0.1:{port}{path}", timeout=10) as answer:
+                return answer.read().decode()
+
+        self.assertIn("ok", ask("/healthz"))
+        lost = int(re.search(r"^rrgate_log_lost_total (\d+)$", ask("/metrics"), re.M)[1])
+        self.assertGreater(lost, 0)
+        told = None
+        while not told:
+            event = json.loads(process.stderr.readline())
+            if event["event"].startswith("lines of the log were lost"):
+                told = event["lines"]
+        self.assertEqual(told, lost)
+        process.send_signal(signal.SIGTERM)
+        self.assertEqual(json.loads(process.stderr.readlines()[-1])["event"], "stopped")
+        self.assertEqual(process.wait(timeout=10), 0)
+
+    def test_a_log_that_nobody_reads_keeps_no_gateway_from_its_end(self):
+        process, port = self.start()
+        self.fill_log(port)
+        process.send_signal(signal.SIGTERM)
+        self.assertEqual(process.wait(timeout=10), 0)
+
+    def test_refusals_of_one_network_fill_no_log(self):
+        process, port = self.start()
+        for _ in range(60):
+            with socket.create_connection(("127.0.0.1", port), 10) as client:
+                client.sendall(b"nonsense\r\n\r\n")
+                client.recv(64)
+        process.send_signal(signal.SIGTERM)
+        events = [json.loads(line)["event"] for line in process.stderr]
+        self.assertEqual(events.count("connection closed: neither Robot Raconteur nor HTTP"), 20)
+
     def test_a_second_signal_waits_for_nobody(self):
         """A session may end by itself within the drain time, unless whoever runs the gateway has enough."""
         with socket.create_server(("127.0.0.1", 0)) as device:
