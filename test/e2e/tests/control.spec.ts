@@ -74,6 +74,17 @@ test("Stop stops the robot also where control was lost to others", async ({ page
   await other.close();
 });
 
+test("the list of all members has a Stop, too", async ({ page, lab }) => {
+  const robot = `${lab.url}api/v1/devices/create/Create/`;
+  expect((await page.request.post(`${robot}Drive`, { data: { velocity: 100, radius: 32767 } })).ok()).toBe(true);
+  await waitUntilDriving(page);
+  await page.getByRole("link", { name: "All members" }).click();
+  await page.getByRole("button", { name: "Stop", exact: true }).click();
+  await expect(page.locator('[data-stop="arrived"]')).toBeVisible();
+  const state = (await (await page.request.get(`${robot}state`)).json()) as { velocity: number };
+  expect(state.velocity).toBe(0);
+});
+
 test("a page that hangs while it drives is out of control and stays so until it is taken by hand", async ({ page }) => {
   await page.keyboard.down("ArrowUp");
   await waitUntilDriving(page);

@@ -252,7 +252,6 @@ const german: Readonly<Record<string, string>> = {
   offline: "nicht erreichbar",
   Address: "Adresse",
   Node: "Knoten",
-  "Mode of connection": "Art der Verbindung",
   Clients: "Clients",
   "Each client has a connection of its own to the device": "Jeder Client hat eine eigene Verbindung zum Gerät",
   "All clients share one session of the gateway with the device":

@@ -136,7 +136,7 @@ function DeviceRow({ device, stale }: { device: Device; stale: boolean }) {
         )}
         {device.mode !== null && (
           <div>
-            <dt>{t("Mode of connection")}</dt>
+            <dt>{t("Mode")}</dt>
             <dd title={t(MODE[device.mode])}>{device.mode}</dd>
           </div>
         )}
