@@ -2,8 +2,8 @@
 import base64
 import json
 import os
-import platform
 import pathlib
+import platform
 import re
 import signal
 import socket
