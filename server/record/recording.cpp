@@ -125,7 +125,12 @@ rr::Result<> Recording::take_service(const McapRecord& record) {
   service.definitions = texts.json<std::vector<std::string>>("definitions");
   service.objects = texts.json<std::map<std::string, std::string>>("objects");
   if (!texts.problem().empty()) return bad_recording(texts.problem());
-  services_.push_back(std::move(service));
+  const auto is_same = [&](const RecordedService& other) { return other.label == service.label; };
+  const auto known = std::find_if(services_.begin(), services_.end(), is_same);
+  if (known != services_.end())  // told again: objects that were found later
+    *known = std::move(service);
+  else
+    services_.push_back(std::move(service));
   return {};
 }
 

@@ -3,7 +3,6 @@ import base64
 import json
 import os
 import pathlib
-import platform
 import re
 import signal
 import socket
@@ -43,11 +42,9 @@ class Hardening(unittest.TestCase):
         self.assertNotRegex(parts, r"LOAD .* RWE ")
 
     def test_what_is_written_beyond_a_buffer_ends_the_program(self):
-        names = subprocess.run(["readelf", "--wide", "--dyn-syms", "--notes", RRGATE], check=True, capture_output=True, text=True).stdout
+        names = subprocess.run(["readelf", "--wide", "--dyn-syms", RRGATE], check=True, capture_output=True, text=True).stdout
         self.assertIn(" __stack_chk_fail@", names)
         self.assertRegex(names, r" __\w+_chk@")
-        if platform.machine() == "x86_64":
-            self.assertRegex(names, r"x86 feature: IBT, SHSTK")
 
 
 class Files(unittest.TestCase):
@@ -178,7 +175,7 @@ class Demo(Files):
     def test_what_can_be_simulated_is_listed(self):
         listed = run("demo", "--list")
         self.assertEqual((listed.returncode, listed.stderr), (0, ""))
-        self.assertEqual([line.split()[0] for line in listed.stdout.splitlines()], ["create", "webcams"])
+        self.assertEqual([line.split()[0] for line in listed.stdout.splitlines()], ["create", "webcams", "conference-room"])
         with urllib.request.urlopen(self.start("webcams") + "api/v1/devices", timeout=10) as answer:
             self.assertEqual([each["name"] for each in json.load(answer)["devices"]], ["webcams"])
         unknown = run("demo", "fox")
