@@ -97,6 +97,7 @@ const german: Readonly<Record<string, string>> = {
   "Take over": "Steuerung übernehmen",
   "You are in control since {0}.": "Sie steuern seit {0}.",
   "You are not in control: {0}": "Sie steuern nicht: {0}",
+  "You may not be in control any more: {0}": "Vielleicht steuern Sie nicht mehr: {0}",
   "Your first command takes control.": "Der erste Befehl nimmt die Steuerung.",
   "1 frame": "1 Bezugssystem",
   "{0} frames": "{0} Bezugssysteme",
