@@ -6,6 +6,7 @@ export const makeSidebar = (decisions) => [
   group("Start", [
     ["What rrgate is", "/"],
     ["Five minutes", "/start"],
+    ["Systems to try", "/systems"],
   ]),
   group("Tutorials", [
     ["A first device in C++", "/tutorials/cpp-device"],

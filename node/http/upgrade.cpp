@@ -1,11 +1,19 @@
 #include "node/http/upgrade.hpp"
 
+#include <algorithm>
+
 #include "core/support/error.hpp"
 
 namespace rrgate {
 
 bool asks_for_websocket(const HttpRequest& request) {
-  return has_token(request.header(http::field::upgrade), "websocket");
+  const auto has = [&request](http::field name, std::string_view token) {
+    const auto lines = request.message.equal_range(name);
+    return std::any_of(lines.first, lines.second, [&](const auto& line) {
+      return has_token({line.value().data(), line.value().size()}, token);
+    });
+  };
+  return has(http::field::upgrade, "websocket") && has(http::field::connection, "upgrade");
 }
 
 Response upgrade_required(std::string_view detail, std::string_view subprotocol) {

@@ -105,6 +105,18 @@ std::string TlsStream::client_name() const {
   return certificate ? certified_name(certificate.get()) : std::string();
 }
 
+std::chrono::system_clock::time_point TlsStream::client_certificate_end() const {
+  using Clock = std::chrono::system_clock;
+  const openssl::Certificate certificate(SSL_get1_peer_certificate(ssl_.get()));
+  std::tm end{};
+  if (!certificate || ASN1_TIME_to_tm(X509_get0_notAfter(certificate.get()), &end) != 1)
+    return Clock::time_point::max();
+  // Certificates may end in the year 9999; the clock, which counts nanoseconds, does so in 2262.
+  const std::chrono::seconds seconds(::timegm(&end));
+  const auto last = std::chrono::floor<std::chrono::seconds>(Clock::time_point::max().time_since_epoch());
+  return seconds < last ? Clock::time_point(seconds) : Clock::time_point::max();
+}
+
 std::string TlsStream::version() const {
   return SSL_get_version(ssl_.get());
 }

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <boost/asio/steady_timer.hpp>
+#include <chrono>
 #include <memory>
 
 #include "node/tls/tls_context.hpp"
@@ -49,6 +50,8 @@ class TlsStream final : public ByteStream {
   /// Whose certificate the client of a server of HTTPS has shown: its common name, else its first alternative name;
   /// empty where it has shown none.
   std::string client_name() const;
+  /// When that certificate expires; the largest time where it has shown none.
+  std::chrono::system_clock::time_point client_certificate_end() const;
   /// "TLSv1.3", for logs.
   std::string version() const;
 

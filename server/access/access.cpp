@@ -369,7 +369,7 @@ std::optional<Identity> Access::renew(const Identity& who) const {
     }
     case Proof::jwt:
     case Proof::oidc:
-      if (!state_->jwt) return std::nullopt;
+      if (!state_->jwt || !state_->jwt->knows(who.credential)) return std::nullopt;
       break;
     case Proof::certificate:
       if (state_->config.clients.ca.empty()) return std::nullopt;

@@ -5,6 +5,7 @@
 #include "node/tls/digest.hpp"
 #include "server/access/access_text.hpp"
 #include "server/access/base64url.hpp"
+#include "server/limits/client_network.hpp"
 
 namespace rrgate {
 
@@ -25,6 +26,27 @@ void AccessRequests::forget_old(Time now) {
   std::erase_if(entries_, [now](const auto& item) { return now - item.second.request.asked >= lifetime; });
 }
 
+bool AccessRequests::make_room(const std::string& site) {
+  if (entries_.size() < max_requests) return true;
+  struct Share {
+    std::size_t count = 0;
+    std::string oldest = {};
+  };
+  std::map<std::string, Share> shares;
+  for (const auto& [id, entry] : entries_) {
+    if (entry.request.state != RequestState::pending) continue;
+    auto& share = shares[site_name(entry.address)];
+    if (++share.count == 1 || entry.request.asked < entries_.at(share.oldest).request.asked) share.oldest = id;
+  }
+  const auto most = std::max_element(shares.begin(), shares.end(), [](const auto& left, const auto& right) {
+    return left.second.count < right.second.count;
+  });
+  const auto own = shares.find(site);
+  if (most == shares.end() || most->second.count <= (own == shares.end() ? 0 : own->second.count) + 1) return false;
+  entries_.erase(most->second.oldest);
+  return true;
+}
+
 rr::Result<AccessRequests::Asked> AccessRequests::ask(std::string name, std::string reason, std::string client,
                                                       std::string address, Time now) {
   forget_old(now);
@@ -35,7 +57,7 @@ rr::Result<AccessRequests::Asked> AccessRequests::ask(std::string name, std::str
   const auto of_address = std::count_if(entries_.begin(), entries_.end(), [&](const auto& item) {
     return item.second.address == address && item.second.request.state == RequestState::pending;
   });
-  if (entries_.size() >= max_requests || static_cast<std::size_t>(of_address) >= max_of_address)
+  if (static_cast<std::size_t>(of_address) >= max_of_address || !make_room(site_name(address)))
     return rr::make_error(rr::ErrorCode::out_of_system_resource,
                           "there are too many requests of access already; somebody must decide on them first");
   Asked out{encode_base64url(rr::random_bytes(9)), encode_base64url(rr::random_bytes(24))};

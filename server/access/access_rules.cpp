@@ -32,13 +32,27 @@ bool fits_all(const std::vector<std::string>& patterns) {
   return patterns.empty() || std::any_of(patterns.begin(), patterns.end(), is_stars);
 }
 
+bool is_command(Verb verb) {
+  return verb == Verb::write || verb == Verb::call || verb == Verb::lock;
+}
+
+bool is_agent(const Identity& who) {
+  return who.face == Face::mcp;
+}
+
 bool is_for(const AccessRule& rule, const Identity& who) {
+  if (rule.agent && !is_agent(who)) return false;
   return std::any_of(rule.roles.begin(), rule.roles.end(),
                      [&](const auto& role) { return role == "*" ? who.is_proven() : who.has_role(role); });
 }
 
 bool gives(const AccessRule& rule, Verb verb) {
   return std::find(rule.may.begin(), rule.may.end(), verb) != rule.may.end();
+}
+
+bool fits(const AccessRule& rule, const AccessRequest& what) {
+  return fits(rule.devices, what.device) && fits(rule.services, what.service) && fits(rule.paths, what.path) &&
+         fits(rule.members, what.member);
 }
 
 std::string describe(const Identity& who) {
@@ -77,34 +91,49 @@ std::optional<Verb> parse_verb(std::string_view text) {
 }
 
 rr::Result<> AccessRules::check(const Identity& who, const AccessRequest& what) const {
-  if (is_open() || (!has_rules() && who.is_proven())) return {};
+  if (is_agent(who) && is_command(what.verb)) {
+    if (terms(who, what)) return {};
+    return denied(who, describe(what) + ": no rule with \"agent\" gives it");
+  }
+  if (may_all(who)) return {};
   const auto given = [](std::string_view text) { return text.empty() ? std::nullopt : std::optional(text); };
   if (what.verb == Verb::read && what.member.empty())
     return sees(who, what.device, given(what.service), given(what.path)) ? rr::Result<>() : denied(who, describe(what));
   for (const auto& rule : rules_)
     if ((gives(rule, what.verb) || (what.is_shape && gives(rule, Verb::write))) && is_for(rule, who) &&
-        fits(rule.devices, what.device) && fits(rule.services, what.service) && fits(rule.paths, what.path) &&
-        fits(rule.members, what.member))
+        fits(rule, what))
       return {};
   return denied(who, describe(what));
 }
 
+std::optional<AgentTerms> AccessRules::terms(const Identity& who, const AccessRequest& what) const {
+  std::optional<AgentTerms> out;
+  for (const auto& rule : rules_) {
+    if (!rule.agent || !gives(rule, what.verb) || !is_for(rule, who) || !fits(rule, what)) continue;
+    if (out)
+      out->add(*rule.agent);
+    else
+      out = rule.agent;
+  }
+  return out;
+}
+
 rr::Result<> AccessRules::check_whole_device(const Identity& who, std::string_view device) const {
-  if (is_open() || (!has_rules() && who.is_proven())) return {};
+  if (may_all(who) && !is_agent(who)) return {};
   const auto has_all_of = [&](Verb verb) {
     return std::any_of(rules_.begin(), rules_.end(), [&](const AccessRule& rule) {
       return gives(rule, verb) && is_for(rule, who) && fits(rule.devices, device) && fits_all(rule.services) &&
              fits_all(rule.paths) && fits_all(rule.members);
     });
   };
-  if (std::all_of(std::begin(device_verbs), std::end(device_verbs), has_all_of)) return {};
-  return denied(who, "do everything to device " + rr::quote(device) +
+  if (!is_agent(who) && std::all_of(std::begin(device_verbs), std::end(device_verbs), has_all_of)) return {};
+  return denied(who, "do everything to " + (device.empty() ? "a device" : "device " + rr::quote(device)) +
                          ", which a connection needs that passes through the gateway unread; with \"mode\": \"shared\" "
                          "of the device rights hold for each member");
 }
 
 bool AccessRules::sees_any(const Identity& who) const {
-  if (is_open() || (!has_rules() && who.is_proven())) return true;
+  if (may_all(who)) return true;
   return std::any_of(rules_.begin(), rules_.end(), [&](const AccessRule& rule) {
     return std::any_of(rule.may.begin(), rule.may.end(), is_device_verb) && is_for(rule, who);
   });
@@ -112,7 +141,7 @@ bool AccessRules::sees_any(const Identity& who) const {
 
 bool AccessRules::sees(const Identity& who, std::string_view device, std::optional<std::string_view> service,
                        std::optional<std::string_view> path) const {
-  if (is_open() || (!has_rules() && who.is_proven())) return true;
+  if (may_all(who)) return true;
   if (!path) path = service;  // its root object: all others are below
   return std::any_of(rules_.begin(), rules_.end(), [&](const AccessRule& rule) {
     return std::any_of(rule.may.begin(), rule.may.end(), is_device_verb) && is_for(rule, who) &&

@@ -12,6 +12,7 @@
 
 #include "core/robdef/model/service_definition.hpp"
 #include "core/support/error.hpp"
+#include "server/access/agent_terms.hpp"
 #include "server/access/identity.hpp"
 
 namespace rrgate {
@@ -52,11 +53,14 @@ struct AccessRule {
   std::vector<std::string> paths = {};
   std::vector<std::string> members = {};
   std::vector<Verb> may = {};
+  /// Set: for agents, who come by Face::mcp, alone; and what they write or call is on these terms.
+  std::optional<AgentTerms> agent = {};
 
   bool operator==(const AccessRule&) const = default;
 };
 
-/// Never changes once made.
+/// Commands of agents, who come by Face::mcp, are given by rules with `agent` alone, whatever else gives them to
+/// others: nobody moves a device by what he reads unless an operator has said so. Never changes once made.
 class AccessRules {
  public:
   /// Everybody may do everything.
@@ -70,6 +74,9 @@ class AccessRules {
   /// object, since it is on the way there.
   /// Errors   permission_denied: a sentence that says who may not do what, for the client.
   [[nodiscard]] rr::Result<> check(const Identity& who, const AccessRequest& what) const;
+  /// On which terms an agent may write or call something: those of all rules that give it together. nullopt: it may
+  /// not, or is no agent.
+  std::optional<AgentTerms> terms(const Identity& who, const AccessRequest& what) const;
   /// Whether somebody may do all of device_verbs to everything of a device: only then can his bytes pass unread.
   /// Errors   permission_denied.
   [[nodiscard]] rr::Result<> check_whole_device(const Identity& who, std::string_view device) const;
@@ -84,6 +91,9 @@ class AccessRules {
   bool has_rules() const { return !rules_.empty(); }
 
  private:
+  /// Without a look at the rules: whether all may be done by who he is.
+  bool may_all(const Identity& who) const { return is_open() || (!has_rules() && who.is_proven()); }
+
   std::vector<AccessRule> rules_;
   bool needs_login_ = false;
 };

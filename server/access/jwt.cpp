@@ -4,6 +4,7 @@
 #include <array>
 #include <optional>
 
+#include "node/tls/digest.hpp"
 #include "server/access/base64url.hpp"
 #include "server/json/json.hpp"
 
@@ -36,6 +37,15 @@ std::optional<rr::SignatureAlgorithm> parse_algorithm(std::string_view name) {
 std::string text_of(const rr::Json& object, const char* key) {
   const auto found = object.find(key);
   return found != object.end() && found->is_string() ? found->get<std::string>() : std::string();
+}
+
+/// What makes a key the one that it is, whatever it is called.
+rr::Bytes material_of(const rr::Json& jwk) {
+  rr::Json out = rr::Json::object();
+  for (const auto* name : {"kty", "crv", "n", "e", "x", "y", "k"})
+    if (const auto found = jwk.find(name); found != jwk.end()) out[name] = *found;
+  const auto text = out.dump(-1, ' ', false, rr::Json::error_handler_t::replace);
+  return rr::Bytes(text.begin(), text.end());
 }
 
 rr::Result<rr::SignatureKey> read_key(const rr::Json& jwk) {
@@ -149,7 +159,7 @@ rr::Result<JwtVerifier> JwtVerifier::from_jwks(std::string_view text, JwtClaims 
     if (!key)
       problem = key.error().message;
     else if (is_for_signatures(jwk, *key))
-      out.keys_.push_back({text_of(jwk, "kid"), std::move(*key)});
+      out.add(text_of(jwk, "kid"), std::move(*key), material_of(jwk));
   }
   if (out.keys_.empty()) return unusable_key_set("no key can be used: " + problem);
   return out;
@@ -162,6 +172,19 @@ rr::Result<JwtVerifier> JwtVerifier::from_published(std::string_view text, JwtCl
   out->proof_ = Proof::oidc;
   if (out->keys_.empty()) return unusable_key_set("no key can be used: a secret that is published is none");
   return out;
+}
+
+void JwtVerifier::add(std::string id, rr::SignatureKey key, rr::ByteSpan material) {
+  rr::Bytes all(material.begin(), material.end());
+  for (const auto* claim : {&claims_.issuer, &claims_.audience, &claims_.user_claim, &claims_.roles_claim}) {
+    all.push_back(0);
+    all.insert(all.end(), claim->begin(), claim->end());
+  }
+  keys_.push_back({std::move(id), std::move(key), encode_base64url(rr::sha256(all))});
+}
+
+bool JwtVerifier::knows(std::string_view credential) const {
+  return std::any_of(keys_.begin(), keys_.end(), [&](const Key& key) { return key.credential == credential; });
 }
 
 bool JwtVerifier::misses_key_of(std::string_view token) const {
@@ -179,12 +202,13 @@ rr::Result<JwtVerifier> JwtVerifier::from_secret(std::string_view text, JwtClaim
   auto key = rr::SignatureKey::from_secret(rr::as_bytes(text));
   if (!key) return unusable_key_set(key.error().message);
   JwtVerifier out(std::move(claims));
-  out.keys_.push_back({{}, std::move(*key)});
+  out.add({}, std::move(*key), rr::as_bytes(text));
   return out;
 }
 
-rr::Result<> JwtVerifier::check_signature(std::string_view signed_part, std::string_view header_part,
-                                          rr::ByteSpan signature) const {
+rr::Result<const JwtVerifier::Key*> JwtVerifier::check_signature(std::string_view signed_part,
+                                                                 std::string_view header_part,
+                                                                 rr::ByteSpan signature) const {
   const auto header = read_object(header_part);
   if (!header) return refused("its header can't be read");
   if (header->contains("crit")) return refused("its header asks for extensions that are unknown here");
@@ -197,7 +221,7 @@ rr::Result<> JwtVerifier::check_signature(std::string_view signed_part, std::str
     // A token without a key's name is tried with all; a key without a name is tried for all.
     if (key.key.algorithm() != *algorithm || (!id.empty() && !key.id.empty() && key.id != id)) continue;
     has_key = true;
-    if (key.key.verifies(signed_part, signature)) return {};
+    if (key.key.verifies(signed_part, signature)) return &key;
   }
   return refused(has_key ? "its signature is wrong" : "there is no key of its name and algorithm here");
 }
@@ -208,7 +232,8 @@ rr::Result<Identity> JwtVerifier::verify(std::string_view token, std::chrono::sy
   const auto signature = decode_base64url(signature_text);
   if (!signature) return refused("its signature can't be read");
   const auto signed_part = token.substr(0, header.size() + 1 + payload.size());
-  if (auto checked = check_signature(signed_part, header, *signature); !checked) return checked.error();
+  const auto key = check_signature(signed_part, header, *signature);
+  if (!key) return key.error();
   // From here on the issuer speaks.
   const auto claims = read_object(payload);
   if (!claims) return refused("its claims can't be read");
@@ -220,6 +245,7 @@ rr::Result<Identity> JwtVerifier::verify(std::string_view token, std::chrono::sy
   if (out.name.empty()) return refused("it names no user (" + rr::quote(claims_.user_claim) + ")");
   out.roles = out.proven_roles = read_roles(find_claim(*claims, claims_.roles_claim));
   out.proof = proof_;
+  out.credential = (*key)->credential;
   out.ends = end_of(*claims);
   return out;
 }

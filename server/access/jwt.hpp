@@ -40,6 +40,9 @@ class JwtVerifier {
   /// Errors   authentication_error: why it is refused, for the client.
   rr::Result<Identity> verify(std::string_view token, std::chrono::system_clock::time_point now) const;
 
+  /// Whether it still judges tokens as it did when it made an identity of one: by the same key, of the same issuer, by
+  /// the same claims. `credential`  of that identity.
+  bool knows(std::string_view credential) const;
   /// Whether the token names a key that is not here: its issuer may have a new one.
   bool misses_key_of(std::string_view token) const;
   std::size_t key_count() const { return keys_.size(); }
@@ -48,9 +51,13 @@ class JwtVerifier {
   struct Key {
     std::string id;
     rr::SignatureKey key;
+    std::string credential;  ///< of identities whose tokens it has signed
   };
   explicit JwtVerifier(JwtClaims claims) : claims_(std::move(claims)) {}
-  rr::Result<> check_signature(std::string_view signed_part, std::string_view header, rr::ByteSpan signature) const;
+  void add(std::string id, rr::SignatureKey key, rr::ByteSpan material);
+  /// Returns the key that has signed it.
+  rr::Result<const Key*> check_signature(std::string_view signed_part, std::string_view header,
+                                         rr::ByteSpan signature) const;
 
   JwtClaims claims_;
   Proof proof_ = Proof::jwt;

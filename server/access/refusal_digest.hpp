@@ -1,4 +1,4 @@
-// Refusals of strangers, of whom there may be any number, in few lines of the audit log. Layer: server/access.
+// Refusals of strangers, of whom there may be any number, in few lines of a log. Layer: server/access.
 #pragma once
 
 #include <chrono>
@@ -10,7 +10,7 @@
 
 namespace rrgate {
 
-/// Of each network the first refusal of a minute is written, and the others are counted.
+/// Of each network the first refusals of a minute are written, and the others are counted.
 class RefusalDigest {
  public:
   using Time = std::chrono::steady_clock::time_point;
@@ -20,13 +20,16 @@ class RefusalDigest {
     std::uint64_t count = 0;
   };
 
+  /// `written`  how many of a network are written in a minute.
+  explicit RefusalDigest(std::uint64_t written = 1) : written_(written) {}
+
   /// Notes a refusal. Returns whether it is to be written.
   bool note(const std::string& network, Time now) {
     if (counts_.empty()) begun_ = now;
     const bool has_room = counts_.size() < max_networks;
-    const auto found = counts_.find(network);
-    if (found == counts_.end() && has_room) return counts_.emplace(network, 0).second;
-    ++(found == counts_.end() ? others_ : found->second);
+    const auto found = has_room ? counts_.try_emplace(network, 0).first : counts_.find(network);
+    if (found != counts_.end()) return ++found->second <= written_;
+    ++others_;
     return false;
   }
   /// What was counted in a minute that is over, or (`is_forced`) until now.
@@ -34,7 +37,7 @@ class RefusalDigest {
     std::vector<Sum> out;
     if (counts_.empty() || (!is_forced && now - begun_ < period)) return out;
     for (const auto& [network, count] : std::exchange(counts_, {}))
-      if (count > 0) out.push_back({network, count});
+      if (count > written_) out.push_back({network, count - written_});
     if (const auto count = std::exchange(others_, 0); count > 0) out.push_back({{}, count});
     return out;
   }
@@ -42,7 +45,8 @@ class RefusalDigest {
  private:
   static constexpr std::size_t max_networks = 100;
 
-  std::map<std::string, std::uint64_t> counts_;
+  std::uint64_t written_;
+  std::map<std::string, std::uint64_t> counts_;  ///< all of them
   std::uint64_t others_ = 0;
   Time begun_{};
 };

@@ -15,7 +15,6 @@
 #include <iomanip>
 #include <iostream>
 #include <memory>
-#include <span>
 
 #include "server/cli/command.hpp"
 #include "server/cli/first_login.hpp"
@@ -32,13 +31,14 @@ constexpr std::uint16_t preferred_port = 8080;
 
 struct DemoDevice {
   std::string_view name;
-  std::string_view program;
+  std::string_view program;  ///< empty: a further node of the program before
   std::string_view service;
   LeaseConfig leases = {};
   std::vector<CallbackRule> callbacks = {};
   std::string path = {};
   std::uint16_t port = 0;
   std::vector<std::string> arguments = {};
+  bool follows_first = false;  ///< is told where the first device is
   pid_t process = -1;
 
   std::string url() const { return "rr+tcp://127.0.0.1:" + std::to_string(port) + "/?service=" + std::string(service); }
@@ -49,7 +49,7 @@ struct DemoDevice {
   }
 };
 
-/// Devices that are shown together. The others follow the first one.
+/// Devices that are shown together.
 struct DemoSystem {
   std::string_view name;
   std::string_view summary;
@@ -66,13 +66,21 @@ std::vector<DemoSystem> list_systems() {
   const DemoDevice create{
       "create", "rrgate-demo-create", "Create", leases, {{"Create.play_callback", CallbackPolicy::first}}};
   const DemoDevice webcams{"webcams", "rrgate-demo-webcams", "Webcam"};
-  return {{"create", "a mobile robot in a room, and two cameras that ride on it", {create, webcams}},
-          {"webcams", "two cameras that stand in a room", {webcams}}};
+  auto riding_webcams = webcams;
+  riding_webcams.follows_first = true;
+  return {{"create", "a mobile robot in a room, and two cameras that ride on it", {create, riding_webcams}},
+          {"webcams", "two cameras that stand in a room", {webcams}},
+          {"conference-room",
+           "lights and colour sensors of a room, and a controller that holds the light at a target",
+           {{"controller", "rrgate-demo-conference-room", "Controller"},
+            {"lights", "", "Lights"},
+            {"sensors-north", "", "Sensors"},
+            {"sensors-south", "", "Sensors"}}}};
 }
 
 int print_systems() {
   for (const auto& system : list_systems())
-    std::cout << std::left << std::setw(10) << system.name << system.summary << "\n";
+    std::cout << std::left << std::setw(17) << system.name << system.summary << "\n";
   return exit_ok;
 }
 
@@ -103,6 +111,21 @@ std::uint16_t find_free_port() {
   return acceptor.local_endpoint().port();
 }
 
+/// Where each device is to listen, and the command lines that say so. Returns the program that is not there, if any.
+std::string prepare_programs(std::vector<DemoDevice>& devices) {
+  DemoDevice* program = nullptr;
+  for (auto& device : devices) {
+    if (!device.program.empty()) program = &device;
+    device.port = find_free_port();
+    program->arguments.insert(program->arguments.end(), {"--port", std::to_string(device.port)});
+    if (program != &device) continue;
+    device.path = find_program(device.program);
+    if (device.path.empty()) return std::string(device.program);
+    if (device.follows_first) device.arguments.insert(device.arguments.end(), {"--robot", devices.front().url()});
+  }
+  return {};
+}
+
 /// Starts a device that ends with us, however we end.
 pid_t start_program(const std::string& path, const std::vector<std::string>& arguments) {
   std::vector<char*> texts{const_cast<char*>(path.c_str())};
@@ -126,7 +149,7 @@ void wait_until_listening(const DemoDevice& device) {
     rr::error_code error;
     probe.connect({asio::ip::address_v4::loopback(), device.port}, error);
     siginfo_t ended{};
-    ::waitid(P_PID, static_cast<id_t>(device.process), &ended, WEXITED | WNOHANG | WNOWAIT);
+    if (device.process > 0) ::waitid(P_PID, static_cast<id_t>(device.process), &ended, WEXITED | WNOHANG | WNOWAIT);
     if (!error || ended.si_pid != 0) return;
     ::usleep(10'000);
   }
@@ -267,19 +290,10 @@ int demo(const DemoOptions& options) {
   const auto systems = list_systems();
   const auto is_wanted = [&options](const DemoSystem& system) { return system.name == options.system; };
   auto devices = std::find_if(systems.begin(), systems.end(), is_wanted)->devices;
-  for (auto& device : devices) {
-    device.path = find_program(device.program);
-    if (device.path.empty()) {
-      return report_failure("demo", std::string(device.program) + " not found beside rrgate");
-    }
-  }
-  for (auto& device : devices) {
-    device.port = find_free_port();
-    device.arguments = {"--port", std::to_string(device.port)};
-  }
-  for (auto& device : std::span(devices).subspan(1))
-    device.arguments.insert(device.arguments.end(), {"--robot", devices.front().url()});
-  for (auto& device : devices) device.process = start_program(device.path, device.arguments);
+  if (const auto missing = prepare_programs(devices); !missing.empty())
+    return report_failure("demo", missing + " not found beside rrgate");
+  for (auto& device : devices)
+    if (!device.program.empty()) device.process = start_program(device.path, device.arguments);
   for (const auto& device : devices) wait_until_listening(device);
 
   std::optional<asio::signal_set> deaths;

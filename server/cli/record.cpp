@@ -140,6 +140,7 @@ int run_record(const RecordOptions& options) {
     RecordingOptions how;
     how.max_bytes = static_cast<std::uint64_t>(options.max_size * 1e6);
     how.kept_files = options.kept_files;
+    how.replaces = options.replaces;
     how.library = "rrgate " + std::string(version);
     auto writer = RecordingWriter::create(options.output, how);
     if (!writer) throw_failure(writer.error());
@@ -178,7 +179,7 @@ void add_record(Commands& commands) {
   add_positive(app, "--duration", options.duration, "End after this time", "SECONDS");
   add_positive(app, "--max-size", options.max_size, "Of one file; then the next one begins: FILE-2, FILE-3, ...", "MB");
   add_count(app, "--keep", options.kept_files, "Files that stay; the oldest go")->needs("--max-size");
-  app.add_flag("--force", options.replaces, "Replace a file that is there");
+  app.add_flag("--force", options.replaces, "Replace files that are there");
   add_connection_options(app, options);
 }
 

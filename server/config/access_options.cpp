@@ -73,6 +73,19 @@ void read_grant(ObjectReader& in, RoleGrant& grant) {
   in.texts("roles", true, read_role(grant.roles));
 }
 
+void read_agent(ObjectReader& in, AgentTerms& terms) {
+  in.ranges("limits", [&](const std::string& place, double least, double most) {
+    terms.limits[place] = {least, most};
+  });
+  std::string approval = "ask";
+  in.choice("approval", approval, {"ask", "none"});
+  terms.needs_approval = approval == "ask";
+  in.flag("lease", terms.needs_lease);
+  auto hold = static_cast<std::size_t>(terms.hold.count());
+  in.size("hold_seconds", hold, {0, 50});
+  terms.hold = std::chrono::seconds(hold);
+}
+
 void read_rule(ObjectReader& in, AccessRule& rule) {
   in.texts("roles", true, read_role(rule.roles));
   in.texts("devices", false, read_pattern(rule.devices));
@@ -92,6 +105,9 @@ void read_rule(ObjectReader& in, AccessRule& rule) {
     in.finding("may",
                "metrics and admin are of the gateway as a whole; expected them in a rule that names no devices, "
                "services, paths or members");
+  in.object("agent", [&](ObjectReader& part) { read_agent(part, rule.agent.emplace()); });
+  if (rule.agent && std::any_of(rule.may.begin(), rule.may.end(), [](Verb verb) { return verb >= Verb::lock; }))
+    in.finding("may", "expected read, write, call and subscribe alone in a rule with \"agent\"");
 }
 
 bool is_loopback(const std::string& host) {

@@ -1,6 +1,43 @@
 #include "server/config/cautions.hpp"
 
+#include <algorithm>
+
 namespace rrgate {
+
+namespace {
+
+/// What an agent would not be given by /mcp without terms, or could answer itself with.
+bool gives_more(const AccessRule& rule) {
+  return std::any_of(rule.may.begin(), rule.may.end(), [](Verb verb) {
+    return verb == Verb::write || verb == Verb::call || verb == Verb::lock || verb == Verb::admin;
+  });
+}
+
+bool share_role(const AccessRule& one, const AccessRule& other) {
+  return std::any_of(one.roles.begin(), one.roles.end(), [&](const auto& role) {
+    return role == "*" || std::any_of(other.roles.begin(), other.roles.end(),
+                                      [&](const auto& each) { return each == "*" || each == role; });
+  });
+}
+
+/// Where an agent could do by another way than /mcp what it may not there.
+void find_ways_around(const Config& config, std::vector<Finding>& out) {
+  const auto& rules = config.access.rules;
+  if (config.mcp.is_enabled && config.access.has_users() && rules.empty())
+    out.push_back({"/access/rules",
+                   "missing: /mcp lets agents read alone, but by all other ways whoever proves who he is may do "
+                   "everything, an agent too"});
+  for (std::size_t i = 0; i < rules.size(); ++i) {
+    if (rules[i].agent || !gives_more(rules[i])) continue;
+    const auto is_of_agent = [&](const AccessRule& each) { return each.agent && share_role(each, rules[i]); };
+    if (std::any_of(rules.begin(), rules.end(), is_of_agent))
+      out.push_back({"/access/rules/" + std::to_string(i) + "/may",
+                     "is for a role that another rule has for agents: by other ways than /mcp an agent of this role "
+                     "does it without limits and without being asked about"});
+  }
+}
+
+}  // namespace
 
 std::vector<Finding> find_cautions(const Config& config) {
   std::vector<Finding> out;
@@ -22,6 +59,7 @@ std::vector<Finding> find_cautions(const Config& config) {
                        " may do everything"});
   if (!config.tls.certificates.empty() && access.has_users() && !config.tls.is_required)
     out.push_back({"/tls/required", "false: a password or a token that is sent in clear is taken"});
+  find_ways_around(config, out);
   return out;
 }
 

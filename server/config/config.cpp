@@ -269,6 +269,7 @@ void read_retry(ObjectReader& in, Retry& retry) {
 void read_mcp(ObjectReader& in, McpConfig& mcp) {
   mcp.is_enabled = true;
   in.duration("longest_wait_ms", mcp.longest_wait, {1000, hour_ms});
+  in.duration("longest_approval_ms", mcp.longest_approval, {1000, hour_ms});
 }
 
 void read_config(ObjectReader& in, Config& config) {

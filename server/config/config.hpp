@@ -225,8 +225,9 @@ struct Discover {
 
 /// The devices for agents, by the Model Context Protocol.
 struct McpConfig {
-  bool is_enabled = false;           ///< there where the configuration has "mcp"
-  milliseconds longest_wait{60000};  ///< for an event
+  bool is_enabled = false;               ///< there where the configuration has "mcp"
+  milliseconds longest_wait{60000};      ///< for an event
+  milliseconds longest_approval{60000};  ///< what a person may take to allow a command; then it is refused
 
   bool operator==(const McpConfig&) const = default;
 };

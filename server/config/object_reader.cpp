@@ -168,6 +168,20 @@ void ObjectReader::texts(std::string_view key, bool is_required, const ReadText&
   }
 }
 
+void ObjectReader::ranges(std::string_view key, const ReadRange& read) {
+  const auto* value = find(key, "object", {});
+  if (!value) return;
+  for (const auto& [name, range] : value->items()) {
+    const bool is_range =
+        range.is_array() && range.size() == 2 && range[0].is_number() && range[1].is_number() && range[0] <= range[1];
+    if (is_range)
+      read(name, range[0].get<double>(), range[1].get<double>());
+    else
+      log_.findings.push_back({path_ + pointer_segment(key) + pointer_segment(name),
+                               "found " + shown(range) + ", expected [LEAST, MOST]: two numbers"});
+  }
+}
+
 void ObjectReader::object(std::string_view key, const ReadObject& read) {
   const auto* value = find(key, "object", {});
   if (!value && !describes()) return;

@@ -44,6 +44,9 @@ class ObjectReader {
   using ReadText = std::function<std::string(const std::string&)>;
   void required_text(std::string_view key, const ReadText& read);
   void texts(std::string_view key, bool is_required, const ReadText& read);
+  /// Two numbers by any name each, the first at most the second.
+  using ReadRange = std::function<void(const std::string& name, double least, double most)>;
+  void ranges(std::string_view key, const ReadRange& read);
   using ReadObject = std::function<void(ObjectReader&)>;
   void object(std::string_view key, const ReadObject& read);
   void objects(std::string_view key, bool is_required, const ReadObject& read);

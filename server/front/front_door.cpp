@@ -43,8 +43,8 @@ rr::awaitable<bool> take_proxy_header(GatewayState& gateway, rr::ByteStream& str
     const auto header = parse_proxy_header({first.data(), size});
     if (!header) {
       gateway.reject(Rejection::proxy_header);
-      log(LogLevel::warning, "connection of a trusted proxy closed",
-          {{"peer", connection.client}, {"error", header.error().message}});
+      gateway.log_refusal(LogLevel::warning, "connection of a trusted proxy closed", connection.client,
+                          {{"peer", connection.client}, {"error", header.error().message}});
       co_return false;
     }
     if (header->size == 0) continue;
@@ -54,16 +54,16 @@ rr::awaitable<bool> take_proxy_header(GatewayState& gateway, rr::ByteStream& str
     connection.client = Connection::describe(connection.peer);
     if (connection.ticket.pass_to(header->client->address())) co_return true;
     gateway.reject(Rejection::too_many);
-    log(LogLevel::warning, "connection refused: too many", {{"peer", connection.client}});
+    gateway.log_refusal(LogLevel::warning, "connection refused: too many", connection.client,
+                        {{"peer", connection.client}});
     co_return false;
   }
 }
 
 /// Reads until the first bytes tell the protocol, and puts them back. Undecided: the connection ended before.
-rr::awaitable<Protocol> look_at_first_bytes(rr::ByteStream& stream, const std::string& client,
-                                            std::chrono::milliseconds patience) {
+rr::awaitable<Protocol> look_at_first_bytes(GatewayState& gateway, rr::ByteStream& stream, const std::string& client) {
   rr::Deadline limit(stream.executor(), [&stream] { stream.close(); });
-  limit.arm(patience);
+  limit.arm(gateway.config().limits.header_timeout);
   std::array<std::uint8_t, 4096> first{};
   std::size_t size = 0;
   auto protocol = Protocol::undecided;
@@ -78,8 +78,8 @@ rr::awaitable<Protocol> look_at_first_bytes(rr::ByteStream& stream, const std::s
     protocol = detect_protocol({first.data(), size});
   }
   if (protocol == Protocol::unknown)
-    log(LogLevel::info, "connection closed: neither Robot Raconteur nor HTTP",
-        {{"peer", client}, {"found", rr::as_text({first.data(), std::min<std::size_t>(size, 16)})}});
+    gateway.log_refusal(LogLevel::info, "connection closed: neither Robot Raconteur nor HTTP", client,
+                        {{"peer", client}, {"found", rr::as_text({first.data(), std::min<std::size_t>(size, 16)})}});
   stream.put_back({first.data(), size});
   co_return protocol;
 }
@@ -90,7 +90,8 @@ rr::awaitable<std::unique_ptr<rr::ByteStream>> accept_https(GatewayState& gatewa
   const auto context = gateway.tls();
   if (!context) {
     gateway.reject(Rejection::unknown_protocol);
-    log(LogLevel::info, "connection closed: TLS is not served here", {{"peer", connection.client}});
+    gateway.log_refusal(LogLevel::info, "connection closed: TLS is not served here", connection.client,
+                        {{"peer", connection.client}});
     co_return nullptr;
   }
   const rr::TlsPeerOptions any_client;
@@ -98,12 +99,13 @@ rr::awaitable<std::unique_ptr<rr::ByteStream>> accept_https(GatewayState& gatewa
   const auto done = co_await tls->handshake(gateway.config().limits.header_timeout);
   if (!done) {
     gateway.reject(Rejection::tls);
-    log(LogLevel::info, "connection closed", {{"error", done.error().message}});
+    gateway.log_refusal(LogLevel::info, "connection closed", connection.client, {{"error", done.error().message}});
     co_return nullptr;
   }
   if (auto name = tls->client_name(); !name.empty()) {
     connection.identity.name = std::move(name);
     connection.identity.proof = Proof::certificate;
+    connection.identity.ends = tls->client_certificate_end();
   }
   co_return tls;
 }
@@ -117,18 +119,17 @@ rr::awaitable<void> serve_connection(GatewayState& gateway, std::unique_ptr<rr::
   Connection connection(Peer{std::move(peer), false}, std::move(local), std::move(ticket));
   connection.stop = [&current](const rr::EndReason&) { current->close(); };
   gateway.add(connection);
-  const auto patience = gateway.config().limits.header_timeout;
   const auto& proxy = gateway.config().proxy;
   if (proxy.has_proxy_protocol && proxy.trust.trusts(connection.peer.endpoint.address()))
     if (!co_await take_proxy_header(gateway, *stream, connection)) co_return;
-  auto protocol = co_await look_at_first_bytes(*stream, connection.client, patience);
+  auto protocol = co_await look_at_first_bytes(gateway, *stream, connection.client);
   if (protocol == Protocol::tls) {
     // Closing what is below closes the TLS stream too, whose part it becomes: `current` holds through the handshake.
     stream = co_await accept_https(gateway, connection, std::move(stream));
     if (!stream) co_return;
     current = stream.get();
     connection.peer.is_encrypted = true;
-    protocol = co_await look_at_first_bytes(*stream, connection.client, patience);
+    protocol = co_await look_at_first_bytes(gateway, *stream, connection.client);
   }
 
   connection.network = network_name(connection.peer.endpoint.address());

@@ -45,10 +45,24 @@ rr::awaitable<rr::error_code> write_refusal(GatewayState& gateway, rr::ByteStrea
   co_return co_await stream.write(slices);
 }
 
+/// The node that native clients put into the query. Errors   invalid_argument: no such id.
+rr::Result<rr::NodeIdentity> asked_node(const Request& request) {
+  rr::NodeIdentity out;
+  if (const auto text = rr::query_value(request.query(), "nodeid")) {
+    auto parsed = rr::parse_node_id(*text);
+    if (!parsed) return parsed.error();
+    out.id = *parsed;
+  }
+  out.name = rr::query_value(request.query(), "nodename").value_or("");
+  return out;
+}
+
 /// Where an upgrade leads: by path, or at "/" by the node that native clients put into the query. "/gateway" is the
-/// gateway's own node, whatever its name is.
+/// gateway's own node, whatever its name is. Who may see nothing is led to a destination of nothing where there is
+/// none, and refused there as at a device.
 rr::Result<Destination> find_destination(GatewayState& gateway, const Request& request) {
   const auto path = request.path();
+  const bool is_stranger = !gateway.access().state().rules.sees_any(request.identity);
   const auto not_found = [](std::string text) {
     return rr::make_error(rr::ErrorCode::node_not_found, std::move(text));
   };
@@ -56,7 +70,8 @@ rr::Result<Destination> find_destination(GatewayState& gateway, const Request& r
     auto name = path.substr(devices_prefix.size());
     if (!name.empty() && name.back() == '/') name.remove_suffix(1);
     auto* device = gateway.devices().find(name);
-    if (!device) {  // strangers are not told so
+    if (!device && is_stranger) return Destination{};
+    if (!device) {  // nor are those told so who may see other devices
       if (auto allowed = gateway.access().check(request.identity, {.device = name}); !allowed) return allowed.error();
       return not_found("no device " + rr::quote(name) + "; /api/v1/devices lists them");
     }
@@ -64,14 +79,10 @@ rr::Result<Destination> find_destination(GatewayState& gateway, const Request& r
   }
   if (path == gateway_path) return Destination{nullptr, &gateway.shared().node()};
   if (path != "/") return not_found("no WebSocket at " + rr::quote(path) + "; expected /devices/NAME, /gateway or /");
-  rr::NodeId node_id;
-  if (const auto text = rr::query_value(request.query(), "nodeid")) {
-    auto parsed = rr::parse_node_id(*text);
-    if (!parsed) return parsed.error();
-    node_id = *parsed;
-  }
-  const auto node_name = rr::query_value(request.query(), "nodename").value_or("");
-  const auto destination = find_destination(gateway, node_id, node_name);
+  const auto asked = asked_node(request);
+  if (!asked) return asked.error();
+  const auto destination = find_destination(gateway, asked->id, asked->name);
+  if (!destination && is_stranger) return Destination{};
   if (!destination) return not_found("no device is the node that the query names");
   return *destination;
 }
@@ -119,13 +130,15 @@ rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& 
   const auto subprotocol = is_json_socket(request) ? json_subprotocol : rr::websocket_subprotocol;
   if (auto refusal = refuse_upgrade(request, subprotocol)) {
     gateway.reject(Rejection::bad_request);
-    log(LogLevel::info, "upgrade refused", {{"peer", connection.client}, {"status", refusal->status}});
+    gateway.log_refusal(LogLevel::info, "upgrade refused", connection.client,
+                        {{"peer", connection.client}, {"status", refusal->status}});
     co_await refuse(*refusal);
     co_return Continuation();
   }
   if (!connection.ticket.pass_to(request.arrival.address)) {
     gateway.reject(Rejection::too_many);
-    log(LogLevel::warning, "connection refused: too many", {{"peer", connection.client}});
+    gateway.log_refusal(LogLevel::warning, "connection refused: too many", connection.client,
+                        {{"peer", connection.client}});
     const auto response = problem_response(503, "too many connections from " + connection.network);
     co_await refuse(response);
     co_return Continuation();
@@ -153,7 +166,7 @@ rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& 
   }
   const bool takes_close = takes_close_frames(request);
   // In a session of ours each request is looked at; see shared_access.hpp.
-  const auto allowed = destination->node ? rr::Result<>() : may_relay(gateway, connection, *destination->device);
+  const auto allowed = destination->node ? rr::Result<>() : may_relay(gateway, connection, destination->device);
   // Who speaks Robot Raconteur can be told so in it, and a page can read why a WebSocket closes; but to show who one
   // is, where a page or another gateway has not done so, is for the upgrade.
   const bool names_protocol = request.message.count(http::field::sec_websocket_protocol) != 0;
@@ -171,8 +184,13 @@ rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& 
     tcp.put_back(unread);
     auto socket = std::make_unique<rr::WebSocketStream>(std::move(stream), rr::WebSocketRole::server, takes_close);
     if (hears_in_session) {
-      log(LogLevel::info, "client refused", {{"peer", connection.client}, {"error", allowed.error().message}});
-      auto self = relayed_identity(gateway, *destination->device);
+      gateway.log_refusal(LogLevel::info, "client refused", connection.client,
+                          {{"peer", connection.client}, {"error", allowed.error().message}});
+      const bool is_stranger = !gateway.access().state().rules.sees_any(request.identity);
+      const auto found = asked_node(request);
+      const auto asked = found ? *found : rr::NodeIdentity();
+      auto self = is_stranger ? unknown_identity(gateway, asked.id, asked.name)
+                              : relayed_identity(gateway, *destination->device);
       auto refusal = allowed.error();
       co_return refuse_in_session(gateway, connection, std::move(self), std::move(socket), std::move(refusal));
     }
@@ -195,7 +213,8 @@ rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& 
   tcp.put_back(unread);
   auto socket = std::make_unique<rr::WebSocketStream>(std::move(stream), rr::WebSocketRole::server, takes_close);
   if (!boarding) {  // a page can't read the status of a refused upgrade, but it can read why a WebSocket closes
-    log(LogLevel::info, "client refused", {{"peer", connection.client}, {"error", boarding.error().message}});
+    gateway.log_refusal(LogLevel::info, "client refused", connection.client,
+                        {{"peer", connection.client}, {"error", boarding.error().message}});
     const auto code = static_cast<std::uint16_t>(allowed ? 1013 : 1008);
     const rr::EndReason reason{code, boarding.error().message};
     co_await socket->end(reason);
@@ -213,11 +232,11 @@ std::optional<Response> refuse_page(GatewayState& gateway, const Request& reques
   if (!refusal) refusal = refuse_foreign_page(request, rules);
   if (!refusal) return std::nullopt;
   gateway.reject(refusal->status == 421 ? Rejection::host : Rejection::origin);
-  log(LogLevel::info, "page refused",
-      {{"peer", request.arrival.peer},
-       {"status", refusal->status},
-       {"host", request.arrival.host},
-       {"origin", request.header(http::field::origin)}});
+  gateway.log_refusal(LogLevel::info, "page refused", request.arrival.peer,
+                      {{"peer", request.arrival.peer},
+                       {"status", refusal->status},
+                       {"host", request.arrival.host},
+                       {"origin", request.header(http::field::origin)}});
   return refusal;
 }
 
@@ -239,7 +258,8 @@ std::optional<Response> require_tls(GatewayState& gateway, const Request& reques
     return response;
   }
   gateway.reject(Rejection::forbidden);
-  log(LogLevel::info, "request in clear refused", {{"peer", request.arrival.peer}, {"path", path}});
+  gateway.log_refusal(LogLevel::info, "request in clear refused", request.arrival.peer,
+                      {{"peer", request.arrival.peer}, {"path", path}});
   return problem_response(403, std::string("the gateway is reached by TLS alone: https://, wss://") +
                                    (shows ? "; what you have shown in clear may be known to others by now" : ""));
 }
@@ -277,8 +297,8 @@ bool makes_work(const Request& request) {
 void note_unreadable(GatewayState& gateway, const Connection& connection, const ReadFailure& failure) {
   if (failure.status == 0) return;  // the client is gone
   gateway.reject(Rejection::bad_request);
-  log(LogLevel::info, "request refused",
-      {{"peer", connection.client}, {"status", failure.status}, {"detail", failure.detail}});
+  gateway.log_refusal(LogLevel::info, "request refused", connection.client,
+                      {{"peer", connection.client}, {"status", failure.status}, {"detail", failure.detail}});
 }
 
 Rejection rejection_of(unsigned status) {

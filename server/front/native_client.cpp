@@ -99,7 +99,8 @@ rr::awaitable<rr::awaitable<void>> serve_native_client(GatewayState& gateway, Co
   rr::Result<> read = bytes ? rr::decode(*bytes, {}, request) : rr::Result<>(bytes.error());
   if (!read) {
     gateway.reject(Rejection::bad_request);
-    log(LogLevel::info, "native client dropped", {{"peer", connection.client}, {"error", read.error().message}});
+    gateway.log_refusal(LogLevel::info, "native client dropped", connection.client,
+                        {{"peer", connection.client}, {"error", read.error().message}});
     client.close();
     co_return rr::awaitable<void>();
   }
@@ -108,16 +109,18 @@ rr::awaitable<rr::awaitable<void>> serve_native_client(GatewayState& gateway, Co
       find_destination(gateway, request.header.receiver_node_id, request.header.receiver_node_name);
   rr::Error refusal;
   bool is_denied = false;
-  const bool is_relayed = destination && !destination->node;
+  // Who may see nothing is refused at a node that is not there as at one that is.
+  const bool is_stranger = !gateway.access().state().rules.sees_any(connection.identity);
+  const bool is_relayed = destination ? !destination->node : is_stranger;
   // What is relayed may be encrypted end to end, from its first message on.
   const bool is_in_clear = !connection.peer.is_encrypted && !(is_relayed && asks_for_tls(request));
   rr::Result<> allowed;
-  if (gateway.config().tls.is_required && is_in_clear && destination) {
+  if (gateway.config().tls.is_required && is_in_clear && (destination || is_relayed)) {
     gateway.reject(Rejection::forbidden);
     allowed = rr::make_error(rr::ErrorCode::permission_denied,
                              "the gateway is reached by TLS alone: rr+wss, or rrs+tcp where it relays");
   } else if (is_relayed) {
-    allowed = may_relay(gateway, connection, *destination->device);
+    allowed = may_relay(gateway, connection, destination ? destination->device : nullptr);
   }
   if (note_circle(gateway, request.header.sender_node_id)) {
     refusal = rr::make_error(rr::ErrorCode::connection_error, "the way leads back to the gateway that it began at");
@@ -136,10 +139,14 @@ rr::awaitable<rr::awaitable<void>> serve_native_client(GatewayState& gateway, Co
     gateway.reject(Rejection::no_such_device);
     refusal = rr::make_error(rr::ErrorCode::node_not_found, "Node not found");
   }
-  log(LogLevel::info, "native client refused",
+  gateway.log_refusal(
+      LogLevel::info, "native client refused", connection.client,
       {{"peer", connection.client}, {"wanted", describe_wish(request.header)}, {"error", refusal.message}});
   if (is_denied && !asks_for_tls(request)) {
-    auto self = is_relayed ? relayed_identity(gateway, *destination->device) : destination->node->identity();
+    const auto& asked = request.header;
+    auto self = is_stranger  ? unknown_identity(gateway, asked.receiver_node_id, asked.receiver_node_name)
+                : is_relayed ? relayed_identity(gateway, *destination->device)
+                             : destination->node->identity();
     co_return refuse_in_session(gateway, connection, std::move(self), std::move(stream), std::move(refusal));
   }
   const auto reply = make_refusal(request, gateway.node_id(), refusal);

@@ -40,6 +40,10 @@ rr::NodeIdentity relayed_identity(GatewayState& gateway, const Device& device) {
   return {url.node_id.value_or(gateway.node_id()), url.node_name};
 }
 
+rr::NodeIdentity unknown_identity(GatewayState& gateway, const rr::NodeId& asked_id, std::string_view asked_name) {
+  return {asked_id.is_any() ? gateway.node_id() : asked_id, std::string(asked_name)};
+}
+
 rr::awaitable<void> refuse_in_session(GatewayState& gateway, Connection& connection, rr::NodeIdentity self,
                                       std::unique_ptr<rr::ByteStream> client, rr::Error refusal) {
   rr::ServiceSessionOptions options;

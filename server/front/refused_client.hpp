@@ -10,6 +10,9 @@
 
 namespace rrgate {
 
+/// The node that a client has asked for, there or not: who may see nothing is not told which it is.
+rr::NodeIdentity unknown_identity(GatewayState& gateway, const rr::NodeId& asked_id, std::string_view asked_name);
+
 /// Who the client of a relayed device believes to talk to: else it would not listen.
 rr::NodeIdentity relayed_identity(GatewayState& gateway, const Device& device);
 

@@ -140,7 +140,8 @@ auto make_admission(GatewayState& gateway, const SharedNode& node, std::string p
       gateway.reject(allowed.error());
     else
       allowed = seating->sit_down(node.device_of(wanted.path));
-    if (!allowed) log(LogLevel::info, "client refused", {{"peer", peer}, {"error", allowed.error().message}});
+    if (!allowed)
+      gateway.log_refusal(LogLevel::info, "client refused", peer, {{"peer", peer}, {"error", allowed.error().message}});
     return allowed;
   };
 }
@@ -165,7 +166,11 @@ std::shared_ptr<SharedClient> begin_session(GatewayState& gateway, Connection& c
   auto session = destination.node->add(std::move(client), std::move(arrival), std::move(ended));
   connection.device = destination.device;
   connection.has_session = true;
-  connection.is_good = [rights] { return rights->is_good(); };
+  connection.is_good = [rights, session] {
+    if (!rights->is_good()) return false;
+    if (rights->have_changed(session->session().user())) session->review();
+    return true;
+  };
   connection.stop = [session](const rr::EndReason& reason) {
     session->close_service();
     session->close(rr::make_error(rr::ErrorCode::connection_error, reason.text));

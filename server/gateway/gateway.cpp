@@ -153,6 +153,7 @@ rr::awaitable<void> Gateway::watch_files() {
     if (is_stopping_) break;
     access_.reload(false);
     access_.tend_audit();
+    tend_log();
     end_those_not_good();
     if (web_tls_ && web_tls_->has_changed()) web_tls_->reload();
     devices_.reload_tls(false);
@@ -260,8 +261,8 @@ void Gateway::accept(asio::ip::tcp::socket socket) {
   auto ticket = admission_.admit(is_proxy ? std::nullopt : std::optional(peer.address()));
   if (!ticket) {
     reject(Rejection::too_many);
-    log(LogLevel::warning, "connection refused: too many",
-        {{"peer", peer.address().to_string()}, {"open", admission_.open()}});
+    log_refusal(LogLevel::warning, "connection refused: too many", peer.address().to_string(),
+                {{"peer", peer.address().to_string()}, {"open", admission_.open()}});
     return;
   }
   ++open_connections_;

@@ -1,6 +1,7 @@
 #include "server/gateway/routes.hpp"
 
 #include "server/http/endpoints/access.hpp"
+#include "server/http/endpoints/agents.hpp"
 #include "server/http/endpoints/dashboard.hpp"
 #include "server/http/endpoints/devices.hpp"
 #include "server/http/endpoints/discovery.hpp"
@@ -58,6 +59,9 @@ std::vector<Route> list_routes(GatewayState& gateway) {
       {post, "/api/v1/access/requests", with_body(ask_endpoint(gateway))},
       {get, "/api/v1/access/requests", requests_endpoint(gateway)},
       {post, "/api/v1/access/requests/*", with_body(request_endpoint(gateway))},
+      {get, "/api/v1/agents/approvals", approvals_endpoint(gateway)},
+      {post, "/api/v1/agents/approvals/*", with_body(approval_endpoint(gateway))},
+      {post, "/api/v1/agents/stop", with_body(stop_agents_endpoint(gateway))},
       {post, std::string(mcp_path), mcp_endpoint(gateway)},
       {get, std::string(mcp_path), no_mcp_stream_endpoint()},
       {get, "/api/*", no_such_api_endpoint()},

@@ -27,6 +27,19 @@ inline std::string network_name(const boost::asio::ip::address& address) {
   return network.to_string() + (network.is_v6() && !network.is_loopback() ? "/64" : "");
 }
 
+/// What a network of IPv6, as network_name() gives it, is mostly a part of: "2001:db8:1::/48", as a site gets it whole.
+/// What is none of these stays as it is.
+inline std::string site_name(std::string_view network) {
+  constexpr std::string_view length = "/64";
+  if (!network.ends_with(length)) return std::string(network);
+  boost::system::error_code error;
+  const auto address = boost::asio::ip::make_address_v6(std::string(network.substr(0, network.size() - 3)), error);
+  if (error) return std::string(network);
+  auto bytes = address.to_bytes();
+  std::fill(bytes.begin() + 6, bytes.end(), std::uint8_t{0});
+  return boost::asio::ip::address_v6(bytes).to_string() + "/48";
+}
+
 /// The same of a client as logs name it: "192.0.2.1:40000", "[2001:db8::1]:40000", or an address alone. What is none of
 /// these stays as it is.
 inline std::string network_name_of(std::string_view client) {

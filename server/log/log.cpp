@@ -1,18 +1,29 @@
 #include "server/log/log.hpp"
 
-#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/sinks/base_sink.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstdio>
+#include <cstdlib>
+#include <mutex>
 
 #include "core/support/error.hpp"
+#include "server/log/log_writer.hpp"
 
 namespace rrgate {
 
 namespace {
 
-bool is_json = false;
+std::atomic<bool> is_json = false;
+
+/// Lines that wait for a slow reader of stderr.
+constexpr std::size_t max_unread_log = 1024 * 1024;
+
+/// How long a program that ends waits for its last lines to be read.
+constexpr std::chrono::milliseconds last_lines_wait{1000};
 
 constexpr std::size_t longest_value = 300;
 
@@ -65,13 +76,35 @@ void set_pattern(spdlog::logger& logger) {
   }
 }
 
+/// Never destroyed: its thread outlives what a program has in static objects.
+LogWriter& log_writer() {
+  static auto& instance = *[] {
+    const auto tell = [](std::uint64_t count) {
+      log(LogLevel::warning, "lines of the log were lost: nobody read them", {{"lines", count}});
+    };
+    auto* made = new LogWriter(STDERR_FILENO, max_unread_log, tell);
+    std::atexit([] { (void)log_writer().flush(last_lines_wait); });
+    return made;
+  }();
+  return instance;
+}
+
+class WriterSink final : public spdlog::sinks::base_sink<std::mutex> {
+  void sink_it_(const spdlog::details::log_msg& message) override {
+    spdlog::memory_buf_t line;
+    formatter_->format(message, line);
+    log_writer().add({line.data(), line.size()});
+  }
+  void flush_() override {}
+};
+
 spdlog::logger& logger() {
-  static const auto instance = [] {
-    auto made = std::make_shared<spdlog::logger>("rrgate", std::make_shared<spdlog::sinks::stderr_sink_st>());
+  static auto& instance = *[] {
+    auto* made = new spdlog::logger("rrgate", std::make_shared<WriterSink>());
     set_pattern(*made);
     return made;
   }();
-  return *instance;
+  return instance;
 }
 
 template <class Fields>
@@ -109,6 +142,10 @@ void configure_log(const std::string& level, const std::string& format) {
   is_json = format == "json";
   set_pattern(logger());
   logger().set_level(spdlog::level::from_str(level));
+}
+
+std::uint64_t lost_log_lines() {
+  return log_writer().lost();
 }
 
 std::string format_log_text(std::string_view event, std::initializer_list<LogField> fields) {

@@ -24,11 +24,16 @@ struct LogField {
       : name(field), value(std::to_string(number)), is_number(true) {}
 };
 
-/// `event` is a short fixed phrase ("device online"); what varies goes into the fields. Goes to stderr.
+/// `event` is a short fixed phrase ("device online"); what varies goes into the fields. Goes to stderr, by a thread of
+/// its own: while nobody reads there, up to 1 MiB waits, and what comes then is dropped. At the end of the program the
+/// last lines are waited for, for a second at most.
 void log(LogLevel level, std::string_view event, std::initializer_list<LogField> fields = {});
 
 /// `level` and `format` are the words of the configuration. Until called: level info, text.
 void configure_log(const std::string& level, const std::string& format);
+
+/// Lines that were dropped because nobody read those before them.
+std::uint64_t lost_log_lines();
 
 /// The line without time and level, for tests: `event name=value name="quoted text"`, or a JSON object's members.
 std::string format_log_text(std::string_view event, std::initializer_list<LogField> fields);

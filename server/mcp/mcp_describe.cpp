@@ -18,25 +18,6 @@ void add_text(rr::OrderedJson& out, const std::string& documentation) {
   if (!documentation.empty()) rr::add_key(out, from_device) = bounded_text(plain_documentation(documentation));
 }
 
-/// The verbs by which a member can be used at all.
-std::vector<Verb> uses_of(const rr::MemberDefinition& member) {
-  std::vector<Verb> out;
-  switch (member.kind) {
-    case rr::MemberKind::property:
-    case rr::MemberKind::wire:
-    case rr::MemberKind::memory:
-      if (member.direction() != rr::MemberDirection::writeonly) out.push_back(Verb::read);
-      break;
-    case rr::MemberKind::event:
-    case rr::MemberKind::pipe:
-      out.push_back(Verb::subscribe);
-      break;
-    default:
-      break;
-  }
-  return out;
-}
-
 rr::OrderedJson parameters_schema(const rr::MemberDefinition& member) {
   auto out = rr::OrderedJson::object();
   rr::add_key(out, "type") = "object";
@@ -53,6 +34,17 @@ rr::OrderedJson parameters_schema(const rr::MemberDefinition& member) {
   return out;
 }
 
+rr::OrderedJson terms_for_agent(const AgentTerms& terms) {
+  auto limits = rr::OrderedJson::object();
+  for (const auto& [place, range] : terms.limits) rr::add_key(limits, place) = {range.least, range.most};
+  auto out = rr::OrderedJson::object();
+  rr::add_key(out, "limits") = std::move(limits);
+  rr::add_key(out, "approval") = terms.needs_approval ? "ask" : "none";
+  rr::add_key(out, "lease") = terms.needs_lease;
+  if (terms.needs_lease) rr::add_key(out, "hold_seconds") = terms.hold.count();
+  return out;
+}
+
 rr::OrderedJson describe_member(const Target& target, const rr::MemberDefinition& member, const AccessRules& rules,
                                 const Identity& who) {
   auto out = rr::OrderedJson::object();
@@ -63,7 +55,9 @@ rr::OrderedJson describe_member(const Target& target, const rr::MemberDefinition
   for (const auto verb : uses_of(member)) {
     auto wanted = access_request(target, verb);
     wanted.member = member.name;
-    if (rules.check(who, wanted)) may.push_back(std::string(to_string(verb)));
+    if (!rules.check(who, wanted)) continue;
+    may.push_back(std::string(to_string(verb)));
+    if (const auto terms = rules.terms(who, wanted)) rr::add_key(out, "terms") = terms_for_agent(*terms);
   }
   const bool has_parameters = member.kind == rr::MemberKind::function || member.kind == rr::MemberKind::event ||
                               member.kind == rr::MemberKind::callback;
@@ -113,6 +107,29 @@ rr::OrderedJson named_types(const rr::OrderedJson& members, const rr::TypeRegist
 }
 
 }  // namespace
+
+std::vector<Verb> uses_of(const rr::MemberDefinition& member) {
+  std::vector<Verb> out;
+  switch (member.kind) {
+    case rr::MemberKind::property:
+    case rr::MemberKind::wire:
+    case rr::MemberKind::memory:
+      if (member.direction() != rr::MemberDirection::writeonly) out.push_back(Verb::read);
+      if (member.kind == rr::MemberKind::property && member.direction() != rr::MemberDirection::readonly)
+        out.push_back(Verb::write);
+      break;
+    case rr::MemberKind::event:
+    case rr::MemberKind::pipe:
+      out.push_back(Verb::subscribe);
+      break;
+    case rr::MemberKind::function:
+      if (!member.is_generator()) out.push_back(Verb::call);
+      break;
+    default:
+      break;
+  }
+  return out;
+}
 
 std::string bounded_text(std::string_view text) {
   if (text.size() <= longest_text) return std::string(text);

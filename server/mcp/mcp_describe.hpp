@@ -16,6 +16,9 @@ inline constexpr std::string_view from_device = "from_device";
 /// Text of a device, cut where it is longer than anybody needs.
 std::string bounded_text(std::string_view text);
 
+/// The verbs by which an agent can use a member at all.
+std::vector<Verb> uses_of(const rr::MemberDefinition& member);
+
 /// Part of a list, from `cursor` on: an empty one begins it.
 struct McpPage {
   std::size_t first = 0;

@@ -14,6 +14,8 @@ namespace {
 
 /// A reply that waits gets a comment so often: clients and proxies see that it lives.
 constexpr std::chrono::seconds mcp_comment_period{10};
+/// Whether who waits still may is looked at so often.
+constexpr std::chrono::seconds look_period{1};
 
 }  // namespace
 
@@ -30,15 +32,19 @@ rr::awaitable<void> McpReply::wait(std::chrono::milliseconds longest, const std:
       state->news.cancel();
     });
   }
-  const auto until = std::chrono::steady_clock::now() + longest;
+  const auto begin = std::chrono::steady_clock::now();
+  const auto until = begin + longest;
+  auto next_comment = begin + mcp_comment_period;
   rr::error_code failed;
   while (!is_there()) {
     const auto now = std::chrono::steady_clock::now();
     if (failed || state_->is_gone) refuse(rr::ErrorCode::operation_cancelled, "the client has gone");
     if (now >= until) refuse(rr::ErrorCode::operation_timeout, why);
-    state_->news.expires_at(std::min(until, now + mcp_comment_period));
-    const auto [cancelled] = co_await state_->news.async_wait(asio::as_tuple(asio::use_awaitable));
-    if (!cancelled) failed = co_await writer_.write(": \n\n");
+    state_->news.expires_at(std::min(until, now + look_period));
+    (void)co_await state_->news.async_wait(asio::as_tuple(asio::use_awaitable));
+    if (std::chrono::steady_clock::now() < next_comment) continue;
+    next_comment += mcp_comment_period;
+    failed = co_await writer_.write(": \n\n");
   }
 }
 

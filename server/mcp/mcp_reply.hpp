@@ -23,8 +23,9 @@ class McpReply {
   std::function<void()> waker() const {
     return [state = state_] { state->news.cancel(); };
   }
-  /// Waits until `is_there`, looked at after each call of waker().
-  /// Throws   rr::Exception: operation_timeout, with `why`; operation_cancelled: the client has gone.
+  /// Waits until `is_there`, looked at after each call of waker() and each second.
+  /// Throws   rr::Exception: operation_timeout, with `why`; operation_cancelled: the client has gone; what `is_there`
+  /// throws.
   rr::awaitable<void> wait(std::chrono::milliseconds longest, const std::function<bool()>& is_there,
                            const std::string& why);
   /// Ends the reply. `message`  a JSON-RPC response; borrowed for the wait.

@@ -47,11 +47,6 @@ SampleHandler note_first(std::shared_ptr<Heard> heard, std::function<void()> wak
   };
 }
 
-std::int64_t age_ms(const rr::TimeSpec& time) {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return std::chrono::duration_cast<milliseconds>(now).count() - time.seconds * 1000 - time.nanoseconds / 1'000'000;
-}
-
 }  // namespace
 
 const McpTools::Tool McpTools::tools[] = {
@@ -93,6 +88,39 @@ const McpTools::Tool McpTools::tools[] = {
            "required": ["device", "path"], "additionalProperties": false},
          "annotations": {"readOnlyHint": true, "idempotentHint": false, "openWorldHint": false}})",
      &McpTools::wait_for_event},
+    {"call",
+     R"({"title": "Call a function",
+         "description": "Calls a function, which may move a robot. Only within the limits that \"describe\" tells under \"terms\"; with \"approval\": \"ask\" a person is shown the call and may allow it, or not; with \"lease\" the call returns when the lease has been held for \"hold_seconds\", and then the robot is made safe: it stops. Refusals are final.",
+         "inputSchema": {"type": "object", "properties": {
+           "device": {"type": "string"},
+           "path": {"type": "string", "description": "SERVICE/OBJECT/FUNCTION"},
+           "args": {"type": "object", "description": "{\"parameter\": value}"},
+           "why": {"type": "string", "maxLength": 500, "description": "what it is good for, for the person who is asked"},
+           "dry_run": {"type": "boolean", "description": "true: nothing is done; the answer says what would be sent"}},
+           "required": ["device", "path", "why"], "additionalProperties": false},
+         "annotations": {"readOnlyHint": false, "destructiveHint": true, "idempotentHint": false, "openWorldHint": false}})",
+     &McpTools::call_function},
+    {"set",
+     R"({"title": "Set a property",
+         "description": "Sets a property, which may move a robot. On the same terms as \"call\".",
+         "inputSchema": {"type": "object", "properties": {
+           "device": {"type": "string"},
+           "path": {"type": "string", "description": "SERVICE/OBJECT/PROPERTY"},
+           "value": {"description": "as its schema says"},
+           "why": {"type": "string", "maxLength": 500, "description": "what it is good for, for the person who is asked"},
+           "dry_run": {"type": "boolean", "description": "true: nothing is done; the answer says what would be sent"}},
+           "required": ["device", "path", "value", "why"], "additionalProperties": false},
+         "annotations": {"readOnlyHint": false, "destructiveHint": true, "idempotentHint": true, "openWorldHint": false}})",
+     &McpTools::set_property},
+    {"stop",
+     R"({"title": "Stop",
+         "description": "Makes an object safe at once, and all below it, whoever commands it now: the values that the operator has declared safe are sent. Always allowed.",
+         "inputSchema": {"type": "object", "properties": {
+           "device": {"type": "string"},
+           "path": {"type": "string", "description": "SERVICE or SERVICE/OBJECT"}},
+           "required": ["device", "path"], "additionalProperties": false},
+         "annotations": {"readOnlyHint": false, "destructiveHint": false, "idempotentHint": true, "openWorldHint": false}})",
+     &McpTools::stop},
 };
 
 rr::OrderedJson McpTools::list(const McpConfig&) {
@@ -122,14 +150,27 @@ rr::awaitable<std::optional<rr::OrderedJson>> McpTools::call(const std::string& 
     error = exception.error();
   }
   if (error) {
-    auto said = rr::OrderedJson::object();
-    rr::add_key(said, "name") = bounded_text(error->qualified_name());
-    const auto told = rr::error_to_json(*error, {})["error"]["message"].get<std::string>();
-    rr::add_key(said, has_asked_device_ ? from_device : std::string_view("message")) = bounded_text(told);
     result = rr::OrderedJson::object();
-    rr::add_key(result, "error") = std::move(said);
+    rr::add_key(result, "error") = error_for_agent(*error);
   }
   co_return tool_result(std::move(result), error.has_value());
+}
+
+rr::OrderedJson McpTools::error_for_agent(const rr::Error& error) const {
+  auto out = rr::OrderedJson::object();
+  // A device says which name an error of its own has.
+  rr::add_key(out, "name") = "RobotRaconteur." + std::string(rr::error_code_name(error.code));
+  const auto told = rr::error_to_json(error, {})["error"];
+  auto words = told["message"].get<std::string>();
+  if (has_asked_device_ && !error.name.empty()) words = told["name"].get<std::string>() + ": " + words;
+  rr::add_key(out, has_asked_device_ ? from_device : std::string_view("message")) = bounded_text(words);
+  return out;
+}
+
+std::int64_t age_ms(const rr::TimeSpec& time, std::chrono::system_clock::time_point now) {
+  constexpr std::int64_t farthest = 1'000'000'000'000'000;  // seconds: devices say any
+  const auto passed = std::chrono::duration_cast<milliseconds>(now.time_since_epoch()).count();
+  return passed - std::clamp(time.seconds, -farthest, farthest) * 1000 - time.nanoseconds / 1'000'000;
 }
 
 rr::OrderedJson tool_result(rr::OrderedJson result, bool is_error) {
@@ -165,15 +206,17 @@ Device& McpTools::find_device(const std::string& name, const std::string& servic
   return *device;
 }
 
-rr::awaitable<TargetPtr> McpTools::find(JsonRequestPtr arguments) {
+rr::awaitable<TargetPtr> McpTools::find(JsonRequestPtr arguments, bool is_urgent) {
   auto segments = value_or_throw(split_path(arguments->text("path", "")));
   if (segments.empty())
     refuse(rr::ErrorCode::invalid_argument,
            "\"path\" is empty, expected SERVICE, SERVICE/OBJECT or SERVICE/OBJECT/MEMBER");
   auto device = find_device(arguments->text("device", ""), segments.front()).shared_from_this();
   pass_ = gateway_.http_access().enter_device(device->config().name, gateway_.config().rates);
-  if (!pass_) {
+  if (!pass_ && !is_urgent) {
     gateway_.reject(Rejection::rate);
+    const AccessRequest asked{.device = device->config().name, .service = segments.front()};
+    gateway_.access().record_too_much(who(), &asked, "too many requests to the device");
     refuse(rr::ErrorCode::out_of_system_resource,
            "too many requests to device " + rr::quote(device->config().name) + "; try again in a second");
   }
@@ -199,6 +242,21 @@ AuditEntryPtr McpTools::admit(const Target& target, Verb verb) {
   throw rr::Exception(begun.error());
 }
 
+void McpTools::allow(const Target& target, Verb verb) {
+  const auto allowed = gateway_.access().check(who(), access_request(target, verb));
+  if (allowed) return;
+  has_asked_device_ = false;
+  gateway_.reject(allowed.error());
+  throw rr::Exception(allowed.error());
+}
+
+void McpTools::go_on(const Target& target, Verb verb) {
+  const auto allowed = standing_.check(access_request(target, verb), Recorded::never);
+  if (allowed) return;
+  has_asked_device_ = false;
+  throw rr::Exception(allowed.error());
+}
+
 // --- the tools ---
 
 McpTools::Answer McpTools::devices(JsonRequestPtr arguments) {
@@ -207,7 +265,11 @@ McpTools::Answer McpTools::devices(JsonRequestPtr arguments) {
 
 McpTools::Answer McpTools::describe(JsonRequestPtr arguments) {
   const auto target = co_await find(arguments);
-  admit(*target, Verb::read);
+  auto verb = Verb::read;
+  if (target->member)
+    for (const auto use : uses_of(*target->member))
+      if (gateway_.access().state().rules.check(who(), access_request(*target, use))) verb = use;
+  allow(*target, verb);
   co_return describe_for_agent(gateway_, who(), *target, arguments->text("cursor", ""));
 }
 
@@ -242,7 +304,7 @@ McpTools::Answer McpTools::read_target(JsonRequestPtr arguments, TargetPtr targe
       if (exception.error().code != rr::ErrorCode::operation_timeout) throw;
     }
     if (heard->sample) {
-      rr::add_key(out, "age_ms") = age_ms(heard->sample->time);
+      rr::add_key(out, "age_ms") = age_ms(heard->sample->time, std::chrono::system_clock::now());
       rr::add_key(out, from_device) = to_json(*target, heard->sample->values.at(0), form);
       co_return out;
     }
@@ -263,13 +325,17 @@ McpTools::Answer McpTools::wait_for_event(JsonRequestPtr arguments) {
   auto handler = note_first(heard, reply_.waker());
   const auto listener = value_or_throw(co_await target->client->listen(std::move(place), 0, std::move(handler)));
   if (entry) entry->finish({});
-  const std::function<bool()> is_there = [heard] { return heard->sample || heard->error; };
+  const std::function<bool()> is_there = [&] {
+    go_on(*target, Verb::subscribe);
+    return heard->sample || heard->error;
+  };
   const std::string why = "nothing has happened";
   try {
     co_await reply_.wait(longest, is_there, why);
   } catch (const rr::Exception& exception) {
     if (exception.error().code != rr::ErrorCode::operation_timeout) throw;
   }
+  go_on(*target, Verb::subscribe);
   if (heard->error) throw rr::Exception(*heard->error);
   auto out = rr::OrderedJson::object();
   rr::add_key(out, "member") = name_of(*target);

@@ -96,6 +96,7 @@ void Player::turn() {
   listener_.changed();
   if (!is_playing_) return;
   if (!next) {  // a recording of one message does not take all the time
+    shift_ += static_cast<McapTime>(static_cast<double>(std::chrono::nanoseconds(look_period).count()) * speed_);
     go_to(recording_.begin());
     rebase();
     return wait(look_period);
@@ -137,11 +138,25 @@ void Player::fail(const rr::Error& error) {
 void Player::deliver_next() {
   const auto& message = messages_.messages[message_++];
   position_ = std::max(position_, message.log_time);
+  deliver(message);
+}
+
+/// The first value of a wire after the replay went back may have been sent long before it was recorded, or before the
+/// one that came last: all that follows is shifted so far that it is newer.
+void Player::deliver(const McapMessage& message) {
+  const auto floor = floors_.find(message.channel);
+  const auto stamp = message.publish_time + shift_;
+  if (floor != floors_.end() && stamp <= floor->second) shift_ += floor->second - stamp + 1;
+  auto& newest = newest_[message.channel];
+  newest = std::max(newest, message.publish_time + shift_);
   listener_.play(message, shift_);
 }
 
 void Player::go_to(McapTime time) {
-  if (time < position_) shift_ += position_ - time;
+  if (time < position_) {
+    shift_ += position_ - time;
+    floors_ = newest_;
+  }
   position_ = time;
   const auto& chunks = recording_.chunks();
   const auto found =
@@ -173,7 +188,7 @@ void Player::restore() {
     if (!load(i)) return;
     for (auto at = i == chunk ? end : messages_.messages.size(); at-- > 0;) {
       const auto& message = messages_.messages[at];
-      if (has_state(message.channel) && found.insert(message.channel).second) listener_.play(message, shift_);
+      if (has_state(message.channel) && found.insert(message.channel).second) deliver(message);
     }
   }
 }

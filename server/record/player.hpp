@@ -5,6 +5,7 @@
 #include <boost/asio/steady_timer.hpp>
 #include <chrono>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 
@@ -57,6 +58,7 @@ class Player {
   const McapMessage* next_message();
   bool load(std::size_t chunk);
   void deliver_next();
+  void deliver(const McapMessage& message);
   void turn();
   void wait(Clock::duration time);
   void rebase();
@@ -74,7 +76,9 @@ class Player {
   double speed_ = 1;
   McapTime position_;
   McapTime shift_ = 0;
-  Clock::time_point base_;  ///< when base_position_ was
+  std::map<std::uint16_t, McapTime> newest_;  ///< time stamp of each channel that was handed out, shift_ included
+  std::map<std::uint16_t, McapTime> floors_;  ///< the same when the replay last went back
+  Clock::time_point base_;                    ///< when base_position_ was
   McapTime base_position_ = 0;
   std::size_t chunk_ = 0;    ///< that the next message is of
   std::size_t message_ = 0;  ///< in it

@@ -18,6 +18,8 @@ namespace asio = boost::asio;
 
 namespace {
 
+constexpr std::size_t readings_at_once = 8;  // of properties
+
 bool is_recordable(const rr::MemberDefinition& member) {
   using enum rr::MemberKind;
   const bool is_kind = member.kind == wire || member.kind == pipe || member.kind == event || member.kind == property;
@@ -131,7 +133,7 @@ asio::awaitable<void> Recorder::record(const rr::AsyncObject& root) {
   }
   problems_.erase("connection");
   begin({});
-  co_await read_properties(std::move(properties), connection);
+  read_properties(properties, connection);
 }
 
 asio::awaitable<std::vector<Recorder::Chosen>> Recorder::choose(const rr::AsyncObject& root, RecordedService& service) {
@@ -185,7 +187,7 @@ asio::awaitable<void> Recorder::choose_by(const std::string& pattern, const rr::
   }
 }
 
-/// The first time; later it is looked up there.
+/// Members that the file has already keep their channels; what is reachable only now is added.
 void Recorder::add_to_file(const rr::AsyncObject& root, RecordedService& service, std::vector<Chosen>& chosen) {
   const auto& session = root.connection()->session();
   for (const auto& definition : session.types().definitions()) service.definitions.push_back(definition->text);
@@ -194,6 +196,8 @@ void Recorder::add_to_file(const rr::AsyncObject& root, RecordedService& service
     if (!is_closed_) listener_.failed(done.error());
     throw rr::ClientException(done.error());
   };
+  if (service_ && service.definitions != service_->definitions)
+    give_up("the service has come back with other definitions: it is recorded no more");
   if (!service_) {
     service.label = writer_.free_label(session.service());
     service.url = url_;
@@ -203,21 +207,20 @@ void Recorder::add_to_file(const rr::AsyncObject& root, RecordedService& service
     service.attributes = attributes_json(root);
     take(writer_.add_service(service));
     service_ = service;
-    for (const auto& each : chosen) {
-      const auto added = writer_.add_member(service, each.object.path(), each.place, *each.member, session.types());
-      take(added);
-      channels_[place_and_member(each.place, each.member->name)] = *added;
-    }
   }
-  if (service.definitions != service_->definitions)
-    give_up("the service has come back with other definitions: it is recorded no more");
-  const auto set_channel = [this](Chosen& each) {
-    const auto found = channels_.find(place_and_member(each.place, each.member->name));
-    if (found == channels_.end()) return true;
-    each.channel = found->second;
-    return false;
-  };
-  std::erase_if(chosen, set_channel);
+  const auto known_objects = service_->objects.size();
+  service_->objects.merge(service.objects);
+  if (service_->objects.size() != known_objects) take(writer_.add_service(*service_));
+  for (auto& each : chosen) {
+    const auto where = place_and_member(each.place, each.member->name);
+    auto channel = channels_.find(where);
+    if (channel == channels_.end()) {
+      const auto added = writer_.add_member(*service_, each.object.path(), each.place, *each.member, session.types());
+      take(added);
+      channel = channels_.emplace(where, *added).first;
+    }
+    each.channel = channel->second;
+  }
 }
 
 asio::awaitable<void> Recorder::follow(const Chosen& chosen) {
@@ -258,24 +261,35 @@ asio::awaitable<void> Recorder::follow(const Chosen& chosen) {
   }
 }
 
-asio::awaitable<void> Recorder::read_properties(std::vector<Chosen> properties, std::uint64_t connection) {
+void Recorder::read_properties(const std::vector<Chosen>& properties, std::uint64_t connection) {
+  const auto due = std::make_shared<std::deque<Due>>();
+  for (const auto& each : properties) due->push_back({std::chrono::steady_clock::now(), each});
+  for (std::size_t i = 0; i < std::min(properties.size(), readings_at_once); ++i)
+    asio::co_spawn(io_, read_what_is_due(due, connection), asio::detached);
+}
+
+/// One of those who share the properties: a slow one holds up its reader alone.
+asio::awaitable<void> Recorder::read_what_is_due(std::shared_ptr<std::deque<Due>> due, std::uint64_t connection) {
+  const auto self = shared_from_this();
   asio::steady_timer timer(io_);
-  auto next = std::chrono::steady_clock::now();
-  while (!properties.empty() && connection == connection_) {
-    for (const auto& each : properties) {
-      std::string refusal;
-      try {
-        const auto value = co_await each.object.get(each.member->name);
-        if (connection == connection_) write_value(each, each.object.connection()->session().types(), value, {});
-      } catch (const rr::Exception& failure) {
-        refusal = failure.what();
-      }
-      if (connection != connection_) co_return;
-      if (!refusal.empty()) tell_problem(place_and_member(each.place, each.member->name), refusal);
-    }
-    next = std::max(next + options_.interval, std::chrono::steady_clock::now());
-    timer.expires_at(next);
+  while (connection == connection_) {
+    auto next = std::move(due->front());  // not empty: each reader holds one, and there are no more readers than these
+    due->pop_front();
+    timer.expires_at(next.time);
     co_await timer.async_wait(asio::as_tuple(asio::use_awaitable));
+    if (connection != connection_) co_return;
+    const auto& each = next.property;
+    std::string refusal;
+    try {
+      const auto value = co_await each.object.get(each.member->name);
+      if (connection == connection_) write_value(each, each.object.connection()->session().types(), value, {});
+    } catch (const rr::Exception& failure) {
+      refusal = failure.what();
+    }
+    if (connection != connection_) co_return;
+    if (!refusal.empty()) tell_problem(place_and_member(each.place, each.member->name), refusal);
+    next.time = std::max(next.time + options_.interval, std::chrono::steady_clock::now());
+    due->push_back(std::move(next));
   }
 }
 

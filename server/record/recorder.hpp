@@ -4,6 +4,7 @@
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/io_context.hpp>
 #include <chrono>
+#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -50,6 +51,10 @@ class Recorder : public std::enable_shared_from_this<Recorder> {
     const rr::MemberDefinition* member = nullptr;
     std::uint16_t channel = 0;
   };
+  struct Due {
+    std::chrono::steady_clock::time_point time;
+    Chosen property;
+  };
 
   boost::asio::awaitable<void> handle_connected(rr::AsyncObject root);
   boost::asio::awaitable<void> record(const rr::AsyncObject& root);
@@ -58,7 +63,8 @@ class Recorder : public std::enable_shared_from_this<Recorder> {
                                          RecordedService& service, std::vector<Chosen>& chosen);
   void add_to_file(const rr::AsyncObject& root, RecordedService& service, std::vector<Chosen>& chosen);
   boost::asio::awaitable<void> follow(const Chosen& chosen);
-  boost::asio::awaitable<void> read_properties(std::vector<Chosen> properties, std::uint64_t connection);
+  void read_properties(const std::vector<Chosen>& properties, std::uint64_t connection);
+  boost::asio::awaitable<void> read_what_is_due(std::shared_ptr<std::deque<Due>> due, std::uint64_t connection);
   void write(std::uint16_t channel, const rr::OrderedJson& message, std::optional<rr::TimeSpec> sent);
   void write_value(const Chosen& chosen, const rr::TypeRegistry& types, const rr::Value& value,
                    std::optional<rr::TimeSpec> sent);

@@ -10,7 +10,7 @@ namespace rrgate {
 
 namespace {
 
-rr::Error malformed(std::string what) {
+rr::Error bad_recording(std::string what) {
   return rr::make_error(rr::ErrorCode::data_serialization_error, std::move(what));
 }
 
@@ -64,13 +64,13 @@ rr::Result<Recording> Recording::open(const std::string& path) {
     if (auto taken = out.take(**record); !taken) return out.reader_.error_in(**record, taken.error().message);
   }
   if (out.services_.empty())
-    return malformed(path + ": holds no service: has no metadata " + rr::quote(recorded_service_name) +
-                     "; was it recorded by rrgate?");
+    return bad_recording(path + ": holds no service: has no metadata " + rr::quote(recorded_service_name) +
+                         "; was it recorded by rrgate?");
   for (const auto& [channel, member] : out.members_) {
     const auto is_its_service = [&, label = &member.service](const auto& service) { return service.label == *label; };
     if (std::none_of(out.services_.begin(), out.services_.end(), is_its_service))
-      return malformed(path + ": channel " + rr::quote(member.topic) + " is of service " + rr::quote(member.service) +
-                       ", which the file does not hold");
+      return bad_recording(path + ": channel " + rr::quote(member.topic) + " is of service " +
+                           rr::quote(member.service) + ", which the file does not hold");
   }
   return out;
 }
@@ -84,7 +84,7 @@ rr::Result<> Recording::take(const McapRecord& record) {
     case McapOpcode::chunk:
       return take_chunk(record);
     case McapOpcode::message:
-      return malformed("stands outside of a chunk; \"mcap convert\" puts it into one");
+      return bad_recording("stands outside of a chunk; \"mcap convert\" puts it into one");
     default:
       return {};
   }
@@ -104,7 +104,7 @@ rr::Result<> Recording::take_channel(const McapRecord& record) {
     member.kind = *kind;
   if (channel->encoding != "json") texts.fail("messages are " + rr::quote(channel->encoding) + ", expected \"json\"");
   if (const auto type = channel->metadata.find("type"); type != channel->metadata.end()) member.type = type->second;
-  if (!texts.problem().empty()) return malformed(rr::quote(channel->topic) + " " + texts.problem());
+  if (!texts.problem().empty()) return bad_recording(rr::quote(channel->topic) + " " + texts.problem());
   members_.emplace(channel->id, std::move(member));
   return {};
 }
@@ -124,8 +124,13 @@ rr::Result<> Recording::take_service(const McapRecord& record) {
   service.attributes = texts.json<rr::OrderedJson>("attributes");
   service.definitions = texts.json<std::vector<std::string>>("definitions");
   service.objects = texts.json<std::map<std::string, std::string>>("objects");
-  if (!texts.problem().empty()) return malformed(texts.problem());
-  services_.push_back(std::move(service));
+  if (!texts.problem().empty()) return bad_recording(texts.problem());
+  const auto is_same = [&](const RecordedService& other) { return other.label == service.label; };
+  const auto known = std::find_if(services_.begin(), services_.end(), is_same);
+  if (known != services_.end())  // told again: objects that were found later
+    *known = std::move(service);
+  else
+    services_.push_back(std::move(service));
   return {};
 }
 
@@ -145,8 +150,8 @@ rr::Result<> Recording::take_chunk(const McapRecord& record) {
     if (!message) return message.error();
     const auto member = members_.find(message->channel);
     if (member == members_.end())
-      return malformed("message at byte " + std::to_string((*inner)->offset) + " of it: is of channel " +
-                       std::to_string(message->channel) + ", which was not told before");
+      return bad_recording("message at byte " + std::to_string((*inner)->offset) + " of it: is of channel " +
+                           std::to_string(message->channel) + ", which was not told before");
     chunk.first = chunk.message_count == 0 ? message->log_time : std::min(chunk.first, message->log_time);
     chunk.last = std::max(chunk.last, message->log_time);
     ++chunk.message_count;
@@ -193,7 +198,7 @@ rr::Result<rr::Json> Recording::read_document(const McapMessage& message) const 
   else if (member.kind != rr::MemberKind::event && !document->contains("value"))
     problem = "has no \"value\"";
   if (problem.empty()) return document;
-  return malformed(path() + ": " + member.topic + ", message " + std::to_string(message.sequence) + ": " + problem);
+  return bad_recording(path() + ": " + member.topic + ", message " + std::to_string(message.sequence) + ": " + problem);
 }
 
 std::string mcap_time_text(McapTime time) {

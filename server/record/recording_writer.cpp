@@ -90,8 +90,13 @@ rr::Result<> RecordingWriter::add_service(const RecordedService& service) {
                   {"attributes", rr::write_json(service.attributes)},
                   {"definitions", rr::write_json(service.definitions)},
                   {"objects", rr::write_json(service.objects)}};
-  services_.push_back(std::move(texts));
-  return writer_.add_metadata(recorded_service_name, services_.back());
+  const auto is_same = [&](const McapTexts& other) { return other.at("label") == service.label; };
+  const auto known = std::find_if(services_.begin(), services_.end(), is_same);
+  if (known != services_.end())
+    *known = texts;
+  else
+    services_.push_back(texts);
+  return writer_.add_metadata(recorded_service_name, texts);
 }
 
 rr::Result<std::uint16_t> RecordingWriter::add_member(const RecordedService& service, const std::string& object_path,
@@ -139,12 +144,21 @@ rr::Result<> RecordingWriter::write(std::uint16_t channel, const rr::OrderedJson
   return written;
 }
 
+/// Files of an earlier recording stay, unless they were to be replaced.
+std::string RecordingWriter::next_path() {
+  for (;;) {
+    auto path = numbered_path(first_path_, ++file_number_);
+    std::error_code error;
+    if (options_.replaces || !std::filesystem::exists(path, error)) return path;
+  }
+}
+
 /// Each file stands for itself: services and channels are told again, under the same numbers.
 rr::Result<> RecordingWriter::begin_next_file() {
   if (auto closed = writer_.close(); !closed) return closed;
   finished_messages_ += writer_.message_count();
   finished_bytes_ += writer_.size();
-  paths_.push_back(numbered_path(first_path_, ++file_number_));
+  paths_.push_back(next_path());
   auto next = McapWriter::create(paths_.back(), options_.library);
   if (!next) return next.error();
   writer_ = std::move(*next);

@@ -35,16 +35,19 @@ struct RecordedService {
 struct RecordingOptions {
   std::uint64_t max_bytes = 0;     ///< of one file, about; then the next one begins. 0: no limit
   std::uint32_t kept_files = 0;    ///< the oldest go when there are more. 0: all stay
+  bool replaces = false;           ///< further files that are there already; else their numbers are left out
   std::string library = "rrgate";  ///< what the file says it was written by
 };
 
 /// Errors of all   those of McapWriter.
 class RecordingWriter {
  public:
+  /// A file of the name `path` is replaced.
   static rr::Result<RecordingWriter> create(const std::string& path, RecordingOptions options = {});
 
   /// A label that no other service of the recording has.
   std::string free_label(const std::string& service) const;
+  /// Again with a label that is there: its objects have become more.
   rr::Result<> add_service(const RecordedService& service);
   /// `object_path`  one of the service's objects. `place`  how the topic names it: "axes/0", empty for the root.
   /// Returns  the channel, for write().
@@ -76,6 +79,7 @@ class RecordingWriter {
       : first_path_(std::move(path)), options_(std::move(options)), writer_(std::move(writer)), paths_{first_path_} {}
   rr::Result<> put_channel(const Channel& channel);
   rr::Result<> begin_next_file();
+  std::string next_path();
 
   std::string first_path_;
   RecordingOptions options_;

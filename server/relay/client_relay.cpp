@@ -6,10 +6,14 @@
 
 namespace rrgate {
 
-rr::Result<> may_relay(GatewayState& gateway, const Connection& connection, const Device& device) {
-  auto allowed = gateway.access().check_whole_device(connection.identity, device.config().name);
-  if (!allowed) gateway.reject(allowed.error());
-  return allowed;
+rr::Result<> may_relay(GatewayState& gateway, const Connection& connection, const Device* device) {
+  auto& access = gateway.access();
+  const auto& who = connection.identity;
+  auto allowed = access.check_whole_device(who, device ? device->config().name : std::string());
+  if (allowed) return allowed;
+  gateway.reject(allowed.error());
+  const auto& rules = access.state().rules;
+  return rules.sees_any(who) ? allowed : rules.check_whole_device(who, {});
 }
 
 rr::awaitable<rr::Result<std::unique_ptr<Boarding>>> board(GatewayState& gateway, const Connection& connection,
@@ -47,8 +51,10 @@ rr::awaitable<void> relay_client(GatewayState& gateway, Connection& connection, 
   connection.has_session = true;
   connection.stop = [&relay](rr::EndReason reason) { relay.stop(std::move(reason)); };
   const auto standing = std::make_shared<Standing>(gateway.access(), connection.identity);
-  connection.is_good = [standing] { return standing->is_good(); };
   const auto& name = device.config().name;
+  connection.is_good = [standing, &access = gateway.access(), name] {
+    return standing->is_good() && access.state().rules.check_whole_device(standing->identity(), name);
+  };
   log(LogLevel::info, "client connected", {{"device", name}, {"peer", connection.client}});
 
   const auto reason = co_await relay.run();

@@ -17,8 +17,9 @@ struct Boarding {
 };
 
 /// Whether a client's bytes may pass to a device unread: only where he could do everything to it.
-/// Errors   permission_denied; the text is for the client.
-rr::Result<> may_relay(GatewayState& gateway, const Connection& connection, const Device& device);
+/// `device`  null: there is none, and the client, who may see nothing, is refused all the same.
+/// Errors   permission_denied; the text is for the client. Who may see nothing gets the same for every device.
+rr::Result<> may_relay(GatewayState& gateway, const Connection& connection, const Device* device);
 
 /// `way`    see Device::connect().
 /// Errors   connection_error: the device is full or can't be reached; the text is for the client.

@@ -95,6 +95,14 @@ Standing& SessionRights::standing_of(const rr::AuthenticatedUser* user) {
   return *user_;
 }
 
+bool SessionRights::have_changed(const rr::AuthenticatedUser* user) {
+  auto subject = user ? subject_of(*user) : Subject();
+  if (reviewed_by_ == access_.state_ptr() && reviewed_as_ == subject) return false;
+  reviewed_by_ = access_.state_ptr();
+  reviewed_as_ = std::move(subject);
+  return true;
+}
+
 rr::Result<> SessionRights::admit_to_service(Standing& asker, const rr::MemberAccess& wanted,
                                              std::string_view service) {
   const auto of_service = node_.device_of(service);

@@ -28,6 +28,8 @@ class SessionRights {
   }
   /// Whether all that was shown is still good; see Standing.
   bool is_good() { return shown_->is_good() && (!user_ || user_->is_good()); }
+  /// Whether anything that rights hang on has changed since the last time that this was asked.
+  bool have_changed(const rr::AuthenticatedUser* user);
 
  private:
   /// Whose rights count. `user`  null: has not logged in.
@@ -41,6 +43,8 @@ class SessionRights {
   StandingPtr shown_;
   StandingPtr user_;  ///< as whom it has logged in; null: it has not
   Subject user_is_;
+  AccessStatePtr reviewed_by_;  ///< and as whom, when have_changed() was asked last
+  Subject reviewed_as_;
 };
 
 }  // namespace rrgate

@@ -35,6 +35,22 @@ void SharedClient::close_service() {
   settle();
 }
 
+/// A right to disconnect is the same as that to connect, and asking for it is not recorded.
+void SharedClient::review() {
+  for (const auto& [path, member] : std::set(wires_)) {
+    if (!service_) return;  // what was sent has ended the session, and the members may be gone
+    if (session_.admits(rr::EntryType::wire_disconnect_req, path, member)) continue;
+    home_->leave_wire(*this, path, *member);
+    close_wire(path, *member);
+  }
+  for (const auto& [id, pipe] : std::unordered_map(pipes_)) {
+    if (!service_) return;
+    if (session_.admits(rr::EntryType::pipe_disconnect_req, pipe.path, pipe.member)) continue;
+    home_->leave_pipe(*this, id);
+    close_pipe(id);
+  }
+}
+
 bool SharedClient::handle_event(rr::Now) {
   const auto event = session_.poll_event();
   if (!event) return false;

@@ -52,6 +52,8 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
   /// Does something about a lease, as if the client had asked for it here. `done`  is called once, maybe at once.
   void ask_for_lease(rr::LockCommand command, const std::string& path, std::chrono::milliseconds deadman,
                      std::function<void(const rr::Result<>&)> done);
+  /// Closes the wires and pipes that the client may not have any more: rights have changed, or who has logged in.
+  void review();
   /// Tells the client that its service ends, then closes.
   void close_service();
   /// Why the gateway has closed it; empty where it has not.

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "core/support/random.hpp"
+#include "server/limits/client_network.hpp"
 
 namespace rrgate {
 
@@ -22,5 +23,16 @@ GatewayState::GatewayState(boost::asio::io_context& io, Config config)
       shared_(config_.node.id.is_any() ? rr::random_node_id() : config_.node.id, config_, logins_) {}
 
 GatewayState::~GatewayState() = default;
+
+void GatewayState::log_refusal(LogLevel level, std::string_view event, std::string_view client,
+                               std::initializer_list<LogField> fields) {
+  if (refusals_.note(network_name_of(client), std::chrono::steady_clock::now())) log(level, event, fields);
+}
+
+void GatewayState::tend_log() {
+  for (const auto& [network, count] : refusals_.take(std::chrono::steady_clock::now()))
+    log(LogLevel::info, "more refusals within a minute",
+        {{"network", network.empty() ? "others" : network}, {"count", count}});
+}
 
 }  // namespace rrgate

@@ -7,12 +7,14 @@
 
 #include "node/tls/tls_context.hpp"
 #include "server/access/access.hpp"
+#include "server/access/approvals.hpp"
 #include "server/access/logins.hpp"
 #include "server/config/config.hpp"
 #include "server/config/tls_files.hpp"
 #include "server/http/router.hpp"
 #include "server/limits/bounded_table.hpp"
 #include "server/limits/memory_budget.hpp"
+#include "server/log/log.hpp"
 #include "server/log/metrics.hpp"
 #include "server/rr/shared_devices.hpp"
 #include "server/state/admission.hpp"
@@ -43,6 +45,12 @@ class GatewayState {
   void reject(const rr::Error& why) {
     reject(why.code == rr::ErrorCode::out_of_system_resource ? Rejection::audit : Rejection::forbidden);
   }
+  /// A line about a refusal that anybody can cause as often as he likes: of a network few a minute are written, and the
+  /// others are counted. `client`  as logs name it.
+  void log_refusal(LogLevel level, std::string_view event, std::string_view client,
+                   std::initializer_list<LogField> fields);
+  /// Writes how many such lines were left out, where a minute is over. To be called now and then.
+  void tend_log();
   Admission& admission() { return admission_; }
   /// Documents about devices that were asked for lately, by what they are made of.
   using Documents = BoundedTable<std::string, Response>;
@@ -55,6 +63,8 @@ class GatewayState {
   MemoryBudget& memory() { return memory_; }
   /// Who may do what.
   Access& access() { return access_; }
+  /// What agents ask a person for.
+  Approvals& approvals() { return approvals_; }
   /// Who is judged for what he logs in as.
   Logins& logins() { return logins_; }
   /// How clients of HTTP show who they are, and how much they may ask for.
@@ -79,6 +89,7 @@ class GatewayState {
   Config config_;
   MemoryBudget memory_;
   Access access_;
+  Approvals approvals_;
   Logins logins_;
   IssuerKeys issuer_keys_;
   HttpAccess http_access_;
@@ -93,6 +104,7 @@ class GatewayState {
   Documents documents_{32};
   Metrics metrics_;
   boost::intrusive::list<Connection, boost::intrusive::constant_time_size<false>> connections_;
+  RefusalDigest refusals_{20};
   bool is_stopping_ = false;
   Workers workers_;  ///< goes first
 };

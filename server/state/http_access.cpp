@@ -81,7 +81,8 @@ rr::awaitable<rr::Result<Identity>> HttpAccess::identify(const Request& request,
       found->face = face;
       if (auto renewed = access_.renew(*found)) co_return std::move(*renewed);
     }
-  if (connection.identity.proof == Proof::certificate) co_return proven(connection.identity);
+  if (connection.identity.proof == Proof::certificate && std::chrono::system_clock::now() < connection.identity.ends)
+    co_return proven(connection.identity);
   co_return access_.anonymous(client, face);
 }
 

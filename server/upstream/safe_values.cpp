@@ -101,6 +101,11 @@ rr::Result<> SafeValues::check(std::string_view path) const {
   return {};
 }
 
+bool SafeValues::has(std::string_view path) const {
+  return std::any_of(items_.begin(), items_.end(),
+                     [&](const Item& item) { return rr::is_within(item.action.path, path); });
+}
+
 /// What was owed when the session was lost: first what could be checked, then, as objects are found, the rest.
 void SafeValues::pay(const std::shared_ptr<Upstream>& upstream) {
   const auto is_due = [this](const std::string& path) { return check(path).has_value(); };

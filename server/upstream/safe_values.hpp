@@ -34,6 +34,8 @@ class SafeValues : public std::enable_shared_from_this<SafeValues> {
   void handle_opened(const std::shared_ptr<Upstream>& upstream);
   /// Whether the device can be made safe at and below a path. Errors   invalid_configuration: what does not fit.
   rr::Result<> check(std::string_view path) const;
+  /// Whether there are any at or below a path.
+  bool has(std::string_view path) const;
   /// Sends all at and below a path, past whatever waits. False: there is no session, or it was lost at this moment;
   /// they are sent as soon as there is one.
   bool send(const std::string& path, const std::shared_ptr<Upstream>& by);

@@ -161,6 +161,18 @@ std::shared_ptr<Upstream> ServiceLocks::open_upstream(const std::shared_ptr<Upst
   return nullptr;
 }
 
+rr::Result<> ServiceLocks::make_safe(std::string_view path) {
+  const auto key = canonical_lock_path(path);
+  if (!device_.config().leases.is_offered || !safe_->has(key))
+    return rr::make_error(rr::ErrorCode::not_implemented_error,
+                          "the gateway knows nothing that makes " + rr::quote(key) +
+                              " safe: the configuration of device " + rr::quote(device_.config().name) +
+                              " declares no \"leases\" with \"safe\" there");
+  if (!safe_->send(key, open_upstream(nullptr)))
+    return rr::make_error(rr::ErrorCode::connection_error, "the device is away; it is made safe when it is back");
+  return safe_->check(key);
+}
+
 void ServiceLocks::end_leases(const std::string& why) {
   leases_.handle_lost(why);
   settle();

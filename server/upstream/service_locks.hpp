@@ -56,6 +56,10 @@ class ServiceLocks : public std::enable_shared_from_this<ServiceLocks> {
   bool is_urgent(std::string_view path, const rr::MemberDefinition& member) const;
   std::vector<HeldLock> held() const { return table_.held(); }
   std::vector<HeldLease> leases() const { return leases_.held(); }
+  /// Sends the safe values at and below a path now, whoever has locks and leases there.
+  /// Errors   not_implemented_error: none are declared; those of SafeValues::check(), where not all could be sent;
+  /// connection_error: they are sent as soon as the device is back.
+  rr::Result<> make_safe(std::string_view path);
   /// Every lease ends, because the gateway or the device goes.
   void end_leases(const std::string& why);
   void handle_opened(const std::shared_ptr<Upstream>& upstream);

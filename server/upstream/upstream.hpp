@@ -157,6 +157,9 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   /// The gateway stops, or shares the device no more: the device is made safe where a lease is held.
   void end_leases(const std::string& why) { locks_->end_leases(why); }
 
+  /// See ServiceLocks::make_safe().
+  rr::Result<> stop_object(std::string_view path) { return locks_->make_safe(path); }
+
   // For ServiceLocks.
   std::uint64_t number() const { return number_; }
   bool is_for_one_client() const { return use_ == UpstreamUse::one_client; }

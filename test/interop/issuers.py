@@ -116,11 +116,11 @@ class People:
         self._name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "People of the lab")])
         self.ca.write_bytes(self._make(self._name, self._key, True).public_bytes(serialization.Encoding.PEM))
 
-    def _make(self, name, key, is_ca):
+    def _make(self, name, key, is_ca, seconds=86400):
         now = datetime.datetime.now(datetime.timezone.utc)
         return x509.CertificateBuilder().subject_name(name).issuer_name(self._name).public_key(key.public_key()) \
             .serial_number(x509.random_serial_number()).not_valid_before(now - datetime.timedelta(hours=1)) \
-            .not_valid_after(now + datetime.timedelta(days=1)) \
+            .not_valid_after(now + datetime.timedelta(seconds=seconds)) \
             .add_extension(x509.BasicConstraints(is_ca, None), True).sign(self._key, hashes.SHA256())
 
     def revoke(self, *certificates):
@@ -135,10 +135,10 @@ class People:
         new.write_bytes(made.sign(self._key, hashes.SHA256()).public_bytes(serialization.Encoding.PEM))
         return new.rename(self.folder / "crl.pem")
 
-    def certificate(self, name):
+    def certificate(self, name, seconds=86400):
         """The files of certificate and key."""
         key = ec.generate_private_key(ec.SECP256R1())
-        made = self._make(x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)]), key, False)
+        made = self._make(x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)]), key, False, seconds)
         files = self.folder / f"{name}.pem", self.folder / f"{name}.key"
         files[0].write_bytes(made.public_bytes(serialization.Encoding.PEM))
         files[1].write_bytes(key.private_bytes(serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8,

@@ -4,6 +4,7 @@ import contextlib
 import http.client
 import itertools
 import json
+import re
 import shutil
 import socket
 import ssl
@@ -467,10 +468,14 @@ def test_keys_that_the_issuer_publishes(device, tmp_path):
 
         gateway.wait_for("keys of the issuer fetched")
         assert [status(first, algorithm) for algorithm in issuers.ALGORITHMS] == [200, 200, 200]
+        link = open_websocket(gateway.port, "/devices/interop",
+                              f"Authorization: {bearer(first.token('root', ['admin'], 'ES256'))['Authorization']}\r\n")
+        assert is_alive(link)
         assert server.asked["/keys"] == 1
         second, third = (issuers.Issuer(server.url, "rrgate", generation) for generation in ("-2", "-3"))
         server.key_set = second.key_set()
         assert [status(second), status(second, "EdDSA"), status(first)] == [200, 200, 401]
+        assert ends(link) < 2  # its key was taken back
         assert server.asked["/keys"] == 2
         server.key_set = third.key_set()
         assert [status(third) for _ in range(20)] == [401] * 20  # the issuer has just been asked
@@ -529,6 +534,30 @@ def test_client_certificates(device, tmp_path):
         context.load_cert_chain(*mallory.certificate("alice"))
         with pytest.raises((ssl.SSLError, ConnectionError)):
             ask(gateway.port, "GET", BASE + "/p_double", context=context)
+
+
+def test_a_certificate_that_expires_ends_what_goes_on_by_it(device, tmp_path):
+    tls = make_web_certificates(tmp_path / "web")
+    people = issuers.People(tmp_path)
+    access = {"client_ca": [str(people.ca)]}
+    with running(tmp_path, device, access, tls=tls) as gateway:
+        def connection(certificate):
+            context = ssl.create_default_context(cafile=tmp_path / "web" / "web-ca.pem")
+            context.load_cert_chain(*certificate)
+            return http.client.HTTPSConnection("127.0.0.1", gateway.port, timeout=20, context=context)
+
+        lasting = Stream(gateway.port, BASE + "/cleared", connection=connection(people.certificate("vera")))
+        kept = connection(brief := people.certificate("alice", seconds=4))
+        kept.request("GET", BASE + "/p_double")
+        assert kept.getresponse().read() and kept.sock
+        stream = Stream(gateway.port, BASE + "/cleared", connection=connection(brief))
+        assert ends(stream.connection.sock or stream.response.fp.raw._sock) < 6
+        kept.request("GET", BASE + "/p_double")
+        assert kept.getresponse().status in (401, 403)
+        assert len(gateway.events("client ended: what it has shown was revoked or has expired")) == 1  # the other goes on
+        stream.close()
+        lasting.close()
+        kept.close()
 
 
 def test_certificates_that_are_revoked(device, tmp_path):
@@ -699,6 +728,53 @@ def test_roles_that_change_hold_in_open_sessions(device, tmp_path):
             (tmp_path / "users.new").rename(tmp_path / "users")
             gateway.wait_for("users and rights read anew")
             assert not may_write()
+
+
+def change_roles(folder, name, role):
+    """As `rrgate passwd` would, without a word of the password."""
+    lines = [re.sub(r"\S+$", role, line) if line.startswith(name + " ") else line
+             for line in (folder / "users").read_text().splitlines()]
+    (folder / "users.new").write_text("\n".join(lines) + "\n")
+    (folder / "users.new").rename(folder / "users")
+
+
+def test_who_may_not_everything_any_more_loses_what_passes_unread(device, tmp_path):
+    make_users(tmp_path)
+    rrgate("passwd", tmp_path / "users", "stays", "--roles", "admin", given="stays\n")
+    with running(tmp_path, device, {"users_file": "users", "rules": RULES}) as gateway:
+        links = {name: open_websocket(gateway.port, "/devices/interop", f"Authorization: {basic(name, password)['Authorization']}\r\n")
+                 for name, password in (("root", None), ("stays", "stays"))}
+        assert all(is_alive(link) for link in links.values())
+        change_roles(tmp_path, "root", "operator")
+        gateway.wait_for("users and rights read anew")
+        assert ends(links["root"]) < 1.5
+        assert is_alive(links["stays"])
+        for link in links.values():
+            link.close()
+
+
+def test_strangers_find_no_node_by_its_name(guarded):
+    """A node that is there refuses them in the same words as one that is not."""
+    named = {"Sec-WebSocket-Protocol": "robotraconteur.robotraconteur.com"}
+    page = {"Origin": f"http://127.0.0.1:{guarded.port}"}
+    there = ask(guarded.port, "GET", "/api/v1/devices/interop", headers=basic("root")).json
+    asked = {"nodename": (there["node_name"], "nobody.there"), "nodeid": (there["node_id"], "12345678-1234-4321-8765-123456789abc")}
+    for part, values in asked.items():
+        for headers in ({}, named, page, {**page, **named}):
+            statuses = {upgrade_status(guarded.port, f"/?{part}={value}&service=interop", headers) for value in values}
+            assert len(statuses) == 1 and statuses <= {101, 401}, (part, headers, statuses)
+        for scheme in ("rr+tcp", "rr+ws"):
+            answers = set()
+            for value in values:
+                url = f"{scheme}://127.0.0.1:{guarded.port}/?{part}={value}&service=interop"
+                done = subprocess.run([sys.executable, "-c", NATIVE_CLIENT, url], capture_output=True, text=True, timeout=60)
+                answers.add(done.stdout)
+            assert len(answers) == 1 and answers.pop().startswith("PermissionDeniedException"), (part, scheme, done)
+    for headers in ({}, named, page):
+        statuses = {upgrade_status(guarded.port, f"/devices/{name}", headers) for name in ("interop", "nothing")}
+        assert len(statuses) == 1, (headers, statuses)
+    # Who may see devices is told.
+    assert upgrade_status(guarded.port, "/?nodename=nobody.there&service=interop", basic("vera")) == 404
 
 
 def test_strangers_are_not_told_what_there_is(guarded):
@@ -895,6 +971,33 @@ def test_who_loses_a_right_loses_within_a_second_what_is_open_by_it(device, tmp_
         assert ask(gateway.port, "POST", BASE + "/fire", {"count": 1}, basic("root")).status == 200
         other.next(subscription=kept, number=2)
         assert isinstance(page.ask("get", "p_double"), float)
+
+
+def test_who_loses_a_right_loses_the_wires_and_pipes_of_a_native_client(device, tmp_path, node):
+    import RobotRaconteur as RR
+    make_users(tmp_path)
+    access = {"users_file": "users", "rules": RULES}
+    devices = [{"name": "interop", "url": device, "mode": "shared"}]
+    with running(tmp_path, device, access, devices=devices) as gateway:
+        gateway.wait_for("session open", service="interop")
+        url = f"rr+tcp://127.0.0.1:{gateway.port}/?nodename=interop&service=interop"
+        closed = {"vera": set(), "root": set()}
+        roots, kept = {}, []
+        for user, seen in closed.items():
+            root = roots[user] = node.ConnectService(url, user, {"password": RR.VarValue(PASSWORDS[user], "string")})
+            wire, pipe = root.state.Connect(), root.poses.Connect(-1)
+            wire.WireConnectionClosedCallback = lambda _, seen=seen: seen.add("wire")
+            pipe.PipeEndpointClosedCallback = lambda _, seen=seen: seen.add("pipe")
+            kept += [wire, pipe]
+        gateway.write({**gateway.config, "access": {**access, "rules": [{"roles": ["viewer"], "may": ["read"]}, *RULES[1:]]}})
+        gateway.wait_for("configuration read anew")
+        gateway.process.wait_until(lambda: closed["vera"] == {"wire", "pipe"})
+        with pytest.raises(RR.PermissionDeniedException):
+            roots["vera"].state.Connect()
+        assert isinstance(roots["vera"].p_double, float)
+        assert closed["root"] == set()
+        for root in roots.values():
+            node.DisconnectService(root)
 
 
 def test_who_loses_his_rights_gets_the_answer_to_what_is_at_work(own_service, tmp_path):

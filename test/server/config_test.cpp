@@ -131,6 +131,12 @@ TEST_CASE("who may do what") {
     finds(with(R"("access": {)" + part + "}"), "gateway.json: /access" + path + ": ", contains);
   };
   access_finds(R"("rules": [{"roles": ["a"], "may": ["reed"]}])", "/rules/0/may/0", "expected one of");
+  const std::string agent = R"("rules": [{"roles": ["a"], "may": ["call"], "agent": )";
+  access_finds(agent + R"({"limits": {"v": 3}}}])", "/rules/0/agent/limits/v", "[LEAST, MOST]");
+  access_finds(agent + R"({"limits": {"v": [1, 0]}}}])", "/rules/0/agent/limits/v", "[LEAST, MOST]");
+  access_finds(agent + R"({"limits": {"v": ["1", 2]}}}])", "/rules/0/agent/limits/v", "[LEAST, MOST]");
+  access_finds(agent + R"({"approval": "never"}}])", "/rules/0/agent/approval", "expected one of");
+  access_finds(R"("rules": [{"roles": ["a"], "may": ["lock"], "agent": {}}])", "/rules/0/may", "agent");
   access_finds(R"("rules": [{"may": ["read"]}])", "/rules/0/roles", "missing");
   access_finds(R"("rules": [{"roles": ["a b"], "may": ["read"]}])", "/rules/0/roles/0", "role");
   access_finds(R"("rules": [{"roles": ["a"], "devices": ["d"], "may": ["admin"]}])", "/rules/0/may", "as a whole");
@@ -166,6 +172,16 @@ TEST_CASE("what may not be meant is no mistake, but is told") {
   CHECK(cautions(proxies) == "/access/rules ");
   CHECK(cautions(proxies + R"(, "access": {"rules": [{"roles": ["a"], "may": ["read"]}]})").empty());
   const std::string tls = R"(, "access": {"users_file": "u"}, "tls": {"certificates": [{"cert": "c", "key": "k"}])";
+  const auto agents = [&](const std::string& rule) {
+    return cautions(R"(, "access": {"tokens_file": "t", "rules": [)" + rule +
+                    R"({"roles": ["agent"], "may": ["call"], "agent": {}}]}, "mcp": {})");
+  };
+  CHECK(agents("").empty());
+  CHECK(agents(R"({"roles": ["agent", "*"], "may": ["read", "subscribe"]},)").empty());
+  CHECK(agents(R"({"roles": ["operator"], "may": ["call"]},)").empty());
+  CHECK(agents(R"({"roles": ["agent"], "may": ["call"]},)") == "/access/rules/0/may ");
+  CHECK(agents(R"({"roles": ["*"], "may": ["admin"]},)") == "/access/rules/0/may ");
+  CHECK(cautions(R"(, "access": {"tokens_file": "t"}, "mcp": {})") == "/access/rules ");
   CHECK(cautions(tls + "}") == "/tls/required ");
   CHECK(cautions(tls + R"(, "required": true})").empty());
 }

@@ -33,6 +33,8 @@ std::vector<std::string> paths_of(const Route& route) {
     for (const auto name : device_resources) out.push_back(device + "/" + std::string(name));
   } else if (route.pattern == "/api/v1/access/requests/*") {
     for (const auto action : request_actions) out.push_back(request + std::string(action));
+  } else if (route.pattern == "/api/v1/agents/approvals/*") {
+    out = {"/api/v1/agents/approvals/{approval}"};
   } else if (route.pattern == "/devices/*") {
     out = {"/devices/{device}"};
   } else if (route.pattern != "/api/*" && route.pattern != "/*" && !route.pattern.starts_with("/docs")) {

@@ -1,9 +1,11 @@
 // The Model Context Protocol, with requests as any client may send them.
 #include <catch2/catch.hpp>
+#include <limits>
 
 #include "server/access/api_tokens.hpp"
 #include "server/json/json.hpp"
 #include "server/mcp/mcp_describe.hpp"
+#include "server/mcp/mcp_tools.hpp"
 #include "test/server/support/test_gateway.hpp"
 #include "test/support/folder.hpp"
 
@@ -35,13 +37,18 @@ void enable(Config& config) {
 
 }  // namespace
 
-TEST_CASE("agents: tools are the same whatever devices there are, and all of them only read") {
+TEST_CASE("agents: tools are the same whatever devices there are, and say whether they only read") {
   TestGateway none(0, enable);
   TestGateway two(2, enable);
   const auto tools = tell(none, request("tools/list")).json["result"]["tools"];
   CHECK(tools == tell(two, request("tools/list")).json["result"]["tools"]);
-  REQUIRE(tools.size() == 4);
-  for (const auto& tool : tools) CHECK(tool["annotations"]["readOnlyHint"] == true);
+  REQUIRE(tools.size() == 7);
+  for (const auto& tool : tools) {
+    const auto name = tool["name"].get<std::string>();
+    const bool is_command = name == "call" || name == "set";
+    CHECK(tool["annotations"]["readOnlyHint"] == !(is_command || name == "stop"));
+    CHECK(tool["annotations"].value("destructiveHint", false) == is_command);
+  }
 }
 
 TEST_CASE("agents: a message that is none is refused with what was expected, and its id is told") {
@@ -104,4 +111,12 @@ TEST_CASE("agents: lists come in pages, and long texts of devices are cut betwee
   CHECK(cut.size() < 1050);
   CHECK(cut.substr(0, 999) == long_text.substr(0, 999));
   CHECK(cut.find("bytes more") != std::string::npos);
+}
+
+TEST_CASE("agents: the age of a wire's value is told of any time that a device says") {
+  const std::chrono::system_clock::time_point now(std::chrono::seconds(1'900'000'000));
+  CHECK(age_ms({1'900'000'000, 0}, now) == 0);
+  CHECK(age_ms({1'899'999'998, 500'000'000}, now) == 1500);
+  CHECK(age_ms({std::numeric_limits<std::int64_t>::max(), 0}, now) < -1'000'000'000'000);
+  CHECK(age_ms({std::numeric_limits<std::int64_t>::min(), 0}, now) > 1'000'000'000'000);
 }

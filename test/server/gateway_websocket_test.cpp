@@ -48,7 +48,7 @@ TEST_CASE("frames that come with the request header are not lost") {
   TestClient client(gateway.port());
   const auto message = make_message("echo", 5000);
   std::string all =
-      "GET /devices/x HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\n"
+      "GET /devices/x HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
       "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
       "Sec-WebSocket-Version: 13\r\n\r\n";
   all += "\x82\xfe" + std::string{static_cast<char>(message.size() >> 8), static_cast<char>(message.size())} +

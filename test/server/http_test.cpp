@@ -72,6 +72,17 @@ struct WebRoot {
 
 }  // namespace
 
+TEST_CASE("a WebSocket is asked for in both headers, on whichever of their lines") {
+  const auto asks = [](const Headers& headers) {
+    return asks_for_websocket(request(http::verb::get, "/devices/x", headers));
+  };
+  CHECK(asks({{"Upgrade", "websocket"}, {"Connection", "keep-alive, Upgrade"}}));
+  CHECK(asks({{"Upgrade", "h2c"}, {"Upgrade", "WebSocket"}, {"Connection", "keep-alive"}, {"Connection", "upgrade"}}));
+  CHECK_FALSE(asks({{"Upgrade", "websocket"}}));  // for the next hop alone, which has not said that it goes on
+  CHECK_FALSE(asks({{"Upgrade", "websocket"}, {"Connection", "keep-alive"}}));
+  CHECK_FALSE(asks({{"Connection", "Upgrade"}}));
+}
+
 TEST_CASE("the router finds the first fitting route") {
   Router router;
   const auto says = [](std::string text) {

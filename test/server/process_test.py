@@ -3,7 +3,6 @@ import base64
 import json
 import os
 import pathlib
-import platform
 import re
 import signal
 import socket
@@ -43,11 +42,9 @@ class Hardening(unittest.TestCase):
         self.assertNotRegex(parts, r"LOAD .* RWE ")
 
     def test_what_is_written_beyond_a_buffer_ends_the_program(self):
-        names = subprocess.run(["readelf", "--wide", "--dyn-syms", "--notes", RRGATE], check=True, capture_output=True, text=True).stdout
+        names = subprocess.run(["readelf", "--wide", "--dyn-syms", RRGATE], check=True, capture_output=True, text=True).stdout
         self.assertIn(" __stack_chk_fail@", names)
         self.assertRegex(names, r" __\w+_chk@")
-        if platform.machine() == "x86_64":
-            self.assertRegex(names, r"x86 feature: IBT, SHSTK")
 
 
 class Files(unittest.TestCase):
@@ -178,7 +175,7 @@ class Demo(Files):
     def test_what_can_be_simulated_is_listed(self):
         listed = run("demo", "--list")
         self.assertEqual((listed.returncode, listed.stderr), (0, ""))
-        self.assertEqual([line.split()[0] for line in listed.stdout.splitlines()], ["create", "webcams"])
+        self.assertEqual([line.split()[0] for line in listed.stdout.splitlines()], ["create", "webcams", "conference-room"])
         with urllib.request.urlopen(self.start("webcams") + "api/v1/devices", timeout=10) as answer:
             self.assertEqual([each["name"] for each in json.load(answer)["devices"]], ["webcams"])
         unknown = run("demo", "fox")
@@ -232,6 +229,51 @@ class Serving(Files):
                 self.assertEqual(client.recv(4096), b"")
             events = [json.loads(line)["event"] for line in process.stderr]
             self.assertEqual(events[-1], "stopped")
+
+    def fill_log(self, port):
+        """Has the gateway write far more than a pipe holds and the gateway keeps: each character of an origin takes six."""
+        for number in range(60 * 20):  # few of one address are written
+            with socket.create_connection(("127.0.0.1", port), 10, source_address=(f"127.0.1.{1 + number % 60}", 0)) as client:
+                client.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nOrigin: http://" + b"\xe9" * 400 + b"\r\n"
+                               b"Connection: close\r\n\r\n")
+                self.assertTrue(client.recv(64).startswith(b"HTTP/1.1 403 "))
+
+    def test_a_log_that_nobody_reads_stops_nothing(self):
+        process, port = self.start()
+        self.fill_log(port)
+
+        def ask(path):
+            with urllib.request.urlopen(f"http://127.0.0.1:{port}{path}", timeout=10) as answer:
+                return answer.read().decode()
+
+        self.assertIn("ok", ask("/healthz"))
+        lost = int(re.search(r"^rrgate_log_lost_total (\d+)$", ask("/metrics"), re.M)[1])
+        self.assertGreater(lost, 0)
+        told = None
+        while not told:
+            event = json.loads(process.stderr.readline())
+            if event["event"].startswith("lines of the log were lost"):
+                told = event["lines"]
+        self.assertEqual(told, lost)
+        process.send_signal(signal.SIGTERM)
+        self.assertEqual(json.loads(process.stderr.readlines()[-1])["event"], "stopped")
+        self.assertEqual(process.wait(timeout=10), 0)
+
+    def test_a_log_that_nobody_reads_keeps_no_gateway_from_its_end(self):
+        process, port = self.start()
+        self.fill_log(port)
+        process.send_signal(signal.SIGTERM)
+        self.assertEqual(process.wait(timeout=10), 0)
+
+    def test_refusals_of_one_network_fill_no_log(self):
+        process, port = self.start()
+        for _ in range(60):
+            with socket.create_connection(("127.0.0.1", port), 10) as client:
+                client.sendall(b"nonsense\r\n\r\n")
+                client.recv(64)
+        process.send_signal(signal.SIGTERM)
+        events = [json.loads(line)["event"] for line in process.stderr]
+        self.assertEqual(events.count("connection closed: neither Robot Raconteur nor HTTP"), 20)
 
     def test_a_second_signal_waits_for_nobody(self):
         """A session may end by itself within the drain time, unless whoever runs the gateway has enough."""

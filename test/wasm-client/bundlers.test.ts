@@ -69,6 +69,24 @@ it("is bundled by esbuild, with the core copied beside it", async () => {
   expect(await show(join(folder, "esbuild/inline.js"))).toBe(await version());
 }, 30_000);
 
+it("is bundled by Rollup, with the core copied beside it", async () => {
+  const { rollup } = await import("rollup");
+  // In the place of @rollup/plugin-node-resolve.
+  const dist = (file: string) => join(folder, "node_modules/rrgate-client/dist", file);
+  const plugin = { name: "resolve", resolveId: (name: string) => (name === "rrgate-client" ? dist("index.js") : null) };
+  const warnings: string[] = [];
+  const bundle = await rollup({
+    input: join(folder, "page.js"),
+    plugins: [plugin],
+    onwarn: ({ message }) => void warnings.push(message),
+  });
+  await bundle.write({ dir: join(folder, "rollup"), format: "es" });
+  await bundle.close();
+  expect(warnings).toEqual([]);
+  await cp(dist("rrgate.wasm"), join(folder, "rollup/rrgate.wasm"));
+  expect(await show(join(folder, "rollup/page.js"))).toBe(await version());
+}, 30_000);
+
 it("is bundled by Vite, which ships the core by itself", async () => {
   const { build } = await import("vite");
   await build({ root: folder, base: "./", logLevel: "silent", build: { outDir: "vite", modulePreload: false } });

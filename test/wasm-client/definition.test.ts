@@ -132,3 +132,13 @@ it("takes constants of the old form", async () => {
   const { constants, types } = await robot.$.definition();
   expect([constants.LIMIT, types.Thing?.constants.NAME]).toEqual([5, "thing"]);
 });
+
+it("gives the constants of an object's type and of its definition for short", async () => {
+  await start();
+  const constants = await robot.$.constants;
+  expect(constants["LIMIT"]).toBe(7); // the type's own
+  expect([constants["HEX"], constants["TEXT"]]).toEqual([-16, 'a, {"quoted"} \u00e9']);
+  expect("constructor" in constants).toBe(false);
+  await robot.$.close();
+  await expect(robot.$.constants).rejects.toThrow("the session is closed");
+});

@@ -119,6 +119,80 @@ it("is aborted when a step is given up", async () => {
   expect((await late).code).toBe(ErrorCode.RequestTimeout);
 });
 
+it("is closed at once, whatever its step waits for", async () => {
+  const run = robot["hang_on"]!();
+  const waiting = failure(run.next());
+  const queued = run.next();
+  await settle();
+  expect(await run.return()).toEqual({ done: true, value: undefined });
+  const error = await waiting;
+  expect([error.code, error.message]).toEqual([ErrorCode.OperationAborted, "hang_on: the generator was closed"]);
+  expect((await queued).done).toBe(true);
+  expect(await ended()).toBe("closed");
+});
+
+it("is aborted at once, and its step rejects with the reason", async () => {
+  const run = robot["hang_on"]!();
+  const waiting = failure(run.next());
+  await settle();
+  const reason = new Error("enough");
+  expect(await failure(run.throw(reason))).toBe(reason);
+  expect(await waiting).toBe(reason);
+  expect(await ended()).toBe("aborted");
+});
+
+it("is not stepped any more where it is closed before the service has said that it is there", async () => {
+  const run = robot["hang_on"]!();
+  const before = robot.$.stats.messagesSent;
+  const waiting = failure(run.next());
+  await Promise.resolve(); // asked, and not answered
+  await run.return();
+  expect((await waiting).code).toBe(ErrorCode.OperationAborted);
+  expect(robot.$.stats.messagesSent).toBe(before + 2); // the call of the function, and the end
+  expect(await ended()).toBe("closed");
+});
+
+it("is closed past whatever waits to be sent", async () => {
+  const run = robot["hang_on"]!();
+  const waiting = failure(run.next());
+  await settle();
+  service.buffered = 1_000_000;
+  const writing = robot["generator_end"]!.set("written");
+  const closing = run.return();
+  await settle();
+  service.buffered = 0;
+  await Promise.all([writing, closing, waiting]);
+  expect(await ended()).toBe("written"); // by what came last
+});
+
+it("tells who ends it what became of that", async () => {
+  const abort = new AbortController();
+  const run = robot["hang_on"]!({ signal: abort.signal });
+  const givenUp = failure(run.next());
+  await settle();
+  service.isMute = true;
+  abort.abort(new Error("enough"));
+  expect((await givenUp).message).toBe("enough");
+  const ending = failure(run.return());
+  await settle();
+  service.drop("gone");
+  expect((await ending).subName).toBe("connection_lost"); // nobody knows whether it was aborted
+});
+
+it("is aborted where it is given up before the service has said that it is there", async () => {
+  const abort = new AbortController();
+  const run = robot["hang_on"]!({ signal: abort.signal });
+  const givenUp = failure(run.next());
+  await Promise.resolve(); // asked, and not answered
+  abort.abort(new Error("enough"));
+  expect((await givenUp).message).toBe("enough");
+  await run.return();
+  expect(await ended()).toBe("aborted");
+  const before = service.sent.length;
+  expect((await failure(robot["hang_on"]!({ signal: abort.signal }).next())).message).toBe("enough");
+  expect(service.sent.length).toBe(before);
+});
+
 it("ends with its session", async () => {
   const run = robot["hang_on"]!();
   const waiting = failure(run.next());

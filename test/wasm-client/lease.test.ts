@@ -1,6 +1,7 @@
 // Leases at a service that knows none, and calls that are sent past what waits. With a gateway: test/e2e/tests/lease.spec.ts.
 import { readdirSync, readFileSync } from "node:fs";
-import { lease } from "../../wasm-client/dist/node.js";
+import { Info } from "../../wasm-client/dist/internal.js";
+import { ErrorCode, lease, RobotRaconteurError } from "../../wasm-client/dist/node.js";
 import type { RemoteObject } from "../../wasm-client/dist/node.js";
 import { failure, TestService } from "./service.js";
 
@@ -8,7 +9,9 @@ const definition = `service test.lease
 stdver 0.10
 object Root
   property double speed
+  wire double velocity
   function double drive(double speed)
+  function string drive_by(string note)
   function string who()
   function int32{generator} count(int32 last)
 end`;
@@ -43,12 +46,145 @@ it("is not for a page that nobody looks at", async () => {
 });
 
 it("calls functions urgently, with arguments and options as otherwise", async () => {
-  expect(Object.keys(robot.$.urgent)).toEqual(["drive", "who", "count"]);
+  expect(Object.keys(robot.$.urgent)).toEqual(["drive", "drive_by", "who", "count"]);
   expect(await robot.$.urgent["drive"]!(3, { timeout: 1000 })).toBe(3);
   expect((await failure(Promise.resolve(robot.$.urgent["drive"]!(1, 2, 3)))).name).toBe(
     "RobotRaconteur.InvalidArgument",
   );
   expect("speed" in robot.$.urgent).toBe(false);
+});
+
+/** A gateway of the object's session, whose renewals are answered as `renew` says. */
+function gateway(renew: () => Promise<unknown>): () => void {
+  const session = Info.sessionOf(robot);
+  const request = session.request.bind(session);
+  const spy = vi.spyOn(session, "request").mockImplementation((ask, options, done) => {
+    let command = -1;
+    const core = { lease: (_path: string, given: number) => ((command = given), 1) };
+    try {
+      ask(core as never);
+    } catch {
+      return request(ask, options, done); // of something else
+    }
+    return (command === 2 ? renew() : Promise.resolve(null)) as ReturnType<typeof request>;
+  });
+  return () => spy.mockRestore();
+}
+
+const late = () =>
+  Promise.reject(new RobotRaconteurError({ code: ErrorCode.RequestTimeout, name: "late", message: "late" }));
+
+describe("a lease", () => {
+  let stop: () => void = () => undefined;
+  let renew: () => Promise<unknown> = () => Promise.resolve(null);
+  beforeEach(() => {
+    vi.useFakeTimers();
+    renew = () => Promise.resolve(null);
+    stop = gateway(() => renew());
+  });
+  afterEach(() => {
+    stop();
+    vi.useRealTimers();
+  });
+
+  it("is doubtful once no renewal was answered for the dead-man's time, and held again with an answer", async () => {
+    const held = await lease(robot, { deadman: 300 });
+    const seen: unknown[] = [];
+    held.onState((state, reason) => seen.push([state, reason?.message]));
+    await vi.advanceTimersByTimeAsync(1000);
+    expect([held.state, held.isHeld, held.reason, seen]).toEqual(["held", true, undefined, []]);
+    const lost = vi.fn();
+    held.onLost(lost);
+    renew = () => new Promise(() => undefined); // the network is away
+    await vi.advanceTimersByTimeAsync(200); // the last answer came to what was asked 100 ms ago, at most
+    expect(held.isHeld).toBe(true);
+    await vi.advanceTimersByTimeAsync(100);
+    const why = "no renewal of the lease was answered for 300 ms: the gateway may have ended it";
+    expect([held.state, held.isHeld, held.reason?.message]).toEqual(["doubtful", false, why]);
+    expect(seen).toEqual([["doubtful", why]]);
+    expect(lost).not.toHaveBeenCalled();
+    await held.release();
+    expect([held.state, held.reason]).toEqual(["released", undefined]);
+  });
+
+  it("is held again, or lost, with the gateway's next answer", async () => {
+    const held = await lease(robot, { deadman: 300 });
+    const seen: string[] = [];
+    held.onState((state) => seen.push(state));
+    renew = late;
+    await vi.advanceTimersByTimeAsync(400);
+    renew = () => Promise.resolve(null);
+    await vi.advanceTimersByTimeAsync(100);
+    expect([held.isHeld, held.reason]).toEqual([true, undefined]);
+    renew = late;
+    await vi.advanceTimersByTimeAsync(400);
+    const ended = new RobotRaconteurError({ code: ErrorCode.InvalidOperation, name: "ended", message: "has ended" });
+    renew = () => Promise.reject(ended);
+    await vi.advanceTimersByTimeAsync(100);
+    expect(seen).toEqual(["doubtful", "held", "doubtful", "lost"]);
+    expect([held.state, held.reason, await held.ended]).toEqual(["lost", ended, ended]);
+  });
+
+  it("is doubtful by the clock, before any timer of a page that wakes up has run", async () => {
+    const held = await lease(robot, { deadman: 300 });
+    vi.setSystemTime(Date.now() + 1000);
+    const now = performance.now();
+    const clock = vi.spyOn(performance, "now").mockReturnValue(now + 300);
+    expect(held.isHeld).toBe(false);
+    clock.mockRestore();
+    await held.release();
+  });
+
+  it("limits calls, and writes of properties and wires, but not reads", async () => {
+    const session = Info.sessionOf(robot);
+    const held = await lease(robot, { deadman: 60_000, callTimeout: 500 });
+    const timeouts: unknown[] = [];
+    vi.spyOn(session, "request").mockImplementation((_ask, options) => {
+      timeouts.push(options?.timeout);
+      return Promise.resolve(null);
+    });
+    await robot["drive"]!(1);
+    await robot["speed"]!.set(1);
+    await robot["velocity"]!.poke(1);
+    await robot["speed"]!.set(1, { timeout: 700 });
+    await robot["speed"]!.set(1, { timeout: undefined });
+    await robot["speed"]!.get();
+    await robot["velocity"]!.peek();
+    expect(timeouts).toEqual([500, 500, 500, 700, 500, undefined, undefined]);
+    await held.release();
+    timeouts.length = 0;
+    await robot["speed"]!.set(1);
+    expect(timeouts).toEqual([undefined]);
+  });
+});
+
+it("sends urgent calls past all but what the WebSocket has", async () => {
+  let buffered = 0;
+  const service = await TestService.start({ definitions: [definition], root: "test.lease.Root" });
+  const open: typeof service.transport = async (url, listener) => {
+    const inner = await service.transport(url, listener);
+    return {
+      ...inner,
+      send: (bytes) => ((buffered += bytes.length), inner.send(bytes)),
+      get buffered() {
+        return buffered; // nothing of it is on its way yet
+      },
+    };
+  };
+  const slow = await service.connect({ transport: open });
+  const sizeBefore = (buffered = 0);
+  const old = [...Array(10)].map(() => slow["drive_by"]!("x".repeat(50_000)));
+  expect(buffered).toBeGreaterThan(sizeBefore);
+  expect(buffered).toBeLessThan(128 * 1024);
+  const order: string[] = [];
+  void slow.$.urgent["drive"]!(0).then(() => order.push("urgent"));
+  for (const call of old) void call.then(() => order.push("older"));
+  buffered = 0;
+  const drained = setInterval(() => (buffered = 0), 1);
+  await vi.waitUntil(() => order.length === 11);
+  clearInterval(drained);
+  expect(order.indexOf("urgent")).toBeLessThanOrEqual(3);
+  await slow.$.close();
 });
 
 it("loads when it is used, and not before", () => {

@@ -26,7 +26,11 @@ it("shows a device, its wires, properties, events and calls", async () => {
   };
   const Panel = () => {
     last = usePanel();
-    return createElement("p", null, `${last.device.state.status} ${String(last.level)} ${String(last.speed.value)}`);
+    return createElement(
+      "p",
+      null,
+      `${last.device.state.status} ${String(last.level.value)} ${String(last.speed.value)}`,
+    );
   };
   const root = createRoot(document.body);
   const shows = (text: string) => act(() => until(() => document.body.textContent === text));
@@ -35,7 +39,7 @@ it("shows a device, its wires, properties, events and calls", async () => {
   await shows("connected undefined 0");
   await act(() =>
     until(
-      () => last?.level === 42,
+      () => last?.level.value === 42,
       () => last?.device.client?.publish_level?.(42),
     ),
   );
@@ -51,6 +55,10 @@ it("shows a device, its wires, properties, events and calls", async () => {
     ),
   );
   expect(sides[0]).toBe(3);
+
+  act(() => service.drop("gone")); // there is nobody else to connect to
+  await act(() => until(() => last?.level.isConnected === false));
+  expect(last?.level).toMatchObject({ value: 42, isConnected: false });
 
   act(() => root.unmount());
   await until(() => service.isClosed);

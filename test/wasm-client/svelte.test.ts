@@ -1,6 +1,6 @@
 // rrgate-client/svelte with Svelte's own stores: one that derives from ours, and get().
 import { derived, get } from "svelte/store";
-import "../../wasm-client/dist/node.js";
+import { subscribe } from "../../wasm-client/dist/node.js";
 import { callStore, deviceStore, listen, propertyStore, wireStore } from "../../wasm-client/dist/svelte/svelte.js";
 import { startDevice, until, url } from "./framework_device.js";
 
@@ -27,7 +27,7 @@ it("follows wires, properties, events and calls", async () => {
   const { subscription, client } = get(device);
 
   const level = wireStore(subscription, "level");
-  const double = derived(level, (value) => 2 * Number(value ?? 0));
+  const double = derived(level, ({ value }) => 2 * Number(value ?? 0));
   let shown = 0;
   stops.push(double.subscribe((value) => void (shown = value)));
   await until(
@@ -57,6 +57,40 @@ it("follows wires, properties, events and calls", async () => {
   await expect(fail.call("RobotRaconteur.OperationFailed", "stuck")).rejects.toThrow("stuck");
   expect(get(fail).error).toMatchObject({ message: "stuck" });
   stops.forEach((stop) => stop());
+});
+
+it("keeps what a wire gave when the connection is lost, and says how old it is and that nothing comes", async () => {
+  const { service, options } = await startDevice();
+  const device = subscribe(url, options);
+  const client = await device.client();
+  const level = wireStore(device, "level");
+  const seen: boolean[] = [];
+  const stop = level.subscribe(({ isConnected }) => void seen.push(isConnected));
+  expect(get(level)).toEqual({ value: undefined, time: undefined, receivedAt: undefined, isConnected: false });
+  await until(() => get(level).isConnected);
+  expect(get(level).value).toBeUndefined();
+  const before = Date.now();
+  await client["publish_level"]!(21);
+  await until(() => get(level).value === 21);
+  const { receivedAt, time } = get(level);
+  expect(receivedAt).toBeGreaterThanOrEqual(before);
+  expect(time?.seconds).toBeGreaterThanOrEqual(0);
+  service.drop("gone");
+  await until(() => !get(level).isConnected);
+  expect(get(level)).toEqual({ value: 21, time, receivedAt, isConnected: false });
+  stop();
+  await device.close();
+});
+
+it("says of a subscription that is closed that nothing comes", async () => {
+  const { options } = await startDevice();
+  const device = subscribe(url, options);
+  const level = wireStore(device, "level");
+  const stop = level.subscribe(() => undefined);
+  await until(() => get(level).isConnected);
+  await device.close();
+  expect(get(level).isConnected).toBe(false);
+  stop();
 });
 
 it("says that there is no connection instead of waiting for one", async () => {

@@ -12,10 +12,10 @@ it("follows a device until the scope ends", async () => {
     const device = useDevice(url, options);
     useEvent(device, "bump", (side) => void sides.push(side));
     const level = useWire(device, "level");
-    const double = computed(() => 2 * Number(level.value ?? 0));
-    return { device, double, speed: useProperty(device, "speed"), add: useCall(device, "add") };
+    const double = computed(() => 2 * Number(level.value.value ?? 0));
+    return { device, level, double, speed: useProperty(device, "speed"), add: useCall(device, "add") };
   };
-  const { device, double, speed, add } = scope.run(use) as ReturnType<typeof use>;
+  const { device, level, double, speed, add } = scope.run(use) as ReturnType<typeof use>;
   await until(() => device.value.state.status === "connected" && speed.state.value.value === 0);
   await until(
     () => double.value === 42,
@@ -31,6 +31,11 @@ it("follows a device until the scope ends", async () => {
     () => device.value.client?.fire_bump?.(3),
   );
   expect(sides[0]).toBe(3);
+
+  expect(level.value).toMatchObject({ value: 21, isConnected: true });
+  service.drop("gone");
+  await until(() => !level.value.isConnected);
+  expect(level.value.value).toBe(21);
 
   scope.stop();
   await until(() => service.isClosed);

@@ -1,8 +1,10 @@
 // The board without a browser: where panels stand, what a file may hold, drafts, definitions, paces.
-import { packBoard, parseBoard, recallBoard, unpackBoard, writeBoard } from "../../web/src/board/board";
+import { packBoard, parseBoard, recallBoard, sameBoard, unpackBoard, writeBoard } from "../../web/src/board/board";
+import type { Board } from "../../web/src/board/board";
+import { Keeper } from "../../web/src/board/keeper";
 import { findRoom, nudge, put, settle } from "../../web/src/board/layout";
 import type { Placed } from "../../web/src/board/layout";
-import { hasPreset, presetFor } from "../../web/src/board/presets";
+import { hasPreset, presetFor, stopFor } from "../../web/src/board/presets";
 import { Pace } from "../../web/src/live/pace";
 import { splitSteps } from "../../web/src/app/router";
 import { asCode } from "../../web/src/panels/code";
@@ -10,6 +12,7 @@ import { hexLines, greyPicture } from "../../web/src/panels/bytes";
 import { Trace, toCsv } from "../../web/src/panels/trace";
 import { readPicture } from "../../web/src/camera/pixels";
 import type { Member } from "../../web/src/robot/remote";
+import { ROBOT_STOP } from "../../web/src/robot/stop";
 import { Definitions, flagNames, scopeOf } from "../../web/src/values/definitions";
 import { draftOf, formatUuid, makeDraft, readUuid, valueOf } from "../../web/src/values/draft";
 import { numberAt, numberPaths } from "../../web/src/values/paths";
@@ -250,12 +253,38 @@ describe("a board", () => {
     const made = presetFor({ type: "com.example.arm.Robot", members, definitions, scope });
     expect(made.panels.map(({ kind }) => kind)).toEqual(["plot", "table", "form", "table"]);
     expect(made.stop).toEqual({ call: "halt", args: [] });
-    expect(hasPreset("__proto__") || hasPreset("constructor")).toBe(false);
+    expect(hasPreset("__proto__", definitions) || hasPreset("constructor", definitions)).toBe(false);
     const tool = "com.robotraconteur.robotics.tool.Tool";
     expect(
       presetFor({ type: tool, members: [member("open", "function", "void")], definitions, scope }).panels,
     ).toHaveLength(1);
-    expect(hasPreset(tool)).toBe(true);
+    expect(hasPreset(tool, definitions)).toBe(true);
+  });
+
+  test("fits a type that implements a standard one, however it is named there, and calls nothing that stops nothing", () => {
+    const driver = new Definitions([
+      "service com.example.ur\nusing com.example.base.Arm as A\nobject UR5\nimplements A\nend",
+      "service com.example.base\nobject Arm\nimplements Other\nimplements com.robotraconteur.robotics.robot.Robot\nend\nobject Other\nimplements Arm\nend",
+    ]);
+    const type = "com.example.ur.UR5";
+    expect([...driver.implemented(type)].sort()).toEqual([
+      "com.example.base.Arm",
+      "com.example.base.Other",
+      "com.robotraconteur.robotics.robot.Robot",
+    ]);
+    expect(hasPreset(type, driver)).toBe(true);
+    const halt = (stops: string): Member => ({
+      name: "halt",
+      kind: "function",
+      type: stops,
+      parameters: [],
+      modifiers: [],
+      documentation: "",
+    });
+    const described = { type, definitions: driver, scope: "com.example.ur" };
+    expect(stopFor({ ...described, members: [halt("void")] })).toEqual(ROBOT_STOP);
+    expect(stopFor({ ...described, members: [halt("double{generator}")] })).toBeNull();
+    expect(presetFor({ ...described, members: [halt("void")] }).panels[0]?.kind).toBe("robot");
   });
 
   test("leads to objects by steps whose keys may have dots", () => {
@@ -274,12 +303,16 @@ test("code quotes what comes from the device", () => {
     documentation: "",
   };
   const place = { device: "it's", service: "a b", object: "Arms[x.y]" };
-  expect(asCode("curl", "http://h/", place, member, ["'; rm -rf /"])).toBe(
+  const types = { definitions, scope };
+  expect(asCode("curl", "http://h/", place, member, ["'; rm -rf /"], types)).toBe(
     `curl -X POST 'http://h/api/v1/devices/it'\\''s/a%20b/Arms/x.y/Drive' \\\n  -H 'Content-Type: application/json' -d '{"__proto__":"'\\''; rm -rf /"}'`,
   );
-  expect(asCode("JavaScript", "http://h/", place, member, [1])).toContain('robot.$.find("*.Arms[x.y]")');
-  expect(asCode("Python", "https://h/", { ...place, object: "" }, member, [true, null])).toContain(
-    "robot.Drive(True, None)",
+  expect(asCode("JavaScript", "http://h/", place, member, [1], types)).toContain('robot.$.find("*.Arms[x.y]")');
+  expect(asCode("Python", "https://h/", { ...place, object: "" }, member, [true], types)).toContain(
+    "robot.Drive(True)",
+  );
+  expect(asCode("Python", "https://h/", place, { ...member, kind: "wire" }, [null], types)).toContain(
+    'robot.get_Arms("x.y").Drive.PokeOutValue(None)',
   );
 });
 
@@ -301,4 +334,27 @@ test("pictures of the standard types are read by their encoding", () => {
   expect(() => readPicture({ image_info: { ...info, width: 9 }, data: Uint8Array.of(1, 2, 3) })).toThrow(
     "the picture has 3 bytes",
   );
+});
+
+test("a board is written at once and then not too often, and the address only while it is the board's", () => {
+  vi.useFakeTimers();
+  const written: string[] = [];
+  const write = (text: string) => ({ store: () => written.push(text), show: () => written.push(`#${text}`) });
+  const keeper = new Keeper();
+  for (let i = 0; i < 300; i++) keeper.write(write(String(i)));
+  expect([...written, keeper.isKept.value]).toEqual(["0", "#0", false]);
+  vi.advanceTimersByTime(399);
+  expect(written).toHaveLength(2);
+  vi.advanceTimersByTime(10_000);
+  expect([...written.splice(0), keeper.isKept.value]).toEqual(["0", "#0", "299", "#299", true]);
+  keeper.write(write("now"));
+  keeper.write(write("left"));
+  keeper.flush(false);
+  vi.advanceTimersByTime(10_000);
+  expect(written).toEqual(["now", "#now", "left"]);
+  vi.useRealTimers();
+  const [one, other] = ["a", "b"].map((title) =>
+    parseBoard(`{"board":1,"panels":[{"kind":"notes","x":0,"y":0,"w":3,"h":5,"title":"${title}"}]}`),
+  ) as [Board, Board];
+  expect([sameBoard(one, { ...one, panels: [...one.panels] }), sameBoard(one, other)]).toEqual([true, false]);
 });

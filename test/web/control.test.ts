@@ -11,13 +11,22 @@ const failed = (code: keyof typeof ErrorCode, message: string) =>
 /** A gateway in the hands of the test. */
 function setup(answer: () => Promise<unknown> = () => Promise.resolve()) {
   const losers: ((reason: Error) => void)[] = [];
+  const watchers: ((state: string, reason?: Error) => void)[] = [];
   const held = {
+    onState: (changed: (state: string, reason?: Error) => void) => watchers.push(changed),
     onLost: (lost: (reason: Error) => void) => losers.push(lost),
     release: vi.fn(() => Promise.resolve()),
   };
   const lease = vi.fn(async () => (await answer(), held));
   const object = { lease } as never;
-  return { control: new Control(object), object, lease, held, lose: (reason: Error) => losers.at(-1)?.(reason) };
+  return {
+    control: new Control(object),
+    object,
+    lease,
+    held,
+    lose: (reason: Error) => losers.at(-1)?.(reason),
+    tell: (state: string, reason?: Error) => watchers.at(-1)?.(state, reason),
+  };
 }
 
 describe("control", () => {
@@ -36,6 +45,17 @@ describe("control", () => {
     await expect(control.begin()).rejects.toThrow("taken over by vera");
     await control.take(true);
     expect(control.mayCommand).toBe(true);
+  });
+  it("that the gateway does not confirm commands nothing until it does", async () => {
+    const { control, lease, tell } = setup();
+    await control.begin();
+    const before = control.state.value;
+    tell("doubtful", failed("RequestTimeout", "no renewal was answered"));
+    expect(control.mayCommand).toBe(false);
+    await expect(control.begin()).rejects.toThrow("no renewal was answered");
+    tell("held");
+    expect(control.state.value).toEqual(before);
+    expect(lease).toHaveBeenCalledOnce();
   });
   it("needs no lease where nobody gives any, and says what else is wrong", async () => {
     const free = setup(() => Promise.reject(failed("NotImplementedError", "none")));

@@ -8,6 +8,8 @@ import {
   worthOf,
 } from "../../web/src/panels/teleop";
 import type { Axis } from "../../web/src/panels/teleop";
+import { HeldSticks } from "../../web/src/panels/held_sticks";
+import { numberIn } from "../../web/src/panels/panel";
 import { Definitions } from "../../web/src/values/definitions";
 
 const nothing = new Definitions([]);
@@ -70,4 +72,64 @@ describe("teleop", () => {
     expect(readAxes({ axes })).toEqual([up, { stick: "left-x", path: "y", scale: 1, deadZone: 0.9 }]);
     expect(readAxes({ axes: "none" })).toEqual([]);
   });
+});
+
+describe("sticks that were let go of", () => {
+  it("wait for a new press: of a key, and of a finger that is still down", () => {
+    const held = new HeldSticks();
+    held.pressKey("KeyW");
+    held.press("right");
+    expect(held.push("right", 1, 0)).toBe(true);
+    expect(held.deflection).toEqual({ ...AT_REST, "left-y": 1, "right-x": 1 });
+    held.letGo();
+    expect(held.deflection).toEqual(AT_REST);
+    expect(held.push("right", 1, 0.5)).toBe(false);
+    expect(held.releaseKey("KeyW")).toBe(false);
+    held.release("right");
+    expect(held.deflection).toEqual(AT_REST);
+    held.press("right");
+    held.push("right", 0, -1);
+    expect(held.deflection["right-y"]).toBe(-1);
+    held.release("right");
+    expect(held.deflection).toEqual(AT_REST);
+  });
+  it("wait, of a gamepad, until each axis was in the middle", () => {
+    const held = new HeldSticks();
+    expect(held.poll([0, -1, 0.5, 0], true)).toBe(true);
+    held.letGo();
+    held.poll([0, -1, 0.5, 0], true);
+    held.poll([0, -0.9, 0.5, 0], true);
+    expect(held.deflection).toEqual(AT_REST);
+    held.poll([0, -0.9, 0, 0], true);
+    held.poll([0, -0.8, 0.4, 0], true);
+    expect(held.deflection).toEqual({ ...AT_REST, "right-x": 0.4 });
+    held.poll([0, 0.01, 0.4, 0], true);
+    held.poll([0, -0.8, 0.4, 0], true);
+    expect(held.deflection).toEqual({ ...AT_REST, "left-y": 0.8, "right-x": 0.4 });
+  });
+  it("are free again past the middle, and where they may not drive", () => {
+    const held = new HeldSticks();
+    held.letGo();
+    held.poll([0.08, 0, 0, 0], true); // worn: never read at 0
+    held.poll([-0.3, 0, 0, 0], true);
+    expect(held.deflection["left-x"]).toBe(-0.3);
+    held.letGo();
+    held.poll([1, 0, 0, 0], false);
+    held.poll([0, 0, 0, 0], false);
+    held.poll([1, 0, 0, 0], false);
+    expect(held.deflection).toEqual(AT_REST);
+    held.poll([1, 0, 0, 0], true);
+    expect(held.deflection["left-x"]).toBe(1);
+  });
+});
+
+test("numbers of a file or an address stay within what a panel allows", () => {
+  for (const [percent, taken] of [
+    [10_000, 100],
+    [-5, 0],
+    [Infinity, 10],
+    ["50", 10],
+    [50, 50],
+  ])
+    expect(numberIn({ percent }, "percent", 10, 0, 100), String(percent)).toBe(taken);
 });

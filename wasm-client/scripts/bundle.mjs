@@ -10,6 +10,7 @@ const entries = [
   "internal",
   "definition/definition",
   "lease/held_lease",
+  "losses/losses",
   "node",
   "react/react",
   "services/find_services",
@@ -20,7 +21,7 @@ const entries = [
 ];
 /** What all entries have in common: one file of it, whoever loads it. */
 const shared =
-  /\/wasm-client\/ts\/(?!usb\/|lease\/|definition\/|react\/|services\/|stores\/|svelte\/|vue\/|(?:index|internal|node)\.ts$)/;
+  /\/wasm-client\/ts\/(?!usb\/|lease\/|losses\/|definition\/|react\/|services\/|stores\/|svelte\/|vue\/|(?:index|internal|node)\.ts$)/;
 
 // Bundlers look for files by `new URL("...", import.meta.url)`; not all take the quotes that the minifier prefers. A plugin
 // after it, so that source maps stay right: each quote is one character, too.

@@ -35,6 +35,7 @@ interface Stream extends Connection {
 abstract class MemberSubscription<C extends Connection, V> implements AsyncIterable<V> {
   protected connection: C | undefined;
   readonly #loops = new Set<ValueQueue<V>>();
+  readonly #connected = new Set<() => void>();
   readonly #failed = new Set<(error: unknown) => void>();
   readonly #stops: (() => void)[];
   #stopWaiting: (() => void) | undefined;
@@ -53,6 +54,12 @@ abstract class MemberSubscription<C extends Connection, V> implements AsyncItera
 
   get isConnected(): boolean {
     return this.connection !== undefined;
+  }
+
+  /** Calls `connected` each time the member is connected. */
+  onConnected(connected: () => void): () => void {
+    this.#connected.add(connected);
+    return () => void this.#connected.delete(connected);
   }
 
   /** Calls `failed` each time the member could not be connected, or its connection ended; it is tried again. */
@@ -107,6 +114,7 @@ abstract class MemberSubscription<C extends Connection, V> implements AsyncItera
       connection = await this.connect(object);
       if (this.#closed) return void connection.close();
       this.connection = connection;
+      for (const connected of [...this.#connected]) callSafely(connected);
       await this.follow(connection);
       throw makeError("InvalidOperation", `${this.member}: the service closed the connection of this member`);
     } catch (error) {

@@ -177,6 +177,10 @@ export class Info implements ObjectInfo {
     return (this.#types = this.#session.look((core) => core.definitions()) ?? this.#types);
   }
 
+  get constants(): ObjectInfo["constants"] {
+    return import("./definition/definition.js").then(({ constants }) => constants(this.#session, this.type));
+  }
+
   async definition(name?: string): Promise<DefinitionInfo> {
     return (await import("./definition/definition.js")).definition(this.#session, this.type, name);
   }

@@ -53,12 +53,27 @@ export interface LeaseOptions extends CallOptions {
   deadman?: number;
   /** Takes it from whoever has it, with a role that may. */
   takeover?: boolean;
-  /** Milliseconds for calls and writes of the object while the lease is held, where they say nothing; 2000. */
+  /**
+   * Milliseconds for calls of functions, and writes of properties and wires, of the object and those below it while the
+   * lease is held, where they say nothing; 2000.
+   */
   callTimeout?: number;
 }
 
+/**
+ * "doubtful": the gateway has answered no renewal for the dead-man's time, as when the network is away: it may have made
+ * the device safe. An answer makes it "held" or "lost".
+ */
+export type LeaseState = "held" | "doubtful" | "lost" | "released";
+
 export interface Lease {
+  readonly state: LeaseState;
+  /** Whether `state` is "held". */
   readonly isHeld: boolean;
+  /** Why it is doubtful or lost. */
+  readonly reason: RobotRaconteurError | undefined;
+  /** Calls `changed` with each new state. @returns a function that ends it. */
+  onState(changed: (state: LeaseState, reason?: RobotRaconteurError) => void): () => void;
   /** Resolves when the lease has ended: with the reason, or without one after release(). Never rejects. */
   readonly ended: Promise<RobotRaconteurError | undefined>;
   /** Calls `lost` once when the lease ends without release(). @returns a function that takes it back. */
@@ -143,6 +158,11 @@ export interface ObjectInfo {
   /** The texts of all service definitions known so far. */
   readonly types: readonly string[];
   /**
+   * The constants of the object's type and of the definition that it stands in; the type's own count where both have one
+   * of a name. Rejects with InvalidOperation where the session is closed.
+   */
+  readonly constants: Promise<DefinitionInfo["constants"]>;
+  /**
    * The constants, enums and types of a definition that the service has sent, with their documentation.
    * @param name  the definition's, "com.example.robot"; that of the object's type where not given.
    * @throws RobotRaconteurError (rejects) InvalidArgument (not known), InvalidOperation (the session is closed).
@@ -150,8 +170,9 @@ export interface ObjectInfo {
   definition(name?: string): Promise<DefinitionInfo>;
   readonly stats: SessionStats;
   /**
-   * The functions of the object, as they are called otherwise, but sent past whatever waits to be sent:
-   * `robot.$.urgent.Stop()`.
+   * The functions of the object, as they are called otherwise, but sent past whatever this side has not handed to the
+   * WebSocket yet: `robot.$.urgent.Stop()`. That is all but the last 128 KiB. What it has passed follows it: an older call
+   * that still waits to be sent arrives after it.
    */
   readonly urgent: Readonly<Record<string, (...args: unknown[]) => Promise<RrValue | undefined>>>;
   /** A member by name: the way to those whose names JavaScript itself calls ("then", "toString"). */
@@ -334,8 +355,10 @@ export interface MemoryMember<A = RrValue> {
 /**
  * A function whose results come one after another; where it takes values (`P`), each `next(value)` hands one over, also
  * the first. The service hears of a run with its first `next()`. `return()`, and so leaving the loop, closes it;
- * `throw()` aborts it. What fails ends it. CallOptions stand for each step: a step that takes too long, or is given up,
- * aborts the run.
+ * `throw(reason)` aborts it: at once, sent past whatever waits. A step that is under way then rejects, with OperationAborted
+ * or the reason. Both resolve when the service has answered, and reject with what it says where it does not end the run.
+ * What fails ends it. CallOptions stand for each step: a step that takes too long, or is given up, aborts the run; what
+ * became of that `return()` tells.
  */
 export interface GeneratorMember<A extends unknown[] = never[], R = RrValue, P = void> {
   (...args: A): AsyncGenerator<R, void, P>;

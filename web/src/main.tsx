@@ -6,6 +6,7 @@ import { App } from "./app/app";
 import { loadLanguage } from "./app/language";
 import { watchRoute } from "./app/router";
 import { AccessDesk } from "./gateway/access";
+import { AgentsDesk } from "./gateway/agents";
 import { DeviceList } from "./gateway/devices";
 import { mustSignIn, session } from "./gateway/session";
 import { UsbDeviceList } from "./gateway/usb_devices";
@@ -33,11 +34,13 @@ const usb = new UsbDeviceList();
 usb.start();
 const access = new AccessDesk(session);
 access.start();
+const agents = new AgentsDesk(session);
+agents.start();
 
 const place = document.getElementById("app");
 if (!place) throw new Error("index.html has no element #app");
 const show = (): void =>
-  render(<App route={watchRoute()} list={list} usb={usb} access={access} session={session} />, place);
+  render(<App route={watchRoute()} list={list} usb={usb} access={access} agents={agents} session={session} />, place);
 loadLanguage().then(show, show); // in English, where the other texts cannot be had
 
 // For "install", and for the page that says that there is no gateway; browsers have it over HTTPS and on this machine.

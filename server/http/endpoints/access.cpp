@@ -8,6 +8,7 @@
 #include "node/tls/base64.hpp"
 #include "server/access/access_text.hpp"
 #include "server/access/api_tokens.hpp"
+#include "server/http/endpoints/gateway_request.hpp"
 #include "server/http/response_writer.hpp"
 #include "server/http/sign_in_cookie.hpp"
 #include "server/json/json.hpp"
@@ -22,60 +23,6 @@ namespace {
 
 using Json = rr::OrderedJson;
 using Clock = std::chrono::system_clock;
-
-Response answer(unsigned status, const Json& json) {
-  return json_response(status, json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n");
-}
-
-rr::Error bad(std::string what) {
-  return rr::make_error(rr::ErrorCode::invalid_argument, std::move(what));
-}
-
-Response error_answer(const rr::Error& error) {
-  switch (error.code) {
-    case rr::ErrorCode::invalid_argument:
-    case rr::ErrorCode::data_serialization_error:
-      return problem_response(400, error.message);
-    case rr::ErrorCode::resource_not_found:
-      return problem_response(404, error.message);
-    case rr::ErrorCode::invalid_state:
-      return problem_response(409, error.message);
-    case rr::ErrorCode::out_of_system_resource: {
-      auto response = problem_response(429, error.message);
-      response.set("Retry-After", "60");
-      return response;
-    }
-    default:
-      return problem_response(500, error.message);
-  }
-}
-
-/// The body as an object; an empty one is {}. JSON alone: a page of another origin can't send that unasked.
-rr::Result<rr::Json> body_of(const Request& request) {
-  const auto& text = request.message.body();
-  if (text.empty()) return {boost::system::in_place_value, rr::Json::object()};
-  const auto type = request.header(http::field::content_type);
-  if (!equals_ignoring_case(type.substr(0, type.find(';')), "application/json"))
-    return bad("Content-Type is " + rr::quote(type) + ", expected application/json");
-  auto json = rr::read_json(text);
-  if (json && !json->is_object()) return bad("expected an object");
-  return json;
-}
-
-/// Empty where it is not there. Errors   invalid_argument: no text.
-rr::Result<std::string> text_of(const rr::Json& body, const char* key) {
-  const auto found = body.find(key);
-  if (found == body.end()) return std::string();
-  if (!found->is_string()) return bad(std::string(key) + " is no string");
-  return found->get<std::string>();
-}
-
-std::optional<Response> refuse_stranger(GatewayState& gateway, const Request& request) {
-  const auto allowed = gateway.access().check(request.identity, {.verb = Verb::admin});
-  if (allowed) return std::nullopt;
-  gateway.reject(allowed.error());
-  return gateway.http_access().refusal(request, allowed.error());
-}
 
 /// Writes a new token into the tokens file, and has it read. Returns it.
 rr::Result<std::string> add_token(GatewayState& gateway, const std::string& name, const std::vector<std::string>& roles,
@@ -100,16 +47,17 @@ Response approve(GatewayState& gateway, const Request& request, const std::strin
   if (!body) return error_answer(body.error());
   std::vector<std::string> roles;
   if (const auto found = body->find("roles"); found != body->end()) {
-    if (!found->is_array()) return error_answer(bad("roles is no array"));
+    if (!found->is_array()) return error_answer(bad_request("roles is no array"));
     for (const auto& role : *found) {
-      if (!role.is_string()) return error_answer(bad("a role is no string"));
+      if (!role.is_string()) return error_answer(bad_request("a role is no string"));
       if (auto checked = check_name("role", role.get<std::string>()); !checked) return error_answer(checked.error());
       roles.push_back(role.get<std::string>());
     }
   }
   std::optional<std::chrono::sys_days> last_day;
   if (const auto days = body->find("days"); days != body->end()) {
-    if (!days->is_number_integer() || *days < 1 || *days > 36500) return error_answer(bad("days: expected 1 to 36500"));
+    if (!days->is_number_integer() || *days < 1 || *days > 36500)
+      return error_answer(bad_request("days: expected 1 to 36500"));
     last_day = std::chrono::floor<std::chrono::days>(Clock::now()) + std::chrono::days(days->get<int>());
   }
   auto& requests = gateway.http_access().requests();
@@ -121,7 +69,7 @@ Response approve(GatewayState& gateway, const Request& request, const std::strin
   const auto detail = pending->name + " of " + pending->client + ": roles " + format_roles(roles) + ", until " +
                       (last_day ? format_day(*last_day) : "it is deleted");
   gateway.access().record({.event = "approved", .who = &request.identity, .detail = detail});
-  return answer(200, {{"state", "approved"}});
+  return json_answer(200, {{"state", "approved"}});
 }
 
 Response deny(GatewayState& gateway, const Request& request, const std::string& id) {
@@ -131,7 +79,7 @@ Response deny(GatewayState& gateway, const Request& request, const std::string& 
   requests.decide(id, {});
   const auto detail = pending->name + " of " + pending->client;
   gateway.access().record({.event = "denied", .who = &request.identity, .detail = detail});
-  return answer(200, {{"state", "denied"}});
+  return json_answer(200, {{"state", "denied"}});
 }
 
 Response claim(GatewayState& gateway, const Request& request, const std::string& id) {
@@ -143,7 +91,7 @@ Response claim(GatewayState& gateway, const Request& request, const std::string&
   if (!found) return error_answer(found.error());
   Json out{{"state", std::string(to_string(found->state))}};
   if (!found->token.empty()) out["token"] = found->token;
-  return answer(200, out);
+  return json_answer(200, out);
 }
 
 /// The header that says the same as the body. Errors   invalid_argument.
@@ -155,9 +103,9 @@ rr::Result<std::string> authorization_of(const Request& request) {
   const auto token = text_of(*body, "token");
   for (const auto* text : {&user, &password, &token})
     if (!*text) return text->error();
-  if (token->empty() == user->empty()) return bad("expected either user and password, or token");
+  if (token->empty() == user->empty()) return bad_request("expected either user and password, or token");
   if (!token->empty()) return "Bearer " + *token;
-  if (user->find(':') != std::string::npos) return bad("a name has no colon");
+  if (user->find(':') != std::string::npos) return bad_request("a name has no colon");
   return "Basic " + rr::encode_base64(rr::as_bytes(*user + ":" + *password));
 }
 
@@ -187,9 +135,9 @@ rr::awaitable<Response> judge_sign_in(GatewayState& gateway, const Request& requ
   if (!cookie) co_return problem_response(409, "you have more roles than a cookie can name");
   gateway.access().record({.event = "signed_in", .who = &who});
   const auto left = std::min(Clock::duration(SignIns::lifetime), who.ends - now);
-  auto response = answer(201, {{"user", who.name},
-                               {"roles", who.roles},
-                               {"expires_in", std::chrono::duration_cast<std::chrono::seconds>(left).count()}});
+  auto response = json_answer(201, {{"user", who.name},
+                                    {"roles", who.roles},
+                                    {"expires_in", std::chrono::duration_cast<std::chrono::seconds>(left).count()}});
   response.set("Set-Cookie", format_sign_in_cookie(request.arrival, *cookie));
   co_return response;
 }
@@ -244,7 +192,7 @@ Handler who_endpoint(GatewayState& gateway) {
     out["requests"] = !access.state().config.tokens_file.empty();
     out["session"] = !who.sign_in.empty();
     out["admin"] = !access.is_open() && access.state().rules.check(who, {.verb = Verb::admin}).has_value();
-    return answer(200, out);
+    return json_answer(200, out);
   };
 }
 
@@ -256,7 +204,7 @@ Handler tickets_endpoint(GatewayState& gateway) {
           request, rr::make_error(rr::ErrorCode::authentication_error, "a ticket is for who has shown who he is"));
     const auto ticket = gateway.access().tickets().issue(request.identity, Clock::now());
     if (!ticket) return problem_response(409, "you have more roles than a ticket can name");
-    return answer(201, {{"ticket", *ticket}, {"expires_in", Tickets::lifetime.count()}});
+    return json_answer(201, {{"ticket", *ticket}, {"expires_in", Tickets::lifetime.count()}});
   };
 }
 
@@ -275,13 +223,13 @@ Handler ask_endpoint(GatewayState& gateway) {
     log(LogLevel::info, "access asked for", {{"name", *name}, {"peer", request.arrival.peer}, {"reason", *reason}});
     gateway.access().record({.event = "asked", .who = &request.identity, .detail = *name});
     const auto lifetime = std::chrono::seconds(AccessRequests::lifetime).count();
-    return answer(202, {{"id", asked->id}, {"secret", asked->secret}, {"expires_in", lifetime}});
+    return json_answer(202, {{"id", asked->id}, {"secret", asked->secret}, {"expires_in", lifetime}});
   };
 }
 
 Handler requests_endpoint(GatewayState& gateway) {
   return [&gateway](const Request& request, std::string_view) {
-    if (auto refusal = refuse_stranger(gateway, request)) return std::move(*refusal);
+    if (auto refusal = refuse_who_may_not_admin(gateway, request)) return std::move(*refusal);
     auto list = Json::array();
     for (const auto& each : gateway.http_access().requests().list(Clock::now()))
       list.push_back({{"id", each.id},
@@ -292,7 +240,7 @@ Handler requests_endpoint(GatewayState& gateway) {
                       {"asked", Clock::to_time_t(each.asked)}});
     Json out;
     out["requests"] = std::move(list);
-    return answer(200, out);
+    return json_answer(200, out);
   };
 }
 
@@ -304,7 +252,7 @@ Handler request_endpoint(GatewayState& gateway) {
     if (std::find(request_actions.begin(), request_actions.end(), what) == request_actions.end())
       return problem_response(404, "expected .../requests/ID/approve, deny or claim");
     if (what == "claim") return claim(gateway, request, id);
-    if (auto refusal = refuse_stranger(gateway, request)) return std::move(*refusal);
+    if (auto refusal = refuse_who_may_not_admin(gateway, request)) return std::move(*refusal);
     if (const auto recordable = gateway.access().audit().admit(); !recordable)
       return gateway.http_access().refusal(request, recordable.error());
     return what == "approve" ? approve(gateway, request, id) : deny(gateway, request, id);

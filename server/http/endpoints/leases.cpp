@@ -24,19 +24,16 @@ milliseconds read_deadman(const ObjectRequest& request) {
   return milliseconds(number);
 }
 
-/// One more client of the session, which holds the lease until that ends.
+/// The key of a client that holds the lease.
 rr::awaitable<std::string> acquire(const ObjectRequest& request, const Target& target, rr::LockCommand command) {
   auto& gateway = request.gateway();
   const auto deadman = read_deadman(request);
   if (gateway.lease_holders().size() >= max_lease_holders)
     refuse(rr::ErrorCode::out_of_system_resource, "too many leases are held by HTTP already");
-  const auto& who = request.request().identity;
-  const UpstreamClient& asker = *target.client;
-  const auto user = who.is_proven() ? who.subject() : asker.lock_user();
-  const auto holder = value_or_throw(gateway.clients().make_another(target.client->upstream(), user));
-  holder->set_standing(std::make_shared<Standing>(gateway.access(), who));
+  auto asker = target.client;
+  auto who = request.request().identity;
   auto path = target.path();
-  co_await holder->lock(command, std::move(path), deadman);
+  const auto holder = co_await hold_lease(gateway, std::move(asker), std::move(who), std::move(path), command, deadman);
   auto key = rr::format_node_id(rr::random_node_id(), rr::NodeIdFormat::dashes);
   gateway.lease_holders().emplace(key, holder);
   holder->on_lease_ended([&gateway, key, executor = holder->upstream()->device().executor()](const auto&, const auto&) {
@@ -46,6 +43,17 @@ rr::awaitable<std::string> acquire(const ObjectRequest& request, const Target& t
 }
 
 }  // namespace
+
+rr::awaitable<std::shared_ptr<ValueClient>> hold_lease(GatewayState& gateway, std::shared_ptr<ValueClient> asker,
+                                                       Identity who, std::string path, rr::LockCommand command,
+                                                       milliseconds deadman) {
+  const UpstreamClient& shared = *asker;
+  const auto user = who.is_proven() ? who.subject() : shared.lock_user();
+  const auto holder = value_or_throw(gateway.clients().make_another(asker->upstream(), user));
+  holder->set_standing(std::make_shared<Standing>(gateway.access(), std::move(who)));
+  co_await holder->lock(command, std::move(path), deadman);
+  co_return holder;
+}
 
 std::optional<std::string_view> lease_event(const ObjectRequest& request, const Target& target) {
   const auto what = target.member ? std::nullopt : request.option("lease");

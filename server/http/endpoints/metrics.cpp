@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "server/config/version.hpp"
+#include "server/log/log.hpp"
 #include "server/state/gateway_state.hpp"
 #include "server/state/http_access.hpp"
 
@@ -207,6 +208,8 @@ Handler metrics_endpoint(GatewayState& gateway) {
     out.single("rrgate_memory_budget_used_bytes", "gauge", "What they make it hold.", memory.used());
     out.single("rrgate_memory_budget_refusals_total", "counter", "What was refused because that was too much.",
                memory.refusals());
+    out.single("rrgate_log_lost_total", "counter", "Lines of the log that were dropped since nobody read it.",
+               lost_log_lines());
     write_audit(out, gateway.access().audit().state());
     const auto devices = look_at(gateway);
     write_devices(out, devices);

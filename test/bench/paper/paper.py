@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The latency of an empty call, by every way there is: paper.py --build DIRECTORY --report FILE [--calls N]
 
-What the paper has as its Table I. All clients run beside their services at once and take turns, a thousandth of their calls each, so
+What the paper has as its Table I. All clients run beside their services at once and take turns, a twentieth of their calls each, so
 that the machine's moods hit all alike. Writes a table (Markdown) and, beside it, a picture of how the latencies are spread (SVG).
 """
 import argparse

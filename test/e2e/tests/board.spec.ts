@@ -62,6 +62,7 @@ test("panels are moved and sized by keys and pointer, and are where they were af
   expect(plot).not.toBeNull();
 
   await page.getByRole("button", { name: "Done" }).click();
+  await expect(page.locator('[data-kept="true"]')).toBeVisible();
   await page.reload();
   await expect(notes.getByRole("textbox")).toHaveValue("call Vera at 12");
   expect(await place()).toEqual(after);
@@ -71,6 +72,7 @@ test("a board goes by its address, and as a file, to another browser", async ({ 
   await openBoard(page, lab.url);
   await addPanel(page, "notes");
   await page.locator('[data-panel="notes"]').getByRole("textbox", { name: "Notes", exact: true }).fill("für alle");
+  await expect(page.locator('[data-kept="true"]')).toBeVisible();
   const address = page.url();
   expect(address).toContain("&board=");
   const saved = page.waitForEvent("download");

@@ -58,6 +58,33 @@ test("Stop stops a robot that another page has in control", async ({ page, conte
   await other.close();
 });
 
+test("Stop stops the robot also where control was lost to others", async ({ page, context, lab }) => {
+  const other = await context.newPage();
+  await openRobot(other, lab);
+  await other.bringToFront();
+  await other.keyboard.down("ArrowUp");
+  await waitUntilDriving(other);
+  await page.bringToFront();
+  await page.keyboard.press("ArrowDown");
+  await expect(control(page)).toHaveAttribute("data-control", "lost");
+  await expect(forward(page)).toBeDisabled();
+  await expect(page.getByRole("button", { name: "Stop" })).toBeEnabled();
+  await page.getByRole("button", { name: "Stop" }).click();
+  await waitUntilStopped(page, 1_000);
+  await other.close();
+});
+
+test("the list of all members has a Stop, too", async ({ page, lab }) => {
+  const robot = `${lab.url}api/v1/devices/create/Create/`;
+  expect((await page.request.post(`${robot}Drive`, { data: { velocity: 100, radius: 32767 } })).ok()).toBe(true);
+  await waitUntilDriving(page);
+  await page.getByRole("link", { name: "All members" }).click();
+  await page.getByRole("button", { name: "Stop", exact: true }).click();
+  await expect(page.locator('[data-stop="arrived"]')).toBeVisible();
+  const state = (await (await page.request.get(`${robot}state`)).json()) as { velocity: number };
+  expect(state.velocity).toBe(0);
+});
+
 test("a page that hangs while it drives is out of control and stays so until it is taken by hand", async ({ page }) => {
   await page.keyboard.down("ArrowUp");
   await waitUntilDriving(page);

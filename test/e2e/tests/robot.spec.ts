@@ -79,6 +79,20 @@ for (const [what, end] of Object.entries(endsOfAHeldKey)) {
   });
 }
 
+for (const key of ["Escape", "Space"]) {
+  test(`${key} stops a robot that others drive, while the slider of the speed has the keyboard`, async ({
+    page,
+    lab,
+  }) => {
+    const drive = `${lab.url}api/v1/devices/create/Create/Drive`;
+    expect((await page.request.post(drive, { data: { velocity: 100, radius: 32767 } })).ok()).toBe(true);
+    await waitUntilDriving(page);
+    await page.getByRole("slider", { name: "Speed" }).focus();
+    await page.keyboard.press(key);
+    await waitUntilStopped(page);
+  });
+}
+
 const endsOfAHeldButton: Readonly<Record<string, (page: Page) => Promise<unknown>>> = {
   "the key is let go": (page) => page.keyboard.up("Enter"),
   "another button takes the keyboard": (page) => page.getByRole("button", { name: "Clear trail" }).focus(),

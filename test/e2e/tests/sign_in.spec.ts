@@ -96,6 +96,58 @@ test("a device is connected with tickets, again after a restart of the gateway; 
   await expect(form(page)).toBeVisible();
 });
 
+test("who asks for access is given a token by somebody who may, and is in with it", async ({ page, browser }) => {
+  await page.goto(lab.url);
+  await page.getByText("Ask for access").first().click();
+  await page.getByLabel("Ask as").fill("tablet");
+  await page.getByLabel("What for").fill("cell 3");
+  await page.keyboard.press("Enter");
+  await expect(page.locator('[data-ask="waiting"]')).toContainText("as tablet");
+  const other = await (await browser.newContext()).newPage();
+  await other.goto(lab.url);
+  await signIn(other, "root", password);
+  const request = other.locator('[data-request="tablet"]');
+  await expect(request).toContainText("cell 3");
+  await request.getByRole("button", { name: "Approve" }).click();
+  await expect(page.locator(".ask-token")).toHaveText(/^rrg_/);
+  await page.getByRole("button", { name: "Sign in with this token" }).click();
+  await expect(page.getByRole("group", { name: "You" })).toContainText("viewer");
+  await other.context().close();
+});
+
+test("what agents ask for is shown to who decides, with who, what and why, and is answered", async ({ page }) => {
+  const answers: (string | null)[] = [];
+  let approvals = [
+    {
+      id: "a1",
+      user: "bot",
+      client: "10.0.0.5",
+      device: "create",
+      path: "Create",
+      member: "Drive",
+      verb: "call",
+      values: { velocity: 100 },
+      why: "to see the door",
+      ["expires_in"]: 20,
+    },
+  ];
+  await page.route("**/api/v1/agents/approvals", (route) => route.fulfill({ json: { approvals, ["stopped_for"]: 0 } }));
+  await page.route("**/api/v1/agents/approvals/a1", async (route) => {
+    answers.push(route.request().postData());
+    approvals = [];
+    await route.fulfill({ json: { state: "allowed" } });
+  });
+  await page.goto(lab.url);
+  await signIn(page, "root", password);
+  const approval = page.locator('[data-approval="a1"]');
+  for (const words of ["bot", "create · Create.Drive", '{"velocity":100}', "to see the door"])
+    await expect(approval).toContainText(words);
+  await approval.getByRole("button", { name: "Allow once" }).click();
+  await expect(approval).toBeHidden();
+  expect(answers).toEqual(['{"answer":"once"}']);
+  await expect(page.getByRole("button", { name: "Stop all agents" })).toBeVisible();
+});
+
 test("the form fits a phone and is used with the keyboard", async ({ page }) => {
   await page.setViewportSize({ width: 320, height: 568 });
   await page.goto(lab.url);

@@ -42,6 +42,25 @@ test("a standard robot: its state in words, a joint jogged while a button is hel
   await expect(forward).toBeDisabled();
 });
 
+test("Halt stops as Stop does, and no jogging begins behind it", async ({ page }) => {
+  await page.goto(`${robot.url}#/devices/peer/robot`);
+  const state = page.getByRole("list", { name: "State" });
+  await page.getByRole("button", { name: "Jog", exact: true }).click();
+  await expect(state).toContainText("jog");
+  await page.getByRole("button", { name: "Halt", exact: true }).click();
+  await expect(state).toContainText("halt");
+  robot.device.signal("SIGSTOP"); // what is sent now is answered late
+  try {
+    await page.getByRole("button", { name: "Jog", exact: true }).click();
+    await page.getByRole("button", { name: "Halt", exact: true }).click();
+  } finally {
+    robot.device.signal("SIGCONT");
+  }
+  await expect(page.getByRole("button", { name: "Jog", exact: true })).toBeEnabled(); // its sequence is over
+  await expect(state).toContainText("halt");
+  await expect(page.getByRole("button", { name: "joint_0 forward" })).toBeDisabled();
+});
+
 test("a robot that freezes is no longer jogged, and its state is marked old", async ({ page }) => {
   await page.goto(`${robot.url}#/devices/peer/robot`);
   await page.getByRole("button", { name: "Jog", exact: true }).click();

@@ -82,6 +82,55 @@ test("a stick on the screen drives as far as it is pushed, and springs back", as
   await expectSpeed(lab, 0);
 });
 
+test("a stick on the screen that is still held drives no more after Escape, until it is pressed anew", async ({
+  page,
+  lab,
+}) => {
+  const box = (await page.getByLabel("Left stick").boundingBox())!;
+  const middle = { x: box.x + box.width / 2, y: box.y + box.height / 2 };
+  await page.mouse.move(middle.x, middle.y);
+  await page.mouse.down();
+  await page.mouse.move(middle.x, box.y);
+  await expectSpeed(lab, 0.05);
+  await page.keyboard.press("Escape");
+  await expectSpeed(lab, 0);
+  await page.mouse.move(middle.x, box.y + 1);
+  await page.mouse.move(middle.x, box.y + 2);
+  await page.waitForTimeout(300); // three repetitions of what is held
+  expect(await speedOf(lab)).toBe(0);
+  await page.mouse.up();
+  await page.mouse.move(middle.x, middle.y);
+  await page.mouse.down();
+  await page.mouse.move(middle.x, box.y - box.height);
+  await expectSpeed(lab, 0.05);
+  await page.mouse.up();
+  await expectSpeed(lab, 0);
+});
+
+test("a gamepad that is still pushed drives no more after Stop, until it was in the middle", async ({ page, lab }) => {
+  const push = (up: number) =>
+    page.evaluate((y) => Object.assign(window, { pads: [{ connected: true, axes: [0, -y, 0, 0] }] }), up);
+  await push(0);
+  await expect(page.locator('[data-gamepad="true"]')).toBeVisible();
+  await page.locator('[data-panel="teleop"]').getByRole("button", { name: "Take control" }).click();
+  for (const stop of ["Stop", "Rest"]) {
+    await push(1);
+    await expectSpeed(lab, 0.05);
+    await page.getByRole("button", { name: stop, exact: true }).click();
+    await expectSpeed(lab, 0);
+    await push(0.9);
+    await page.waitForTimeout(300); // three repetitions of what is held
+    expect(await speedOf(lab)).toBe(0);
+    await push(0);
+    await expect(command(page)).toHaveText("0,32767");
+    await page.waitForTimeout(100); // a few frames: the page has seen it in the middle
+  }
+  await push(1);
+  await expectSpeed(lab, 0.05);
+  await push(0);
+  await expectSpeed(lab, 0);
+});
+
 test("a gamepad drives once one is in control, past its dead zone", async ({ page, lab }) => {
   const push = (up: number) =>
     page.evaluate((y) => Object.assign(window, { pads: [{ connected: true, axes: [0, -y, 0, 0] }] }), up);

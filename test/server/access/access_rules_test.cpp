@@ -55,6 +55,9 @@ bool means(const Meanings& meanings, const std::vector<std::string>& patterns, c
 bool model_allows(const std::vector<AccessRule>& rules, const Identity& identity, const std::string& device,
                   const std::string& service, const std::string& path, const std::string& member, Verb verb) {
   for (const auto& rule : rules) {
+    // Rules for agents are for them alone, and no others give them anything that moves a device.
+    const bool is_command = verb == Verb::write || verb == Verb::call || verb == Verb::lock;
+    if (identity.face == Face::mcp ? is_command && !rule.agent : rule.agent.has_value()) continue;
     bool is_for = false;
     for (const auto& role : rule.roles)
       is_for = is_for || (role == "*" && identity.is_proven()) ||
@@ -88,12 +91,14 @@ class RandomRules {
       rule.members = some(keys(member_meanings));
       for (const auto verb : all_verbs)
         if (pick(2)) rule.may.push_back(verb);
+      if (pick(2)) rule.agent.emplace();
     }
     return out;
   }
   Identity identity() {
     auto out = who("somebody", some(all_roles));
     if (pick(4) == 0) out.proof = Proof::none;
+    if (pick(2)) out.face = Face::mcp;
     return out;
   }
 
@@ -166,6 +171,71 @@ TEST_CASE("rights: without rules those may everything who have proven who they a
   CHECK_FALSE(rules.check(Identity{}, request));
   CHECK_FALSE(rules.check_whole_device(Identity{}, "create"));
   CHECK_FALSE(rules.sees(Identity{}, "create"));
+}
+
+TEST_CASE("agents: what moves a device is given by rules for agents alone, and those give nothing by any other face") {
+  const AccessRequest drive{"create", "Create", "Create", "Drive", Verb::call};
+  auto agent = who("mind", {"agent"});
+  agent.face = Face::mcp;
+  CHECK_FALSE(AccessRules().check(agent, drive));
+  CHECK_FALSE(AccessRules({}, true).check(agent, drive));
+  CHECK(AccessRules({}, true).check(agent, {"create", "Create", "Create", "DistanceTraveled", Verb::read}));
+  CHECK_FALSE(AccessRules({}, true).check_whole_device(agent, "create"));
+  const AccessRules ordinary({AccessRule{.roles = {"agent"}, .may = {Verb::read, Verb::write, Verb::call}}}, true);
+  CHECK_FALSE(ordinary.check(agent, drive));
+  CHECK_FALSE(ordinary.terms(agent, drive));
+
+  const AccessRules rules({AccessRule{.roles = {"agent"}, .members = {"Drive"}, .may = {Verb::call}, .agent = {{}}}},
+                          true);
+  CHECK(rules.check(agent, drive));
+  REQUIRE(rules.terms(agent, drive));
+  CHECK(rules.terms(agent, drive)->needs_approval);
+  CHECK(rules.terms(agent, drive)->needs_lease);
+  CHECK_FALSE(rules.check(agent, {"create", "Create", "Create", "Other", Verb::call}));
+  for (const auto face : {Face::none, Face::native, Face::websocket, Face::rest, Face::stream, Face::json}) {
+    agent.face = face;
+    CHECK_FALSE(rules.check(agent, drive));
+    CHECK_FALSE(rules.terms(agent, drive));
+    CHECK_FALSE(rules.sees(agent, "create"));
+    CHECK_FALSE(rules.check_whole_device(agent, "create"));
+  }
+}
+
+TEST_CASE("agents: of several rules the terms hold together") {
+  auto agent = who("mind", {"agent"});
+  agent.face = Face::mcp;
+  const AgentTerms wide{{{"v", {-500, 100}}}, false, false, std::chrono::seconds(9)};
+  const AgentTerms narrow{{{"v", {-50, 300}}, {"w", {0, 1}}}, true, true, std::chrono::seconds(2)};
+  const AccessRules rules({AccessRule{.roles = {"agent"}, .may = {Verb::call}, .agent = wide},
+                           AccessRule{.roles = {"*"}, .may = {Verb::call}, .agent = narrow}},
+                          true);
+  const AgentTerms both{{{"v", {-50, 100}}, {"w", {0, 1}}}, true, true, std::chrono::seconds(2)};
+  CHECK(rules.terms(agent, {"d", "s", "s", "m", Verb::call}) == both);
+  CHECK(rules.terms(agent, {"d", "s", "s", "m", Verb::write}) == std::nullopt);
+}
+
+TEST_CASE("agents: what has a limit must be there, be a number, and lie within") {
+  const auto passes = [](const std::string& place, const std::string& json) {
+    const AgentTerms terms{.limits = {{place, {-2, 3}}}};
+    return terms.check(rr::OrderedJson::parse(json)).has_value();
+  };
+  for (const auto* good :
+       {R"({"v": -2})", R"({"v": 3, "w": 99})", R"({"v": 2.5})", R"({"v": [1, 2]})", R"({"v": [[1], [2]]})"})
+    CHECK(passes("v", good));
+  for (const auto* bad :
+       {R"({})", R"({"v": 3.1})", R"({"v": -3})", R"({"v": null})", R"({"v": true})", R"({"v": "NaN"})",
+        R"({"v": "Infinity"})", R"({"v": "3"})", R"({"v": " 3"})", R"({"v": "+3"})", R"({"v": "03"})",
+        R"({"v": "1e0"})", R"({"v": ""})", R"({"v": []})", R"({"v": [1, 4]})", R"({"v": [1, []]})",
+        R"({"v": {"v": 1}})", R"({"w": 1})", R"({"v": "18446744073709551616"})"})
+    CHECK_FALSE(passes("v", bad));
+  CHECK(passes("a.b", R"({"a": {"b": 1}})"));
+  CHECK(passes("a.b", R"({"a": [{"b": 1}, {"b": 2}]})"));
+  for (const auto* bad :
+       {R"({"a": {"b": 4}})", R"({"a": [{"b": 1}, {}]})", R"({"a": 1})", R"({"a.b": 1})", R"({"a": []})"})
+    CHECK_FALSE(passes("a.b", bad));
+  const AgentTerms terms{.limits = {{"v", {-2, 3}}}};
+  CHECK_THAT(terms.check(rr::OrderedJson::object()).error().message,
+             Catch::Contains("'v' has to be a number from -2.0 to 3.0"));
 }
 
 TEST_CASE("rights: a refusal says who may not do what") {

@@ -138,6 +138,43 @@ TEST_CASE("tokens are checked with the secret of a file, and with its next one w
   CHECK_FALSE(knows(first));
 }
 
+TEST_CASE("what a JSON Web Token has shown ends with its key, its issuer and what it was judged by") {
+  Files files;
+  files.write("secret", std::string(32, 'a'));
+  AccessConfig config;
+  config.jwt.secret_file = files.path("secret");
+  config.jwt.claims.issuer = "https://id.example";
+  Access access(config);
+  REQUIRE(access.load());
+  const auto now = std::chrono::system_clock::now();
+  const auto end = std::chrono::duration_cast<std::chrono::seconds>(now.time_since_epoch()).count() + 600;
+  const auto token = test::JwtSigner("HS256", std::string(32, 'a'))
+                         .sign({{"sub", "alice"}, {"iss", "https://id.example"}, {"exp", end}});
+  const auto alice = access.with_grants(access.state().jwt->verify(token, now).value());
+  CHECK(access.renew(alice));
+  access.reload(true);
+  CHECK(access.renew(alice));
+  SECTION("another key") {
+    files.write("secret", std::string(32, 'b'));
+    access.reload(true);
+    CHECK_FALSE(access.renew(alice));
+  }
+  SECTION("another issuer, audience or claim") {
+    auto other = config;
+    const auto which = GENERATE(0, 1, 2, 3);
+    (which == 0   ? other.jwt.claims.issuer
+     : which == 1 ? other.jwt.claims.audience
+     : which == 2 ? other.jwt.claims.user_claim
+                  : other.jwt.claims.roles_claim) = "other";
+    REQUIRE(access.replace(load_access(other).value()));
+    CHECK_FALSE(access.renew(alice));
+  }
+  SECTION("none any more") {
+    REQUIRE(access.replace(load_access({}).value()));
+    CHECK_FALSE(access.renew(alice));
+  }
+}
+
 TEST_CASE("roles are those of the file and those that the configuration adds") {
   Files files;
   files.write("users", Files::user("alice", "one", "viewer"));

@@ -1,4 +1,5 @@
 // What is bounded in number and time: tickets, requests of access.
+#include <algorithm>
 #include <catch2/catch.hpp>
 
 #include "server/access/access_requests.hpp"
@@ -41,6 +42,26 @@ TEST_CASE("refusals of strangers: one of a network a minute, and the sum of the 
   CHECK(sums(seconds(201), true) == "others 19901; ");
 }
 
+TEST_CASE("refusals: as many of a network as are wanted, then their sum") {
+  RefusalDigest digest(20);
+  int written = 0;
+  for (int i = 0; i < 50; ++i) written += digest.note("a", start);
+  for (int i = 0; i < 20; ++i) written += digest.note("b", start);
+  CHECK(written == 40);
+  const auto sums = digest.take(start + seconds(60));
+  REQUIRE(sums.size() == 1);
+  CHECK(sums[0].network == "a");
+  CHECK(sums[0].count == 30);
+}
+
+TEST_CASE("the site that a network of IPv6 is a part of") {
+  CHECK(site_name("2001:db8:1:2::/64") == "2001:db8:1::/48");
+  CHECK(site_name("2001:db8:1:ffff::/64") == "2001:db8:1::/48");
+  CHECK(site_name("192.0.2.1") == "192.0.2.1");
+  CHECK(site_name("::1") == "::1");
+  CHECK(site_name("no address/64") == "no address/64");
+}
+
 TEST_CASE("the network of a client as logs name it") {
   CHECK(network_name_of("192.0.2.1:40000") == "192.0.2.1");
   CHECK(network_name_of("192.0.2.1") == "192.0.2.1");
@@ -72,6 +93,19 @@ TEST_CASE("guessing: so often of a user and of a network, and nobody else is kep
     guess("alice", std::to_string(i), seconds(2));
     if (i % 5000 == 0) CHECK_FALSE(limits.begin("bob", "here", at(seconds(2))));
   }
+}
+
+TEST_CASE("guessing: the networks of one site do not each get their own share") {
+  LoginLimits limits;
+  const rr::Now now{start, {}};
+  const auto network = [](int number) { return "2001:db8:1:" + std::to_string(number) + "::/64"; };
+  int guesses = 0;
+  for (; guesses < 10'000 && limits.begin("alice", network(guesses), now); ++guesses)
+    limits.handle_failure("alice", network(guesses), now);
+  CHECK(guesses == 600);
+  CHECK(limits.begin("alice", network(1), {start + seconds(1), {}}));
+  CHECK(limits.begin("alice", "2001:db8:2:1::/64", now));
+  CHECK(limits.begin("alice", "192.0.2.1", now));
 }
 
 TEST_CASE("guessing: so many of a network are judged at a time") {
@@ -226,9 +260,35 @@ TEST_CASE("requests of access: few, and for an hour") {
   CHECK_FALSE(ask(0));
   int more = 0;
   while (ask(1 + more) && more < 1000) ++more;
-  CHECK(more == 97);
+  CHECK(more == 99);  // the two above one of address 0 have made room
   CHECK(ask(0, std::chrono::minutes(60)));
   CHECK(requests.list(day + std::chrono::minutes(60)).size() == 1);
   CHECK_FALSE(requests.ask("a b", "", "c", "x", day + std::chrono::minutes(60)));
   CHECK_FALSE(requests.ask("a", std::string(501, 'x'), "c", "x", day + std::chrono::minutes(60)));
+}
+
+TEST_CASE("requests of access: who asks for much takes the places of nobody else") {
+  AccessRequests requests;
+  const auto ask = [&](const std::string& name, const std::string& address, int after) {
+    return requests.ask(name, "", "c", address, day + seconds(after)).has_value();
+  };
+  const auto has = [&](const std::string& name) {
+    const auto all = requests.list(day + seconds(200));
+    return std::any_of(all.begin(), all.end(), [&](const auto& each) { return each.name == name; });
+  };
+  const bool is_site = GENERATE(false, true);
+  int asked = 0;
+  const auto network = [&](int number) {
+    return is_site ? "2001:db8:1:" + std::to_string(number) + "::/64" : "192.0.2." + std::to_string(number);
+  };
+  CHECK(ask("early", "203.0.113.1", 0));
+  while (asked < 99 && ask("n" + std::to_string(asked), network(asked / 3), 1 + asked)) ++asked;
+  CHECK(asked == 99);
+  CHECK_FALSE(ask("more", network(0), 150));
+  for (int i = 0; i < 5; ++i) CHECK(ask("late" + std::to_string(i), "198.51.100." + std::to_string(i), 150 + i));
+  CHECK(requests.list(day + seconds(200)).size() == 100);
+  CHECK(has("early"));
+  CHECK(has("late0"));
+  CHECK(has("late4"));
+  CHECK_FALSE(has("n0"));
 }

@@ -63,6 +63,26 @@ TEST_CASE("JWT: every algorithm, and no signature for another text") {
   }
 }
 
+TEST_CASE("JWT: a key is known again by what it is, not by what it is called") {
+  const JwtSigner first("ES256"), second("ES256");
+  auto named = first.jwk();
+  named["kid"] = "one";
+  auto renamed = first.jwk();
+  renamed["kid"] = "two";
+  auto other = second.jwk();
+  other["kid"] = "one";
+  const auto made = JwtVerifier::from_jwks(jwks({named, second.jwk()}), {});
+  REQUIRE(made);
+  const auto credential = made->verify(first.sign(claims()), now).value().credential;
+  CHECK_FALSE(credential.empty());
+  CHECK(made->verify(second.sign(claims()), now).value().credential != credential);
+  CHECK(made->knows(credential));
+  CHECK(JwtVerifier::from_jwks(jwks({other, renamed}), {})->knows(credential));
+  CHECK_FALSE(JwtVerifier::from_jwks(jwks({other}), {})->knows(credential));
+  CHECK_FALSE(JwtVerifier::without_keys({}).knows(credential));
+  CHECK_FALSE(made->knows(""));
+}
+
 TEST_CASE("JWT: the key says the algorithm") {
   const JwtSigner rsa("RS256");
   const auto verify = verifier(rsa);

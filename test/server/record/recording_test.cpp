@@ -1,4 +1,5 @@
 #include <catch2/catch.hpp>
+#include <fstream>
 
 #include "server/record/recording.hpp"
 #include "test/support/folder.hpp"
@@ -116,6 +117,29 @@ TEST_CASE("a file that is large enough is followed by the next, which stands for
        std::filesystem::directory_iterator(std::filesystem::path(writer.path()).parent_path()))
     ++files;
   CHECK(files == 2);
+}
+
+TEST_CASE("the files that follow leave those of an earlier recording alone, unless they are to be replaced") {
+  const test::Folder folder;
+  const auto earlier = folder.path("a-2.mcap");
+  const auto record_much = [&](bool replaces) {
+    Recorded robot;
+    RecordingOptions options;
+    options.max_bytes = 20'000;
+    options.replaces = replaces;
+    auto writer = RecordingWriter::create(folder.path("a.mcap"), options).value();
+    robot.service.label = "Robot";
+    REQUIRE(writer.add_service(robot.service));
+    const auto pose = robot.add(writer, "pose");
+    for (int i = 0; writer.path() == folder.path("a.mcap"); ++i) REQUIRE(writer.write(pose, value(i), {}, {i, 0}));
+    REQUIRE(writer.close());
+    return writer.path();
+  };
+  std::ofstream(earlier) << "of yesterday";
+  CHECK(record_much(false) == folder.path("a-3.mcap"));
+  CHECK(std::filesystem::file_size(earlier) == 12);
+  CHECK(record_much(true) == earlier);
+  CHECK(std::filesystem::file_size(earlier) > 12);
 }
 
 TEST_CASE("schemas have no references and no choices, as tools read them that plot") {

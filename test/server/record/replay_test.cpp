@@ -41,13 +41,18 @@ struct Device {
   std::int32_t gain = 0;
   std::unique_ptr<rr::RunningNode> node;
 
-  Device() {
+  /// `port`  where it listens beside the free one; 0: nowhere.
+  explicit Device(std::uint16_t port = 0, bool has_axis = true) {
     service->property("gain").get([this] { return gain; }).set([this](std::int32_t value) { gain = value; });
     service->function("go", [] {});
     service->generator("steps", [] { return rr::Generator{}; });
-    service->objref("axes", [this](std::string_view index) { return index == "x y" ? axis : nullptr; });
-    node = std::make_unique<rr::RunningNode>([this](rr::Node& added) { added.add(service); }, rr::NodeOptions{},
-                                             "dev.node");
+    service->objref("axes",
+                    [this, has_axis](std::string_view index) { return has_axis && index == "x y" ? axis : nullptr; });
+    const auto prepare = [this, port](rr::Node& added) {
+      added.add(service);
+      if (port != 0) added.listen("rr+tcp://127.0.0.1:" + std::to_string(port));
+    };
+    node = std::make_unique<rr::RunningNode>(prepare, rr::NodeOptions{}, "dev.node");
   }
   void tell(std::int32_t number) {
     node->ask([&](rr::Node&) {
@@ -268,6 +273,100 @@ TEST_CASE("a replay is moved, stepped, sped up and played again, and time stamps
   CHECK_THAT(rr::error_of([&] { control.set("speed", 0.0); }).message, Catch::Contains("expected 0.001 to 1000"));
   CHECK_THAT(rr::error_of([&] { control.call("step", 10'001u); }).message, Catch::Contains("expected 10000 at most"));
   CHECK(control.get("file").to_text().value() == recorded.path);
+}
+
+TEST_CASE("what a wire sends after the replay went back is newer than all before, whatever its time stamps are") {
+  const test::Folder folder;
+  rr::TypeRegistry types;
+  REQUIRE(types.add({definition}, rr::RobdefMode::strict));
+  auto writer = RecordingWriter::create(folder.path("late.mcap")).value();
+  RecordedService service{"Dev", "rr+tcp://h/?service=Dev", "Dev", "com.dev.Dev"};
+  service.definitions = {definition};
+  service.objects = {{"Dev", "com.dev.Dev"}};
+  REQUIRE(writer.add_service(service));
+  const auto* count = types.find_entity("com.dev.Dev")->find_member("count");
+  const auto channel = writer.add_member(service, "Dev", "", *count, types).value();
+  // The values are a second apart, and reached the recorder at once.
+  for (int i = 1; i <= 3; ++i) REQUIRE(writer.write(channel, {{"value", i}}, rr::TimeSpec{i, 0}, {5, i}));
+  REQUIRE(writer.close());
+
+  boost::asio::io_context io(1);
+  std::vector<McapTime> stamps;
+  Player::Listener listener;
+  listener.play = [&](const McapMessage& message, McapTime shift) { stamps.push_back(message.publish_time + shift); };
+  listener.changed = [] {};
+  listener.failed = [](const rr::Error& error) { FAIL_CHECK(error.message); };
+  Player player(io, Recording::open(writer.path()).value(), listener);
+  player.set_loops(true);
+  player.set_speed(0.001);  // a loop's end adds 100 us
+  player.play();
+  REQUIRE(run_until(io, [&] { return stamps.size() >= 9; }));
+  player.pause();
+  player.seek(2e-9);  // what it was then: the value before
+  player.step(1);
+  CHECK(stamps.size() >= 11);
+  CHECK(std::is_sorted(stamps.begin(), stamps.end(), std::less_equal<>()));
+  CHECK(std::adjacent_find(stamps.begin(), stamps.end()) == stamps.end());
+}
+
+TEST_CASE("a property that is slow to answer holds up no other") {
+  const test::Folder folder;
+  const auto service = rr::Service::from_text({"service com.slow\nstdver 0.10\nobject Dev\nproperty int32 slow "
+                                               "[readonly]\nproperty int32 gain [readonly]\nend\n"},
+                                              "Dev", "Dev");
+  std::vector<rr::Reply<std::int32_t>> unanswered;
+  service->property("slow").get([&](rr::Reply<std::int32_t> reply) { unanswered.push_back(std::move(reply)); });
+  service->property("gain").get([] { return 1; });
+  rr::RunningNode node([&](rr::Node& added) { added.add(service); });
+  boost::asio::io_context io(1);
+  auto writer = RecordingWriter::create(folder.path("dev.mcap")).value();
+  Recorder::Listener listener;
+  listener.begun = [](const rr::Result<>& outcome) { CHECK(outcome); };
+  listener.problem = [](const std::string& problem) { FAIL_CHECK(problem); };
+  const RecorderOptions how{{"slow", "gain"}, std::chrono::milliseconds(1)};
+  const auto recorder = std::make_shared<Recorder>(io, writer, how, listener);
+  recorder->start(node.url("Dev"), {});
+  CHECK(run_until(io, [&] { return writer.message_count() >= 3; }));
+  recorder->close();
+  node.stop();
+  node.join();
+}
+
+TEST_CASE("an object that is first there after a reconnection is recorded from then on") {
+  const test::Folder folder;
+  auto device = std::make_unique<Device>(std::uint16_t{0}, false);
+  const auto url = device->node->url("Dev");
+  const auto port = device->node->port();
+  boost::asio::io_context io(1);
+  auto writer = RecordingWriter::create(folder.path("dev.mcap")).value();
+  Recorder::Listener listener;
+  listener.begun = [](const rr::Result<>& outcome) { CHECK(outcome); };
+  std::vector<std::string> problems;
+  listener.problem = [&](const std::string& problem) { problems.push_back(problem); };
+  listener.failed = [](const rr::Error& error) { FAIL_CHECK(error.message); };
+  const RecorderOptions how{{"count", "axes/x%20y/*"}, std::chrono::milliseconds(1)};
+  const auto recorder = std::make_shared<Recorder>(io, writer, how, listener);
+  recorder->start(url, {});
+  const auto records = [&](std::uint64_t messages, std::size_t members) {
+    return run_until(io, [&] {
+      device->tell(1);
+      return writer.message_count() >= messages && writer.topics().size() == members;
+    });
+  };
+  REQUIRE(records(1, 1));
+  device.reset();
+  REQUIRE(run_until(io, [&] { return !problems.empty() && problems.back().find("lost") != std::string::npos; }));
+  device = std::make_unique<Device>(port);
+  REQUIRE(records(writer.message_count() + 10, 2));
+  recorder->close();
+  run_until(io, [] { return false; });
+  REQUIRE(writer.close());
+  CHECK(!recorded_values(writer.path(), "/Dev/axes/x y/angle").empty());
+  const auto recording = Recording::open(writer.path()).value();
+  REQUIRE(recording.services().size() == 1);
+  CHECK(recording.services()[0].objects.size() == 2);
+  const RunningReplay replay(writer.path());  // serves it
+  CHECK(replay.problems().empty());
 }
 
 TEST_CASE("what can't be recorded is told, and the rest recorded") {

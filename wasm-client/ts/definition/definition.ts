@@ -17,6 +17,13 @@ export function definition(session: Session, type: string, name = type.replace(/
     : makeError("InvalidOperation", "definition: the session is closed");
 }
 
+/** See ObjectInfo.constants. */
+export function constants(session: Session, type: string): Constants {
+  const { constants: shared, types } = definition(session, type);
+  const own = types[type.slice(type.lastIndexOf(".") + 1)]?.constants ?? {};
+  return record([...Object.entries(shared), ...Object.entries(own)]);
+}
+
 /** As the core gives it; constants still as they are written. */
 function makeDefinition(raw: RawDefinition): DefinitionInfo {
   const notes = new Map<string, string>();

@@ -4,7 +4,7 @@
 import { callSafely, ErrorCode, makeError, RobotRaconteurError } from "../errors.js";
 import { Info } from "../object.js";
 import type { Session } from "../session.js";
-import type { CallOptions, Lease, LeaseOptions, RemoteObject } from "../types.js";
+import type { CallOptions, Lease, LeaseOptions, LeaseState, RemoteObject } from "../types.js";
 
 const Command = { acquire: 0, takeOver: 1, renew: 2, release: 3 } as const;
 const renewalsPerDeadman = 3;
@@ -22,12 +22,13 @@ export async function lease(object: RemoteObject, options: LeaseOptions = {}): P
   const path = object.$.path;
   const ask = (command: number, more: CallOptions = {}) =>
     session.request((core) => core.lease(path, command, deadman), more);
+  const askedAt = performance.now();
   try {
     await ask(options.takeover ? Command.takeOver : Command.acquire, options);
   } catch (error) {
     throw explain(error);
   }
-  const held = new HeldLease(ask, deadman);
+  const held = new HeldLease(ask, deadman, askedAt);
   held.whenOver(limitCalls(session, path, options.callTimeout ?? defaultCallTimeout));
   held.whenOver(
     session.onClose((reason) => held.lose(reason ?? makeError("ConnectionError", "the session was closed"))),
@@ -37,7 +38,7 @@ export async function lease(object: RemoteObject, options: LeaseOptions = {}): P
 
 const limits = new WeakMap<Session, Map<string, number>>();
 
-/** Calls of the object and of those below it have so much time, until the returned function is called. */
+/** Commands of the object and of those below it have so much time, until the returned function is called. */
 function limitCalls(session: Session, path: string, timeout: number): () => void {
   const ofSession = limits.get(session) ?? new Map<string, number>();
   limits.set(session, ofSession);
@@ -60,27 +61,51 @@ const isHidden = (): boolean => typeof document !== "undefined" && document.visi
 class HeldLease implements Lease {
   readonly ended: Promise<RobotRaconteurError | undefined>;
   #end!: (reason?: RobotRaconteurError) => void;
-  #isHeld = true;
+  #state: LeaseState = "held";
+  #reason: RobotRaconteurError | undefined;
+  /** When the newest renewal that was answered was asked for: the gateway's dead-man's time begins no earlier. */
+  #renewedAt: number;
+  #doubtTimer: ReturnType<typeof setTimeout> | undefined;
   #isRenewing = false;
-  #isReleased = false;
   readonly #losers = new Set<(reason: RobotRaconteurError) => void>();
+  readonly #watchers = new Set<(state: LeaseState, reason?: RobotRaconteurError) => void>();
   readonly #undo: (() => void)[] = [];
 
+  /** `askedAt`  when the lease was asked for. */
   constructor(
     private readonly ask: (command: number, options?: CallOptions) => Promise<unknown>,
-    deadman: number,
+    private readonly deadman: number,
+    askedAt: number,
   ) {
+    this.#renewedAt = askedAt;
     this.ended = new Promise((resolve) => (this.#end = resolve));
-    const timer = setInterval(() => void this.#renew(deadman), deadman / renewalsPerDeadman);
-    this.whenOver(() => clearInterval(timer));
+    const timer = setInterval(() => void this.#renew(), deadman / renewalsPerDeadman);
+    this.whenOver(() => (clearInterval(timer), clearTimeout(this.#doubtTimer)));
+    this.#armDoubt();
+  }
+
+  /** By the clock: a page that has just woken up has run no timer yet. */
+  get state(): LeaseState {
+    this.#doubt();
+    return this.#state;
   }
 
   get isHeld(): boolean {
-    return this.#isHeld;
+    return this.state === "held";
+  }
+
+  get reason(): RobotRaconteurError | undefined {
+    this.#doubt();
+    return this.#reason;
   }
 
   whenOver(undo: () => void): void {
     this.#undo.push(undo);
+  }
+
+  onState(changed: (state: LeaseState, reason?: RobotRaconteurError) => void): () => void {
+    this.#watchers.add(changed);
+    return () => void this.#watchers.delete(changed);
   }
 
   onLost(lost: (reason: RobotRaconteurError) => void): () => void {
@@ -89,9 +114,8 @@ class HeldLease implements Lease {
   }
 
   async release(): Promise<void> {
-    if (this.#isReleased) return;
-    this.#isReleased = true;
-    if (this.#isHeld) this.#finish();
+    if (this.#state === "released") return;
+    this.#finish("released");
     await this.ask(Command.release); // of one that was lost, too: until then its commands are refused
   }
 
@@ -100,18 +124,27 @@ class HeldLease implements Lease {
   }
 
   lose(reason: RobotRaconteurError): void {
-    if (!this.#isHeld) return;
+    if (this.#isOver) return;
     const losers = [...this.#losers];
-    this.#finish(reason);
+    this.#finish("lost", reason);
     for (const lost of losers) callSafely(() => lost(reason));
   }
 
+  get #isOver(): boolean {
+    return this.#state === "lost" || this.#state === "released";
+  }
+
   /** One at a time: those that a slow line delays say nothing of a page that is alive later. */
-  async #renew(deadman: number): Promise<void> {
+  async #renew(): Promise<void> {
     if (this.#isRenewing || isHidden()) return;
     this.#isRenewing = true;
+    const askedAt = performance.now();
     try {
-      await this.ask(Command.renew, { timeout: deadman });
+      await this.ask(Command.renew, { timeout: this.deadman });
+      if (this.#isOver) return;
+      this.#renewedAt = askedAt;
+      this.#show("held");
+      this.#armDoubt();
     } catch (error) {
       // Unanswered: the gateway knows. The next renewal asks it.
       const isLate = error instanceof RobotRaconteurError && error.code === ErrorCode.RequestTimeout;
@@ -121,10 +154,30 @@ class HeldLease implements Lease {
     }
   }
 
-  #finish(reason?: RobotRaconteurError): void {
-    this.#isHeld = false;
+  #doubt(): void {
+    if (this.#state !== "held" || performance.now() - this.#renewedAt < this.deadman) return;
+    const text = `no renewal of the lease was answered for ${this.deadman} ms: the gateway may have ended it`;
+    this.#show("doubtful", makeError("RequestTimeout", text));
+  }
+
+  /** The doubt comes in time, not with the next renewal. */
+  #armDoubt(): void {
+    clearTimeout(this.#doubtTimer);
+    this.#doubtTimer = setTimeout(() => this.#doubt(), this.#renewedAt + this.deadman - performance.now());
+  }
+
+  #show(state: LeaseState, reason?: RobotRaconteurError): void {
+    if (state === this.#state) return;
+    this.#state = state;
+    this.#reason = reason;
+    for (const changed of [...this.#watchers]) callSafely(() => changed(state, reason));
+  }
+
+  #finish(state: LeaseState, reason?: RobotRaconteurError): void {
     for (const undo of this.#undo.splice(0)) undo();
+    this.#show(state, reason);
     this.#losers.clear();
+    this.#watchers.clear();
     this.#end(reason);
   }
 }

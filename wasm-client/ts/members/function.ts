@@ -13,10 +13,7 @@ export function makeFunction(context: MemberContext): Call {
   const isVoid = info.type === "void";
   const call = async (...args: unknown[]) => {
     const { values, options } = splitArguments(signature(info), count, args);
-    const value = await session.request((core) => core.callFunction(path, info.name, values), {
-      timeout: session.timeoutAt?.(path),
-      ...options,
-    });
+    const value = await session.command(path, (core) => core.callFunction(path, info.name, values), options);
     return isVoid ? undefined : value;
   };
   return Object.defineProperty(call, "name", { value: info.name });

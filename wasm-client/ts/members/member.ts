@@ -1,5 +1,6 @@
 // What the faces of all members have in common. Layer: wasm-client/ts.
 import { makeError } from "../errors.js";
+import type { lossesOf as of } from "../losses/losses.js";
 import type { Session } from "../session.js";
 import type { CallOptions, MemberInfo, RemoteObject } from "../types.js";
 
@@ -11,6 +12,10 @@ export interface MemberContext {
   /** The object that a path leads to; concurrent look-ups share one. */
   findObject(path: string, options?: CallOptions): Promise<RemoteObject>;
 }
+
+/** See lossesOf() in losses/losses.ts. */
+export const lossesOf = async (...args: Parameters<typeof of>): ReturnType<typeof of> =>
+  (await import("../losses/losses.js")).lossesOf(...args);
 
 /** "Drive(velocity, radius)": for messages. */
 export function signature(info: MemberInfo): string {

@@ -11,7 +11,7 @@ import type {
   RrValue,
 } from "../types.js";
 import { checkSignal, within } from "../within.js";
-import { lossesOf } from "./losses.js";
+import { lossesOf } from "./member.js";
 import type { MemberContext } from "./member.js";
 import { ValueQueue } from "./queue.js";
 

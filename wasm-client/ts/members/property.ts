@@ -6,7 +6,7 @@ export function makeProperty({ session, path, info }: MemberContext): PropertyMe
   return Object.freeze({
     get: async (options = {}) => session.request((core) => core.getProperty(path, info.name), options),
     set: async (value: unknown, options = {}) => {
-      await session.request((core) => core.setProperty(path, info.name, value), options);
+      await session.command(path, (core) => core.setProperty(path, info.name, value), options);
     },
   } satisfies PropertyMember<unknown>);
 }

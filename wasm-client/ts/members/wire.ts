@@ -3,7 +3,7 @@ import { asyncDispose } from "../dispose.js";
 import { makeError } from "../errors.js";
 import type { CallOptions, Losses, RrValue, WireConnection, WireMember, WireTime } from "../types.js";
 import { checkSignal } from "../within.js";
-import { lossesOf } from "./losses.js";
+import { lossesOf } from "./member.js";
 import type { MemberContext } from "./member.js";
 import { ValueQueue } from "./queue.js";
 
@@ -20,7 +20,7 @@ export function makeWire(context: MemberContext): WireMember<unknown> {
     peek: async (options = {}) => session.request((core) => core.peekInValue(path, name), options),
     peekOut: async (options = {}) => session.request((core) => core.peekOutValue(path, name), options),
     poke: async (value: unknown, options = {}) => {
-      await session.request((core) => core.pokeOutValue(path, name, value), options);
+      await session.command(path, (core) => core.pokeOutValue(path, name, value), options);
     },
   } satisfies WireMember<unknown>);
 }

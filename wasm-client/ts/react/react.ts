@@ -16,12 +16,13 @@ import type {
   Urls,
   ValueOf,
   View,
+  WireState,
 } from "../stores/stores.js";
 import type { MemberSubscriptionOptions } from "../member_subscription.js";
 import type { SubscribeOptions } from "../subscribe.js";
 import type { ArgumentsOf, EventLike, MembersLike, PacketOf, RemoteObject, WireLike } from "../types.js";
 
-export type { DeviceState, MemberState, PropertyOptions };
+export type { DeviceState, MemberState, PropertyOptions, WireState };
 
 const useStore = <T>(store: View<T>): T => useSyncExternalStore(store.subscribe, store.getSnapshot, store.getSnapshot);
 
@@ -36,12 +37,12 @@ export function useDevice<T = RemoteObject>(urls: Urls<T>, options?: SubscribeOp
   return useStore(useMemo(() => deviceStore<T>(urls, options), [key]));
 }
 
-/** The newest value of a wire; undefined before the first. */
+/** What a wire gave last: `value`, undefined before the first, and whether newer ones would come. */
 export function useWire<T, K extends MembersLike<T, WireLike>>(
   { subscription }: DeviceState<T>,
   member: K,
   { path }: MemberSubscriptionOptions = {},
-): PacketOf<T, K> | undefined {
+): WireState<PacketOf<T, K>> {
   return useStore(useMemo(() => wireStore(subscription, member, { path }), [subscription, member, path]));
 }
 

@@ -7,7 +7,16 @@ import { ValueStore } from "../store.js";
 import type { Store } from "../store.js";
 import { subscribe } from "../subscribe.js";
 import type { SubscribeOptions, Subscription, SubscriptionState } from "../subscribe.js";
-import type { ArgumentsOf, DynamicMember, EventLike, MembersLike, PacketOf, RemoteObject, WireLike } from "../types.js";
+import type {
+  ArgumentsOf,
+  DynamicMember,
+  EventLike,
+  MembersLike,
+  PacketOf,
+  RemoteObject,
+  WireLike,
+  WireTime,
+} from "../types.js";
 
 /** What React, Svelte and Vue need of a store. */
 export type View<T> = Pick<Store<T>, "getSnapshot" | "subscribe">;
@@ -17,6 +26,17 @@ export interface DeviceState<T = RemoteObject> {
   readonly client: Client<T> | undefined;
   readonly subscription: Subscription<T> | undefined;
   readonly state: SubscriptionState;
+}
+
+/** What a wire gave last. It stays when the connection is lost: `isConnected` and `receivedAt` tell what it is worth. */
+export interface WireState<V> {
+  readonly value: V | undefined;
+  /** By the sender's clock. */
+  readonly time: WireTime | undefined;
+  /** By this side's clock, as Date.now() has it. */
+  readonly receivedAt: number | undefined;
+  /** Whether newer values would come. */
+  readonly isConnected: boolean;
 }
 
 /** What a member gave last. `error`: why it gave nothing newer. */
@@ -125,19 +145,30 @@ export function deviceStore<T = RemoteObject>(urls: Urls<T>, options?: Subscribe
   return store;
 }
 
-/** The newest value of a wire. */
+/** What a wire gave last, and whether that can still be so. */
 export function wireStore<T, K extends MembersLike<T, WireLike>>(
   device: Subscription<T> | undefined,
   member: K,
   options: MemberSubscriptionOptions = {},
-): View<PacketOf<T, K> | undefined> {
-  type V = PacketOf<T, K> | undefined;
-  const store: LiveStore<V> = new LiveStore<V>(undefined, () => {
+): View<WireState<PacketOf<T, K>>> {
+  type State = WireState<PacketOf<T, K>>;
+  const none = { value: undefined, time: undefined, receivedAt: undefined, isConnected: false };
+  const store: LiveStore<State> = new LiveStore<State>(none, () => {
     if (!device) return () => undefined;
     const wire = device.wire(member, options);
-    const stop = wire.store.subscribe((value) => store.show(value as V));
+    const show = (news: Partial<State>) => store.show({ ...store.getSnapshot(), ...news });
+    const lost = () => show({ isConnected: false });
+    const stops = [
+      wire.onConnected(() => show({ isConnected: true })),
+      wire.onFailed(lost),
+      device.onClosed(lost),
+      wire.store.subscribe((value) => {
+        if (value !== undefined) show({ value: value as PacketOf<T, K>, time: wire.time, receivedAt: Date.now() });
+      }),
+    ];
     return () => {
-      stop();
+      for (const stop of stops) stop();
+      lost();
       void wire.close();
     };
   });

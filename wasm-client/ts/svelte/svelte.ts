@@ -3,4 +3,11 @@
  * @module
  */
 export { callStore, deviceStore, listen, propertyStore, wireStore } from "../stores/stores.js";
-export type { CallStore, DeviceState, MemberState, PropertyOptions, PropertyStore } from "../stores/stores.js";
+export type {
+  CallStore,
+  DeviceState,
+  MemberState,
+  PropertyOptions,
+  PropertyStore,
+  WireState,
+} from "../stores/stores.js";

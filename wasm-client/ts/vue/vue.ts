@@ -15,12 +15,13 @@ import type {
   Urls,
   ValueOf,
   View,
+  WireState,
 } from "../stores/stores.js";
 import type { MemberSubscriptionOptions } from "../member_subscription.js";
 import type { SubscribeOptions } from "../subscribe.js";
 import type { ArgumentsOf, EventLike, MembersLike, PacketOf, RemoteObject, WireLike } from "../types.js";
 
-export type { DeviceState, MemberState, PropertyOptions };
+export type { DeviceState, MemberState, PropertyOptions, WireState };
 type Device<T> = Readonly<ShallowRef<DeviceState<T>>>;
 
 /** Follows the store of each subscription of the device in turn. */
@@ -47,12 +48,12 @@ export function useDevice<T = RemoteObject>(urls: Urls<T>, options?: SubscribeOp
   return device;
 }
 
-/** The newest value of a wire; undefined before the first. */
+/** What a wire gave last: `value`, undefined before the first, and whether newer ones would come. */
 export function useWire<T, K extends MembersLike<T, WireLike>>(
   device: Device<T>,
   member: K,
   options: MemberSubscriptionOptions = {},
-): Readonly<ShallowRef<PacketOf<T, K> | undefined>> {
+): Readonly<ShallowRef<WireState<PacketOf<T, K>>>> {
   return useStores(device, (subscription) => wireStore(subscription, member, options)).value;
 }
 

@@ -13,10 +13,12 @@ import type { Theme } from "./theme";
 import type { DeviceList } from "../gateway/devices";
 import type { UsbDeviceList } from "../gateway/usb_devices";
 import type { AccessDesk } from "../gateway/access";
+import type { AgentsDesk } from "../gateway/agents";
 import { mustSignIn } from "../gateway/session";
 import type { Session } from "../gateway/session";
 import { DevicesPage } from "../pages/devices_page";
 import { ServicePage } from "../pages/service_page";
+import { AgentsPart } from "../pages/agents_part";
 import { Account, SignInPage } from "../pages/sign_in_page";
 import { Mark, SunMoonIcon } from "../ui/icons";
 
@@ -25,10 +27,11 @@ interface AppParts {
   list: DeviceList;
   usb: UsbDeviceList;
   access: AccessDesk;
+  agents: AgentsDesk;
   session: Session;
 }
 
-export function App({ route, list, usb, access, session }: AppParts) {
+export function App({ route, list, usb, access, agents, session }: AppParts) {
   const where = useStore(route);
   const main = useRef<HTMLElement>(null);
   const who = useStore(session.who);
@@ -59,13 +62,14 @@ export function App({ route, list, usb, access, session }: AppParts) {
       </header>
       <main id="main" ref={main} tabIndex={-1}>
         {isForm && <SignInPage session={session} done={() => setAsked(false)} />}
+        {!isForm && <AgentsPart agents={agents} />}
         {!isForm && <Page route={where} list={list} usb={usb} access={access} />}
       </main>
     </>
   );
 }
 
-function Page({ route: where, list, usb, access }: Omit<AppParts, "route" | "session"> & { route: Route }) {
+function Page({ route: where, list, usb, access }: Omit<AppParts, "route" | "session" | "agents"> & { route: Route }) {
   return (
     <>
       {where.page === "devices" && <DevicesPage list={list} usb={usb} access={access} />}

@@ -3,6 +3,7 @@
 
 import { settle } from "./layout";
 import type { Placed } from "./layout";
+import type { StopCall } from "../robot/stop";
 
 export const PANEL_KINDS = [
   "plot",
@@ -35,13 +36,6 @@ export interface Panel extends Placed {
   settings: Settings;
 }
 
-/** What stops the device: a function with its arguments, and a property to set as well: some drivers have only one of them. */
-export interface StopCall {
-  call: string;
-  args: readonly number[];
-  set?: { property: string; value: number };
-}
-
 export interface Board {
   panels: readonly Panel[];
   stop: StopCall | null;
@@ -72,6 +66,11 @@ export function writeBoard({ panels, stop }: Board): object {
       ...(Object.keys(settings).length > 0 && { settings }),
     })),
   };
+}
+
+/** Whether both are the same for who looks at them. */
+export function sameBoard(a: Board, b: Board): boolean {
+  return a === b || JSON.stringify(writeBoard(a)) === JSON.stringify(writeBoard(b));
 }
 
 /** For an address: letters, digits, "-" and "_". */

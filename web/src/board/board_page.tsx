@@ -16,8 +16,19 @@ import type { Link } from "../robot/link";
 import { Failure } from "../ui/failure";
 import { saveFile } from "../ui/save_file";
 import { Definitions, scopeOf } from "../values/definitions";
-import { keepBoard, makeId, packBoard, PANEL_KINDS, parseBoard, recallBoard, unpackBoard, writeBoard } from "./board";
+import {
+  keepBoard,
+  makeId,
+  packBoard,
+  PANEL_KINDS,
+  parseBoard,
+  recallBoard,
+  sameBoard,
+  unpackBoard,
+  writeBoard,
+} from "./board";
 import type { Board, Panel, PanelKind } from "./board";
+import { Keeper } from "./keeper";
 import { findRoom, inOrder, nudge, put, settle } from "./layout";
 import { PanelFrame } from "./panel_frame";
 import { presetFor } from "./presets";
@@ -29,7 +40,7 @@ type ServiceRoute = Route & { page: "service" };
 export default function BoardPage({ link, route, list }: { link: Link; route: ServiceRoute; list: DeviceList }) {
   const path = route.path.map(formatStep).join(".");
   const key = boardKey(route);
-  const { object, last, failure } = useObject(link, "", path);
+  const { object, last, failure } = useObject(link, "", path, list);
   const preset = useMemo(() => {
     if (!last) return null;
     return presetFor({
@@ -39,11 +50,12 @@ export default function BoardPage({ link, route, list }: { link: Link; route: Se
       scope: scopeOf(last.type),
     });
   }, [last?.type]);
-  const { board, trouble, setBoard, setTrouble } = useBoard(key, route, preset);
+  const { board, isKept, trouble, setBoard, setTrouble } = useBoard(key, route, preset);
   const [arranging, setArranging] = useState(false);
-  const silent = usePulse(object);
+  const silent = usePulse(object, useShared(list, route.device));
   const services = useServices(list);
   if (!board) return failure === null ? <Waiting /> : <Failure text={failure} />;
+  const stop = preset?.stop ?? board.stop; // a file may say how to stop what is not known, and nothing else
   const setPanels = (panels: readonly Panel[]): void => setBoard({ ...board, panels });
   const add = (kind: PanelKind): void => {
     const { w, h } = KINDS[kind];
@@ -54,9 +66,9 @@ export default function BoardPage({ link, route, list }: { link: Link; route: Se
   const update = (id: string, change: Partial<Panel>): void =>
     setPanels(board.panels.map((panel) => (panel.id === id ? { ...panel, ...change } : panel)));
   return (
-    <div class="board-page">
+    <div class="board-page" data-kept={isKept}>
       <div class="board-bar">
-        {board.stop && <StopButton object={object} stop={board.stop} />}
+        {stop && <StopButton object={object} stop={stop} />}
         {silent !== null && (
           <p class="failure board-silent" role="alert">
             {t("The device has not answered for {0}.", oldness(silent))}
@@ -82,6 +94,7 @@ export default function BoardPage({ link, route, list }: { link: Link; route: Se
             link={link}
             place={{ device: route.device, service: route.service, object: path }}
             services={services}
+            list={list}
             arranging={arranging}
             move={(place) => setPanels(put(board.panels, panel.id, place))}
             step={(dx, dy) => setPanels(nudge(board.panels, panel.id, dx, dy))}
@@ -109,6 +122,8 @@ export function boardKey({ device, service, path }: ServiceRoute): string {
 }
 
 interface BoardState {
+  /** Whether all changes are in the address and this browser. */
+  isKept: boolean;
   board: Board | null;
   trouble: string | null;
   /** `isPreset`: it is not worth keeping. */
@@ -133,13 +148,31 @@ function useBoard(key: string, route: ServiceRoute, preset: Board | null): Board
     found ??= recallBoard(key);
     setChosen(found && { key, board: found });
   }, [key, route.board]);
+  const keeper = useMemo(() => new Keeper(), []);
+  useEffect(() => {
+    const leave = (): void => keeper.flush(true);
+    window.addEventListener("pagehide", leave);
+    return () => {
+      window.removeEventListener("pagehide", leave);
+      keeper.flush(false);
+    };
+  }, [key, keeper]);
+  const shown = chosen?.key === key ? chosen.board : preset;
   const setBoard = (board: Board, isPreset = false): void => {
+    if (!isPreset && shown && sameBoard(shown, board)) return; // a finger that moves within a cell
     setChosen({ key, board });
-    keepBoard(key, isPreset ? null : board);
     const address = formatRoute(route.device, route.service, route.path, "board");
-    history.replaceState(null, "", isPreset ? address : `${address}&board=${packBoard(board)}`);
+    keeper.write({
+      store: () => keepBoard(key, isPreset ? null : board),
+      show: () => history.replaceState(null, "", isPreset ? address : `${address}&board=${packBoard(board)}`),
+    });
   };
-  return { board: chosen?.key === key ? chosen.board : preset, trouble, setBoard, setTrouble };
+  return { board: shown, isKept: useStore(keeper.isKept), trouble, setBoard, setTrouble };
+}
+
+/** Whether all clients share the gateway's connection to the device. */
+function useShared(list: DeviceList, device: string): boolean {
+  return devicesOf(useStore(list.state))?.find(({ name }) => name === device)?.mode === "shared";
 }
 
 /** "device/service" of all that the gateway has. */

@@ -5,6 +5,7 @@ import { Component } from "preact";
 import type { ComponentChildren, ComponentType } from "preact";
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { t } from "../app/language";
+import type { DeviceList } from "../gateway/devices";
 import { useObject } from "../live/links";
 import { KINDS, textIn } from "../panels/panel";
 import type { PanelProps } from "../panels/panel";
@@ -20,6 +21,7 @@ export interface PanelFrameProps {
   link: Link;
   place: { device: string; service: string; object: string };
   services: readonly string[];
+  list: DeviceList;
   arranging: boolean;
   move: Change;
   step: (dx: number, dy: number) => void;
@@ -27,9 +29,20 @@ export interface PanelFrameProps {
   remove: () => void;
 }
 
-export function PanelFrame({ panel, link, place, services, arranging, move, step, update, remove }: PanelFrameProps) {
+export function PanelFrame({
+  panel,
+  link,
+  place,
+  services,
+  list,
+  arranging,
+  move,
+  step,
+  update,
+  remove,
+}: PanelFrameProps) {
   const path = [place.object, panel.object].filter((each) => each !== "" && panel.from === "").join(".");
-  const { object, last, failure } = useObject(link, panel.from, panel.from === "" ? path : panel.object);
+  const { object, last, failure } = useObject(link, panel.from, panel.from === "" ? path : panel.object, list);
   const count = last?.definitions.length ?? 0;
   const definitions = useMemo(() => new Definitions(last?.definitions ?? []), [last, count]);
   const Shown = useLoaded(panel.kind);

@@ -1,11 +1,14 @@
 // The board that an object starts with: of the standard types by hand, of all others by what its members are.
 // Layer: web/board, pure.
 
+import { isGenerator } from "../robot/remote";
 import type { Member } from "../robot/remote";
+import { ROBOT_STOP } from "../robot/stop";
+import type { StopCall } from "../robot/stop";
 import type { Definitions } from "../values/definitions";
 import { isNumeric, parseType } from "../values/type_text";
 import { makeId } from "./board";
-import type { Board, Panel, PanelKind, Settings, StopCall } from "./board";
+import type { Board, Panel, PanelKind, Settings } from "./board";
 import { settle } from "./layout";
 
 export interface Described {
@@ -20,7 +23,7 @@ type Spec = [kind: PanelKind, x: number, y: number, w: number, h: number, settin
 const ROBOT = "com.robotraconteur.robotics.robot.Robot";
 const STANDARD: Readonly<Record<string, { stop: StopCall | null; panels: readonly Spec[] }>> = {
   [ROBOT]: {
-    stop: { call: "halt", args: [], set: { property: "command_mode", value: 0 } },
+    stop: ROBOT_STOP,
     panels: [
       ["robot", 0, 0, 7, 13],
       ["plot", 7, 0, 5, 8, { member: "robot_state" }],
@@ -72,27 +75,37 @@ const STANDARD: Readonly<Record<string, { stop: StopCall | null; panels: readonl
   },
 };
 
-/** Whether the type is known, so that its board is worth showing first. */
-export function hasPreset(type: string): boolean {
-  return Object.hasOwn(STANDARD, type);
+/** Whether the type is known, or one that it implements, so that its board is worth showing first. */
+export function hasPreset(type: string, definitions: Definitions): boolean {
+  return standardOf(type, definitions) !== undefined;
+}
+
+function standardOf(type: string, definitions: Definitions) {
+  const types = new Set([type, ...definitions.implemented(type)]);
+  const found = Object.keys(STANDARD).find((each) => types.has(each));
+  return found === undefined ? undefined : STANDARD[found];
 }
 
 export function presetFor(object: Described): Board {
-  const standard = hasPreset(object.type) ? STANDARD[object.type] : undefined;
+  const standard = standardOf(object.type, object.definitions);
   if (!standard) return { panels: settle(byMembers(object)), stop: stopFor(object) };
   const panels = standard.panels
     .filter(([, , , , , settings]) => isThere(settings, object.members))
     .map((spec) => makePanel(spec));
-  return { panels: settle(panels), stop: standard.stop };
+  return { panels: settle(panels), stop: stopFor(object) };
 }
 
 const STOPS = /^(halt|stop|e_?stop|emergency_stop|abort)$/i;
 
-/** A function that says that it stops, or the demo robot's. */
-function stopFor({ type, members }: Described): StopCall | null {
-  const found = members.find(
-    (each) => each.kind === "function" && each.parameters.length === 0 && STOPS.test(each.name),
+/** That of the standard type, a function that says that it stops, or the demo robot's. */
+export function stopFor({ type, members, definitions }: Described): StopCall | null {
+  // A call of a generator only begins one: it stops nothing.
+  const calls = members.filter(
+    (each) => each.kind === "function" && each.parameters.length === 0 && !isGenerator(each),
   );
+  const standard = standardOf(type, definitions)?.stop;
+  if (standard && calls.some(({ name }) => name === standard.call)) return standard;
+  const found = calls.find(({ name }) => STOPS.test(name));
   if (found) return { call: found.name, args: [] };
   return /^experimental\.\w*create\w*\./.test(type) && members.some(({ name }) => name === "Drive")
     ? { call: "Drive", args: [0, 0] }

@@ -3,11 +3,12 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
-import { stopNow, tellStop } from "../robot/control";
+import { tellStop } from "../robot/control";
 import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
+import { stopDevice } from "../robot/stop";
+import type { StopCall } from "../robot/stop";
 import { clockTime } from "../ui/words";
-import type { StopCall } from "./board";
 
 type State =
   | { kind: "ready" }
@@ -15,24 +16,22 @@ type State =
   | { kind: "arrived"; tookMs: number; time: number }
   | { kind: "failed"; why: string };
 
-const TIMEOUT_MS = 2_000;
-
 export function StopButton({ object, stop }: { object: Remote | null; stop: StopCall }) {
   const [state, setState] = useState<State>({ kind: "ready" });
   const latest = useRef(object);
   latest.current = object;
   const send = (): void => {
-    tellStop();
     const at = performance.now();
     const device = latest.current;
-    if (!device) return setState({ kind: "failed", why: t("not connected: nothing was sent") });
-    setState({ kind: "sent", at });
-    // Nothing is waited for: a call that hangs does not hold this one up, and each press sends again.
-    const ways = [device.urgent(stop.call, stop.args, { timeout: TIMEOUT_MS })];
-    if (stop.set) ways.push(device.set(stop.set.property, stop.set.value, { timeout: TIMEOUT_MS }));
-    stopNow(device, true, () => firstToArrive(ways)).then(
+    if (!device) {
+      tellStop();
+      return setState({ kind: "failed", why: t("not connected: nothing was sent") });
+    }
+    setState({ kind: "sent", at }); // each press sends again
+    const fail = (error: unknown): void => setState({ kind: "failed", why: explain(error) });
+    stopDevice(device, stop, fail).then(
       () => setState({ kind: "arrived", tookMs: performance.now() - at, time: Date.now() }),
-      (error: unknown) => setState({ kind: "failed", why: explain(error) }),
+      fail,
     );
   };
   const sendNow = useRef(send);
@@ -61,15 +60,6 @@ export function StopButton({ object, stop }: { object: Remote | null; stop: Stop
       </p>
     </div>
   );
-}
-
-/** @throws (rejects) why the first way failed, where all did. */
-async function firstToArrive(ways: readonly Promise<unknown>[]): Promise<void> {
-  try {
-    await Promise.any(ways);
-  } catch (error) {
-    throw (error as AggregateError).errors[0];
-  }
 }
 
 function wordsOf(state: State, stop: StopCall): string {

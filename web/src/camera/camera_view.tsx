@@ -3,11 +3,12 @@
 // Layer: web/camera.
 
 import { useEffect, useRef, useState } from "preact/hooks";
+import { t } from "../app/language";
 import { useStore } from "../app/store";
-import { devicesOf, relayUrl } from "../gateway/devices";
-import { session } from "../gateway/session";
+import { devicesOf } from "../gateway/devices";
+import { linkTo } from "../gateway/link_to";
 import type { DeviceList, GatewayState } from "../gateway/devices";
-import { Link } from "../robot/link";
+import type { Link } from "../robot/link";
 import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
 import { drawFrame } from "./draw_frame";
@@ -45,10 +46,10 @@ export function CameraView({ list, robot, shown }: { list: DeviceList; robot: st
   return (
     <section class="panel camera" aria-labelledby="camera-title">
       <h2 id="camera-title" class="unseen">
-        Camera
+        {t("Camera")}
       </h2>
       {place ? (
-        <Camera key={`${place.device}/${place.service}`} place={place} shown={shown} />
+        <Camera key={`${place.device}/${place.service}`} place={place} list={list} shown={shown} />
       ) : (
         <NoCamera loading={gateway.kind === "loading"} />
       )}
@@ -60,20 +61,19 @@ function NoCamera({ loading }: { loading: boolean }) {
   return (
     <div class="camera-frame">
       <p class="camera-note">
-        {loading ? "Looking for a camera …" : "No device behind this gateway offers a webcam service right now."}
+        {loading ? t("Looking for a camera …") : t("No device behind this gateway offers a webcam service right now.")}
       </p>
     </div>
   );
 }
 
-function Camera({ place, shown }: { place: Place; shown: boolean }) {
+function Camera({ place, list, shown }: { place: Place; list: DeviceList; shown: boolean }) {
   const [link, setLink] = useState<Link | null>(null);
   useEffect(() => {
-    const url = relayUrl(place.device, place.service);
-    const made = new Link(() => session.withTicket(url));
+    const { link: made, dispose } = linkTo(place.device, place.service, list);
     setLink(made);
-    return () => made.dispose();
-  }, [place.device, place.service]);
+    return dispose;
+  }, [place.device, place.service, list]);
   return link && <Picture link={link} place={place} shown={shown} />;
 }
 
@@ -87,8 +87,8 @@ function Picture({ link, place, shown }: { link: Link; place: Place; shown: bool
   const { failure, hasFrame, size, age } = useFrames(canvas, remote, index, shown);
   const note =
     state.kind === "lost"
-      ? `No connection to ${place.device} since ${clockTime(state.since)}. Retrying by itself.`
-      : (failure ?? (hasFrame ? age && `This picture is ${age}.` : "Waiting for the first picture …"));
+      ? t("No connection to {0} since {1}. Retrying by itself.", place.device, clockTime(state.since))
+      : (failure ?? (hasFrame ? age && t("This picture is {0}.", age) : t("Waiting for the first picture …")));
   return (
     <>
       <div class={`camera-frame ${note !== null && hasFrame ? "is-stale" : ""}`}>
@@ -97,7 +97,7 @@ function Picture({ link, place, shown }: { link: Link; place: Place; shown: bool
           width={4}
           height={3}
           role="img"
-          aria-label={`Picture from camera ${cameras.find((c) => c.index === index)?.name ?? ""}`}
+          aria-label={t("Picture from camera {0}", cameras.find((c) => c.index === index)?.name ?? "")}
         />
         {note !== null && (
           <p class="camera-note" role={failure === null ? undefined : "alert"}>
@@ -108,7 +108,7 @@ function Picture({ link, place, shown }: { link: Link; place: Place; shown: bool
       <div class="camera-foot">
         {cameras.length > 1 ? (
           <label>
-            <span class="unseen">Camera</span>
+            <span class="unseen">{t("Camera")}</span>
             <select
               class="field"
               value={String(index)}

@@ -2,6 +2,7 @@
 // Layer: web/camera.
 
 import { useEffect, useState } from "preact/hooks";
+import { t } from "../app/language";
 import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
 import { drawFrame } from "./draw_frame";
@@ -20,11 +21,11 @@ export function Snapshot({ host, index }: { host: Remote; index: number }) {
   return (
     <>
       <button class="button button-quiet" type="button" onClick={take}>
-        Snapshot
+        {t("Snapshot")}
       </button>
       {url && (
         <a href={url} download="snapshot.png">
-          Save it
+          {t("Save it")}
         </a>
       )}
       {failure !== null && (

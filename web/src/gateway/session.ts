@@ -1,6 +1,7 @@
 // Who this page is to the gateway: signing in and out, and what its requests and connections show.
 // Layer: web/gateway. Source: GET /api/v1/access, POST and DELETE /api/v1/session, POST /api/v1/tickets.
 
+import { t } from "../app/language";
 import { Store } from "../app/store";
 
 export interface Who {
@@ -43,9 +44,10 @@ export class Session {
     const body = JSON.stringify(proofOf(name, secret));
     const init = { method: "POST", headers: { ["Content-Type"]: "application/json" }, body };
     const response = await this.#ask("api/v1/session", init).catch((error: unknown) => {
-      throw new Error(`The gateway does not answer (${(error as Error).message}).`);
+      throw new Error(t("The gateway does not answer ({0}).", (error as Error).message));
     });
-    if (response.status === 401) throw new Error(name === "" ? "This token is not valid." : "Wrong name or password.");
+    if (response.status === 401)
+      throw new Error(name === "" ? t("This token is not valid.") : t("Wrong name or password."));
     if (!response.ok) throw new Error(await problemOf(response));
     this.trouble.value = null;
     await this.#look();
@@ -101,7 +103,7 @@ export class Session {
 
   #take(who: Who): void {
     const hasEnded = this.who.value?.session === true && who.user === null;
-    if (hasEnded) this.trouble.value = "The gateway no longer accepts this sign-in.";
+    if (hasEnded) this.trouble.value = t("The gateway no longer accepts this sign-in.");
     if (JSON.stringify(who) !== JSON.stringify(this.who.value)) this.who.value = who;
   }
 
@@ -134,7 +136,7 @@ export function readWho(answer: unknown): Who {
 
 /** @throws Error: the protocol has no place for this name. */
 export function proofOf(name: string, secret: string): Record<string, string> {
-  if (name.includes(":")) throw new Error("A name has no colon.");
+  if (name.includes(":")) throw new Error(t("A name has no colon."));
   return name === "" ? { token: secret.trim() } : { user: name, password: secret };
 }
 

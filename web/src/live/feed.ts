@@ -8,6 +8,8 @@ import { Pace } from "./pace";
 export type FeedKind = "wire" | "pipe" | "property" | "event";
 
 const PROPERTY_MS = 500;
+const FIRST_RETRY_MS = 1_000;
+const LONGEST_RETRY_MS = 30_000;
 
 export class Feed {
   readonly pace = new Pace();
@@ -25,14 +27,28 @@ export class Feed {
   start(): void {
     const stop = new AbortController();
     this.#stop = stop;
-    this.#run(stop.signal).catch((error: unknown) => {
-      if (!stop.signal.aborted) this.failure = explain(error);
-    });
+    void this.#keepRunning(stop.signal);
   }
 
   stop(): void {
     this.#stop?.abort();
     this.#stop = null;
+  }
+
+  /** What failed, or was closed, is tried again, more and more rarely until something comes. */
+  async #keepRunning(signal: AbortSignal): Promise<void> {
+    for (let waits = FIRST_RETRY_MS; !signal.aborted; waits = Math.min(LONGEST_RETRY_MS, waits * 2)) {
+      const before = this.pace.count;
+      try {
+        await this.#run(signal);
+        return;
+      } catch (error) {
+        if (signal.aborted) return;
+        this.failure = explain(error);
+      }
+      if (this.pace.count > before) waits = FIRST_RETRY_MS;
+      await pause(waits, signal);
+    }
   }
 
   async #run(signal: AbortSignal): Promise<void> {
@@ -57,7 +73,7 @@ export class Feed {
       } catch (error) {
         this.failure = explain(error);
       }
-      await new Promise((resolve) => setTimeout(resolve, Math.max(50, PROPERTY_MS - (performance.now() - begun))));
+      await pause(Math.max(50, PROPERTY_MS - (performance.now() - begun)), signal);
     }
   }
 
@@ -65,9 +81,18 @@ export class Feed {
     if (this.#stop === null) return;
     const now = performance.now();
     this.newest = value;
+    this.failure = null;
     this.pace.hear(now);
     for (const heard of this.heard) heard(value, now);
   }
+}
+
+/** Ends early where `signal` is given. */
+function pause(ms: number, signal: AbortSignal): Promise<void> {
+  return new Promise((resolve) => {
+    const timer = setTimeout(resolve, ms);
+    signal.addEventListener("abort", () => (clearTimeout(timer), resolve()), { once: true });
+  });
 }
 
 const feeds = new Map<Remote, Map<string, { feed: Feed; users: number }>>();

@@ -3,31 +3,26 @@
 
 import { useEffect, useState } from "preact/hooks";
 import { Store, useStore } from "../app/store";
-import { relayUrl } from "../gateway/devices";
-import { session } from "../gateway/session";
-import { isUsb, usbUrl } from "../gateway/usb_devices";
-import { Link } from "../robot/link";
+import type { DeviceList } from "../gateway/devices";
+import { linkTo } from "../gateway/link_to";
+import type { Link } from "../robot/link";
 import type { LinkState } from "../robot/link";
 import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
 import { parseStep, splitSteps } from "../app/router";
 import { walk } from "../robot/walk";
 
-const links = new Map<string, { link: Link; users: number }>();
+const links = new Map<string, { link: Link; dispose: () => void; users: number }>();
 const nowhere = new Store<LinkState>({ kind: "connecting" });
 
-function openLink(place: string): { link: Link; close: () => void } {
+function openLink(place: string, list: DeviceList): { link: Link; close: () => void } {
   const [device = "", service = ""] = place.split("/").map(decodeURIComponent);
-  const url = relayUrl(device, service);
-  const entry = links.get(place) ?? {
-    link: new Link(isUsb(device) ? usbUrl(device, service) : () => session.withTicket(url)),
-    users: 0,
-  };
+  const entry = links.get(place) ?? { ...linkTo(device, service, list), users: 0 };
   links.set(place, entry);
   entry.users++;
   const close = (): void => {
     if (--entry.users > 0) return;
-    entry.link.dispose();
+    entry.dispose();
     links.delete(place);
   };
   return { link: entry.link, close };
@@ -38,14 +33,15 @@ export function useObject(
   own: Link,
   from: string,
   path: string,
+  list: DeviceList,
 ): { object: Remote | null; last: Remote | null; failure: string | null } {
   const [other, setOther] = useState<Link | null>(null);
   useEffect(() => {
     if (from === "") return setOther(null);
-    const { link, close } = openLink(from);
+    const { link, close } = openLink(from, list);
     setOther(link);
     return close;
-  }, [from]);
+  }, [from, list]);
   const state = useStore(from === "" ? own.state : (other?.state ?? nowhere));
   const root = state.kind === "online" ? state.remote : null;
   const [found, setFound] = useState<{ object: Remote; root: Remote; path: string } | null>(null);

@@ -2,6 +2,7 @@
 // Layer: web/members.
 
 import { useEffect, useRef, useState } from "preact/hooks";
+import { t } from "../app/language";
 import { explain } from "../robot/remote";
 import { Failure } from "../ui/failure";
 import { parseInput } from "../values/parse";
@@ -38,7 +39,7 @@ export function CallbackRow({ object, member, live }: MemberRowProps) {
         {member.type !== "void" && (
           <ValueInput
             quiet
-            label={`Answer of ${member.name}`}
+            label={t("Answer of {0}", member.name)}
             type={member.type}
             text={text}
             disabled={!live}
@@ -52,7 +53,7 @@ export function CallbackRow({ object, member, live }: MemberRowProps) {
           aria-pressed={answering}
           onClick={() => setAnswering(!answering)}
         >
-          {answering ? "Stop answering" : "Answer"}
+          {answering ? t("Stop answering") : t("Answer")}
           <span class="unseen"> {member.name}</span>
         </button>
       </div>

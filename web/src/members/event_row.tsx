@@ -2,6 +2,7 @@
 // Layer: web/members.
 
 import { useEffect, useState } from "preact/hooks";
+import { t } from "../app/language";
 import { explain } from "../robot/remote";
 import { Failure } from "../ui/failure";
 import { formatArguments, Log, useLog } from "./log";
@@ -26,7 +27,7 @@ export function EventRow({ object, member, live }: MemberRowProps) {
       <RowHead member={member} signature={`(${member.parameters.map((p) => `${p.type} ${p.name}`).join(", ")})`} />
       <Failure text={failure} />
       {log.entries.length === 0 ? (
-        <p class="note">{live ? "Listening. Nothing heard yet." : "Not connected."}</p>
+        <p class="note">{live ? t("Listening. Nothing heard yet.") : t("Not connected.")}</p>
       ) : (
         <Log name={member.name} entries={log.entries} />
       )}

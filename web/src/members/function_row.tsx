@@ -2,6 +2,7 @@
 // Layer: web/members.
 
 import { useState } from "preact/hooks";
+import { t } from "../app/language";
 import { Failure } from "../ui/failure";
 import { formatValue } from "../values/format";
 import { parseInput } from "../values/parse";
@@ -27,7 +28,7 @@ export function FunctionRow({ object, member, live }: MemberRowProps) {
       const begun = performance.now();
       const result = await object.call(member.name, args);
       const tookMs = performance.now() - begun;
-      setAnswer({ text: member.type === "void" ? "done" : formatValue(result), tookMs });
+      setAnswer({ text: member.type === "void" ? t("done") : formatValue(result), tookMs });
     });
   };
   return (
@@ -49,10 +50,10 @@ export function FunctionRow({ object, member, live }: MemberRowProps) {
       )}
       <div class="row-line">
         <button class="button" type="submit" disabled={!live || calling.busy || streams}>
-          {calling.busy ? "Calling …" : "Call"}
+          {calling.busy ? t("Calling …") : t("Call")}
           <span class="unseen"> {member.name}</span>
         </button>
-        {streams && <p class="note">Generators cannot be called from this page yet.</p>}
+        {streams && <p class="note">{t("The Generator panel of the board runs it.")}</p>}
         <output class="value" hidden={answer === null}>
           {answer && (
             <>

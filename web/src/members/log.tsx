@@ -2,6 +2,7 @@
 // Layer: web/members.
 
 import { useMemo, useState } from "preact/hooks";
+import { t } from "../app/language";
 import type { Member } from "../robot/remote";
 import { clockTimeMs } from "../ui/words";
 import { formatValue } from "../values/format";
@@ -35,7 +36,7 @@ export function formatArguments(member: Member, args: readonly unknown[]): strin
 
 export function Log({ name, entries }: { name: string; entries: readonly LogEntry[] }) {
   return (
-    <ol class="log" tabIndex={0} aria-label={`Log of ${name}`}>
+    <ol class="log" tabIndex={0} aria-label={t("Log of {0}", name)}>
       {entries.map((entry) => (
         <li key={entry.number}>
           <span class="log-number">{entry.number}</span>

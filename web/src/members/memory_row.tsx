@@ -2,6 +2,7 @@
 // Layer: web/members.
 
 import { useEffect, useState } from "preact/hooks";
+import { t } from "../app/language";
 import { Failure } from "../ui/failure";
 import { formatValue } from "../values/format";
 import { parseInput } from "../values/parse";
@@ -40,30 +41,32 @@ export function MemoryRow({ object, member, live }: MemberRowProps) {
     <>
       <RowHead member={member} />
       <div class="row-line">
-        <p class="note">{size === null ? "size not read" : `${size.join(" × ")} items`}</p>
+        <p class="note">{size === null ? t("size not read") : t("{0} items", size.join(" × "))}</p>
         <button class="button" type="button" disabled={!live || measuring.busy} onClick={measure}>
-          Measure<span class="unseen"> {member.name}</span>
+          {t("Measure")}
+          <span class="unseen"> {member.name}</span>
         </button>
       </div>
       <Failure text={measuring.failure} />
       {readable && (
         <form class="row-line row-form" onSubmit={read}>
           <ValueInput
-            label={`Position in ${member.name}`}
+            label={t("Position in {0}", member.name)}
             type="uint32[]"
             text={position}
             disabled={!live}
             onText={setPosition}
           />
           <ValueInput
-            label={`Items of ${member.name}`}
+            label={t("Items of {0}", member.name)}
             type="uint32[]"
             text={count}
             disabled={!live}
             onText={setCount}
           />
           <button class="button" type="submit" disabled={!live || reading.busy}>
-            Read<span class="unseen"> {member.name}</span>
+            {t("Read")}
+            <span class="unseen"> {member.name}</span>
           </button>
         </form>
       )}

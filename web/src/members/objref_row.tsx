@@ -2,6 +2,7 @@
 // Layer: web/members.
 
 import { useState } from "preact/hooks";
+import { t } from "../app/language";
 import { formatRoute } from "../app/router";
 import { RowHead } from "./row";
 import type { MemberRowProps } from "./row";
@@ -34,20 +35,22 @@ export function ObjrefRow({ member, route, live }: MemberRowProps) {
       <RowHead member={member} />
       {indexType === null ? (
         <a class="button" href={address(null)}>
-          Open<span class="unseen"> {member.name}</span>
+          {t("Open")}
+          <span class="unseen"> {member.name}</span>
         </a>
       ) : (
         <form class="row-line" onSubmit={open}>
           <ValueInput
             quiet
-            label={`Index of ${member.name}`}
+            label={t("Index of {0}", member.name)}
             type={indexType}
             text={index}
             disabled={!live}
             onText={(text) => (setIndex(text), setFailure(null))}
           />
           <button class="button" type="submit" disabled={!live}>
-            Open<span class="unseen"> {member.name}</span>
+            {t("Open")}
+            <span class="unseen"> {member.name}</span>
           </button>
         </form>
       )}

@@ -2,6 +2,7 @@
 // Layer: web/members.
 
 import { useEffect, useState } from "preact/hooks";
+import { t } from "../app/language";
 import { explain } from "../robot/remote";
 import { Failure } from "../ui/failure";
 import { formatValue } from "../values/format";
@@ -40,10 +41,10 @@ export function PipeRow({ object, member, live }: MemberRowProps) {
             aria-pressed={following}
             onClick={() => setFollowing(!following)}
           >
-            {following ? "Stop" : "Follow"}
+            {following ? t("Stop") : t("Follow")}
             <span class="unseen"> {member.name}</span>
           </button>
-          {following && log.entries.length === 0 && <p class="note">Connected. No packet yet.</p>}
+          {following && log.entries.length === 0 && <p class="note">{t("Connected. No packet yet.")}</p>}
         </div>
       )}
       <Failure text={failure} />

@@ -2,6 +2,7 @@
 // Layer: web/members.
 
 import { useEffect, useState } from "preact/hooks";
+import { t } from "../app/language";
 import { Failure } from "../ui/failure";
 import { formatValue } from "../values/format";
 import { parseInput } from "../values/parse";
@@ -32,9 +33,10 @@ export function PropertyRow({ object, member, live }: MemberRowProps) {
       <RowHead member={member} />
       {readable && (
         <div class="row-line">
-          <output class="value">{shown ?? (reading.busy ? "reading …" : "not read")}</output>
+          <output class="value">{shown ?? (reading.busy ? t("reading …") : t("not read"))}</output>
           <button class="button" type="button" disabled={!live || reading.busy} onClick={read}>
-            Read<span class="unseen"> {member.name}</span>
+            {t("Read")}
+            <span class="unseen"> {member.name}</span>
           </button>
         </div>
       )}
@@ -43,14 +45,15 @@ export function PropertyRow({ object, member, live }: MemberRowProps) {
         <form class="row-line" onSubmit={write}>
           <ValueInput
             quiet
-            label={`New value of ${member.name}`}
+            label={t("New value of {0}", member.name)}
             type={member.type}
             text={text}
             disabled={!live}
             onText={setText}
           />
           <button class="button" type="submit" disabled={!live || writing.busy}>
-            Set<span class="unseen"> {member.name}</span>
+            {t("Set")}
+            <span class="unseen"> {member.name}</span>
           </button>
         </form>
       )}

@@ -2,6 +2,7 @@
 // Layer: web/members.
 
 import { useEffect, useMemo, useState } from "preact/hooks";
+import { t } from "../app/language";
 import { Plot } from "../chart/plot";
 import { explain } from "../robot/remote";
 import { rateOf, Series } from "../robot/series";
@@ -81,10 +82,10 @@ function WireReader({ object, name, live }: { object: MemberRowProps["object"]; 
   return (
     <>
       <div class={`wire ${age === null ? "" : "is-stale"}`}>
-        <output class="value wire-value">{text ?? (live ? "no value yet" : "not connected")}</output>
+        <output class="value wire-value">{text ?? (live ? t("no value yet") : t("not connected"))}</output>
         {lines.length > 0 && (
           <div class="wire-plot">
-            <Plot series={lines} label={`Plot of ${name} over the last 30 seconds`} live={live} />
+            <Plot series={lines} label={t("Plot of {0} over the last 30 seconds", name)} live={live} />
             <ul class="legend">
               {labels.map((label, i) => (
                 <li key={label} class={`legend-${(i % 6) + 1}`}>
@@ -96,8 +97,8 @@ function WireReader({ object, name, live }: { object: MemberRowProps["object"]; 
         )}
       </div>
       <p class="note">
-        {rate > 0 ? `${rate.toFixed(1)} values a second` : "no values in the last 2 s"}
-        {age !== null && `; this one is ${age}`}
+        {rate > 0 ? t("{0} values a second", rate.toFixed(1)) : t("no values in the last 2 s")}
+        {age !== null && t("; this one is {0}", age)}
       </p>
       <Failure text={failure} />
     </>
@@ -126,14 +127,15 @@ function WireWriter({
       <form class="row-line" onSubmit={send}>
         <ValueInput
           quiet
-          label={`Value to send on ${name}`}
+          label={t("Value to send on {0}", name)}
           type={type}
           text={text}
           disabled={!live}
           onText={setText}
         />
         <button class="button" type="submit" disabled={!live || sending.busy}>
-          Send<span class="unseen"> on {name}</span>
+          {t("Send")}
+          <span class="unseen"> {name}</span>
         </button>
       </form>
       <Failure text={sending.failure} />

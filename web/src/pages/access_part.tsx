@@ -2,6 +2,7 @@
 // Layer: web/pages.
 
 import { useState } from "preact/hooks";
+import { t } from "../app/language";
 import { useStore } from "../app/store";
 import type { AccessDesk, AccessRequest } from "../gateway/access";
 import { sentence } from "../ui/words";
@@ -11,8 +12,8 @@ export function AccessPart({ access }: { access: AccessDesk }) {
   const trouble = useStore(access.trouble);
   if (pending.length === 0 && trouble === null) return null;
   return (
-    <section class="access-part" aria-label="Requests of access">
-      <h2 class="place-name">Access</h2>
+    <section class="access-part" aria-label={t("Requests of access")}>
+      <h2 class="place-name">{t("Access")}</h2>
       <ul class="devices">
         {pending.map((request) => (
           <RequestRow key={request.id} request={request} access={access} />
@@ -33,7 +34,7 @@ function RequestRow({ request, access }: { request: AccessRequest; access: Acces
   return (
     <li class="device" data-request={request.name}>
       <p>
-        <strong>{request.name}</strong> from <span class="code">{request.client}</span> asks for access
+        <strong>{request.name}</strong> <span class="code">({request.client})</span> {t("asks for access")}
         {request.reason !== "" && <>: {request.reason}</>}
       </p>
       <form
@@ -44,13 +45,13 @@ function RequestRow({ request, access }: { request: AccessRequest; access: Acces
         }}
       >
         <label>
-          Roles <input type="text" value={roles} onInput={(event) => setRoles(event.currentTarget.value)} />
+          {t("Roles")} <input type="text" value={roles} onInput={(event) => setRoles(event.currentTarget.value)} />
         </label>
         <button class="button" type="submit" disabled={words.length === 0}>
-          Approve
+          {t("Approve")}
         </button>
         <button class="button" type="button" onClick={() => void access.deny(request)}>
-          Deny
+          {t("Deny")}
         </button>
       </form>
     </li>

@@ -98,8 +98,8 @@ function AwayDetail({ state }: { state: GatewayState & { kind: "away" } }) {
   return (
     <>
       {location.host}: {sentence(state.reason)}{" "}
-      <span aria-hidden="true">Away for {span(now - state.since)}; asking every 2 s.</span>
-      {state.devices && state.devices.length > 0 && " Below is what it said last."}
+      <span aria-hidden="true">{t("Away for {0}; asking every 2 s.", span(now - state.since))}</span>
+      {state.devices && state.devices.length > 0 && ` ${t("Below is what it said last.")}`}
     </>
   );
 }
@@ -110,25 +110,25 @@ function DeviceRow({ device, stale }: { device: Device; stale: boolean }) {
       <div class="device-head">
         <h2 class="place-name">{device.name}</h2>
         {device.found && (
-          <span class="found-mark" title="Found on the network; it goes when it is not announced any more">
-            found
+          <span class="found-mark" title={t("Found on the network; it goes when it is not announced any more")}>
+            {t("found")}
           </span>
         )}
         {isUsb(device.name) && (
-          <span class="found-mark" title="Plugged into this computer; the page speaks to it without the gateway">
+          <span class="found-mark" title={t("Plugged into this computer; the page speaks to it without the gateway")}>
             USB
           </span>
         )}
-        <StateBadge state={device.state} text={stale ? `was ${device.state}` : device.state} />
+        <StateBadge state={device.state} text={stale ? t("was {0}", t(device.state)) : t(device.state)} />
       </div>
       <dl class="device-facts">
         <div>
-          <dt>Address</dt>
+          <dt>{t("Address")}</dt>
           <dd class="code">{device.url}</dd>
         </div>
         {device.nodeName !== "" && (
           <div>
-            <dt>Node</dt>
+            <dt>{t("Node")}</dt>
             <dd class="code" title={device.nodeId}>
               {device.nodeName}
             </dd>
@@ -136,21 +136,21 @@ function DeviceRow({ device, stale }: { device: Device; stale: boolean }) {
         )}
         {device.mode !== null && (
           <div>
-            <dt>Mode</dt>
-            <dd title={MODE[device.mode]}>{device.mode}</dd>
+            <dt>{t("Mode")}</dt>
+            <dd title={t(MODE[device.mode])}>{device.mode}</dd>
           </div>
         )}
         {device.clients !== null && (
           <div>
-            <dt>Clients</dt>
+            <dt>{t("Clients")}</dt>
             <dd>{device.clients}</dd>
           </div>
         )}
       </dl>
       {device.state !== "online" && (
         <p class="device-trouble">
-          {sentence(device.lastError ?? "Not reached yet")}{" "}
-          {!stale && !isUsb(device.name) && "The gateway keeps trying."}
+          {sentence(device.lastError ?? t("Not reached yet"))}{" "}
+          {!stale && !isUsb(device.name) && t("The gateway keeps trying.")}
         </p>
       )}
       <ul class="services">
@@ -161,7 +161,9 @@ function DeviceRow({ device, stale }: { device: Device; stale: boolean }) {
         ))}
         {device.services.length === 0 && (
           <li class="no-services">
-            {device.state === "online" ? "It offers no services." : "Its services show here once it has answered."}
+            {device.state === "online"
+              ? t("It offers no services.")
+              : t("Its services show here once it has answered.")}
           </li>
         )}
       </ul>
@@ -181,7 +183,7 @@ function ServiceLink({ device, service }: { device: Device; service: Service }) 
   return (
     <a class="service" href={formatRoute(device.name, service.name)}>
       <span class="service-name">{service.name}</span>
-      <span class="code service-type">{service.type === "" ? "type not read yet" : service.type}</span>
+      <span class="code service-type">{service.type === "" ? t("type not read yet") : service.type}</span>
     </a>
   );
 }
@@ -211,11 +213,11 @@ const EXAMPLE = `{
 function NoDevices() {
   return (
     <section class="empty">
-      <h2 class="place-name">Uncharted waters</h2>
-      <p>This gateway knows no devices yet. Name one in its configuration and it appears here by itself:</p>
+      <h2 class="place-name">{t("Uncharted waters")}</h2>
+      <p>{t("This gateway knows no devices yet. Name one in its configuration and it appears here by itself:")}</p>
       <pre class="code">{EXAMPLE}</pre>
       <p>
-        Or start the simulated robot: <code>rrgate demo</code>
+        {t("Or start the simulated robot:")} <code>rrgate demo</code>
       </p>
     </section>
   );

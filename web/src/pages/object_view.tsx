@@ -2,6 +2,7 @@
 // Layer: web/pages.
 
 import type { ComponentType } from "preact";
+import { t } from "../app/language";
 import type { Route } from "../app/router";
 import { CallbackRow } from "../members/callback_row";
 import { EventRow } from "../members/event_row";
@@ -37,14 +38,14 @@ export function ObjectView({ object, live, route }: ObjectViewProps) {
   return (
     <div class="object">
       <p class="object-type">
-        Object of type <code>{object.type}</code>
+        {t("Object of type")} <code>{object.type}</code>
       </p>
-      {object.members.length === 0 && <p class="empty">This object has no members.</p>}
+      {object.members.length === 0 && <p class="empty">{t("This object has no members.")}</p>}
       {groups
         .filter((group) => group.members.length > 0)
         .map(({ kind, title, Row, members }) => (
           <section key={kind} class="group" aria-labelledby={`group-${kind}`}>
-            <h2 id={`group-${kind}`}>{title}</h2>
+            <h2 id={`group-${kind}`}>{t(title)}</h2>
             <ul class="rows">
               {members.map((member) => (
                 <li key={member.name} class="row" data-member={member.name}>

@@ -2,6 +2,7 @@
 // Layer: web/pages. What is known of the robot outlives its connections; see RobotModel.
 
 import { useEffect, useMemo, useState } from "preact/hooks";
+import { t } from "../app/language";
 import { useStore } from "../app/store";
 import { CameraView } from "../camera/camera_view";
 import { RobotChart } from "../chart/robot_chart";
@@ -69,19 +70,19 @@ export function RobotPage({ link, list, device, shown }: RobotPageProps) {
     <div class="robot">
       <section class={`panel chart-panel ${poseComes ? "" : "is-stale"}`} aria-labelledby="chart-title">
         <h2 id="chart-title" class="unseen">
-          Chart
+          {t("Chart")}
         </h2>
         <RobotChart model={model} live={poseComes} />
-        {poseAge !== null && <p class="chart-age">Last known, {poseAge}</p>}
+        {poseAge !== null && <p class="chart-age">{t("Last known, {0}", poseAge)}</p>}
         <div class="chart-foot">
           <PoseLine model={model} live={live} />
           {remote?.has("reset", "function") && (
             <button class="button button-quiet" type="button" onClick={() => putBack(remote)}>
-              To start
+              {t("To start")}
             </button>
           )}
           <button class="button button-quiet" type="button" onClick={() => model.clearTrail()}>
-            Clear trail
+            {t("Clear trail")}
           </button>
           <SongBox robot={remote} />
         </div>
@@ -90,6 +91,7 @@ export function RobotPage({ link, list, device, shown }: RobotPageProps) {
         driver={driver}
         control={control}
         enabled={live && shown && isOpen}
+        linked={live}
         lost={state.kind === "lost"}
         failure={driveFailure}
         device={device}

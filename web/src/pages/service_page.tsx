@@ -2,22 +2,26 @@
 // Layer: web/pages.
 
 import type { ComponentType } from "preact";
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
-import { formatRoute } from "../app/router";
+import { formatRoute, formatStep } from "../app/router";
 import type { PathStep, Route, View } from "../app/router";
 import { recallBoard } from "../board/board";
-import { hasPreset } from "../board/presets";
+import { hasPreset, stopFor } from "../board/presets";
+import { StopButton } from "../board/stop";
 import { useStore } from "../app/store";
-import { devicesOf, relayUrl } from "../gateway/devices";
+import { devicesOf } from "../gateway/devices";
 import type { DeviceList } from "../gateway/devices";
-import { session } from "../gateway/session";
-import { isUsb, usbUrl } from "../gateway/usb_devices";
-import { Link } from "../robot/link";
+import { linkTo } from "../gateway/link_to";
+import { isUsb } from "../gateway/usb_devices";
+import { useObject } from "../live/links";
+import type { Link } from "../robot/link";
 import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
+import type { StopCall } from "../robot/stop";
 import { isCreate } from "../robot/robot_model";
 import { walk } from "../robot/walk";
+import { Definitions, scopeOf } from "../values/definitions";
 import { LinkStrip } from "../ui/link_strip";
 import { ObjectView } from "./object_view";
 import { RobotPage } from "./robot_page";
@@ -37,6 +41,7 @@ export function ServicePage({ route, list }: { route: ServiceRoute; list: Device
       <div class="service-head">
         <h1 class="place-name">{device}</h1>
         {link && <LinkStrip link={link} list={list} device={device} service={service} />}
+        {link && shown === "members" && <HeadStop link={link} path={path} list={list} />}
         {link && <Views route={route} shown={shown} first={first} drives={drives} />}
       </div>
       {drives && link && (
@@ -48,7 +53,8 @@ export function ServicePage({ route, list }: { route: ServiceRoute; list: Device
       {link && shown === "members" && <MembersPage link={link} route={route} path={path} />}
       {isMissing && (
         <p class="empty">
-          The gateway has no device of this name. If one comes, it opens here by itself. <a href="#/">All devices</a>
+          {t("The gateway has no device of this name. If one comes, it opens here by itself.")}{" "}
+          <a href="#/">{t("All devices")}</a>
         </p>
       )}
     </div>
@@ -76,6 +82,23 @@ function Views({ route, shown, first, drives }: { route: ServiceRoute; shown: Vi
   );
 }
 
+/** Of the object that is shown, else of the service: where its type says how. A board and the demo robot have their own. */
+function HeadStop({ link, path, list }: { link: Link; path: readonly PathStep[]; list: DeviceList }) {
+  const shown = useObject(link, "", path.map(formatStep).join("."), list);
+  const root = useObject(link, "", "", list);
+  const [own, service] = [useStop(shown.last), useStop(root.last)];
+  if (own) return <StopButton object={shown.object} stop={own} />;
+  return service && <StopButton object={root.object} stop={service} />;
+}
+
+function useStop(object: Remote | null): StopCall | null {
+  return useMemo(() => {
+    if (!object) return null;
+    const { type, members } = object;
+    return stopFor({ type, members, definitions: new Definitions(object.definitions), scope: scopeOf(type) });
+  }, [object]);
+}
+
 /** What an address without a view shows: the demo robot's page, a board that was made or is known to fit, else all members. */
 function useFirstView(link: Link | null, route: ServiceRoute, drives: boolean): View {
   const [isKnown, setKnown] = useState(false);
@@ -84,7 +107,7 @@ function useFirstView(link: Link | null, route: ServiceRoute, drives: boolean): 
     if (!link) return;
     const look = (): void => {
       const state = link.state.value;
-      if (state.kind === "online") setKnown(hasPreset(state.remote.type));
+      if (state.kind === "online") setKnown(hasPreset(state.remote.type, new Definitions(state.remote.definitions)));
     };
     look();
     return link.state.watch(look);
@@ -117,22 +140,9 @@ function useLink(device: string, service: string, list: DeviceList, isWanted: bo
   const [link, setLink] = useState<Link | null>(null);
   useEffect(() => {
     if (!isWanted) return setLink(null);
-    const url = relayUrl(device, service);
-    const made = new Link(isUsb(device) ? usbUrl(device, service) : () => session.withTicket(url));
+    const { link: made, dispose } = linkTo(device, service, list);
     setLink(made);
-    let wasOnline = true;
-    const unwatch = list.state.watch((gateway) => {
-      const known = gateway.kind === "known" && gateway.devices.find((d) => d.name === device);
-      const isOnline = known !== false && known?.state === "online";
-      if (known && known.state === "offline") made.setAway(known.lastError ?? "offline");
-      if (isOnline) made.setAway(null);
-      if (isOnline && !wasOnline) made.retryNow();
-      wasOnline = isOnline;
-    });
-    return () => {
-      unwatch();
-      made.dispose();
-    };
+    return dispose;
   }, [device, service, list, isWanted]);
   return link;
 }

@@ -2,9 +2,11 @@
 // Layer: web/pages.
 
 import { useEffect, useRef, useState } from "preact/hooks";
+import { t } from "../app/language";
 import { useStore } from "../app/store";
 import type { Session } from "../gateway/session";
 import { Failure } from "../ui/failure";
+import { AskPart } from "./ask_part";
 
 export function SignInPage({ session, done }: { session: Session; done: () => void }) {
   const [name, setName] = useState("");
@@ -12,15 +14,16 @@ export function SignInPage({ session, done }: { session: Session; done: () => vo
   const [isBusy, setBusy] = useState(false);
   const [failure, setFailure] = useState<string | null>(null);
   const expired = useStore(session.trouble);
+  const who = useStore(session.who);
   const first = useRef<HTMLInputElement>(null);
   const second = useRef<HTMLInputElement>(null);
   useEffect(() => first.current?.focus(), []);
 
-  const signIn = async (): Promise<void> => {
+  const signIn = async (as: string, shown: string): Promise<void> => {
     setBusy(true);
     setFailure(null);
     try {
-      await session.signIn(name.trim(), secret);
+      await session.signIn(as, shown);
       done();
     } catch (error) {
       setFailure((error as Error).message);
@@ -35,12 +38,12 @@ export function SignInPage({ session, done }: { session: Session; done: () => vo
         aria-labelledby="sign-in-title"
         onSubmit={(event) => {
           event.preventDefault();
-          if (!isBusy) void signIn();
+          if (!isBusy) void signIn(name.trim(), secret);
         }}
       >
-        <h1 id="sign-in-title">Sign in</h1>
+        <h1 id="sign-in-title">{t("Sign in")}</h1>
         <label>
-          Name
+          {t("Name")}
           <input
             ref={first}
             type="text"
@@ -54,10 +57,10 @@ export function SignInPage({ session, done }: { session: Session; done: () => vo
           />
         </label>
         <p id="sign-in-hint" class="sign-in-hint">
-          Empty, if you have a token.
+          {t("Empty, if you have a token.")}
         </p>
         <label>
-          Password or token
+          {t("Password or token")}
           <input
             ref={second}
             type="password"
@@ -70,9 +73,10 @@ export function SignInPage({ session, done }: { session: Session; done: () => vo
         </label>
         <Failure text={failure ?? expired} />
         <button class="button" type="submit" aria-disabled={isBusy}>
-          {isBusy ? "Signing in" : "Sign in"}
+          {isBusy ? t("Signing in") : t("Sign in")}
         </button>
       </form>
+      {who?.requests && <AskPart session={session} use={(token) => void signIn("", token)} />}
     </div>
   );
 }
@@ -84,12 +88,12 @@ export function Account({ session, ask }: { session: Session; ask: () => void })
   if (who.user === null)
     return who.roles.length === 0 ? null : (
       <button class="button" type="button" onClick={ask}>
-        Sign in
+        {t("Sign in")}
       </button>
     );
-  const roles = who.roles.length === 0 ? "no role" : who.roles.join(", ");
+  const roles = who.roles.length === 0 ? t("no role") : who.roles.join(", ");
   return (
-    <div class="account" role="group" aria-label="You">
+    <div class="account" role="group" aria-label={t("You")}>
       <p>
         <strong>{who.user}</strong> <span class="account-roles">{roles}</span>
       </p>
@@ -99,7 +103,7 @@ export function Account({ session, ask }: { session: Session; ask: () => void })
           type="button"
           onClick={() => void session.signOut().catch((error: unknown) => setFailure((error as Error).message))}
         >
-          Sign out
+          {t("Sign out")}
         </button>
       )}
       <Failure text={failure} />

@@ -3,7 +3,10 @@
 
 import { parseStep, splitSteps } from "../app/router";
 import type { Member } from "../robot/remote";
+import type { Definitions } from "../values/definitions";
 import { jsonOf } from "../values/draft";
+import { inputsOf } from "./panel";
+import { PythonCode } from "./python_code";
 
 export type CodeLanguage = "JavaScript" | "curl" | "Python";
 
@@ -14,6 +17,12 @@ export interface CodePlace {
   object: string;
 }
 
+/** What the types of the member's values are named in. */
+export interface Types {
+  definitions: Definitions;
+  scope: string;
+}
+
 /** `base`: of the gateway, with a slash at its end. */
 export function asCode(
   language: CodeLanguage,
@@ -21,10 +30,11 @@ export function asCode(
   place: CodePlace,
   member: Member,
   values: readonly unknown[],
+  types: Types,
 ): string {
   if (language === "curl") return curl(base, place, member, values);
   const url = `${base.replace(/^http/, "ws")}devices/${encodeURIComponent(place.device)}?service=${encodeURIComponent(place.service)}`;
-  return language === "Python" ? python(url, place, member, values) : javaScript(url, place, member, values);
+  return language === "Python" ? python(url, place, member, values, types) : javaScript(url, place, member, values);
 }
 
 function javaScript(url: string, { object }: CodePlace, member: Member, values: readonly unknown[]): string {
@@ -47,8 +57,16 @@ function curl(base: string, place: CodePlace, member: Member, values: readonly u
   return `curl -X ${isCall ? "POST" : "PUT"} ${shell(`${base}api/v1/devices/${steps.join("/")}`)} \\\n  -H 'Content-Type: application/json' -d ${shell(body)}`;
 }
 
-function python(url: string, { object }: CodePlace, member: Member, values: readonly unknown[]): string {
-  const args = values.map(pythonValue).join(", ");
+function python(
+  url: string,
+  { object }: CodePlace,
+  member: Member,
+  values: readonly unknown[],
+  { definitions, scope }: Types,
+): string {
+  const code = new PythonCode(definitions);
+  const inputs = inputsOf(member);
+  const args = values.map((value, i) => code.value(value, inputs[i]?.type ?? "varvalue", scope)).join(", ");
   const target = splitSteps(object)
     .map(parseStep)
     .reduce((at, { member: step, index }) => {
@@ -63,24 +81,11 @@ function python(url: string, { object }: CodePlace, member: Member, values: read
         : `${target}.${member.name}.PokeOutValue(${args})`;
   return [
     "from RobotRaconteur.Client import *",
+    ...(code.usesNumpy ? ["import numpy"] : []),
     `robot = RRN.ConnectService(${JSON.stringify(`rr+${url}`)})`,
+    ...code.lines,
     done,
   ].join("\n");
-}
-
-function pythonValue(value: unknown): string {
-  if (value === null || value === undefined) return "None";
-  if (typeof value === "boolean") return value ? "True" : "False";
-  if (typeof value === "number" && !Number.isFinite(value)) return `float("${String(value).toLowerCase()}")`;
-  if (value instanceof Map)
-    return `{${[...(value as Map<unknown, unknown>)].map(([key, item]) => `${JSON.stringify(key)}: ${pythonValue(item)}`).join(", ")}}`;
-  if (ArrayBuffer.isView(value) || Array.isArray(value))
-    return `[${Array.from(value as ArrayLike<unknown>, pythonValue).join(", ")}]`;
-  if (typeof value === "object")
-    return `{${Object.entries(value)
-      .map(([key, item]) => `${JSON.stringify(key)}: ${pythonValue(item)}`)
-      .join(", ")}}`;
-  return typeof value === "bigint" ? String(value) : JSON.stringify(value);
 }
 
 /** "Webcams[0].lens" as steps of a URL: Webcams, 0, lens. */

@@ -11,7 +11,7 @@ import { draftOf, jsonOf, makeDraft, valueOf } from "../values/draft";
 import type { Draft } from "../values/draft";
 import { rowsOf } from "../values/rows";
 import { asCode } from "./code";
-import type { CodeLanguage } from "./code";
+import type { CodeLanguage, Types } from "./code";
 import { DraftInput } from "./draft_input";
 import { inputsOf, membersFor, textIn, textsIn } from "./panel";
 import type { PanelProps } from "./panel";
@@ -152,7 +152,7 @@ function MemberForm({ object, member, definitions, scope, place, withMore = fals
       )}
       <Failure text={doing.failure} />
       {withMore && done.length > 0 && <History done={done} take={setDrafts} />}
-      {withMore && <Code member={member} values={values} place={place} />}
+      {withMore && <Code member={member} values={values} place={place} types={{ definitions, scope }} />}
     </form>
   );
 }
@@ -181,16 +181,18 @@ function Code({
   member,
   values,
   place,
+  types,
 }: {
   member: Member;
   values: () => readonly unknown[];
   place: PanelProps["place"];
+  types: Types;
 }) {
   const [shown, setShown] = useState<{ language: CodeLanguage; text: string; isCopied: boolean } | null>(null);
   const show = (language: CodeLanguage): void => {
     let text: string;
     try {
-      text = asCode(language, new URL(".", document.baseURI).href, place, member, values());
+      text = asCode(language, new URL(".", document.baseURI).href, place, member, values(), types);
     } catch (error) {
       return setShown({ language, text: (error as Error).message, isCopied: false });
     }

@@ -1,20 +1,22 @@
 // A generator function: run it, step by step or by itself, and stop it.
 // Layer: web/panels.
 
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
-import { explain } from "../robot/remote";
+import { useStore } from "../app/store";
+import { onStop } from "../robot/control";
 import type { Member } from "../robot/remote";
 import { Failure } from "../ui/failure";
 import { clockTimeMs } from "../ui/words";
 import { makeDraft, valueOf } from "../values/draft";
+import type { Draft } from "../values/draft";
 import { rowsOf } from "../values/rows";
 import { DraftInput } from "./draft_input";
+import { GeneratorRun } from "./generator_run";
 import { membersFor, textIn } from "./panel";
 import type { PanelProps } from "./panel";
 import { MemberSelect } from "./parts";
 
-type State = "ready" | "stepping" | "running" | "held" | "ended" | "stopped";
 interface Result {
   number: number;
   time: number;
@@ -48,53 +50,46 @@ function Run({ object, definitions, scope, member }: PanelProps & { member: Memb
   const stepType = stepped?.type.replace(/\{generator\}$/, "") ?? "";
   const [drafts, setDrafts] = useState(() => plain.map(({ type }) => makeDraft(type, definitions, scope)));
   const [step, setStep] = useState(() => (stepped ? makeDraft(stepType, definitions, scope) : null));
-  const [state, setState] = useState<State>("ready");
   const [results, setResults] = useState<readonly Result[]>([]);
-  const [failure, setFailure] = useState<string | null>(null);
-  const run = useRef<AsyncGenerator<unknown, void, unknown> | null>(null);
-  const goesOn = useRef(false);
+  const latest = useRef({ definitions, scope });
+  latest.current = { definitions, scope };
+  const run = useMemo(
+    () =>
+      new GeneratorRun((value) => {
+        const text = rowsOf(
+          value,
+          member.type.replace(/\{generator\}$/, ""),
+          latest.current.definitions,
+          latest.current.scope,
+        )
+          .map((row) => (row.name === "" ? row.text : `${row.name}: ${row.text}`))
+          .join(", ");
+        setResults((old) => [{ number: (old[0]?.number ?? 0) + 1, time: Date.now(), text }, ...old.slice(0, MOST - 1)]);
+      }),
+    [member],
+  );
+  const state = useStore(run.state);
+  const failure = useStore(run.failure);
+  useEffect(() => () => run.leave(), [object, run]);
+  useEffect(() => onStop(() => void run.stop()), [run]);
 
-  const end = (next: State): void => {
-    goesOn.current = false;
-    const running = run.current;
-    run.current = null;
-    setState(next);
-    running?.return().catch(() => undefined); // it is over, whatever the device says to that
-  };
-  useEffect(() => () => end("stopped"), [object]);
-
-  const advance = async (): Promise<void> => {
+  const read = (draft: Draft | undefined, type: string): unknown =>
+    valueOf(draft ?? makeDraft(type, definitions, scope), type, definitions, scope);
+  const begin = (): AsyncGenerator<unknown, void, unknown> => {
     if (!object) throw new Error(t("not connected"));
-    run.current ??= object.generate(
+    return object.generate(
       member.name,
-      plain.map(({ type }, i) => valueOf(drafts[i] ?? makeDraft(type, definitions, scope), type, definitions, scope)),
+      plain.map(({ type }, i) => read(drafts[i], type)),
     );
-    const given = step === null ? undefined : valueOf(step, stepType, definitions, scope);
-    const mine = run.current;
-    const next = await mine.next(given);
-    if (run.current !== mine) return;
-    if (next.done) return end("ended");
-    const text = rowsOf(next.value, member.type.replace(/\{generator\}$/, ""), definitions, scope)
-      .map((row) => (row.name === "" ? row.text : `${row.name}: ${row.text}`))
-      .join(", ");
-    setResults((old) => [{ number: (old[0]?.number ?? 0) + 1, time: Date.now(), text }, ...old.slice(0, MOST - 1)]);
   };
-  const go = async (byItself: boolean): Promise<void> => {
-    setFailure(null);
-    if (run.current === null) setResults([]);
-    goesOn.current = byItself;
-    setState(byItself ? "running" : "stepping");
-    try {
-      do await advance();
-      while (goesOn.current);
-      if (run.current !== null) setState("held");
-    } catch (error) {
-      if (run.current === null && goesOn.current) return; // stopped meanwhile
-      end("ended");
-      setFailure(explain(error));
-    }
+  const given = useRef((): unknown => undefined);
+  given.current = () => (step === null ? undefined : read(step, stepType)); // what is typed in while it runs counts
+  const go = (byItself: boolean): void => {
+    if (run.isFresh) setResults([]);
+    void run.go(byItself, begin, () => given.current());
   };
-  const isUnderWay = state === "running" || state === "stepping";
+  const isUnderWay = state === "running" || state === "stepping" || state === "stopping";
+  const canStop = state === "running" || state === "stepping" || state === "held";
   return (
     <div class="member-form">
       {plain.map(({ name, type }, i) => (
@@ -119,22 +114,17 @@ function Run({ object, definitions, scope, member }: PanelProps & { member: Memb
         />
       )}
       <div class="row-line">
-        <button class="button" type="button" disabled={!object || isUnderWay} onClick={() => void go(true)}>
+        <button class="button" type="button" disabled={!object || isUnderWay} onClick={() => go(true)}>
           {t("Run")}
         </button>
-        <button class="button" type="button" disabled={!object || isUnderWay} onClick={() => void go(false)}>
+        <button class="button" type="button" disabled={!object || isUnderWay} onClick={() => go(false)}>
           {t("Step")}
         </button>
-        <button
-          class="button"
-          type="button"
-          disabled={state === "ready" || state === "ended" || state === "stopped"}
-          onClick={() => end("stopped")}
-        >
+        <button class="button" type="button" disabled={!canStop} onClick={() => void run.stop()}>
           {t("Stop")}
         </button>
-        <span class="note" role="status">
-          {t(state)}
+        <span class="note" role="status" data-run={state}>
+          {state === "stopping" ? t("stopping: the device answers the step under way first") : t(state)}
         </span>
       </div>
       <Failure text={failure} />

@@ -1,19 +1,16 @@
 // A button that moves while it is held, by finger, mouse or key; letting go stops, and so does anything odd.
 // Layer: web/panels.
 
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { onStop } from "../robot/control";
 import { explain } from "../robot/remote";
+import { HeldJog } from "./held_jog";
+import type { JogMeans } from "./held_jog";
 
-const REPEAT_MS = 100;
-
-export interface JogButtonProps {
+export interface JogButtonProps extends Pick<JogMeans, "jog" | "stop"> {
   label: string;
   sign: string;
   enabled: boolean;
-  /** Moves for a moment; called again and again. `isHeld`: whether it is still wanted, after a wait. */
-  jog: (isHeld: () => boolean) => Promise<unknown>;
-  stop: () => Promise<unknown>;
   fail: (text: string | null) => void;
 }
 
@@ -21,37 +18,34 @@ export function JogButton({ label, sign, enabled, jog, stop, fail }: JogButtonPr
   const [held, setHeld] = useState(false);
   const latest = useRef({ jog, stop, fail });
   latest.current = { jog, stop, fail };
-  const letGo = (): void => setHeld(false);
+  const hold = useMemo(
+    () =>
+      new HeldJog({
+        jog: (isHeld) => latest.current.jog(isHeld),
+        stop: () => latest.current.stop(),
+        fail: (error) => latest.current.fail(explain(error)),
+        done: () => latest.current.fail(null),
+        changed: setHeld,
+      }),
+    [],
+  );
+  const letGo = (): void => hold.end();
   useEffect(() => {
-    if (!held || !enabled) return;
-    let isOver = false;
-    let isWaiting = false;
-    const send = (): void => {
-      if (isWaiting || isOver) return; // no queue of commands that are old when they are carried out
-      isWaiting = true;
-      latest.current
-        .jog(() => !isOver)
-        .then(
-          () => !isOver && latest.current.fail(null),
-          (error: unknown) => (latest.current.fail(explain(error)), letGo()),
-        )
-        .finally(() => (isWaiting = false));
-    };
-    send();
-    const timer = setInterval(send, REPEAT_MS);
+    if (!enabled) hold.end();
+  }, [enabled, hold]);
+  useEffect(() => {
     const forget = onStop(letGo);
     window.addEventListener("blur", letGo);
+    window.addEventListener("pagehide", letGo);
     document.addEventListener("visibilitychange", letGo);
     return () => {
-      isOver = true;
-      clearInterval(timer);
       forget();
       window.removeEventListener("blur", letGo);
+      window.removeEventListener("pagehide", letGo);
       document.removeEventListener("visibilitychange", letGo);
-      // At once, and not behind a command that hangs.
-      latest.current.stop().catch((error: unknown) => latest.current.fail(explain(error)));
+      letGo();
     };
-  }, [held, enabled]);
+  }, [hold]);
   return (
     <button
       class={`jog-button ${held ? "is-held" : ""}`}
@@ -62,14 +56,14 @@ export function JogButton({ label, sign, enabled, jog, stop, fail }: JogButtonPr
       onPointerDown={(event) => {
         if (event.button !== 0) return;
         event.currentTarget.setPointerCapture(event.pointerId);
-        setHeld(true);
+        hold.begin();
       }}
       onLostPointerCapture={letGo}
       onContextMenu={(event) => event.preventDefault()}
       onKeyDown={(event) => {
         if (event.code !== "Space" && event.code !== "Enter") return;
         event.preventDefault();
-        if (!event.repeat) setHeld(true);
+        if (!event.repeat) hold.begin();
       }}
       onKeyUp={letGo}
       onBlur={letGo}

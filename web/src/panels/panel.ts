@@ -3,6 +3,7 @@
 
 import type { ComponentType } from "preact";
 import type { PanelKind, Settings } from "../board/board";
+import { isGenerator } from "../robot/remote";
 import type { Member, MemberKind, Remote } from "../robot/remote";
 import type { Definitions } from "../values/definitions";
 
@@ -33,8 +34,6 @@ interface KindOfPanel {
 }
 
 const notWriteOnly = (member: Member): boolean => !member.modifiers.includes("writeonly");
-const isGenerator = (member: Member): boolean =>
-  [member.type, ...member.parameters.map(({ type }) => type)].some((type) => type.endsWith("{generator}"));
 
 const takesValues = (member: Member): boolean =>
   !isGenerator(member) && (member.kind !== "function" || member.parameters.length > 0);
@@ -127,7 +126,8 @@ export function textsIn(settings: Settings, name: string): string[] {
   return Array.isArray(value) ? value.filter((each): each is string => typeof each === "string") : [];
 }
 
-export function numberIn(settings: Settings, name: string, otherwise: number): number {
+/** A number of the settings, which may come from a file or an address: from `least` to `most`. */
+export function numberIn(settings: Settings, name: string, otherwise: number, least: number, most: number): number {
   const value = Object.hasOwn(settings, name) ? settings[name] : undefined;
-  return typeof value === "number" && Number.isFinite(value) ? value : otherwise;
+  return typeof value === "number" && Number.isFinite(value) ? Math.min(most, Math.max(least, value)) : otherwise;
 }

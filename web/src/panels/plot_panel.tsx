@@ -25,7 +25,7 @@ export default function PlotPanel(props: PanelProps) {
   const choices = membersFor("plot", members);
   const name = textIn(settings, "member") || choices[0]?.name || "";
   const member = choices.find((each) => each.name === name);
-  const seconds = numberIn(settings, "seconds", 30);
+  const seconds = numberIn(settings, "seconds", 30, 1, 3600);
   const kind = feedKindOf(member);
   const look = useFeed(object, kind, name);
   const available = useMemo(() => numberPaths(look.value), [look.feed, look.value === undefined]);

@@ -5,8 +5,9 @@ import { useEffect, useState } from "preact/hooks";
 import { t } from "../app/language";
 import { useFeed } from "../live/use_feed";
 import { useAction } from "../members/row";
-import { stopNow } from "../robot/control";
+import { stopNow, tellStop, watchStop } from "../robot/control";
 import { explain } from "../robot/remote";
+import { ROBOT_STOP, stopDevice } from "../robot/stop";
 import { ControlLine, useControl } from "../ui/control_line";
 import { Failure } from "../ui/failure";
 import { formatNumber } from "../values/format";
@@ -27,7 +28,7 @@ export default function RobotPanel({ object, members, definitions, scope, settin
   const [failure, setFailure] = useState<string | null>(null);
   const acting = useAction();
   const { control, isOpen } = useControl(object);
-  const percent = numberIn(settings, "percent", 10);
+  const percent = numberIn(settings, "percent", 10, 0, 100);
   useEffect(() => {
     if (!object || !isRobot) return;
     let isCurrent = true;
@@ -40,12 +41,20 @@ export default function RobotPanel({ object, members, definitions, scope, settin
   if (!isRobot) return <p class="note">{t("This object is no robot of the standard types.")}</p>;
 
   const mode = state ? modeName(state.commandMode, "RobotCommandMode", definitions, scope) : "";
-  const setMode = (number: number): void =>
+  const beginJog = (): void =>
     acting.run(async () => {
-      if (number !== 0) await control?.begin();
-      if (number !== 0) await object?.set("command_mode", 0); // a robot changes its mode only from halt
-      await object?.set("command_mode", number);
+      const isStopped = watchStop();
+      await control?.begin();
+      if (isStopped()) return;
+      await object?.set("command_mode", 0); // a robot changes its mode only from halt
+      if (!isStopped()) await object?.set("command_mode", 1);
     });
+  const haltAll = (): void => {
+    const fail = (error: unknown): void => setFailure(explain(error));
+    setFailure(null);
+    if (object) stopDevice(object, ROBOT_STOP, fail).catch(fail);
+    else tellStop();
+  };
   const positions = state?.positions ?? new Float64Array();
   const jogBy = (way: "call" | "urgent", index: number, direction: number): Promise<unknown> => {
     const velocity = new Float64Array(positions.length);
@@ -74,7 +83,8 @@ export default function RobotPanel({ object, members, definitions, scope, settin
           type="button"
           aria-pressed={mode === "halt"}
           disabled={!object}
-          onClick={() => setMode(0)}
+          onPointerDown={(event) => event.button === 0 && haltAll()}
+          onClick={(event) => event.detail === 0 && haltAll()}
         >
           {t("Halt")}
         </button>
@@ -83,7 +93,7 @@ export default function RobotPanel({ object, members, definitions, scope, settin
           type="button"
           aria-pressed={mode === "jog"}
           disabled={!object || acting.busy}
-          onClick={() => setMode(1)}
+          onClick={beginJog}
         >
           {t("Jog")}
         </button>

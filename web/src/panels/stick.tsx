@@ -3,15 +3,21 @@
 
 import { useRef } from "preact/hooks";
 
-export interface StickProps {
+export interface StickMoves {
+  /** A finger or a button of the mouse is down on it. */
+  press: () => void;
+  /** Right and up are positive, -1 to 1. */
+  move: (x: number, y: number) => void;
+  release: () => void;
+}
+
+export interface StickProps extends StickMoves {
   label: string;
   x: number;
   y: number;
-  /** Right and up are positive, -1 to 1; (0, 0) when it is let go. */
-  move: (x: number, y: number) => void;
 }
 
-export function StickPad({ label, x, y, move }: StickProps) {
+export function StickPad({ label, x, y, press, move, release }: StickProps) {
   const held = useRef<number | null>(null);
   const follow = (event: PointerEvent): void => {
     if (held.current !== event.pointerId) return;
@@ -28,12 +34,13 @@ export function StickPad({ label, x, y, move }: StickProps) {
         if (event.button !== 0) return;
         event.currentTarget.setPointerCapture(event.pointerId);
         held.current = event.pointerId;
+        press();
         follow(event);
       }}
       onPointerMove={follow}
       onLostPointerCapture={() => {
         held.current = null;
-        move(0, 0);
+        release();
       }}
       onContextMenu={(event) => event.preventDefault()}
     >

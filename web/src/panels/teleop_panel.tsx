@@ -10,21 +10,14 @@ import { ControlLine, useControl } from "../ui/control_line";
 import { Failure } from "../ui/failure";
 import { jsonOf } from "../values/draft";
 import { DraftInput } from "./draft_input";
+import { HeldSticks } from "./held_sticks";
+import type { Side } from "./held_sticks";
 import { inputsOf, membersFor, textIn } from "./panel";
 import type { PanelProps } from "./panel";
 import { MemberSelect } from "./parts";
 import { StickPad } from "./stick";
-import {
-  AT_REST,
-  commandOf,
-  deflectionOfGamepad,
-  deflectionOfKeys,
-  isStickKey,
-  readAxes,
-  readNeutral,
-  STICKS,
-  together,
-} from "./teleop";
+import type { StickMoves } from "./stick";
+import { AT_REST, commandOf, isStickKey, readAxes, readNeutral, STICKS } from "./teleop";
 import type { Axis, Deflection } from "./teleop";
 
 const REPEAT_MS = 100;
@@ -76,7 +69,7 @@ export default function TeleopPanel(props: PanelProps) {
   }, [object, control, member, driver]);
 
   const enabled = object !== null && isOpen && mapping.axes.length > 0;
-  const { shown, pad, sticks, hasGamepad } = useSticks(driver, enabled, () => control?.mayCommand === true);
+  const { shown, pad, sticks, stop, hasGamepad } = useSticks(driver, enabled, () => control?.mayCommand === true);
   const setAxes = (axes: readonly Axis[]): void => change({ ...settings, axes });
   return (
     <div class="teleop panel-scroll">
@@ -92,17 +85,11 @@ export default function TeleopPanel(props: PanelProps) {
         tabIndex={0}
         {...pad}
       >
-        <StickPad label={t("Left stick")} x={shown["left-x"]} y={shown["left-y"]} move={sticks.left} />
-        <button
-          class="pad-stop"
-          type="button"
-          disabled={!object || !member}
-          onPointerDown={() => driver.stop()}
-          onClick={() => driver.stop()}
-        >
+        <StickPad label={t("Left stick")} x={shown["left-x"]} y={shown["left-y"]} {...sticks.left} />
+        <button class="pad-stop" type="button" disabled={!object || !member} onPointerDown={stop} onClick={stop}>
           {t("Rest")}
         </button>
-        <StickPad label={t("Right stick")} x={shown["right-x"]} y={shown["right-y"]} move={sticks.right} />
+        <StickPad label={t("Right stick")} x={shown["right-x"]} y={shown["right-y"]} {...sticks.right} />
       </div>
       <p class="note" data-gamepad={hasGamepad}>
         {hasGamepad
@@ -167,53 +154,57 @@ function Sent({ mapping, inputs, definitions, scope, shown }: Shown) {
 function useSticks(driver: Driver<Deflection>, enabled: boolean, mayPoll: () => boolean) {
   const [shown, setShown] = useState<Deflection>(AT_REST);
   const [hasGamepad, setHasGamepad] = useState(false);
-  const held = useRef({ keys: new Set<string>(), pointers: AT_REST, gamepad: AT_REST }).current;
   const latest = useRef({ enabled, mayPoll });
   latest.current = { enabled, mayPoll };
   const actions = useMemo(() => {
+    const held = new HeldSticks();
     const apply = (): void => {
-      const all = together(deflectionOfKeys(held.keys), held.pointers, held.gamepad);
+      const all = held.deflection;
       const isRest = !latest.current.enabled || STICKS.every((stick) => all[stick] === 0);
       driver.want(isRest ? AT_REST : all);
       setShown(isRest ? AT_REST : all);
     };
     const letGo = (): void => {
-      held.keys.clear();
-      held.pointers = held.gamepad = AT_REST;
+      held.letGo();
       apply();
     };
-    const stick = (side: "left" | "right") => (x: number, y: number) => {
-      held.pointers = { ...held.pointers, [`${side}-x`]: x, [`${side}-y`]: y };
-      apply();
-    };
+    const stick = (side: Side): StickMoves => ({
+      press: () => held.press(side),
+      move: (x, y) => void (held.push(side, x, y) && apply()),
+      release: () => {
+        held.release(side);
+        apply();
+      },
+    });
     const keyDown = (event: KeyboardEvent): void => {
       if (event.ctrlKey || event.metaKey || event.altKey) return letGo(); // a shortcut; its key-up may never come
       if (!isStickKey(event.code)) return;
       event.preventDefault(); // arrows would scroll
       if (event.repeat) return;
-      held.keys.add(event.code);
+      held.pressKey(event.code);
       apply();
     };
     const keyUp = (event: KeyboardEvent): void => {
       if (event.key === "Meta") return letGo(); // macOS tells no key-up of keys that were held with it
-      if (held.keys.delete(event.code)) apply();
+      if (held.releaseKey(event.code)) apply();
     };
     const poll = (): void => {
       const found = (navigator.getGamepads?.() ?? []).find((each) => each?.connected) ?? null;
       setHasGamepad(found !== null);
-      const before = held.gamepad;
-      const counts = found !== null && latest.current.mayPoll() && document.hasFocus();
-      held.gamepad = counts ? withoutDrift(deflectionOfGamepad(found.axes)) : AT_REST;
-      if (STICKS.some((each) => before[each] !== held.gamepad[each])) apply();
+      if (held.poll(found?.axes ?? null, latest.current.mayPoll() && document.hasFocus())) apply();
     };
     return {
       letGo,
       poll,
+      stop: () => {
+        letGo();
+        driver.stop();
+      },
       pad: { onKeyDown: keyDown, onKeyUp: keyUp, onFocusOut: letGo },
       left: stick("left"),
       right: stick("right"),
     };
-  }, [driver, held]);
+  }, [driver]);
   useEffect(() => {
     if (!enabled) actions.letGo();
   }, [enabled, actions]);
@@ -236,17 +227,12 @@ function useSticks(driver: Driver<Deflection>, enabled: boolean, mayPoll: () => 
       actions.letGo();
     };
   }, [actions]);
-  return { shown, hasGamepad, pad: actions.pad, sticks: { left: actions.left, right: actions.right } };
-}
-
-/** A stick that nobody touches trembles around 0. Steps of 1/50 keep it from sending each tremble. */
-function withoutDrift(deflection: Deflection): Deflection {
-  const step = (value: number): number => (Math.abs(value) < 0.05 ? 0 : Math.round(value * 50) / 50);
   return {
-    "left-x": step(deflection["left-x"]),
-    "left-y": step(deflection["left-y"]),
-    "right-x": step(deflection["right-x"]),
-    "right-y": step(deflection["right-y"]),
+    shown,
+    hasGamepad,
+    pad: actions.pad,
+    stop: actions.stop,
+    sticks: { left: actions.left, right: actions.right },
   };
 }
 

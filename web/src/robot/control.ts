@@ -14,6 +14,8 @@ export type ControlState =
   | { kind: "idle" }
   | { kind: "taking" }
   | { kind: "held"; since: number }
+  /** The gateway has answered no renewal in time: it may have made the device safe. Ends as held or lost. */
+  | { kind: "doubtful"; reason: string }
   /** Nobody gives leases of this object. */
   | { kind: "free" }
   | { kind: "lost"; reason: string; byOthers: boolean };
@@ -39,7 +41,7 @@ export class Control {
   /** For a first command. @throws (rejects) where others have it, and where it was lost. */
   async begin(): Promise<void> {
     const { value } = this.state;
-    if (value.kind === "lost") throw new Error(value.reason);
+    if (value.kind === "lost" || value.kind === "doubtful") throw new Error(value.reason);
     if (!this.mayCommand) await this.take();
   }
 
@@ -70,7 +72,13 @@ export class Control {
     try {
       const lease = await this.#object.lease({ deadman: DEADMAN_MS, takeover, timeout: 2_000 });
       this.#lease = lease;
-      this.state.value = { kind: "held", since: Date.now() };
+      const since = Date.now();
+      this.state.value = { kind: "held", since };
+      lease.onState((state, reason) => {
+        if (lease !== this.#lease) return;
+        if (state === "held") this.state.value = { kind: "held", since };
+        if (state === "doubtful") this.state.value = { kind: "doubtful", reason: doubt(reason) };
+      });
       lease.onLost((reason) => lease === this.#lease && this.#lose(reason));
     } catch (error) {
       if (codeOf(error) === ErrorCode.NotImplementedError) this.state.value = { kind: "free" };
@@ -87,6 +95,8 @@ export class Control {
     this.state.value = { kind: "lost", reason: t("You are not in control: {0}", explain(reason)), byOthers };
   }
 }
+
+const doubt = (reason: unknown): string => t("You may not be in control any more: {0}", explain(reason));
 
 function codeOf(error: unknown): number | undefined {
   return error instanceof RobotRaconteurError ? error.code : undefined;
@@ -122,10 +132,18 @@ export async function stopNow(
 }
 
 const stopping = new EventTarget();
+let stops = 0;
 
 /** Somebody asked for a stop: whatever is held down drives no more. */
 export function tellStop(): void {
+  stops += 1;
   stopping.dispatchEvent(new Event("stop"));
+}
+
+/** @returns whether somebody has asked for a stop since: what is done in several steps ends there. */
+export function watchStop(): () => boolean {
+  const before = stops;
+  return () => stops !== before;
 }
 
 /** @returns a function that hears no more. */

@@ -1,6 +1,6 @@
 // The part of `rrgate-client` that this page uses, by name: members appear only at run time, so they are looked up
 // and checked here, once, instead of being cast all over the pages.
-// Layer: web/robot. Beside link.ts and gateway/usb_devices.ts the only file that imports `rrgate-client`.
+// Layer: web/robot. Others import of `rrgate-client` at most its errors, subscriptions, leases and USB devices.
 
 import { lease, RobotRaconteurError } from "rrgate-client";
 import type {
@@ -13,6 +13,8 @@ import type {
   RemoteObject,
 } from "rrgate-client";
 
+import { UnderWay } from "./under_way";
+
 export type Member = MemberInfo;
 export type { MemberKind };
 
@@ -23,9 +25,11 @@ export interface Remote {
   readonly members: readonly Member[];
   /** The texts of the definitions known so far. */
   readonly definitions: readonly string[];
+  /** Commands of this connection that are not answered yet. */
+  readonly underWay: UnderWay;
   has(name: string, kind: MemberKind): boolean;
   call(name: string, args: readonly unknown[], options?: CallOptions): Promise<unknown>;
-  /** Past whatever waits to be sent. */
+  /** Past whatever waits to be sent. @throws (rejects) where `name` is no function, or one that only begins a generator. */
   urgent(name: string, args: readonly unknown[], options?: CallOptions): Promise<unknown>;
   /** The right to command the object. @throws (rejects) NotImplementedError where nobody gives any. */
   lease(options: LeaseOptions): Promise<Lease>;
@@ -46,8 +50,8 @@ export interface Remote {
   generate(name: string, args: readonly unknown[]): AsyncGenerator<unknown, void, unknown>;
   lock(kind: "user" | "client"): Promise<void>;
   unlock(): Promise<void>;
-  /** Asks the device for something small: whether it still answers. Nothing is asked of an object that has nothing small. */
-  ping(timeoutMs: number): Promise<void>;
+  /** Asks the device for something small: whether it still answers. @returns false where the object has nothing small, so that nothing was asked. */
+  ping(timeoutMs: number): Promise<boolean>;
   /** Answers a callback by `handler`. @returns a function that stops answering. */
   answer(name: string, handler: (...args: unknown[]) => unknown): () => void;
   /** @returns a function that unsubscribes. */
@@ -69,7 +73,12 @@ export function explain(error: unknown): string {
   return error instanceof Error ? error.message : String(error);
 }
 
-export function remoteOf(object: RemoteObject): Remote {
+/** The last step's type, or that of the last argument, says that it is a generator. */
+export function isGenerator({ type, parameters }: Pick<Member, "type" | "parameters">): boolean {
+  return [type, parameters.at(-1)?.type ?? ""].some((each) => each.endsWith("{generator}"));
+}
+
+export function remoteOf(object: RemoteObject, underWay = new UnderWay()): Remote {
   const info = object.$;
   // By name through `$`: a definition may call a member "then" or "toString".
   const member = (name: string): DynamicMember => {
@@ -83,11 +92,18 @@ export function remoteOf(object: RemoteObject): Remote {
       return info.types;
     },
     has: (name, kind) => info.members.some((m) => m.name === name && m.kind === kind),
-    call: async (name, args, options) => member(name)(...args, ...(options ? [options] : [])),
-    urgent: async (name, args, options) => member(name) && info.urgent[name]?.(...args, ...(options ? [options] : [])),
+    underWay,
+    call: (name, args, options) =>
+      underWay.follow((async () => member(name)(...args, ...(options ? [options] : [])))()),
+    urgent: async (name, args, options) => {
+      const declared = info.members.find((each) => each.name === name);
+      const urgent = declared?.kind === "function" && !isGenerator(declared) ? info.urgent[name] : undefined;
+      if (!urgent) throw new Error(`${info.type} has no function "${name}" that can be called at once`);
+      return urgent(...args, ...(options ? [options] : []));
+    },
     lease: async (options) => lease(object, options),
     get: async (name) => member(name).get(),
-    set: async (name, value, options) => member(name).set(value, options),
+    set: (name, value, options) => underWay.follow((async () => member(name).set(value, options))()),
     wire: (name, signal) => valuesOf(() => member(name).connect({ signal }), signal),
     pipe: (name, signal) => valuesOf(() => member(name).connect(-1, { signal }), signal),
     dimensions: async (name) => member(name).dimensions(),
@@ -101,16 +117,17 @@ export function remoteOf(object: RemoteObject): Remote {
       const small = smallest(info.members);
       if (small?.kind === "wire") await member(small.name).peek({ timeout });
       else if (small) await member(small.name).get({ timeout });
+      return small !== undefined;
     },
     answer: (name, handler) => {
       const callback = member(name);
       callback.handler = handler;
       return () => void (callback.handler = null);
     },
-    poke: async (name, value) => member(name).poke(value),
+    poke: (name, value) => underWay.follow((async () => member(name).poke(value))()),
     on: (name, heard) => member(name).on(heard),
     child: async (name, index) =>
-      remoteOf(await (index === undefined ? member(name).get<RemoteObject>() : member(name).get(index))),
+      remoteOf(await (index === undefined ? member(name).get<RemoteObject>() : member(name).get(index)), underWay),
   };
 }
 

@@ -54,16 +54,16 @@ export function useDriving(driver: Driver<DriveCommand>, speed: number, enabled:
 
   useEffect(() => {
     const keyDown = (event: KeyboardEvent): void => {
+      if (isStop(event)) {
+        event.preventDefault();
+        return stop();
+      }
       if (event.ctrlKey || event.metaKey || event.altKey) return letGo(); // a shortcut; its key-up may never come
       if (takesKeys(event.target)) return;
       const direction = directionOfKey(event.code);
-      if (direction) {
-        event.preventDefault(); // arrows would scroll the page
-        if (!event.repeat) press(event.code, direction);
-      } else if (event.code === "Escape" || (event.code === "Space" && !isButton(event.target))) {
-        event.preventDefault();
-        stop();
-      }
+      if (!direction) return;
+      event.preventDefault(); // arrows would scroll the page
+      if (!event.repeat) press(event.code, direction);
     };
     const keyUp = (event: KeyboardEvent): void => {
       if (event.key === "Meta")
@@ -97,6 +97,9 @@ function takesKeys(target: EventTarget | null): boolean {
   return target instanceof Element && target.closest("input, textarea, select, [contenteditable]") !== null;
 }
 
-function isButton(target: EventTarget | null): boolean {
-  return target instanceof Element && target.closest("button, a") !== null;
+/** Esc anywhere; Space where it has no other meaning. */
+function isStop({ code, target }: KeyboardEvent): boolean {
+  if (code === "Escape") return true;
+  const hasMeaning = 'button, a, input:not([type="range"]), textarea, select, [contenteditable]';
+  return code === "Space" && !(target instanceof Element && target.closest(hasMeaning) !== null);
 }

@@ -2,6 +2,7 @@
 // Layer: web/robot_view.
 
 import { useState } from "preact/hooks";
+import { t } from "../app/language";
 import type { Control } from "../robot/control";
 import type { Driver } from "../robot/driver";
 import { SPEED_MAX, SPEED_MIN } from "../robot/steering";
@@ -16,31 +17,33 @@ export interface DrivePanelProps {
   driver: Driver<DriveCommand>;
   control: Control | null;
   enabled: boolean;
+  /** Whether there is a connection: Stop needs nothing else. */
+  linked: boolean;
   lost: boolean;
   failure: string | null;
   device: string;
 }
 
-export function DrivePanel({ driver, control, enabled, lost, failure, device }: DrivePanelProps) {
+export function DrivePanel({ driver, control, enabled, linked, lost, failure, device }: DrivePanelProps) {
   const [speed, setSpeed] = useState(200);
   const driving = useDriving(driver, speed, enabled);
   return (
     <section class="panel drive" aria-labelledby="drive-title">
       <h2 id="drive-title" class="unseen">
-        Drive
+        {t("Drive")}
       </h2>
-      <div class="pad" role="group" aria-label="Hold to drive">
-        <HoldButton direction="forward" label="Forward" driving={driving} enabled={enabled} />
-        <HoldButton direction="left" label="Left" driving={driving} enabled={enabled} />
+      <div class="pad" role="group" aria-label={t("Hold to drive")}>
+        <HoldButton direction="forward" label={t("Forward")} driving={driving} enabled={enabled} />
+        <HoldButton direction="left" label={t("Left")} driving={driving} enabled={enabled} />
         {/* At the press already; a click alone is the keyboard's, or a screen reader's. */}
-        <button class="pad-stop" type="button" disabled={!enabled} onPointerDown={driving.stop} onClick={driving.stop}>
-          Stop
+        <button class="pad-stop" type="button" disabled={!linked} onPointerDown={driving.stop} onClick={driving.stop}>
+          {t("Stop")}
         </button>
-        <HoldButton direction="right" label="Right" driving={driving} enabled={enabled} />
-        <HoldButton direction="back" label="Back" driving={driving} enabled={enabled} />
+        <HoldButton direction="right" label={t("Right")} driving={driving} enabled={enabled} />
+        <HoldButton direction="back" label={t("Back")} driving={driving} enabled={enabled} />
       </div>
       <div class="speed">
-        <label for="speed">Speed</label>
+        <label for="speed">{t("Speed")}</label>
         <input
           id="speed"
           type="range"
@@ -57,10 +60,10 @@ export function DrivePanel({ driver, control, enabled, lost, failure, device }: 
       <ControlLine control={control} />
       <p class="note drive-note">
         {lost
-          ? `Driving is off: no connection to ${device}. It comes back by itself.`
+          ? t("Driving is off: no connection to {0}. It comes back by itself.", device)
           : enabled
-            ? "Hold a button, an arrow key or WASD. Letting go stops; so do Space and Esc."
-            : "Driving is off until the robot is connected."}
+            ? t("Hold a button, an arrow key or WASD. Letting go stops; so do Space and Esc.")
+            : t("Driving is off until the robot is connected.")}
       </p>
       <Failure text={failure} />
     </section>

@@ -2,6 +2,7 @@
 // Layer: web/robot_view.
 
 import { useEffect, useState } from "preact/hooks";
+import { t } from "../app/language";
 import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
 import { nameNotes, songAfter } from "../robot/song";
@@ -24,9 +25,9 @@ export function SongBox({ robot }: { robot: Remote | null }) {
   return (
     <>
       <button class="button button-quiet" type="button" onClick={press}>
-        Play a song
+        {t("Play a song")}
       </button>
-      <output class="chart-song" aria-label="Song">
+      <output class="chart-song" aria-label={t("Song")}>
         {text}
       </output>
     </>

@@ -2,6 +2,7 @@
 // Layer: web/robot_view.
 
 import type { ComponentChildren } from "preact";
+import { t } from "../app/language";
 import { useStore } from "../app/store";
 import { Plot } from "../chart/plot";
 import type { RobotModel, Told } from "../robot/robot_model";
@@ -21,42 +22,56 @@ export function ValuesPanel({ model, live }: { model: RobotModel; live: boolean 
   const packetRate = packetsCome ? rateOf(series.packets, performance.now()).toFixed(0) : "0";
   return (
     <section class="panel values" aria-labelledby="values-title">
-      <h2 id="values-title">Values</h2>
+      <h2 id="values-title">{t("Values")}</h2>
       <div class="readings">
-        <Reading model={model} told="distanceMm" name="Distance" id="distance" value={distanceMm} unit="mm">
-          <Plot series={[series.distance]} label="Distance, last 30 seconds" minSpan={100} live={live} />
+        <Reading model={model} told="distanceMm" name={t("Distance")} id="distance" value={distanceMm} unit="mm">
+          <Plot series={[series.distance]} label={t("Distance, last 30 seconds")} minSpan={100} live={live} />
         </Reading>
-        <Reading model={model} told="angleDeg" name="Angle" id="angle" value={angleDeg} unit="°">
-          <Plot series={[series.angle]} label="Angle, last 30 seconds" minSpan={10} firstColour={1} live={live} />
+        <Reading model={model} told="angleDeg" name={t("Angle")} id="angle" value={angleDeg} unit="°">
+          <Plot series={[series.angle]} label={t("Angle, last 30 seconds")} minSpan={10} firstColour={1} live={live} />
         </Reading>
-        <Reading model={model} told="leftWheelMmS" name="Wheels" id="wheels" value={hasWheels ? "" : null} unit="mm/s">
+        <Reading
+          model={model}
+          told="leftWheelMmS"
+          name={t("Wheels")}
+          id="wheels"
+          value={hasWheels ? "" : null}
+          unit="mm/s"
+        >
           <Plot
             series={[series.leftWheel, series.rightWheel]}
-            label="Wheel speeds, last 30 seconds"
+            label={t("Wheel speeds, last 30 seconds")}
             minSpan={50}
             firstColour={2}
             live={live}
           />
           <p class="legend-line">
             <span class="legend-3">
-              left <b data-reading="left-wheel">{leftWheelMmS ?? "–"}</b>
+              {t("left")} <b data-reading="left-wheel">{leftWheelMmS ?? "–"}</b>
             </span>
             <span class="legend-4">
-              right <b data-reading="right-wheel">{rightWheelMmS ?? "–"}</b>
+              {t("right")} <b data-reading="right-wheel">{rightWheelMmS ?? "–"}</b>
             </span>
           </p>
         </Reading>
         <Reading
           model={model}
           told="bumpers"
-          name="Bumpers"
+          name={t("Bumpers")}
           id="bumpers"
-          value={bumpers === null ? null : sideOf(bumpers) || "free"}
+          value={bumpers === null ? null : sideOf(bumpers) || t("free")}
         >
           <BumperPicture bits={bumpers ?? 0} />
         </Reading>
-        <Reading model={model} told="packet" name="Packets" id="packets" value={packet && packetRate} unit="a second">
-          <p class="code packet-bytes">{packet ? `${packet.id}: ${formatHex(packet.bytes, 14)}` : "none yet"}</p>
+        <Reading
+          model={model}
+          told="packet"
+          name={t("Packets")}
+          id="packets"
+          value={packet && packetRate}
+          unit={t("a second")}
+        >
+          <p class="code packet-bytes">{packet ? `${packet.id}: ${formatHex(packet.bytes, 14)}` : t("none yet")}</p>
         </Reading>
       </div>
       <Failure text={live ? trouble : null} />

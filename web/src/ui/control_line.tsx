@@ -10,7 +10,7 @@ import { clockTime } from "./words";
 
 export interface InControl {
   control: Control | null;
-  /** False after it was lost, until it is taken by hand. */
+  /** False after it was lost, until it is taken by hand, and while the gateway does not confirm it. */
   isOpen: boolean;
 }
 
@@ -20,7 +20,7 @@ export function useControl(object: Remote | null): InControl {
   const control = useMemo(() => (object ? controlOf(object) : null), [object]);
   useEffect(() => control?.use(), [control]);
   const { kind } = useStore(control?.state ?? NOBODY);
-  return { control, isOpen: control !== null && kind !== "lost" };
+  return { control, isOpen: control !== null && kind !== "lost" && kind !== "doubtful" };
 }
 
 export function ControlLine({ control }: { control: Control | null }) {
@@ -29,7 +29,7 @@ export function ControlLine({ control }: { control: Control | null }) {
   const take = (takeover: boolean): void => void control?.take(takeover).catch(() => undefined); // the state says why not
   return (
     <div class="control-line" data-control={state.kind}>
-      {state.kind === "held" ? (
+      {state.kind === "held" || state.kind === "doubtful" ? (
         <button class="button" type="button" onClick={() => void control?.release().catch(() => undefined)}>
           {t("Give back")}
         </button>
@@ -43,10 +43,10 @@ export function ControlLine({ control }: { control: Control | null }) {
           {state.kind === "lost" && state.byOthers ? t("Take over") : t("Take control")}
         </button>
       )}
-      <p role="status" class={state.kind === "lost" ? "failure" : "note"}>
+      <p role="status" class={"reason" in state ? "failure" : "note"}>
         {state.kind === "held"
           ? t("You are in control since {0}.", clockTime(state.since))
-          : state.kind === "lost"
+          : "reason" in state
             ? state.reason
             : t("Your first command takes control.")}
       </p>

@@ -28,6 +28,8 @@ interface Definition {
   using: Map<string, string>;
   structs: Map<string, Struct>;
   enums: Map<string, Enum>;
+  /** Objects: the types that they implement, as their lines name them. */
+  objects: Map<string, string[]>;
 }
 
 export class Definitions {
@@ -60,9 +62,28 @@ export class Definitions {
     return enums.find((each) => lower(each) === wanted) ?? enums.find((each) => lower(each).endsWith(wanted));
   }
 
+  /** The qualified types that an object of `type` is, too: those that it implements, and what they implement. */
+  implemented(type: string): Set<string> {
+    const found = new Set<string>();
+    const look = (each: string): void => {
+      const [definition, name] = this.#find(each, scopeOf(each));
+      for (const base of definition?.objects.get(name) ?? []) {
+        const qualified = this.#qualify(base, definition?.name ?? "");
+        if (found.has(qualified)) continue; // a definition may go round in circles
+        found.add(qualified);
+        look(qualified);
+      }
+    };
+    look(type);
+    return found;
+  }
+
+  #qualify(base: string, scope: string): string {
+    return base.includes(".") ? base : (this.#byName.get(scope)?.using.get(base) ?? `${scope}.${base}`);
+  }
+
   #find(base: string, scope: string): [Definition | undefined, string] {
-    const here = this.#byName.get(scope);
-    const qualified = base.includes(".") ? base : (here?.using.get(base) ?? `${scope}.${base}`);
+    const qualified = this.#qualify(base, scope);
     const dot = qualified.lastIndexOf(".");
     return [this.#byName.get(qualified.slice(0, dot)), qualified.slice(dot + 1)];
   }
@@ -92,7 +113,13 @@ export function enumName(value: unknown, type: Enum): string | undefined {
 }
 
 function readDefinition(text: string): Definition {
-  const definition: Definition = { name: "", using: new Map(), structs: new Map(), enums: new Map() };
+  const definition: Definition = {
+    name: "",
+    using: new Map(),
+    structs: new Map(),
+    enums: new Map(),
+    objects: new Map(),
+  };
   const lines = text.replace(/\\\r?\n/g, " ").split(/\r?\n/);
   for (let i = 0; i < lines.length; i++) {
     const line = (lines[i] ?? "").trim();
@@ -104,11 +131,15 @@ function readDefinition(text: string): Definition {
       for (i++; i < lines.length && lines[i]?.trim() !== "end"; i++) body.push((lines[i] ?? "").trim());
       const name = `${definition.name}.${first}`;
       if (word === "enum") definition.enums.set(first, { name, values: readEnum(body) });
-      else if (word !== "object")
-        definition.structs.set(first, { kind: word, name, scope: definition.name, fields: readFields(body) });
+      else if (word === "object") definition.objects.set(first, readImplements(body));
+      else definition.structs.set(first, { kind: word, name, scope: definition.name, fields: readFields(body) });
     }
   }
   return definition;
+}
+
+function readImplements(body: readonly string[]): string[] {
+  return body.flatMap((line) => /^implements\s+(\S+)/.exec(line)?.[1] ?? []);
 }
 
 function readFields(body: readonly string[]): Field[] {

@@ -1,7 +1,7 @@
-// What a service tells of this session's own subscriptions. Layer: wasm-client/ts/members.
+// What a service tells of this session's own subscriptions. Loaded when it is asked for. Layer: wasm-client/ts.
 // Source: core/session/subscription_losses.hpp.
 import type { CallOptions, Losses, RrValue } from "../types.js";
-import type { MemberContext } from "./member.js";
+import type { MemberContext } from "../members/member.js";
 
 /** `index`: of a pipe endpoint. */
 export async function lossesOf(

@@ -1,0 +1,19 @@
+// What a person says to agents: yes, no, stop. Layer: server/http/endpoints. See docs/mcp.md.
+#pragma once
+
+#include "server/http/router.hpp"
+
+namespace rrgate {
+
+class GatewayState;
+
+/// GET /api/v1/agents/approvals, for admins: {"approvals": [{"id", "user", "client", "device", "path", "member",
+/// "verb", "values", "why", "expires_in"}], "stopped_for": seconds}.
+Handler approvals_endpoint(GatewayState& gateway);
+/// POST /api/v1/agents/approvals/ID {"answer": "once", "minutes" or "deny", "minutes": N}, for admins: {"state"}.
+Handler approval_endpoint(GatewayState& gateway);
+/// POST /api/v1/agents/stop {"minutes": N}, for admins: {"ended": commands, "stopped_for": seconds}. 0 minutes: what
+/// goes on ends, and agents may go on.
+Handler stop_agents_endpoint(GatewayState& gateway);
+
+}  // namespace rrgate

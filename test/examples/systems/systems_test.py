@@ -1,0 +1,238 @@
+"""Starts the systems of examples/ and uses them as somebody would who reads them.
+
+systems_test.py BUILD_DIR
+"""
+import json
+import os
+import pty
+import select
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import tty
+import unittest
+
+BUILD = sys.argv.pop(1)
+RRGATE = os.path.join(BUILD, "server", "rrgate")
+CREATE = os.path.join(BUILD, "examples", "demo", "rrgate-create-serial")
+DEADLINE = 30  # seconds
+
+
+def ran(*arguments):
+    return subprocess.run([RRGATE, *map(str, arguments)], capture_output=True, text=True, timeout=DEADLINE)
+
+
+def rrgate(*arguments):
+    done = ran(*arguments)
+    assert done.returncode == 0, (arguments, done.stderr)
+    return done.stdout.strip()
+
+
+def get(*arguments):
+    return json.loads(rrgate("get", *arguments, "--json"))
+
+
+def wait_for(is_so):
+    until = time.monotonic() + DEADLINE
+    while not is_so():
+        assert time.monotonic() < until, "not within the deadline"
+        time.sleep(0.05)
+
+
+def colour(value):
+    return [value[name] for name in ("red", "green", "blue")]
+
+
+class Program:
+    """One that says its URL in its first line with "://"."""
+
+    def __init__(self, test, *command):
+        self.log = test.enterContext(tempfile.TemporaryFile("w+"))
+        self.process = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, stderr=self.log, text=True)
+        test.addCleanup(self.process.stdout.close)
+        test.addCleanup(self.process.wait)
+        test.addCleanup(self.process.kill)
+
+    def url(self, begin=""):
+        for line in self.process.stdout:
+            if line.startswith(begin) and "://" in line:
+                return line.split()[-1]
+        raise AssertionError("no URL: " + self.said())
+
+    def said(self):
+        self.log.seek(0)
+        return self.log.read()
+
+
+class ConferenceRoom(unittest.TestCase):
+    def setUp(self):
+        gateway = Program(self, RRGATE, "demo", "conference-room", "--port", 0)
+        self.addCleanup(gateway.process.terminate)
+        pages = gateway.url("rrgate demo: http://127")
+        self.controller = f"{pages}devices/controller?service=Controller"
+        self.lights = f"{pages}devices/lights?service=Lights"
+        self.north = f"{pages}devices/sensors-north?service=Sensors"
+        self.south = f"{pages}devices/sensors-south?service=Sensors"
+
+        wait_for(lambda: ran("get", self.controller, "mean").returncode == 0)
+
+    def is_reached(self, target):
+        return all(abs(found - wanted) < 0.04 * wanted for found, wanted in zip(colour(get(self.controller, "mean")), target))
+
+    def light(self):
+        """Of all lights and colours together."""
+        return sum(sum(colour(level)) for level in get(self.lights, "levels"))
+
+    def test_a_target_is_reached_by_the_lights_through_the_gateway(self):
+        self.assertEqual(len(get(self.lights, "places")), 8)
+        for target in ([300, 250, 200], [150, 200, 350]):
+            rrgate("set", self.controller, "target", json.dumps(target))
+            wait_for(lambda: self.is_reached(target))
+            readings = get(self.north, "readings") + get(self.south, "readings")
+            self.assertEqual(len(readings), 12)
+            for reading in readings:
+                for found, wanted in zip(colour(reading), target):
+                    self.assertLess(abs(found - wanted), 0.2 * wanted)
+        level = get(self.lights, "lights/0/level")
+        self.assertGreater(level["blue"], level["red"])  # the room has turned blue
+
+    def test_daylight_is_made_up_for(self):
+        target = [300, 300, 300]
+        rrgate("set", self.controller, "target", json.dumps(target))
+        wait_for(lambda: self.is_reached(target))
+        before = self.light()
+        for sensors in (self.north, self.south):
+            rrgate("set", sensors, "daylight", "[160, 160, 160]")
+        wait_for(lambda: self.is_reached(target) and self.light() < before - 2)
+
+    def test_the_lights_are_left_alone_while_the_controller_is_off(self):
+        rrgate("set", self.controller, "on", "false")
+        levels = [{"red": 0.1, "green": 0.2, "blue": 0.3}] * 8
+        rrgate("set", self.lights, "levels", json.dumps(levels))
+        seen = rrgate("watch", self.controller, "mean", "--count", "10").splitlines()
+        self.assertEqual(len(seen), 10)
+        self.assertEqual(get(self.lights, "levels"), levels)
+        rrgate("set", self.controller, "on", "true")
+        wait_for(lambda: get(self.lights, "levels") != levels)
+
+    def test_what_makes_no_sense_is_refused(self):
+        for service, member, value in ((self.controller, "target", "[2000, 0, 0]"), (self.controller, "gain", "2"),
+                                       (self.lights, "levels", "[[0, 0, 0]]"), (self.lights, "lights/0/level", "[0, 0, 1.5]")):
+            refused = ran("set", service, member, value)
+            self.assertNotEqual(refused.returncode, 0)
+            self.assertRegex(refused.stderr, "expected|outside of")
+        self.assertNotEqual(ran("get", self.lights, "lights/8/level").returncode, 0)
+
+
+class Robot:
+    """The bytes of an iRobot Create, on a terminal in the place of a serial line."""
+
+    LENGTHS = {128: 1, 132: 1, 137: 5, 141: 2, 150: 2}
+
+    def __init__(self):
+        self.line, its_end = pty.openpty()
+        tty.setraw(its_end)
+        self.device, self._its_end = os.ttyname(its_end), its_end
+        self.commands = []
+        self._is_plugged = True
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self):
+        seen = b""
+        while self._is_plugged:
+            if not select.select([self.line], [], [], 0.05)[0]:
+                continue
+            seen += os.read(self.line, 256)
+            while seen and len(seen) >= (length := self._length(seen)):
+                self.commands.append(list(seen[:length]))
+                seen = seen[length:]
+
+    def _length(self, seen):
+        if seen[0] in (140, 148):
+            at = 2 if seen[0] == 140 else 1
+            return 1 + at + (seen[at] * (2 if at == 2 else 1)) if len(seen) > at else at + 1
+        return self.LENGTHS[seen[0]]
+
+    def say(self, data):
+        os.write(self.line, data)
+
+    def packet(self, bumps=0, distance=0, angle=0, buttons=0):
+        data = bytes([7, bumps, 19, *struct.pack(">h", distance), 20, *struct.pack(">h", angle), 18, buttons])
+        packet = bytes([19, len(data)]) + data
+        return packet + bytes([-sum(packet) % 256])
+
+    def heard(self, command):
+        wait_for(lambda: command in self.commands)
+
+    def unplug(self):
+        if not self._is_plugged:
+            return
+        self._is_plugged = False
+        self._reader.join()
+        for end in (self._its_end, self.line):
+            os.close(end)
+
+
+class CreateMinimal(unittest.TestCase):
+    def setUp(self):
+        self.robot = Robot()
+        self.addCleanup(self.robot.unplug)
+        self.program = Program(self, CREATE, self.robot.device, 0)
+        self.url = self.program.url()
+
+    def test_the_robot_is_started_and_driven(self):
+        self.robot.heard([150, 0])
+        self.assertEqual(self.robot.commands, [[128], [132], [150, 0]])
+        rrgate("call", self.url, "Drive", "-200", "500")
+        self.robot.heard([137, 0xff, 0x38, 0x01, 0xf4])
+        self.robot.heard([137, 0, 0, 0x7f, 0xff])  # the client that drives it is gone
+        for arguments in (("501", "0"), ("-501", "0"), ("100", "2001")):
+            refused = ran("call", self.url, "Drive", *arguments)
+            self.assertIn("expected -", refused.stderr)
+        self.assertEqual(len(self.robot.commands), 5)
+
+    def test_the_stream_is_read_and_what_is_no_packet_left_out(self):
+        watch = Program(self, RRGATE, "watch", self.url, "Bump", "--count", 1, "--json")
+        # Nobody streams: the robot says this all the same, as one does that was switched on before.
+        spoilt = bytearray(self.robot.packet(distance=1000))
+        spoilt[5] ^= 1
+
+        def bumps():
+            self.robot.say(b"\x01\x13" + bytes(spoilt) + self.robot.packet(distance=-3, angle=2)[:-4])
+            self.robot.say(self.robot.packet() + self.robot.packet(bumps=2))
+            return watch.process.poll() is not None
+
+        wait_for(bumps)
+        wait_for(lambda: get(self.url, "Bumpers") == 2)
+        self.assertEqual(get(self.url, "DistanceTraveled"), 0)
+        half = self.robot.packet(distance=-300, angle=-90)
+        self.robot.say(half[:7])
+        self.assertEqual(get(self.url, "DistanceTraveled"), 0)
+        self.robot.say(half[7:] + self.robot.packet(distance=100, angle=30))
+        wait_for(lambda: get(self.url, "DistanceTraveled") == -200)
+        self.assertEqual(get(self.url, "AngleTraveled"), -60)
+        self.assertNotEqual(ran("set", self.url, "Bumpers", "0").returncode, 0)
+
+    def test_it_streams_while_somebody_wants_it(self):
+        rrgate("call", self.url, "StartStreaming")  # and is gone
+        self.robot.heard([148, 4, 7, 19, 20, 18])
+        wait_for(lambda: self.robot.commands.count([150, 0]) == 2)
+
+    def test_a_line_that_goes_away_is_told_and_ends_the_program(self):
+        self.robot.heard([150, 0])
+        self.robot.unplug()
+        self.assertEqual(self.program.process.wait(DEADLINE), 1)
+        self.assertIn("is gone: ", self.program.said())
+
+    def test_a_line_that_is_not_there_is_told(self):
+        done = subprocess.run([CREATE, "/dev/no-robot"], capture_output=True, text=True, timeout=DEADLINE)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("/dev/no-robot", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

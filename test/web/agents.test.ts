@@ -1,0 +1,124 @@
+// What agents wait for, and asking for access: what the gateway is asked, and what is made of its answers.
+import { Store } from "../../web/src/app/store";
+import { AccessAsk } from "../../web/src/gateway/access_ask";
+import { AgentsDesk, readAgents } from "../../web/src/gateway/agents";
+import type { Who } from "../../web/src/gateway/session";
+
+const answer = (status: number, body: unknown = {}) => new Response(JSON.stringify(body), { status });
+const admin: Who = { user: "root", roles: ["admin"], login: true, session: true, requests: false, admin: true };
+
+function setup(who: Who | null = admin) {
+  const fetch = vi.fn((_path: string, _init?: RequestInit) => Promise.resolve(answer(404)));
+  return { fetch, who: new Store(who) };
+}
+
+describe("agents", () => {
+  const approval = {
+    id: "a1",
+    user: "bot",
+    client: "10.0.0.5",
+    device: "arm",
+    path: "robot",
+    member: "move",
+    verb: "call",
+  };
+
+  it("are those that wait, as far as the gateway tells of them", () => {
+    const given = { ...approval, values: { speed: 1 }, why: "to see", expires_in: 20 };
+    expect(readAgents({ approvals: [given, null, { user: "x" }], stopped_for: 5 })).toEqual({
+      stoppedForS: 5,
+      approvals: [{ ...approval, values: '{"speed":1}', why: "to see", expiresInS: 20 }],
+    });
+    expect(readAgents(null)).toEqual({ approvals: [], stoppedForS: 0 });
+  });
+
+  it("are none where the gateway has no such address, and are forgotten with the right to decide", async () => {
+    const session = setup();
+    const desk = new AgentsDesk(session);
+    expect(await desk.look()).toBe(false);
+    expect(desk.state.value).toBeNull();
+    session.fetch.mockResolvedValue(answer(200, { approvals: [approval] }));
+    expect(await desk.look()).toBe(true);
+    expect(desk.state.value?.approvals).toHaveLength(1);
+    session.who.value = { ...admin, admin: false };
+    expect(desk.state.value).toBeNull();
+    session.fetch.mockClear();
+    await desk.look();
+    expect(session.fetch).not.toHaveBeenCalled();
+  });
+
+  it("are answered and stopped, and a refusal is told", async () => {
+    const session = setup();
+    const desk = new AgentsDesk(session);
+    session.fetch.mockImplementation((path) =>
+      Promise.resolve(path.endsWith("approvals") ? answer(200, {}) : answer(409, { detail: "too late" })),
+    );
+    const [waiting] = readAgents({ approvals: [approval] }).approvals;
+    if (!waiting) throw new Error("nothing waits");
+    await desk.answer(waiting, { answer: "minutes", minutes: 10 });
+    const [path, init] = session.fetch.mock.calls[0] ?? [];
+    expect([path, init?.method, init?.body]).toEqual([
+      "api/v1/agents/approvals/a1",
+      "POST",
+      '{"answer":"minutes","minutes":10}',
+    ]);
+    expect(desk.trouble.value).toBe("too late");
+    session.fetch.mockImplementation(() => Promise.resolve(answer(200, {})));
+    await desk.stop(10);
+    expect(session.fetch.mock.calls.map(([at, given]) => [at, given?.body])).toContainEqual([
+      "api/v1/agents/stop",
+      '{"minutes":10}',
+    ]);
+    expect(desk.trouble.value).toBeNull();
+  });
+});
+
+describe("asking for access", () => {
+  beforeEach(() => void vi.useFakeTimers());
+  afterEach(() => void vi.useRealTimers());
+
+  async function asked() {
+    const session = setup(null);
+    session.fetch.mockResolvedValueOnce(answer(202, { id: "r/1", secret: "s", expires_in: 3600 }));
+    const ask = new AccessAsk(session);
+    await ask.ask("tablet", "cell 3");
+    return { ask, fetch: session.fetch };
+  }
+
+  it("waits for an answer, and is told the token that comes with it once", async () => {
+    const { ask, fetch } = await asked();
+    expect(ask.state.value).toEqual({ kind: "waiting", name: "tablet" });
+    expect(fetch.mock.calls[0]?.[1]?.body).toBe('{"name":"tablet","reason":"cell 3"}');
+    fetch.mockRejectedValueOnce(new Error("away")).mockResolvedValueOnce(answer(200, { state: "pending" }));
+    await vi.advanceTimersByTimeAsync(6_000);
+    expect(ask.state.value.kind).toBe("waiting");
+    fetch.mockResolvedValueOnce(answer(200, { state: "approved", token: "rrg_1" }));
+    await vi.advanceTimersByTimeAsync(3_000);
+    expect(ask.state.value).toEqual({ kind: "approved", token: "rrg_1" });
+    const [path, init] = fetch.mock.calls.at(-1) ?? [];
+    expect([path, init?.body]).toEqual(["api/v1/access/requests/r%2F1/claim", '{"secret":"s"}']);
+    fetch.mockClear();
+    await vi.advanceTimersByTimeAsync(60_000);
+    expect(fetch).not.toHaveBeenCalled();
+  });
+
+  it("is refused, runs out, and is asked after no more when the page goes on", async () => {
+    const denied = await asked();
+    denied.fetch.mockResolvedValueOnce(answer(200, { state: "denied" }));
+    await vi.advanceTimersByTimeAsync(3_000);
+    expect(denied.ask.state.value).toEqual({ kind: "refused", why: "denied" });
+    const expired = await asked();
+    await vi.advanceTimersByTimeAsync(3_000);
+    expect(expired.ask.state.value).toEqual({ kind: "refused", why: "expired" });
+    const left = await asked();
+    left.ask.dispose();
+    left.fetch.mockClear();
+    await vi.advanceTimersByTimeAsync(60_000);
+    expect(left.fetch).not.toHaveBeenCalled();
+    const refused = setup(null);
+    refused.fetch.mockResolvedValueOnce(answer(429, { detail: "too many" }));
+    const ask = new AccessAsk(refused);
+    await ask.ask("x", "");
+    expect(ask.state.value).toEqual({ kind: "failed", why: "too many" });
+  });
+});
