@@ -146,12 +146,7 @@ class AsyncObject {
 
   /// Arguments as they are; for another token than use_awaitable there is call_values().
   template <class... Args>
-  boost::asio::awaitable<Value> call(std::string_view function, Args&&... arguments) const {
-    std::vector<Value> values;
-    values.reserve(sizeof...(Args));
-    (values.push_back(to_value(std::forward<Args>(arguments))), ...);
-    return call_values(function, std::move(values));
-  }
+  boost::asio::awaitable<Value> call(std::string_view function, Args&&... arguments) const;
   template <class Token = boost::asio::use_awaitable_t<>>
   auto call_values(std::string_view function, std::vector<Value> arguments, Token&& token = {}) const {
     return request<&ClientConnection::call>(token, std::string(function), std::move(arguments));
@@ -337,6 +332,15 @@ class AsyncObject {
   std::shared_ptr<ClientConnection> connection_;
   std::string path_;
 };
+
+// Here, since clang wants to know what call_values() returns.
+template <class... Args>
+boost::asio::awaitable<Value> AsyncObject::call(std::string_view function, Args&&... arguments) const {
+  std::vector<Value> values;
+  values.reserve(sizeof...(Args));
+  (values.push_back(to_value(std::forward<Args>(arguments))), ...);
+  return call_values(function, std::move(values));
+}
 
 /// The root object of the service that `url` names; completes with an AsyncObject. The connection lives until
 /// disconnect().

@@ -15,7 +15,7 @@ namespace {
 /// A reply that waits gets a comment so often: clients and proxies see that it lives.
 constexpr std::chrono::seconds mcp_comment_period{10};
 /// Whether who waits still may is looked at so often.
-constexpr std::chrono::seconds look_period{1};
+constexpr std::chrono::seconds standing_look_period{1};
 
 }  // namespace
 
@@ -40,7 +40,7 @@ rr::awaitable<void> McpReply::wait(std::chrono::milliseconds longest, const std:
     const auto now = std::chrono::steady_clock::now();
     if (failed || state_->is_gone) refuse(rr::ErrorCode::operation_cancelled, "the client has gone");
     if (now >= until) refuse(rr::ErrorCode::operation_timeout, why);
-    state_->news.expires_at(std::min(until, now + look_period));
+    state_->news.expires_at(std::min(until, now + standing_look_period));
     (void)co_await state_->news.async_wait(asio::as_tuple(asio::use_awaitable));
     if (std::chrono::steady_clock::now() < next_comment) continue;
     next_comment += mcp_comment_period;

@@ -8,7 +8,7 @@ namespace rrgate {
 namespace {
 
 constexpr int messages_a_turn = 1000;  // others have a turn between
-constexpr std::chrono::milliseconds look_period{100};
+constexpr std::chrono::milliseconds playing_look_period{100};
 
 double to_seconds(McapTime time) {
   return static_cast<double>(time) * 1e-9;
@@ -96,15 +96,15 @@ void Player::turn() {
   listener_.changed();
   if (!is_playing_) return;
   if (!next) {  // a recording of one message does not take all the time
-    shift_ += static_cast<McapTime>(static_cast<double>(std::chrono::nanoseconds(look_period).count()) * speed_);
+    shift_ += static_cast<McapTime>(static_cast<double>(std::chrono::nanoseconds(playing_look_period).count()) * speed_);
     go_to(recording_.begin());
     rebase();
-    return wait(look_period);
+    return wait(playing_look_period);
   }
   if (count == messages_a_turn) return wait({});
   const std::chrono::duration<double, std::nano> until(
       static_cast<double>(next->log_time - std::min(due, next->log_time)) / speed_);
-  wait(until < look_period ? std::chrono::duration_cast<Clock::duration>(until) : Clock::duration(look_period));
+  wait(until < playing_look_period ? std::chrono::duration_cast<Clock::duration>(until) : Clock::duration(playing_look_period));
 }
 
 const McapMessage* Player::next_message() {

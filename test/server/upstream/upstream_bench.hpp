@@ -65,7 +65,7 @@ class UpstreamBench {
     REQUIRE(run_until([&] { return out->has_value(); }));
     return std::move(**out);
   }
-  void open() { REQUIRE(wait_for(upstream->open())); }
+  void open() { REQUIRE(wait_for(upstream->open()).has_value()); }
   rr::Result<rr::Value> find(const std::string& path) {
     std::optional<rr::Result<rr::Value>> found;
     upstream->find_object(path, [&](rr::Result<rr::Value> result) { found = std::move(result); });
