@@ -60,7 +60,8 @@ function alignByClass(markdown) {
     markdown.renderer.rules[rule] = (tokens, index, options, _environment, renderer) => {
       const token = tokens[index];
       const aligned = /^text-align:(\w+)$/.exec(token.attrGet("style") ?? "");
-      if (aligned) token.attrs = [...token.attrs.filter(([name]) => name !== "style"), ["class", `align-${aligned[1]}`]];
+      if (aligned)
+        token.attrs = [...token.attrs.filter(([name]) => name !== "style"), ["class", `align-${aligned[1]}`]];
       return renderer.renderToken(tokens, index, options);
     };
 }
