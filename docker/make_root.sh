@@ -1,5 +1,5 @@
 #!/bin/sh
-# make_root.sh SOURCE ROOT    puts into ROOT what the image is made of: programs, page, libraries, a configuration
+# make_root.sh SOURCE ROOT    puts into ROOT what the image is made of: programs, page, documentation, libraries, a configuration
 set -eu
 source=$1
 root=$2
@@ -9,8 +9,9 @@ if [ ! -x "$prebuilt/bin/rrgate" ]; then
   apt-get update
   apt-get install -y --no-install-recommends git
   cd "$source"
-  ./dev setup
+  ./dev setup product
   ./dev build
+  ./dev docs
   cmake --install build/release --prefix "$prebuilt" --strip
 fi
 

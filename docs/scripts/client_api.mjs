@@ -4,16 +4,27 @@ import { tmpdir } from "node:os";
 import path from "node:path";
 import { Application } from "typedoc";
 
+/** What a program imports, and its source: "rrgate-client/react" is a part of the package with a reference of its own. */
+const ENTRIES = { "": "index.ts", "react/": "react/react.ts", "svelte/": "svelte/svelte.ts", "vue/": "vue/vue.ts" };
+
 /** @returns {Promise<[string, string][]>} names and texts of its pages */
 export async function clientPages(repository) {
+  const pages = [];
+  for (const [prefix, file] of Object.entries(ENTRIES))
+    for (const [name, text] of await pagesOf(repository, file, `rrgate-client/${prefix}`.slice(0, -1)))
+      pages.push([prefix + name, text]);
+  return pages;
+}
+
+async function pagesOf(repository, file, title) {
   const client = path.join(repository, "wasm-client");
   const out = await mkdtemp(path.join(tmpdir(), "rrgate-docs-"));
   try {
     const app = await Application.bootstrapWithPlugins({
       plugin: ["typedoc-plugin-markdown"],
-      entryPoints: [path.join(client, "ts/index.ts")],
+      entryPoints: [path.join(client, "ts", file)],
       tsconfig: path.join(client, "tsconfig.json"),
-      name: "rrgate-client",
+      name: title,
       readme: "none",
       disableSources: true,
       excludePrivate: true,

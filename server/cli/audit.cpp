@@ -12,6 +12,7 @@
 #include "core/support/glob.hpp"
 #include "server/access/audit_trail.hpp"
 #include "server/cli/command.hpp"
+#include "server/cli/printable.hpp"
 #include "server/json/json.hpp"
 
 namespace rrgate {
@@ -59,13 +60,6 @@ std::string text_of(const rr::Json& record, const char* key) {
   return found != record.end() && found->is_string() ? found->get<std::string>() : std::string();
 }
 
-/// What control characters a record has stays off the terminal: JSON had them escaped.
-std::string printable(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](char c) { return (c >= 0 && c < 0x20) || c == 0x7f; }, '?');
-  return text;
-}
-
 class Reader {
  public:
   Reader(const AuditOptions& options, std::string since) : options_(options), since_(std::move(since)) {}
@@ -86,7 +80,7 @@ class Reader {
            matches(options_.outcome, "outcome") && matches(options_.face, "face") && text_of(record, "time") >= since_;
   }
 
-  /// time, outcome, event, who, from where, to what, why.
+  /// time, outcome, event, who, from where, to what, why. JSON had control characters escaped.
   static std::string describe(const rr::Json& record) {
     const auto get = [&](const char* key) { return printable(text_of(record, key)); };
     const auto or_dash = [](std::string text) { return text.empty() ? "-" : text; };

@@ -31,8 +31,9 @@ int check_config(const CheckOptions& options) {
   if (options.service_user) {
     const auto missing = find_missing_rights(*options.service_user, file, config.config);
     if (!missing) return report_failure("check-config", missing.error().message);
-    for (const auto& sentence : *missing) std::cerr << short_name(file) << ": " << sentence << "\n";
-    if (!missing->empty()) return exit_usage;
+    for (const auto& sentence : missing->needed) std::cerr << short_name(file) << ": " << sentence << "\n";
+    for (const auto& sentence : missing->optional) std::cerr << short_name(file) << ": warning: " << sentence << "\n";
+    if (!missing->needed.empty()) return exit_usage;
   }
   for (const auto& caution : find_cautions(config.config))
     std::cerr << format_finding(short_name(file), {caution.path, "warning: " + caution.text}) << "\n";

@@ -16,15 +16,19 @@ constexpr double patience = 2;  // for a device, in s: somebody waits at a promp
 
 // What it prints begins with what was typed. Nothing: the shell offers files.
 constexpr std::string_view bash_script = R"(_rrgate() {
-    local line=${COMP_LINE:0:COMP_POINT} words=() before candidate
+    local line=${COMP_LINE:0:COMP_POINT} words=() part=${COMP_WORDS[COMP_CWORD]} before='' candidate
     read -ra words <<<"$line"
     [[ $line == *[[:space:]] ]] && words+=("")
-    words=("${words[@]//[\'\"]/}")
-    # Of words with ":" or "=" in them bash replaces the last part alone.
-    before=${words[-1]%"${COMP_WORDS[COMP_CWORD]//[:=]/}"}
+    words=("${words[@]//[\'\"\\]/}")
+    # Where no quote is open, bash replaces only the last part of words with ":" or "=" in them, and "&" needs a "\".
+    local is_quoted=
+    if [[ $part == [\'\"]* ]]; then is_quoted=yes; else part=${part//[:=\\]/} before=${words[-1]}; fi
+    before=${before%"$part"}
     COMPREPLY=()
     while IFS= read -r candidate; do
-        COMPREPLY+=("${candidate#"$before"}")
+        candidate=${candidate#"$before"}
+        if [[ ! $is_quoted && $candidate ]]; then printf -v candidate %q "$candidate"; fi
+        COMPREPLY+=("$candidate")
     done < <(rrgate completion words -- "${words[@]:1}" 2>/dev/null)
 }
 complete -o default -F _rrgate rrgate

@@ -1,4 +1,5 @@
 // rrgate demo: simulated devices and a gateway to them, on free ports. Layer: server/cli.
+#include <fcntl.h>
 #include <qrencode.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
@@ -11,6 +12,7 @@
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <csignal>
+#include <cstdlib>
 #include <filesystem>
 #include <iomanip>
 #include <iostream>
@@ -233,8 +235,27 @@ void print_address(std::uint16_t port, const DemoLogin* login) {
   std::cout << "rrgate demo: " << url("127.0.0.1") << std::endl;
 }
 
-/// Prints the address once all devices answer; says so if they don't.
-rr::awaitable<void> announce(Gateway& gateway, std::uint16_t port, const DemoLogin* login) {
+bool has_variable(const char* name) {
+  const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): there is one thread
+  return value && *value != '\0';
+}
+
+/// On a desktop, for somebody at a terminal; nothing otherwise. The browser is nobody's child: it stays when we end.
+void open_browser(const std::string& url) {
+  if (!::isatty(STDOUT_FILENO) || !(has_variable("DISPLAY") || has_variable("WAYLAND_DISPLAY"))) return;
+  const pid_t child = ::fork();
+  if (child > 0) ::waitpid(child, nullptr, 0);
+  if (child != 0) return;
+  if (::fork() != 0) ::_exit(0);
+  ::setsid();
+  if (const int nowhere = ::open("/dev/null", O_RDWR); nowhere >= 0)
+    for (const int each : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) ::dup2(nowhere, each);
+  ::execlp("xdg-open", "xdg-open", url.c_str(), nullptr);
+  ::_exit(127);
+}
+
+/// Prints the address once all devices answer, and opens it in a browser. Says so if they don't answer.
+rr::awaitable<void> announce(Gateway& gateway, std::uint16_t port, const DemoLogin* login, bool opens_browser) {
   asio::steady_timer pause(co_await asio::this_coro::executor);
   const auto is_online = [](const auto& device) { return device->state() == DeviceState::online; };
   const auto& devices = gateway.devices().all();
@@ -247,7 +268,9 @@ rr::awaitable<void> announce(Gateway& gateway, std::uint16_t port, const DemoLog
     pause.expires_after(std::chrono::milliseconds(50));
     co_await pause.async_wait(asio::as_tuple(asio::use_awaitable));
   }
-  if (!gateway.is_stopping()) print_address(port, login);
+  if (gateway.is_stopping()) co_return;
+  print_address(port, login);
+  if (opens_browser) open_browser("http://127.0.0.1:" + std::to_string(port) + "/");
 }
 
 Config make_config(const std::vector<DemoDevice>& devices, std::uint16_t port, const DemoLogin* login) {
@@ -277,6 +300,7 @@ struct DemoOptions {
   bool is_list = false;
   std::optional<std::uint16_t> port;
   bool is_lan = false;
+  bool is_without_browser = false;
 };
 
 int demo(const DemoOptions& options) {
@@ -304,13 +328,14 @@ int demo(const DemoOptions& options) {
       wait_for_death();
     });
   };
-  const auto code =
-      run_gateway(make_config(devices, port, user), [&](auto& io, Gateway& gateway, const auto& addresses) {
-        deaths.emplace(io, SIGCHLD);
-        gateway.on_stop([&] { deaths->cancel(); });
-        wait_for_death();
-        asio::co_spawn(io, announce(gateway, addresses.front().port, user), asio::detached);
-      });
+  const auto code = run_gateway(make_config(devices, port, user), [&](auto& io, Gateway& gateway,
+                                                                      const auto& addresses) {
+    deaths.emplace(io, SIGCHLD);
+    gateway.on_stop([&] { deaths->cancel(); });
+    wait_for_death();
+    asio::co_spawn(io, announce(gateway, addresses.front().port, user, !options.is_lan && !options.is_without_browser),
+                   asio::detached);
+  });
   stop_devices(devices);
   return code;
 }
@@ -331,6 +356,8 @@ void add_demo(Commands& commands) {
       ->option_text("N");
   app.add_flag("--lan", options.is_lan, "Let other machines come, with a password that it prints")
       ->envname("RRGATE_DEMO_LAN");
+  app.add_flag("--no-browser", options.is_without_browser,
+               "Don't open the page; it is opened where a terminal and a desktop are, without --lan");
 }
 
 }  // namespace rrgate

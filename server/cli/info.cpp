@@ -2,6 +2,7 @@
 #include <iostream>
 
 #include "core/session/service_path.hpp"
+#include "server/cli/printable.hpp"
 #include "server/cli/recording_file.hpp"
 #include "server/cli/remote_service.hpp"
 
@@ -100,17 +101,18 @@ std::string lock_text(const rr::OrderedJson& lock) {
 }
 
 void print_description(const rr::OrderedJson& description) {
-  std::cout << description["path"].get<std::string>() << ": " << description["type"].get<std::string>() << "\n";
+  const auto print_line = [](const std::string& text) { std::cout << printable(text) << "\n"; };
+  print_line(description["path"].get<std::string>() + ": " + description["type"].get<std::string>());
   if (const auto text = description["documentation"].get<std::string>(); !text.empty())
-    std::cout << "  " << first_line(text) << "\n";
+    print_line("  " + first_line(text));
   for (const auto& [name, value] : description["attributes"].items())
-    std::cout << "  attribute " << name << ": " << rr::write_json(value) << "\n";
+    print_line("  attribute " + name + ": " + rr::write_json(value));
   if (description.contains("locks"))
-    for (const auto& lock : description["locks"]) std::cout << "  " << lock_text(lock) << "\n";
+    for (const auto& lock : description["locks"]) print_line("  " + lock_text(lock));
   for (const auto& member : description["members"]) {
-    std::cout << "  " << member["declaration"].get<std::string>() << "\n";
+    print_line("  " + member["declaration"].get<std::string>());
     if (const auto text = member["documentation"].get<std::string>(); !text.empty())
-      std::cout << "      " << first_line(text) << "\n";
+      print_line("      " + first_line(text));
   }
 }
 
@@ -148,9 +150,16 @@ int info(const InfoOptions& options) {
 int robdef(const RemoteOptions& options) {
   return run_remote("robdef", options.url, [&] {
     const auto root = open_service(remote_address(options));
+    const auto& definitions = root.connection().asynchronous().session().types().definitions();
+    if (options.is_json) {
+      auto list = rr::OrderedJson::array();
+      for (const auto& definition : definitions)
+        list.push_back({{"name", definition->name}, {"text", definition->text}});
+      return print_value(list, true);
+    }
     std::string separator;
-    for (const auto& definition : root.connection().asynchronous().session().types().definitions()) {
-      std::cout << separator << definition->text;
+    for (const auto& definition : definitions) {
+      std::cout << separator << text_for_output(definition->text);
       separator = definition->text.ends_with("\n") ? "\n" : "\n\n";
     }
     std::cout << std::endl;
@@ -173,6 +182,7 @@ void add_info(Commands& commands) {
 void add_robdef(Commands& commands) {
   const auto [app, options] = commands.add("robdef", "Print the service definitions of a service", robdef);
   add_url(app, options)->required();
+  add_json(app, options);
   add_connection_options(app, options);
 }
 

@@ -37,6 +37,7 @@ std::string reason_to_keep(const fs::path& file) {
 
 /// With it sign-ins outlive the gateway's restart.
 constexpr const char* ticket_key_name = "tickets.key";
+constexpr const char* tls_folder_name = "tls";
 constexpr std::size_t ticket_key_bytes = 48;
 
 nlohmann::ordered_json make_config(const fs::path& folder, const std::string& certificate) {
@@ -56,6 +57,26 @@ nlohmann::ordered_json make_config(const fs::path& folder, const std::string& ce
   return config;
 }
 
+std::vector<fs::path> files_beside(const fs::path& folder) {
+  return {folder / "users", folder / ticket_key_name, folder / tls_folder_name};
+}
+
+/// Takes away what a run made that fails: the next run would refuse to write beside it.
+class TakeBack {
+ public:
+  explicit TakeBack(std::vector<fs::path> paths) : paths_(std::move(paths)) {}
+  TakeBack(const TakeBack&) = delete;
+  TakeBack& operator=(const TakeBack&) = delete;
+  ~TakeBack() {
+    std::error_code error;
+    for (const auto& path : paths_) fs::remove_all(path, error);
+  }
+  void keep_all() { paths_.clear(); }
+
+ private:
+  std::vector<fs::path> paths_;
+};
+
 struct InitOptions {
   std::string folder{service_folder};
   std::string user = "admin";
@@ -69,15 +90,17 @@ int init(const InitOptions& options) {
   const auto file = folder / "gateway.json";
   if (const auto reason = reason_to_keep(file); !reason.empty())
     return report_failure("init", file.string() + ": " + reason + "; nothing was written");
-  for (const auto* each : {"users", ticket_key_name, "tls"}) {
+  for (const auto& each : files_beside(folder)) {
     std::error_code error;
-    if (fs::exists(folder / each, error))
-      return report_failure("init", (folder / each).string() + ": is there already; nothing was written");
+    if (fs::exists(each, error))
+      return report_failure("init", each.string() + ": is there already; nothing was written");
   }
+  TakeBack made(files_beside(folder));
 
   const auto names = names_of_machine();
-  if (make_authorities({.folder = folder / "tls", .days = 3650}) != exit_ok) return exit_failed;
-  if (make_web_certificate({{.folder = folder / "tls"}, names}) != exit_ok) return exit_failed;
+  const auto tls_folder = folder / tls_folder_name;
+  if (make_authorities({.folder = tls_folder, .days = 3650}) != exit_ok) return exit_failed;
+  if (make_web_certificate({{.folder = tls_folder}, names}) != exit_ok) return exit_failed;
 
   const auto password = write_first_user(folder / "users", user);
   if (!password) return report_failure("init", password.error().message);
@@ -87,10 +110,11 @@ int init(const InitOptions& options) {
   const auto config = make_config(folder, names.front()).dump(2) + "\n";
   if (const auto done = rr::write_secret(file, config, true, rr::SecretReaders::folder_group); !done)
     return report_failure("init", done.error().message);
+  made.keep_all();
 
   std::cout << file.string() << "\n\nuser " << user << ", password " << *password << " (shown this once; rrgate passwd "
             << (folder / "users").string() << " " << user << " sets another)\nhttps://" << names.front()
-            << ":8443/ once it runs; browsers believe it with " << (folder / "tls" / "web-ca.pem").string()
+            << ":8443/ once it runs; browsers believe it with " << (tls_folder / "web-ca.pem").string()
             << "\nNext: put your devices into " << file.string() << ", then "
             << (folder == service_folder ? "systemctl enable --now rrgate" : "rrgate serve --config " + file.string())
             << "\n";

@@ -3,6 +3,7 @@
 #include "server/cli/ls.hpp"
 
 #include <algorithm>
+#include <array>
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
@@ -13,6 +14,7 @@
 #include <thread>
 
 #include "node/discovery/discovery.hpp"
+#include "server/cli/printable.hpp"
 #include "server/cli/progress.hpp"
 #include "server/cli/remote_service.hpp"
 
@@ -29,14 +31,20 @@ struct FoundService {
   std::string name;
   std::string type;
   std::string url;
+  std::vector<std::string> implements = {};
   std::string problem = {};  ///< why the node told nothing
+
+  bool is_of(const std::string& wanted) const {
+    return type == wanted || std::find(implements.begin(), implements.end(), wanted) != implements.end();
+  }
 
   auto operator<=>(const FoundService&) const = default;  // NOLINT(modernize-use-nullptr): of what it makes
 };
 
 void add_services(std::vector<FoundService>& out, const rr::NodeServices& answer) {
   for (const auto& each : answer.services)
-    out.push_back({answer.node.name, each.name, each.root_object_type, each.connection_url});
+    out.push_back(
+        {answer.node.name, each.name, each.root_object_type, each.connection_url, each.root_object_implements});
 }
 
 /// Hears for `wait` who is there, then asks all for their services, side by side.
@@ -64,8 +72,12 @@ rr::awaitable<void> find_services(rr::Discovery& discovery, std::chrono::millise
                      if (!failure && answer)
                        add_services(out, *answer);
                      else
-                       out.push_back({node.node_name.empty() ? rr::format_node_id(node.node_id) : node.node_name, "",
-                                      "", node.urls.front().url, failure ? "no answer" : answer.error().message});
+                       out.push_back({node.node_name.empty() ? rr::format_node_id(node.node_id) : node.node_name,
+                                      "",
+                                      "",
+                                      node.urls.front().url,
+                                      {},
+                                      failure ? "no answer" : answer.error().message});
                      --waiting;
                      if (progress) progress->show(nodes.size() - waiting);
                      if (waiting == 0) timer.cancel();
@@ -116,13 +128,14 @@ std::vector<FoundService> services_of_gateway(const std::string& web_url, Remote
     const auto problem = device["state"] == "online"
                              ? std::string()
                              : device["state"].get<std::string>() + ": " + device["last_error"].get<std::string>();
-    for (const auto& service : device["services"])
-      out.push_back(
-          {name, service.get<std::string>(), "",
-           base + "/devices/" + rr::percent_encode(name) + "?service=" + rr::percent_encode(service.get<std::string>()),
-           problem});
-    if (device["services"].empty())
-      out.push_back({name, "", "", base + "/devices/" + rr::percent_encode(name), problem});
+    const auto url = base + "/devices/" + rr::percent_encode(name);
+    for (const auto& service : device["services"]) {
+      const auto service_name = service["name"].get<std::string>();
+      out.push_back({name, service_name, service["root_object_type"].get<std::string>(),
+                     url + "?service=" + rr::percent_encode(service_name),
+                     service["root_object_implements"].get<std::vector<std::string>>(), problem});
+    }
+    if (device["services"].empty()) out.push_back({name, "", "", url, {}, problem});
   }
   return out;
 }
@@ -141,37 +154,46 @@ std::vector<FoundService> list_services(const ListOptions& options) {
     const auto address = remote_address(options);
     out = options.url.starts_with("http") ? services_of_gateway(options.url, address) : services_of_node(address);
   }
-  if (!options.type.empty()) std::erase_if(out, [&](const auto& each) { return each.type != options.type; });
+  if (!options.type.empty()) std::erase_if(out, [&](const auto& each) { return !each.is_of(options.type); });
   std::sort(out.begin(), out.end());
   return out;
 }
 
+void print_json(const FoundService& service, std::string_view mark) {
+  auto line = rr::OrderedJson::object();
+  if (!mark.empty()) line["change"] = mark == "+ " ? "found" : "lost";
+  line["node"] = service.node;
+  line["service"] = service.name;
+  line["type"] = service.type;
+  line["implements"] = service.implements;
+  line["url"] = service.url;
+  if (!service.problem.empty()) line["problem"] = service.problem;
+  std::cout << line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) << "\n";
+}
+
+void print_table(const std::vector<FoundService>& services, std::string_view mark) {
+  std::vector<std::array<std::string, 3>> rows;
+  std::array<std::size_t, 3> widths{4, 7, 4};
+  for (const auto& each : services) {
+    const auto& row =
+        rows.emplace_back(std::array<std::string, 3>{printable(each.node), printable(each.name), printable(each.type)});
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
+  }
+  for (std::size_t row = 0; row < rows.size(); ++row) {
+    std::cout << mark;
+    for (std::size_t i = 0; i < widths.size(); ++i)
+      std::cout << rows[row][i] << std::string(widths[i] - rows[row][i].size() + 2, ' ');
+    const auto problem = printable(services[row].problem);
+    std::cout << printable(services[row].url) << (problem.empty() ? "" : "  (" + problem + ")") << "\n";
+  }
+}
+
 /// `mark`  what each line begins with.
 void print_services(const std::vector<FoundService>& services, std::string_view mark, bool is_json) {
-  std::size_t widths[3] = {4, 7, 4};
-  for (const auto& each : services) {
-    widths[0] = std::max(widths[0], each.node.size());
-    widths[1] = std::max(widths[1], each.name.size());
-    widths[2] = std::max(widths[2], each.type.size());
-  }
-  const auto padded = [&](const std::string& text, std::size_t column) {
-    return text + std::string(widths[column] - text.size() + 2, ' ');
-  };
-  for (const auto& each : services) {
-    if (is_json) {
-      auto line = rr::OrderedJson::object();
-      if (!mark.empty()) line["change"] = mark == "+ " ? "found" : "lost";
-      line["node"] = each.node;
-      line["service"] = each.name;
-      line["type"] = each.type;
-      line["url"] = each.url;
-      if (!each.problem.empty()) line["problem"] = each.problem;
-      std::cout << line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) << "\n";
-    } else {
-      std::cout << mark << padded(each.node, 0) << padded(each.name, 1) << padded(each.type, 2) << each.url
-                << (each.problem.empty() ? "" : "  (" + each.problem + ")") << "\n";
-    }
-  }
+  if (is_json)
+    for (const auto& each : services) print_json(each, mark);
+  else
+    print_table(services, mark);
   std::cout << std::flush;
 }
 
@@ -210,7 +232,8 @@ std::vector<std::string> find_service_urls(std::chrono::milliseconds wait) {
 void add_ls(Commands& commands) {
   const auto [app, options] = commands.add("ls", "List services: around here, of a node, of a gateway", ls);
   app.add_option("URL", options.url, "A node, or a gateway's http(s)://HOST:PORT")->option_text(" ");
-  app.add_option("--type", options.type, "Services of this type alone")->option_text("TYPE");
+  app.add_option("--type", options.type, "Services whose root object is of this type, or implements it")
+      ->option_text("TYPE");
   add_count(app, "--wait", options.wait, "How long to listen for nodes, in s")->option_text("SECONDS [2]");
   app.add_flag("--watch", options.watches, "Go on, and tell what comes and goes");
   add_json(app, options);

@@ -7,6 +7,7 @@
 
 #include "core/support/node_id.hpp"
 #include "server/cli/command.hpp"
+#include "server/cli/printable.hpp"
 #include "server/record/recording.hpp"
 
 namespace rrgate {
@@ -52,17 +53,17 @@ std::string with_one_digit(double number) {
 }
 
 void print_description(const rr::OrderedJson& recording) {
-  std::cout << recording["file"].get<std::string>() << ": " << recording["messages"] << " messages in "
-            << with_one_digit(recording["seconds"]) << " s from " << recording["begin"].get<std::string>() << "\n";
+  const auto text = [](const rr::OrderedJson& value) { return printable(value.get<std::string>()); };
+  std::cout << text(recording["file"]) << ": " << recording["messages"] << " messages in "
+            << with_one_digit(recording["seconds"]) << " s from " << text(recording["begin"]) << "\n";
   if (recording["cut"].is_string())
-    std::cout << "  was cut: " << recording["cut"].get<std::string>() << "; all before that is there\n";
+    std::cout << "  was cut: " << text(recording["cut"]) << "; all before that is there\n";
   for (const auto& service : recording["services"]) {
-    std::cout << "  " << service["name"].get<std::string>() << ": " << service["type"].get<std::string>() << " of "
-              << service["url"].get<std::string>() << "\n";
+    std::cout << "  " << text(service["name"]) << ": " << text(service["type"]) << " of " << text(service["url"])
+              << "\n";
     for (const auto& member : service["members"])
-      std::cout << "    " << member["topic"].get<std::string>() << ": " << member["messages"] << " of "
-                << member["kind"].get<std::string>()
-                << (member["type"] == "" ? "" : " " + member["type"].get<std::string>()) << "\n";
+      std::cout << "    " << text(member["topic"]) << ": " << member["messages"] << " of " << text(member["kind"])
+                << (member["type"] == "" ? "" : " " + text(member["type"])) << "\n";
   }
 }
 

@@ -1,5 +1,7 @@
 #include "server/cli/remote_service.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstdlib>
 #include <fstream>
@@ -7,6 +9,7 @@
 #include <iterator>
 
 #include "node/tls/base64.hpp"
+#include "server/cli/printable.hpp"
 #include "server/cli/stored_logins.hpp"
 #include "server/http/split_path.hpp"
 #include "server/json/value_from_json.hpp"
@@ -209,19 +212,23 @@ rr::OrderedJson to_json(const rr::Value& value, const rr::TypeDefinition& type, 
   return std::move(*json);
 }
 
+std::string text_for_output(const std::string& text) {
+  return ::isatty(STDOUT_FILENO) ? printable(text, LineEnds::kept) : text;
+}
+
 void print_value(const rr::OrderedJson& json, bool is_json) {
   if (is_json)
     std::cout << rr::write_json(json);
   else if (json.is_string())
-    std::cout << json.get_ref<const std::string&>();
+    std::cout << text_for_output(json.get_ref<const std::string&>());
   else
-    std::cout << json.dump(json.is_object() ? 2 : -1);
+    std::cout << text_for_output(json.dump(json.is_object() ? 2 : -1));
   std::cout << std::endl;  // whoever reads a pipe sees each value as it comes
 }
 
 int run_remote(std::string_view command, std::string_view url, const std::function<void()>& run) {
   const auto tell = [&](std::string_view what, int code) {
-    std::cerr << "rrgate " << command << ": " << url << ": " << what << "\n";
+    std::cerr << "rrgate " << command << ": " << url << ": " << printable(what) << "\n";
     return code;
   };
   try {

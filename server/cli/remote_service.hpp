@@ -79,6 +79,8 @@ void expect_kind(const RemoteMember& found, const std::vector<rr::MemberKind>& k
 rr::Json read_json_argument(std::string_view text, const rr::TypeDefinition& type);
 /// Throws   rr::Exception: text of the device that is not UTF-8.
 rr::OrderedJson to_json(const rr::Value& value, const rr::TypeDefinition& type, const rr::TypeRegistry& types);
+/// Text of a device as it is; printable() where standard output is a terminal, with its line ends.
+std::string text_for_output(const std::string& text);
 /// For people: text without quotes, structures over several lines. With --json: one line.
 void print_value(const rr::OrderedJson& json, bool is_json);
 

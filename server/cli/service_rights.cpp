@@ -18,7 +18,8 @@ namespace fs = std::filesystem;
 
 struct WantedFile {
   std::string path;
-  int access;  ///< as access() takes it
+  int access;                 ///< as access() takes it
+  const char* for_what = "";  ///< what fails without it, where the gateway runs all the same
 };
 
 std::vector<WantedFile> wanted_files(const std::string& file, const Config& config) {
@@ -35,6 +36,9 @@ std::vector<WantedFile> wanted_files(const std::string& file, const Config& conf
   for (const auto& ca : config.discover.tls.ca) reads(ca);
   for (const auto* files : {&config.access.clients.ca, &config.access.clients.crl})
     for (const auto& each : *files) reads(each);
+  // A new token comes in a new file that takes the place of the old one.
+  if (const auto& tokens = config.access.tokens_file; !tokens.empty())
+    wanted.push_back({fs::path(tokens).parent_path().string(), W_OK | X_OK, "requests for access can't be approved"});
   for (const auto* path : {&config.access.users_file, &config.access.tokens_file, &config.access.jwt.jwks_file,
                            &config.access.jwt.secret_file, &config.access.ticket_key_file, &config.web_root})
     reads(*path);
@@ -63,14 +67,19 @@ std::string obstacle(const fs::path& path) {
          (group ? group->gr_name : std::to_string(about.st_gid)) + " with mode " + mode;
 }
 
-/// Runs as the user. One line for each file.
+constexpr char needed_mark = '!';
+constexpr char optional_mark = '?';
+
+/// Runs as the user. One line for each file, which begins with a mark.
 std::string missing_rights(const std::string& user, const std::vector<WantedFile>& wanted) {
   std::string lines;
   for (const auto& each : wanted) {
     const auto path = fs::absolute(each.path.empty() ? "." : each.path).lexically_normal();
     if (::eaccess(path.c_str(), each.access) == 0) continue;
     const auto* what = each.access == R_OK ? " can't read " : " can't write ";
-    lines += "user " + rr::quote(user) + what + path.string() + ": " + obstacle(path) + "\n";
+    const std::string consequence = each.for_what;
+    lines += (consequence.empty() ? needed_mark : optional_mark) + ("user " + rr::quote(user)) + what + path.string() +
+             ": " + obstacle(path) + (consequence.empty() ? "" : "; " + consequence) + "\n";
   }
   return lines;
 }
@@ -90,8 +99,7 @@ void write_all(int to, std::string_view text) {
 
 }  // namespace
 
-rr::Result<std::vector<std::string>> find_missing_rights(const std::string& user, const std::string& file,
-                                                         const Config& config) {
+rr::Result<MissingRights> find_missing_rights(const std::string& user, const std::string& file, const Config& config) {
   const auto* about = ::getpwnam(user.c_str());  // NOLINT(concurrency-mt-unsafe): one thread
   if (about == nullptr)
     return rr::make_error(rr::ErrorCode::invalid_argument, "there is no user " + rr::quote(user) + " on this machine");
@@ -116,9 +124,9 @@ rr::Result<std::vector<std::string>> find_missing_rights(const std::string& user
   if (child < 0 || ::waitpid(child, &status, 0) != child || status != 0)
     return rr::make_error(rr::ErrorCode::system_resource_permission_denied,
                           "only root can ask what user " + rr::quote(user) + " may do");
-  std::vector<std::string> found;
+  MissingRights found;
   for (std::size_t begin = 0, end = 0; (end = lines.find('\n', begin)) != std::string::npos; begin = end + 1)
-    found.push_back(lines.substr(begin, end - begin));
+    (lines[begin] == optional_mark ? found.optional : found.needed).push_back(lines.substr(begin + 1, end - begin - 1));
   return found;
 }
 

@@ -7,6 +7,7 @@
 #include <sstream>
 #include <thread>
 
+#include "server/cli/printable.hpp"
 #include "server/cli/remote_service.hpp"
 
 namespace rrgate {
@@ -125,7 +126,7 @@ rr::OrderedJson rates_of(const Snapshot& before, const Snapshot& now) {
 void print_table(const std::string& url, const rr::OrderedJson& rates) {
   std::ostringstream out;
   if (::isatty(STDOUT_FILENO)) out << "\x1b[H\x1b[2J";
-  out << "rrgate " << rates["version"].get<std::string>() << " at " << url << ", up "
+  out << "rrgate " << printable(rates["version"].get<std::string>()) << " at " << url << ", up "
       << duration_text(rates["uptime"].get<double>()) << "\n\n"
       << std::left << std::setw(24) << "device" << std::setw(12) << "state" << std::setw(8) << "mode" << std::right
       << std::setw(8) << "clients" << std::setw(14) << "messages/s" << std::setw(12) << "kB/s" << std::setw(12)
@@ -133,9 +134,9 @@ void print_table(const std::string& url, const rr::OrderedJson& rates) {
       << "\n"
       << std::fixed;
   for (const auto& each : rates["devices"])
-    out << std::left << std::setw(23) << each["device"].get<std::string>() << " " << std::setw(12)
-        << each["state"].get<std::string>() << std::setw(8) << each["mode"].get<std::string>() << std::right
-        << std::setw(8) << each["clients"].get<std::uint32_t>() << std::setprecision(1) << std::setw(14)
+    out << std::left << std::setw(23) << printable(each["device"].get<std::string>()) << " " << std::setw(12)
+        << printable(each["state"].get<std::string>()) << std::setw(8) << printable(each["mode"].get<std::string>())
+        << std::right << std::setw(8) << each["clients"].get<std::uint32_t>() << std::setprecision(1) << std::setw(14)
         << each["messages_per_second"].get<double>() << std::setw(12) << each["bytes_per_second"].get<double>() / 1000
         << std::setw(12) << each["dropped_per_second"].get<double>() << "\n";
   std::cout << out.str() << std::flush;

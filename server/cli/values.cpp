@@ -24,13 +24,17 @@ struct ValueOptions : RemoteOptions {
   std::string output;                ///< of get and call: a file
 };
 
+bool is_image_name(const std::string& file) {
+  return file.ends_with(".png") || file.ends_with(".jpg") || file.ends_with(".jpeg");
+}
+
 /// To the terminal, or to the file that --output names.
 void deliver(const rr::Value& value, const rr::TypeDefinition& type, const rr::TypeRegistry& types,
              const ValueOptions& options) {
   const auto& file = options.output;
   if (file.empty()) return print_value(to_json(value, type, types), options.is_json);
   std::string content;
-  if (file.ends_with(".png") || file.ends_with(".jpg") || file.ends_with(".jpeg")) {
+  if (is_image_name(file)) {
     if (!is_image_type(type, types)) throw NotUnderstood("its value is no image: " + rr::format_type(type));
     const auto work = prepare_image(value, type, types, file.ends_with(".png") ? png_type : jpeg_type);
     auto image = work ? encode_image(*work) : work.error();
@@ -41,6 +45,34 @@ void deliver(const rr::Value& value, const rr::TypeDefinition& type, const rr::T
   }
   if (!write_text_file(file, content)) throw std::runtime_error(file + ": can't be written");
 }
+
+/// The same for many values: a file gets a line for each as it comes.
+class ValueSink {
+ public:
+  /// Throws   NotUnderstood; std::runtime_error: the file can't be written.
+  explicit ValueSink(const ValueOptions& options) : options_(options) {
+    if (is_image_name(options.output))
+      throw NotUnderstood(rr::quote(options.member) + " is a generator: " + options.output +
+                          " would hold one of its values; a file with another ending gets a line of JSON for each");
+    if (options.output.empty()) return;
+    file_.open(options.output, std::ios::binary | std::ios::trunc);
+    check();
+  }
+
+  void deliver(const rr::Value& value, const rr::TypeDefinition& type, const rr::TypeRegistry& types) {
+    if (options_.output.empty()) return print_value(to_json(value, type, types), options_.is_json);
+    file_ << rr::write_json(to_json(value, type, types)) << std::endl;
+    check();
+  }
+
+ private:
+  void check() const {
+    if (!file_) throw std::runtime_error(options_.output + ": can't be written");
+  }
+
+  const ValueOptions& options_;
+  std::ofstream file_;
+};
 
 /// Waits for a request, as BlockingConnection::wait_for(), and shows how much has passed meanwhile.
 template <class Start>
@@ -95,6 +127,7 @@ void set_value(const RemoteMember& found, const ValueOptions& options) {
     });
   else
     found.object.poke_out(member.name, *value);
+  if (options.is_json) print_value(to_json(*value, member.type, found.types()), true);
 }
 
 std::string signature(const rr::MemberDefinition& function) {
@@ -142,8 +175,9 @@ void call_function(const RemoteMember& found, const ValueOptions& options) {
   auto type = member.type;
   if (member.is_generator()) {
     type.container = rr::ContainerKind::none;
+    ValueSink sink(options);
     auto generator = found.object.generator_values(member.name, values);
-    for (const auto& value : generator) deliver(value, type, found.types(), options);
+    for (const auto& value : generator) sink.deliver(value, type, found.types());
     return;
   }
   const auto result = wait_showing_bytes(found.object, [&](auto& connection, auto done) {
@@ -179,7 +213,8 @@ NewCommand<ValueOptions> add_member_command(Commands& commands, const char* name
 /// What get and call do with a value.
 void add_output_options(CLI::App& app, ValueOptions& options) {
   add_json(app, options);
-  app.add_option("--output,-o", options.output, "Write it to a file; as an image where it ends in .png or .jpg")
+  app.add_option("--output,-o", options.output,
+                 "Write it to a file, values of a generator as lines; as an image where it ends in .png or .jpg")
       ->option_text("FILE");
 }
 
@@ -196,6 +231,7 @@ void add_set(Commands& commands) {
   const auto [app, options] =
       add_member_command(commands, "set", {property, wire}, "Write a property or a wire", run_with_member<set_value>);
   app.add_option("VALUE", options.value, "JSON; @FILE, or - for standard input")->required()->option_text(" ");
+  add_json(app, options)->description("Print the value that was written, as one line of JSON");
 }
 
 void add_call(Commands& commands) {

@@ -1,8 +1,10 @@
 // rrgate watch: values of a wire, packets of a pipe, events, one line each. Layer: server/cli.
+#include <cmath>
 #include <csignal>
 #include <ctime>
 #include <iomanip>
 #include <iostream>
+#include <optional>
 
 #include "server/cli/csv.hpp"
 #include "server/cli/remote_service.hpp"
@@ -22,10 +24,8 @@ void interrupt(int) {
 
 enum class WatchForm : std::uint8_t { text, json, csv };
 
-std::string time_text(bool is_short) {
-  const auto now = std::chrono::system_clock::now();
-  const auto seconds = std::chrono::system_clock::to_time_t(now);
-  const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(now.time_since_epoch()).count() % 1000;
+std::string time_text(rr::TimeSpec time, bool is_short) {
+  const auto seconds = static_cast<std::time_t>(time.seconds);
   std::tm parts{};
   if (is_short)
     ::localtime_r(&seconds, &parts);
@@ -34,25 +34,49 @@ std::string time_text(bool is_short) {
   char text[40];
   const auto size = std::strftime(text, sizeof(text), is_short ? "%H:%M:%S" : "%Y-%m-%dT%H:%M:%S", &parts);
   char fraction[8];
-  std::snprintf(fraction, sizeof(fraction), ".%03d", static_cast<int>(ms));
+  std::snprintf(fraction, sizeof(fraction), ".%03d", static_cast<int>(time.nanoseconds / 1'000'000));
   return std::string(text, size) + fraction + (is_short ? "" : "Z");
 }
 
-/// Prints what comes, and counts it.
+rr::TimeSpec time_now() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(now);
+  return {seconds.count(), static_cast<std::int32_t>(std::chrono::nanoseconds(now - seconds).count())};
+}
+
+/// In s; negative where the device's clock is ahead of this machine's.
+double age_of(rr::TimeSpec then, rr::TimeSpec now) {
+  return static_cast<double>(now.seconds - then.seconds) + 1e-9 * (now.nanoseconds - then.nanoseconds);
+}
+
+std::string age_text(double age) {
+  char text[40];
+  std::snprintf(text, sizeof(text), "%.6f", age);
+  return text;
+}
+
+/// Prints what comes, and counts it. Values of wires have the time at which the device sent them, and their age.
 class ValuePrinter {
  public:
   ValuePrinter(WatchForm form, std::uint64_t limit) : form_(form), limit_(limit) {}
 
-  void print(const rr::OrderedJson& value) {
+  void print(const rr::OrderedJson& value, std::optional<rr::TimeSpec> sent = std::nullopt) {
     if (is_done()) return;
     ++count_;
-    if (form_ == WatchForm::csv) return print_csv(value);
+    const auto now = time_now();
+    if (form_ == WatchForm::csv) return print_csv(value, now, sent);
     if (form_ == WatchForm::text) {
-      std::cout << time_text(true) << "  " << rr::write_json(value) << std::endl;
+      std::cout << time_text(now, true);
+      if (sent) std::cout << "  sent " << time_text(*sent, true) << ", age " << age_text(age_of(*sent, now)) << " s";
+      std::cout << "  " << text_for_output(rr::write_json(value)) << std::endl;
       return;
     }
     auto line = rr::OrderedJson::object();
-    line["time"] = time_text(false);
+    line["time"] = time_text(now, false);
+    if (sent) {
+      line["device_time"] = time_text(*sent, false);
+      line["age"] = std::round(age_of(*sent, now) * 1e6) / 1e6;
+    }
     line["value"] = value;
     std::cout << rr::write_json(line) << std::endl;
   }
@@ -61,17 +85,18 @@ class ValuePrinter {
 
  private:
   /// A column for each number of the first value, named by its place: "/position/0".
-  void print_csv(const rr::OrderedJson& value) {
+  void print_csv(const rr::OrderedJson& value, rr::TimeSpec now, std::optional<rr::TimeSpec> sent) {
     const auto cells = rr::Json::parse(rr::write_json(value)).flatten();
     if (columns_.empty()) {
-      std::cout << "time";
+      std::cout << "time" << (sent ? ",device_time,age" : "");
       for (const auto& [place, cell] : cells.items()) {
         columns_.push_back(place);
         std::cout << "," << csv_cell(place.empty() ? "value" : place);
       }
       std::cout << "\n";
     }
-    std::cout << time_text(false);
+    std::cout << time_text(now, false);
+    if (sent) std::cout << "," << time_text(*sent, false) << "," << age_text(age_of(*sent, now));
     for (const auto& column : columns_) {
       const auto cell = cells.find(column);
       std::cout << "," << (cell == cells.end() ? "" : csv_cell(*cell));
@@ -89,13 +114,16 @@ void begin_watching(const RemoteMember& found, ValuePrinter& printer) {
   using enum rr::MemberKind;
   expect_kind(found, {wire, pipe, event}, "watch");
   const auto& member = *found.member;
-  const auto print = [&printer, &member, types = &found.types()](const rr::Value& value) {
-    printer.print(to_json(value, member.type, *types));
+  const auto json_of = [&member, types = &found.types()](const rr::Value& value) {
+    return to_json(value, member.type, *types);
   };
   if (member.kind == wire) {
-    found.object.connect_wire(member.name, [print](const rr::Value& value, rr::TimeSpec) { print(value); });
+    found.object.connect_wire(member.name, [&printer, json_of](const rr::Value& value, rr::TimeSpec sent) {
+      printer.print(json_of(value), sent);
+    });
   } else if (member.kind == pipe) {
-    found.object.connect_pipe(member.name, print);
+    found.object.connect_pipe(member.name,
+                              [&printer, json_of](const rr::Value& value) { printer.print(json_of(value)); });
   } else {
     found.object.on_event(member.name, [&printer, &member, types = &found.types()](std::span<const rr::Value> values) {
       const auto json = rr::arguments_to_json(values, member, *types, {});

@@ -44,6 +44,14 @@ rr::Value describe(const std::string& device, const LeaseNews& news) {
                         {"reason", news.why}}};
 }
 
+rr::Value describe(const DeviceService& service) {
+  rr::List implements;
+  for (const auto& type : service.implements) implements.items.emplace_back(type);
+  return rr::Structure{
+      "org.rrgate.gateway.DeviceService",
+      {{"name", service.name}, {"root_object_type", service.type}, {"root_object_implements", std::move(implements)}}};
+}
+
 double seconds(std::chrono::microseconds time) {
   return std::chrono::duration<double>(time).count();
 }
@@ -140,7 +148,7 @@ rr::Value GatewayService::describe(const Device& device) const {
   if (const auto& identity = device.identity()) {
     node_name = identity->node_name;
     node_id.assign(identity->node_id.bytes.begin(), identity->node_id.bytes.end());
-    for (const auto& service : identity->services) services.items.emplace_back(service.name);
+    for (const auto& service : identity->services) services.items.push_back(rrgate::describe(service));
   }
   return rr::Structure{"org.rrgate.gateway.Device",
                        {{"name", device.config().name},

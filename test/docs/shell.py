@@ -7,6 +7,7 @@ import signal
 import shutil
 import subprocess
 import sys
+import sysconfig
 import threading
 
 from processes import BUILD, ROOT
@@ -14,8 +15,8 @@ from processes import BUILD, ROOT
 DEADLINE = 30.0  # seconds for one command
 
 # What goes on until it is ended, and the port by which others reach it.
-SERVERS = {r"(build/release/server/)?rrgate (demo|serve|proxy)\b": 8080, r"python examples/thermostat/device\.py": 52230,
-           r"build-examples/thermostat_device": 52230, r"python -m reynard_the_robot": 29200}
+SERVERS = {r"(build/release/server/)?rrgate (demo|serve|proxy)\b": 8080, r"\S+/python examples/thermostat/device\.py": 52230,
+           r"build-examples/thermostat_device": 52230, r"\S+/python -m reynard_the_robot": 29200}
 
 
 class Shell:
@@ -24,12 +25,18 @@ class Shell:
         programs = folder / "bin"
         programs.mkdir()
         (programs / "rrgate").symlink_to(BUILD / "server" / "rrgate")
+        python = pathlib.Path(sys.executable)
+        node = python.parent / "node"  # where ./dev setup found none on the machine
+        if node.exists():
+            (programs / "node").symlink_to(node)
         for name in ("build", "docker", "robdef", "wasm-client"):
             (folder / name).symlink_to(ROOT / name)
         shutil.copytree(ROOT / "examples", folder / "examples", ignore=shutil.ignore_patterns("node_modules", "rrgate-client"))
         (folder / "build-examples").mkdir()
         (folder / "build-examples/thermostat_device").symlink_to(BUILD / "test/examples/thermostat_device")
-        environment = {**os.environ, "PATH": f"{programs}:{pathlib.Path(sys.executable).parent}:{os.environ['PATH']}:/usr/sbin:/sbin", "LC_ALL": "C.UTF-8",
+        environment = {**os.environ, "PATH": f"{programs}:/usr/bin:{os.environ['PATH']}:/usr/sbin:/sbin", "LC_ALL": "C.UTF-8",
+                       # What pip finds here it does not download: there is no network.
+                       "PYTHONPATH": sysconfig.get_path("purelib"),
                        "ROBOTRACONTEUR_SYSTEM_PREFIX": str(folder), "ROBOTRACONTEUR_USER_HOME": str(folder / "home"),
                        "ROBOTRACONTEUR_SYSTEM_CONFIG_DIR": str(folder / "home"), "HOME": str(folder / "home")}
         self._servers = {}

@@ -1,22 +1,22 @@
 """The commands of each page, run in their order as they stand there; what they print is what the page says."""
 import pathlib
 import re
+import sys
 import tempfile
 
 import pytest
 
 import not_run
 from machine import need
-from pages import blocks, find, pages, unknown
+from pages import ROOT, blocks, find, pages, unknown
 from shell import Shell, commands_of, looks_like, trace
 
 # What a page takes for granted, beside the blocks that are run.
 BEFORE = {
-    "docs/command-line.md": ["python -m reynard_the_robot --quiet", "export REYNARD='rr+tcp://localhost:29200/?service=reynard'"],
-    "docs/recording.md": ["python -m reynard_the_robot --quiet"],
+    "docs/recording.md": [f"{sys.executable} -m reynard_the_robot --quiet"],
     "README.md": ["rrgate demo"],
     "docs/http-api.md": ["rrgate demo"],
-    "docs/start.md": ["rrgate demo", "python -m reynard_the_robot --quiet"],
+    "docs/start.md": ["rrgate demo"],
     "docs/tutorials/page.md": ["build-examples/thermostat_device", "mkdir examples/thermostat/node_modules",
                                "ln -s $PWD/wasm-client examples/thermostat/node_modules/rrgate-client"],
     "docs/tutorials/robot.md": ["rrgate demo", "mkdir node_modules", "ln -s $PWD/wasm-client node_modules/rrgate-client"],
@@ -70,6 +70,21 @@ def follow(shell, block):
 
 def is_in(listed, block, command):
     return any(page == block.page and command.startswith(beginning) for page, beginning in listed)
+
+
+def test_python_comes_from_a_folder_of_its_own():
+    """Debian has no "python", and its pip refuses to install beside its packages."""
+    commands = [command for block in blocks() if block.language == "sh" for command, _ in commands_of(block.text)]
+    words = [re.split(r"&&|\||;", command) for command in commands]
+    found = [part.strip() for parts in words for part in parts if re.match(r"\s*(pip3?|python|python3 -m pip)\b", part)]
+    assert commands and found == []
+
+
+def test_packages_are_where_the_script_puts_them():
+    version = re.search(r"^project\(rrgate VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text(), re.M)[1]
+    named = [name for block in blocks() if block.language == "sh" for name in re.findall(r"apt install (\S+)", block.text)]
+    assert set(named) == {f"./build/package/rrgate_{version}_amd64.deb"}
+    assert "\npackages=$PWD/build/package\n" in (ROOT / "dev").read_text()
 
 
 def test_what_is_not_run_is_there():

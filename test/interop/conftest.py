@@ -3,6 +3,7 @@ import faulthandler
 import json
 import os
 import shutil
+import socket
 import sys
 import tempfile
 
@@ -11,7 +12,7 @@ import pytest
 from clients import Chromium
 from directions import DIRECTIONS, LEVELS, LOCAL_URL, PEERS, service_command
 from matrix import Matrix
-from processes import ROOT, Background, start_gateway
+from processes import ROOT, Background, free_port, start_gateway
 from tls_nodes import make_lab
 
 TEST_DEADLINE = 120.0  # seconds; beyond it the run is ended with all stacks printed
@@ -178,3 +179,19 @@ def gateway(request, tmp_path_factory):
 def lab(tmp_path_factory):
     """A folder with certificates, as tls_nodes.make_lab has it."""
     return make_lab(tmp_path_factory.mktemp("lab"))
+
+
+@pytest.fixture(scope="module")
+def reynard(tmp_path_factory):
+    log = tmp_path_factory.mktemp("reynard") / "log"
+    port = free_port()
+    device = Background([sys.executable, "-m", "reynard_the_robot", "--quiet", "--disable-ascii-socket",
+                         "--http-port", free_port(), f"--robotraconteur-tcp-port={port}"], log)
+
+    def is_listening():
+        with socket.socket() as probe:
+            return probe.connect_ex(("127.0.0.1", port)) == 0
+
+    device.wait_until(is_listening)
+    yield f"rr+tcp://127.0.0.1:{port}/?service=reynard"
+    device.stop()

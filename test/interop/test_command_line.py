@@ -1,64 +1,31 @@
 """The commands of rrgate that use a device, against Reynard the Robot: directly, and through a gateway with users and
 without."""
-import contextlib
+import datetime
+import getpass
 import json
 import os
-import pty
+import pathlib
 import re
+import shutil
 import socket
 import subprocess
 import sys
+import tempfile
 import time
 
 import pytest
 import RobotRaconteur as RR
 
+from command_line import DEVICE_ERROR, DONE, FAILED, NOT_UNDERSTOOD, REFUSED, UNREACHABLE, Ran, run, shown_on_terminal
 from found_nodes import THEIRS, TYPE
 from gateways import RRGATE, Gateway
 from processes import BUILD, ROOT, Background, free_port
-from shared_sites import Site
+from shared_sites import Site, start_service
 from tap import Tap
 from users import PASSWORDS, make_users
 
-DONE, FAILED, NOT_UNDERSTOOD, UNREACHABLE, REFUSED, DEVICE_ERROR = range(6)
 RULES = [{"roles": ["viewer", "operator"], "may": ["read", "subscribe"]},
          {"roles": ["operator"], "members": ["say", "color"], "may": ["write", "call"]}]
-
-
-class Ran:
-    def __init__(self, arguments, given="", environment={}):
-        done = subprocess.run([RRGATE, *map(str, arguments)], input=given, capture_output=True, text=True, timeout=30,
-                              env={**os.environ, **environment})
-        self.code, self.out, self.error = done.returncode, done.stdout, done.stderr
-
-    def refused(self, code, *words):
-        """Whether it ended so, with one sentence that has these words."""
-        assert self.code == code, (self.code, self.out, self.error)
-        assert self.out == "" and self.error.count("\n") == 1, (self.out, self.error)
-        assert all(word in self.error for word in words), self.error
-        return True
-
-
-def run(*arguments, **more):
-    ran = Ran(arguments, **more)
-    assert ran.code == DONE, (ran.code, ran.error)
-    return ran.out.strip()
-
-
-@pytest.fixture(scope="module")
-def reynard(tmp_path_factory):
-    log = tmp_path_factory.mktemp("reynard") / "log"
-    port = free_port()
-    device = Background([sys.executable, "-m", "reynard_the_robot", "--quiet", "--disable-ascii-socket",
-                         "--http-port", free_port(), f"--robotraconteur-tcp-port={port}"], log)
-
-    def is_listening():
-        with socket.socket() as probe:
-            return probe.connect_ex(("127.0.0.1", port)) == 0
-
-    device.wait_until(is_listening)
-    yield f"rr+tcp://127.0.0.1:{port}/?service=reynard"
-    device.stop()
 
 
 @pytest.fixture(scope="module", params=["directly", "shared", "relay"])
@@ -96,6 +63,7 @@ def test_values_are_read_written_and_called(url):
     run("set", url, "color", "[0.25, 0.5, 1]")
     assert run("get", url, "color") == "[0.25,0.5,1.0]"
     assert run("set", url, "color", "-", given="[1, 0, 0.5]") == ""
+    assert json.loads(run("set", url, "color", "[1, 0, 0.5]", "--json")) == [1.0, 0.0, 0.5]
     assert json.loads(run("get", url, "color", "--json")) == [1.0, 0.0, 0.5]
     assert run("call", url, "say", "hello there") == ""
     assert run("call", url, "say", "--", "-5 degrees") == ""
@@ -169,6 +137,8 @@ def test_what_a_service_has_is_told(url):
     told = json.loads(run("info", url, "color", "--json"))
     assert [member["kind"] for member in told["members"]] == ["property"]
     assert "wire ReynardState state [readonly]" in run("robdef", url)
+    definitions = {each["name"]: each["text"] for each in json.loads(run("robdef", url, "--json"))}
+    assert "wire ReynardState state [readonly]" in definitions["experimental.reynard_the_robot"]
 
 
 def test_locks_of_a_gateways_device_are_told(node, tmp_path):
@@ -201,8 +171,22 @@ def test_values_are_watched(url):
     times = [line["value"]["time"] for line in lines]
     assert len(times) == 3 and times == sorted(times)
     header, *rows = run("watch", url, "state", "--count", "2", "--csv").splitlines()
-    assert header.startswith("time,/arm_position/0,") and len(rows) == 2
+    assert header.startswith("time,device_time,age,/arm_position/0,") and len(rows) == 2
     assert {row.count(",") for row in rows} == {header.count(",")}
+
+
+def test_values_of_wires_have_the_devices_time_and_their_age(url):
+    def parse(text):
+        return datetime.datetime.fromisoformat(text.replace("Z", "+00:00"))
+
+    line = json.loads(run("watch", url, "state", "--count", "1", "--json"))
+    difference = (parse(line["time"]) - parse(line["device_time"])).total_seconds()
+    assert line["age"] == pytest.approx(difference, abs=0.0021)  # both times are cut to milliseconds
+    assert -0.1 < line["age"] < 5
+    _, row = run("watch", url, "state", "--count", "1", "--csv").splitlines()
+    time, device_time, age = row.split(",")[:3]
+    assert (parse(time) - parse(device_time)).total_seconds() == pytest.approx(float(age), abs=0.0021)
+    assert re.match(r"\d\d:\d\d:\d\d\.\d{3}  sent \d\d:\d\d:\d\d\.\d{3}, age -?\d+\.\d{6} s  \{", run("watch", url, "state", "--count", "1"))
 
 
 def test_events_are_watched(node, tmp_path):
@@ -250,20 +234,6 @@ def slow_reynard(reynard):
     line.close()
 
 
-def shown_on_terminal(*arguments):
-    """What somebody at a terminal sees on standard error."""
-    terminal, theirs = pty.openpty()
-    with subprocess.Popen([RRGATE, *map(str, arguments)], stdout=subprocess.DEVNULL, stderr=theirs) as process:
-        os.close(theirs)
-        shown = b""
-        with contextlib.suppress(OSError):  # it has ended
-            while piece := os.read(terminal, 4096):
-                shown += piece
-        os.close(terminal)
-    assert process.returncode == DONE, shown
-    return shown.decode()
-
-
 @pytest.mark.parametrize("command, words", [
     (["ls", "--wait", "1"], r"listening \[#+\.+\]  \d\d %"),
     (["ping", "URL", "--count", "150"], r"asking \[#+\.+\]  \d\d %"),
@@ -289,6 +259,22 @@ def test_values_go_to_files(reynard, tmp_path):
     assert run("get", reynard, "color", "-o", file) == "" and json.loads(file.read_text()) == [0.5, 0.25, 0.0]
     assert Ran(["get", reynard, "color", "-o", "/nowhere/color"]).refused(FAILED, "/nowhere/color", "written")
     assert Ran(["get", reynard, "color", "-o", tmp_path / "color.png"]).refused(NOT_UNDERSTOOD, "no image: double[]")
+
+
+def test_each_value_of_a_generator_is_a_line_of_the_file(tmp_path):
+    service, url = start_service(tmp_path)
+    try:
+        file = tmp_path / "values.jsonl"
+        file.write_text("what was there before\n")
+        assert run("call", url, "count_up", "0.5", "3", "-o", file) == ""
+        assert [json.loads(line) for line in file.read_text().splitlines()] == [0.5, 1.5, 2.5]
+        assert run("call", url, "count_up", "0.5", "3").splitlines() == ["0.5", "1.5", "2.5"]
+        image = tmp_path / "values.png"
+        refused = Ran(["call", url, "count_up", "0.5", "3", "-o", image])
+        assert refused.refused(NOT_UNDERSTOOD, "'count_up' is a generator", "values.png") and not image.exists()
+        assert Ran(["call", url, "count_up", "0.5", "3", "-o", "/nowhere/values"]).refused(FAILED, "/nowhere/values", "written")
+    finally:
+        service.stop()
 
 
 def test_images_go_to_files(tmp_path):
@@ -345,21 +331,61 @@ def test_shells_ask_what_may_come(reynard):
     assert complete("serve", "--config", "") == []
 
 
-def test_bash_completes_urls_and_members(reynard):
-    script = """source <(rrgate completion bash)
-COMP_LINE=$1; COMP_POINT=${#1}
-# As bash splits it: ":" and "=" are words by themselves.
-read -ra COMP_WORDS <<<"$(sed 's/[:=]/ & /g' <<<"$1")"; COMP_CWORD=$((${#COMP_WORDS[@]} - 1))
-_rrgate; echo "${COMPREPLY[@]}" """
-    path = f"{os.path.dirname(RRGATE)}:{os.environ['PATH']}"
+def test_services_of_a_type_are_listed(tmp_path):
+    """By the type of the root object, and by what it implements: of a node, and of a gateway's devices."""
+    port = free_port()
+    robot = Background([BUILD / "examples" / "demo" / "rrgate-demo-create", "--port", port], tmp_path / "log")
+    url = f"rr+tcp://127.0.0.1:{port}/?service=Create"
+    gateway = None
+    try:
+        robot.wait_until(lambda: Ran(["info", url]).code == DONE)
+        gateway = Gateway(tmp_path, {"devices": [{"name": "create", "url": url}, {"name": "nobody", "url": url.replace(str(port), "1")}]})
+        gateway.wait_for("device online")
+        base = f"http://127.0.0.1:{gateway.port}"
+        own, above = "experimental.simulatedcreate.SimulatedCreate", "experimental.create2.Create"
+        for where in url.split("?")[0], base:
+            for wanted in own, above:
+                (line,) = run("ls", where, "--type", wanted, "--json").splitlines()
+                found = json.loads(line)
+                assert (found["service"], found["type"]) == ("Create", own) and above in found["implements"]
+            assert run("ls", where, "--type", "experimental.create2.Nothing") == ""
+        assert own in run("ls", base) and len(run("ls", base).splitlines()) == 2
+    finally:
+        if gateway:
+            gateway.process.stop()
+        robot.stop()
 
-    def completed(line):
-        return subprocess.run(["bash", "-c", script, "bash", line], capture_output=True, text=True, timeout=30,
-                              env={**os.environ, "PATH": path}).stdout.split()
 
-    assert completed("rrgate che") == ["check-config", "check"]
-    assert completed(f"rrgate get '{reynard}' robot_p") == ["robot_position"]
-    assert completed(f"rrgate call '{reynard}' teleport x") == ["x="]
+def test_a_folder_that_init_could_not_finish_is_begun_anew(tmp_path):
+    folder = tmp_path / "lab"
+    (folder / "gateway.json.new").mkdir(parents=True)  # so that the configuration, which comes last, can't be written
+    (folder / "gateway.json.new" / "x").write_text("")
+    failed = Ran(["init", folder])
+    assert failed.code == FAILED and failed.error == f"rrgate init: {folder}/gateway.json: can't be written\n"
+    assert [each.name for each in folder.iterdir()] == ["gateway.json.new"]
+    shutil.rmtree(folder / "gateway.json.new")
+    assert "user admin" in run("init", folder)
+    assert {"gateway.json", "tls", "users", "tickets.key"} <= {each.name for each in folder.iterdir()}
+    (folder / "gateway.json").unlink()
+    assert Ran(["init", folder]).refused(FAILED, "is there already")
+    assert (folder / "users").exists() and (folder / "tls").exists()  # what it did not make stays
+
+
+def test_check_config_warns_of_tokens_that_the_service_cannot_write(tmp_path_factory):
+    user = "nobody" if os.geteuid() == 0 else getpass.getuser()
+    with tempfile.TemporaryDirectory() as name:  # below folders that everybody may enter
+        folder = pathlib.Path(name)
+        (folder / "gateway.json").write_text(json.dumps({"listen": ["127.0.0.1:1"], "devices": [], "access": {"tokens_file": "tokens"}}))
+        (folder / "tokens").write_text("")
+        folder.chmod(0o555)
+        for each in folder.iterdir():
+            each.chmod(0o644)
+        ran = Ran(["check-config", folder / "gateway.json", "--as-service", user])
+        assert ran.code == DONE and "good" in ran.out
+        (warning,) = [line for line in ran.error.splitlines() if "can't write" in line]
+        assert f"warning: user '{user}' can't write {folder}" in warning and "requests for access can't be approved" in warning
+        folder.chmod(0o777)
+        assert "can't write" not in Ran(["check-config", folder / "gateway.json", "--as-service", user]).error
 
 
 def test_services_are_listed(reynard, url):

@@ -2,6 +2,7 @@
 
 #include "server/access/access.hpp"
 #include "server/cli/command.hpp"
+#include "server/cli/printable.hpp"
 #include "server/config/config.hpp"
 #include "server/config/version.hpp"
 #include "server/log/log.hpp"
@@ -107,4 +108,13 @@ TEST_CASE("init: the configuration has a key of its own, so that sign-ins outliv
   const auto again = test::run_command("init", {std::filesystem::path(other.path("x")).parent_path().string()});
   CHECK(again.code == 1);
   CHECK_THAT(again.errors, Catch::Contains("tickets.key: is there already; nothing was written"));
+}
+
+TEST_CASE("what would command a terminal is shown as question marks") {
+  CHECK(printable("wei\u00df, \u20ac, \u00a0") == "wei\u00df, \u20ac, \u00a0");
+  CHECK(printable("a\x1b[31m\x7f\r") == "a?[31m??");
+  CHECK(printable("\u0080\u009b\u009f\u00a0") == "???\u00a0");
+  CHECK(printable("a\tb\n\x1b") == "a?b??");
+  CHECK(printable("a\tb\n\x1b", LineEnds::kept) == "a\tb\n?");
+  CHECK(printable(std::string_view("\0\xc2", 2)) == "?\xc2");
 }

@@ -1,0 +1,118 @@
+"""What people meet at a terminal: completion by the shell, texts of devices, a browser that opens."""
+import json
+import os
+import pty
+import re
+import select
+import subprocess
+import sys
+import time
+
+import pytest
+
+from command_line import DEVICE_ERROR, Ran, run, shown_on_terminal
+from gateways import RRGATE
+from processes import ROOT, Background, free_port
+
+
+def test_text_of_a_device_does_not_command_the_terminal(tmp_path):
+    """ESC, and the C1 characters that some terminals obey."""
+    device = Background([sys.executable, ROOT / "test" / "interop" / "peers" / "escaping_device.py", (port := free_port())],
+                        tmp_path / "log")
+    device.next_line()
+    url = f"rr+tcp://127.0.0.1:{port}/?service=evil"
+    try:
+        assert run("get", url, "text") == "a\tb\n\x1b[31mc\x9b31md"  # a file gets what there is
+        assert "b\r\n?[31mc?31md" in shown_on_terminal("get", url, "text", standard_output=True)
+        assert Ran(["call", url, "fail"]).refused(DEVICE_ERROR, "?[31mwrong")
+    finally:
+        device.stop()
+
+
+def test_bash_completes_urls_and_members(reynard):
+    script = """source <(rrgate completion bash)
+COMP_LINE=$1; COMP_POINT=${#1}
+# As bash splits it: ":" and "=" are words by themselves.
+read -ra COMP_WORDS <<<"$(sed 's/[:=]/ & /g' <<<"$1")"; COMP_CWORD=$((${#COMP_WORDS[@]} - 1))
+_rrgate; echo "${COMPREPLY[@]}" """
+    path = f"{os.path.dirname(RRGATE)}:{os.environ['PATH']}"
+
+    def completed(line):
+        return subprocess.run(["bash", "-c", script, "bash", line], capture_output=True, text=True, timeout=30,
+                              env={**os.environ, "PATH": path}).stdout.split()
+
+    assert completed("rrgate che") == ["check-config", "check"]
+    assert completed(f"rrgate get '{reynard}' robot_p") == ["robot_position"]
+    assert completed(f"rrgate call '{reynard}' teleport x") == ["x="]
+
+
+@pytest.mark.parametrize("typed", ["http://h", "'http://h", '"http://h', "http:", "ht", r"http://h:8080/devices/a\?nodeid=1\&"])
+def test_urls_that_bash_completes_reach_the_program_whole(typed, tmp_path):
+    """In a bash at a terminal: "&" would run the command beside it, without what follows."""
+    url = "http://h:8080/devices/a?nodeid=1&service=x"
+    program = tmp_path / "rrgate"
+    program.write_text(f"""#!/bin/bash
+if [[ "$1 $2" == "completion words" ]]; then [[ "{url}" == "${{@: -1}}"* ]] && echo "{url}"
+elif [[ $1 == completion ]]; then {RRGATE} completion bash
+else printf 'got <%s>\\n' "$@"; fi
+""")
+    program.chmod(0o755)
+    terminal, theirs = pty.openpty()
+    environment = {**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}", "PS1": "ready ", "TERM": "dumb", "HOME": str(tmp_path)}
+    with subprocess.Popen(["bash", "--norc", "--noprofile", "-i"], stdin=theirs, stdout=theirs, stderr=theirs, env=environment,
+                          start_new_session=True) as bash:
+        os.close(theirs)
+        shown = ""
+
+        def read_until(words):
+            nonlocal shown
+            deadline = time.monotonic() + 10
+            while words not in shown:
+                assert time.monotonic() < deadline, shown
+                if select.select([terminal], [], [], 0.2)[0]:
+                    shown += os.read(terminal, 4096).decode(errors="replace")
+
+        try:
+            read_until("ready ")
+            os.write(terminal, b"source <(rrgate completion bash); echo lo''aded\n")
+            read_until("loaded")
+            os.write(terminal, f"rrgate get {typed}\t\n".encode())
+            read_until("got <http")
+            read_until(">")
+            assert re.findall(r"got <(.*)>", shown.replace("\r", "")) == ["get", url]
+        finally:
+            bash.kill()
+            os.close(terminal)
+
+
+@pytest.mark.parametrize("more, desktop, opens", [([], True, True), (["--no-browser"], True, False), (["--lan"], True, False),
+                                                  ([], False, False)])
+def test_the_demo_opens_a_browser_on_a_desktop(more, desktop, opens, tmp_path):
+    browser = tmp_path / "xdg-open"
+    browser.write_text(f"#!/bin/sh\necho \"$@\" >{tmp_path}/opening && mv {tmp_path}/opening {tmp_path}/opened\n")
+    browser.chmod(0o755)
+    environment = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    environment |= {"PATH": f"{tmp_path}:{os.environ['PATH']}"} | ({"DISPLAY": ":9"} if desktop else {})
+    terminal, theirs = pty.openpty()
+    with subprocess.Popen([RRGATE, "demo", "webcams", "--port", "0", *more], stdout=theirs, stderr=theirs, env=environment) as demo:
+        os.close(theirs)
+        try:
+            shown = ""
+            while not (address := re.search(r"rrgate demo: (http://127\S+)", shown)):
+                shown += os.read(terminal, 4096).decode(errors="replace")
+            deadline = time.monotonic() + 10
+            while opens and not (tmp_path / "opened").exists():
+                assert time.monotonic() < deadline
+                time.sleep(0.01)
+            if opens:
+                assert (tmp_path / "opened").read_text().strip() == address[1]
+        finally:
+            demo.terminate()
+            demo.wait()
+            os.close(terminal)
+    assert (tmp_path / "opened").exists() == opens  # it would have been opened before the demo ended
+
+
+def test_the_script_lists_demos_as_the_program_does():
+    listed = subprocess.run([ROOT / "dev", "demo", "--list"], capture_output=True, text=True, timeout=30, check=True)
+    assert listed.stdout == subprocess.run([RRGATE, "demo", "--list"], capture_output=True, text=True, timeout=30, check=True).stdout
