@@ -96,7 +96,8 @@ void Player::turn() {
   listener_.changed();
   if (!is_playing_) return;
   if (!next) {  // a recording of one message does not take all the time
-    shift_ += static_cast<McapTime>(static_cast<double>(std::chrono::nanoseconds(playing_look_period).count()) * speed_);
+    shift_ +=
+        static_cast<McapTime>(static_cast<double>(std::chrono::nanoseconds(playing_look_period).count()) * speed_);
     go_to(recording_.begin());
     rebase();
     return wait(playing_look_period);
@@ -104,7 +105,8 @@ void Player::turn() {
   if (count == messages_a_turn) return wait({});
   const std::chrono::duration<double, std::nano> until(
       static_cast<double>(next->log_time - std::min(due, next->log_time)) / speed_);
-  wait(until < playing_look_period ? std::chrono::duration_cast<Clock::duration>(until) : Clock::duration(playing_look_period));
+  wait(until < playing_look_period ? std::chrono::duration_cast<Clock::duration>(until)
+                                   : Clock::duration(playing_look_period));
 }
 
 const McapMessage* Player::next_message() {
