@@ -11,6 +11,7 @@ COMMANDS = {
     ("docs/device-author.md", "build-examples/web_server"): "test/interop/test_web_server.py runs it",
     ("docs/discovery.md", "install -d"): "makes folders of this machine's users: test/interop/test_local_discovery.py does it",
     ("docs/embedding.md", "build-examples/thermostat_gateway"): "test/examples/examples_test.py builds and runs it",
+    ("docs/mcp.md", "curl -u root"): "takes an agent that asks: test/interop/test_mcp_commands.py has one",
     ("docs/start.md", "apt install"): "installs a package: test/interop/test_package.py does",
     ("docs/start.md", "docker build"): "takes a container engine: test/interop/test_container.py does it",
     ("docs/start.md", "./dev demo"): "builds everything; the test starts what came of it",

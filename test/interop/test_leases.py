@@ -11,17 +11,12 @@ import RobotRaconteur as RR
 
 from http_api import ask
 from json_sockets import Socket
+from leases import LEASES, PLAIN, wait_for
 from news import News
 from processes import free_port
 from shared_sites import Site, is_refused
 from users import PASSWORDS, basic, make_users
 
-PLAIN = "/api/v1/devices/interop/plain"
-LEASES = {
-    "members": [{"member": "plain.finish", "lease": "never"}, {"member": "plain.speed", "lease": "required"}],
-    "safe": [{"property": "plain.speed", "value": 0}, {"wire": "plain.target", "value": -1}],
-    "takeover": ["operator", "admin"],
-}
 LOCKED = RR.ObjectLockedException
 DEADMAN = 200
 SOON = 0.3  # s, behind the dead-man's time: when the device is safe
@@ -44,14 +39,6 @@ def gateway(site):
 
 def session_of(root):
     return RR.RobotRaconteurNode.s.GetServiceAttributes(root)["rrgate.session"].data
-
-
-def wait_for(is_so, within=10):
-    begin = time.monotonic()
-    while not is_so():
-        assert time.monotonic() - begin < within, "not in time"
-        time.sleep(0.005)
-    return time.monotonic() - begin
 
 
 def is_safe(arm):

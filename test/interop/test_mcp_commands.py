@@ -7,12 +7,12 @@ import time
 
 import pytest
 
+from agents import call, hostile_robot, lose_role, meanwhile, records, with_tokens
 from http_api import ask
 from json_sockets import Socket
+from leases import LEASES, PLAIN, wait_for
 from processes import start_gateway
 from shared_sites import Site
-from test_leases import LEASES, PLAIN, wait_for
-from test_mcp import call, hostile_robot, lose_role, meanwhile, records, with_tokens
 
 SPEED = {"roles": ["agent"], "paths": ["plain"], "members": ["speed"], "may": ["write"]}
 APPROVALS = "/api/v1/agents/approvals"
