@@ -82,7 +82,7 @@ const rr::MemberDefinition& commanded_member(const Target& target, Verb verb) {
     refuse(rr::ErrorCode::invalid_operation,
            rr::quote(name_of(target)) + " is a " +
                (member ? std::string(member_kind_name(member->kind)) : std::string("object")) +
-               "; agents call functions" + " and set properties, and write to nothing else");
+               "; agents call functions and set properties, and write to nothing else");
   if (is_call && member->is_generator())
     refuse(rr::ErrorCode::invalid_operation,
            rr::quote(member->name) + " is a generator, which goes on for longer than one request; agents call none");
@@ -138,7 +138,7 @@ McpTools::Answer McpTools::command(JsonRequestPtr arguments, Verb verb) {
                     why};
   auto terms = judge(command);
   auto& approvals = gateway_.approvals();
-  bool is_approved = !terms.needs_approval || approvals.is_granted(command.wanted, wall_now());
+  const bool is_approved = !terms.needs_approval || approvals.is_granted(command.wanted, wall_now());
   if (is_dry) {
     auto out = rr::OrderedJson::object();
     rr::add_key(out, "member") = name_of(target);
@@ -149,7 +149,6 @@ McpTools::Answer McpTools::command(JsonRequestPtr arguments, Verb verb) {
   }
   if (!is_approved) {
     co_await ask_person(command);
-    is_approved = true;
     terms = judge(command);  // while the person was asked rights may have changed
   }
   co_return co_await give(command, terms);

@@ -158,6 +158,8 @@ void ValueClient::joined(const Key& key, const rr::Result<>& result) {
   const auto found = topics_.find(key);
   if (found == topics_.end()) return;
   auto& topic = found->second;
+  if (!result && topic.state == TopicState::joined)
+    return closed(key, result.error());  // its listeners are to hear of it
   topic.state = result ? TopicState::joined : TopicState::idle;
   if (!result) topic.error = result.error();
   changed_.cancel();

@@ -63,3 +63,18 @@ TEST_CASE("joining a member of an object that the device replaces meanwhile fail
   REQUIRE(rack.bench.run_until([&] { return second->has_value(); }));
   CHECK((**second).has_value());
 }
+
+TEST_CASE("a member that the device closes is told to its listeners, and joined again by the next one") {
+  const std::string member = GENERATE("news", "level");
+  Rack rack;
+  const auto first = rack.listen(member);
+  REQUIRE(rack.bench.run_until([&] { return first->has_value(); }));
+  REQUIRE((**first).has_value());
+  rack.service->root().release("parts", "1");
+  REQUIRE(rack.bench.run_until([&] { return !rack.heard.empty(); }));
+  CHECK(rack.heard.size() == 1);
+  REQUIRE(rack.bench.find(part).has_value());
+  const auto second = rack.listen(member);
+  REQUIRE(rack.bench.run_until([&] { return second->has_value(); }));
+  CHECK((**second).has_value());
+}
