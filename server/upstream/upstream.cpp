@@ -207,7 +207,10 @@ void Upstream::request(UpstreamClient& client, const rr::Called& called, Complet
   // What the device lost while it was asked is said in our words: clients know by them that it may come back.
   done = [weak = weak_from_this(), done = std::move(done)](rr::Result<rr::Value> result) {
     const auto self = weak.lock();
-    if (!result && self && !self->connection_) return done(self->lost_error());
+    if (result || !self) return done(std::move(result));
+    if (!self->connection_) return done(self->lost_error());
+    // The session has ended with this, and says so after it.
+    if (self->connection_->session().state() == rr::ClientState::closed) return done(self->lost_error(result.error()));
     done(std::move(result));
   };
   const auto& path = path_of(called);

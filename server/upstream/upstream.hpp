@@ -136,6 +136,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   const std::shared_ptr<rr::ClientConnection>& connection() const { return connection_; }
   /// What requests fail with while the device is away.
   rr::Error lost_error() const;
+  rr::Error lost_error(const std::optional<rr::Error>& reason) const;
   /// The objects at and below a path were replaced.
   void on_released(std::function<void(const std::string& path)> handler) { on_released_ = std::move(handler); }
 

@@ -214,9 +214,13 @@ void Upstream::break_off() {
 }
 
 rr::Error Upstream::lost_error() const {
+  return lost_error(loss_);
+}
+
+rr::Error Upstream::lost_error(const std::optional<rr::Error>& reason) const {
   return rr::make_error(rr::ErrorCode::connection_error,
                         "connection_lost: device " + rr::quote(device_->config().name) +
-                            (loss_ ? ": " + loss_->message : std::string(" is not connected")));
+                            (reason ? ": " + reason->message : std::string(" is not connected")));
 }
 
 void Upstream::lost(const rr::Error& reason) {

@@ -77,7 +77,7 @@ class Site:
         """Returns once `root` is served again."""
         self.device.stop()
         # What is on its way at that moment hears why it has no answer, what comes later that there is no connection.
-        with pytest.raises(RR.ConnectionException, match="connection_lost|the peer closed the connection|the service was closed"):
+        with pytest.raises(RR.ConnectionException, match="connection_lost|the peer closed the connection"):
             while True:
                 root.status
         self.start_again()

@@ -17,16 +17,19 @@ object Bench
     event struck(int32 number)
     wire double level [readonly]
     function int32{generator} count()
+    function void wait()
 end
 )";
 
 struct Counting {
   std::shared_ptr<const bool> life = std::make_shared<const bool>(true);
   std::shared_ptr<rr::Service> service = rr::Service::from_text({definition}, "bench", "Bench");
+  std::optional<rr::Reply<void>> waiting;  ///< whoever called wait()
 
   Counting() {
     service->generator(
         "count", [this] { return [next = 0, token = life]() mutable { return std::optional<std::int32_t>(++next); }; });
+    service->function("wait", [this](rr::Reply<void> reply) { waiting = std::move(reply); });
   }
   /// Generators that clients have opened and not closed.
   long open_generators() const { return life.use_count() - 1; }
@@ -130,4 +133,17 @@ TEST_CASE("a generator that opens when its client has gone is nobody else's") {
   REQUIRE(bench.run_until([&] { return next->has_value(); }));
   REQUIRE_FALSE((**next).has_value());
   CHECK((*next)->error().code == rr::ErrorCode::invalid_operation);
+}
+
+TEST_CASE("what a device was asked when its service ended is told to be lost with the connection") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  bench.open();
+  HearingClient client(bench.upstream);
+  const auto asked = bench.ask(client, rr::CallKind::function, "bench", "wait");
+  REQUIRE(bench.run_until([&] { return device.waiting.has_value(); }));
+  bench.node.stop();
+  REQUIRE(bench.run_until([&] { return asked->has_value(); }));
+  REQUIRE_FALSE((**asked).has_value());
+  CHECK((*asked)->error().message == "connection_lost: device 'device': the service was closed");
 }
