@@ -93,7 +93,7 @@ const rr::MemberDefinition& commanded_member(const Target& target, Verb verb) {
 }  // namespace
 
 /// What is judged, shown and sent is this, once read.
-struct McpTools::Command {
+struct McpTools::Command {  // NOLINT(bugprone-exception-escape): the JSON of its values throws nothing in moves
   TargetPtr target;
   rr::Called called = {};
   rr::OrderedJson values = {};  ///< of `called`, by the names of parameters or of the property

@@ -379,7 +379,7 @@ rr::awaitable<rr::Result<std::shared_ptr<ValueClient>>> ValueClients::open(std::
                                                                            SessionKey key) {
   const auto made = find_or_make(device, key);
   if (!made) co_return made.error();
-  const auto upstream = *made;
+  const auto upstream = *made;  // NOLINT(performance-unnecessary-copy-initialization): kept while this waits
   const std::pair place(device->config().name, key);
   entries_[place].last_opened = std::chrono::steady_clock::now();
   if (!sweep_.is_armed()) sweep_.arm(idle_time / 3);

@@ -178,7 +178,7 @@ struct SessionKey {
   std::string password = {};
   /// Whose name that is.
   Subject subject() const { return username.empty() ? Subject() : Subject{Subject::Kind::device_user, username}; }
-  auto operator<=>(const SessionKey&) const = default;
+  auto operator<=>(const SessionKey&) const = default;  // NOLINT(modernize-use-nullptr): of what it makes
 };
 
 /// Clients for plain requests by device, service and login; made when somebody asks, gone when nobody has for half a
