@@ -246,3 +246,5 @@ def test_the_unit_is_one(tmp_path):
     result = subprocess.run(["systemd-analyze", "security", "--offline=true", "--threshold=20", tmp_path / "rrgate.service"],
                             capture_output=True, text=True, timeout=60)
     assert result.returncode == 0, result.stdout[-300:]
+    (said,) = re.findall(r"rates its exposure ([\d.]+) ", (ROOT / "docs/deploy.md").read_text())
+    assert f"Overall exposure level for rrgate.service: {said} " in result.stdout
