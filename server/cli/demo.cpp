@@ -262,7 +262,7 @@ rr::awaitable<void> announce(Gateway& gateway, std::uint16_t port, const DemoLog
   const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(20);
   while (!gateway.is_stopping() && !std::all_of(devices.begin(), devices.end(), is_online)) {
     if (std::chrono::steady_clock::now() > give_up) {
-      log(LogLevel::warning, "not all demo devices answer; the page shows which");
+      log(LogLevel::warning, "some demo devices do not answer; the page shows which");
       break;
     }
     pause.expires_after(std::chrono::milliseconds(50));
