@@ -41,7 +41,7 @@ function UsbPart({ usb }: { usb: UsbDeviceList }) {
   const devices = useStore(usb.devices);
   const trouble = useStore(usb.trouble);
   return (
-    <section class="usb-part" aria-label="USB devices of this computer">
+    <section class="usb-part" aria-label={t("USB devices of this computer")}>
       {devices.length > 0 && (
         <ul class="devices">
           {devices.map((device) => (
@@ -50,7 +50,7 @@ function UsbPart({ usb }: { usb: UsbDeviceList }) {
         </ul>
       )}
       <button class="button" type="button" onClick={() => void usb.choose()}>
-        Connect USB device
+        {t("Connect USB device")}
       </button>
       {trouble !== null && (
         <p class="failure" role="alert">
@@ -67,12 +67,12 @@ function GatewayStrip({ state }: { state: GatewayState }) {
   return (
     <section
       class={`link-strip gateway-strip link-${badge[state.kind]}`}
-      aria-label="Gateway"
+      aria-label={t("Gateway")}
       data-gateway={state.kind}
     >
       <StateBadge
         state={badge[state.kind]}
-        text={{ loading: "asking", known: "gateway", away: "gateway away" }[state.kind]}
+        text={t({ loading: "asking", known: "gateway", away: "gateway away" }[state.kind])}
       />
       <div class="link-words">
         <p class="link-head" role="status">
