@@ -111,8 +111,13 @@ def systemd():
     need_programs("systemd-analyze")
 
 
+def apparmor():
+    """apparmor_parser, which reads profiles; no kernel with AppArmor is needed for that."""
+    need_programs("apparmor_parser")
+
+
 CAPABILITIES = {"network": network, "packet-loss": packet_loss, "mount-namespaces": mount_namespaces,
-                "containers": containers, "debian-root": debian_root, "guest": guest, "systemd": systemd}
+                "containers": containers, "debian-root": debian_root, "guest": guest, "systemd": systemd, "apparmor": apparmor}
 
 
 @functools.cache
