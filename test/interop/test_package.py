@@ -98,7 +98,7 @@ def test_what_is_where(root):
         ["root:rrgate 750", "root:rrgate 640", "rrgate:rrgate 750", "rrgate:rrgate 750"]
     for path in ("usr/libexec/rrgate/rrgate-demo-create", "usr/share/rrgate/web/index.html.br", "usr/share/rrgate/docs/index.html", "usr/share/man/man1/rrgate.1.gz",
                  "usr/share/rrgate/gateway.schema.json", "lib/systemd/system/rrgate.socket",
-                 "usr/lib/udev/rules.d/60-robotraconteur-usb.rules", "usr/share/doc/rrgate/copyright"):
+                 "etc/apparmor.d/rrgate", "etc/apparmor.d/local/rrgate", "usr/lib/udev/rules.d/60-robotraconteur-usb.rules", "usr/share/doc/rrgate/copyright"):
         assert (root.folder / path).is_file(), path
     assert "good" in root.run("rrgate", "check-config", "--as-service", "rrgate", "/etc/rrgate/gateway.json").stdout
 
