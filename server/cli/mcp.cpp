@@ -85,6 +85,7 @@ Config config_for(const McpOptions& options) {
   auto& login = read.config.devices.front().login;
   login.username = options.user;
   if (const auto* given = address.options.credentials.get_if<rr::MapString>()) login.credentials = *given;
+  read.config.timeouts.connect = address.timeout;
   read.config.listen.clear();
   return std::move(read.config);
 }

@@ -88,7 +88,8 @@ void McpBridge::take(std::string_view line) {
   if (message->method == "notifications/cancelled" && json->contains("params"))
     return cancel(id_of((*json)["params"], "requestId").dump());
   if (under_way_.size() >= most_at_once)
-    return refuse(message->id, internal_error, "more than 64 messages at once; wait for answers");
+    return refuse(message->id, internal_error,
+                  "more than " + std::to_string(most_at_once) + " messages at once; wait for answers");
   under_way_.emplace(message->id.dump(), message);
   boost::asio::co_spawn(executor_, carry(message), [this, message](const std::exception_ptr& failure) {
     if (failure && !message->is_answered) refuse(message->id, internal_error, "the message could not be carried");

@@ -232,7 +232,7 @@ rr::awaitable<rr::OrderedJson> result_of(GatewayState& gateway, McpReply& reply,
   if (method == "ping") co_return rr::OrderedJson::object();
   if (method == "tools/list") {
     page_of(0, message.text("cursor"));  // all tools are one page
-    co_return McpTools::list(gateway.config().mcp);
+    co_return McpTools::list();
   }
   if (method == "resources/list") co_return list_resources(gateway, who, message.text("cursor"));
   if (method == "resources/templates/list") co_return resource_templates();

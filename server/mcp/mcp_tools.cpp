@@ -104,7 +104,7 @@ const McpTools::Tool McpTools::tools[] = {
      &McpTools::stop},
 };
 
-rr::OrderedJson McpTools::list(const McpConfig&) {
+rr::OrderedJson McpTools::list() {
   auto list = rr::OrderedJson::array();
   for (const auto& tool : tools) {
     auto& out = list.emplace_back(rr::OrderedJson::object());

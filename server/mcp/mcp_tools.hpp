@@ -19,7 +19,7 @@ class McpTools {
       : gateway_(gateway), reply_(reply), standing_(gateway.access(), reply.request().identity) {}
 
   /// The result of tools/list. The same for all devices: nothing of theirs is in it.
-  static rr::OrderedJson list(const McpConfig& config);
+  static rr::OrderedJson list();
   /// The result of tools/call: what a tool can't do is one too. nullopt: there is no such tool.
   /// `arguments`  borrowed for the wait.
   rr::awaitable<std::optional<rr::OrderedJson>> call(const std::string& name, const rr::Json& arguments);
