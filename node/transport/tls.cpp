@@ -6,6 +6,7 @@
 #include <boost/asio/use_awaitable.hpp>
 
 #include "node/tls/openssl.hpp"
+#include "node/tls/revocations.hpp"
 
 namespace rr {
 
@@ -115,6 +116,10 @@ std::chrono::system_clock::time_point TlsStream::client_certificate_end() const 
   const std::chrono::seconds seconds(::timegm(&end));
   const auto last = std::chrono::floor<std::chrono::seconds>(Clock::time_point::max().time_since_epoch());
   return seconds < last ? Clock::time_point(seconds) : Clock::time_point::max();
+}
+
+std::string TlsStream::client_certificate_marks() const {
+  return chain_marks(ssl_.get());
 }
 
 std::string TlsStream::version() const {

@@ -106,6 +106,7 @@ rr::awaitable<std::unique_ptr<rr::ByteStream>> accept_https(GatewayState& gatewa
     connection.identity.name = std::move(name);
     connection.identity.proof = Proof::certificate;
     connection.identity.ends = tls->client_certificate_end();
+    connection.identity.credential = tls->client_certificate_marks();
   }
   co_return tls;
 }
