@@ -106,6 +106,16 @@ def guest():
         raise Lacking("there is no kernel in build/deps/linux, which ./dev test gets from Debian")
 
 
+def firefox():
+    """Firefox of the long support, which Debian has."""
+    need_programs("firefox-esr")
+
+
+def webkit():
+    """WebKitGTK: Epiphany on a display of its own, and its WebDriver."""
+    need_programs("epiphany", "WebKitWebDriver", "xvfb-run", "xauth", "dbus-run-session")
+
+
 def systemd():
     """systemd-analyze, which reads units."""
     need_programs("systemd-analyze")
@@ -117,7 +127,8 @@ def apparmor():
 
 
 CAPABILITIES = {"network": network, "packet-loss": packet_loss, "mount-namespaces": mount_namespaces,
-                "containers": containers, "debian-root": debian_root, "guest": guest, "systemd": systemd, "apparmor": apparmor}
+                "containers": containers, "debian-root": debian_root, "guest": guest, "firefox": firefox, "webkit": webkit,
+                "systemd": systemd, "apparmor": apparmor}
 
 
 @functools.cache
