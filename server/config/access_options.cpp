@@ -155,14 +155,15 @@ void read_audit(ObjectReader& in, AuditConfig& audit) {
 void check_access(const Config& config, std::vector<Finding>& findings) {
   const auto& access = config.access;
   if (!access.identity_headers.user.empty() && config.proxy.trust.proxies.empty())
-    findings.push_back({"/access/identity_headers", "there is nobody to take them from; expected trusted_proxies"});
+    findings.push_back(
+        {"/access/identity_headers", "expected trusted_proxies too: the headers are accepted only from these"});
   if (!access.clients.crl.empty() && access.clients.ca.empty())
     findings.push_back({"/access/client_crl", "there is no CA whose certificates it revokes; expected client_ca"});
   if (!access.clients.ca.empty() && config.tls.certificates.empty())
     findings.push_back({"/access/client_ca", "clients show certificates within TLS; expected tls.certificates"});
   if (config.tls.is_required && config.tls.certificates.empty() && config.proxy.trust.proxies.empty())
     findings.push_back(
-        {"/tls/required", "nobody could come; expected tls.certificates, or trusted_proxies that serve TLS"});
+        {"/tls/required", "no client could connect; expected tls.certificates, or trusted_proxies that serve TLS"});
   if (!access.anonymous_role.empty() && access.rules.empty())
     findings.push_back({"/access/anonymous_role", "there is no rule that gives it anything; expected rules"});
   if (!config.insecure)

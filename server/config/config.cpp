@@ -213,7 +213,7 @@ void read_proxy(ObjectReader& in, Config& config) {
   config.proxy.trust.headers = headers == "forwarded" ? ForwardedBy::forwarded : ForwardedBy::x_forwarded;
   config.proxy.has_proxy_protocol = protocol == "required";
   if (config.proxy.has_proxy_protocol && config.proxy.trust.proxies.empty())
-    in.finding("proxy_protocol", "there is nobody to take it from; expected trusted_proxies beside it");
+    in.finding("proxy_protocol", "expected trusted_proxies too: the header is accepted only from these");
 }
 
 void read_limits(ObjectReader& in, Limits& limits) {
