@@ -1,4 +1,5 @@
 // serve(): a page as a device, with a gateway that is not one. Through a real one: test/interop/test_page_device.py.
+import { readFileSync } from "node:fs";
 import { ErrorCode, RobotRaconteurError } from "../../wasm-client/dist/node.js";
 import { serve, type ServedDevice, type ServeOptions } from "../../wasm-client/dist/serve/node.js";
 import { FakeGateway, type PageSocket } from "./fake_gateway.js";
@@ -234,5 +235,49 @@ it("ends a client that talks garbage, and no other", async () => {
   noise.tell(new TextEncoder().encode("RRACnonsense".repeat(9)).buffer);
   expect(noise.isClosed).toBe(true);
   expect(await phone.add(1, 2)).toBe(3);
+  await phone.$.close();
+});
+
+it("does what the documentation says", async () => {
+  await device.close();
+  const page = readFileSync(new URL("../../docs/serve.md", import.meta.url), "utf8");
+  const code = /```js\n(.*?)```/s
+    .exec(page)![1]!
+    .replace(/^import .*$/m, "")
+    .replace('url: "/"', 'url: "ws://gateway/"');
+  const handlers: Record<string, (event: object) => void> = {};
+  const listen = (name: string, handler: (event: object) => void) => void (handlers[name] = handler);
+  const document = { body: { style: { opacity: "1" } } };
+  const AsyncFunction = (async () => undefined).constructor as new (
+    ...text: string[]
+  ) => (...given: unknown[]) => Promise<ServedDevice>;
+  const example = new AsyncFunction("serve", "addEventListener", "document", `${code}; return device;`);
+  device = await example(serve, listen, document);
+  handlers["devicemotion"]!({ acceleration: { x: 1, y: 2, z: 3 } });
+
+  interface Example extends Omit<Phone, "motion" | "light" | "ask_me"> {
+    acceleration: Phone["motion"];
+    brightness: { poke(value: number): Promise<void> };
+    chat: { connect(): Promise<AsyncIterable<string> & { send(text: string): Promise<void> }> };
+    samples: { read(position: number, count: number): Promise<Float64Array> };
+  }
+  const phone = await gateway.connect<Example>();
+  expect(Array.from(await phone.acceleration.peek())).toEqual([1, 2, 3]);
+  await phone.brightness.poke(0.5);
+  expect(document.body.style.opacity).toBe("0.5");
+  const counted: number[] = [];
+  for await (const number of phone.count(3)) counted.push(number);
+  expect(counted).toEqual([1, 2, 3]);
+  const chat = await phone.chat.connect();
+  await chat.send("hello");
+  for await (const text of chat) {
+    expect(text).toBe("HELLO");
+    break;
+  }
+  expect(await phone.samples.read(98, 2)).toEqual(new Float64Array(2));
+  const tapped = new Promise((resolve) => phone.tapped.on((x, y) => resolve([x, y])));
+  handlers["pointerdown"]!({ clientX: 4, clientY: 5 });
+  expect(await tapped).toEqual([4, 5]);
+  expect(await (await phone.lamps.get("right")).level.get()).toBe(0);
   await phone.$.close();
 });
