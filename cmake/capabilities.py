@@ -121,9 +121,14 @@ def systemd():
     need_programs("systemd-analyze")
 
 
+def apparmor():
+    """apparmor_parser, which reads profiles; no kernel with AppArmor is needed for that."""
+    need_programs("apparmor_parser")
+
+
 CAPABILITIES = {"network": network, "packet-loss": packet_loss, "mount-namespaces": mount_namespaces,
                 "containers": containers, "debian-root": debian_root, "guest": guest, "firefox": firefox, "webkit": webkit,
-                "systemd": systemd}
+                "systemd": systemd, "apparmor": apparmor}
 
 
 @functools.cache

@@ -386,8 +386,7 @@ std::shared_ptr<Object> Service::make_object(std::string_view type) {
   if (!entity || entity->kind != EntityKind::object)
     refuse("service " + rr::quote(name_) + ": there is no object type " + rr::quote(qualified));
   std::shared_ptr<Object> object(new Object(*this, *entity));
-  std::erase_if(objects_, [](const std::weak_ptr<Object>& other) { return other.expired(); });
-  objects_.push_back(object);
+  if (!hosted_) unattached_.push_back(object);
   return object;
 }
 
@@ -414,13 +413,14 @@ void Service::set_security(SecurityPolicy policy) {
 std::shared_ptr<HostedService> Service::attach(ServiceHost& host) {
   if (hosted_) refuse("service " + rr::quote(name_) + " was added to a node before");
   std::string missing;
-  for (const std::weak_ptr<Object>& weak : objects_)
+  for (const std::weak_ptr<Object>& weak : unattached_)
     if (const auto object = weak.lock(); object && why_partly_.empty())
       for (const std::string& handler : object->missing_handlers()) missing += (missing.empty() ? "" : ", ") + handler;
   if (!missing.empty()) refuse("service " + rr::quote(name_) + ": no handler for " + missing);
   auto hosted = HostedService::make(name_, root_, types_, attributes_);
   if (!hosted) refuse("service " + rr::quote(name_) + ": " + hosted.error().message);
   hosted_ = std::move(*hosted);
+  unattached_.clear();
   hosted_->set_policy(security_);
   host_ = &host;
   return hosted_;

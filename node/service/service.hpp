@@ -368,7 +368,7 @@ class Service {
   std::shared_ptr<TypeRegistry> types_;
   std::string definition_;  ///< name of the one that unqualified object types are of
   std::shared_ptr<Object> root_;
-  std::vector<std::weak_ptr<Object>> objects_;
+  std::vector<std::weak_ptr<Object>> unattached_;  ///< made before attach(), which checks their handlers
   /// Those with wires that have a value for one client alone.
   std::map<ClientId, std::set<std::weak_ptr<Object>, std::owner_less<>>> objects_of_clients_;
   MapString attributes_;

@@ -195,3 +195,11 @@ def reynard(tmp_path_factory):
     device.wait_until(is_listening)
     yield f"rr+tcp://127.0.0.1:{port}/?service=reynard"
     device.stop()
+
+
+@pytest.fixture
+def own_service(tmp_path):
+    """A service that no other test uses, so that it can be paused: (process, URL)"""
+    process = Background([sys.executable, PEERS / "service.py"], tmp_path / "service.log")
+    yield process, json.loads(process.next_line())["url"]
+    process.stop()

@@ -107,6 +107,43 @@ def test_the_gateways_login_is_for_the_services_that_want_one(site):
     assert {service: site.connect(service).who() for service in whose} == whose
 
 
+def test_a_restart_of_the_device_changes_nothing_of_who_is_who(site):
+    """Neither for the gateway's login, nor for a page's, nor for callbacks: a call that was lost with the device is no
+    reason to ask its client."""
+    whose = {"guarded": "gateway", "open": "gateway", "plain": ""}
+    roots = {service: site.connect(service) for service in whose}
+    second = site.connect("plain")
+    with Socket(site.port, "/api/v1/devices/interop/guarded") as page:
+        page.ask("login", username="alice", password="secret")
+        assert page.refusal("login", username="bob", password="wrong")[0] == "AuthenticationError"
+        moving = Call(lambda: roots["plain"].move(1.0))
+        site.gateway.wait_until(lambda: second.moving == 1)
+        site.restart_device(second)
+        with pytest.raises(RR.ConnectionException, match="connection_lost"):
+            moving.result()
+        for service, root in roots.items():
+            site.wait_until_served(root)
+            assert root.who() == whose[service]
+        site.gateway.wait_until(lambda: "result" in page.next(id=page.send("get", "status")))
+        assert page.ask("call", "who", args={}) == "alice"
+    roots["plain"].confirm.Function = lambda question: "from the first"
+    second.confirm.Function = lambda question: "from the second"
+    assert second.ask("are you there?") == "from the second"
+
+
+def test_a_client_too_many_hears_so_from_a_device_that_came_back_too(node, tmp_path):
+    site = Site(tmp_path, node, {"max_clients": 1})
+    try:
+        root = site.connect("plain")
+        for _ in range(2):
+            with pytest.raises(RR.ConnectionException, match="all the clients it may have"):
+                site.connect("plain")
+            site.restart_device(root)
+        assert root.status == 0
+    finally:
+        site.stop()
+
+
 # --- locks ---
 
 
