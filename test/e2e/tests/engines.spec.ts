@@ -65,6 +65,7 @@ for (const [name, { start, needs }] of Object.entries(engines)) {
 
     test("jogs a joint of a standard robot while a button is held, and stops it", async () => {
       await visitor.open(`${arm.url}#/devices/peer/robot`);
+      await visitor.see({ css: ".robot-words" }, /ready/);
       await visitor.press(button("Jog"));
       const letGo = await visitor.hold(button("joint_1 forward"));
       await visitor.see({ css: '[data-position="1"]' }, /^0\.0*[1-9]/);
@@ -104,7 +105,7 @@ for (const [name, { start, needs }] of Object.entries(engines)) {
       expect(await visitor.complaints()).toEqual([]);
 
       await visitor.open("about:blank");
-      await visitor.resize(...phone); // the last size: in windows that have grown, WebKitGTK takes the pointer to be elsewhere
+      await visitor.resize(...phone);
       await visitor.open(address);
       await visitor.see({ css: '[data-panel="plot"] .freshness' }, /a second/);
       const note = () => visitor.run(() => document.querySelector<HTMLTextAreaElement>(".board textarea")?.value);
