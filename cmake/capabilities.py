@@ -106,13 +106,29 @@ def guest():
         raise Lacking("there is no kernel in build/deps/linux, which ./dev test gets from Debian")
 
 
+def firefox():
+    """Firefox of the long support, which Debian has."""
+    need_programs("firefox-esr")
+
+
+def webkit():
+    """WebKitGTK: Epiphany on a display of its own, and its WebDriver."""
+    need_programs("epiphany", "WebKitWebDriver", "xvfb-run", "xauth", "dbus-run-session")
+
+
 def systemd():
     """systemd-analyze, which reads units."""
     need_programs("systemd-analyze")
 
 
+def apparmor():
+    """apparmor_parser, which reads profiles; no kernel with AppArmor is needed for that."""
+    need_programs("apparmor_parser")
+
+
 CAPABILITIES = {"network": network, "packet-loss": packet_loss, "mount-namespaces": mount_namespaces,
-                "containers": containers, "debian-root": debian_root, "guest": guest, "systemd": systemd}
+                "containers": containers, "debian-root": debian_root, "guest": guest, "firefox": firefox, "webkit": webkit,
+                "systemd": systemd, "apparmor": apparmor}
 
 
 @functools.cache

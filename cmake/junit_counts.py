@@ -43,7 +43,10 @@ def verdict_of(case):
 
 def skip_reason(case):
     skipped = case.find("skipped")
-    return "" if skipped is None else (skipped.get("message") or skipped.text or "").strip()
+    if skipped is None:
+        return ""
+    by_property = next((each.get("value") for each in case.iter("property") if each.get("name") == "skip"), "")  # Playwright's
+    return (skipped.get("message") or (skipped.text or "").strip() or by_property).strip()
 
 
 def needed(reason):

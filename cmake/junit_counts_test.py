@@ -71,6 +71,11 @@ class Verdict(unittest.TestCase):
         for is_strict in (False, True):
             self.assertEqual(self.judge(report(skipped("needs guest: there is no kernel")), is_strict=is_strict), ([0, 0, 1], ""))
 
+    def test_the_reason_of_a_skip_may_be_a_property_as_playwright_writes_it(self):
+        reason = '<properties><property name="skip" value="needs guest: there is no kernel"/></properties>'
+        case = f'<testcase name="left out">{reason}<skipped>\n</skipped></testcase>'
+        self.assertEqual(self.judge(report(PASSED, case), is_strict=True), ([1, 0, 1], ""))
+
     def test_what_the_machine_has_cannot_be_skipped(self):
         counts, why = self.judge(report(PASSED, skipped("needs network: ip: command not found")))
         self.assertEqual(counts, [1, 1, 0])

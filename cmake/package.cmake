@@ -5,6 +5,7 @@ set(RRGATE_PACKAGE_FILES "${PROJECT_SOURCE_DIR}/build/package/files" CACHE PATH 
 # Two components, "system" and "dev_system", that `cmake --install` leaves out: they have places outside of a prefix.
 install_unit("/lib/systemd/system" system EXCLUDE_FROM_ALL)
 install(FILES cmake/deb/gateway.json DESTINATION /etc/rrgate COMPONENT system EXCLUDE_FROM_ALL)
+install(FILES cmake/deb/apparmor DESTINATION /etc/apparmor.d RENAME rrgate COMPONENT system EXCLUDE_FROM_ALL)
 install(FILES "${RRGATE_PACKAGE_FILES}/rrgate.1.gz" DESTINATION share/man/man1 COMPONENT system EXCLUDE_FROM_ALL)
 foreach(completion bash-completion/completions/rrgate zsh/vendor-completions/_rrgate fish/vendor_completions.d/rrgate.fish)
   get_filename_component(folder "${completion}" DIRECTORY)

@@ -59,8 +59,10 @@ void DefinitionSet::add_imports(std::span<const std::string> folders) {
         std::error_code error;
         return std::filesystem::is_regular_file(file, error) && add_file(file.string());
       };
+      if (find_service(import.name) || add_from(beside)) continue;
       // One that is nowhere is reported by verify(), at the line of its import.
-      if (!find_service(import.name) && !add_from(beside)) std::any_of(folders.begin(), folders.end(), add_from);
+      for (const auto& folder : folders)
+        if (add_from(folder)) break;
     }
   }
 }

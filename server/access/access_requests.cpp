@@ -59,7 +59,7 @@ rr::Result<AccessRequests::Asked> AccessRequests::ask(std::string name, std::str
   });
   if (static_cast<std::size_t>(of_address) >= max_of_address || !make_room(site_name(address)))
     return rr::make_error(rr::ErrorCode::out_of_system_resource,
-                          "there are too many requests of access already; somebody must decide on them first");
+                          "too many requests for access wait; an admin must decide on them first");
   Asked out{encode_base64url(rr::random_bytes(9)), encode_base64url(rr::random_bytes(24))};
   RequestOfAccess request{out.id, std::move(name), std::move(reason), std::move(client), RequestState::pending, now};
   entries_.emplace(out.id, Entry{std::move(request), std::move(address), rr::sha256(rr::as_bytes(out.secret)), {}});

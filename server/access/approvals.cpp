@@ -26,9 +26,9 @@ std::vector<std::shared_ptr<Approvals::Asked>> Approvals::pending(Time now) cons
 
 rr::Result<Approvals::AskedPtr> Approvals::ask(WantedCommand command, Wake wake, Time ends, Time now) {
   if (command.values.size() > max_values || command.why.size() > max_why)
-    return rr::make_error(rr::ErrorCode::invalid_argument, "nobody can judge so much: expected values of at most " +
-                                                               std::to_string(max_values) + " bytes, and at most " +
-                                                               std::to_string(max_why) + " of \"why\"");
+    return rr::make_error(rr::ErrorCode::invalid_argument,
+                          "too much for a person to judge: expected values of at most " + std::to_string(max_values) +
+                              " bytes, and at most " + std::to_string(max_why) + " of \"why\"");
   std::erase_if(asked_, [](const auto& each) { return each.expired(); });
   const auto waiting = pending(now);
   const auto of_subject = std::count_if(waiting.begin(), waiting.end(), [&](const auto& each) {
@@ -36,7 +36,7 @@ rr::Result<Approvals::AskedPtr> Approvals::ask(WantedCommand command, Wake wake,
   });
   if (waiting.size() >= max_pending || static_cast<std::size_t>(of_subject) >= max_of_subject)
     return rr::make_error(rr::ErrorCode::out_of_system_resource,
-                          "too many commands wait for a person already; somebody must answer them first");
+                          "too many commands wait for approval; a person must answer them first");
   auto asked = std::make_shared<Asked>();
   asked->approval_ = {encode_base64url(rr::random_bytes(9)), std::move(command), ends};
   asked->wake_ = std::move(wake);
@@ -62,10 +62,10 @@ rr::Result<Approval> Approvals::answer(const std::string& id, const Identity& by
       std::find_if(waiting.begin(), waiting.end(), [&](const auto& each) { return each->approval_.id == id; });
   if (found == waiting.end())
     return rr::make_error(rr::ErrorCode::resource_not_found,
-                          "no such command waits: it was answered, is too old, or who asked has gone");
+                          "no such command waits: it was answered, is too old, or its client has gone");
   auto& asked = **found;
   if (is_allowed && asked.approval_.command.who.subject() == by.subject())
-    return rr::make_error(rr::ErrorCode::permission_denied, "nobody allows himself what he has asked for");
+    return rr::make_error(rr::ErrorCode::permission_denied, "a user cannot approve their own command");
   asked.state_ = is_allowed ? ApprovalState::allowed : ApprovalState::denied;
   std::erase_if(grants_, [now](const auto& each) { return each.second <= now; });
   const bool is_somebody = !asked.approval_.command.who.subject().is_nobody();  // else it would be for everybody

@@ -182,26 +182,27 @@ int read_audit(const AuditOptions& options) {
 }  // namespace
 
 void add_audit(Commands& commands) {
-  const auto [app, options] = commands.add("audit", "Read the audit log, and check that it is whole", read_audit);
-  app.add_option("FILE", options.files, "What \"audit\" names, and what was renamed; in any order")
+  const auto [app, options] = commands.add("audit", "Read and verify the audit log", read_audit);
+  app.add_option("FILE", options.files, "The file of the option \"audit\", and rotated files; in any order")
       ->required()
       ->option_text("...");
-  auto* verifies = app.add_flag("--verify", options.verifies, "Check the chain of all records through all files");
+  auto* verifies = app.add_flag("--verify", options.verifies, "Verify the chain of all records in all files");
   const auto add_filter = [&app = app, verifies](const char* name, std::string& value, const char* summary) {
     return app.add_option(name, value, summary)->option_text("PATTERN")->excludes(verifies);
   };
-  add_filter("--user", options.user, "Of whom, of the gateway or of a device; '*' and '?' as in rules");
-  add_filter("--device", options.device, "To which device");
-  add_filter("--member", options.member, "To which member");
-  add_filter("--since", options.since, "Not before: 2030-01-31T12:00 (UTC), or 15m, 2h, 7d ago")->option_text("TIME");
+  add_filter("--user", options.user, "User of the gateway or of a device; '*' and '?' as in rules");
+  add_filter("--device", options.device, "Device");
+  add_filter("--member", options.member, "Member");
+  add_filter("--since", options.since, "Since this time: 2030-01-31T12:00 (UTC), or 15m, 2h, 7d ago")
+      ->option_text("TIME");
   add_filter("--outcome", options.outcome, "ok, error or refused")
       ->check(CLI::IsMember({"ok", "error", "refused"}))
       ->option_text("OUTCOME");
   add_filter("--face", options.face, "native, websocket, rest, stream or json")
       ->check(CLI::IsMember({"native", "websocket", "rest", "stream", "json", "mcp"}))
       ->option_text("FACE");
-  app.add_flag("--follow", options.follows, "Go on with what is added, until Ctrl-C")->excludes(verifies);
-  app.add_flag("--json", options.as_json, "Records as they are in the file")->excludes(verifies);
+  app.add_flag("--follow", options.follows, "Continue with new records, until Ctrl-C")->excludes(verifies);
+  app.add_flag("--json", options.as_json, "Print the records as they are in the file")->excludes(verifies);
 }
 
 }  // namespace rrgate

@@ -158,16 +158,19 @@ int make_web_certificate(const WebCertificateOptions& options) {
 
 void add_cert(Commands& commands) {
   auto& group = commands.add_group("cert", "Make certificates for nodes and for HTTPS");
-  const auto [ca, authorities] = commands.add("ca", "Two CAs, for nodes and for web servers", make_authorities, &group);
+  const auto [ca, authorities] =
+      commands.add("ca", "Make two CAs, for nodes and for web servers", make_authorities, &group);
   authorities.days = 3650;
   add_certificate_options(ca, authorities);
 
-  const auto [node, one] = commands.add("node", "For a node, as rrs+tcp asks for", make_node_certificate, &group);
+  const auto [node, one] =
+      commands.add("node", "Make a certificate for a node (rrs+tcp)", make_node_certificate, &group);
   add_certificate_options(node, one);
   node.add_option("NODE", one.node, "Name or id of the node")->required()->option_text(" ");
   node.add_option("--output", one.output, "Folder for it; without it where nodes look")->option_text("FOLDER");
 
-  const auto [web, server] = commands.add("web", "For a web server", make_web_certificate, &group);
+  const auto [web, server] =
+      commands.add("web", "Make a certificate for a web server (HTTPS)", make_web_certificate, &group);
   add_certificate_options(web, server);
   web.add_option("HOST", server.hosts, "Names and addresses of the server")->required()->option_text("...");
 }

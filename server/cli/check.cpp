@@ -16,7 +16,7 @@ int check(const DefinitionOptions& options) {
 }  // namespace
 
 void add_check(Commands& commands) {
-  const auto [app, options] = commands.add("check", "Say what is wrong with service definitions", check);
+  const auto [app, options] = commands.add("check", "Check service definitions", check);
   add_files(app, options);
   add_folders(app, options);
   add_compat(app, options);

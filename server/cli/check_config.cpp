@@ -44,9 +44,9 @@ int check_config(const CheckOptions& options) {
 }  // namespace
 
 void add_check_config(Commands& commands) {
-  const auto [app, options] = commands.add("check-config", "Say what is wrong with a configuration", check_config);
+  const auto [app, options] = commands.add("check-config", "Check a configuration", check_config);
   app.add_option("FILE", options.file, "Configuration")->required()->option_text(" ");
-  app.add_option("--as-service", options.service_user, "Also say which files this user can't read or write")
+  app.add_option("--as-service", options.service_user, "Also report files that this user can't read or write")
       ->option_text("USER");
 }
 

@@ -44,7 +44,7 @@ int Commands::run(std::vector<std::string> words) {
   }
   // Not before: commands would take them over.
   app_.set_help_all_flag("--help-all", "Print the options of all commands");
-  app_.footer("\"rrgate COMMAND --help\" tells the options of a command.");
+  app_.footer("\"rrgate COMMAND --help\" shows the options of a command.");
   std::reverse(words.begin(), words.end());  // as CLI11 takes them
   try {
     app_.parse(std::move(words));

@@ -167,14 +167,13 @@ int complete(const CompletionOptions& options) {
 }  // namespace
 
 void add_completion(Commands& commands) {
-  const auto [app, options] =
-      commands.add("completion", "Print a script for a shell, so that it completes commands and members", complete);
+  const auto [app, options] = commands.add("completion", "Print a completion script for a shell", complete);
   options.program = &commands.app();
-  app.add_option("SHELL", options.shell, "bash, zsh or fish; \"words\" tells what may stand for the last of WORD")
+  app.add_option("SHELL", options.shell, "bash, zsh or fish; \"words\" prints the completions of the last WORD")
       ->required()
       ->check(CLI::IsMember({"bash", "zsh", "fish", "words"}))
       ->option_text(" ");
-  app.add_option("WORD", options.words, "Of a command line, behind --")->option_text("...");
+  app.add_option("WORD", options.words, "Words of a command line, after --")->option_text("...");
   app.footer("For bash: source <(rrgate completion bash)");
 }
 

@@ -20,12 +20,12 @@ inline void add_files(CLI::App& app, DefinitionOptions& options) {
   app.add_option("FILE", options.files, "Service definitions")->required()->option_text("...");
 }
 inline void add_folders(CLI::App& app, DefinitionOptions& options) {
-  app.add_option("-I", options.folders, "Folder of definitions that others import; may be repeated")
+  app.add_option("-I", options.folders, "Folder with imported definitions; may be repeated")
       ->allow_extra_args(false)
       ->option_text("FOLDER");
 }
 inline CLI::Option* add_compat(CLI::App& app, DefinitionOptions& options) {
-  return app.add_flag("--compat", options.is_compatible, "Take what Robot Raconteur 1.x takes beside the standard");
+  return app.add_flag("--compat", options.is_compatible, "Accept what Robot Raconteur 1.x accepts beyond the standard");
 }
 
 /// Prints all diagnostics to stderr; returns whether the definitions can be used.

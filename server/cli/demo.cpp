@@ -262,7 +262,7 @@ rr::awaitable<void> announce(Gateway& gateway, std::uint16_t port, const DemoLog
   const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(20);
   while (!gateway.is_stopping() && !std::all_of(devices.begin(), devices.end(), is_online)) {
     if (std::chrono::steady_clock::now() > give_up) {
-      log(LogLevel::warning, "not all demo devices answer; the page shows which");
+      log(LogLevel::warning, "some demo devices do not answer; the page shows which");
       break;
     }
     pause.expires_after(std::chrono::milliseconds(50));
@@ -347,17 +347,16 @@ void add_demo(Commands& commands) {
   std::vector<std::string> names;
   for (const auto& system : list_systems()) names.emplace_back(system.name);
   options.system = names.front();
-  app.add_option("NAME", options.system, "What is simulated; --list tells what there is")
+  app.add_option("NAME", options.system, "System to simulate; --list shows all")
       ->check(CLI::IsMember(names))
       ->option_text("[" + names.front() + "]");
-  app.add_flag("--list", options.is_list, "Print what can be simulated, and end");
-  app.add_option("--port", options.port, "0 for a free one; without it 8080 where that is free")
+  app.add_flag("--list", options.is_list, "List the systems and exit");
+  app.add_option("--port", options.port, "Port of the page, 0 for any free one; default: 8080 if it is free")
       ->check(CLI::Range(0, 65535))
       ->option_text("N");
-  app.add_flag("--lan", options.is_lan, "Let other machines come, with a password that it prints")
+  app.add_flag("--lan", options.is_lan, "Allow other machines, with a password that is printed")
       ->envname("RRGATE_DEMO_LAN");
-  app.add_flag("--no-browser", options.is_without_browser,
-               "Don't open the page; it is opened where a terminal and a desktop are, without --lan");
+  app.add_flag("--no-browser", options.is_without_browser, "Do not open the page in a browser");
 }
 
 }  // namespace rrgate

@@ -117,13 +117,12 @@ int run_export(const ExportOptions& options) {
 }  // namespace
 
 void add_export(Commands& commands) {
-  const auto [app, options] = commands.add("export", "Write a recorded member as a table", run_export);
+  const auto [app, options] = commands.add("export", "Write a member of a recording as a table", run_export);
   app.add_option("FILE", options.file, "A file of \"rrgate record\"")->required()->option_text(" ");
-  app.add_flag("--csv", options.is_csv, "A line for each message, a column for each number");
-  app.add_option("--member", options.member,
-                 "Which one, as \"rrgate info FILE\" lists them: \"/Create/state\", \"state\"")
+  app.add_flag("--csv", options.is_csv, "One line for each message, one column for each number");
+  app.add_option("--member", options.member, "Member, as \"rrgate info FILE\" lists it: \"/Create/state\", \"state\"")
       ->option_text("MEMBER");
-  app.add_option("-o", options.output, "File to write; standard output without it")->option_text("OUT");
+  app.add_option("-o", options.output, "File to write; default: standard output")->option_text("OUT");
 }
 
 }  // namespace rrgate

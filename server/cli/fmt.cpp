@@ -42,10 +42,10 @@ int format(const FormatOptions& options) {
 }  // namespace
 
 void add_fmt(Commands& commands) {
-  const auto [app, options] = commands.add("fmt", "Print service definitions, or lay them out", format);
+  const auto [app, options] = commands.add("fmt", "Format service definitions", format);
   add_files(app, options);
   auto* compat = add_compat(app, options);
-  auto* check = app.add_flag("--check", options.is_check, "Name the files that are laid out otherwise");
+  auto* check = app.add_flag("--check", options.is_check, "List files with another format");
   app.add_flag("--in-place", options.in_place, "Write the files anew")->excludes(check)->excludes(compat);
   check->excludes(compat);
 }

@@ -86,7 +86,7 @@ void add_generator(const NewCommand<GenerateOptions>& command, const std::string
 void add_generate(Commands& commands) {
   auto& group = commands.add_group("generate", "Write TypeScript types or C++ classes");
   add_generator(commands.add("ts", "TypeScript types of the objects", run_generator<generate_ts>, &group),
-                "File to write; standard output without it");
+                "File to write; default: standard output");
   add_generator(commands.add("cpp", "C++ classes for clients and services", run_generator<generate_cpp_files>, &group),
                 "Folder to write to; this one without it");
 }

@@ -74,11 +74,11 @@ int ask_health(const HealthOptions& options) {
 }  // namespace
 
 void add_health(Commands& commands) {
-  const auto [app, options] = commands.add("health", "Ask a running gateway whether it is well", ask_health);
-  app.add_option("ADDRESS", options.address, "Where it listens")
+  const auto [app, options] = commands.add("health", "Check the health of a running gateway", ask_health);
+  app.add_option("ADDRESS", options.address, "Address of the gateway")
       ->capture_default_str()
       ->option_text("[127.0.0.1:8080]");
-  app.add_flag("--ready", options.asks_ready, "Whether it also reaches its devices");
+  app.add_flag("--ready", options.asks_ready, "Ask whether it accepts clients");
 }
 
 }  // namespace rrgate

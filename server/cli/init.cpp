@@ -124,9 +124,11 @@ int init(const InitOptions& options) {
 }  // namespace
 
 void add_init(Commands& commands) {
-  const auto [app, options] = commands.add("init", "Write a configuration with TLS and a user to begin with", init);
-  app.add_option("FOLDER", options.folder, "Where to")->capture_default_str()->option_text("[/etc/rrgate]");
-  app.add_option("--user", options.user, "The first user's name")->capture_default_str()->option_text("NAME [admin]");
+  const auto [app, options] = commands.add("init", "Write a first configuration, with TLS and a user", init);
+  app.add_option("FOLDER", options.folder, "Folder of the configuration")
+      ->capture_default_str()
+      ->option_text("[/etc/rrgate]");
+  app.add_option("--user", options.user, "Name of the first user")->capture_default_str()->option_text("NAME [admin]");
 }
 
 }  // namespace rrgate

@@ -230,12 +230,12 @@ std::vector<std::string> find_service_urls(std::chrono::milliseconds wait) {
 }
 
 void add_ls(Commands& commands) {
-  const auto [app, options] = commands.add("ls", "List services: around here, of a node, of a gateway", ls);
+  const auto [app, options] = commands.add("ls", "List services: on the network, of a node, of a gateway", ls);
   app.add_option("URL", options.url, "A node, or a gateway's http(s)://HOST:PORT")->option_text(" ");
   app.add_option("--type", options.type, "Services whose root object is of this type, or implements it")
       ->option_text("TYPE");
   add_count(app, "--wait", options.wait, "How long to listen for nodes, in s")->option_text("SECONDS [2]");
-  app.add_flag("--watch", options.watches, "Go on, and tell what comes and goes");
+  app.add_flag("--watch", options.watches, "Continue, and report services that appear and disappear");
   add_json(app, options);
   add_connection_options(app, options);
 }

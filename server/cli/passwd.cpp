@@ -123,10 +123,10 @@ int set_password(const PasswordOptions& options) {
 
 void add_passwd(Commands& commands) {
   const auto [app, options] = commands.add("passwd", "Set a user's password and roles", set_password);
-  app.add_option("FILE", options.file, "What \"users_file\" names")->required()->option_text(" ");
+  app.add_option("FILE", options.file, "The file of the option \"users_file\"")->required()->option_text(" ");
   app.add_option("NAME", options.name, "The user")->required()->option_text(" ");
-  auto* deletes = app.add_flag("--delete", options.deletes, "Take the user out");
-  app.add_option("--roles", options.roles, "Roles, or _ for none; unchanged without it")
+  auto* deletes = app.add_flag("--delete", options.deletes, "Delete the user");
+  app.add_option("--roles", options.roles, "Roles, or _ for none; default: unchanged")
       ->option_text("A,B")
       ->excludes(deletes);
 }

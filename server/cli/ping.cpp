@@ -126,21 +126,21 @@ int bench(const BenchOptions& options) {
 }  // namespace
 
 void add_ping(Commands& commands) {
-  const auto [app, options] = commands.add("ping", "Time requests to a service", ping);
+  const auto [app, options] = commands.add("ping", "Measure the latency of requests to a service", ping);
   add_url(app, options)->required();
-  add_count(app, "--count", options.count, "Requests, one after the other")->option_text("N [100]");
+  add_count(app, "--count", options.count, "Number of requests, one after the other")->option_text("N [100]");
   add_json(app, options);
   add_connection_options(app, options);
 }
 
 void add_bench(Commands& commands) {
-  const auto [app, options] = commands.add("bench", "Time many requests to a service side by side", bench);
+  const auto [app, options] = commands.add("bench", "Measure many parallel requests to a service", bench);
   options.count = 10'000;
   add_url(app, options)->required();
-  app.add_option("PROPERTY", options.property, "Property to read; without it the node alone is asked")
+  app.add_option("PROPERTY", options.property, "Property to read; default: a request to the node itself")
       ->option_text(" ");
   add_count(app, "--count", options.count, "Requests")->option_text("N [10000]");
-  add_count(app, "--parallel", options.parallel, "Requests that are under way at a time")->option_text("N [16]");
+  add_count(app, "--parallel", options.parallel, "Number of requests at the same time")->option_text("N [16]");
   add_json(app, options);
   add_connection_options(app, options);
 }

@@ -39,12 +39,12 @@ int run_proxy(const ProxyOptions& options) {
 void add_proxy(Commands& commands) {
   const auto [app, options] = commands.add("proxy", "Run a gateway for one device, without a file", run_proxy);
   app.add_option("URL", options.url, "The device's service")->required()->option_text(" ");
-  app.add_option("--name", options.name, "Of the device at the gateway; the service's without it")->option_text("NAME");
+  app.add_option("--name", options.name, "Name of the device; default: the name of the service")->option_text("NAME");
   app.add_option("--port", options.port, "Port on 127.0.0.1; 0 for a free one")
       ->check(CLI::Range(0, 65535))
       ->capture_default_str()
       ->option_text("N [8080]");
-  app.add_flag("--relay", options.is_relay, "Each client gets a session of its own with the device");
+  app.add_flag("--relay", options.is_relay, "Give each client its own session with the device");
 }
 
 }  // namespace rrgate

@@ -169,17 +169,17 @@ CLI::Option* add_positive(CLI::App& app, const std::string& name, double& number
 }  // namespace
 
 void add_record(Commands& commands) {
-  const auto [app, options] = commands.add("record", "Record what happens at services", run_record);
+  const auto [app, options] = commands.add("record", "Record the data of services", run_record);
   app.add_option("URL", options.urls, "Services, as \"rrgate ls\" prints them")->required()->option_text("...");
-  app.add_option("-o", options.output, "File to write, as MCAP")->required()->option_text("FILE");
+  app.add_option("-o", options.output, "MCAP file to write")->required()->option_text("FILE");
   app.add_option("--members", options.members, "Paths of members, with commas between: \"state,axes/0/*\"")
       ->delimiter(',')
       ->option_text("MEMBERS [*]");
-  add_positive(app, "--interval", options.interval, "Between two readings of a property", "SECONDS [1]");
-  add_positive(app, "--duration", options.duration, "End after this time", "SECONDS");
-  add_positive(app, "--max-size", options.max_size, "Of one file; then the next one begins: FILE-2, FILE-3, ...", "MB");
-  add_count(app, "--keep", options.kept_files, "Files that stay; the oldest go")->needs("--max-size");
-  app.add_flag("--force", options.replaces, "Replace files that are there");
+  add_positive(app, "--interval", options.interval, "Time between two reads of a property", "SECONDS [1]");
+  add_positive(app, "--duration", options.duration, "Stop after this time", "SECONDS");
+  add_positive(app, "--max-size", options.max_size, "Size at which the next file begins: FILE-2, FILE-3, ...", "MB");
+  add_count(app, "--keep", options.kept_files, "Number of files to keep; older ones are deleted")->needs("--max-size");
+  app.add_flag("--force", options.replaces, "Overwrite existing files");
   add_connection_options(app, options);
 }
 

@@ -75,7 +75,7 @@ CLI::Option* add_url(CLI::App& app, RemoteOptions& options) {
 
 void add_connection_options(CLI::App& app, RemoteOptions& options) {
   app.add_option("--user", options.user, "Log in, with the password of $RRGATE_PASSWORD")->option_text("NAME");
-  app.add_option("--timeout", options.timeout, "For connecting and for each request")
+  app.add_option("--timeout", options.timeout, "Limit for connecting and for each request")
       ->check([](const std::string& text) {
         double seconds = 0;
         const bool is_good = CLI::detail::lexical_cast(text, seconds) && seconds > 0 && seconds <= 86'400;

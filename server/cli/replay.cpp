@@ -62,19 +62,20 @@ int run_replay(const ReplayCommandOptions& options) {
 }  // namespace
 
 void add_replay(Commands& commands) {
-  const auto [app, options] = commands.add("replay", "Serve a recording as the devices that were recorded", run_replay);
+  const auto [app, options] =
+      commands.add("replay", "Serve a recording as if it were the recorded devices", run_replay);
   app.add_option("FILE", options.file, "A file of \"rrgate record\"")->required()->option_text(" ");
-  app.add_option("--speed", options.speed, "2 is twice as fast as it was recorded")
+  app.add_option("--speed", options.speed, "Speed as a factor: 2 is twice as fast")
       ->check(CLI::Range(Player::min_speed, Player::max_speed))
       ->option_text("N [1]");
-  app.add_option("--start", options.start, "Where to begin, in seconds since the first message")
+  app.add_option("--start", options.start, "Start at this time after the first message")
       ->check(CLI::Range(0.0, 1e10))
       ->option_text("SECONDS [0]");
-  app.add_flag("--loop", options.loops, "Begin again after the last message");
+  app.add_flag("--loop", options.loops, "Start again after the last message");
   app.add_flag("--paused", options.is_paused, "Wait until a client of the service \"replay\" calls play");
-  app.add_option("--listen", options.listen, "Of the first node; others take the ports behind it")
+  app.add_option("--listen", options.listen, "Address of the first node; others use the next ports")
       ->option_text("URL [rr+tcp://127.0.0.1:0]");
-  app.add_flag("--keep-ids", options.keeps_ids, "Take the NodeIDs that were recorded; those nodes must not run");
+  app.add_flag("--keep-ids", options.keeps_ids, "Use the recorded NodeIDs; the recorded nodes must not run");
 }
 
 }  // namespace rrgate

@@ -59,11 +59,11 @@ int make_token(const TokenOptions& options) {
 
 void add_token(Commands& commands) {
   const auto [app, options] = commands.add("token", "Make an API token", make_token);
-  app.add_option("FILE", options.file, "What \"tokens_file\" names")->required()->option_text(" ");
-  app.add_option("NAME", options.name, "Of the token")->required()->option_text(" ");
-  auto* deletes = app.add_flag("--delete", options.deletes, "Take the token out");
+  app.add_option("FILE", options.file, "The file of the option \"tokens_file\"")->required()->option_text(" ");
+  app.add_option("NAME", options.name, "Name of the token")->required()->option_text(" ");
+  auto* deletes = app.add_flag("--delete", options.deletes, "Delete the token");
   app.add_option("--roles", options.roles, "Roles")->option_text("A,B")->excludes(deletes);
-  app.add_option("--days", options.days, "How long it is good; for ever without it")
+  app.add_option("--days", options.days, "Days until it expires; default: never")
       ->check(CLI::Range(1, 36500))
       ->option_text("N")
       ->excludes(deletes);

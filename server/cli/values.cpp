@@ -213,8 +213,9 @@ NewCommand<ValueOptions> add_member_command(Commands& commands, const char* name
 /// What get and call do with a value.
 void add_output_options(CLI::App& app, ValueOptions& options) {
   add_json(app, options);
-  app.add_option("--output,-o", options.output,
-                 "Write it to a file, values of a generator as lines; as an image where it ends in .png or .jpg")
+  app.add_option(
+         "--output,-o", options.output,
+         "Write to a file: as an image if the name ends in .png or .jpg, otherwise as JSON, one line for each value")
       ->option_text("FILE");
 }
 

@@ -175,11 +175,13 @@ int run_watch(const WatchOptions& options) {
 void add_watch(Commands& commands) {
   const auto [app, options] = commands.add("watch", "Print values of a wire, packets of a pipe, events", run_watch);
   add_url(app, options)->required();
-  app.add_option("MEMBER", options.member, "As \"get\" has it")->required()->option_text(" ");
-  add_count(app, "--count", options.count, "End after so many values");
-  add_count(app, "--for", options.seconds, "End after so many seconds");
+  app.add_option("MEMBER", options.member, "\"position\", or through objrefs \"axes/0/position\"")
+      ->required()
+      ->option_text(" ");
+  add_count(app, "--count", options.count, "Stop after this number of values");
+  add_count(app, "--for", options.seconds, "Stop after this number of seconds");
   auto* json = add_json(app, options);
-  app.add_flag("--csv", options.is_csv, "A line for each value, a column for each number")->excludes(json);
+  app.add_flag("--csv", options.is_csv, "One line for each value, one column for each number")->excludes(json);
   add_connection_options(app, options);
 }
 

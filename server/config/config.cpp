@@ -62,7 +62,7 @@ void read_proxy(ObjectReader& in, Config& config) {
   config.proxy.trust.headers = headers == "forwarded" ? ForwardedBy::forwarded : ForwardedBy::x_forwarded;
   config.proxy.has_proxy_protocol = protocol == "required";
   if (config.proxy.has_proxy_protocol && config.proxy.trust.proxies.empty())
-    in.finding("proxy_protocol", "there is nobody to take it from; expected trusted_proxies beside it");
+    in.finding("proxy_protocol", "expected trusted_proxies too: the header is accepted only from these");
 }
 
 void read_limits(ObjectReader& in, Limits& limits) {
@@ -101,6 +101,14 @@ void read_retry(ObjectReader& in, Retry& retry) {
   in.duration("min_ms", retry.min, {50, hour_ms});
   in.duration("max_ms", retry.max, {50, hour_ms});
   in.duration("online_ms", retry.online, {50, hour_ms});
+}
+
+void read_serve(ObjectReader& in, ServeConfig& serve) {
+  serve.is_enabled = true;
+  in.size("max_devices", serve.max_devices, {1, 4096});
+  std::string mode = "shared";
+  in.choice("mode", mode, {"shared", "relay"});
+  serve.mode = mode == "relay" ? DeviceMode::relay : DeviceMode::shared;
 }
 
 void read_mcp(ObjectReader& in, McpConfig& mcp) {
@@ -152,6 +160,7 @@ void read_config(ObjectReader& in, Config& config) {
   in.object("timeouts", [&](ObjectReader& part) { read_timeouts(part, config.timeouts); });
   in.object("retry", [&](ObjectReader& part) { read_retry(part, config.retry); });
   in.object("mcp", [&](ObjectReader& part) { read_mcp(part, config.mcp); });
+  in.object("serve", [&](ObjectReader& part) { read_serve(part, config.serve); });
   in.object("log", [&](ObjectReader& part) {
     part.choice("level", config.log.level, {"trace", "debug", "info", "warning", "error"});
     part.choice("format", config.log.format, {"text", "json"});

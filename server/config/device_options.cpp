@@ -10,18 +10,6 @@ namespace rrgate {
 
 namespace {
 
-/// A name stands in paths and logs: letters, digits, '_', '-', '.', beginning with a letter or digit.
-std::string check_device_name(const std::string& name) {
-  const auto is_plain = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
-  };
-  const auto is_name_char = [&](char c) { return is_plain(c) || c == '_' || c == '-' || c == '.'; };
-  if (name.empty() || name.size() > 64 || !is_plain(name.front()) ||
-      !std::all_of(name.begin(), name.end(), is_name_char))
-    return "found " + rr::quote(name) + ", expected 1 to 64 letters, digits, '_', '-', '.', first a letter or digit";
-  return {};
-}
-
 std::string read_device_url(const std::string& text, rr::ConnectionUrl& target) {
   auto url = rr::parse_url(text, rr::ServiceInUrl::optional);
   if (!url) return url.error().message;
@@ -117,6 +105,17 @@ void read_discover_rule(ObjectReader& in, DiscoverRule& rule) {
 }
 
 }  // namespace
+
+std::string check_device_name(const std::string& name) {
+  const auto is_plain = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+  };
+  const auto is_name_char = [&](char c) { return is_plain(c) || c == '_' || c == '-' || c == '.'; };
+  if (name.empty() || name.size() > 64 || !is_plain(name.front()) ||
+      !std::all_of(name.begin(), name.end(), is_name_char))
+    return "found " + rr::quote(name) + ", expected 1 to 64 letters, digits, '_', '-', '.', first a letter or digit";
+  return {};
+}
 
 void read_device(ObjectReader& in, DeviceConfig& device) {
   in.required_text("name", [&](const std::string& text) {

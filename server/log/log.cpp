@@ -80,7 +80,7 @@ void set_pattern(spdlog::logger& logger) {
 LogWriter& log_writer() {
   static auto& instance = *[] {
     const auto tell = [](std::uint64_t count) {
-      log(LogLevel::warning, "lines of the log were lost: nobody read them", {{"lines", count}});
+      log(LogLevel::warning, "lines of the log were lost: they were read too slowly", {{"lines", count}});
     };
     auto* made = new LogWriter(STDERR_FILENO, max_unread_log, tell);
     std::atexit([] { (void)log_writer().flush(last_lines_wait); });

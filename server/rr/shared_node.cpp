@@ -16,7 +16,7 @@ std::shared_ptr<SharedClient> SharedNode::add(std::unique_ptr<rr::ByteStream> st
   options.admit = std::move(arrival.admit);
   options.enter = std::move(arrival.enter);
   const auto key = rr::format_node_id(rr::random_node_id(), rr::NodeIdFormat::dashes);
-  options.attributes.items.emplace_back(std::string(session_attribute), rr::Value(key));
+  options.attributes.items.emplace_back(std::string(session_attribute), key);
   if (const auto verified = stream->verified_peer(); !verified.is_any()) options.verified_node_id = verified;
   auto client =
       std::make_shared<SharedClient>(*this, directory_, std::move(options), std::move(stream), std::move(arrival.from),

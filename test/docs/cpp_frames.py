@@ -23,7 +23,6 @@ using namespace com::example::robot;
 """
 
 FRAMES = {
-    ("README.md", "int main() {"): ("const char* definition = \"\";\n#define main readme_main\n", "\n#undef main\n"),
     ("docs/definition-tools.md", "const auto object = co_await"):
         ("boost::asio::awaitable<void> typed(boost::asio::io_context& io, std::string url) {\n", "}\n"),
     ("docs/device-author.md", "// A coroutine"):

@@ -132,12 +132,23 @@ def test_cpp(tmp_path):
     made = run(RRGATE, "generate", "cpp", tmp_path / "com.example.robot.robdef", "-o", tmp_path)
     assert made.returncode == 0, made.stderr
     text = INCLUDES
-    for block in (block for block in blocks() if block.language == "cpp" and not block.file):
+    for block in (block for block in blocks() if block.language == "cpp" and not block.file and not is_program(block)):
         frame = find(FRAMES, block)
         assert frame, f"{block}: what stands around this fragment is to be named in cpp_frames.py"
         text += f"{frame[0]}#line {block.line + 1} \"{block.page}\"\n{block.text}{frame[1]}"
     (tmp_path / "pages.cpp").write_text(text)
     done = run(*compiler(), "-fsyntax-only", "-w", f"-I{tmp_path}", tmp_path / "pages.cpp", env={**os.environ, "LC_ALL": "C"})
+    assert done.returncode == 0, done.stderr[:4000]
+
+
+def is_program(block):
+    return "int main(" in block.text
+
+
+@pytest.mark.parametrize("block", [case for case in of("cpp") if is_program(case.values[0])])
+def test_a_program_compiles_as_it_is_printed(block, tmp_path):
+    (tmp_path / "main.cpp").write_text(block.text)
+    done = run(*compiler(), "-fsyntax-only", "-w", tmp_path / "main.cpp", env={**os.environ, "LC_ALL": "C"})
     assert done.returncode == 0, done.stderr[:4000]
 
 

@@ -1,4 +1,4 @@
-// A gateway that asks who one is, in front of the demo robot; it can be stopped and started again on its port.
+// A gateway that asks who one is, in front of the demo robot, and of its cameras where they are wanted; it can be stopped and started again on its port.
 import { execFileSync } from "node:child_process";
 import { mkdtempSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
@@ -9,11 +9,12 @@ export const password = "of it all";
 
 export class GuardedLab {
   readonly create: Program;
+  readonly webcams: Program | null = null;
   readonly gateway: Program;
   readonly url: string;
   readonly token: string;
 
-  private constructor(createPort: number, port: number, site: string) {
+  private constructor(createPort: number, port: number, webcamsPort: number | null, site: string) {
     const folder = mkdtempSync(path.join(tmpdir(), "rrgate-e2e-"));
     const file = (name: string): string => path.join(folder, name);
     for (const [name, roles] of [
@@ -34,7 +35,13 @@ export class GuardedLab {
         { roles: ["viewer"], may: ["read"] },
       ],
     };
-    const devices = [{ name: "create", url: `rr+tcp://127.0.0.1:${createPort}/?service=Create` }];
+    const createUrl = `rr+tcp://127.0.0.1:${createPort}/?service=Create`;
+    const devices = [{ name: "create", url: createUrl }];
+    if (webcamsPort !== null) {
+      devices.push({ name: "webcams", url: `rr+tcp://127.0.0.1:${webcamsPort}/?service=Webcam` });
+      const options = ["--port", String(webcamsPort), "--robot", createUrl];
+      this.webcams = new Program(deviceProgram("rrgate-demo-webcams"), options);
+    }
     writeFileSync(
       file("gateway.json"),
       JSON.stringify({ listen: [`127.0.0.1:${port}`], ["web_root"]: site, devices, access }),
@@ -44,28 +51,29 @@ export class GuardedLab {
     this.gateway = new Program(rrgate, ["serve", "--config", file("gateway.json")]);
   }
 
-  static async start(site: string): Promise<GuardedLab> {
-    const lab = new GuardedLab(await freePort(), await freePort(), site);
+  static async start(site: string, { hasCamera = false } = {}): Promise<GuardedLab> {
+    const lab = new GuardedLab(await freePort(), await freePort(), hasCamera ? await freePort() : null, site);
     lab.create.start();
+    lab.webcams?.start();
     lab.gateway.start();
     await lab.waitUntilOnline();
     return lab;
   }
 
-  /** Until the gateway has reached its device. */
+  /** Until the gateway has reached all devices. */
   async waitUntilOnline(withinMs = 30_000): Promise<void> {
     const headers = { ["Authorization"]: `Bearer ${this.token}` };
     const giveUp = Date.now() + withinMs;
     for (;;) {
       const answer = await fetch(`${this.url}api/v1/devices`, { headers }).catch(() => null);
       const text = await answer?.text();
-      if (text?.includes('"online"')) return;
-      if (Date.now() > giveUp) throw new Error(`create is not online: ${text}\n${this.gateway.output}`);
+      if (text?.includes('"online"') && !/"(connecting|offline)"/.test(text)) return;
+      if (Date.now() > giveUp) throw new Error(`not all are online: ${text}\n${this.gateway.output}`);
       await new Promise((resolve) => setTimeout(resolve, 100));
     }
   }
 
   async stop(): Promise<void> {
-    await Promise.all([this.gateway.kill("SIGTERM"), this.create.kill("SIGTERM")]);
+    await Promise.all([this.gateway, this.create, this.webcams].map((program) => program?.kill("SIGTERM")));
   }
 }

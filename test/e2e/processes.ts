@@ -106,14 +106,17 @@ export async function startGateway(
   return { program, url };
 }
 
-/** The test service as device "big", and a gateway to it. */
-export async function startTestService(site: string): Promise<{ url: string; stop(): Promise<void> }> {
+/** The test service as device "big", and a gateway to it; `more`: of its configuration. */
+export async function startTestService(
+  site: string,
+  more: object = {},
+): Promise<{ url: string; stop(): Promise<void> }> {
   const service = path.join(path.dirname(rrgate), "../test/interop/cpp/rr-test-service");
   if (!existsSync(service)) throw new Error(`${service} is missing: build the target rr-test-service`);
   const device = new Program(service, []);
   device.start();
   const found = await device.waitForOutput(/"url": *"([^"]+)"/);
-  const gateway = await startGateway("big", found[1] ?? "", site);
+  const gateway = await startGateway("big", found[1] ?? "", site, more);
   const stop = async () => {
     await gateway.program.kill("SIGTERM");
     await device.kill("SIGTERM");

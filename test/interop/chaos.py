@@ -5,7 +5,7 @@ the while, and what must hold is judged:
     chaos.py --minutes N [--seed S]
 
 No packet of a pipe is lost or comes twice within a session, no event either; no call runs twice, and what was answered has run; a
-lock is held by one; when the faults have ended, wires have the last value, and the gateway's memory and descriptors are what they
+lock is held by one; who is inside, at a device that no fault is for, is answered within two seconds; when the faults have ended, wires have the last value, and the gateway's memory and descriptors are what they
 were. Ends with 1 where something did not hold. The seed makes the order of faults and their lengths.
 """
 import argparse
@@ -25,7 +25,7 @@ import tempfile
 import threading
 import time
 
-from chaos_clients import Caller, Findings, Listener, Locker, OurPiper, Piper, Program, Publisher, Tokens, Watcher
+from chaos_clients import Caller, Findings, Insider, Listener, Locker, OurPiper, Piper, Program, Publisher, Tokens, Watcher
 from directions import PEERS
 from gateways import RRGATE, read_metrics
 from http_api import ask, fetch
@@ -226,6 +226,21 @@ class Site:
             {"name": "relayed", "url": through}, {"name": "ours", "url": url, "mode": "shared"}], self.clock)
         self.front = Line(lambda: self.gateway.port)
         self.clients = []
+        self.is_recovering = True  # until a gateway that has come back has answered
+        self.away = None  # when the gateway was away last: (since, until), None for until: it is
+        self.slowest = 0.0
+
+    @contextlib.contextmanager
+    def gateway_away(self):
+        begin = time.monotonic()
+        self.away, self.is_recovering = (begin, None), True
+        try:
+            yield
+        finally:
+            self.away, self.is_recovering = (begin, time.monotonic()), True
+
+    def was_away_since(self, moment):
+        return self.away is not None and (self.away[1] is None or self.away[1] >= moment)
 
     @property
     def port(self):
@@ -251,7 +266,8 @@ class Site:
         self.programs = [Program("native", self, native % "shared"), Program("websocket", self, websocket % "shared"),
                          Program("relayed", self, websocket % "relayed")]
         self.publisher = Publisher("Publisher", self)
-        self.clients = [self.publisher, *self.programs, *(kind(f"{kind.__name__}{number}", self) for number in (1, 2)
+        self.insider = Insider("Insider", self)
+        self.clients = [self.publisher, self.insider, *self.programs, *(kind(f"{kind.__name__}{number}", self) for number in (1, 2)
                                           for kind in (Caller, Listener, Watcher, Piper, OurPiper, Locker))]
 
     def end(self):
@@ -291,6 +307,12 @@ class Site:
             wait_until(lambda: set(values().values()) == {value}, "wires have the last value")
         except AssertionError as error:
             self.findings.break_("wires", f"{error}, {value} or newer: {values()}")
+        count = self.findings.counts.get("answers inside", 0)
+        try:
+            wait_until(lambda: self.findings.counts.get("answers inside", 0) > count, "who is inside is answered")
+        except AssertionError as error:
+            self.findings.break_("liveness", error)
+        self.slowest = max(self.slowest, self.insider.p99())
         self.end()
         for fault in faults_of_calls(ran(self.device.journal), self.findings.answered):
             self.findings.break_("calls", fault)
@@ -456,7 +478,7 @@ def play(site, dice, seconds, say=print):
         name = dice.choices(names, weights)[0]
         length, after = dice.choice((0.05, 0.3, 1.0, 3.0)) * dice.random(), dice.choice((0.1, 1.0, 2.0)) * dice.random()
         say(f"{time.monotonic() - started:6.1f} s: {name}, for {length:.2f} s", flush=True)
-        with FAULTS[name](site, dice):
+        with site.gateway_away() if name.startswith("gateway") else contextlib.nullcontext(), FAULTS[name](site, dice):
             time.sleep(length)
         time.sleep(after)
     site.judge(before)
@@ -479,7 +501,7 @@ def main():
             play(site, random.Random(seed), min(ROUND, max(5.0, until - time.monotonic())))
         finally:
             site.close()
-        print(f"seed {seed}: {site.findings.counts}")
+        print(f"seed {seed}: {site.findings.counts}; p99 of answers inside: {site.slowest * 1e3:.0f} ms")
         if site.findings.broken:
             print("\n".join(site.findings.broken))
             print(f"seed {seed} FAILED; logs are in {folder}")

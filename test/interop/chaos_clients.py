@@ -99,6 +99,54 @@ class Caller(Client):
             self.findings.break_(self.name, f"call {token} was answered with {answer.status}: {answer.body[:200]}")
 
 
+class Insider(Client):
+    """Asks a device that no fault is for, on one connection and past all lines: whatever else breaks, it is answered, and soon,
+    as long as the gateway itself is there."""
+
+    bound = 2.0  # seconds; all the others, and their devices, use the machine as well
+
+    def __init__(self, name, site):
+        self.times = []
+        super().__init__(name, site)
+
+    def work(self):
+        connection = http.client.HTTPConnection("127.0.0.1", self.site.port, timeout=20)
+        begin = time.monotonic()
+        try:
+            while self.is_wanted:
+                begin = time.monotonic()
+                connection.request("POST", "/api/v1/devices/ours/interop/add", '{"left": 1, "right": 2}',
+                                   {"Content-Type": "application/json"})
+                answer = connection.getresponse()
+                text = answer.read()
+                self.judge(begin, answer.status, text)
+                time.sleep(0.01)
+        except LOSSES as error:
+            if self.is_wanted and not self.site.was_away_since(begin):
+                self.findings.break_(self.name, f"lost its connection: {error!r}")
+            raise
+        finally:
+            connection.close()
+
+    def judge(self, begin, status, text):
+        took = time.monotonic() - begin
+        if self.site.was_away_since(begin):
+            return
+        if status != 200 and self.site.is_recovering:
+            return  # the gateway has come back, and looks for its devices
+        if status != 200:
+            return self.findings.break_(self.name, f"was answered with {status}: {text[:200]}")
+        if took > self.bound:
+            self.findings.break_(self.name, f"waited {took:.2f} s for an answer")
+        self.site.is_recovering = False
+        self.times.append(took)
+        self.findings.count("answers inside")
+
+    def p99(self):
+        """Seconds."""
+        return sorted(self.times)[len(self.times) * 99 // 100] if self.times else 0.0
+
+
 class Publisher(Client):
     """Gives the wire new values."""
 

@@ -1,5 +1,7 @@
 """A short part of what `./dev soak` does for as long as one likes: the same faults, by fixed seeds."""
 import random
+import time
+import types
 
 import chaos
 import pytest
@@ -13,7 +15,7 @@ def test_nothing_is_lost_or_doubled_while_everything_breaks(tmp_path, seed):
     finally:
         site.close()
     assert site.findings.broken == []
-    assert {"calls", "packets", "packets of the reference", "events", "values", "locks"} <= set(site.findings.counts)
+    assert {"calls", "answers inside", "packets", "packets of the reference", "events", "values", "locks"} <= set(site.findings.counts)
 
 
 def test_the_oracle_sees_what_must_not_be(tmp_path):
@@ -23,3 +25,22 @@ def test_the_oracle_sees_what_must_not_be(tmp_path):
     journal = tmp_path / "journal"
     journal.write_text("1\n2\n2\n3\n")
     assert chaos.faults_of_calls(chaos.ran(journal), {1, 4}) == ["ran twice: [2]", "were answered and never ran: [4]"]
+
+
+def test_the_oracle_sees_who_is_inside_and_waits():
+    site = types.SimpleNamespace(was_away_since=lambda moment: False, is_recovering=False)
+    insider = chaos.Insider.__new__(chaos.Insider)
+    insider.name, insider.site, insider.findings, insider.times = "insider", site, chaos.Findings(), []
+    now = time.monotonic()
+    insider.judge(now, 200, b"")
+    site.was_away_since = lambda moment: True
+    insider.judge(now, 503, b"")
+    site.was_away_since = lambda moment: False
+    site.is_recovering = True
+    insider.judge(now, 503, b"its device is not there yet")
+    assert insider.findings.broken == [] and insider.findings.counts == {"answers inside": 1}
+    insider.judge(now, 200, b"")
+    insider.judge(now, 503, b"no")
+    insider.judge(now - 3, 200, b"")
+    assert [words.split(" for")[0] for words in insider.findings.broken] == \
+        ["insider: was answered with 503: b'no'", "insider: waited 3.00 s"]

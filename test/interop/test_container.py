@@ -246,3 +246,21 @@ def test_the_unit_is_one(tmp_path):
     result = subprocess.run(["systemd-analyze", "security", "--offline=true", "--threshold=20", tmp_path / "rrgate.service"],
                             capture_output=True, text=True, timeout=60)
     assert result.returncode == 0, result.stdout[-300:]
+    (said,) = re.findall(r"rates its exposure ([\d.]+) ", (ROOT / "docs/deploy.md").read_text())
+    assert f"Overall exposure level for rrgate.service: {said} " in result.stdout
+
+
+def test_the_apparmor_profile_is_one(tmp_path):
+    """As the parser reads it, for the service of this name alone; nothing is loaded."""
+    need("apparmor")
+    profile = ROOT / "cmake" / "deb" / "apparmor"
+    command = ["apparmor_parser", "--skip-kernel-load", "--skip-cache"]
+    result = subprocess.run([*command, profile], capture_output=True, text=True, timeout=60, check=False)
+    assert result.returncode == 0, result.stderr
+    names = subprocess.run([*command, "--names", profile], capture_output=True, text=True, timeout=60, check=True).stdout
+    assert names.split() == ["rrgate"]
+    (chosen,) = re.findall(r"^AppArmorProfile=-(\w+)$", (ROOT / "gateway-config" / "rrgate.service.in").read_text(), re.M)
+    assert chosen == "rrgate"
+    wrong = tmp_path / "wrong"
+    wrong.write_text(profile.read_text().replace("/usr/bin/rrgate mr,", "/usr/bin/rrgate mz,"))
+    assert subprocess.run([*command, wrong], capture_output=True, timeout=60, check=False).returncode != 0

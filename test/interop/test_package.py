@@ -2,6 +2,7 @@
 import base64
 import json
 import re
+import resource
 import shutil
 import ssl
 import subprocess
@@ -23,6 +24,7 @@ class Root:
 
     def __init__(self, folder):
         self.folder = folder
+        self.installing = 0.0  # seconds of processor time
 
     def run(self, *words, given=None, fails=False):
         result = subprocess.run(["chroot", self.folder, *words], capture_output=True, text=True, input=given, timeout=60)
@@ -44,9 +46,17 @@ def root(tmp_path_factory):
     subprocess.run(["mknod", "-m", "666", folder / "dev/urandom", "c", "1", "9"], check=True)
     shutil.copy(deb, folder / "rrgate.deb")
     root = Root(folder)
+    before = processor_time()
     root.run("dpkg", "-i", "/rrgate.deb")
+    root.installing = processor_time() - before
     yield root
     shutil.rmtree(folder, ignore_errors=True)
+
+
+def processor_time():
+    """Seconds, of all processes that were started here and have ended."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def unit(root):
@@ -88,9 +98,50 @@ def test_what_is_where(root):
         ["root:rrgate 750", "root:rrgate 640", "rrgate:rrgate 750", "rrgate:rrgate 750"]
     for path in ("usr/libexec/rrgate/rrgate-demo-create", "usr/share/rrgate/web/index.html.br", "usr/share/rrgate/docs/index.html", "usr/share/man/man1/rrgate.1.gz",
                  "usr/share/rrgate/gateway.schema.json", "lib/systemd/system/rrgate.socket",
-                 "usr/lib/udev/rules.d/60-robotraconteur-usb.rules", "usr/share/doc/rrgate/copyright"):
+                 "etc/apparmor.d/rrgate", "etc/apparmor.d/local/rrgate", "usr/lib/udev/rules.d/60-robotraconteur-usb.rules", "usr/share/doc/rrgate/copyright"):
         assert (root.folder / path).is_file(), path
     assert "good" in root.run("rrgate", "check-config", "--as-service", "rrgate", "/etc/rrgate/gateway.json").stdout
+
+
+def test_the_demo_drives_its_robot_at_once(root, tmp_path):
+    """As whoever has just installed the package does; both together take less than 20 s of processor time."""
+    need("mount-namespaces")  # the demo looks into /proc for the programs beside it
+    before = processor_time()
+    demo = Background(["unshare", "--mount", "--propagation", "private", "sh", "-c", 'mount -t proc proc "$0/proc" && exec chroot "$0" "$@"',
+                       root.folder, "rrgate", "demo", "--no-browser", "--port", str(free_port())], tmp_path / "log")
+    try:
+        said = next(line for line in iter(demo.next_line, None) if line.startswith("rrgate demo: "))  # its devices speak too
+        port = int(re.fullmatch(r"rrgate demo: http://127\.0\.0\.1:(\d+)/", said)[1])
+        page = ask(port, "GET", "/")
+        assert page.status == 200 and b"<!doctype html>" in page.body.lower()
+        robot = "/api/v1/devices/create/Create"
+        first = ask(port, "GET", f"{robot}/state").json
+        assert ask(port, "POST", f"{robot}/Drive", body={"velocity": 200, "radius": 32767}).status == 200
+        demo.wait_until(lambda: ask(port, "GET", f"{robot}/state").json["x"] != first["x"])
+    finally:
+        code = demo.stop()
+    assert code == 0
+    assert root.installing + processor_time() - before < 20
+
+
+def test_a_program_is_built_with_the_development_package(tmp_path):
+    """By what both packages have, and the libraries of this Debian."""
+    for deb in PACKAGES.glob("*_amd64.deb"):
+        subprocess.run(["dpkg-deb", "-x", deb, tmp_path / "root"], check=True, timeout=120)
+    (tmp_path / "CMakeLists.txt").write_text("""
+cmake_minimum_required(VERSION 3.25)
+project(arm LANGUAGES CXX)
+find_package(rrgate REQUIRED COMPONENTS node)
+add_executable(arm main.cpp)
+target_link_libraries(arm PRIVATE rrgate::node)
+""")
+    (program,) = re.findall(r"```cpp\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
+    (tmp_path / "main.cpp").write_text(program.replace("0.0.0.0:52222", "127.0.0.1:0").replace("node.run();", ""))
+    prefixes = f"-DCMAKE_PREFIX_PATH={tmp_path}/root/usr;{ROOT}/build/deps/boost181/usr"
+    for command in (["cmake", "-S", tmp_path, "-B", tmp_path / "build", prefixes], ["cmake", "--build", tmp_path / "build"]):
+        done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+        assert done.returncode == 0, done.stdout + done.stderr
+    subprocess.run([tmp_path / "build" / "arm"], check=True, timeout=10)
 
 
 def test_a_lab_in_four_commands(root, tmp_path):

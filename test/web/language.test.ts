@@ -1,4 +1,4 @@
-// Every text that the page passes through t() has a German one, with the same places for values.
+// Every text of the page goes through t(), and has a German one, with the same places for values.
 import german from "../../web/src/messages/de";
 
 const files = import.meta.glob<string>("../../web/src/**/*.{ts,tsx}", {
@@ -8,7 +8,7 @@ const files = import.meta.glob<string>("../../web/src/**/*.{ts,tsx}", {
 });
 const texts = new Set(
   Object.values(files).flatMap((source) =>
-    [...source.matchAll(/\bt\(\s*"((?:[^"\\]|\\.)*)"/g)].map((match) => match[1] ?? ""),
+    [...source.matchAll(/\bt\(\s*(?:"((?:[^"\\]|\\.)*)"|'([^']*)')/g)].map((match) => match[1] ?? match[2] ?? ""),
   ),
 );
 
@@ -17,4 +17,16 @@ test("all texts are there in German, with the same values", () => {
   expect([...texts].filter((text) => !Object.hasOwn(german, text))).toEqual([]);
   for (const [text, other] of Object.entries(german))
     expect(other.match(/\{\d\}/g)?.sort() ?? [], text).toEqual(text.match(/\{\d\}/g)?.sort() ?? []);
+});
+
+test("no text between tags, and none that is read aloud, goes past t()", () => {
+  const past = Object.entries(files).flatMap(([file, source]) =>
+    file.endsWith(".tsx")
+      ? [
+          ...source.matchAll(/\b(?:aria-label|title|alt)="[^"]*[A-Za-z]{3}[^"]*"/g),
+          ...source.matchAll(/<(?:p|h\d|button|span|a|td|th|dt|summary|label|option)\b[^<>]*>\s*[A-Z][a-z]+[^<>{}]*</g),
+        ].map(([text]) => `${file}: ${text}`)
+      : [],
+  );
+  expect(past).toEqual([]);
 });

@@ -129,7 +129,7 @@ rr::awaitable<Response> judge_sign_in(GatewayState& gateway, const Request& requ
     co_return http_access.refusal(request, error);
   }
   if (who.proof != Proof::password && who.proof != Proof::token && who.proof != Proof::jwt && who.proof != Proof::oidc)
-    co_return problem_response(409, "a certificate, or a proxy, shows with each request who you are");
+    co_return problem_response(409, "a certificate or a proxy identifies you in each request already");
   const auto now = Clock::now();
   const auto cookie = gateway.access().sign_ins().begin(who, now);
   if (!cookie) co_return problem_response(409, "you have more roles than a cookie can name");
@@ -201,7 +201,7 @@ Handler tickets_endpoint(GatewayState& gateway) {
     auto& http_access = gateway.http_access();
     if (!request.identity.is_proven() && !gateway.access().is_open())
       return http_access.refusal(
-          request, rr::make_error(rr::ErrorCode::authentication_error, "a ticket is for who has shown who he is"));
+          request, rr::make_error(rr::ErrorCode::authentication_error, "only an authenticated client gets a ticket"));
     const auto ticket = gateway.access().tickets().issue(request.identity, Clock::now());
     if (!ticket) return problem_response(409, "you have more roles than a ticket can name");
     return json_answer(201, {{"ticket", *ticket}, {"expires_in", Tickets::lifetime.count()}});
@@ -211,7 +211,7 @@ Handler tickets_endpoint(GatewayState& gateway) {
 Handler ask_endpoint(GatewayState& gateway) {
   return [&gateway](const Request& request, std::string_view) {
     if (gateway.access().state().config.tokens_file.empty())
-      return problem_response(409, "nobody can be given access here: the gateway has no tokens_file");
+      return problem_response(409, "requests for access are not possible: the gateway has no tokens_file");
     const auto body = body_of(request);
     if (!body) return error_answer(body.error());
     const auto name = text_of(*body, "name");

@@ -24,6 +24,7 @@ nlohmann::ordered_json describe(const Device& device, const Request& request, co
   out["websocket_url"] = websocket_url(arrival, device.config().name);
   out["mode"] = device.is_shared() ? "shared" : "relay";
   out["found"] = device.config().is_found;
+  out["served"] = device.config().is_served;
   out["node_id"] = nullptr;
   out["node_name"] = nullptr;
   const auto& identity = device.identity();
@@ -54,8 +55,8 @@ Handler devices_endpoint(GatewayState& gateway) {
       if (access.sees(request.identity, device->config().name))
         out["devices"].push_back(describe(*device, request, access));
     if (out["devices"].empty() && !access.is_open() && !request.identity.is_proven())
-      return gateway.http_access().refusal(
-          request, rr::make_error(rr::ErrorCode::permission_denied, "who is not logged in may see no device"));
+      return gateway.http_access().refusal(request, rr::make_error(rr::ErrorCode::permission_denied,
+                                                                   "a client that is not logged in may see no device"));
     return json_response(200, out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
   };
 }

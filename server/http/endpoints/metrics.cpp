@@ -208,7 +208,7 @@ Handler metrics_endpoint(GatewayState& gateway) {
     out.single("rrgate_memory_budget_used_bytes", "gauge", "What they make it hold.", memory.used());
     out.single("rrgate_memory_budget_refusals_total", "counter", "What was refused because that was too much.",
                memory.refusals());
-    out.single("rrgate_log_lost_total", "counter", "Lines of the log that were dropped since nobody read it.",
+    out.single("rrgate_log_lost_total", "counter", "Lines of the log that were dropped because it was read too slowly.",
                lost_log_lines());
     write_audit(out, gateway.access().audit().state());
     const auto devices = look_at(gateway);

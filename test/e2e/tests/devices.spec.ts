@@ -52,3 +52,49 @@ test("the chosen colours stay after a reload", async ({ page, lab }) => {
   await page.reload();
   await expect(page.locator("html")).toHaveAttribute("data-theme", "dark");
 });
+
+test("of 5000 devices one is found, states and types are groups, and the list scrolls without long tasks", async ({
+  page,
+  lab,
+}) => {
+  const devices = [...Array(5000)].map((_, i) => ({
+    name: `device-${i}`,
+    url: `rr+tcp://10.1.${i >> 8}.${i & 255}:52222/`,
+    state: i % 10 === 0 ? "offline" : "online",
+    services: [{ name: "main", type: i % 2 ? "com.example.Camera" : "com.example.Robot" }],
+  }));
+  await page.route("**/api/v1/devices", (route) => route.fulfill({ json: { devices } }));
+  await page.goto(lab.url);
+  const line = (index: number) => page.locator(`[data-device="device-${index}"]`);
+  await expect(line(0)).toBeVisible();
+  const slowest = await page.evaluate(async () => {
+    const gaps: number[] = [];
+    const list = document.querySelector(".device-list")!;
+    for (let frame = 0, last = performance.now(); frame < 60; frame++) {
+      window.scrollBy(0, 3000);
+      await new Promise(requestAnimationFrame);
+      gaps.push(performance.now() - last);
+      last = performance.now();
+      if (list.childElementCount > 120) throw new Error(`${list.childElementCount} items at once`);
+    }
+    return gaps.sort((a, b) => a - b)[Math.floor(gaps.length / 2)];
+  });
+  expect(slowest).toBeLessThan(50);
+  await page.keyboard.press("End");
+  await expect(line(4999)).toBeInViewport();
+
+  await page.getByLabel("Search devices").fill("10.1.3.7: camera");
+  await expect(line(775)).toBeVisible();
+  await expect(page.locator("[data-device]")).toHaveCount(1);
+  await line(775).getByRole("button", { name: "More of device-775" }).click();
+  await expect(line(775)).toContainText("Address");
+  await page.getByLabel("Search devices").fill("");
+  await page.getByLabel("State", { exact: true }).selectOption("offline");
+  await page.getByLabel("Groups").selectOption("type");
+  await expect(page.getByRole("heading", { name: "com.example.Robot 500" })).toBeVisible();
+  await page.reload();
+  await expect(page.getByRole("heading", { name: "com.example.Robot 500" })).toBeVisible();
+  await page.getByLabel("Search devices").fill("nothing like it");
+  await page.getByRole("button", { name: "Show all" }).click();
+  await expect(page.getByRole("status").filter({ hasText: "5000 of 5000" })).toBeVisible();
+});

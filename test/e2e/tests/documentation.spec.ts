@@ -34,9 +34,9 @@ async function lookAround(page: Page, base: string): Promise<void> {
     await expect(words).toBeVisible({ timeout: 500 });
   }).toPass();
   await words.fill("allowed_hosts");
-  await page.locator(".VPLocalSearchBox .result").filter({ hasText: "By which name" }).first().click();
-  await expect(page).toHaveURL(/access\.html#by-which-name$/);
-  await expect(page.getByRole("heading", { name: "By which name" })).toBeVisible();
+  await page.locator(".VPLocalSearchBox .result").filter({ hasText: "Host names" }).first().click();
+  await expect(page).toHaveURL(/access\.html#host-names$/);
+  await expect(page.getByRole("heading", { name: "Host names" })).toBeVisible();
   expect(elsewhere).toEqual([]);
   expect(complaints).toEqual([]);
 }

@@ -51,6 +51,30 @@ for (const colorScheme of ["light", "dark"] as const) {
   }
 }
 
+for (const [size, viewport] of Object.entries({
+  phone: { width: 390, height: 844 },
+  "phone on its side": { width: 844, height: 390 },
+  tablet: { width: 1024, height: 768 },
+})) {
+  test(`Stop is in reach wherever a page is scrolled to, and nothing is wider than the screen: ${size}`, async ({
+    page,
+    lab,
+  }) => {
+    await page.setViewportSize(viewport);
+    for (const view of ["drive", "board", "members"]) {
+      await page.goto(`${lab.url}#/devices/create/Create?view=${view}`);
+      await expect(page.locator('[data-link="online"]')).toBeVisible();
+      const stop = page.getByRole("button", { name: "Stop", exact: true });
+      await expect(stop, view).toBeInViewport({ ratio: 1 });
+      await page.evaluate(() => window.scrollTo(0, document.documentElement.scrollHeight));
+      await expect.poll(() => page.evaluate(() => scrollY), { message: view }).toBeGreaterThan(0);
+      await expect(stop, view).toBeInViewport({ ratio: 1 });
+      expect(await page.evaluate(() => document.documentElement.scrollWidth - innerWidth), view).toBeLessThanOrEqual(0);
+      await stop.click(); // nothing lies over it
+    }
+  });
+}
+
 test("a board is made by keyboard alone", async ({ page, lab }) => {
   await page.goto(`${lab.url}#/devices/webcams/Webcam?view=board`);
   await expect(page.locator(".board-panel").first()).toBeVisible();

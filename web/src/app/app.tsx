@@ -108,8 +108,8 @@ function ThemeButton() {
     <button
       class="icon-button"
       type="button"
-      title={`Colours: ${chosen}`}
-      aria-label={`Colours: ${chosen}. Change to ${NEXT[chosen]}`}
+      title={t("Colours: {0}", t(chosen))}
+      aria-label={t("Colours: {0}. Change to {1}", t(chosen), t(NEXT[chosen]))}
       onClick={() => (theme.value = NEXT[chosen])}
     >
       <SunMoonIcon theme={chosen} />
@@ -139,14 +139,14 @@ function LanguageSelect() {
 function UnknownPage({ address }: { address: string }) {
   return (
     <div class="page page-narrow">
-      <h1>No such page</h1>
-      <p>
-        There is nothing at <code>{address}</code>. Services live at{" "}
-        <code>/devices/&lt;device&gt;/&lt;service&gt;</code>.
-      </p>
-      <p>
-        <a href="#/">All devices</a>
-      </p>
+      <h1>{t("No such page")}</h1>
+      <div class="empty">
+        <p>{t("There is nothing at this address:")}</p>
+        <pre class="code">{address}</pre>
+        <a class="button" href="#/">
+          {t("All devices")}
+        </a>
+      </div>
     </div>
   );
 }
@@ -155,5 +155,5 @@ function titleOf(route: Route): string {
   if (route.page === "devices") return t("Devices");
   if (route.page === "unknown") return t("No such page");
   const last = route.path[route.path.length - 1];
-  return last ? `${formatStep(last)} of ${route.device}` : route.device;
+  return last ? t("{0} of {1}", formatStep(last), route.device) : route.device;
 }

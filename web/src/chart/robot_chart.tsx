@@ -2,6 +2,7 @@
 // Layer: web/chart.
 
 import { useEffect, useRef } from "preact/hooks";
+import { t } from "../app/language";
 import { useStore } from "../app/store";
 import type { RobotModel } from "../robot/robot_model";
 import type { Room } from "../robot/room";
@@ -43,7 +44,9 @@ export function RobotChart({ model, live }: { model: RobotModel; live: boolean }
       ref={canvas}
       class="chart"
       role="img"
-      aria-label="Map of the floor with the robot, where it has been, and where it bumped. The pose is given in numbers below."
+      aria-label={t(
+        "Map of the floor with the robot, where it has been, and where it bumped. The pose is given in numbers below.",
+      )}
     />
   );
 }

@@ -143,7 +143,7 @@ export function proofOf(name: string, secret: string): Record<string, string> {
 /** What the gateway said about a request that it refused. */
 export async function problemOf(response: Response): Promise<string> {
   const problem = (await response.json().catch(() => null)) as { detail?: unknown } | null;
-  return typeof problem?.detail === "string" ? problem.detail : `the gateway answered ${response.status}`;
+  return typeof problem?.detail === "string" ? problem.detail : t("the gateway answered {0}", response.status);
 }
 
 /** X-Requested-With: the page has a form, so no browser's dialog is wanted. */

@@ -3,14 +3,13 @@
 
 import { t } from "../app/language";
 import { useNow, useStore } from "../app/store";
-import { formatRoute } from "../app/router";
 import { devicesOf } from "../gateway/devices";
-import type { Device, DeviceList, DeviceMode, GatewayState, Service } from "../gateway/devices";
-import { isUsb } from "../gateway/usb_devices";
+import type { DeviceList, GatewayState } from "../gateway/devices";
 import type { UsbDeviceList } from "../gateway/usb_devices";
 import type { AccessDesk } from "../gateway/access";
 import { AccessPart } from "./access_part";
-import { SubscriptionsPart } from "./subscriptions_part";
+import { DeviceCard } from "./device_card";
+import { DeviceParts } from "./device_parts";
 import { StateBadge } from "../ui/state_badge";
 import { clockTime, sentence, span } from "../ui/words";
 
@@ -23,13 +22,7 @@ export function DevicesPage({ list, usb, access }: { list: DeviceList; usb: UsbD
       <GatewayStrip state={state} />
       {state.kind === "loading" && <LoadingRows />}
       {devices && devices.length === 0 && state.kind === "known" && <NoDevices />}
-      {devices && devices.length > 0 && (
-        <ul class={`devices ${state.kind === "away" ? "is-stale" : ""}`}>
-          {devices.map((device) => (
-            <DeviceRow key={device.name} device={device} stale={state.kind === "away"} />
-          ))}
-        </ul>
-      )}
+      {devices && devices.length > 0 && <DeviceParts devices={devices} stale={state.kind === "away"} />}
       {usb.isPossible && <UsbPart usb={usb} />}
       <AccessPart access={access} />
     </div>
@@ -41,16 +34,18 @@ function UsbPart({ usb }: { usb: UsbDeviceList }) {
   const devices = useStore(usb.devices);
   const trouble = useStore(usb.trouble);
   return (
-    <section class="usb-part" aria-label="USB devices of this computer">
+    <section class="usb-part" aria-label={t("USB devices of this computer")}>
       {devices.length > 0 && (
         <ul class="devices">
           {devices.map((device) => (
-            <DeviceRow key={device.name} device={device} stale={false} />
+            <li key={device.name} class="device" data-device={device.name}>
+              <DeviceCard device={device} stale={false} />
+            </li>
           ))}
         </ul>
       )}
       <button class="button" type="button" onClick={() => void usb.choose()}>
-        Connect USB device
+        {t("Connect USB device")}
       </button>
       {trouble !== null && (
         <p class="failure" role="alert">
@@ -67,12 +62,12 @@ function GatewayStrip({ state }: { state: GatewayState }) {
   return (
     <section
       class={`link-strip gateway-strip link-${badge[state.kind]}`}
-      aria-label="Gateway"
+      aria-label={t("Gateway")}
       data-gateway={state.kind}
     >
       <StateBadge
         state={badge[state.kind]}
-        text={{ loading: "asking", known: "gateway", away: "gateway away" }[state.kind]}
+        text={t({ loading: "asking", known: "gateway", away: "gateway away" }[state.kind])}
       />
       <div class="link-words">
         <p class="link-head" role="status">
@@ -101,90 +96,6 @@ function AwayDetail({ state }: { state: GatewayState & { kind: "away" } }) {
       <span aria-hidden="true">{t("Away for {0}; asking every 2 s.", span(now - state.since))}</span>
       {state.devices && state.devices.length > 0 && ` ${t("Below is what it said last.")}`}
     </>
-  );
-}
-
-function DeviceRow({ device, stale }: { device: Device; stale: boolean }) {
-  return (
-    <li class="device" data-device={device.name}>
-      <div class="device-head">
-        <h2 class="place-name">{device.name}</h2>
-        {device.found && (
-          <span class="found-mark" title={t("Found on the network; it goes when it is not announced any more")}>
-            {t("found")}
-          </span>
-        )}
-        {isUsb(device.name) && (
-          <span class="found-mark" title={t("Plugged into this computer; the page speaks to it without the gateway")}>
-            USB
-          </span>
-        )}
-        <StateBadge state={device.state} text={stale ? t("was {0}", t(device.state)) : t(device.state)} />
-      </div>
-      <dl class="device-facts">
-        <div>
-          <dt>{t("Address")}</dt>
-          <dd class="code">{device.url}</dd>
-        </div>
-        {device.nodeName !== "" && (
-          <div>
-            <dt>{t("Node")}</dt>
-            <dd class="code" title={device.nodeId}>
-              {device.nodeName}
-            </dd>
-          </div>
-        )}
-        {device.mode !== null && (
-          <div>
-            <dt>{t("Mode")}</dt>
-            <dd title={t(MODE[device.mode])}>{device.mode}</dd>
-          </div>
-        )}
-        {device.clients !== null && (
-          <div>
-            <dt>{t("Clients")}</dt>
-            <dd>{device.clients}</dd>
-          </div>
-        )}
-      </dl>
-      {device.state !== "online" && (
-        <p class="device-trouble">
-          {sentence(device.lastError ?? t("Not reached yet"))}{" "}
-          {!stale && !isUsb(device.name) && t("The gateway keeps trying.")}
-        </p>
-      )}
-      <ul class="services">
-        {device.services.map((service) => (
-          <li key={service.name}>
-            <ServiceLink device={device} service={service} />
-          </li>
-        ))}
-        {device.services.length === 0 && (
-          <li class="no-services">
-            {device.state === "online"
-              ? t("It offers no services.")
-              : t("Its services show here once it has answered.")}
-          </li>
-        )}
-      </ul>
-      {device.mode === "shared" && (
-        <SubscriptionsPart device={device.name} online={device.state === "online"} stale={stale} />
-      )}
-    </li>
-  );
-}
-
-const MODE: Readonly<Record<DeviceMode, string>> = {
-  relay: "Each client has a connection of its own to the device",
-  shared: "All clients share one session of the gateway with the device",
-};
-
-function ServiceLink({ device, service }: { device: Device; service: Service }) {
-  return (
-    <a class="service" href={formatRoute(device.name, service.name)}>
-      <span class="service-name">{service.name}</span>
-      <span class="code service-type">{service.type === "" ? t("type not read yet") : service.type}</span>
-    </a>
   );
 }
 

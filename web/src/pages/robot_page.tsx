@@ -87,16 +87,18 @@ export function RobotPage({ link, list, device, shown }: RobotPageProps) {
           <SongBox robot={remote} />
         </div>
       </section>
-      <DrivePanel
-        driver={driver}
-        control={control}
-        enabled={live && shown && isOpen}
-        linked={live}
-        lost={state.kind === "lost"}
-        failure={driveFailure}
-        device={device}
-      />
-      <CameraView list={list} robot={device} shown={shown} />
+      <div class="robot-side">
+        <DrivePanel
+          driver={driver}
+          control={control}
+          enabled={live && shown && isOpen}
+          linked={live}
+          lost={state.kind === "lost"}
+          failure={driveFailure}
+          device={device}
+        />
+        <CameraView list={list} robot={device} shown={shown} />
+      </div>
       <ValuesPanel model={model} live={live} />
       <BumpLog model={model} />
     </div>

@@ -41,9 +41,9 @@ export function ServicePage({ route, list }: { route: ServiceRoute; list: Device
       <div class="service-head">
         <h1 class="place-name">{device}</h1>
         {link && <LinkStrip link={link} list={list} device={device} service={service} />}
-        {link && shown === "members" && <HeadStop link={link} path={path} list={list} />}
         {link && <Views route={route} shown={shown} first={first} drives={drives} />}
       </div>
+      {link && shown === "members" && <HeadStop link={link} path={path} list={list} />}
       {drives && link && (
         <div hidden={shown !== "drive"}>
           <RobotPage link={link} list={list} device={device} shown={shown === "drive"} />

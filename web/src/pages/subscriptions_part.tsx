@@ -2,6 +2,7 @@
 // Layer: web/pages.
 
 import { useEffect, useState } from "preact/hooks";
+import { t } from "../app/language";
 import { useStore } from "../app/store";
 import { SubscriptionList, subscriptionsOf } from "../gateway/subscriptions";
 import type { Subscription, SubscriptionsState } from "../gateway/subscriptions";
@@ -18,7 +19,8 @@ export function SubscriptionsPart({ device, online, stale }: Props) {
   return (
     <details class="subscriptions" onToggle={(event) => setOpen(event.currentTarget.open)}>
       <summary>
-        Subscriptions<span class="unseen"> of {device}</span>
+        {t("Subscriptions")}
+        <span class="unseen"> {device}</span>
       </summary>
       {open && <Subscriptions device={device} online={online} stale={stale} />}
     </details>
@@ -46,26 +48,27 @@ function Subscriptions({ device, online, stale }: Props) {
 
 /** Changes rarely, so that it can be announced: the numbers are in the table. */
 function headline(state: SubscriptionsState, online: boolean, stale: boolean): string {
-  if (state.kind === "loading") return "Asking the gateway for them.";
-  if (state.kind === "denied") return `You may not see them: ${sentence(state.reason)}`;
+  if (state.kind === "loading") return t("Asking the gateway for them.");
+  if (state.kind === "denied") return t("You may not see them: {0}", sentence(state.reason));
   if (state.kind === "away") {
-    const below = state.subscriptions && state.subscriptions.length > 0 ? " Below is what it said last." : "";
-    return `The gateway has not told them since ${clockTime(state.since)}: ${sentence(state.reason)}${below}`;
+    const below = state.subscriptions && state.subscriptions.length > 0 ? ` ${t("Below is what it said last.")}` : "";
+    const since = clockTime(state.since);
+    return `${t("The gateway has not told them since {0}: {1}", since, sentence(state.reason))}${below}`;
   }
-  if (!online && !stale) return "The device is away: nothing comes until it is back, and then they go on.";
-  if (state.subscriptions.length === 0) return "No client listens to a wire or a pipe of it now.";
-  return "Wires and pipes of each client, since it connected them.";
+  if (!online && !stale) return t("The device is away: nothing comes until it is back, and then they go on.");
+  if (state.subscriptions.length === 0) return t("No client listens to a wire or a pipe of it now.");
+  return t("Wires and pipes of each client, since it connected them.");
 }
 
 /** With its roles said outright: on a narrow screen its rows are laid out as blocks, and browsers would forget them. */
 function Table({ device, subscriptions }: { device: string; subscriptions: Subscription[] }) {
   return (
-    <table class="ledger" role="table" aria-label={`Subscriptions of ${device}`}>
+    <table class="ledger" role="table" aria-label={t("Subscriptions of {0}", device)}>
       <thead role="rowgroup">
         <tr role="row">
           {["Member", "Client", "Delivered", "Conflated", "Dropped", "Age p50", "Age p99"].map((name) => (
-            <th key={name} role="columnheader" scope="col" title={HINTS[name]}>
-              {name}
+            <th key={name} role="columnheader" scope="col" title={HINTS[name] && t(HINTS[name])}>
+              {t(name)}
             </th>
           ))}
         </tr>
@@ -89,9 +92,9 @@ const HINTS: Readonly<Record<string, string>> = {
 
 function Row({ subscription }: { subscription: Subscription }) {
   const { path, member, kind, client, delivered, conflated, dropped, ageP50Ms, ageP99Ms } = subscription;
-  const aged = (ms: number): string => (delivered > 0 ? ageText(ms) : "none yet");
+  const aged = (ms: number): string => (delivered > 0 ? ageText(ms) : t("none yet"));
   const cells: [name: string, value: string, mark: string][] = [
-    ["Client", client === "" ? "unknown" : client, "code"],
+    ["Client", client === "" ? t("unknown") : client, "code"],
     ["Delivered", String(delivered), ""],
     ["Conflated", String(conflated), conflated > 0 ? "is-conflated" : ""],
     ["Dropped", String(dropped), dropped > 0 ? "is-dropped" : ""],
@@ -105,10 +108,10 @@ function Row({ subscription }: { subscription: Subscription }) {
           {path}.<wbr />
           {member}
         </span>{" "}
-        <span class="note">{kind}</span>
+        <span class="note">{t(kind)}</span>
       </th>
       {cells.map(([name, value, mark]) => (
-        <td key={name} role="cell" class={mark} data-label={name}>
+        <td key={name} role="cell" class={mark} data-label={t(name)}>
           {value}
         </td>
       ))}

@@ -22,7 +22,7 @@ export function LinkStrip({ link, list, device, service }: LinkStripProps) {
   const lost = state.kind === "lost";
   const badge = lost ? "offline" : state.kind;
   return (
-    <section class={`link-strip link-${badge}`} aria-label="Connection" data-link={state.kind}>
+    <section class={`link-strip link-${badge}`} aria-label={t("Connection")} data-link={state.kind}>
       <StateBadge
         state={badge}
         text={t({ online: "connected", connecting: "connecting", offline: "not connected" }[badge])}
@@ -52,7 +52,9 @@ function headline(state: LinkState, device: string, service: string): string {
 function detail(state: LinkState, device: string): string {
   return state.kind === "online"
     ? state.remote.type
-    : `Asking ${isUsb(device) ? "this browser" : "the gateway"} for the device`;
+    : isUsb(device)
+      ? t("Asking this browser for the device")
+      : t("Asking the gateway for the device");
 }
 
 function LostDetail({
@@ -66,13 +68,13 @@ function LostDetail({
 }) {
   const now = useNow(500);
   const gateway = useStore(list.state);
-  const next = state.retryAt <= now ? "trying now" : `next try in ${span(state.retryAt - now + 999)}`;
+  const next = state.retryAt <= now ? t("trying now") : t("next try in {0}", span(state.retryAt - now + 999));
   const why = isUsb(device) ? sentence(state.reason) : reasonOf(state, gateway, device);
   return (
     <>
       {why}{" "}
       <span class="nowrap" aria-hidden="true">
-        Away for {span(now - state.since)}; {next}.
+        {t("Away for {0}; {1}.", span(now - state.since), next)}
       </span>
     </>
   );
@@ -80,10 +82,11 @@ function LostDetail({
 
 /** What the gateway says of the device tells more than the connection that failed. */
 function reasonOf(state: LinkState & { kind: "lost" }, gateway: GatewayState, device: string): string {
-  if (gateway.kind === "away") return `The gateway itself does not answer (${gateway.reason}).`;
+  if (gateway.kind === "away") return t("The gateway itself does not answer ({0}).", gateway.reason);
   const devices = devicesOf(gateway);
   const known = devices?.find((d) => d.name === device);
-  if (devices && !known) return `The gateway has no device "${device}" any more.`;
+  if (devices && !known) return t('The gateway has no device "{0}" any more.', device);
   if (!known || known.state === "online") return sentence(state.reason);
-  return `The gateway says: device ${known.state}${known.lastError ? `, ${known.lastError}` : ""}.`;
+  const said = [t(known.state), ...(known.lastError ? [known.lastError] : [])].join(", ");
+  return t("The gateway says: device {0}.", said);
 }

@@ -21,7 +21,7 @@ export function StateBadge({ state, text }: { state: BadgeState; text?: string }
         )}
         {state === "offline" && <path d="M1 1l8 8M9 1L1 9" stroke="currentColor" stroke-width="2.200" />}
       </svg>
-      {text ?? state}
+      <span class="badge-word">{text ?? state}</span>
     </span>
   );
 }

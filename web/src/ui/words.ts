@@ -1,6 +1,8 @@
 // Times of day, spans and sentences, as people read them.
 // Layer: web/ui, pure.
 
+import { t } from "../app/language";
+
 /** `14:03:22` in the reader's own time. */
 export function clockTime(ms: number): string {
   return new Date(ms).toLocaleTimeString(undefined, {
@@ -29,7 +31,12 @@ const STALE_MS = 800; // a value says that it is old within a second, wherever i
 
 /** `3 s old` for a value that ought to be newer; null for one that is young. */
 export function staleAge(ageMs: number): string | null {
-  return ageMs < STALE_MS ? null : `${span(ageMs + 500)} old`;
+  return ageMs < STALE_MS ? null : t("{0} old", span(ageMs + 500));
+}
+
+/** A text whose lines were broken for an editor, in paragraphs: lists and empty lines stay as they are. */
+export function flowing(text: string): string {
+  return text.trim().replace(/(\S)[ \t]*\n(?!\s|[-*•]|\d+[.)])/g, "$1 ");
 }
 
 /** The same text with an end. */
