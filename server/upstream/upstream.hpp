@@ -202,13 +202,11 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   };
   /// A wire's value as the turns send it: encoded once for all of them.
   struct Outgoing {
-    Outgoing(const std::string& path, const rr::MemberDefinition& member, rr::WireValue its_value,
+    Outgoing(const std::string& path, const rr::MemberDefinition& member, std::shared_ptr<const rr::WireValue> newest,
              rr::TimePoint arrived, std::uint64_t its_count)
-        : value(std::move(its_value)), packet(path, member, value.value, value.time, arrived), count(its_count) {}
-    Outgoing(const Outgoing&) = delete;
-    Outgoing& operator=(const Outgoing&) = delete;
+        : value(std::move(newest)), packet(path, member, value->value, value->time, arrived), count(its_count) {}
 
-    const rr::WireValue value;
+    const std::shared_ptr<const rr::WireValue> value;
     rr::WirePacket packet;
     const std::uint64_t count;  ///< Wire::count of it
   };
@@ -220,7 +218,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
     const rr::MemberDefinition& member;
     std::vector<Follower> followers;
     std::size_t next = 0;  ///< before the follower whose turn it is
-    std::optional<rr::WireValue> newest;
+    std::shared_ptr<const rr::WireValue> newest;
     rr::TimePoint arrived;               ///< of the newest
     std::optional<Outgoing> outgoing;    ///< while hand_out() is at it
     std::uint64_t count = 0;             ///< values that have come
