@@ -20,18 +20,6 @@ namespace {
 
 constexpr std::int64_t hour_ms = 3'600'000;
 
-/// A name stands in paths and logs: letters, digits, '_', '-', '.', beginning with a letter or digit.
-std::string check_device_name(const std::string& name) {
-  const auto is_plain = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
-  };
-  const auto is_name_char = [&](char c) { return is_plain(c) || c == '_' || c == '-' || c == '.'; };
-  if (name.empty() || name.size() > 64 || !is_plain(name.front()) ||
-      !std::all_of(name.begin(), name.end(), is_name_char))
-    return "found " + rr::quote(name) + ", expected 1 to 64 letters, digits, '_', '-', '.', first a letter or digit";
-  return {};
-}
-
 std::string read_device_url(const std::string& text, rr::ConnectionUrl& target) {
   auto url = rr::parse_url(text, rr::ServiceInUrl::optional);
   if (!url) return url.error().message;
@@ -266,6 +254,14 @@ void read_retry(ObjectReader& in, Retry& retry) {
   in.duration("online_ms", retry.online, {50, hour_ms});
 }
 
+void read_serve(ObjectReader& in, ServeConfig& serve) {
+  serve.is_enabled = true;
+  in.size("max_devices", serve.max_devices, {1, 4096});
+  std::string mode = "shared";
+  in.choice("mode", mode, {"shared", "relay"});
+  serve.mode = mode == "relay" ? DeviceMode::relay : DeviceMode::shared;
+}
+
 void read_mcp(ObjectReader& in, McpConfig& mcp) {
   mcp.is_enabled = true;
   in.duration("longest_wait_ms", mcp.longest_wait, {1000, hour_ms});
@@ -315,6 +311,7 @@ void read_config(ObjectReader& in, Config& config) {
   in.object("timeouts", [&](ObjectReader& part) { read_timeouts(part, config.timeouts); });
   in.object("retry", [&](ObjectReader& part) { read_retry(part, config.retry); });
   in.object("mcp", [&](ObjectReader& part) { read_mcp(part, config.mcp); });
+  in.object("serve", [&](ObjectReader& part) { read_serve(part, config.serve); });
   in.object("log", [&](ObjectReader& part) {
     part.choice("level", config.log.level, {"trace", "debug", "info", "warning", "error"});
     part.choice("format", config.log.format, {"text", "json"});
@@ -368,6 +365,17 @@ void locate_files(Config& config, const std::filesystem::path& folder) {
 }
 
 }  // namespace
+
+std::string check_device_name(const std::string& name) {
+  const auto is_plain = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+  };
+  const auto is_name_char = [&](char c) { return is_plain(c) || c == '_' || c == '-' || c == '.'; };
+  if (name.empty() || name.size() > 64 || !is_plain(name.front()) ||
+      !std::all_of(name.begin(), name.end(), is_name_char))
+    return "found " + rr::quote(name) + ", expected 1 to 64 letters, digits, '_', '-', '.', first a letter or digit";
+  return {};
+}
 
 ParsedConfig parse_config(std::string_view text, const std::filesystem::path& folder) {
   ParsedConfig out;

@@ -40,6 +40,8 @@ class GatewayState {
   SharedDevices& shared() { return shared_; }
   /// Null where the configuration has no "discover", and before start().
   FoundDevices* found() { return config_.discover.is_enabled ? found_.get() : nullptr; }
+  /// Pages that are devices.
+  PageLinks& pages() { return pages_; }
   Metrics& metrics() { return metrics_; }
   void reject(Rejection why) { metrics_.reject(why); }
   /// For an error of Access::check().
@@ -101,6 +103,7 @@ class GatewayState {
   ValueClients clients_;
   std::map<std::string, std::shared_ptr<ValueClient>, std::less<>> lease_holders_;
   std::unique_ptr<FoundDevices> found_;
+  PageLinks pages_;
   Admission admission_;
   HandshakeTurns handshakes_;
   SharedDevices shared_;

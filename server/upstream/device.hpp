@@ -17,6 +17,7 @@
 #include "server/config/config.hpp"
 #include "server/config/tls_files.hpp"
 #include "server/log/metrics.hpp"
+#include "server/upstream/page_link.hpp"
 #include "server/upstream/probe.hpp"
 
 namespace rrgate {
@@ -32,8 +33,9 @@ std::string_view to_string(DeviceState state);
 class Device : public std::enable_shared_from_this<Device> {
  public:
   /// `tls`  of all found devices; null: files of its own, where its URL wants them.
+  /// `page`  how it is reached if a page is the device; null: by its URL.
   Device(const boost::asio::any_io_executor& executor, DeviceConfig config, const Config& whole,
-         std::shared_ptr<TlsFiles> tls = nullptr);
+         std::shared_ptr<TlsFiles> tls = nullptr, std::shared_ptr<PageLink> page = nullptr);
 
   const DeviceConfig& config() const { return config_; }
   boost::asio::any_io_executor executor() { return wake_.get_executor(); }
@@ -165,15 +167,16 @@ class DeviceRegistry {
   /// The devices of another configuration, which must outlive this call alone: those that stay as they are, and new
   /// ones. Errors   as load_tls(); nothing has changed.
   [[nodiscard]] rr::Result<std::vector<std::shared_ptr<Device>>> prepare(const Config& next);
-  /// Takes what prepare() made, once the configuration has been replaced. Found devices stay.
+  /// Takes what prepare() made, once the configuration has been replaced. Found devices stay, and pages whose names
+  /// no other device has now.
   void replace(std::vector<std::shared_ptr<Device>> configured);
   bool has(const Device& device) const;
 
   /// Called when devices have joined or gone.
   void on_change(std::function<void()> handler) { on_change_ = std::move(handler); }
-  /// A found device joins; its name is nobody's yet.
-  Device& add(DeviceConfig device, std::shared_ptr<TlsFiles> tls);
-  /// A found device goes; clients that are connected to it stay so.
+  /// A device that is found or a page joins; its name is nobody's yet.
+  Device& add(DeviceConfig device, std::shared_ptr<TlsFiles> tls, std::shared_ptr<PageLink> page = nullptr);
+  /// Such a device goes; clients that are connected to it stay so.
   void remove(const Device& device);
 
   const std::vector<std::shared_ptr<Device>>& all() const { return devices_; }

@@ -99,6 +99,14 @@ TEST_CASE("leases: what a device needs, and what makes it safe") {
         "gateway.json: /devices/0/leases/members/0/lease: ", "required, covered, never");
 }
 
+TEST_CASE("pages that are devices") {
+  CHECK_FALSE(parse_config(with(R"("insecure": false)")).config.serve.is_enabled);
+  CHECK(parse_config(with(R"("serve": {})")).config.serve == ServeConfig{true, 16, DeviceMode::shared});
+  CHECK(parse_config(with(R"("serve": {"max_devices": 3, "mode": "relay"})")).config.serve ==
+        ServeConfig{true, 3, DeviceMode::relay});
+  finds(with(R"("serve": {"max_devices": 0})"), "gateway.json: /serve/max_devices: ", "expected");
+}
+
 TEST_CASE("who may do what") {
   const auto parsed = parse_config(R"({
     "listen": ["127.0.0.1:0"], "devices": [], "trusted_proxies": ["127.0.0.1"],
@@ -110,7 +118,8 @@ TEST_CASE("who may do what") {
       "grants": [{"users": ["*@lab"], "roles": ["viewer"]}],
       "rules": [{"roles": ["*"], "devices": ["a"], "services": ["s"], "paths": ["s.*"], "members": [""],
                  "may": ["read", "lock"]},
-                {"roles": ["ops"], "may": ["metrics", "admin"]}]}})");
+                {"roles": ["ops"], "may": ["metrics", "admin"]},
+                {"roles": ["staff"], "devices": ["phone-*"], "may": ["serve"]}]}})");
   REQUIRE(parsed.findings.empty());
   const auto& access = parsed.config.access;
   CHECK(access.users_file == "users");
@@ -119,7 +128,8 @@ TEST_CASE("who may do what") {
   CHECK(access.anonymous_role == "guest");
   CHECK(access.grants == std::vector<RoleGrant>{{{"*@lab"}, {"viewer"}}});
   CHECK(access.rules == std::vector<AccessRule>{{{"*"}, {"a"}, {"s"}, {"s.*"}, {""}, {Verb::read, Verb::lock}},
-                                                {{"ops"}, {}, {}, {}, {}, {Verb::metrics, Verb::admin}}});
+                                                {{"ops"}, {}, {}, {}, {}, {Verb::metrics, Verb::admin}},
+                                                {{"staff"}, {"phone-*"}, {}, {}, {}, {Verb::serve}}});
   CHECK(access.audit.file == "audit");
   CHECK(access.has_users());
   const auto audit =
@@ -131,6 +141,10 @@ TEST_CASE("who may do what") {
     finds(with(R"("access": {)" + part + "}"), "gateway.json: /access" + path + ": ", contains);
   };
   access_finds(R"("rules": [{"roles": ["a"], "may": ["reed"]}])", "/rules/0/may/0", "expected one of");
+  access_finds(R"("rules": [{"roles": ["a"], "devices": ["d"], "may": ["admin"]}])", "/rules/0/may",
+               "names no devices");
+  access_finds(R"("rules": [{"roles": ["a"], "paths": ["s"], "may": ["serve"]}])", "/rules/0/may",
+               "names no services, paths or members");
   const std::string agent = R"("rules": [{"roles": ["a"], "may": ["call"], "agent": )";
   access_finds(agent + R"({"limits": {"v": 3}}}])", "/rules/0/agent/limits/v", "[LEAST, MOST]");
   access_finds(agent + R"({"limits": {"v": [1, 0]}}}])", "/rules/0/agent/limits/v", "[LEAST, MOST]");

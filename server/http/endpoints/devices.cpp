@@ -24,6 +24,7 @@ nlohmann::ordered_json describe(const Device& device, const Request& request, co
   out["websocket_url"] = websocket_url(arrival, device.config().name);
   out["mode"] = device.is_shared() ? "shared" : "relay";
   out["found"] = device.config().is_found;
+  out["served"] = device.config().is_served;
   out["node_id"] = nullptr;
   out["node_name"] = nullptr;
   const auto& identity = device.identity();
