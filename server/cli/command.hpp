@@ -81,6 +81,7 @@ void add_watch(Commands& commands);
 void add_record(Commands& commands);
 void add_replay(Commands& commands);
 void add_export(Commands& commands);
+void add_mcp(Commands& commands);
 void add_ping(Commands& commands);
 void add_bench(Commands& commands);
 void add_top(Commands& commands);

@@ -27,6 +27,7 @@ int run_command_line(std::vector<std::string> words) {
   add_record(commands);
   add_replay(commands);
   add_export(commands);
+  add_mcp(commands);
   add_ping(commands);
   add_bench(commands);
   add_top(commands);

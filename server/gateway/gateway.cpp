@@ -7,10 +7,13 @@
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <cerrno>
+#include <cstring>
 #include <utility>
 
 #include "core/session/service/service_index.hpp"
 #include "node/transport/accept_all.hpp"
+#include "node/transport/socket_stream.hpp"
 #include "server/config/access_options.hpp"
 #include "server/front/front_door.hpp"
 #include "server/gateway/routes.hpp"
@@ -265,10 +268,32 @@ void Gateway::accept(asio::ip::tcp::socket socket) {
                 {{"peer", peer.address().to_string()}, {"open", admission_.open()}});
     return;
   }
+  serve(rr::make_tcp_stream(std::move(socket), config_.timeouts.send_stall), peer, local, std::move(*ticket));
+}
+
+rr::Result<std::unique_ptr<rr::ByteStream>> Gateway::connect_inside() {
+  int pair[2];
+  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair) != 0)
+    return rr::make_error(rr::ErrorCode::system_resource_error,
+                          std::string("no pair of sockets: ") + std::strerror(errno));
+  const auto stream_of = [this](int socket) {
+    return std::make_unique<rr::SocketStream>(rr::SocketStream::Socket(io_, {AF_UNIX, 0}, socket), "this process",
+                                              config_.timeouts.send_stall);
+  };
+  auto ours = stream_of(pair[0]);
+  auto theirs = stream_of(pair[1]);
+  auto ticket = admission_.admit(std::nullopt);
+  if (!ticket) return rr::make_error(rr::ErrorCode::out_of_system_resource, "too many connections");
+  const asio::ip::tcp::endpoint here(asio::ip::address_v4::loopback(), 0);
+  serve(std::move(ours), here, here, std::move(*ticket));
+  return theirs;
+}
+
+void Gateway::serve(std::unique_ptr<rr::ByteStream> stream, const asio::ip::tcp::endpoint& peer,
+                    const asio::ip::tcp::endpoint& local, Admission::Ticket ticket) {
   ++open_connections_;
-  auto stream = rr::make_tcp_stream(std::move(socket), config_.timeouts.send_stall);
-  auto serve = serve_connection(*this, std::move(stream), peer, local, std::move(*ticket));
-  asio::co_spawn(io_, std::move(serve), [this](std::exception_ptr failure) {
+  auto serving = serve_connection(*this, std::move(stream), peer, local, std::move(ticket));
+  asio::co_spawn(io_, std::move(serving), [this](std::exception_ptr failure) {
     --open_connections_;
     if (is_stopping_) drained_.cancel();
     if (!failure) return;

@@ -24,6 +24,9 @@ class Gateway : public GatewayState {
   /// Errors   connection_error: an address that can't be listened on; then nothing is started.
   [[nodiscard]] rr::Result<std::vector<rr::HostPort>> start(const std::vector<int>& sockets = {});
 
+  /// Serves a client of this process, as one from 127.0.0.1. Errors   system_resource_error, out_of_system_resource.
+  [[nodiscard]] rr::Result<std::unique_ptr<rr::ByteStream>> connect_inside();
+
   /// Goes on with another configuration. Sessions end only where their device is gone or another one; limits, timeouts
   /// and sizes hold for new connections.
   /// Errors   certificates or CAs that can't be used, an address that can't be listened on; then nothing has changed.
@@ -49,6 +52,8 @@ class Gateway : public GatewayState {
   void serve(Listener listener);
   rr::Result<> adopt(int socket, std::vector<rr::HostPort>& bound);
   void accept(boost::asio::ip::tcp::socket socket);
+  void serve(std::unique_ptr<rr::ByteStream> stream, const boost::asio::ip::tcp::endpoint& peer,
+             const boost::asio::ip::tcp::endpoint& local, Admission::Ticket ticket);
   rr::awaitable<void> drain();
   rr::awaitable<void> watch_files();
   /// Ends what goes on for clients whose proof was revoked or has expired.

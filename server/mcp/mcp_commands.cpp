@@ -3,6 +3,7 @@
 #include <chrono>
 
 #include "server/http/endpoints/call_log.hpp"
+#include "server/http/endpoints/large_json.hpp"
 #include "server/http/endpoints/leases.hpp"
 #include "server/http/endpoints/member_values.hpp"
 #include "server/mcp/mcp_describe.hpp"
@@ -11,6 +12,11 @@
 namespace rrgate {
 
 namespace {
+
+/// Results of a generator that an agent gets.
+constexpr std::size_t most_results = 100;
+constexpr std::size_t usual_results = 10;
+constexpr std::size_t largest_results = 1024u * 1024;  // bytes of values; as JSON they may be longer
 
 /// What a device may take to answer; it is the lease that bounds it.
 constexpr std::chrono::seconds longest_call{50};
@@ -83,12 +89,34 @@ const rr::MemberDefinition& commanded_member(const Target& target, Verb verb) {
            rr::quote(name_of(target)) + " is a " +
                (member ? std::string(member_kind_name(member->kind)) : std::string("object")) +
                "; agents call functions and set properties, and write to nothing else");
-  if (is_call && member->is_generator())
+  if (is_call && takes_values(*member))
     refuse(rr::ErrorCode::invalid_operation,
-           rr::quote(member->name) + " is a generator, which goes on for longer than one request; agents call none");
+           rr::quote(member->name) + " is a generator that is sent a value for each step; agents call none of these");
   expect_direction(*member, rr::MemberDirection::readonly);
   return *member;
 }
+
+/// A generator that the device is told of the end of, whatever that comes by. One that is at its end hears nothing.
+class OpenGenerator {
+ public:
+  OpenGenerator(std::shared_ptr<ValueClient> client, const Target& target)
+      : client_(std::move(client)), end_(target.request(rr::CallKind::generator_abort)) {
+    end_.generator = client_->next_generator();
+  }
+  OpenGenerator(const OpenGenerator&) = delete;
+  OpenGenerator& operator=(const OpenGenerator&) = delete;
+  ~OpenGenerator() {
+    client_->upstream()->request(*client_, end_, [](const rr::Result<rr::Value>&) {});
+  }
+
+  rr::GeneratorId id() const { return end_.generator; }
+  /// It will end in good order.
+  void close_at_end() { end_.kind = rr::CallKind::generator_close; }
+
+ private:
+  std::shared_ptr<ValueClient> client_;
+  rr::Called end_;
+};
 
 }  // namespace
 
@@ -98,6 +126,7 @@ struct McpTools::Command {  // NOLINT(bugprone-exception-escape): the JSON of it
   rr::Called called = {};
   rr::OrderedJson values = {};  ///< of `called`, by the names of parameters or of the property
   WantedCommand wanted = {};
+  std::size_t most = usual_results;  ///< of a generator
 };
 
 McpTools::Answer McpTools::call_function(JsonRequestPtr arguments) {
@@ -118,6 +147,7 @@ McpTools::Answer McpTools::command(JsonRequestPtr arguments, Verb verb) {
   allow(target, verb);
   const auto& member = commanded_member(target, verb);
   const rr::JsonForm form;
+  if (const auto* most = arguments->find("most")) command.most = count_of(*most, "most", most_results);
   command.called = target.request(verb == Verb::call ? rr::CallKind::function : rr::CallKind::property_set);
   if (verb == Verb::call) {
     command.called.arguments = arguments_of(*arguments, target, form);
@@ -191,10 +221,11 @@ rr::awaitable<void> McpTools::ask_person(const Command& command) {
     go_on(*command.target, command.wanted.verb);
     return asked->state() != ApprovalState::pending;
   };
-  const std::string nobody = "nobody has answered in time, and so it is refused";
   std::optional<rr::Error> failed;
+  reply_.note("a person is asked");
   try {
-    co_await reply_.wait(longest, is_answered, nobody);
+    if (!co_await reply_.wait(longest, is_answered))
+      failed = rr::make_error(rr::ErrorCode::operation_timeout, "nobody has answered in time, and so it is refused");
   } catch (const rr::Exception& exception) {
     failed = exception.error();
   }
@@ -206,9 +237,6 @@ rr::awaitable<void> McpTools::ask_person(const Command& command) {
 }
 
 McpTools::Answer McpTools::give(const Command& command, const AgentTerms& terms) {
-  struct Answered {
-    std::optional<rr::Result<rr::Value>> result;
-  };
   const auto& target = *command.target;
   const auto trace = trace_id_of(reply_.request().header("traceparent"));
   const auto stopped = std::make_shared<bool>(false);
@@ -229,48 +257,107 @@ McpTools::Answer McpTools::give(const Command& command, const AgentTerms& terms)
     if (begun) begun->finish({});
     lease.emplace(client, target.path(), reply_.waker());
   }
-  const auto check = [&] {
+  const std::function<void()> check = [&] {
     if (*stopped) refuse(rr::ErrorCode::operation_aborted, "a person has stopped all agents");
+    reply_.expect_client();
     go_on(target, command.wanted.verb);
     if (lease) lease->check();
   };
   check();
+  reply_.note("the device is at work");
   const auto entry = gateway_.access().begin(standing_.identity(), command.wanted.what(), trace);
-  const auto answered = std::make_shared<Answered>();
-  client->upstream()->request(*client, command.called,
-                              [answered, entry, client, wake = reply_.waker()](const rr::Result<rr::Value>& result) {
-                                if (entry) entry->finish(result ? rr::Result<>() : rr::Result<>(result.error()));
-                                answered->result = result;
-                                wake();
-                              });
-  const std::function<bool()> is_answered = [&] {
-    check();
-    return answered->result.has_value();
-  };
-  const std::string late = "the device has not answered in time" + std::string(lease ? "; it was made safe" : "");
-  co_await reply_.wait(longest_call, is_answered, late);
-  if (!*answered->result) {
-    has_asked_device_ = true;
-    throw rr::Exception(answered->result->error());
-  }
   auto out = rr::OrderedJson::object();
   rr::add_key(out, "member") = name_of(target);
   rr::add_key(out, "sent") = command.values;
-  if (command.wanted.verb == Verb::call) rr::add_key(out, from_device) = to_json(target, **answered->result, {});
+  if (target.member->is_generator()) {
+    const auto results = co_await run_generator(command, client, check, entry);
+    out.update(results);
+  } else {
+    auto called = command.called;
+    OnAnswer record = [entry](const rr::Result<rr::Value>& result) {
+      if (entry) entry->finish(result ? rr::Result<>() : rr::Result<>(result.error()));
+    };
+    const auto answered = co_await ask(*client, std::move(called), longest_call, check, std::move(record));
+    if (!answered) {
+      has_asked_device_ = true;
+      throw rr::Exception(answered.error());
+    }
+    if (command.wanted.verb == Verb::call) co_await add_value(out, target, *answered);
+  }
   if (!lease) co_return out;
   lease->renew();
   const std::function<bool()> is_over = [&] {
     check();
     return false;
   };
-  std::optional<rr::Error> ended;
-  try {
-    co_await reply_.wait(terms.hold, is_over, "");
-  } catch (const rr::Exception& exception) {
-    if (exception.error().code != rr::ErrorCode::operation_timeout) ended = exception.error();
-  }
-  if (ended) throw rr::Exception(*ended);
+  reply_.note("the lease is held");
+  co_await reply_.wait(terms.hold, is_over);
   rr::add_key(out, "made_safe") = "the lease was held for " + std::to_string(terms.hold.count()) + " s";
+  co_return out;
+}
+
+rr::awaitable<rr::Result<rr::Value>> McpTools::ask(ValueClient& client, rr::Called called,
+                                                   std::chrono::milliseconds longest,
+                                                   const std::function<void()>& check, OnAnswer on_answer) {
+  struct Answered {
+    std::optional<rr::Result<rr::Value>> result;
+  };
+  const auto answered = std::make_shared<Answered>();
+  client.upstream()->request(client, std::move(called),
+                             [answered, on_answer = std::move(on_answer), life = client.shared_from_this(),
+                              wake = reply_.waker()](const rr::Result<rr::Value>& result) {
+                               if (on_answer) on_answer(result);
+                               answered->result = result;
+                               wake();
+                             });
+  const std::function<bool()> is_answered = [&] {
+    check();
+    return answered->result.has_value();
+  };
+  if (!co_await reply_.wait(longest, is_answered))
+    refuse(rr::ErrorCode::operation_timeout, "the device has not answered in time");
+  co_return std::move(*answered->result);
+}
+
+McpTools::Answer McpTools::run_generator(const Command& command, std::shared_ptr<ValueClient> client,
+                                         const std::function<void()>& check, AuditEntryPtr entry) {
+  const auto& target = *command.target;
+  const auto until = std::chrono::steady_clock::now() + longest_call;
+  const auto generator = std::make_shared<OpenGenerator>(client, target);
+  auto opening = command.called;
+  opening.kind = rr::CallKind::generator_open;
+  opening.generator = generator->id();
+  std::optional<rr::Error> failed;
+  OnAnswer keep = [generator](const rr::Result<rr::Value>&) {};  // who goes before it is open leaves its end to this
+  if (const auto opened = co_await ask(*client, std::move(opening), longest_call, check, std::move(keep)); !opened)
+    failed = opened.error();
+  auto results = rr::OrderedJson::array();
+  std::size_t bytes = 0;
+  bool has_ended = false;
+  while (!failed && results.size() < command.most && bytes < largest_results) {
+    auto step = target.request(rr::CallKind::generator_next);
+    step.generator = generator->id();
+    const auto rest = std::chrono::duration_cast<milliseconds>(until - std::chrono::steady_clock::now());
+    const auto next = co_await ask(*client, std::move(step), rest, check, nullptr);
+    has_ended = !next && next.error().code == rr::ErrorCode::stop_iteration;
+    if (has_ended) break;
+    if (!next) {
+      failed = next.error();
+    } else {
+      results.push_back(to_json(target, *next, {}));
+      bytes += held_bytes(results.back());
+      reply_.note(std::to_string(results.size()) + " results so far");
+    }
+  }
+  if (entry) entry->finish(failed ? rr::Result<>(*failed) : rr::Result<>());
+  if (!failed) generator->close_at_end();
+  if (failed) {
+    has_asked_device_ = true;
+    throw rr::Exception(*failed);
+  }
+  auto out = rr::OrderedJson::object();
+  rr::add_key(out, "has_ended") = has_ended;
+  rr::add_key(out, from_device) = std::move(results);
   co_return out;
 }
 

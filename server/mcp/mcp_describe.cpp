@@ -108,6 +108,10 @@ rr::OrderedJson named_types(const rr::OrderedJson& members, const rr::TypeRegist
 
 }  // namespace
 
+bool takes_values(const rr::MemberDefinition& function) {
+  return !function.parameters.empty() && function.parameters.back().type.container == rr::ContainerKind::generator;
+}
+
 std::vector<Verb> uses_of(const rr::MemberDefinition& member) {
   std::vector<Verb> out;
   switch (member.kind) {
@@ -115,6 +119,8 @@ std::vector<Verb> uses_of(const rr::MemberDefinition& member) {
     case rr::MemberKind::wire:
     case rr::MemberKind::memory:
       if (member.direction() != rr::MemberDirection::writeonly) out.push_back(Verb::read);
+      if (member.kind == rr::MemberKind::wire && member.direction() != rr::MemberDirection::writeonly)
+        out.push_back(Verb::subscribe);
       if (member.kind == rr::MemberKind::property && member.direction() != rr::MemberDirection::readonly)
         out.push_back(Verb::write);
       break;
@@ -123,7 +129,7 @@ std::vector<Verb> uses_of(const rr::MemberDefinition& member) {
       out.push_back(Verb::subscribe);
       break;
     case rr::MemberKind::function:
-      if (!member.is_generator()) out.push_back(Verb::call);
+      if (!takes_values(member)) out.push_back(Verb::call);
       break;
     default:
       break;

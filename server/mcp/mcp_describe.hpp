@@ -16,6 +16,9 @@ inline constexpr std::string_view from_device = "from_device";
 /// Text of a device, cut where it is longer than anybody needs.
 std::string bounded_text(std::string_view text);
 
+/// Whether a function is a generator that is sent values, one for each step.
+bool takes_values(const rr::MemberDefinition& function);
+
 /// The verbs by which an agent can use a member at all.
 std::vector<Verb> uses_of(const rr::MemberDefinition& member);
 

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <array>
 
+#include "node/tls/base64.hpp"
+#include "node/tls/digest.hpp"
 #include "server/config/version.hpp"
 #include "server/http/endpoints/large_json.hpp"
 #include "server/http/endpoints/refusal.hpp"
 #include "server/mcp/mcp_describe.hpp"
 #include "server/mcp/mcp_tools.hpp"
+#include "server/state/agent_requests.hpp"
 
 namespace rrgate {
 
@@ -27,6 +30,8 @@ constexpr int invalid_params = -32602;
 constexpr int resource_not_found = -32002;
 constexpr int header_mismatch = -32020;
 constexpr int unsupported_version = -32022;
+
+constexpr const char* session_header = "Mcp-Session-Id";
 
 constexpr const char* instructions =
     "Robots and devices of one gateway. Begin with the tool \"devices\", then \"describe\" a path, then use it. "
@@ -130,6 +135,29 @@ rr::OrderedJson capabilities() {
   return {{"tools", rr::OrderedJson::object()}, {"resources", rr::OrderedJson::object()}};
 }
 
+/// What the requests of a client are known by, from which it may cancel others: nobody else knows the id, and with
+/// another login it is another session. Empty: it has none. The gateway keeps nothing of it.
+std::string session_of(const Request& request) {
+  const auto id = request.header(session_header);
+  return id.empty() ? std::string() : std::string(id) + "\n" + request.identity.name;
+}
+
+/// A request that the client cancels ends as if the client had gone.
+void cancel(AgentRequests& requests, const McpMessage& message, const std::string& session) {
+  const auto id = message.params.find("requestId");
+  if (session.empty() || id == message.params.end()) return;
+  requests.cancel(session, id->dump());
+}
+
+/// What the client calls a request of which it wants to know how far it is; null where it does not.
+rr::OrderedJson progress_token(const McpMessage& message) {
+  const auto meta = message.params.find("_meta");
+  if (meta == message.params.end() || !meta->is_object()) return nullptr;
+  const auto token = meta->find("progressToken");
+  if (token == meta->end() || !(token->is_string() || token->is_number_integer())) return nullptr;
+  return *token;
+}
+
 rr::OrderedJson initialize(const McpMessage& message) {
   const auto wanted = message.text("protocolVersion");
   const bool has_it =
@@ -169,7 +197,11 @@ rr::OrderedJson resource_templates() {
 
 // g++ 12 destroys lists of initializers twice where they stand in a coroutine: these two are functions.
 
-rr::OrderedJson resource_result(const std::string& uri, const rr::OrderedJson& read) {
+rr::OrderedJson resource_result(const std::string& uri, const rr::OrderedJson& read, const McpImage* image) {
+  if (image)
+    return {
+        {"contents",
+         {{{"uri", uri}, {"mimeType", image->media_type}, {"blob", rr::encode_base64(rr::as_bytes(image->bytes))}}}}};
   const auto result = tool_result(read, false);
   return {{"contents", {{{"uri", uri}, {"mimeType", "application/json"}, {"text", result["content"][0]["text"]}}}}};
 }
@@ -200,7 +232,7 @@ rr::awaitable<rr::OrderedJson> result_of(GatewayState& gateway, McpReply& reply,
   if (method == "ping") co_return rr::OrderedJson::object();
   if (method == "tools/list") {
     page_of(0, message.text("cursor"));  // all tools are one page
-    co_return McpTools::list(gateway.config().mcp);
+    co_return McpTools::list();
   }
   if (method == "resources/list") co_return list_resources(gateway, who, message.text("cursor"));
   if (method == "resources/templates/list") co_return resource_templates();
@@ -215,7 +247,7 @@ rr::awaitable<rr::OrderedJson> result_of(GatewayState& gateway, McpReply& reply,
       refusal = refusal_of(exception.error(), tools);
     }
     if (refusal) throw McpRefusal(*refusal);
-    co_return resource_result(uri, read);
+    co_return resource_result(uri, read, tools.image());
   }
   if (method == "tools/call") {
     const auto name = message.text("name");
@@ -238,12 +270,19 @@ rr::awaitable<void> answer_message(GatewayState& gateway, ResponseWriter& writer
   try {
     message = read_message(writer.request());
     take_revision(message, writer.request());
+    const auto session = session_of(writer.request());
+    auto& requests = AgentRequests::of(writer.executor());
     if (message.id.is_null()) {
+      if (message.method == "notifications/cancelled") cancel(requests, message, session);
       Response accepted;
       accepted.status = 202;
       co_await writer.send(accepted);
       co_return;
     }
+    reply.set_progress(progress_token(message));
+    AgentRequests::Handle under_way;
+    if (!session.empty()) under_way = requests.add(session, message.id.dump(), reply.canceller());
+    if (message.method == "initialize") writer.add_header(session_header, rr::encode_base64(rr::random_bytes(18)));
     auto result = co_await result_of(gateway, reply, message);
     if (message.is_modern) {
       rr::add_key(result, "resultType") = "complete";
@@ -283,6 +322,14 @@ rr::awaitable<void> answer_mcp(GatewayState& gateway, ResponseWriter& writer) {
   co_await answer_message(gateway, writer, message);
 }
 
+rr::awaitable<void> end_session(ResponseWriter& writer) {
+  if (const auto session = session_of(writer.request()); !session.empty())
+    AgentRequests::of(writer.executor()).cancel_all(session);
+  Response response;
+  response.status = 204;
+  co_await writer.send(response);
+}
+
 }  // namespace
 
 Handler mcp_endpoint(GatewayState& gateway) {
@@ -293,10 +340,31 @@ Handler mcp_endpoint(GatewayState& gateway) {
   };
 }
 
+Handler end_mcp_endpoint() {
+  return [](const Request&, std::string_view) {
+    Response response;
+    response.answer_later = end_session;
+    return response;
+  };
+}
+
+Handler mcp_metadata_endpoint(GatewayState& gateway) {
+  return [&gateway](const Request& request, std::string_view) {
+    const auto& jwt = gateway.access().state().config.jwt;
+    if (!gateway.config().mcp.is_enabled || !jwt.discovers || origin_of(request).empty())
+      return problem_response(404, "no issuer of tokens is known here, or the gateway serves no agents");
+    const rr::OrderedJson out{{"resource", origin_of(request) + std::string(mcp_path)},
+                              {"resource_name", "rrgate: robots and devices"},
+                              {"authorization_servers", {jwt.claims.issuer}},
+                              {"bearer_methods_supported", {"header"}}};
+    return json_response(200, rr::write_json(out) + "\n");
+  };
+}
+
 Handler no_mcp_stream_endpoint() {
   return [](const Request&, std::string_view) {
     auto response = problem_response(405, "messages come by POST; the gateway sends none that nobody has asked for");
-    response.set("Allow", "POST");
+    response.set("Allow", "DELETE, POST");
     return response;
   };
 }

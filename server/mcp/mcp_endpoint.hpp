@@ -5,15 +5,18 @@
 #include <string_view>
 
 #include "server/http/router.hpp"
+#include "server/state/agent_login.hpp"
 
 namespace rrgate {
 
 class GatewayState;
 
-inline constexpr std::string_view mcp_path = "/mcp";
-
 /// Answers one message of a client. Nothing is kept between two of them.
 Handler mcp_endpoint(GatewayState& gateway);
+/// The client's session is over: what it still waits for is cancelled.
+Handler end_mcp_endpoint();
+/// Which issuer's tokens clients show at mcp_path, where one is configured. Source: RFC 9728.
+Handler mcp_metadata_endpoint(GatewayState& gateway);
 /// 405: the gateway sends nothing that no request has asked for.
 Handler no_mcp_stream_endpoint();
 

@@ -23,11 +23,24 @@ class McpReply {
   std::function<void()> waker() const {
     return [state = state_] { state->news.cancel(); };
   }
-  /// Waits until `is_there`, looked at after each call of waker() and each second.
-  /// Throws   rr::Exception: operation_timeout, with `why`; operation_cancelled: the client has gone; what `is_there`
-  /// throws.
-  rr::awaitable<void> wait(std::chrono::milliseconds longest, const std::function<bool()>& is_there,
-                           const std::string& why);
+  /// The client wants to hear how far it is: each second that it waits it hears of what goes on.
+  /// `token`  a string or a number, of its choice.
+  void set_progress(rr::OrderedJson token) { progress_ = std::move(token); }
+  /// What goes on from now on, in words of the gateway.
+  void note(std::string what) { what_ = std::move(what); }
+  /// The client has cancelled the request: whoever waits hears it as if the client had gone. Outlives the reply.
+  std::function<void()> canceller() const {
+    return [state = state_] {
+      state->is_gone = true;
+      state->news.cancel();
+    };
+  }
+  /// Throws   rr::Exception, operation_cancelled: nobody wants the answer any more.
+  void expect_client() const;
+
+  /// Waits until `is_there`, looked at after each call of waker() and each second. False: it was not in time.
+  /// Throws   rr::Exception: that of expect_client(); what `is_there` throws.
+  rr::awaitable<bool> wait(std::chrono::milliseconds longest, const std::function<bool()>& is_there);
   /// Ends the reply. `message`  a JSON-RPC response; borrowed for the wait.
   rr::awaitable<void> send(const rr::OrderedJson& message, unsigned status);
 
@@ -38,8 +51,15 @@ class McpReply {
     bool is_gone = false;
   };
 
+  rr::awaitable<rr::error_code> begin_stream();
+  std::string sign_of_life() const;
+
   ResponseWriter& writer_;
   std::shared_ptr<State> state_;
+  rr::OrderedJson progress_ = nullptr;  ///< the client's token; null: it does not want to know
+  std::string what_;
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+  std::chrono::steady_clock::time_point next_sign_ = begin_;
   bool is_streamed_ = false;
 };
 

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "server/access/standing.hpp"
+#include "server/mcp/mcp_image.hpp"
 #include "server/mcp/mcp_reply.hpp"
 #include "server/socket/json_members.hpp"
 
@@ -18,10 +19,13 @@ class McpTools {
       : gateway_(gateway), reply_(reply), standing_(gateway.access(), reply.request().identity) {}
 
   /// The result of tools/list. The same for all devices: nothing of theirs is in it.
-  static rr::OrderedJson list(const McpConfig& config);
+  static rr::OrderedJson list();
   /// The result of tools/call: what a tool can't do is one too. nullopt: there is no such tool.
   /// `arguments`  borrowed for the wait.
   rr::awaitable<std::optional<rr::OrderedJson>> call(const std::string& name, const rr::Json& arguments);
+
+  /// The image that stands beside the answer; null: there is none.
+  const McpImage* image() const { return image_ ? &*image_ : nullptr; }
 
   /// What there is to read, by its URI, "rrgate://DEVICE" or "rrgate://DEVICE/PATH". Throws   rr::Exception.
   rr::awaitable<rr::OrderedJson> read_resource(const std::string& uri);
@@ -45,6 +49,7 @@ class McpTools {
   Answer describe(JsonRequestPtr arguments);
   Answer read(JsonRequestPtr arguments);
   Answer wait_for_event(JsonRequestPtr arguments);
+  Answer watch(JsonRequestPtr arguments);
   Answer call_function(JsonRequestPtr arguments);
   Answer set_property(JsonRequestPtr arguments);
   Answer stop(JsonRequestPtr arguments);
@@ -61,7 +66,12 @@ class McpTools {
   void allow(const Target& target, Verb verb);
   /// For who waits: he still may. Throws   rr::Exception.
   void go_on(const Target& target, Verb verb);
+
+  // mcp_reading.cpp. All throw   rr::Exception.
+
   Answer read_target(JsonRequestPtr arguments, TargetPtr target);
+  /// Adds what a device has said: under "from_device", or as an image beside the answer.
+  rr::awaitable<void> add_value(rr::OrderedJson& answer, const Target& target, const rr::Value& value);
 
   // mcp_commands.cpp. All throw   rr::Exception.
 
@@ -73,18 +83,30 @@ class McpTools {
   rr::awaitable<void> ask_person(const Command& command);
   /// Gives the command, under the lease where the terms say so, and holds that.
   Answer give(const Command& command, const AgentTerms& terms);
+  using OnAnswer = std::function<void(const rr::Result<rr::Value>&)>;
+  /// Asks the device for a part of a command. `check`  throws where it must not go on; borrowed for the wait.
+  /// `on_answer`  called when the device answers, though nobody may wait for it any more.
+  rr::awaitable<rr::Result<rr::Value>> ask(ValueClient& client, rr::Called called, std::chrono::milliseconds longest,
+                                           const std::function<void()>& check, OnAnswer on_answer);
+  /// All that a generator gives, up to as many as are wanted.
+  Answer run_generator(const Command& command, std::shared_ptr<ValueClient> client, const std::function<void()>& check,
+                       AuditEntryPtr entry);
 
   GatewayState& gateway_;
   McpReply& reply_;
   Standing standing_;
   std::optional<RateGate::Pass> pass_;
+  std::optional<McpImage> image_;
   bool has_asked_device_ = false;  ///< errors from then on may be in the device's words
 };
+
+/// A whole number from 1 to `most`. Throws   rr::Exception, invalid_argument.
+std::size_t count_of(const rr::Json& given, std::string_view name, std::size_t most);
 
 /// By the gateway's clock; of any time that a device may say.
 std::int64_t age_ms(const rr::TimeSpec& time, std::chrono::system_clock::time_point now);
 
-/// {"content": ..., "structuredContent": ...}
-rr::OrderedJson tool_result(rr::OrderedJson result, bool is_error);
+/// {"content": ..., "structuredContent": ...}. `image`  beside the result; null: there is none.
+rr::OrderedJson tool_result(rr::OrderedJson result, bool is_error, const McpImage* image = nullptr);
 
 }  // namespace rrgate

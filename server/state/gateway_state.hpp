@@ -19,6 +19,7 @@
 #include "server/rr/shared_devices.hpp"
 #include "server/state/admission.hpp"
 #include "server/state/connection.hpp"
+#include "server/state/handshake_turns.hpp"
 #include "server/state/http_access.hpp"
 #include "server/state/workers.hpp"
 #include "server/upstream/device.hpp"
@@ -59,6 +60,8 @@ class GatewayState {
   Documents& documents() { return documents_; }
   /// Clients that hold a lease for requests of HTTP, by the key that those show; each until its lease ends.
   std::map<std::string, std::shared_ptr<ValueClient>, std::less<>>& lease_holders() { return lease_holders_; }
+  /// Of whom TLS handshakes go on.
+  HandshakeTurns& handshakes() { return handshakes_; }
   /// What would take long on this thread.
   Workers& workers() { return workers_; }
   /// What clients make the gateway hold.
@@ -102,6 +105,7 @@ class GatewayState {
   std::unique_ptr<FoundDevices> found_;
   PageLinks pages_;
   Admission admission_;
+  HandshakeTurns handshakes_;
   SharedDevices shared_;
   Router router_;
   Documents documents_{32};

@@ -8,6 +8,7 @@
 #include "server/http/sign_in_cookie.hpp"
 #include "server/json/json.hpp"
 #include "server/limits/client_network.hpp"
+#include "server/state/agent_login.hpp"
 #include "server/state/connection.hpp"
 
 namespace rrgate {
@@ -81,8 +82,12 @@ rr::awaitable<rr::Result<Identity>> HttpAccess::identify(const Request& request,
       found->face = face;
       if (auto renewed = access_.renew(*found)) co_return std::move(*renewed);
     }
-  if (connection.identity.proof == Proof::certificate && std::chrono::system_clock::now() < connection.identity.ends)
-    co_return proven(connection.identity);
+  if (connection.identity.proof == Proof::certificate)
+    if (auto certified = access_.renew(connection.identity)) {
+      certified->client = client;
+      certified->face = face;
+      co_return std::move(*certified);
+    }
   co_return access_.anonymous(client, face);
 }
 
@@ -149,7 +154,12 @@ Response HttpAccess::refusal(const Request& request, const rr::Error& error) con
   response.set("Cache-Control", "no-store");
   if (status == 401 && state.users && request.header("X-Requested-With").empty())
     response.set("WWW-Authenticate", "Basic realm=\"rrgate\", charset=\"UTF-8\"");
-  if (status == 401 && (state.tokens || state.jwt)) response.set("WWW-Authenticate", "Bearer realm=\"rrgate\"");
+  if (status == 401 && (state.tokens || state.jwt)) {
+    std::string challenge = "Bearer realm=\"rrgate\"";
+    if (request.path() == mcp_path && state.config.jwt.discovers && !origin_of(request).empty())
+      challenge += ", resource_metadata=\"" + origin_of(request) + std::string(mcp_metadata_path) + "\"";
+    response.set("WWW-Authenticate", std::move(challenge));
+  }
   if (status == 503) response.set("Retry-After", "2");
   return response;
 }

@@ -1,15 +1,13 @@
 #include "server/state/issuer_keys.hpp"
 
-#include <array>
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/use_awaitable.hpp>
-#include <boost/beast/http/parser.hpp>
-#include <boost/beast/http/string_body.hpp>
 
 #include "core/session/url.hpp"
 #include "node/driver/backoff.hpp"
+#include "node/http/response_reader.hpp"
 #include "node/transport/tcp.hpp"
 #include "node/transport/tls.hpp"
 #include "node/transport/watchdog.hpp"
@@ -19,7 +17,6 @@
 namespace rrgate {
 
 namespace asio = boost::asio;
-namespace http = boost::beast::http;
 
 namespace {
 
@@ -42,28 +39,9 @@ rr::Result<std::string> text_at(std::string_view document, const char* key) {
 /// The body of what comes until the connection, or the response, ends.
 rr::awaitable<rr::Result<std::string>> read_answer(rr::ByteStream& stream) {
   const auto fail = [](const std::string& why) { return rr::make_error(rr::ErrorCode::connection_error, why); };
-  http::response_parser<http::string_body> parser;
-  parser.body_limit(largest_document);
-  parser.eager(true);
-  rr::Bytes received;
-  while (!parser.is_done()) {
-    std::array<std::uint8_t, 4096> chunk;
-    const auto read = co_await stream.read_some(chunk);
-    if (read.error && parser.need_eof()) break;
-    if (read.error) co_return fail(read.error.message());
-    boost::beast::error_code error;
-    if (read.is_end()) {
-      parser.put_eof(error);
-    } else {
-      received.insert(received.end(), chunk.begin(), chunk.begin() + static_cast<std::ptrdiff_t>(read.bytes));
-      const auto used = parser.put(asio::const_buffer(received.data(), received.size()), error);
-      received.erase(received.begin(), received.begin() + static_cast<std::ptrdiff_t>(used));
-      if (error == http::error::need_more) error = {};
-    }
-    if (error)
-      co_return fail("no HTTP, or more than " + std::to_string(largest_document) + " bytes: " + error.message());
-    if (received.size() > largest_document) co_return fail("a header without end");
-  }
+  ResponseParser parser;
+  const std::function<void()> nobody;
+  if (const auto read = co_await read_response(stream, parser, largest_document, nobody); !read) co_return read.error();
   if (parser.get().result_int() != 200) co_return fail("status " + std::to_string(parser.get().result_int()));
   co_return std::move(parser.get().body());
 }

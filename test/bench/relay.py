@@ -64,12 +64,12 @@ def haproxy(device_port):
 
 @contextlib.contextmanager
 def listening(port, *command):
-    """A process that has begun to listen."""
+    """A process that has begun to listen: its id."""
     with tempfile.TemporaryDirectory() as scratch:
         process = Background(command, pathlib.Path(scratch) / "log")
         try:
             process.wait_until(lambda: is_open(port))
-            yield
+            yield process.process.pid
         finally:
             process.stop()
 

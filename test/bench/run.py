@@ -13,6 +13,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 
+import agents
 import calls
 import relay
 
@@ -58,12 +59,14 @@ FIGURES = ("min", "p50", "p99", "mean")
 AIMS = {
     "codec": Aim("at least half as fast as memcpy", 0.5, at_most=False),
     calls.SLOW: Delay(5),
+    agents.NAME: Delay(1, "p50"),
     "relay": Aim("no slower than HAProxy in TCP mode (which differs from itself by 5 %)", 1.05),
     f"call, rr+tcp, {calls.ONE}": Aim("of a raw echo", 1.3, kinds=("p50",)),
     f"call, rr+tcp, {calls.TWO}": Aim("of a raw echo", 1.5, kinds=("p50",)),
     f"call, rr+ws, {calls.ONE}": Aim("of a raw TCP echo", 1.6, kinds=("p50",)),
     f"call, rr+ws, {calls.TWO}": Aim("of a raw TCP echo", 1.6, kinds=("p50",)),
 }
+MOST_BYTES = 32_000  # less than so many for an idle agent
 MOST_ALLOCATIONS = 2  # less than so many for a call, client and service together
 
 
@@ -75,6 +78,8 @@ def aim_of(result):
 def is_met(result):
     if "each" in result:
         return result["each"] < MOST_ALLOCATIONS
+    if "bytes" in result:
+        return result["bytes"] < MOST_BYTES
     aim = aim_of(result)
     return aim is None or aim.is_met(result)
 
@@ -87,6 +92,7 @@ def results_of(build):
         yield from lines_of(command)
     with relay.device(build) as device, relay.relays(build, device) as (ours, yardstick):
         yield from lines_of([build / "test" / "bench" / "bench_relay", ours, yardstick])
+    yield from lines_of([sys.executable, pathlib.Path(agents.__file__), "--build", build])
 
 
 def lines_of(command):
@@ -102,7 +108,10 @@ def report(results):
     lines += ["", "| allocations | a call | aim | |", "|---|---|---|---|"]
     lines += [f"| {result['name'].removeprefix('allocations, ')}, client and service together | {result['each']:.2f} "
               f"| < {MOST_ALLOCATIONS} | {verdict(result)} |" for result in results if "each" in result]
-    judged = [result for result in results if "each" in result or aim_of(result)]
+    lines += ["", "| memory | each | aim | |", "|---|---|---|---|"]
+    lines += [f"| {result['name'].removeprefix('memory, ')} | {result['bytes'] / 1000:.1f} kB | < {MOST_BYTES / 1000:.0f} kB "
+              f"| {verdict(result)} |" for result in results if "bytes" in result]
+    judged = [result for result in results if "each" in result or "bytes" in result or aim_of(result)]
     missed = sum(not is_met(result) for result in judged)
     lines += ["", f"{len(judged) - missed} aims met, {missed} missed; {platform.machine()}, {platform.processor() or 'processor unknown'}"]
     return "\n".join(lines) + "\n"

@@ -73,19 +73,26 @@ class Robot:
 
 
 @contextlib.contextmanager
-def hostile_robot():
-    """(URL, robot)"""
+def serving(definition, type_name, robot):
+    """The URL of a node of this process that has the robot as its service."""
     other = RR.RobotRaconteurNode()
     other.Init()
     port = free_port()
     transport = RR.TcpTransport(other)
     transport.StartServer(port)
     other.RegisterTransport(transport)
-    other.RegisterServiceType(HOSTILE)
-    robot = Robot()
-    other.RegisterService("robot", "experimental.hostile.Robot", robot)
-    yield f"rr+tcp://127.0.0.1:{port}/?service=robot", robot
+    other.RegisterServiceType(definition)
+    other.RegisterService("robot", type_name, robot)
+    yield f"rr+tcp://127.0.0.1:{port}/?service=robot"
     other.Shutdown()
+
+
+@contextlib.contextmanager
+def hostile_robot():
+    """(URL, robot)"""
+    robot = Robot()
+    with serving(HOSTILE, "experimental.hostile.Robot", robot) as url:
+        yield url, robot
 
 
 READS = {"roles": ["agent"], "may": ["read", "subscribe"]}

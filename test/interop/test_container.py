@@ -246,10 +246,8 @@ def test_the_unit_is_one(tmp_path):
     result = subprocess.run(["systemd-analyze", "security", "--offline=true", "--threshold=20", tmp_path / "rrgate.service"],
                             capture_output=True, text=True, timeout=60)
     assert result.returncode == 0, result.stdout[-300:]
-<<<<<<< HEAD
     (said,) = re.findall(r"rates its exposure ([\d.]+) ", (ROOT / "docs/deploy.md").read_text())
     assert f"Overall exposure level for rrgate.service: {said} " in result.stdout
-=======
 
 
 def test_the_apparmor_profile_is_one(tmp_path):
@@ -266,4 +264,3 @@ def test_the_apparmor_profile_is_one(tmp_path):
     wrong = tmp_path / "wrong"
     wrong.write_text(profile.read_text().replace("/usr/bin/rrgate mr,", "/usr/bin/rrgate mz,"))
     assert subprocess.run([*command, wrong], capture_output=True, timeout=60, check=False).returncode != 0
->>>>>>> trust

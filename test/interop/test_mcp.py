@@ -56,7 +56,7 @@ def test_an_agent_finds_its_way_and_reads(site, modern):
         return tools.tools, devices.structured_content, resources.resources, read.structured_content, resource.contents[0].text
 
     tools, devices, resources, read, resource = with_agent(site.port, look, modern=modern)
-    assert {tool.name for tool in tools if tool.annotations.read_only_hint} == {"devices", "describe", "read", "wait_for_event"}
+    assert {tool.name for tool in tools if tool.annotations.read_only_hint} == {"devices", "describe", "read", "wait_for_event", "watch"}
     assert {tool.name for tool in tools if not tool.annotations.read_only_hint} == {"call", "set", "stop"}
     assert [each["name"] for each in devices["devices"]] == ["interop"]
     assert [str(each.uri) for each in resources] == ["rrgate://interop"]

@@ -3,8 +3,10 @@
 #include <limits>
 
 #include "server/access/api_tokens.hpp"
+#include "server/http/shrink_image.hpp"
 #include "server/json/json.hpp"
 #include "server/mcp/mcp_describe.hpp"
+#include "server/mcp/mcp_summary.hpp"
 #include "server/mcp/mcp_tools.hpp"
 #include "test/server/support/test_gateway.hpp"
 #include "test/support/folder.hpp"
@@ -42,7 +44,7 @@ TEST_CASE("agents: tools are the same whatever devices there are, and say whethe
   TestGateway two(2, enable);
   const auto tools = tell(none, request("tools/list")).json["result"]["tools"];
   CHECK(tools == tell(two, request("tools/list")).json["result"]["tools"]);
-  REQUIRE(tools.size() == 7);
+  REQUIRE(tools.size() == 8);
   for (const auto& tool : tools) {
     const auto name = tool["name"].get<std::string>();
     const bool is_command = name == "call" || name == "set";
@@ -119,4 +121,39 @@ TEST_CASE("agents: the age of a wire's value is told of any time that a device s
   CHECK(age_ms({1'899'999'998, 500'000'000}, now) == 1500);
   CHECK(age_ms({std::numeric_limits<std::int64_t>::max(), 0}, now) < -1'000'000'000'000);
   CHECK(age_ms({std::numeric_limits<std::int64_t>::min(), 0}, now) > 1'000'000'000'000);
+}
+
+TEST_CASE("agents: what is watched is summarised by its numbers, wherever they stand") {
+  McpSummary summary;
+  summary.add(rr::OrderedJson::parse(R"({"at": {"x": 1, "y": [2, -2]}, "name": "a", "big": "9007199254740993"})"));
+  summary.add(rr::OrderedJson::parse(R"({"at": {"x": 4, "y": []}, "is_on": true})"));
+  const auto told = summary.to_json();
+  REQUIRE(told.size() == 3);
+  CHECK(told["at.x"] == rr::OrderedJson::parse(R"({"min": 1.0, "max": 4.0, "mean": 2.5})"));
+  CHECK(told["at.y.1"]["mean"] == -2.0);
+  McpSummary number;
+  number.add(5);
+  CHECK(number.to_json()[""]["max"] == 5.0);
+  McpSummary many;
+  auto wide = rr::OrderedJson::object();
+  for (int i = 0; i < 1000; ++i) wide["n" + std::to_string(i)] = i;
+  many.add(wide);
+  CHECK(many.to_json().size() == 100);
+}
+
+TEST_CASE("a smaller image has the mean of each square of pixels") {
+  const rr::Bytes rows{0, 10, 20, 30, 99, /**/ 10, 20, 30, 40, 99, /**/ 200, 200, 7, 9, 99};
+  PixelImage image{4, 3, 5, PixelFormat::mono8, rows};
+  const auto half = shrink_image(image, 2);
+  CHECK(half.image.width == 2);
+  CHECK(half.image.height == 2);
+  CHECK(half.pixels == rr::Bytes{10, 30, 200, 8});
+  const auto same = shrink_image(image, 4);
+  CHECK(same.pixels == rr::Bytes{0, 10, 20, 30, 10, 20, 30, 40, 200, 200, 7, 9});
+  const rr::Bytes wide{1, 2, 3, 3, 4, 5};
+  CHECK(shrink_image({2, 1, 6, PixelFormat::rgb8, wide}, 1).pixels == rr::Bytes{2, 3, 4});
+  const rr::Bytes sixteen{0xff, 10, 0xff, 20};
+  const auto higher = shrink_image({2, 1, 4, PixelFormat::mono16, sixteen}, 1);
+  CHECK(higher.image.format == PixelFormat::mono8);
+  CHECK(higher.pixels == rr::Bytes{15});
 }

@@ -171,6 +171,9 @@ TEST_CASE("rights: without rules those may everything who have proven who they a
   CHECK_FALSE(rules.check(Identity{}, request));
   CHECK_FALSE(rules.check_whole_device(Identity{}, "create"));
   CHECK_FALSE(rules.sees(Identity{}, "create"));
+  CHECK(AccessRules().sees_any(Identity{}));
+  CHECK(rules.sees_any(who("alice", {})));
+  CHECK_FALSE(rules.sees_any(Identity{}));
 }
 
 TEST_CASE("agents: what moves a device is given by rules for agents alone, and those give nothing by any other face") {
@@ -286,6 +289,9 @@ TEST_CASE("rights: a device is seen by those who may do something with it, and b
   CHECK_FALSE(rules.sees(watcher, "arm1"));  // what he may is of no device
   CHECK_FALSE(rules.sees(who("stranger", {}), "arm1"));
   CHECK_FALSE(rules.sees(Identity{}, "create"));
+  CHECK(rules.sees_any(viewer));
+  CHECK_FALSE(rules.sees_any(watcher));
+  CHECK_FALSE(rules.sees_any(who("stranger", {})));
   CHECK(rules.sees(viewer, "arm1", "Arm"));
   CHECK_FALSE(rules.sees(viewer, "arm1", "Create"));
   CHECK_FALSE(rules.sees(viewer, "create", "Arm"));

@@ -34,6 +34,11 @@ export function staleAge(ageMs: number): string | null {
   return ageMs < STALE_MS ? null : t("{0} old", span(ageMs + 500));
 }
 
+/** A text whose lines were broken for an editor, in paragraphs: lists and empty lines stay as they are. */
+export function flowing(text: string): string {
+  return text.trim().replace(/(\S)[ \t]*\n(?!\s|[-*•]|\d+[.)])/g, "$1 ");
+}
+
 /** The same text with an end. */
 export function sentence(text: string): string {
   const trimmed = text.trim();

@@ -1,0 +1,211 @@
+#include "server/cli/mcp_bridge.hpp"
+
+#include <algorithm>
+#include <boost/asio/co_spawn.hpp>
+#include <iostream>
+
+#include "node/http/response_reader.hpp"
+
+namespace rrgate {
+
+namespace {
+
+constexpr std::size_t most_at_once = 64;
+/// Of an answer: twice what the gateway gives, as text and as JSON, and an image.
+constexpr std::size_t largest_answer = 4u * 1024 * 1024;
+/// The gateway says something every ten seconds as long as it works on a request.
+constexpr std::chrono::seconds longest_silence{60};
+constexpr std::chrono::seconds last_grace{1};
+
+constexpr int parse_error = -32700;
+constexpr int internal_error = -32603;
+
+/// What a member of an object says as text; empty where it is none.
+std::string text_in(const rr::Json& json, std::initializer_list<const char*> keys) {
+  const auto* at = &json;
+  for (const auto* key : keys) {
+    const auto found = at->is_object() ? at->find(key) : at->end();
+    if (!at->is_object() || found == at->end()) return {};
+    at = &*found;
+  }
+  return at->is_string() ? at->get<std::string>() : std::string();
+}
+
+/// May stand in a header.
+bool is_plain(std::string_view text) {
+  return std::all_of(text.begin(), text.end(), [](char c) { return c > ' ' && c < 0x7f; });
+}
+
+std::string trimmed(std::string text) {
+  // White space of JSON alone: a line is a message.
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  std::replace(text.begin(), text.end(), '\r', ' ');
+  while (text.ends_with(' ')) text.pop_back();
+  return text;
+}
+
+}  // namespace
+
+struct McpBridge::Message {
+  rr::OrderedJson id = nullptr;  ///< null: a notification; nobody waits for an answer
+  std::string method = {};
+  std::string revision = {};  ///< that the message says it is of; empty: as agreed
+  std::string text = {};
+  rr::ByteStream* stream = nullptr;
+  bool is_cancelled = false;
+  bool is_answered = false;
+};
+
+McpBridge::McpBridge(boost::asio::any_io_executor executor, McpServer server,
+                     std::function<void(std::string_view)> tell, std::function<void()> ended)
+    : executor_(std::move(executor)),
+      server_(std::move(server)),
+      tell_(std::move(tell)),
+      ended_(std::move(ended)),
+      grace_(executor_, [this] {
+        for (const auto& [id, message] : under_way_) {
+          message->is_cancelled = true;
+          if (message->stream) message->stream->close();
+        }
+      }) {}
+
+void McpBridge::take(std::string_view line) {
+  if (line.find_first_not_of(" \t\r") == std::string_view::npos) return;
+  const auto json = rr::read_json(line);
+  if (!json) return refuse(nullptr, parse_error, json.error().message);
+  const auto message = std::make_shared<Message>();
+  message->text = line;
+  message->method = text_in(*json, {"method"});
+  message->revision = text_in(*json, {"params", "_meta", "io.modelcontextprotocol/protocolVersion"});
+  const auto id_of = [](const rr::Json& object, const char* key) {
+    const auto found = object.is_object() ? object.find(key) : object.end();
+    return object.is_object() && found != object.end() ? rr::OrderedJson(*found) : rr::OrderedJson();
+  };
+  if (!message->method.empty()) message->id = id_of(*json, "id");
+  if (!is_plain(message->method) || !is_plain(message->revision))
+    return refuse(message->id, parse_error, "neither a method nor a revision has other characters than ASCII's");
+  // The end of the request's connection tells the gateway.
+  if (message->method == "notifications/cancelled" && json->contains("params"))
+    return cancel(id_of((*json)["params"], "requestId").dump());
+  if (under_way_.size() >= most_at_once)
+    return refuse(message->id, internal_error,
+                  "more than " + std::to_string(most_at_once) + " messages at once; wait for answers");
+  under_way_.emplace(message->id.dump(), message);
+  boost::asio::co_spawn(executor_, carry(message), [this, message](const std::exception_ptr& failure) {
+    if (failure && !message->is_answered) refuse(message->id, internal_error, "the message could not be carried");
+    std::erase_if(under_way_, [&](const auto& each) { return each.second == message; });
+    if (is_ending_ && under_way_.empty()) ended_();
+  });
+}
+
+void McpBridge::end() {
+  is_ending_ = true;
+  if (under_way_.empty()) return ended_();
+  grace_.arm(last_grace);
+}
+
+void McpBridge::cancel(const std::string& id) {
+  const auto [first, last] = under_way_.equal_range(id);
+  for (auto it = first; it != last; ++it) {
+    auto& message = *it->second;
+    if (message.id.is_null()) continue;
+    message.is_cancelled = true;
+    if (message.stream) message.stream->close();
+  }
+}
+
+rr::awaitable<void> McpBridge::carry(std::shared_ptr<Message> message) {
+  const auto done = co_await exchange(*message);
+  message->stream = nullptr;
+  if (message->is_cancelled || message->is_answered) co_return;
+  const auto why = done ? std::string("the gateway has ended its answer before it was whole") : done.error().message;
+  if (!message->id.is_null())
+    refuse(message->id, internal_error, why);
+  else if (!done)
+    std::cerr << "rrgate mcp: " << message->method << ": " << why << "\n";
+}
+
+rr::awaitable<rr::Result<>> McpBridge::exchange(Message& message) {
+  auto connected = co_await server_.connect();
+  if (!connected) co_return connected.error();
+  const auto stream = std::move(*connected);
+  message.stream = stream.get();
+  const struct Gone {
+    rr::ByteStream*& stream;
+    ~Gone() { stream = nullptr; }
+  } gone{message.stream};
+  if (message.is_cancelled) co_return rr::Result<>();
+  rr::Deadline silence(executor_, [&stream] { stream->close(); });
+  silence.arm(longest_silence);
+  const auto request = request_of(message);
+  const auto slice = rr::as_bytes(request);
+  const std::span<const rr::ByteSpan> slices(&slice, 1);
+  if (const auto error = co_await stream->write(slices))
+    co_return rr::make_error(rr::ErrorCode::connection_error, error.message());
+
+  ResponseParser parser;
+  const std::function<void()> take_events = [&] {
+    silence.arm(longest_silence);
+    auto& response = parser.get();
+    if (!std::string_view(response[boost::beast::http::field::content_type]).starts_with("text/event-stream")) return;
+    auto& body = response.body();
+    for (auto end = body.find("\n\n"); end != std::string::npos; end = body.find("\n\n")) {
+      const auto data = body.find("data: ");
+      if (data < end) answer(message, body.substr(data + 6, body.find('\n', data) - data - 6));
+      body.erase(0, end + 2);
+    }
+  };
+  if (auto read = co_await read_response(*stream, parser, largest_answer, take_events); !read) co_return read;
+  co_return pass_on(message, parser.get().result_int(), std::move(parser.get().body()));
+}
+
+/// What is no event stream, or is left of one.
+rr::Result<> McpBridge::pass_on(Message& message, unsigned status, std::string body) {
+  if (message.is_answered || status == 202) return {};
+  auto json = rr::read_json(body);
+  const auto fail = [&](const std::string& why) {
+    return rr::make_error(rr::ErrorCode::connection_error, "the gateway answers " + std::to_string(status) + why);
+  };
+  if (!json || !json->is_object()) return fail("");
+  if (!json->contains("jsonrpc")) {
+    const auto detail = text_in(*json, {"detail"});
+    return fail(detail.empty() ? "" : ": " + detail);
+  }
+  if (message.id.is_null() && !message.method.empty())
+    return status < 400 ? rr::Result<>() : fail(": " + text_in(*json, {"error", "message"}));
+  if ((*json)["id"].is_null()) {  // refused before it was read
+    (*json)["id"] = message.id;
+    body = json->dump();
+  }
+  answer(message, std::move(body));
+  return {};
+}
+
+/// A message of the gateway: the answer, or what comes before it.
+void McpBridge::answer(Message& message, std::string text) {
+  if (message.is_cancelled || message.is_answered) return;
+  const auto json = rr::read_json(text);
+  if (!json || !json->is_object()) return;
+  if (!json->contains("method")) message.is_answered = true;
+  if (message.method == "initialize") revision_ = text_in(*json, {"result", "protocolVersion"});
+  tell_(trimmed(std::move(text)));
+}
+
+void McpBridge::refuse(const rr::OrderedJson& id, int code, std::string_view why) {
+  tell_(rr::write_json({{"jsonrpc", "2.0"}, {"id", id}, {"error", {{"code", code}, {"message", why}}}}));
+}
+
+std::string McpBridge::request_of(const Message& message) const {
+  std::string out = "POST " + server_.path + " HTTP/1.1\r\nHost: " + server_.authority +
+                    "\r\nContent-Type: application/json\r\nAccept: application/json, text/event-stream\r\n"
+                    "User-Agent: rrgate\r\nConnection: close\r\nContent-Length: " +
+                    std::to_string(message.text.size()) + "\r\n";
+  const auto& revision = message.revision.empty() ? revision_ : message.revision;
+  const bool is_first = message.method == "initialize";
+  if (!revision.empty() && !is_first) out += "MCP-Protocol-Version: " + revision + "\r\n";
+  if (!message.method.empty()) out += "Mcp-Method: " + message.method + "\r\n";
+  for (const auto& [name, value] : server_.headers) out += name + ": " + value + "\r\n";
+  return out + "\r\n" + message.text;
+}
+
+}  // namespace rrgate

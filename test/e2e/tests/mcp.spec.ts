@@ -1,0 +1,116 @@
+// Agents by the official TypeScript SDK of the Model Context Protocol: over HTTP, and by `rrgate mcp` on standard input and output.
+import { Client } from "@modelcontextprotocol/sdk/client/index.js";
+import { StdioClientTransport } from "@modelcontextprotocol/sdk/client/stdio.js";
+import { StreamableHTTPClientTransport } from "@modelcontextprotocol/sdk/client/streamableHttp.js";
+import { expect, test } from "@playwright/test";
+import { deviceProgram, Program, rrgate, startGateway, webRoot } from "../processes";
+
+const drive = { device: "create", path: "Create/Drive", why: "to see it move" };
+const members = ["Drive"];
+
+let create: Program;
+let gateway: { program: Program; url: string };
+
+test.beforeAll(async () => {
+  create = new Program(deviceProgram("rrgate-demo-create"), ["--port", "0"]);
+  create.start();
+  const url = (await create.waitForOutput(/(rr\+tcp:\S+)/))[1] ?? "";
+  const leases = { safe: [{ call: "Create.Drive", arguments: [0, 0] }] };
+  gateway = await startGateway("create", url, webRoot, {
+    devices: [{ name: "create", url, mode: "shared", leases }],
+    mcp: {},
+    access: {
+      ["anonymous_role"]: "agent",
+      rules: [
+        { roles: ["agent"], may: ["read", "subscribe"] },
+        {
+          roles: ["agent"],
+          members,
+          may: ["call"],
+          agent: { limits: { velocity: [-200, 200] }, approval: "none", ["hold_seconds"]: 20 },
+        },
+      ],
+    },
+  });
+});
+
+test.afterAll(async () => {
+  await gateway?.program.kill("SIGTERM");
+  await create?.kill("SIGTERM");
+});
+
+const ways = {
+  ["by HTTP"]: () => new StreamableHTTPClientTransport(new URL("mcp", gateway.url)),
+  ["by standard input and output"]: () => new StdioClientTransport({ command: rrgate, args: ["mcp", gateway.url] }),
+};
+
+interface Told {
+  isError?: boolean;
+  structuredContent?: Record<string, unknown>;
+}
+
+for (const [way, connect] of Object.entries(ways)) {
+  test.describe(way, () => {
+    let client: Client;
+    const ask = async (name: string, args: Record<string, unknown>): Promise<Told> =>
+      (await client.callTool({ name, arguments: args })) as Told;
+    test.beforeEach(async () => {
+      client = new Client({ name: "test", version: "1" });
+      await client.connect(connect());
+    });
+    test.afterEach(() => client.close());
+
+    test("tools, resources and members are listed", async () => {
+      const { tools } = await client.listTools();
+      expect(tools.map(({ name }) => name)).toEqual(
+        expect.arrayContaining(["devices", "describe", "read", "call", "stop"]),
+      );
+      const { resources } = await client.listResources();
+      expect(resources.map(({ uri }) => uri)).toEqual(["rrgate://create"]);
+      const { contents } = await client.readResource({ uri: "rrgate://create/Create" });
+      expect(JSON.stringify(contents)).toContain("Drive");
+      const described = await ask("describe", { device: "create", path: "Create/Drive" });
+      expect(JSON.stringify(described.structuredContent)).toContain('"velocity":[-200');
+    });
+
+    test("a call is tried, is refused outside its limits, and is cancelled", async () => {
+      const dry = await ask("call", { ...drive, args: { velocity: 100, radius: 0 }, ["dry_run"]: true });
+      expect(dry.structuredContent).toMatchObject({ ["would_send"]: { velocity: 100 }, ["would_ask_a_person"]: false });
+      const fast = await ask("call", { ...drive, args: { velocity: 300, radius: 0 } });
+      expect(fast.isError).toBe(true);
+
+      const cancelling = new AbortController();
+      const heard: string[] = [];
+      const calling = client
+        .callTool({ name: "call", arguments: { ...drive, args: { velocity: 100, radius: 0 } } }, undefined, {
+          signal: cancelling.signal,
+          onprogress: ({ message }) => void heard.push(message ?? ""),
+        })
+        .then(() => "answered")
+        .catch(() => "cancelled");
+      await expect.poll(() => heard).toContain("the lease is held");
+      const second = await ask("call", { ...drive, args: { velocity: 50, radius: 0 } });
+      expect(JSON.stringify(second.structuredContent)).toContain("has the lease");
+      cancelling.abort();
+      expect(await calling).toBe("cancelled");
+      // Nobody has the lease any more.
+      await expect
+        .poll(async () => {
+          const again = new AbortController();
+          const told: string[] = [];
+          const result = client
+            .callTool({ name: "call", arguments: { ...drive, args: { velocity: 0, radius: 0 } } }, undefined, {
+              signal: again.signal,
+              onprogress: ({ message }) => {
+                told.push(message ?? "");
+                if (message === "the lease is held") again.abort();
+              },
+            })
+            .catch(() => null);
+          await result;
+          return told;
+        })
+        .toContain("the lease is held");
+    });
+  });
+}
