@@ -245,8 +245,8 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
   std::shared_ptr<Target> target;
   if (client) {
     auto used = *client;
-    if (const auto key = writer.request().header(lease_header); !key.empty()) {
-      const auto holder = gateway.lease_holders().find(key);
+    if (const auto lease = writer.request().header(lease_header); !lease.empty()) {
+      const auto holder = gateway.lease_holders().find(lease);
       // A key that is none any more: its commands are those of a client without a lease.
       if (holder != gateway.lease_holders().end() && holder->second->upstream() == used->upstream())
         used = holder->second;

@@ -25,10 +25,6 @@ const Features no_combined = [] {
   return features;
 }();
 
-Value pose(double x) {
-  return Structure{"experimental.loopback.Pose", {{"x", Value(x)}, {"joints", Value(std::vector<double>{1, 2, 3})}}};
-}
-
 }  // namespace
 
 TEST_CASE("a session is set up in every combination of features, fed byte by byte") {

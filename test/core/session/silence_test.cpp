@@ -11,10 +11,6 @@ using namespace rr::test;
 
 namespace {
 
-Value pose(double x) {
-  return Structure{"experimental.loopback.Pose", {{"x", Value(x)}, {"joints", Value(std::vector<double>{1, 2, 3})}}};
-}
-
 /// A request of about 16 kB, which stays queued.
 Bytes encoded_pose(Loopback& pair) {
   const Structure large{"experimental.loopback.Pose",
