@@ -12,6 +12,7 @@
 #include "server/http/endpoints/leases.hpp"
 #include "server/http/endpoints/member_values.hpp"
 #include "server/http/endpoints/members.hpp"
+#include "server/http/etag.hpp"
 #include "server/log/log.hpp"
 #include "server/state/http_access.hpp"
 
