@@ -66,6 +66,7 @@ rr::awaitable<std::optional<ReadFailure>> RequestReader::read_on(std::size_t chu
   // Read where it is kept: of many clients that send slowly each holds what it has sent, and little more.
   if (buffer_.empty() && buffer_.capacity() > 2 * chunk) rr::Bytes().swap(buffer_);
   const auto had = buffer_.size();
+  buffer_.reserve(had + chunk);  // no more than that
   buffer_.resize(had + chunk);
   const auto read = co_await stream_.read_some(std::span(buffer_).subspan(had));
   buffer_.resize(had + read.bytes);

@@ -154,8 +154,8 @@ rr::awaitable<void> serve_connection(GatewayState& gateway, std::unique_ptr<rr::
   auto& identity = connection.identity;
   identity.client = connection.client;
   identity.face = Face::native;
-  identity = identity.is_proven() ? gateway.access().with_grants(std::move(identity))
-                                  : gateway.access().anonymous(connection.client, Face::native);
+  const auto certified = identity.is_proven() ? gateway.access().renew(identity) : std::nullopt;
+  identity = certified ? *certified : gateway.access().anonymous(connection.client, Face::native);
   rr::awaitable<void> continuation;
   switch (protocol) {
     case Protocol::robot_raconteur:

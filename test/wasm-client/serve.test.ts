@@ -77,7 +77,10 @@ const implementation = () => ({
   grid: { dims: [3, 2], data: new Int16Array([1, 2, 3, 4, 5, 6]) },
   askMe: (question: string) => device.caller!.call(device.root, "ask", question),
   lamps: { left: { level: 1 }, right: { level: 2 } },
-  thing: { rrType: "test.phone.Lamp", level: 7 },
+  thing: () => {
+    device.emit("tapped", 1, 2);
+    return { rrType: "test.phone.Lamp", level: 7 };
+  },
 });
 let implementationLevel = 0;
 let ended = 0;
@@ -133,6 +136,15 @@ it("hands on what was thrown, and what is wrong with an answer", async () => {
   expect((await failure(phone.broken.get())).message).toContain("broken");
   report.mockRestore();
   expect(reported).toHaveLength(1); // whoever wrote it sees it, too
+  await phone.$.close();
+});
+
+it("does nothing else while an object is looked for", async () => {
+  const phone = await gateway.connect<{ thing: { get(): Promise<unknown> } } & Phone>();
+  const error = await failure(phone.thing.get());
+  expect(error).toMatchObject({ code: ErrorCode.InvalidOperation });
+  expect(error.message).toContain("may not use members of the device");
+  expect(await phone.add(1, 2)).toBe(3);
   await phone.$.close();
 });
 

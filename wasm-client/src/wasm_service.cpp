@@ -207,7 +207,8 @@ JsValue WasmService::reply(std::uint32_t number, double id, const JsValue& value
   const auto [kind, member] = call.mapped();
   const auto type = answer_type(kind, *member);
   const auto read = type.type == DataType::void_t ? Result<Value>(Value{}) : read_value(value, type, member->name);
-  client->session->reply(static_cast<CallId>(id), read, now_);
+  // Getters of the value may have run: the client may be gone.
+  if (auto* still_there = find(number)) still_there->session->reply(static_cast<CallId>(id), read, now_);
   return read ? JsValue::undefined() : to_js(read.error(), *types_);
 }
 
@@ -263,6 +264,8 @@ JsValue WasmService::send_pipe(std::uint32_t number, double pipe, const JsValue&
     return to_js(make_error(ErrorCode::invalid_operation, "the pipe endpoint is closed"), *types_);
   const auto value = read_value(js, known->second->type, known->second->name);
   if (!value) return to_js(value.error(), *types_);
+  client = find(number);  // getters of the value may have run: the client may be gone
+  if (!client) return JsValue::undefined();
   const auto sent = client->session->send_pipe_packet(id, *value, now_);
   return sent ? JsValue::undefined() : to_js(sent.error(), *types_);
 }

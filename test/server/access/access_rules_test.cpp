@@ -209,11 +209,14 @@ TEST_CASE("agents: of several rules the terms hold together") {
   agent.face = Face::mcp;
   const AgentTerms wide{{{"v", {-500, 100}}}, false, false, std::chrono::seconds(9)};
   const AgentTerms narrow{{{"v", {-50, 300}}, {"w", {0, 1}}}, true, true, std::chrono::seconds(2)};
-  const AccessRules rules({AccessRule{.roles = {"agent"}, .may = {Verb::call}, .agent = wide},
-                           AccessRule{.roles = {"*"}, .may = {Verb::call}, .agent = narrow}},
-                          true);
+  std::vector<AccessRule> list{AccessRule{.roles = {"agent"}, .may = {Verb::call}, .agent = wide},
+                               AccessRule{.roles = {"*"}, .may = {Verb::call}, .agent = narrow}};
+  const AccessRules rules(list, true);
+  std::reverse(list.begin(), list.end());
+  const AccessRules reversed(list, true);
   const AgentTerms both{{{"v", {-50, 100}}, {"w", {0, 1}}}, true, true, std::chrono::seconds(2)};
   CHECK(rules.terms(agent, {"d", "s", "s", "m", Verb::call}) == both);
+  CHECK(reversed.terms(agent, {"d", "s", "s", "m", Verb::call}) == both);
   CHECK(rules.terms(agent, {"d", "s", "s", "m", Verb::write}) == std::nullopt);
 }
 

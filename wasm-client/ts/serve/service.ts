@@ -21,6 +21,7 @@ export class Service implements ServiceOfObject {
   readonly #objects = new Map<string, ServedObject>();
   readonly #clients = new Map<number, ServedClient>();
   #caller: Caller | undefined;
+  #isLooking = false;
 
   /** @throws RobotRaconteurError as ServiceCore.create(). */
   static async create(options: ServiceOptions, implementation: Implementation): Promise<Service> {
@@ -50,38 +51,47 @@ export class Service implements ServiceOfObject {
     return client;
   }
 
+  /**
+   * The core where it may be asked something: it waits for the answer while an objref is looked up.
+   * @throws RobotRaconteurError InvalidOperation
+   */
+  get #free(): ServiceCore {
+    if (!this.#isLooking) return this.#core;
+    throw makeError("InvalidOperation", "what finds the object of an objref may not use members of the device");
+  }
+
   forget(client: ServedClient): void {
     this.#clients.delete(client.number);
   }
 
   /** Tells all clients that the service ends. */
   close(): void {
-    this.#core.closeService();
+    this.#free.closeService();
     this.#pump();
   }
 
   // --- asked by objects ---
 
   emit(object: ServedObject, event: string, args: readonly unknown[]): void {
-    this.#core.sendEvent(object, event, args);
+    this.#free.sendEvent(object, event, args);
     this.#pump();
   }
 
   setWire(object: ServedObject, wire: string, value: unknown): void {
-    this.#core.sendWire(0, object, wire, value);
+    this.#free.sendWire(0, object, wire, value);
     this.#pump();
   }
 
   async sendPipe(endpoint: ServedEndpoint, value: unknown): Promise<void> {
     const client = this.#clients.get(endpoint.client);
     if (endpoint.isClosed || !client) throw makeError("InvalidOperation", "the pipe endpoint is closed");
-    this.#core.sendPipe(endpoint.client, endpoint.id, value);
+    this.#free.sendPipe(endpoint.client, endpoint.id, value);
     client.pump();
     await client.room();
   }
 
   closePipe(endpoint: ServedEndpoint): void {
-    this.#core.closePipe(endpoint.client, endpoint.id);
+    this.#free.closePipe(endpoint.client, endpoint.id);
     this.#clients.get(endpoint.client)?.forgetPipe(endpoint);
   }
 
@@ -89,7 +99,7 @@ export class Service implements ServiceOfObject {
     return new Promise((resolve, reject) => {
       const client = this.#clients.get(number);
       if (!client) throw makeError("ConnectionError", "the client is gone");
-      client.expect(this.#core.callCallback(number, object, callback, args), { resolve, reject });
+      client.expect(this.#free.callCallback(number, object, callback, args), { resolve, reject });
       client.pump();
     });
   }
@@ -97,7 +107,7 @@ export class Service implements ServiceOfObject {
   release(path: string): void {
     for (const known of this.#objects.keys())
       if (known === path || known.startsWith(`${path}.`) || known.startsWith(`${path}[`)) this.#objects.delete(known);
-    this.#core.release(path);
+    this.#free.release(path);
     this.#pump();
   }
 
@@ -120,7 +130,13 @@ export class Service implements ServiceOfObject {
     path: string,
     type: string,
   ): ServedObject {
-    const implementation = childOf(parent, member, index);
+    this.#isLooking = true;
+    let implementation: Implementation;
+    try {
+      implementation = childOf(parent, member, index);
+    } finally {
+      this.#isLooking = false;
+    }
     const known = this.#objects.get(path);
     if (known?.implementation === implementation) return known;
     // Where the definition leaves it open, or to say that it is more than that.
