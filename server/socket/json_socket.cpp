@@ -45,7 +45,7 @@ rr::awaitable<void> serve_json_socket(GatewayState& gateway, Connection& connect
                                                       gateway.memory().charge(place->from.network));
   const auto operations = std::make_shared<JsonOperations>(gateway, *place, socket->outbox());
   const auto device = place->device->config().name;
-  connection.device = place->device.get();
+  connection.device = place->device;
   connection.stop = [socket](rr::EndReason reason) { socket->stop(std::move(reason)); };
   connection.is_good = [standing = place->standing, operations] {
     operations->review();  // ends what the client has no right to any more
