@@ -68,7 +68,7 @@ void add_role(std::vector<std::string>& roles, const std::string& role) {
 /// What goes into the audit log though it was allowed.
 bool is_recorded(Verb verb) {
   return verb == Verb::write || verb == Verb::call || verb == Verb::lock || verb == Verb::subscribe ||
-         verb == Verb::serve;
+         verb == Verb::record || verb == Verb::serve;
 }
 
 }  // namespace

@@ -96,7 +96,7 @@ void read_rule(ObjectReader& in, AccessRule& rule) {
     const auto verb = parse_verb(text);
     if (!verb)
       return "found " + rr::quote(text) +
-             ", expected one of: read, write, call, subscribe, lock, serve, metrics, admin";
+             ", expected one of: read, write, call, subscribe, lock, record, serve, metrics, admin";
     rule.may.push_back(*verb);
     return {};
   });

@@ -161,6 +161,7 @@ void read_config(ObjectReader& in, Config& config) {
   in.object("retry", [&](ObjectReader& part) { read_retry(part, config.retry); });
   in.object("mcp", [&](ObjectReader& part) { read_mcp(part, config.mcp); });
   in.object("serve", [&](ObjectReader& part) { read_serve(part, config.serve); });
+  in.object("recordings", [&](ObjectReader& part) { read_recordings(part, config.recordings); });
   in.object("log", [&](ObjectReader& part) {
     part.choice("level", config.log.level, {"trace", "debug", "info", "warning", "error"});
     part.choice("format", config.log.format, {"text", "json"});
@@ -203,6 +204,7 @@ void locate_files(Config& config, const std::filesystem::path& folder) {
     if (!path.empty()) path = (folder / path).string();
   };
   locate(config.web_root);
+  locate(config.recordings.folder);
   for (auto& certificate : config.tls.certificates) {
     locate(certificate.certificate_file);
     locate(certificate.key_file);

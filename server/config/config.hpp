@@ -15,6 +15,7 @@
 #include "node/transport/http_headers.hpp"
 #include "server/access/access_config.hpp"
 #include "server/config/finding.hpp"
+#include "server/config/recording_options.hpp"
 #include "server/http/forwarded.hpp"
 
 namespace rrgate {
@@ -262,6 +263,7 @@ struct Config {
   LogConfig log;
   McpConfig mcp;
   ServeConfig serve;
+  RecordingsConfig recordings;
 
   bool operator==(const Config&) const = default;
 };

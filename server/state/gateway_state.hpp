@@ -28,6 +28,8 @@
 
 namespace rrgate {
 
+class Recordings;
+
 /// The parts of a gateway. Uses one thread: that of the io_context. Gateway alone starts, changes and stops them.
 class GatewayState {
  public:
@@ -37,6 +39,7 @@ class GatewayState {
   const Config& config() const { return config_; }
   DeviceRegistry& devices() { return devices_; }
   ValueClients& clients() { return clients_; }
+  Recordings& recordings() { return *recordings_; }
   SharedDevices& shared() { return shared_; }
   /// Null where the configuration has no "discover", and before start().
   FoundDevices* found() { return config_.discover.is_enabled ? found_.get() : nullptr; }
@@ -101,6 +104,7 @@ class GatewayState {
   std::unique_ptr<TlsFiles> web_tls_;
   DeviceRegistry devices_;
   ValueClients clients_;
+  std::unique_ptr<Recordings> recordings_;
   std::map<std::string, std::shared_ptr<ValueClient>, std::less<>> lease_holders_;
   std::unique_ptr<FoundDevices> found_;
   PageLinks pages_;

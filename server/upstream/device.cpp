@@ -202,6 +202,8 @@ void Device::start() {
 
 rr::awaitable<void> Device::watch() {
   while (!is_stopping_) {
+    co_await wait_for_turn();
+    if (is_stopping_) break;
     looks_again_ = false;
     has_come_back_ = false;
     auto probed = probe_any(urls_to_try(), dial_options(), look_id_);
@@ -227,6 +229,15 @@ rr::awaitable<void> Device::watch() {
       co_await wake_.async_wait(asio::as_tuple(asio::use_awaitable));
     }
   }
+}
+
+rr::awaitable<void> Device::wait_for_turn() {
+  if (!pace_ || looks_again_) co_return;
+  const auto look = state_ == DeviceState::connecting ? LookPace::Look::first : LookPace::Look::later;
+  const auto turn = pace_->take_turn(look, std::chrono::steady_clock::now());
+  wake_.expires_at(turn);
+  while (!is_stopping_ && !looks_again_ && std::chrono::steady_clock::now() < turn)
+    co_await wake_.async_wait(asio::as_tuple(asio::use_awaitable));
 }
 
 std::vector<rr::ConnectionUrl> Device::urls_to_try() const {
@@ -281,7 +292,14 @@ void Device::note_answer(const rr::Result<ProbeResult>& result, DeviceState befo
 
 DeviceRegistry::DeviceRegistry(const asio::any_io_executor& executor, const Config& config)
     : executor_(executor), config_(config) {
-  for (const auto& device : config.devices) devices_.push_back(std::make_shared<Device>(executor, device, config));
+  for (const auto& device : config.devices) devices_.push_back(make(device, config));
+}
+
+std::shared_ptr<Device> DeviceRegistry::make(DeviceConfig device, const Config& whole, std::shared_ptr<TlsFiles> tls,
+                                             std::shared_ptr<PageLink> page) {
+  auto made = std::make_shared<Device>(executor_, std::move(device), whole, std::move(tls), std::move(page));
+  made->share_pace(pace_);
+  return made;
 }
 
 rr::Result<> DeviceRegistry::load_tls() {
@@ -309,7 +327,7 @@ rr::Result<std::vector<std::shared_ptr<Device>>> DeviceRegistry::prepare(const C
       out.push_back(*stays);
       continue;
     }
-    out.push_back(std::make_shared<Device>(executor_, config, next));
+    out.push_back(make(config, next));
     if (auto loaded = out.back()->load_tls(); !loaded) return loaded.error();
   }
   return out;
@@ -336,7 +354,7 @@ bool DeviceRegistry::has(const Device& device) const {
 }
 
 Device& DeviceRegistry::add(DeviceConfig device, std::shared_ptr<TlsFiles> tls, std::shared_ptr<PageLink> page) {
-  devices_.push_back(std::make_shared<Device>(executor_, std::move(device), config_, std::move(tls), std::move(page)));
+  devices_.push_back(make(std::move(device), config_, std::move(tls), std::move(page)));
   auto& added = *devices_.back();
   added.start();
   if (on_change_) on_change_();

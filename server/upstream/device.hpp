@@ -17,6 +17,7 @@
 #include "server/config/config.hpp"
 #include "server/config/tls_files.hpp"
 #include "server/log/metrics.hpp"
+#include "server/upstream/look_pace.hpp"
 #include "server/upstream/page_link.hpp"
 #include "server/upstream/probe.hpp"
 
@@ -108,6 +109,9 @@ class Device : public std::enable_shared_from_this<Device> {
   [[nodiscard]] rr::Result<> load_tls();
   void reload_tls(bool is_forced);
 
+  /// Its looks take their turns; without this none waits.
+  void share_pace(std::shared_ptr<LookPace> pace) { pace_ = std::move(pace); }
+
   /// Probes until stop(), all URLs side by side; stop() ends what is being dialed.
   rr::awaitable<void> watch();
   /// The same, by itself.
@@ -120,6 +124,8 @@ class Device : public std::enable_shared_from_this<Device> {
   template <class T>
   rr::awaitable<rr::Result<T>> until_stopped(rr::awaitable<rr::Result<T>> work);
   void look_again();
+  /// Until its turn, or until somebody wants it looked at now.
+  rr::awaitable<void> wait_for_turn();
   /// The one that worked last, then the others.
   std::vector<rr::ConnectionUrl> urls_to_try() const;
   void note(const rr::Result<ProbeResult>& result);
@@ -133,10 +139,11 @@ class Device : public std::enable_shared_from_this<Device> {
   std::shared_ptr<TlsFiles> tls_;                        ///< null: the URL wants none
   std::list<boost::asio::cancellation_signal> dialing_;  ///< what stop() ends
   Retry retry_;
-  rr::Backoff backoff_;         ///< between looks at it while it does not answer
-  const rr::NodeId look_id_;    ///< the node that looks come from: none but they have it
-  bool has_come_back_ = false;  ///< the look that is on its way
-  bool is_circle_ = false;      ///< the last look came back, and was not answered
+  rr::Backoff backoff_;             ///< between looks at it while it does not answer
+  std::shared_ptr<LookPace> pace_;  ///< of all devices; may be null
+  const rr::NodeId look_id_;        ///< the node that looks come from: none but they have it
+  bool has_come_back_ = false;      ///< the look that is on its way
+  bool is_circle_ = false;          ///< the last look came back, and was not answered
   DeviceState state_ = DeviceState::connecting;
   std::string last_error_;
   std::optional<ProbeResult> identity_;
@@ -189,8 +196,12 @@ class DeviceRegistry {
   Device* route(const rr::NodeId& node_id, std::string_view node_name) const;
 
  private:
+  std::shared_ptr<Device> make(DeviceConfig device, const Config& whole, std::shared_ptr<TlsFiles> tls = nullptr,
+                               std::shared_ptr<PageLink> page = nullptr);
+
   boost::asio::any_io_executor executor_;
   const Config& config_;
+  std::shared_ptr<LookPace> pace_ = std::make_shared<LookPace>();  ///< devices may outlive this
   std::vector<std::shared_ptr<Device>> devices_;
   std::function<void()> on_change_;
 };

@@ -10,7 +10,6 @@ import sys
 import tempfile
 import time
 
-
 from load import PROGRAMS, cpu_seconds, resident_bytes, running
 from rows import Row, report
 

@@ -80,6 +80,15 @@ TEST_CASE("certificates, and how devices are checked") {
   CHECK(findings_of(with(R"("tls": {"required": true}, "trusted_proxies": ["127.0.0.1"])")).empty());
 }
 
+TEST_CASE("recordings: a folder, and what is recorded") {
+  finds(with(R"("recordings": {})"), "gateway.json: /recordings/folder: ", "missing");
+  finds(with(R"("recordings": {"folder": ""})"), "gateway.json: /recordings/folder: ", "empty");
+  finds(with(R"("recordings": {"folder": "f", "record": [{"device": "a"}]})"),
+        "gateway.json: /recordings/record/0/service: ", "missing");
+  finds(with(R"("recordings": {"folder": "f", "record": [{"device": "a", "service": "s", "kept_files": 2}]})"),
+        "gateway.json: /recordings/record/0/kept_files: ", "max_file_bytes");
+}
+
 TEST_CASE("leases: what a device needs, and what makes it safe") {
   const auto leases = [](const std::string& text, const std::string& mode = "shared") {
     return R"({"listen": ["127.0.0.1:0"], "devices": [{"name": "a", "url": "rr+tcp://h:1/?service=s", "mode": ")" +
@@ -273,6 +282,9 @@ TEST_CASE("every option arrives") {
                "clients": 5, "clients_per_address": 6, "memory": 50000000, "client_queue_bytes": 70000, "opaque_rate": 7000},
     "timeouts": {"connect_ms": 101, "drain_ms": 102, "send_stall_ms": 103, "idle_ms": 104, "unused_session_ms": 105},
     "retry": {"min_ms": 51, "max_ms": 52, "online_ms": 53},
+    "recordings": {"folder": "recordings", "max_bytes": 5000000, "at_once": 2,
+                   "record": [{"device": "a", "service": "s", "members": ["x", "y/*"], "interval_ms": 50,
+                               "max_file_bytes": 1000000, "kept_files": 3}, {"device": "a", "service": "t"}]},
     "log": {"level": "debug", "format": "json"} // the end
   })");
   CHECK(parsed.findings.empty());
@@ -310,6 +322,11 @@ TEST_CASE("every option arrives") {
   CHECK(config.limits == Limits{20000, 2000, 3000, milliseconds(300), 40000, 5, 6, 50000000, 70000, 7000});
   CHECK(config.timeouts ==
         Timeouts{milliseconds(101), milliseconds(102), milliseconds(103), milliseconds(104), milliseconds(105)});
+  CHECK(config.recordings.folder == "recordings");
+  CHECK(config.recordings.max_bytes == 5'000'000);
+  CHECK(config.recordings.at_once == 2);
+  const RecordingWish wish{"a", "s", {"x", "y/*"}, milliseconds(50), milliseconds(0), 1'000'000, 3};
+  CHECK(config.recordings.standing == std::vector<RecordingWish>{wish, {"a", "t"}});
   CHECK(config.retry == Retry{milliseconds(51), milliseconds(52), milliseconds(53)});
   CHECK(config.log == LogConfig{"debug", "json"});
 }

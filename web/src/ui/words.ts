@@ -45,6 +45,14 @@ export function sentence(text: string): string {
   return /[.!?]$/.test(trimmed) ? trimmed : `${trimmed}.`;
 }
 
+/** `0 B`, `12 kB`, `3.4 MB`. */
+export function bytesText(bytes: number): string {
+  const units = ["B", "kB", "MB", "GB", "TB"];
+  let [value, unit] = [bytes, 0];
+  for (; value >= 1000 && unit < units.length - 1; unit++) value /= 1000;
+  return `${unit === 0 || value >= 100 ? Math.round(value) : value.toFixed(1)} ${units[unit]}`;
+}
+
 /** `0.4 ms`, `12 ms`, `1.5 s`: how old a value is. */
 export function ageText(ms: number): string {
   if (ms >= 1000) return `${(ms / 1000).toFixed(1)} s`;
