@@ -15,7 +15,7 @@ core/robdef/model core/robdef/parse core/robdef/verify core/robdef/format core/r
 core/types core/member core/session core/session/client core/session/service core/discovery
 node/platform node/tls node/transport node/http node/driver node/values node/client node/service node/discovery
 node/subscribe node/generate
-server/log server/json server/limits server/access server/http server/record server/config server/upstream server/rr server/state server/relay
+server/log server/json server/limits server/access server/http server/record server/config server/upstream server/recordings server/rr server/state server/relay
 server/http/endpoints server/socket server/mcp server/front server/gateway server/cli server
 """.split()
 

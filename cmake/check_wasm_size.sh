@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Adds up what a page has to load of a built client package (.wasm and .js, after brotli) and holds it to the budgets:
 # one for what every page loads, one for usb/, which a page loads when it speaks to a USB device, one for lease/, which
-# it loads when it takes a lease, one for losses/, which it loads when it asks what was lost, one for definition/, which
+# it loads when it takes a lease, one for serve/, which it loads when it is a device, one for losses/, which it loads when it asks what was lost, one for definition/, which
 # it loads when it asks for a definition, one for services/, which it loads when it looks for services, and one for what
 # it has of a framework.
 # Usage: check_wasm_size.sh DIRECTORY [LIMIT_KB [USB_LIMIT_KB]]
@@ -29,10 +29,11 @@ find_files() {
 
 # Nobody loads inline.js and rrgate.wasm, and internal.js is not published.
 mapfile -t files < <(find_files -not -path "$directory/usb/*" -not -path "$directory/lease/*" -not -path "$directory/definition/*" \
-  -not -path "$directory/services/*" -not -path "$directory/losses/*" -not -path "$directory/stores/*" \
+  -not -path "$directory/services/*" -not -path "$directory/serve/*" -not -path "$directory/losses/*" -not -path "$directory/stores/*" \
   -not -path "$directory/react/*" -not -path "$directory/svelte/*" -not -path "$directory/vue/*" -not -name inline.js -not -name internal.js)
 mapfile -t usb_files < <(find_files -path "$directory/usb/*")
 mapfile -t definition_files < <(find_files -path "$directory/definition/*")
+mapfile -t serve_files < <(find_files -path "$directory/serve/*")
 mapfile -t service_files < <(find_files -path "$directory/services/*")
 mapfile -t framework_files < <(for name in stores react svelte vue; do find_files -path "$directory/$name/*"; done)
 mapfile -t losses_files < <(find_files -path "$directory/losses/*")
@@ -40,6 +41,7 @@ mapfile -t lease_files < <(find_files -path "$directory/lease/*")
 check client "${2:-122}" "${files[@]}"
 check "USB part" "${3:-20}" "${usb_files[@]}"
 check "part for leases" 2 "${lease_files[@]}"
+check "part for services" 144 "${serve_files[@]}"
 check "part for losses" 1 "${losses_files[@]}"
 check "part for definitions" 2 "${definition_files[@]}"
 check "part that finds services" 1 "${service_files[@]}"

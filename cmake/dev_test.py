@@ -7,8 +7,8 @@ import tempfile
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-COMMANDS = ("setup", "build", "docs", "demo", "test", "asan", "tsan", "fuzz", "bench", "soak", "package", "debian13", "fmt", "lint",
-            "clean")
+COMMANDS = ("setup", "build", "docs", "demo", "test", "asan", "tsan", "fuzz", "bench", "soak", "package", "debian13", "mutate", "fmt",
+            "lint", "clean")
 DOERS = ("apt-get", "cmake", "ctest", "dpkg-query", "mmdebstrap", "npm", "npx", "python3", "sudo")
 
 

@@ -33,6 +33,7 @@ export const makeSidebar = (decisions) => [
     ["Leases", "/leases"],
     ["Devices for agents", "/mcp"],
     ["Discovery", "/discovery"],
+    ["A page as a device", "/serve"],
   ]),
   group("Security", [
     ["Access control", "/access"],

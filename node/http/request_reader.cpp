@@ -1,13 +1,15 @@
 #include "node/http/request_reader.hpp"
 
 #include <algorithm>
-#include <array>
 #include <boost/asio/buffer.hpp>
 #include <boost/beast/http/error.hpp>
 
 namespace rrgate {
 
 namespace {
+
+constexpr std::size_t header_chunk = 2048;
+constexpr std::size_t body_chunk = 4096;
 
 ReadFailure failure_of(const boost::beast::error_code& error, const RequestLimits& limits, std::size_t body_limit) {
   if (error == http::error::header_limit)
@@ -59,14 +61,16 @@ std::size_t RequestReader::parse(Parser& parser, rr::Bytes& buffer, boost::beast
   return used;
 }
 
-/// Reads more into buffer_, while limit_ is armed.
-rr::awaitable<std::optional<ReadFailure>> RequestReader::read_on() {
-  std::array<std::uint8_t, 4096> chunk;
-  const auto read = co_await stream_.read_some(chunk);
-  if (!read.error && !read.is_end()) {
-    buffer_.insert(buffer_.end(), chunk.begin(), chunk.begin() + static_cast<std::ptrdiff_t>(read.bytes));
-    co_return std::nullopt;
-  }
+/// Reads more into buffer_, at most `chunk` bytes, while limit_ is armed.
+rr::awaitable<std::optional<ReadFailure>> RequestReader::read_on(std::size_t chunk) {
+  // Read where it is kept: of many clients that send slowly each holds what it has sent, and little more.
+  if (buffer_.empty() && buffer_.capacity() > 2 * chunk) rr::Bytes().swap(buffer_);
+  const auto had = buffer_.size();
+  buffer_.reserve(had + chunk);  // no more than that
+  buffer_.resize(had + chunk);
+  const auto read = co_await stream_.read_some(std::span(buffer_).subspan(had));
+  buffer_.resize(had + read.bytes);
+  if (!read.error && !read.is_end()) co_return std::nullopt;
   const bool is_late = !limit_.is_armed();
   limit_.disarm();
   if (!is_late) co_return ReadFailure();
@@ -94,7 +98,7 @@ rr::awaitable<ReadRequest> RequestReader::next() {
       co_return ReadRequest{std::nullopt, failure_of(error, limits_, limits_.body_bytes)};
     }
     if (parser.is_header_done()) break;
-    auto failure = co_await read_on();
+    auto failure = co_await read_on(header_chunk);
     // One that sends nothing is idle, not late.
     if (failure && !is_started) failure = ReadFailure();
     if (failure) co_return ReadRequest{std::nullopt, std::move(*failure)};
@@ -142,7 +146,7 @@ rr::awaitable<std::optional<ReadFailure>> RequestReader::read_body(HttpRequest& 
     const auto end = begin + limits_.header_timeout + std::chrono::milliseconds(received * 1000 / least_rate);
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
     limit_.arm(std::min(limits_.header_timeout, left));
-    auto failure = co_await read_on();
+    auto failure = co_await read_on(body_chunk);
     limit_.disarm();
     if (failure) co_return failure;
   }

@@ -63,7 +63,7 @@ class RequestReader {
   bool has_folded_header() const;
   /// Gives the parser what was read. Returns how much of it was taken.
   static std::size_t parse(Parser& parser, rr::Bytes& buffer, boost::beast::error_code& error);
-  rr::awaitable<std::optional<ReadFailure>> read_on();
+  rr::awaitable<std::optional<ReadFailure>> read_on(std::size_t chunk);
 
   rr::ByteStream& stream_;
   RequestLimits limits_;

@@ -8,6 +8,7 @@
 #include "node/tls/client_certificates.hpp"
 #include "node/tls/node_certificate_check.hpp"
 #include "node/tls/openssl.hpp"
+#include "node/tls/revocations.hpp"
 
 namespace rr {
 
@@ -170,16 +171,9 @@ Result<> load_web_certificate(SSL_CTX* context, const WebCertificate& files) {
 }
 
 Result<> add_revocation_list(X509_STORE* store, const std::string& file) {
-  const openssl::Bio in(BIO_new_file(file.c_str(), "r"));
-  if (!in) return unusable("revocation list " + quote(file, 200) + ": " + last_error());
-  int added = 0;
-  while (const openssl::RevocationList list{PEM_read_bio_X509_CRL(in.get(), nullptr, nullptr, nullptr)})
-    added += X509_STORE_add_crl(store, list.get());
-  ERR_clear_error();
-  if (added == 0)
-    return unusable("revocation list " + quote(file, 200) + ": found none in it, expected PEM (X509 CRL)");
-  X509_STORE_set_flags(store, X509_V_FLAG_CRL_CHECK | X509_V_FLAG_CRL_CHECK_ALL);
-  return {};
+  auto added = read_revocation_lists(file, [store](X509_CRL* list) { X509_STORE_add_crl(store, list); });
+  if (added) X509_STORE_set_flags(store, X509_V_FLAG_CRL_CHECK | X509_V_FLAG_CRL_CHECK_ALL);
+  return added;
 }
 
 /// Says whose certificates clients may show.

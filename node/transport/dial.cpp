@@ -165,6 +165,7 @@ std::string dialable_schemes() {
 }
 
 awaitable<Dialed> dial(ConnectionUrl url, DialOptions options) {
+  if (options.reach) co_return co_await options.reach();
   const auto* dialer = find_dialer(url.scheme);
   if (!dialer)
     co_return make_error(ErrorCode::connection_error,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -21,6 +22,9 @@ struct DialOptions {
   HttpHeaders headers = {};
   /// For the schemes with TLS between nodes ("rrs+..."). Null: no certificate of one's own, and default_trust().
   TlsContextPtr tls = {};
+  /// Asked for the stream instead of the transport of the URL's scheme, which is a name then. Null: the list in
+  /// dial.cpp.
+  std::function<awaitable<Result<std::unique_ptr<ByteStream>>>()> reach = {};
   /// For the schemes by HTTPS ("...+wss"). Null: what this system trusts.
   TlsContextPtr web_tls = {};
 };

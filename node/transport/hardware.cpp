@@ -11,8 +11,8 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <optional>
 
-#include "node/transport/await_tuple.hpp"
 #include "node/transport/usb_host.hpp"
+#include "node/transport/watch_timer.hpp"
 
 namespace rr {
 
@@ -94,21 +94,16 @@ awaitable<std::vector<HardwareNode>> list_hardware_nodes(DriverRoots roots) {
 }
 
 struct HardwareWatch::State {
-  State(const asio::any_io_executor& executor, OnNodes receiver, std::chrono::milliseconds period, DriverRoots where)
-      : on_nodes(std::move(receiver)), refresh(period), roots(std::move(where)), wake(executor) {}
-
   OnNodes on_nodes;
-  std::chrono::milliseconds refresh;
   DriverRoots roots;
-  asio::steady_timer wake;
-  std::optional<asio::posix::stream_descriptor> news;
-  bool has_news = false;
-  bool is_stopped = false;
+  WatchTimer timer;
+  std::optional<asio::posix::stream_descriptor> news = {};
 };
 
 HardwareWatch::HardwareWatch(const asio::any_io_executor& executor, OnNodes on_nodes, std::chrono::milliseconds refresh,
                              DriverRoots roots)
-    : state_(std::make_shared<State>(executor, std::move(on_nodes), refresh, std::move(roots))) {
+    : state_(std::make_shared<State>(
+          State{std::move(on_nodes), std::move(roots), WatchTimer(executor, refresh, settle_time)})) {
   if (const int number = open_news(); number >= 0) {
     state_->news.emplace(executor, number);
     asio::co_spawn(executor, listen(state_), asio::detached);
@@ -117,40 +112,32 @@ HardwareWatch::HardwareWatch(const asio::any_io_executor& executor, OnNodes on_n
 }
 
 HardwareWatch::~HardwareWatch() {
-  state_->is_stopped = true;
-  state_->wake.cancel();
+  state_->timer.stop();
   error_code ignored;
   if (state_->news) state_->news->close(ignored);
 }
 
 awaitable<void> HardwareWatch::run(std::shared_ptr<State> state) {
-  while (!state->is_stopped) {
-    state->has_news = false;
+  while (!state->timer.is_stopped()) {
+    state->timer.begin_look();
     const auto nodes = co_await list_hardware_nodes(state->roots);
-    if (state->is_stopped) break;
+    if (state->timer.is_stopped()) break;
     state->on_nodes(nodes);
-    if (!state->has_news) {
-      state->wake.expires_after(state->refresh);
-      co_await state->wake.async_wait(await_tuple);
-    }
-    if (!state->has_news || state->is_stopped) continue;
-    state->wake.expires_after(settle_time);
-    co_await state->wake.async_wait(await_tuple);
+    co_await state->timer.wait();
   }
 }
 
 awaitable<void> HardwareWatch::listen(std::shared_ptr<State> state) {
   char buffer[8192];
-  while (!state->is_stopped) {
+  for (;;) {
     // No asynchronous read: a datagram that is lost (ENOBUFS) is news as well.
     const auto [error] = co_await state->news->async_wait(asio::posix::stream_descriptor::wait_read, await_tuple);
-    if (error || state->is_stopped) break;
+    if (error || state->timer.is_stopped()) break;
     const auto count = ::recv(state->news->native_handle(), buffer, sizeof(buffer), 0);
     if (count == 0 || (count < 0 && errno != ENOBUFS && errno != EAGAIN && errno != EINTR)) break;
     if (count > 0 && !is_about_us({buffer, static_cast<std::size_t>(count)})) continue;
     if (count < 0 && errno != ENOBUFS) continue;
-    const bool is_first = !std::exchange(state->has_news, true);
-    if (is_first) state->wake.cancel();
+    state->timer.hear_news();
   }
 }
 

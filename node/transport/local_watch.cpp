@@ -6,7 +6,6 @@
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/posix/stream_descriptor.hpp>
-#include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <cstring>
 #include <map>
@@ -14,7 +13,7 @@
 #include <set>
 
 #include "core/session/service/service_index.hpp"
-#include "node/transport/await_tuple.hpp"
+#include "node/transport/watch_timer.hpp"
 
 namespace rr {
 
@@ -77,9 +76,6 @@ Result<std::vector<LocalNode>> list_local_nodes() {
 }
 
 struct LocalWatch::State {
-  State(const asio::any_io_executor& executor, OnNodes receiver, OnProblem reporter, std::chrono::milliseconds period)
-      : on_nodes(std::move(receiver)), on_problem(std::move(reporter)), refresh(period), wake(executor) {}
-
   bool is_news(std::string_view events) const {
     while (events.size() >= sizeof(inotify_event)) {
       inotify_event event{};
@@ -115,42 +111,36 @@ struct LocalWatch::State {
 
   OnNodes on_nodes;
   OnProblem on_problem;
-  std::chrono::milliseconds refresh;
-  asio::steady_timer wake;
   std::optional<asio::posix::stream_descriptor> inotify;
-  Watched watched;
-  std::string problem;  ///< reported last
-  bool has_news = false;
-  bool is_stopped = false;
+  WatchTimer timer;
+  Watched watched = {};
+  std::string problem = {};  ///< reported last
 };
 
 LocalWatch::LocalWatch(const asio::any_io_executor& executor, OnNodes on_nodes, OnProblem on_problem,
-                       std::chrono::milliseconds refresh)
-    : state_(std::make_shared<State>(executor, std::move(on_nodes), std::move(on_problem), refresh)) {
-  if (const int number = ::inotify_init1(IN_NONBLOCK | IN_CLOEXEC); number >= 0) {
-    state_->inotify.emplace(executor, number);
-    asio::co_spawn(executor, listen(state_), asio::detached);
-  } else {
-    state_->refresh = std::min(refresh, blind_refresh);
-  }
+                       std::chrono::milliseconds refresh) {
+  std::optional<asio::posix::stream_descriptor> inotify;
+  if (const int number = ::inotify_init1(IN_NONBLOCK | IN_CLOEXEC); number >= 0) inotify.emplace(executor, number);
+  if (!inotify) refresh = std::min(refresh, blind_refresh);
+  state_ = std::make_shared<State>(State{std::move(on_nodes), std::move(on_problem), std::move(inotify),
+                                         WatchTimer(executor, refresh, folder_settle_time)});
+  if (state_->inotify) asio::co_spawn(executor, listen(state_), asio::detached);
   asio::co_spawn(executor, run(state_), asio::detached);
 }
 
 LocalWatch::~LocalWatch() {
-  state_->is_stopped = true;
-  state_->wake.cancel();
+  state_->timer.stop();
   error_code ignored;
   if (state_->inotify) state_->inotify->close(ignored);
 }
 
 void LocalWatch::refresh() {
-  const bool is_first = !std::exchange(state_->has_news, true);
-  if (is_first) state_->wake.cancel();
+  state_->timer.hear_news();
 }
 
 awaitable<void> LocalWatch::run(std::shared_ptr<State> state) {
-  while (!state->is_stopped) {
-    state->has_news = false;
+  while (!state->timer.is_stopped()) {
+    state->timer.begin_look();
     state->watch_folders();  // before the look, so that nothing falls between
     const auto nodes = list_local_nodes();
     const auto problem = nodes ? std::string() : nodes.error().message;
@@ -159,23 +149,16 @@ awaitable<void> LocalWatch::run(std::shared_ptr<State> state) {
     else if (problem != state->problem)
       state->on_problem(problem);
     state->problem = problem;
-    if (state->is_stopped) break;
-    if (!state->has_news) {
-      state->wake.expires_after(state->refresh);
-      co_await state->wake.async_wait(await_tuple);
-    }
-    if (!state->has_news || state->is_stopped) continue;
-    state->wake.expires_after(folder_settle_time);
-    co_await state->wake.async_wait(await_tuple);
+    co_await state->timer.wait();
   }
 }
 
 awaitable<void> LocalWatch::listen(std::shared_ptr<State> state) {
   alignas(inotify_event) char buffer[16 * 1024];
-  while (!state->is_stopped) {
+  for (;;) {
     const auto [error, size] = co_await state->inotify->async_read_some(asio::buffer(buffer), await_tuple);
-    if (error || state->is_stopped) break;
-    if (state->is_news(std::string_view(buffer, size)) && !std::exchange(state->has_news, true)) state->wake.cancel();
+    if (error || state->timer.is_stopped()) break;
+    if (state->is_news(std::string_view(buffer, size))) state->timer.hear_news();
   }
 }
 

@@ -6,6 +6,7 @@
 #include <boost/asio/use_awaitable.hpp>
 
 #include "node/tls/openssl.hpp"
+#include "node/tls/revocations.hpp"
 
 namespace rr {
 
@@ -14,6 +15,7 @@ namespace asio = boost::asio;
 namespace {
 
 constexpr std::size_t record_size = 16 * 1024;  // of plain text, at most, says TLS
+constexpr std::size_t handshake_chunk = 2048;   // before it is clear who comes
 constexpr std::size_t unsent_limit = 64 * 1024;
 
 /// How long the alert of a refusal, or the end, may take to leave.
@@ -117,6 +119,10 @@ std::chrono::system_clock::time_point TlsStream::client_certificate_end() const 
   return seconds < last ? Clock::time_point(seconds) : Clock::time_point::max();
 }
 
+std::string TlsStream::client_certificate_marks() const {
+  return chain_marks(ssl_.get());
+}
+
 std::string TlsStream::version() const {
   return SSL_get_version(ssl_.get());
 }
@@ -137,7 +143,7 @@ error_code TlsStream::failure(int result) {
 
 /// Waits for bytes of the peer and hands them to OpenSSL.
 awaitable<error_code> TlsStream::feed() {
-  received_.resize(record_size);
+  received_.resize(is_open_ ? record_size : handshake_chunk);
   const auto read = co_await inner_->read_some(received_);
   if (read.error) co_return read.error;
   if (read.is_end()) co_return asio::error::eof;

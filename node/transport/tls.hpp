@@ -52,6 +52,8 @@ class TlsStream final : public ByteStream {
   std::string client_name() const;
   /// When that certificate expires; the largest time where it has shown none.
   std::chrono::system_clock::time_point client_certificate_end() const;
+  /// What tells that certificate and those of the CAs between it and the one that is trusted, see chain_marks().
+  std::string client_certificate_marks() const;
   /// "TLSv1.3", for logs.
   std::string version() const;
 

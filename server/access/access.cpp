@@ -47,6 +47,7 @@ std::map<std::string, std::string> look(const AccessConfig& config) {
   for (const auto* file : {&config.users_file, &config.tokens_file, &config.jwt.jwks_file, &config.jwt.secret_file,
                            &config.ticket_key_file})
     if (!file->empty()) out[*file] = rr::file_look(*file);
+  for (const auto& file : config.clients.crl) out[file] = rr::file_look(file);
   return out;
 }
 
@@ -66,7 +67,8 @@ void add_role(std::vector<std::string>& roles, const std::string& role) {
 
 /// What goes into the audit log though it was allowed.
 bool is_recorded(Verb verb) {
-  return verb == Verb::write || verb == Verb::call || verb == Verb::lock || verb == Verb::subscribe;
+  return verb == Verb::write || verb == Verb::call || verb == Verb::lock || verb == Verb::subscribe ||
+         verb == Verb::record || verb == Verb::serve;
 }
 
 }  // namespace
@@ -106,6 +108,9 @@ rr::Result<AccessStatePtr> load_access(const AccessConfig& config) {
     if (!jwt) return jwt.error();
     out->jwt = std::move(*jwt);
   }
+  auto revoked = rr::Revocations::from_files(config.clients.crl);
+  if (!revoked) return revoked.error();
+  out->revoked = std::move(*revoked);
   if (!config.ticket_key_file.empty()) {
     const auto text = read_file("ticket key", config.ticket_key_file);
     if (!text) return text.error();
@@ -372,7 +377,7 @@ std::optional<Identity> Access::renew(const Identity& who) const {
       if (!state_->jwt || !state_->jwt->knows(who.credential)) return std::nullopt;
       break;
     case Proof::certificate:
-      if (state_->config.clients.ca.empty()) return std::nullopt;
+      if (state_->config.clients.ca.empty() || state_->revoked.has_any_of(who.credential)) return std::nullopt;
       break;
     case Proof::proxy:
       if (state_->config.identity_headers.user.empty()) return std::nullopt;

@@ -9,6 +9,7 @@
 
 #include "core/session/service/authenticator.hpp"
 #include "node/service/password_file.hpp"
+#include "node/tls/revocations.hpp"
 #include "server/access/access_config.hpp"
 #include "server/access/access_rules.hpp"
 #include "server/access/api_tokens.hpp"
@@ -27,7 +28,8 @@ struct AccessState {
   std::shared_ptr<const rr::PasswordFileAuthenticator> users = {};  ///< null: no users file
   std::optional<ApiTokens> tokens = {};
   std::optional<JwtVerifier> jwt = {};
-  rr::Bytes ticket_key = {};  ///< empty: the gateway's own
+  rr::Revocations revoked = {};  ///< client certificates
+  rr::Bytes ticket_key = {};     ///< empty: the gateway's own
 };
 using AccessStatePtr = std::shared_ptr<const AccessState>;
 

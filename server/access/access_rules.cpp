@@ -9,7 +9,8 @@ namespace rrgate {
 
 namespace {
 
-constexpr std::string_view verb_names[] = {"read", "write", "call", "subscribe", "lock", "metrics", "admin"};
+constexpr std::string_view verb_names[] = {"read", "write", "call",    "subscribe", "lock",
+                                            "record", "serve", "metrics", "admin"};
 
 bool fits(const std::vector<std::string>& patterns, std::string_view text) {
   return patterns.empty() || std::any_of(patterns.begin(), patterns.end(),
@@ -65,7 +66,7 @@ std::string describe(const Identity& who) {
 }
 
 std::string describe(const AccessRequest& what) {
-  if (!is_device_verb(what.verb))
+  if (!is_device_verb(what.verb) && what.verb != Verb::serve)
     return what.verb == Verb::metrics ? "read the gateway's metrics" : "manage the gateway";
   std::string out(to_string(what.verb));
   if (!what.member.empty()) out += " " + rr::quote(what.member) + " of";

@@ -17,16 +17,17 @@
 
 namespace rrgate {
 
-/// What one may do. Those up to `lock` are done to members and objects of devices, the others to the gateway itself.
-enum class Verb : std::uint8_t { read, write, call, subscribe, lock, metrics, admin };
+/// What one may do. Those up to `lock` are done to members and objects of devices; `record` is done to services as a
+/// whole; `serve` is to be a device by that name; the others are done to the gateway itself.
+enum class Verb : std::uint8_t { read, write, call, subscribe, lock, record, serve, metrics, admin };
 inline constexpr Verb device_verbs[] = {Verb::read, Verb::write, Verb::call, Verb::subscribe, Verb::lock};
-inline constexpr Verb all_verbs[] = {Verb::read, Verb::write,   Verb::call, Verb::subscribe,
-                                     Verb::lock, Verb::metrics, Verb::admin};
+inline constexpr Verb all_verbs[] = {Verb::read,   Verb::write, Verb::call,    Verb::subscribe, Verb::lock,
+                                     Verb::record, Verb::serve, Verb::metrics, Verb::admin};
 std::string_view to_string(Verb verb);
 /// nullopt: no such verb.
 std::optional<Verb> parse_verb(std::string_view text);
 constexpr bool is_device_verb(Verb verb) {
-  return verb <= Verb::lock;
+  return verb <= Verb::record;
 }
 
 /// What it takes to connect a wire or a pipe: where clients only send, nobody hears anything by it.

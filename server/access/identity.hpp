@@ -74,7 +74,7 @@ struct Identity {
   /// As whom a device knows the client, by a login that the device has judged. It gives no right here.
   std::string device_user = {};
   /// Tells a password or a token from any other that the name has had; of a JSON Web Token, the key and the claims that
-  /// it was judged by. No secret can be had from it.
+  /// it was judged by; of a certificate, its marks (rr::chain_marks). No secret can be had from it.
   std::string credential = {};
   std::string sign_in = {};  ///< which one the proof is remembered by (SignIns); empty: it was shown with the request
   Time ends = never;         ///< of the proof

@@ -41,6 +41,7 @@ struct DemoDevice {
   std::uint16_t port = 0;
   std::vector<std::string> arguments = {};
   bool follows_first = false;  ///< is told where the first device is
+  bool has_group = false;      ///< is told by what name the nodes of this demo find one another
   pid_t process = -1;
 
   std::string url() const { return "rr+tcp://127.0.0.1:" + std::to_string(port) + "/?service=" + std::string(service); }
@@ -68,6 +69,12 @@ std::vector<DemoSystem> list_systems() {
   const DemoDevice create{
       "create", "rrgate-demo-create", "Create", leases, {{"Create.play_callback", CallbackPolicy::first}}};
   const DemoDevice webcams{"webcams", "rrgate-demo-webcams", "Webcam"};
+  const auto assembly = [](std::string_view name, std::string_view service) {
+    DemoDevice part{name, "rrgate-demo-microassembly", service};
+    part.arguments = {std::string(name)};
+    part.has_group = true;
+    return part;
+  };
   auto riding_webcams = webcams;
   riding_webcams.follows_first = true;
   return {{"create", "a mobile robot in a room, and two cameras that ride on it", {create, riding_webcams}},
@@ -77,7 +84,11 @@ std::vector<DemoSystem> list_systems() {
            {{"controller", "rrgate-demo-conference-room", "Controller"},
             {"lights", "", "Lights"},
             {"sensors-north", "", "Sensors"},
-            {"sensors-south", "", "Sensors"}}}};
+            {"sensors-south", "", "Sensors"}}},
+          {"microassembly",
+           "six probes under four microscopes, on nodes that find one another",
+           {assembly("cell", "Cell"), assembly("stages", "Stages"), assembly("cameras", "Cameras"),
+            assembly("illuminators", "Illuminators")}}};
 }
 
 int print_systems() {
@@ -123,6 +134,8 @@ std::string prepare_programs(std::vector<DemoDevice>& devices) {
     if (program != &device) continue;
     device.path = find_program(device.program);
     if (device.path.empty()) return std::string(device.program);
+    if (device.has_group)
+      device.arguments.insert(device.arguments.end(), {"--group", "microassembly" + std::to_string(::getpid())});
     if (device.follows_first) device.arguments.insert(device.arguments.end(), {"--robot", devices.front().url()});
   }
   return {};

@@ -51,8 +51,8 @@ nlohmann::ordered_json make_config(const fs::path& folder, const std::string& ce
   if (folder == service_folder) access["audit_file"] = std::string(service_log_folder) + "/audit.jsonl";
   access["rules"] = {
       {{"roles", {"viewer", "operator"}}, {"may", {"read", "subscribe"}}},
-      {{"roles", {"operator"}}, {"may", {"write", "call", "lock"}}},
-      {{"roles", {"admin"}}, {"may", {"read", "write", "call", "subscribe", "lock", "metrics", "admin"}}},
+      {{"roles", {"operator"}}, {"may", {"write", "call", "lock", "record"}}},
+      {{"roles", {"admin"}}, {"may", {"read", "write", "call", "subscribe", "lock", "record", "metrics", "admin"}}},
   };
   return config;
 }

@@ -16,7 +16,6 @@
 #include "node/discovery/discovery.hpp"
 #include "server/cli/printable.hpp"
 #include "server/cli/progress.hpp"
-#include "server/cli/remote_service.hpp"
 
 namespace rrgate {
 
@@ -226,6 +225,18 @@ std::vector<std::string> find_service_urls(std::chrono::milliseconds wait) {
   std::vector<std::string> out;
   for (auto& each : services_around(wait, false))
     if (each.problem.empty()) out.push_back(std::move(each.url));
+  return out;
+}
+
+std::vector<std::string> list_service_urls(const RemoteOptions& where, const std::string& type) {
+  ListOptions options;
+  static_cast<RemoteOptions&>(options) = where;
+  options.type = type;
+  const auto place = where.url.substr(0, where.url.find_first_of("?#"));
+  const bool is_device = place.find("/devices/") != std::string::npos;
+  std::vector<std::string> out;
+  for (const auto& each : list_services(options))
+    if (!each.name.empty() && (!is_device || each.url.starts_with(place + "?"))) out.push_back(each.url);
   return out;
 }
 

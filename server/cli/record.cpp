@@ -12,6 +12,7 @@
 #include <optional>
 #include <sstream>
 
+#include "server/cli/ls.hpp"
 #include "server/cli/progress.hpp"
 #include "server/cli/remote_service.hpp"
 #include "server/config/version.hpp"
@@ -27,6 +28,7 @@ using std::chrono::steady_clock;
 
 struct RecordOptions : RemoteOptions {
   std::vector<std::string> urls;
+  std::string type;
   std::string output;
   std::vector<std::string> members = {"*"};
   double interval = 1;           ///< in s
@@ -40,6 +42,29 @@ struct RecordOptions : RemoteOptions {
   if (error.code == rr::ErrorCode::invalid_argument) throw NotUnderstood(error.message);            // of --members
   if (error.code == rr::ErrorCode::system_resource_error) throw std::runtime_error(error.message);  // of the file
   throw rr::ClientException(error);
+}
+
+/// Services as the command line names them: by themselves, as all of a gateway's device, or by their type.
+std::vector<std::string> find_services(const RecordOptions& options) {
+  if (options.urls.empty() && options.type.empty()) throw NotUnderstood("expected URLs, or --type");
+  const auto find_at = [&](const std::string& url) {
+    auto where = static_cast<RemoteOptions>(options);
+    where.url = url;
+    auto found = list_service_urls(where, options.type);
+    if (found.empty())
+      throw rr::ClientException(rr::make_error(rr::ErrorCode::service_not_found,
+                                               (url.empty() ? "around here" : url) + ": no service" +
+                                                   (options.type.empty() ? "" : " of type " + options.type)));
+    return found;
+  };
+  if (options.urls.empty()) return find_at({});
+  std::vector<std::string> out;
+  for (const auto& url : options.urls) {
+    const bool is_device = url.starts_with("http") && url.find("service=") == std::string::npos;
+    const auto found = options.type.empty() && !is_device ? std::vector{url} : find_at(url);
+    out.insert(out.end(), found.begin(), found.end());
+  }
+  return out;
 }
 
 /// Records until its time is over, somebody ends it, or the file can't be written.
@@ -71,7 +96,7 @@ class RecordRun {
 
  private:
   void start_recorders() {
-    Recorder::Listener listener;
+    RecordListener listener;
     listener.begun = [this](const rr::Result<>& outcome) {
       if (!outcome) return fail(outcome.error());
       if (++begun_ == recorders_.size()) begin_ = steady_clock::now();
@@ -80,14 +105,14 @@ class RecordRun {
     listener.failed = [this](const rr::Error& error) { fail(error); };
     const RecorderOptions how{options_.members,
                               std::chrono::milliseconds(static_cast<std::int64_t>(options_.interval * 1000))};
-    for (const auto& url : options_.urls) {
+    for (const auto& url : find_services(options_)) {
       auto remote = static_cast<RemoteOptions>(options_);
       remote.url = url;
       const auto address = remote_address(remote);
       if (const auto parsed = rr::parse_url(address.url); !parsed)
         throw NotUnderstood(parsed.error().message + "; rrgate ls lists services");
-      recorders_.push_back(std::make_shared<Recorder>(io_, writer_, how, listener));
-      recorders_.back()->start(address.url, address.options);
+      recorders_.push_back(std::make_shared<Recorder>(io_, writer_, address.url, how, listener));
+      recorders_.back()->start(address.options);
     }
   }
   void fail(const rr::Error& error) {
@@ -170,7 +195,13 @@ CLI::Option* add_positive(CLI::App& app, const std::string& name, double& number
 
 void add_record(Commands& commands) {
   const auto [app, options] = commands.add("record", "Record the data of services", run_record);
-  app.add_option("URL", options.urls, "Services, as \"rrgate ls\" prints them")->required()->option_text("...");
+  app.add_option("URL", options.urls,
+                 "Services, as \"rrgate ls\" prints them, or a gateway's http(s)://HOST:PORT/devices/NAME for a whole device")
+      ->option_text("...");
+  app.add_option("--type", options.type,
+                 "Record the services of this type, or that implement it, of the URLs' nodes and gateways; without "
+                 "URLs, of all nodes that are found")
+      ->option_text("TYPE");
   app.add_option("-o", options.output, "MCAP file to write")->required()->option_text("FILE");
   app.add_option("--members", options.members, "Paths of members, with commas between: \"state,axes/0/*\"")
       ->delimiter(',')

@@ -95,18 +95,22 @@ void read_rule(ObjectReader& in, AccessRule& rule) {
   in.texts("may", true, [&](const std::string& text) -> std::string {
     const auto verb = parse_verb(text);
     if (!verb)
-      return "found " + rr::quote(text) + ", expected one of: read, write, call, subscribe, lock, metrics, admin";
+      return "found " + rr::quote(text) +
+             ", expected one of: read, write, call, subscribe, lock, record, serve, metrics, admin";
     rule.may.push_back(*verb);
     return {};
   });
-  const bool is_narrow =
-      !rule.devices.empty() || !rule.services.empty() || !rule.paths.empty() || !rule.members.empty();
-  if (is_narrow && std::any_of(rule.may.begin(), rule.may.end(), [](Verb verb) { return !is_device_verb(verb); }))
+  const auto gives = [&rule](auto&& is_one) { return std::any_of(rule.may.begin(), rule.may.end(), is_one); };
+  const bool is_within_device = !rule.services.empty() || !rule.paths.empty() || !rule.members.empty();
+  if ((is_within_device || !rule.devices.empty()) && gives([](Verb verb) { return verb > Verb::serve; }))
     in.finding("may",
                "metrics and admin are of the gateway as a whole; expected them in a rule that names no devices, "
                "services, paths or members");
+  if (is_within_device && gives([](Verb verb) { return verb == Verb::serve; }))
+    in.finding("may",
+               "serve is of a device as a whole; expected it in a rule that names no services, paths or members");
   in.object("agent", [&](ObjectReader& part) { read_agent(part, rule.agent.emplace()); });
-  if (rule.agent && std::any_of(rule.may.begin(), rule.may.end(), [](Verb verb) { return verb >= Verb::lock; }))
+  if (rule.agent && gives([](Verb verb) { return verb >= Verb::lock; }))
     in.finding("may", "expected read, write, call and subscribe alone in a rule with \"agent\"");
 }
 

@@ -9,7 +9,8 @@ namespace {
 /// What an agent would not be given by /mcp without terms, or could answer itself with.
 bool gives_more(const AccessRule& rule) {
   return std::any_of(rule.may.begin(), rule.may.end(), [](Verb verb) {
-    return verb == Verb::write || verb == Verb::call || verb == Verb::lock || verb == Verb::admin;
+    return verb == Verb::write || verb == Verb::call || verb == Verb::lock || verb == Verb::record ||
+           verb == Verb::admin;
   });
 }
 

@@ -1,7 +1,6 @@
 #include "server/config/config.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -9,9 +8,8 @@
 #include <sstream>
 
 #include "node/http/origin.hpp"
-#include "node/transport/schemes.hpp"
 #include "server/config/access_options.hpp"
-#include "server/config/lease_options.hpp"
+#include "server/config/device_options.hpp"
 #include "server/config/object_reader.hpp"
 
 namespace rrgate {
@@ -19,104 +17,6 @@ namespace rrgate {
 namespace {
 
 constexpr std::int64_t hour_ms = 3'600'000;
-
-/// A name stands in paths and logs: letters, digits, '_', '-', '.', beginning with a letter or digit.
-std::string check_device_name(const std::string& name) {
-  const auto is_plain = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
-  };
-  const auto is_name_char = [&](char c) { return is_plain(c) || c == '_' || c == '-' || c == '.'; };
-  if (name.empty() || name.size() > 64 || !is_plain(name.front()) ||
-      !std::all_of(name.begin(), name.end(), is_name_char))
-    return "found " + rr::quote(name) + ", expected 1 to 64 letters, digits, '_', '-', '.', first a letter or digit";
-  return {};
-}
-
-std::string read_device_url(const std::string& text, rr::ConnectionUrl& target) {
-  auto url = rr::parse_url(text, rr::ServiceInUrl::optional);
-  if (!url) return url.error().message;
-  // No node of this process is a device.
-  if (!rr::can_dial(url->scheme) || url->scheme == "rr+intra")
-    return "scheme " + rr::quote(url->scheme) + " is not available for devices; available: " + rr::dialable_schemes();
-  target = *url;
-  return {};
-}
-
-constexpr auto no_file_name = "empty; expected the name of a file";
-
-auto read_file_name(std::string& target) {
-  return [&target](const std::string& text) -> std::string {
-    target = text;
-    return text.empty() ? no_file_name : "";
-  };
-}
-auto read_file_name(std::vector<std::string>& target) {
-  return [&target](const std::string& text) -> std::string {
-    target.push_back(text);
-    return text.empty() ? no_file_name : "";
-  };
-}
-
-/// What stands between the gateway and the device.
-void read_way(ObjectReader& in, DeviceConfig& device) {
-  std::string proxy;
-  in.text("proxy", proxy);
-  if (!proxy.empty()) {
-    auto address = rr::parse_host_port(proxy);
-    const auto* scheme = rr::find_url_scheme(device.url.scheme);
-    if (!address)
-      in.finding("proxy", address.error().message);
-    else if (scheme && !scheme->needs_host)
-      in.finding("proxy", "there is no proxy on the way of " + device.url.scheme + "; expected a URL with a host");
-    else
-      device.proxy = std::move(*address);
-  }
-  in.objects("headers", false, [&](ObjectReader& item) {
-    std::pair<std::string, std::string> header;
-    item.required_text("name", [&](const std::string& text) -> std::string {
-      header.first = text;
-      return {};
-    });
-    item.required_text("value", [&](const std::string& text) -> std::string {
-      header.second = text;
-      return {};
-    });
-    if (!header.first.empty() && !rr::is_extra_header(header.first, header.second))
-      item.finding("name", "header " + rr::quote(header.first) +
-                               " can't be added: the upgrade sets it itself, or its name or value has a character that "
-                               "headers can't have");
-    device.headers.push_back(std::move(header));
-  });
-}
-
-void read_mode(ObjectReader& in, DeviceMode& mode) {
-  std::string text = "relay";
-  in.choice("mode", text, {"relay", "shared"});
-  mode = text == "shared" ? DeviceMode::shared : DeviceMode::relay;
-}
-
-void read_login(ObjectReader& in, UpstreamLogin& login) {
-  in.required_text("username", [&](const std::string& text) -> std::string {
-    login.username = text;
-    return {};
-  });
-  in.required_text("password", [&](const std::string& text) -> std::string {
-    login.credentials.items.emplace_back("password", rr::Value(text));
-    return {};
-  });
-}
-
-void read_callback_rule(ObjectReader& in, CallbackRule& rule) {
-  in.required_text("member", [&](const std::string& text) -> std::string {
-    rule.member = text;
-    return {};
-  });
-  std::string answer = "owner";
-  in.choice("answer", answer, {"owner", "first", "all"});
-  rule.policy = answer == "first" ? CallbackPolicy::first
-                : answer == "all" ? CallbackPolicy::all
-                                  : CallbackPolicy::owner;
-}
 
 void read_node(ObjectReader& in, NodeConfig& node) {
   std::string id;
@@ -132,78 +32,15 @@ void read_node(ObjectReader& in, NodeConfig& node) {
     in.finding("id", "found " + rr::quote(id) + ", expected a UUID that is not all zeros");
 }
 
-void read_device(ObjectReader& in, DeviceConfig& device) {
-  in.required_text("name", [&](const std::string& text) {
-    device.name = text;
-    return check_device_name(text);
-  });
-  in.required_text("url", [&](const std::string& text) { return read_device_url(text, device.url); });
-  in.size("max_clients", device.max_clients, {0, 1'000'000});
-  read_mode(in, device.mode);
-  in.object("login", [&](ObjectReader& part) { read_login(part, device.login); });
-  in.objects("callbacks", false,
-             [&](ObjectReader& item) { read_callback_rule(item, device.callbacks.emplace_back()); });
-  in.flag("shares_reads", device.shares_reads);
-  in.object("leases", [&](ObjectReader& part) { read_leases(part, device.leases); });
-  if (device.mode == DeviceMode::relay && device.leases.is_offered)
-    in.finding("leases", "the commands of a relayed device pass unread; expected \"mode\": \"shared\"");
-  if (device.mode == DeviceMode::relay && (!device.login.username.empty() || !device.callbacks.empty()))
-    in.finding("mode",
-               "login and callbacks are of shared devices: clients of a relayed one have sessions of their own");
-  read_way(in, device);
-  in.object("tls", [&](ObjectReader& part) { part.texts("ca", false, read_file_name(device.tls.ca)); });
-}
-
 void read_tls(ObjectReader& in, TlsConfig& tls) {
   in.objects("certificates", false, [&](ObjectReader& item) {
     rr::WebCertificate certificate;
-    item.required_text("cert", read_file_name(certificate.certificate_file));
-    item.required_text("key", read_file_name(certificate.key_file));
+    item.required_file("cert", certificate.certificate_file);
+    item.required_file("key", certificate.key_file);
     tls.certificates.push_back(std::move(certificate));
   });
   in.flag("required", tls.is_required);
   in.size("hsts_seconds", tls.hsts_seconds, {0, 100'000'000});
-}
-
-void read_discover_rule(ObjectReader& in, DiscoverRule& rule) {
-  std::string node_id;
-  in.text("node_name", rule.node_name);
-  in.text("node_id", node_id);
-  in.text("service_type", rule.service_type);
-  const auto is_glob_char = [](char c) {
-    return std::string_view("*?._-").find(c) != std::string_view::npos || std::isalnum(static_cast<unsigned char>(c));
-  };
-  if (!std::all_of(rule.node_name.begin(), rule.node_name.end(), is_glob_char))
-    in.finding("node_name", "found " + rr::quote(rule.node_name) +
-                                ", expected the letters, digits, '_', '-', '.' of node names, '*' or '?'");
-  if (!node_id.empty()) {
-    const auto id = rr::parse_node_id(node_id);
-    if (id && !id->is_any())
-      rule.node_id = *id;
-    else
-      in.finding("node_id", "found " + rr::quote(node_id) + ", expected a UUID that is not all zeros");
-  } else if (rule.node_name.empty() && rule.service_type.empty()) {
-    in.finding("node_name",
-               "missing; a rule needs one of node_name, node_id and service_type (\"node_name\": \"*\" allows all)");
-  }
-}
-
-void read_discover(ObjectReader& in, Discover& discover) {
-  discover.is_enabled = true;
-  std::vector<std::string> scopes;
-  in.texts("scopes", false, [&](const std::string& text) -> std::string {
-    if (text != "node_local" && text != "link_local" && text != "site_local" && text != "ipv4_broadcast")
-      return "found " + rr::quote(text) + ", expected one of: node_local, link_local, site_local, ipv4_broadcast";
-    scopes.push_back(text);
-    return {};
-  });
-  if (!scopes.empty()) discover.scopes = std::move(scopes);
-  in.objects("allow", false, [&](ObjectReader& item) { read_discover_rule(item, discover.allow.emplace_back()); });
-  in.size("max_devices", discover.max_devices, {1, 4096});
-  in.flag("local", discover.local);
-  in.flag("hardware", discover.hardware);
-  read_mode(in, discover.mode);
-  in.object("tls", [&](ObjectReader& part) { part.texts("ca", false, read_file_name(discover.tls.ca)); });
 }
 
 void read_proxy(ObjectReader& in, Config& config) {
@@ -266,6 +103,14 @@ void read_retry(ObjectReader& in, Retry& retry) {
   in.duration("online_ms", retry.online, {50, hour_ms});
 }
 
+void read_serve(ObjectReader& in, ServeConfig& serve) {
+  serve.is_enabled = true;
+  in.size("max_devices", serve.max_devices, {1, 4096});
+  std::string mode = "shared";
+  in.choice("mode", mode, {"shared", "relay"});
+  serve.mode = mode == "relay" ? DeviceMode::relay : DeviceMode::shared;
+}
+
 void read_mcp(ObjectReader& in, McpConfig& mcp) {
   mcp.is_enabled = true;
   in.duration("longest_wait_ms", mcp.longest_wait, {1000, hour_ms});
@@ -315,6 +160,8 @@ void read_config(ObjectReader& in, Config& config) {
   in.object("timeouts", [&](ObjectReader& part) { read_timeouts(part, config.timeouts); });
   in.object("retry", [&](ObjectReader& part) { read_retry(part, config.retry); });
   in.object("mcp", [&](ObjectReader& part) { read_mcp(part, config.mcp); });
+  in.object("serve", [&](ObjectReader& part) { read_serve(part, config.serve); });
+  in.object("recordings", [&](ObjectReader& part) { read_recordings(part, config.recordings); });
   in.object("log", [&](ObjectReader& part) {
     part.choice("level", config.log.level, {"trace", "debug", "info", "warning", "error"});
     part.choice("format", config.log.format, {"text", "json"});
@@ -357,6 +204,7 @@ void locate_files(Config& config, const std::filesystem::path& folder) {
     if (!path.empty()) path = (folder / path).string();
   };
   locate(config.web_root);
+  locate(config.recordings.folder);
   for (auto& certificate : config.tls.certificates) {
     locate(certificate.certificate_file);
     locate(certificate.key_file);

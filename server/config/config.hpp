@@ -15,6 +15,7 @@
 #include "node/transport/http_headers.hpp"
 #include "server/access/access_config.hpp"
 #include "server/config/finding.hpp"
+#include "server/config/recording_options.hpp"
 #include "server/http/forwarded.hpp"
 
 namespace rrgate {
@@ -105,6 +106,7 @@ struct DeviceConfig {
   rr::ConnectionUrl url;
   std::size_t max_clients = 0;  ///< 0: no bound of its own
   bool is_found = false;        ///< by discovery, not configured
+  bool is_served = false;       ///< by a page, not configured; there as long as that is
   DeviceTls tls;
   rr::HostPort proxy;       ///< HTTP proxy on the way; empty host: none
   rr::HttpHeaders headers;  ///< for WebSocket URLs
@@ -223,6 +225,15 @@ struct Discover {
   bool operator==(const Discover&) const = default;
 };
 
+/// Pages that are devices, each by a WebSocket at /serve/NAME.
+struct ServeConfig {
+  bool is_enabled = false;  ///< there where the configuration has "serve"
+  std::size_t max_devices = 16;
+  DeviceMode mode = DeviceMode::shared;
+
+  bool operator==(const ServeConfig&) const = default;
+};
+
 /// The devices for agents, by the Model Context Protocol.
 struct McpConfig {
   bool is_enabled = false;               ///< there where the configuration has "mcp"
@@ -251,6 +262,8 @@ struct Config {
   Retry retry;
   LogConfig log;
   McpConfig mcp;
+  ServeConfig serve;
+  RecordingsConfig recordings;
 
   bool operator==(const Config&) const = default;
 };
@@ -265,6 +278,10 @@ ParsedConfig parse_config(std::string_view text, const std::filesystem::path& fo
 
 /// The same for a file and its folder; a file that can't be read is a finding with an empty path.
 ParsedConfig load_config(const std::string& file);
+
+/// Names of devices stand in paths and logs: letters, digits, '_', '-', '.', beginning with a letter or digit.
+/// Returns  what is wrong; empty: nothing.
+std::string check_device_name(const std::string& name);
 
 /// Every option the parser knows, in its order: what the schema must say too.
 std::vector<OptionInfo> config_options();

@@ -16,6 +16,10 @@ const nlohmann::json& empty_object() {
   return value;
 }
 
+std::string no_file_name(const std::string& text) {
+  return text.empty() ? "empty; expected the name of a file" : "";
+}
+
 std::string type_of(const nlohmann::json& value) {
   if (value.is_number_integer()) return "integer";
   if (value.is_number()) return "number";
@@ -166,6 +170,20 @@ void ObjectReader::texts(std::string_view key, bool is_required, const ReadText&
       log_.findings.push_back({item_path, "found " + shown((*value)[i]) + ", expected a string"});
     }
   }
+}
+
+void ObjectReader::required_file(std::string_view key, std::string& target) {
+  required_text(key, [&target](const std::string& text) {
+    target = text;
+    return no_file_name(text);
+  });
+}
+
+void ObjectReader::files(std::string_view key, std::vector<std::string>& target) {
+  texts(key, false, [&target](const std::string& text) {
+    target.push_back(text);
+    return no_file_name(text);
+  });
 }
 
 void ObjectReader::ranges(std::string_view key, const ReadRange& read) {

@@ -44,6 +44,9 @@ class ObjectReader {
   using ReadText = std::function<std::string(const std::string&)>;
   void required_text(std::string_view key, const ReadText& read);
   void texts(std::string_view key, bool is_required, const ReadText& read);
+  /// Names of files, none of them empty.
+  void required_file(std::string_view key, std::string& target);
+  void files(std::string_view key, std::vector<std::string>& target);
   /// Two numbers by any name each, the first at most the second.
   using ReadRange = std::function<void(const std::string& name, double least, double most)>;
   void ranges(std::string_view key, const ReadRange& read);

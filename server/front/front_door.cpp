@@ -60,11 +60,14 @@ rr::awaitable<bool> take_proxy_header(GatewayState& gateway, rr::ByteStream& str
   }
 }
 
+/// Few: who comes and stays silent makes the gateway hold no more than this.
+constexpr std::size_t first_look = 256;
+
 /// Reads until the first bytes tell the protocol, and puts them back. Undecided: the connection ended before.
 rr::awaitable<Protocol> look_at_first_bytes(GatewayState& gateway, rr::ByteStream& stream, const std::string& client) {
   rr::Deadline limit(stream.executor(), [&stream] { stream.close(); });
   limit.arm(gateway.config().limits.header_timeout);
-  std::array<std::uint8_t, 4096> first{};
+  std::array<std::uint8_t, first_look> first{};
   std::size_t size = 0;
   auto protocol = Protocol::undecided;
   while (protocol == Protocol::undecided) {
@@ -94,9 +97,23 @@ rr::awaitable<std::unique_ptr<rr::ByteStream>> accept_https(GatewayState& gatewa
                         {{"peer", connection.client}});
     co_return nullptr;
   }
+  HandshakeTurns::Turn turn(gateway.handshakes(), network_name(connection.peer.endpoint.address()), stream->executor());
+  const auto stop = std::exchange(connection.stop, [&turn, below = stream.get()](const rr::EndReason&) {
+    turn.cancel();
+    below->close();
+  });
+  const auto& limits = gateway.config().limits;
+  const bool has_turn = co_await turn.come(limits.header_timeout);
+  connection.stop = stop;
+  if (!has_turn) {
+    gateway.reject(Rejection::tls);
+    gateway.log_refusal(LogLevel::info, "connection closed: too many TLS handshakes are unfinished", connection.client,
+                        {{"peer", connection.client}});
+    co_return nullptr;
+  }
   const rr::TlsPeerOptions any_client;
   auto tls = std::make_unique<rr::TlsStream>(std::move(stream), context, rr::TlsRole::server, any_client);
-  const auto done = co_await tls->handshake(gateway.config().limits.header_timeout);
+  const auto done = co_await tls->handshake(limits.header_timeout);
   if (!done) {
     gateway.reject(Rejection::tls);
     gateway.log_refusal(LogLevel::info, "connection closed", connection.client, {{"error", done.error().message}});
@@ -106,6 +123,7 @@ rr::awaitable<std::unique_ptr<rr::ByteStream>> accept_https(GatewayState& gatewa
     connection.identity.name = std::move(name);
     connection.identity.proof = Proof::certificate;
     connection.identity.ends = tls->client_certificate_end();
+    connection.identity.credential = tls->client_certificate_marks();
   }
   co_return tls;
 }
@@ -136,8 +154,8 @@ rr::awaitable<void> serve_connection(GatewayState& gateway, std::unique_ptr<rr::
   auto& identity = connection.identity;
   identity.client = connection.client;
   identity.face = Face::native;
-  identity = identity.is_proven() ? gateway.access().with_grants(std::move(identity))
-                                  : gateway.access().anonymous(connection.client, Face::native);
+  const auto certified = identity.is_proven() ? gateway.access().renew(identity) : std::nullopt;
+  identity = certified ? *certified : gateway.access().anonymous(connection.client, Face::native);
   rr::awaitable<void> continuation;
   switch (protocol) {
     case Protocol::robot_raconteur:

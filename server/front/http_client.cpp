@@ -5,6 +5,7 @@
 #include "node/http/upgrade.hpp"
 #include "node/transport/websocket.hpp"
 #include "server/access/standing.hpp"
+#include "server/front/page_device.hpp"
 #include "server/front/refused_client.hpp"
 #include "server/front/serve_shared_client.hpp"
 #include "server/http/endpoints/objects.hpp"
@@ -127,7 +128,9 @@ rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& 
     co_await write_refusal(gateway, tcp, refusal);
     co_await tcp.end(rr::no_reason);
   };
-  const auto subprotocol = is_json_socket(request) ? json_subprotocol : rr::websocket_subprotocol;
+  const auto subprotocol = is_json_socket(request)   ? json_subprotocol
+                           : is_page_device(request) ? page_subprotocol(request)
+                                                     : rr::websocket_subprotocol;
   if (auto refusal = refuse_upgrade(request, subprotocol)) {
     gateway.reject(Rejection::bad_request);
     gateway.log_refusal(LogLevel::info, "upgrade refused", connection.client,
@@ -145,6 +148,8 @@ rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& 
   }
   if (is_json_socket(request))
     co_return co_await accept_json_socket(gateway, connection, std::move(stream), request, unread);
+  if (is_page_device(request))
+    co_return co_await accept_page_device(gateway, connection, std::move(stream), request, unread);
   const auto destination = find_destination(gateway, request);
   if (!destination) {
     const auto& error = destination.error();
@@ -349,7 +354,7 @@ rr::awaitable<Continuation> serve_http_client(GatewayState& gateway, Connection&
     HttpAccess::Admitted admitted;
     admitted.refusal = refuse_page(gateway, request);
     if (!admitted.refusal) admitted.refusal = require_tls(gateway, request);
-    if (!admitted.refusal && !is_refused && is_guarded(request)) {
+    if (!admitted.refusal && !is_refused && is_guarded(request) && !is_awaited_page(gateway, request)) {
       const auto urgent = find_urgent(gateway, request);
       const AccessRequest wanted{.device = urgent.device, .service = urgent.service};
       admitted =

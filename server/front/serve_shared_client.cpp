@@ -164,7 +164,7 @@ std::shared_ptr<SharedClient> begin_session(GatewayState& gateway, Connection& c
       .is_encrypted = connection.peer.is_encrypted,
       .memory = gateway.memory().charge(connection.network)};
   auto session = destination.node->add(std::move(client), std::move(arrival), std::move(ended));
-  connection.device = destination.device;
+  connection.device = destination.device ? destination.device->shared_from_this() : nullptr;
   connection.has_session = true;
   connection.is_good = [rights, session] {
     if (!rights->is_good()) return false;

@@ -18,6 +18,7 @@
 #include "server/front/front_door.hpp"
 #include "server/gateway/routes.hpp"
 #include "server/log/log.hpp"
+#include "server/recordings/recordings.hpp"
 
 namespace rrgate {
 
@@ -112,6 +113,7 @@ rr::Result<std::vector<rr::HostPort>> Gateway::start(const std::vector<int>& soc
   shared_.add_own(own_service_->device(), std::string(GatewayService::name));
   if (found_) found_->start();
   issuer_keys_.start();
+  recordings_->follow_config();
   asio::co_spawn(io_, watch_files(), asio::detached);
   return bound;
 }
@@ -227,6 +229,7 @@ rr::Result<> Gateway::reconfigure(Config next) {
     found_ = std::make_unique<FoundDevices>(io_, config_, devices_, std::move(found_tls));
     found_->start();
   }
+  if (before.recordings != config_.recordings) recordings_->follow_config();
   router_ = make_routes(*this);
   for (auto it = connections_.begin(); it != connections_.end();) {
     auto& connection = *it++;
@@ -316,6 +319,7 @@ void Gateway::stop(std::function<void()> on_stopped) {
   if (on_stop_) on_stop_();
   if (found_) found_->stop();
   issuer_keys_.stop();
+  recordings_->stop();
   devices_.stop();
   clients_.stop();
   devices_.on_change(nullptr);

@@ -10,6 +10,7 @@
 #include "server/http/endpoints/health.hpp"
 #include "server/http/endpoints/metrics.hpp"
 #include "server/http/endpoints/objects.hpp"
+#include "server/http/endpoints/recordings.hpp"
 #include "server/http/response_writer.hpp"
 #include "server/mcp/mcp_endpoint.hpp"
 
@@ -52,6 +53,11 @@ std::vector<Route> list_routes(GatewayState& gateway) {
       {post, "/api/v1/devices/*", objects_endpoint(gateway)},
       {options, "/api/v1/devices/*", objects_endpoint(gateway)},
       {get, "/api/v1/discovery", discovery_endpoint(gateway)},
+      {get, "/api/v1/recordings", recordings_endpoint(gateway)},
+      {post, "/api/v1/recordings", with_body(begin_recording_endpoint(gateway))},
+      {get, "/api/v1/recordings/*", recording_endpoint(gateway)},
+      {post, "/api/v1/recordings/*", with_body(stop_recording_endpoint(gateway))},
+      {delete_, "/api/v1/recordings/*", delete_recording_endpoint(gateway)},
       {get, "/api/v1/access", who_endpoint(gateway)},
       {post, "/api/v1/session", sign_in_endpoint(gateway)},
       {delete_, "/api/v1/session", sign_out_endpoint(gateway)},

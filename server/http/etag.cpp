@@ -14,4 +14,13 @@ std::string make_etag(std::string_view content, std::string_view suffix) {
   return std::string(text) + std::string(suffix) + "\"";
 }
 
+Response with_etag(Response response, const Request& request) {
+  const auto etag = make_etag(*response.body);
+  response.set("ETag", etag).set("Cache-Control", "no-cache");
+  if (!has_token(request.header(http::field::if_none_match), etag)) return response;
+  response.status = 304;
+  response.body = nullptr;
+  return response;
+}
+
 }  // namespace rrgate

@@ -4,9 +4,13 @@
 #include <string>
 #include <string_view>
 
+#include "server/http/request.hpp"
+
 namespace rrgate {
 
 /// Quoted, as a header has it; the same for the same content, in every run. `suffix` tells encodings of it apart.
 std::string make_etag(std::string_view content, std::string_view suffix = {});
+/// With an ETag of its content; 304 where the request has it already.
+Response with_etag(Response response, const Request& request);
 
 }  // namespace rrgate

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <optional>
 #include <set>
 
 #include "server/http/endpoints/member_values.hpp"
@@ -51,14 +52,17 @@ rr::OrderedJson describe_member(const Target& target, const rr::MemberDefinition
   rr::add_key(out, "name") = member.name;
   rr::add_key(out, "kind") = std::string(member_kind_name(member.kind));
   rr::add_key(out, "type") = format_type(member.type);
-  auto& may = rr::add_key(out, "may") = rr::OrderedJson::array();
+  auto may = rr::OrderedJson::array();
+  std::optional<AgentTerms> terms;
   for (const auto verb : uses_of(member)) {
     auto wanted = access_request(target, verb);
     wanted.member = member.name;
     if (!rules.check(who, wanted)) continue;
     may.push_back(std::string(to_string(verb)));
-    if (const auto terms = rules.terms(who, wanted)) rr::add_key(out, "terms") = terms_for_agent(*terms);
+    if (auto of_verb = rules.terms(who, wanted)) terms = std::move(of_verb);
   }
+  rr::add_key(out, "may") = std::move(may);
+  if (terms) rr::add_key(out, "terms") = terms_for_agent(*terms);
   const bool has_parameters = member.kind == rr::MemberKind::function || member.kind == rr::MemberKind::event ||
                               member.kind == rr::MemberKind::callback;
   if (has_parameters) rr::add_key(out, "parameters") = parameters_schema(member);

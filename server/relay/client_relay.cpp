@@ -47,7 +47,7 @@ rr::awaitable<void> relay_client(GatewayState& gateway, Connection& connection, 
                              .outbox_bytes = limits.outbox_bytes,
                              .opaque_rate = limits.opaque_rate};
   Relay relay(*client, *boarding->stream, options, device.traffic(), gateway.memory().charge(connection.network));
-  connection.device = &device;
+  connection.device = device.shared_from_this();
   connection.has_session = true;
   connection.stop = [&relay](rr::EndReason reason) { relay.stop(std::move(reason)); };
   const auto standing = std::make_shared<Standing>(gateway.access(), connection.identity);

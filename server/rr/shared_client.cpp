@@ -30,6 +30,16 @@ SharedClient::SharedClient(SharedClientOwner& owner, rr::ServiceDirectory& direc
       rights_(std::move(rights)),
       key_(std::move(key)) {}
 
+template <class F>
+auto SharedClient::while_here(F work) {
+  return [this, weak = weak_from_this(), work = std::move(work)](const auto&... results) {
+    const auto self = weak.lock();
+    if (!self) return;
+    work(results...);
+    settle();
+  };
+}
+
 void SharedClient::close_service() {
   session_.close_service(rr::read_clocks());
   settle();
@@ -88,14 +98,9 @@ void SharedClient::handle(const rr::ClientGone&) {
 
 void SharedClient::handle(const rr::Called& called) {
   if (!service_) return;
-  const std::weak_ptr<StreamDriver> weak = weak_from_this();
-  auto done = [this, weak, id = called.id](const rr::Result<rr::Value>& result) {
-    const auto self = weak.lock();
-    if (!self) return;
+  home_->request(*this, called, while_here([this, id = called.id](const rr::Result<rr::Value>& result) {
     session_.reply(id, result, rr::read_clocks());
-    settle();
-  };
-  home_->request(*this, called, std::move(done));
+  }));
 }
 
 void SharedClient::handle(const rr::GeneratorEnded& ended) {
@@ -104,24 +109,14 @@ void SharedClient::handle(const rr::GeneratorEnded& ended) {
 
 void SharedClient::handle(const rr::ObjectWanted& wanted) {
   if (!service_) return;
-  const std::weak_ptr<StreamDriver> weak = weak_from_this();
-  service_->find_object(*home_, wanted.path, [this, weak, path = wanted.path](const rr::Result<>& found) {
-    const auto self = weak.lock();
-    if (!self) return;
+  service_->find_object(*home_, wanted.path, while_here([this, path = wanted.path](const rr::Result<>& found) {
     session_.handle_object_found(path, found, rr::read_clocks());
-    settle();
-  });
+  }));
 }
 
 /// A client that is told that it has left holds no lock any more.
 void SharedClient::handle(const rr::LeaveWanted&) {
-  const std::weak_ptr<StreamDriver> weak = weak_from_this();
-  auto left = [this, weak] {
-    const auto self = weak.lock();
-    if (!self) return;
-    session_.answer_leave(rr::read_clocks());
-    settle();
-  };
+  auto left = while_here([this] { session_.answer_leave(rr::read_clocks()); });
   if (!service_) return left();
   if (!login_) return home_->remove(*this, std::move(left));
   home_->remove(*this);
@@ -423,13 +418,9 @@ AuditEntryPtr SharedClient::begin_lease_end(const std::string& path) const {
 
 void SharedClient::handle(const rr::LockWanted& wanted) {
   if (!service_) return;
-  const std::weak_ptr<StreamDriver> weak = weak_from_this();
-  begin_lock(wanted, [this, weak, id = wanted.id](const rr::Result<>& result) {
-    const auto self = weak.lock();
-    if (!self) return;
-    session_.answer_lock(id, result, rr::read_clocks());
-    settle();
-  });
+  begin_lock(wanted, while_here([this, id = wanted.id](const rr::Result<>& result) {
+               session_.answer_lock(id, result, rr::read_clocks());
+             }));
 }
 
 }  // namespace rrgate

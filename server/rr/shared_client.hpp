@@ -65,6 +65,10 @@ class SharedClient final : public rr::SessionDriver<rr::ServiceSession>, private
     const rr::MemberDefinition* member = nullptr;
   };
 
+  /// What calls `work` while this client is there, and passes on what is due then.
+  template <class F>
+  auto while_here(F work);
+
   bool handle_event(rr::Now now) override;
   void ended() override;
   void has_written() override;

@@ -4,6 +4,7 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/intrusive/list.hpp>
 #include <functional>
+#include <memory>
 #include <string>
 #include <utility>
 
@@ -30,7 +31,7 @@ struct Connection : boost::intrusive::list_base_hook<boost::intrusive::link_mode
   /// Whether what its client has shown is still good (Standing); none: nothing goes on that would have to end.
   std::function<bool()> is_good;
   /// Set while it is used for one device.
-  const Device* device = nullptr;
+  std::shared_ptr<const Device> device;
   /// It carries a Robot Raconteur session, which may go on for a while when the gateway stops.
   bool has_session = false;
   Peer peer;

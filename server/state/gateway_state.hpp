@@ -19,6 +19,7 @@
 #include "server/rr/shared_devices.hpp"
 #include "server/state/admission.hpp"
 #include "server/state/connection.hpp"
+#include "server/state/handshake_turns.hpp"
 #include "server/state/http_access.hpp"
 #include "server/state/workers.hpp"
 #include "server/upstream/device.hpp"
@@ -26,6 +27,8 @@
 #include "server/upstream/value_client.hpp"
 
 namespace rrgate {
+
+class Recordings;
 
 /// The parts of a gateway. Uses one thread: that of the io_context. Gateway alone starts, changes and stops them.
 class GatewayState {
@@ -36,9 +39,12 @@ class GatewayState {
   const Config& config() const { return config_; }
   DeviceRegistry& devices() { return devices_; }
   ValueClients& clients() { return clients_; }
+  Recordings& recordings() { return *recordings_; }
   SharedDevices& shared() { return shared_; }
   /// Null where the configuration has no "discover", and before start().
   FoundDevices* found() { return config_.discover.is_enabled ? found_.get() : nullptr; }
+  /// Pages that are devices.
+  PageLinks& pages() { return pages_; }
   Metrics& metrics() { return metrics_; }
   void reject(Rejection why) { metrics_.reject(why); }
   /// For an error of Access::check().
@@ -57,6 +63,8 @@ class GatewayState {
   Documents& documents() { return documents_; }
   /// Clients that hold a lease for requests of HTTP, by the key that those show; each until its lease ends.
   std::map<std::string, std::shared_ptr<ValueClient>, std::less<>>& lease_holders() { return lease_holders_; }
+  /// Of whom TLS handshakes go on.
+  HandshakeTurns& handshakes() { return handshakes_; }
   /// What would take long on this thread.
   Workers& workers() { return workers_; }
   /// What clients make the gateway hold.
@@ -96,9 +104,12 @@ class GatewayState {
   std::unique_ptr<TlsFiles> web_tls_;
   DeviceRegistry devices_;
   ValueClients clients_;
+  std::unique_ptr<Recordings> recordings_;
   std::map<std::string, std::shared_ptr<ValueClient>, std::less<>> lease_holders_;
   std::unique_ptr<FoundDevices> found_;
+  PageLinks pages_;
   Admission admission_;
+  HandshakeTurns handshakes_;
   SharedDevices shared_;
   Router router_;
   Documents documents_{32};

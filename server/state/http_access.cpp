@@ -82,8 +82,12 @@ rr::awaitable<rr::Result<Identity>> HttpAccess::identify(const Request& request,
       found->face = face;
       if (auto renewed = access_.renew(*found)) co_return std::move(*renewed);
     }
-  if (connection.identity.proof == Proof::certificate && std::chrono::system_clock::now() < connection.identity.ends)
-    co_return proven(connection.identity);
+  if (connection.identity.proof == Proof::certificate)
+    if (auto certified = access_.renew(connection.identity)) {
+      certified->client = client;
+      certified->face = face;
+      co_return std::move(*certified);
+    }
   co_return access_.anonymous(client, face);
 }
 

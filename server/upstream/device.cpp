@@ -72,7 +72,7 @@ std::string_view to_string(DeviceState state) {
 }
 
 Device::Device(const asio::any_io_executor& executor, DeviceConfig config, const Config& whole,
-               std::shared_ptr<TlsFiles> tls)
+               std::shared_ptr<TlsFiles> tls, std::shared_ptr<PageLink> page)
     : config_(std::move(config)),
       dial_options_{whole.timeouts.connect, whole.timeouts.send_stall, config_.proxy, config_.headers},
       tls_(tls                      ? std::move(tls)
@@ -81,7 +81,9 @@ Device::Device(const asio::any_io_executor& executor, DeviceConfig config, const
       retry_(whole.retry),
       backoff_(retry_.min, retry_.max),
       look_id_(rr::random_node_id()),
-      wake_(executor) {}
+      wake_(executor) {
+  if (page) dial_options_.reach = [page = std::move(page)] { return PageLink::dial(page); };
+}
 
 rr::DialOptions Device::dial_options(std::string_view way) const {
   auto options = dial_options_;
@@ -200,6 +202,8 @@ void Device::start() {
 
 rr::awaitable<void> Device::watch() {
   while (!is_stopping_) {
+    co_await wait_for_turn();
+    if (is_stopping_) break;
     looks_again_ = false;
     has_come_back_ = false;
     auto probed = probe_any(urls_to_try(), dial_options(), look_id_);
@@ -225,6 +229,15 @@ rr::awaitable<void> Device::watch() {
       co_await wake_.async_wait(asio::as_tuple(asio::use_awaitable));
     }
   }
+}
+
+rr::awaitable<void> Device::wait_for_turn() {
+  if (!pace_ || looks_again_) co_return;
+  const auto look = state_ == DeviceState::connecting ? LookPace::Look::first : LookPace::Look::later;
+  const auto turn = pace_->take_turn(look, std::chrono::steady_clock::now());
+  wake_.expires_at(turn);
+  while (!is_stopping_ && !looks_again_ && std::chrono::steady_clock::now() < turn)
+    co_await wake_.async_wait(asio::as_tuple(asio::use_awaitable));
 }
 
 std::vector<rr::ConnectionUrl> Device::urls_to_try() const {
@@ -279,7 +292,14 @@ void Device::note_answer(const rr::Result<ProbeResult>& result, DeviceState befo
 
 DeviceRegistry::DeviceRegistry(const asio::any_io_executor& executor, const Config& config)
     : executor_(executor), config_(config) {
-  for (const auto& device : config.devices) devices_.push_back(std::make_shared<Device>(executor, device, config));
+  for (const auto& device : config.devices) devices_.push_back(make(device, config));
+}
+
+std::shared_ptr<Device> DeviceRegistry::make(DeviceConfig device, const Config& whole, std::shared_ptr<TlsFiles> tls,
+                                             std::shared_ptr<PageLink> page) {
+  auto made = std::make_shared<Device>(executor_, std::move(device), whole, std::move(tls), std::move(page));
+  made->share_pace(pace_);
+  return made;
 }
 
 rr::Result<> DeviceRegistry::load_tls() {
@@ -290,7 +310,8 @@ rr::Result<> DeviceRegistry::load_tls() {
 
 void DeviceRegistry::reload_tls(bool is_forced) {
   for (const auto& device : devices_)
-    if (!device->config().is_found) device->reload_tls(is_forced);  // those have theirs together
+    if (!device->config().is_found && !device->config().is_served)
+      device->reload_tls(is_forced);  // those have theirs together
 }
 
 void DeviceRegistry::start() {
@@ -306,7 +327,7 @@ rr::Result<std::vector<std::shared_ptr<Device>>> DeviceRegistry::prepare(const C
       out.push_back(*stays);
       continue;
     }
-    out.push_back(std::make_shared<Device>(executor_, config, next));
+    out.push_back(make(config, next));
     if (auto loaded = out.back()->load_tls(); !loaded) return loaded.error();
   }
   return out;
@@ -320,7 +341,8 @@ void DeviceRegistry::replace(std::vector<std::shared_ptr<Device>> configured) {
   }
   for (const auto& device : before) {
     if (has(*device)) continue;
-    if (device->config().is_found)
+    const auto& config = device->config();
+    if (config.is_found || (config.is_served && !find(config.name)))
       devices_.push_back(device);
     else
       device->stop();
@@ -331,8 +353,8 @@ bool DeviceRegistry::has(const Device& device) const {
   return std::any_of(devices_.begin(), devices_.end(), [&](const auto& each) { return each.get() == &device; });
 }
 
-Device& DeviceRegistry::add(DeviceConfig device, std::shared_ptr<TlsFiles> tls) {
-  devices_.push_back(std::make_shared<Device>(executor_, std::move(device), config_, std::move(tls)));
+Device& DeviceRegistry::add(DeviceConfig device, std::shared_ptr<TlsFiles> tls, std::shared_ptr<PageLink> page) {
+  devices_.push_back(make(std::move(device), config_, std::move(tls), std::move(page)));
   auto& added = *devices_.back();
   added.start();
   if (on_change_) on_change_();
@@ -371,7 +393,8 @@ rr::NodeIdentity identity_of(const Device& device) {
 
 Device* DeviceRegistry::find_configured(const rr::NodeId& node_id) const {
   for (const auto& device : devices_)
-    if (!device->config().is_found && identity_of(*device).id == node_id) return device.get();
+    if (!device->config().is_found && !device->config().is_served && identity_of(*device).id == node_id)
+      return device.get();
   return nullptr;
 }
 

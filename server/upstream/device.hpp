@@ -17,6 +17,8 @@
 #include "server/config/config.hpp"
 #include "server/config/tls_files.hpp"
 #include "server/log/metrics.hpp"
+#include "server/upstream/look_pace.hpp"
+#include "server/upstream/page_link.hpp"
 #include "server/upstream/probe.hpp"
 
 namespace rrgate {
@@ -32,8 +34,9 @@ std::string_view to_string(DeviceState state);
 class Device : public std::enable_shared_from_this<Device> {
  public:
   /// `tls`  of all found devices; null: files of its own, where its URL wants them.
+  /// `page`  how it is reached if a page is the device; null: by its URL.
   Device(const boost::asio::any_io_executor& executor, DeviceConfig config, const Config& whole,
-         std::shared_ptr<TlsFiles> tls = nullptr);
+         std::shared_ptr<TlsFiles> tls = nullptr, std::shared_ptr<PageLink> page = nullptr);
 
   const DeviceConfig& config() const { return config_; }
   boost::asio::any_io_executor executor() { return wake_.get_executor(); }
@@ -106,6 +109,9 @@ class Device : public std::enable_shared_from_this<Device> {
   [[nodiscard]] rr::Result<> load_tls();
   void reload_tls(bool is_forced);
 
+  /// Its looks take their turns; without this none waits.
+  void share_pace(std::shared_ptr<LookPace> pace) { pace_ = std::move(pace); }
+
   /// Probes until stop(), all URLs side by side; stop() ends what is being dialed.
   rr::awaitable<void> watch();
   /// The same, by itself.
@@ -118,6 +124,8 @@ class Device : public std::enable_shared_from_this<Device> {
   template <class T>
   rr::awaitable<rr::Result<T>> until_stopped(rr::awaitable<rr::Result<T>> work);
   void look_again();
+  /// Until its turn, or until somebody wants it looked at now.
+  rr::awaitable<void> wait_for_turn();
   /// The one that worked last, then the others.
   std::vector<rr::ConnectionUrl> urls_to_try() const;
   void note(const rr::Result<ProbeResult>& result);
@@ -131,10 +139,11 @@ class Device : public std::enable_shared_from_this<Device> {
   std::shared_ptr<TlsFiles> tls_;                        ///< null: the URL wants none
   std::list<boost::asio::cancellation_signal> dialing_;  ///< what stop() ends
   Retry retry_;
-  rr::Backoff backoff_;         ///< between looks at it while it does not answer
-  const rr::NodeId look_id_;    ///< the node that looks come from: none but they have it
-  bool has_come_back_ = false;  ///< the look that is on its way
-  bool is_circle_ = false;      ///< the last look came back, and was not answered
+  rr::Backoff backoff_;             ///< between looks at it while it does not answer
+  std::shared_ptr<LookPace> pace_;  ///< of all devices; may be null
+  const rr::NodeId look_id_;        ///< the node that looks come from: none but they have it
+  bool has_come_back_ = false;      ///< the look that is on its way
+  bool is_circle_ = false;          ///< the last look came back, and was not answered
   DeviceState state_ = DeviceState::connecting;
   std::string last_error_;
   std::optional<ProbeResult> identity_;
@@ -165,15 +174,16 @@ class DeviceRegistry {
   /// The devices of another configuration, which must outlive this call alone: those that stay as they are, and new
   /// ones. Errors   as load_tls(); nothing has changed.
   [[nodiscard]] rr::Result<std::vector<std::shared_ptr<Device>>> prepare(const Config& next);
-  /// Takes what prepare() made, once the configuration has been replaced. Found devices stay.
+  /// Takes what prepare() made, once the configuration has been replaced. Found devices stay, and pages whose names
+  /// no other device has now.
   void replace(std::vector<std::shared_ptr<Device>> configured);
   bool has(const Device& device) const;
 
   /// Called when devices have joined or gone.
   void on_change(std::function<void()> handler) { on_change_ = std::move(handler); }
-  /// A found device joins; its name is nobody's yet.
-  Device& add(DeviceConfig device, std::shared_ptr<TlsFiles> tls);
-  /// A found device goes; clients that are connected to it stay so.
+  /// A device that is found or a page joins; its name is nobody's yet.
+  Device& add(DeviceConfig device, std::shared_ptr<TlsFiles> tls, std::shared_ptr<PageLink> page = nullptr);
+  /// Such a device goes; clients that are connected to it stay so.
   void remove(const Device& device);
 
   const std::vector<std::shared_ptr<Device>>& all() const { return devices_; }
@@ -186,8 +196,12 @@ class DeviceRegistry {
   Device* route(const rr::NodeId& node_id, std::string_view node_name) const;
 
  private:
+  std::shared_ptr<Device> make(DeviceConfig device, const Config& whole, std::shared_ptr<TlsFiles> tls = nullptr,
+                               std::shared_ptr<PageLink> page = nullptr);
+
   boost::asio::any_io_executor executor_;
   const Config& config_;
+  std::shared_ptr<LookPace> pace_ = std::make_shared<LookPace>();  ///< devices may outlive this
   std::vector<std::shared_ptr<Device>> devices_;
   std::function<void()> on_change_;
 };

@@ -105,7 +105,8 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   rr::awaitable<rr::Result<>> open();
   /// Opens it, again and again, until close(). `is_used`: says whether a session that was opened is of use.
   void keep_open(Retry retry, std::function<rr::Result<>()> is_used = nullptr);
-  /// The same, but without clients for this time it rests: the device has no session to keep.
+  /// The same, but without clients for this time it rests: the device has no session to keep. Until the first client
+  /// comes it is opened to see what there is, and rests at once.
   void rest_unused(std::chrono::milliseconds after) { rests_after_ = after; }
   bool is_resting() const { return is_resting_; }
   /// Has it opened again where it rests.
@@ -202,13 +203,11 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   };
   /// A wire's value as the turns send it: encoded once for all of them.
   struct Outgoing {
-    Outgoing(const std::string& path, const rr::MemberDefinition& member, rr::WireValue its_value,
+    Outgoing(const std::string& path, const rr::MemberDefinition& member, std::shared_ptr<const rr::WireValue> newest,
              rr::TimePoint arrived, std::uint64_t its_count)
-        : value(std::move(its_value)), packet(path, member, value.value, value.time, arrived), count(its_count) {}
-    Outgoing(const Outgoing&) = delete;
-    Outgoing& operator=(const Outgoing&) = delete;
+        : value(std::move(newest)), packet(path, member, value->value, value->time, arrived), count(its_count) {}
 
-    const rr::WireValue value;
+    const std::shared_ptr<const rr::WireValue> value;
     rr::WirePacket packet;
     const std::uint64_t count;  ///< Wire::count of it
   };
@@ -220,7 +219,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
     const rr::MemberDefinition& member;
     std::vector<Follower> followers;
     std::size_t next = 0;  ///< before the follower whose turn it is
-    std::optional<rr::WireValue> newest;
+    std::shared_ptr<const rr::WireValue> newest;
     rr::TimePoint arrived;               ///< of the newest
     std::optional<Outgoing> outgoing;    ///< while hand_out() is at it
     std::uint64_t count = 0;             ///< values that have come
@@ -314,6 +313,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   std::chrono::milliseconds rests_after_{0};  ///< without clients; 0: never
   bool is_attempting_ = false;
   bool is_resting_ = false;
+  bool is_wanted_ = false;  ///< a client has come, or was about to
   bool is_waking_ = false;  ///< has rested, and the attempt to open it again is not over
   bool is_closed_ = false;
   bool closes_unused_ = false;

@@ -175,6 +175,8 @@ rr::awaitable<void> Upstream::run(std::shared_ptr<Upstream> self, Retry retry, s
 rr::awaitable<bool> Upstream::watch_use() {
   while (is_open() && !is_closed_) {
     const bool may_rest = clients_.empty() && rests_after_ > rests_after_.zero();
+    // Where leases are offered, what makes the device safe is still being checked.
+    if (may_rest && !is_wanted_ && !device_->config().leases.is_offered) co_return true;
     wake_.expires_at(may_rest ? std::chrono::steady_clock::now() + rests_after_
                               : asio::steady_timer::time_point::max());
     const auto [cancelled] = co_await wake_.async_wait(wait_token);
@@ -192,6 +194,7 @@ rr::awaitable<void> Upstream::rest() {
 }
 
 void Upstream::wake() {
+  is_wanted_ = true;
   if (!is_resting_) return;
   is_resting_ = false;
   is_waking_ = true;

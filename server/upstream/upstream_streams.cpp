@@ -36,8 +36,9 @@ void Upstream::join_wire(UpstreamClient& client, const std::string& path, const 
   wire->followers.push_back({&client, wire->count});
   if (wire->is_attached) {
     client.answer_wire(path, member, {});
-    if (!wire->newest || !has_joined(client, key)) return;
-    rr::WirePacket packet(path, member, wire->newest->value, wire->newest->time, wire->arrived);
+    const auto newest = wire->newest;
+    if (!newest || !has_joined(client, key)) return;
+    rr::WirePacket packet(path, member, newest->value, newest->time, wire->arrived);
     client.receive_wire(packet);
   } else if (wire->followers.size() == 1) {
     attach_wire(key);
@@ -87,7 +88,7 @@ void Upstream::publish_wire(const MemberKey& key, const rr::Value& value, rr::Ti
   const auto found = wires_.find(key);
   if (found == wires_.end()) return;
   auto& wire = *found->second;
-  wire.newest = rr::WireValue{time, value};
+  wire.newest = std::make_shared<const rr::WireValue>(rr::WireValue{time, value});
   wire.arrived = std::chrono::steady_clock::now();
   ++wire.count;
   if (!std::exchange(wire.is_due, true)) hand_out_later(found->second);
@@ -103,7 +104,7 @@ void Upstream::hand_out_later(const std::shared_ptr<Wire>& wire) {
 /// values, of which the last one counts, and everybody else has to get a turn, too.
 void Upstream::hand_out(const std::shared_ptr<Wire>& wire) {
   if (!wire->outgoing || wire->outgoing->count != wire->count)
-    wire->outgoing.emplace(wire->path, wire->member, *wire->newest, wire->arrived, wire->count);
+    wire->outgoing.emplace(wire->path, wire->member, wire->newest, wire->arrived, wire->count);
   std::size_t up_to_date = 0;  // in a row
   for (std::size_t sent = 0; sent < clients_a_turn;) {
     auto& followers = wire->followers;  // they may leave while they are sent to

@@ -106,17 +106,18 @@ export async function startGateway(
   return { program, url };
 }
 
-/** The test service as device "big", and a gateway to it; `more`: of its configuration. */
+/** The test service as device "big", and a gateway to it; `more`: of its configuration, by the URL of the device. */
 export async function startTestService(
   site: string,
-  more: object = {},
+  more: (url: string) => object = () => ({}),
 ): Promise<{ url: string; stop(): Promise<void> }> {
   const service = path.join(path.dirname(rrgate), "../test/interop/cpp/rr-test-service");
   if (!existsSync(service)) throw new Error(`${service} is missing: build the target rr-test-service`);
   const device = new Program(service, []);
   device.start();
   const found = await device.waitForOutput(/"url": *"([^"]+)"/);
-  const gateway = await startGateway("big", found[1] ?? "", site, more);
+  const url = found[1] ?? "";
+  const gateway = await startGateway("big", url, site, more(url));
   const stop = async () => {
     await gateway.program.kill("SIGTERM");
     await device.kill("SIGTERM");

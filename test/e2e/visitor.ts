@@ -61,9 +61,21 @@ export class Visitor {
   /** @returns what lets go of it. */
   async hold(thing: Thing): Promise<() => Promise<void>> {
     await this.see(thing);
-    const { x, y } = (await this.#look(thing))!;
+    const { x, y } = await this.#whereItStays(thing);
     await this.#engine.pointer("down", x, y);
     return () => this.#engine.pointer("up", x, y);
+  }
+
+  /** What is loaded around it may still move it. */
+  async #whereItStays(thing: Thing): Promise<Look> {
+    let last: Look | null = null;
+    await expect(async () => {
+      const before = last;
+      last = await this.#look(thing);
+      expect(last && [last.x, last.y]).toEqual(before && [before.x, before.y]);
+      expect(last).not.toBeNull();
+    }).toPass({ intervals: [150], timeout: 15_000 });
+    return last!;
   }
 
   async holdKey(key: keyof typeof KEYS): Promise<() => Promise<void>> {

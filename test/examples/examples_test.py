@@ -48,7 +48,19 @@ class Examples(unittest.TestCase):
             finally:
                 self.end(device)
             self.outlives_the_device(build, url)
+            self.systems_are_there(build)
             self.is_behind_a_gateway_inside_a_program(build)
+
+    def systems_are_there(self, build):
+        for words, told in ((["rrgate-demo-conference-room"], "controller: rr+tcp://"),
+                            (["rrgate-demo-microassembly", "stages", "--group", f"examples{os.getpid()}"], "rr+tcp://")):
+            with subprocess.Popen([os.path.join(build, words[0]), *words[1:]], stdout=subprocess.PIPE, text=True) as system:
+                try:
+                    self.assertTrue(system.stdout.readline().startswith(told))
+                finally:
+                    system.terminate()
+        refused = subprocess.run([os.path.join(build, "rrgate-create-serial"), "/dev/no-robot"], capture_output=True, text=True)
+        self.assertIn("/dev/no-robot", refused.stderr)
 
     def outlives_the_device(self, build, url):
         listen = url.split("/?")[0]

@@ -107,14 +107,14 @@ class IssuerServer:
 
 
 class People:
-    """A CA, and certificates of it by name."""
+    """A CA, and certificates of it by name. `above`: the CA that vouches for it, if it is no root."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, name="People of the lab", above=None):
         folder.mkdir(exist_ok=True)
-        self.folder, self.ca = folder, folder / "people-ca.pem"
+        self.folder, self.ca, self._above = folder, folder / "people-ca.pem", above
         self._key = ec.generate_private_key(ec.SECP256R1())
-        self._name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "People of the lab")])
-        self.ca.write_bytes(self._make(self._name, self._key, True).public_bytes(serialization.Encoding.PEM))
+        self._name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
+        self.ca.write_bytes((above or self)._make(self._name, self._key, True).public_bytes(serialization.Encoding.PEM))
 
     def _make(self, name, key, is_ca, seconds=86400):
         now = datetime.datetime.now(datetime.timezone.utc)
@@ -140,7 +140,7 @@ class People:
         key = ec.generate_private_key(ec.SECP256R1())
         made = self._make(x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)]), key, False, seconds)
         files = self.folder / f"{name}.pem", self.folder / f"{name}.key"
-        files[0].write_bytes(made.public_bytes(serialization.Encoding.PEM))
+        files[0].write_bytes(made.public_bytes(serialization.Encoding.PEM) + (self.ca.read_bytes() if self._above else b""))
         files[1].write_bytes(key.private_bytes(serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8,
                                                serialization.NoEncryption()))
         return files

@@ -268,3 +268,20 @@ def test_devices_without_leases_give_none(node, tmp_path):
             page.ask("set", "speed", value=1)
     finally:
         site.stop()
+
+
+def test_a_lease_that_is_taken_and_released_stops_a_device_that_has_no_stop(node, tmp_path):
+    site = Site(tmp_path, node, {"leases": {**LEASES, "takeover": ["*"]}})
+    try:
+        arm = site.direct("plain")
+        devices = ask(site.port, "GET", "/api/v1/devices").json["devices"]
+        assert [each["safe"] for each in devices if each["name"] == "interop"] == [["plain.speed", "plain.target"]]
+        with Socket(site.port, PLAIN) as page:
+            drives(page, arm)
+            taken = ask(site.port, "POST", PLAIN + "?lease=take&deadman=2000")
+            assert taken.status == 200
+            key = {"Rrgate-Lease": taken.json["lease"]}
+            assert ask(site.port, "POST", PLAIN + "?lease=release", headers=key).status == 204
+            wait_for(lambda: is_safe(arm))
+    finally:
+        site.stop()

@@ -200,12 +200,98 @@ def test_certificates_that_are_revoked(device, tmp_path):
         assert status(alice) == status(vera) == 200
         people.revoke(alice[0])
         gateway.wait_for("TLS files read anew")
+        gateway.wait_for("users and rights read anew")
         with pytest.raises((ssl.SSLError, ConnectionError)):
             status(alice)
         assert status(vera) == 200
         (tmp_path / "crl.pem").write_text("nothing")  # changes nothing
         assert "found none in it" in gateway.wait_for("TLS files can't be used; those from before stay in use")["error"]
         assert status(vera) == 200
+
+
+def test_a_certificate_that_is_revoked_ends_what_goes_on_by_it(device, tmp_path):
+    """Event streams, WebSockets, requests on a connection that was there before, and tickets that it was given."""
+    tls = make_web_certificates(tmp_path / "web")
+    people = issuers.People(tmp_path)
+    access = {"client_ca": [str(people.ca)], "client_crl": [str(people.revoke())], "grants": [{"users": ["*"], "roles": ["viewer"]}]}
+    with running(tmp_path, device, access, tls=tls) as gateway:
+        def connection(certificate):
+            context = ssl.create_default_context(cafile=tmp_path / "web" / "web-ca.pem")
+            context.load_cert_chain(*certificate)
+            return http.client.HTTPSConnection("127.0.0.1", gateway.port, timeout=20, context=context)
+
+        def status(kept, method="GET", path=BASE + "/p_double"):
+            kept.request(method, path, headers={"Content-Length": "0"} if method == "POST" else {})
+            answer = kept.getresponse()
+            return answer.status, answer.read()
+
+        alice, vera = (people.certificate(name) for name in ("alice", "vera"))
+        kept, others = connection(alice), connection(vera)
+        assert status(kept)[0] == status(others)[0] == 200
+        ticket = json.loads(status(kept, "POST", "/api/v1/tickets")[1])["ticket"]
+        lasting = Stream(gateway.port, BASE + "/cleared", connection=connection(vera))
+        stream = Stream(gateway.port, BASE + "/cleared", connection=connection(alice))
+        page = connection(alice)
+        page.request("GET", BASE, headers={"Connection": "Upgrade", "Upgrade": "websocket", "Sec-WebSocket-Version": "13",
+                                           "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==",
+                                           "Sec-WebSocket-Protocol": "rrgate.json.v1"})
+        link = page.sock
+        assert page.getresponse().status == 101
+        begin = time.monotonic()
+        people.revoke(alice[0])
+        for open_one in (stream.connection.sock or stream.response.fp.raw._sock, link):
+            ends(open_one)
+        assert time.monotonic() - begin < 2  # a second, and what a busy machine adds
+        assert status(kept)[0] in (401, 403)
+        assert upgrade_status(gateway.port, BASE + "?ticket=" + ticket, {"Sec-WebSocket-Protocol": "rrgate.json.v1"}) in (401, 403)
+        assert status(others)[0] == 200
+        assert len(gateway.events("client ended: what it has shown was revoked or has expired")) == 2
+        for each in (stream, lasting, kept, others, page):
+            each.close()
+
+
+def test_a_ca_that_is_revoked_ends_what_goes_on_by_its_certificates(device, tmp_path):
+    tls = make_web_certificates(tmp_path / "web")
+    people = issuers.People(tmp_path)
+    room = issuers.People(tmp_path / "room", "People of the room", above=people)
+    access = {"client_ca": [str(people.ca)], "client_crl": [str(people.revoke()), str(room.revoke())]}
+    with running(tmp_path, device, access, tls=tls) as gateway:
+        def stream(certificate):
+            context = ssl.create_default_context(cafile=tmp_path / "web" / "web-ca.pem")
+            context.load_cert_chain(*certificate)
+            connection = http.client.HTTPSConnection("127.0.0.1", gateway.port, timeout=20, context=context)
+            return Stream(gateway.port, BASE + "/cleared", connection=connection)
+
+        lasting, ended = stream(people.certificate("vera")), stream(room.certificate("alice"))
+        people.revoke(room.ca)
+        ends(ended.connection.sock or ended.response.fp.raw._sock)
+        assert len(gateway.events("client ended: what it has shown was revoked or has expired")) == 1
+        ended.close()
+        lasting.close()
+
+
+def test_a_grant_that_is_taken_back_is_gone_for_certificates_too(device, tmp_path):
+    """On a connection that was there before."""
+    tls = make_web_certificates(tmp_path / "web")
+    people = issuers.People(tmp_path)
+    access = {"client_ca": [str(people.ca)], "rules": RULES, "grants": [{"users": ["alice"], "roles": ["operator"]}]}
+    with running(tmp_path, device, access, tls=tls) as gateway:
+        context = ssl.create_default_context(cafile=tmp_path / "web" / "web-ca.pem")
+        context.load_cert_chain(*people.certificate("alice"))
+        kept = http.client.HTTPSConnection("127.0.0.1", gateway.port, timeout=20, context=context)
+
+        def status():
+            kept.request("GET", BASE + "/p_double")
+            answer = kept.getresponse()
+            answer.read()
+            return answer.status
+
+        assert status() == 200
+        link = kept.sock
+        gateway.write({**gateway.config, "access": {**access, "grants": []}})
+        gateway.wait_for("configuration read anew")
+        assert status() == 403 and kept.sock is link
+        kept.close()
 
 
 def test_tls_alone(device, tmp_path):

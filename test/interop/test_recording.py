@@ -101,6 +101,24 @@ def test_a_recording_is_an_mcap_file_as_its_own_package_reads_it(of_create):
     assert states[0].keys() >= {"x", "y", "heading"} and states[-1]["x"] != states[0]["x"]
 
 
+def test_services_are_recorded_by_their_type_and_by_the_name_of_a_gateways_device(create, tmp_path):
+    gateway = Gateway(tmp_path, {"devices": [{"name": "robot", "url": create, "mode": "shared"}]})
+    try:
+        gateway.wait_for("device online", device="robot")
+        base = f"http://127.0.0.1:{gateway.port}"
+        node = create.split("?")[0]
+        for number, words in enumerate(([f"{base}/devices/robot"], [base, "--type", "experimental.create2.Create"],
+                                        [node, "--type", "experimental.create2.Create"])):
+            file = tmp_path / f"{number}.mcap"
+            rrgate("record", *words, "-o", file, "--duration", 1)
+            assert "/Create/state" in {topic for topic, _, _ in messages(file)}
+        said = rrgate("record", base, "--type", "com.example.Arm", "-o", tmp_path / "none.mcap", code=3)
+        assert "no service of type com.example.Arm" in said and not (tmp_path / "none.mcap").exists()
+        assert "--type" in rrgate("record", "-o", tmp_path / "none.mcap", code=2)
+    finally:
+        gateway.process.stop()
+
+
 def test_each_message_is_what_its_schema_says(of_create):
     import jsonschema
     with open(of_create, "rb") as file:

@@ -11,15 +11,12 @@ import pytest
 import RobotRaconteur as RR
 
 from clients import JS, run_program
-from gateways import rrgate
-from http_api import ask
 from load import Clients, running
 from news import News
 from processes import BUILD, Background, read_json, start_gateway
 from scenarios import POSE
-from shared_sites import port_of, start_service
+from shared_sites import RETRY, is_refused, port_of, start_arm, start_service
 from tap import Tap
-from users import PASSWORDS, RULES, basic, make_users
 from values import Values
 
 SERVICES = {"interop", "guarded", "open", "proven", "RobotRaconteurServiceIndex"}  # of the test service's node
@@ -50,8 +47,9 @@ def wire_news(connection):
 
 def test_many_clients_are_one_to_the_device(node, site):
     _, port, url = site
+    roots = [node.ConnectService(f"rr+ws://127.0.0.1:{port}/devices/interop?service=interop")]
     before = connections_to(port_of(url))
-    roots = [node.ConnectService(f"rr+ws://127.0.0.1:{port}/devices/interop?service=interop") for _ in range(8)]
+    roots += [node.ConnectService(f"rr+ws://127.0.0.1:{port}/devices/interop?service=interop") for _ in range(7)]
     wires = [root.state.Connect() for root in roots]
     news = [wire_news(wire) for wire in wires]
     assert connections_to(port_of(url)) == before
@@ -325,17 +323,25 @@ def test_a_client_too_many_hears_why(node, tmp_path, mode, scheme):
 
 
 def test_a_device_without_a_service_index(node, tmp_path):
-    """What its URL names is a service too."""
-    service, url = start_service(tmp_path)
+    """What its URL names is a service too, and is so again when the device comes back."""
+    service, url = start_arm(tmp_path)
     index, nobody = b"RobotRaconteurServiceIndex", b"RobotRaconteurServiceNobody"[:26]
     tap = Tap(port_of(url), change=lambda data: data.replace(index, nobody))
-    gateway, port = start_gateway(tmp_path, f"rr+tcp://127.0.0.1:{tap.port}/?service=interop", device={"mode": "shared"})
+    gateway, port = start_gateway(tmp_path, f"rr+tcp://127.0.0.1:{tap.port}/?service=plain", device={"mode": "shared"}, retry=RETRY)
     try:
-        root = node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop")
-        assert root.version == "1"
-        (device,) = read_json(f"http://127.0.0.1:{port}/api/v1/devices")["devices"]
-        assert [each["name"] for each in device["services"]] == ["interop"]
-        assert read_json(f"http://127.0.0.1:{port}/api/v1/devices/interop/interop/version") == "1"
+        root = node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=plain")
+        for is_last in (False, True):
+            assert root.status == 0
+            (device,) = read_json(f"http://127.0.0.1:{port}/api/v1/devices")["devices"]
+            assert [each["name"] for each in device["services"]] == ["plain"]
+            assert read_json(f"http://127.0.0.1:{port}/api/v1/devices/interop/plain/status") == 0
+            if is_last:
+                break
+            service.stop()
+            gateway.wait_until(lambda: is_refused(RR.ConnectionException, lambda: root.status))
+            service, url = start_arm(tmp_path)
+            tap.lead_to(port_of(url))
+            gateway.wait_until(lambda: not is_refused(RR.ConnectionException, lambda: root.status))
         node.DisconnectService(root)
     finally:
         gateway.stop()
@@ -365,283 +371,6 @@ def test_who_answers_callbacks(node, tmp_path, answer):
         assert second.answered in ((10.0,) if answer == "first" else (10.0, 11.0))
         node.DisconnectService(first)
         node.DisconnectService(second)
-    finally:
-        gateway.stop()
-        service.stop()
-
-
-def audited(gateway, folder, is_there):
-    """What others than the audit log itself are recorded with, once it is there."""
-    found = []
-
-    def read():
-        lines = map(json.loads, (folder / "audit").read_text().splitlines())
-        found[:] = [line for line in lines if line["event"] not in ("started", "stopped")]
-        return found and is_there(found)
-
-    gateway.wait_until(read)
-    return found
-
-
-def test_rights_member_by_member(node, tmp_path):
-    """Users of the gateway in a shared session, each verb against what the rules say."""
-    service, url = start_service(tmp_path)
-    make_users(tmp_path)
-
-    def is_up():  # the list of devices is not for everybody
-        return "device online device=interop" in (tmp_path / "gateway.log").read_text()
-
-    gateway, port = start_gateway(tmp_path, url, device={"mode": "shared"}, is_up=is_up,
-                                  access={"users_file": "users", "rules": RULES, "audit_file": "audit"})
-    shared_url = f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop"
-
-    def write_memory(root):
-        root.m_numbers.Write(0, numpy.array([1.0]), 0, 1)
-
-    attempts = {
-        "read": lambda root: root.p_double,
-        "write": lambda root: setattr(root, "p_double", 2.5),
-        "call": lambda root: root.add(1.0, 2.0),
-        "other write": lambda root: setattr(root, "p_int32", 1),
-        "other call": lambda root: root.nothing(),
-        "memory": write_memory,
-        "peek": lambda root: root.both.PeekInValue(),
-        "poke": lambda root: root.both.PokeOutValue(1.0),
-        "subscribe": lambda root: root.state.Connect().Close(),
-        "pipe": lambda root: root.greetings.Connect(-1).Close(),
-        "below": lambda root: root.get_head().size,
-        "below call": lambda root: root.get_head().identify(),
-        "lock": lambda root: node.RequestObjectLock(root, RR.RobotRaconteurObjectLockFlags_CLIENT_LOCK),
-    }
-    looks = {"read", "peek", "subscribe", "pipe", "below"}
-    may = {"vera": looks, "alice": looks | {"write", "call"}, "root": set(attempts)}
-    try:
-        with pytest.raises(RR.AuthenticationException):
-            node.ConnectService(shared_url, "alice", {"password": RR.VarValue("wrong", "string")})
-        for user, allowed in may.items():
-            root = node.ConnectService(shared_url, user, {"password": RR.VarValue(PASSWORDS[user], "string")})
-            for what, attempt in attempts.items():
-                try:
-                    attempt(root)
-                    denied = False
-                except RR.PermissionDeniedException as error:
-                    assert "may not" in str(error), str(error)
-                    denied = True
-                except RR.RobotRaconteurException:  # the device's own affair: it was asked
-                    denied = False
-                assert denied == (what not in allowed), (user, what)
-            node.DisconnectService(root)
-        lines = audited(gateway, tmp_path, lambda lines: any(line["event"] == "login" and line["user"] == "root" for line in lines))
-        assert any(line.get("user") == "vera" and line.get("member") == "p_double" for line in lines), lines[-5:]
-        logins = [(line["event"], line["user"]) for line in lines if line["event"].startswith("login")]
-        assert logins == [("login_failed", "alice"), *(("login", user) for user in may)]
-        assert all(line["client"].startswith("127.0.0.1:") for line in lines)
-    finally:
-        gateway.stop()
-        service.stop()
-
-
-def test_a_login_that_the_device_judges_gives_no_rights_of_the_gateways_users(node, tmp_path):
-    """Where the gateway has users, but none with passwords, a login is the device's; alice there is nobody here."""
-    service, url = start_service(tmp_path)
-    (tmp_path / "tokens").touch()
-    rules = [{"roles": ["guest"], "may": ["read", "call"]}, {"roles": ["*", "operator"], "may": ["write"]}]
-    access = {"tokens_file": "tokens", "anonymous_role": "guest", "rules": rules, "audit_file": "audit",
-              "grants": [{"users": ["alice"], "roles": ["operator"]}]}
-    gateway, port = start_gateway(tmp_path, url, device={"mode": "shared"}, access=access)
-    try:
-        root = node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=guarded", "alice",
-                                   {"password": RR.VarValue("secret", "string")})
-        assert root.who() == "alice"
-        with pytest.raises(RR.PermissionDeniedException, match="'alice' of the device, who is no user of the gateway, may not write"):
-            root.level = 2.0
-        node.DisconnectService(root)
-        lines = audited(gateway, tmp_path, lambda lines: lines[-1]["event"] == "refused")
-        (refused,) = (line for line in lines if line["event"] == "refused")
-        assert (refused["proof"], refused["device_user"]) == ("none", "alice")
-        (login,) = (line for line in lines if line["event"] == "login")
-        assert (login["device_user"], login["device"], login["service"], login.get("user")) == ("alice", "interop", "guarded", None)
-        assert login["client"].startswith("127.0.0.1:")
-        with pytest.raises(RR.AuthenticationException):
-            node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=guarded", *password_of("alice", "wrong"))
-        lines = audited(gateway, tmp_path, lambda lines: lines[-1]["event"] == "login_failed")
-        assert (lines[-1]["event"], lines[-1]["device_user"]) == ("login_failed", "alice")
-    finally:
-        gateway.stop()
-        service.stop()
-
-
-def test_users_that_a_reload_brings_are_the_gateways_at_services_that_are_open(node, tmp_path):
-    service, url = start_service(tmp_path)
-    gateway, port = start_gateway(tmp_path, url, device={"mode": "shared"})
-
-    def connect(service, user, password):
-        return node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service={service}", user,
-                                   {"password": RR.VarValue(password, "string")})
-
-    try:
-        before = connect("guarded", "alice", "secret")  # a user of the device
-        assert before.who() == "alice"
-        make_users(tmp_path)
-        config = json.loads((tmp_path / "gateway.json").read_text())
-        (tmp_path / "gateway.json").write_text(json.dumps({**config, "access": {"users_file": "users", "rules": RULES}}))
-        gateway.wait_until(lambda: "configuration read anew" in (tmp_path / "gateway.log").read_text())
-        with pytest.raises(RR.PermissionDeniedException):
-            before.who()
-        for service_name in ("guarded", "interop"):
-            with pytest.raises(RR.AuthenticationException):
-                connect(service_name, "alice", "secret")
-        root = connect("interop", "alice", PASSWORDS["alice"])
-        assert root.version == "1"
-        with pytest.raises(RR.PermissionDeniedException, match="operator"):
-            root.nothing()
-        for each in (before, root):
-            node.DisconnectService(each)
-    finally:
-        gateway.stop()
-        service.stop()
-
-
-def password_of(user, password=None):
-    return user, {"password": RR.VarValue(password or PASSWORDS[user], "string")}
-
-
-def test_who_may_do_nothing_gets_to_no_service(node, tmp_path):
-    """Refused as he connects: he takes no place, is asked nothing, and is told of nothing."""
-    service, url = start_service(tmp_path)
-    make_users(tmp_path)
-    rrgate("passwd", tmp_path / "users", "nora", "--roles", "none", given="nothing\n")
-    device = {"mode": "shared", "max_clients": 1, "callbacks": [{"member": "interop.ask", "answer": "first"}]}
-    access = {"users_file": "users", "rules": RULES, "audit_file": "audit"}
-    gateway, port = start_gateway(tmp_path, url, device=device, access=access, node={"name": "lab.gateway"},
-                                  is_up=lambda: "session open device=interop service=interop" in (tmp_path / "gateway.log").read_text())
-    of_device, of_gateway = (f"rr+tcp://127.0.0.1:{port}/?nodename={name}&service=" for name in ("interop", "lab.gateway"))
-    strangers = []
-    try:
-        for where in (of_device, of_gateway):
-            for name in ("interop", "guarded", "nothing"):
-                with pytest.raises(RR.AuthenticationException, match=f"who is not logged in may not use service '{name}'"):
-                    node.ConnectService(where + name)
-                with pytest.raises(RR.AuthenticationException, match="Authentication Failed"):
-                    node.ConnectService(where + name, *password_of("vera", "wrong"))
-            with pytest.raises(RR.PermissionDeniedException, match="'nora' .* may not"):
-                node.ConnectService(where + "interop", *password_of("nora", "nothing"))
-            index = node.ConnectService(where + "RobotRaconteurServiceIndex")
-            strangers.append(index)
-            assert {each.Name for each in index.GetLocalNodeServices().values()} == {"RobotRaconteurServiceIndex"}
-            assert index.GetRoutedNodes() == {} and index.GetDetectedNodes() == {}
-        root = node.ConnectService(of_device + "interop", *password_of("root"))  # on the one seat there is
-        root.ask.Function = lambda question: 2.0
-        root.start_ask("may it?")
-        gateway.wait_until(lambda: root.answered == 2.0)
-        with pytest.raises(RR.ConnectionException, match="all the clients it may have"):
-            node.ConnectService(of_gateway + "interop", *password_of("vera"))
-        node.DisconnectService(root)
-        audited(gateway, tmp_path, lambda lines: any((line["event"], line.get("device"), line.get("user")) == ("refused", "interop", "nora")
-                                                     for line in lines))
-        for each in strangers:
-            node.DisconnectService(each)
-    finally:
-        gateway.stop()
-        service.stop()
-
-
-def test_a_stranger_wakes_no_session_that_rests(node, tmp_path):
-    """Nor does his wrong password; a login that is right does, and finds what it needs."""
-    service, url = start_service(tmp_path)
-    make_users(tmp_path)
-    log = tmp_path / "gateway.log"
-    gateway, port = start_gateway(tmp_path, url, device={"mode": "shared"}, access={"users_file": "users", "rules": RULES},
-                                  timeouts={"unused_session_ms": 300},
-                                  is_up=lambda: "session rests device=interop service=interop" in log.read_text())
-    shared_url = f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop"
-    try:
-        opened = log.read_text().count("session open device=interop service=interop")
-        for login in ((), password_of("vera", "wrong")):
-            with pytest.raises(RR.AuthenticationException):
-                node.ConnectService(shared_url, *login)
-        assert log.read_text().count("session open device=interop service=interop") == opened
-        vera = node.ConnectService(shared_url, *password_of("vera"))
-        assert vera.version == "1"
-        assert log.read_text().count("session open device=interop service=interop") == opened + 1
-        node.DisconnectService(vera)
-    finally:
-        gateway.stop()
-        service.stop()
-
-
-def test_a_user_who_is_deleted_has_no_session_any_more(node, tmp_path):
-    service, url = start_service(tmp_path)
-    make_users(tmp_path)
-    gateway, port = start_gateway(tmp_path, url, device={"mode": "shared"}, access={"users_file": "users", "rules": RULES},
-                                  is_up=lambda: "session open device=interop service=interop" in (tmp_path / "gateway.log").read_text())
-    shared_url = f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop"
-    try:
-        sessions = {user: node.ConnectService(shared_url, *password_of(user)) for user in ("vera", "root")}
-        assert all(root.version == "1" for root in sessions.values())
-        # Meanwhile: where from another client comes is for those who manage the gateway.
-        wire = sessions["vera"].state.Connect()
-        clients = {}
-        for user in ("root", "alice"):
-            answer = ask(port, "GET", "/api/v1/devices/interop/subscriptions", headers=basic(user)).json
-            clients[user] = [each["client"] for each in answer["subscriptions"]]
-        assert clients["alice"] == [None] and clients["root"][0].startswith("127.0.0.1:"), clients
-        wire.Close()
-        rrgate("passwd", tmp_path / "users", "vera", "--delete")
-        began = time.monotonic()
-        with pytest.raises(RR.RobotRaconteurException):
-            while time.monotonic() - began < 10:
-                sessions["vera"].version
-        assert time.monotonic() - began < 1.5
-        assert sessions["root"].version == "1"
-        node.DisconnectService(sessions["root"])
-    finally:
-        gateway.stop()
-        service.stop()
-
-
-def test_wrong_passwords_of_one_user_keep_out_no_other(node, tmp_path):
-    service, url = start_service(tmp_path)
-    make_users(tmp_path)
-    gateway, port = start_gateway(tmp_path, url, device={"mode": "shared"}, access={"users_file": "users", "rules": RULES},
-                                  is_up=lambda: "session open device=interop service=interop" in (tmp_path / "gateway.log").read_text())
-    shared_url = f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop"
-    try:
-        for number in range(65):
-            with pytest.raises(RR.AuthenticationException):
-                node.ConnectService(shared_url, *password_of("alice", f"guess {number}"))
-        root = node.ConnectService(shared_url, *password_of("root"))
-        assert root.version == "1"
-        node.DisconnectService(root)
-    finally:
-        gateway.stop()
-        service.stop()
-
-
-def test_the_audit_log_has_the_first_packet_of_each_wire_and_pipe(node, tmp_path):
-    service, url = start_service(tmp_path)
-    make_users(tmp_path)
-    access = {"users_file": "users", "rules": RULES, "audit_file": "audit"}
-    gateway, port = start_gateway(tmp_path, url, device={"mode": "shared"}, access=access,
-                                  is_up=lambda: "session open device=interop service=interop" in (tmp_path / "gateway.log").read_text())
-
-    def recorded():
-        lines = [json.loads(line) for line in (tmp_path / "audit").read_text().splitlines()]
-        return [(line["event"], line["user"], line["member"]) for line in lines if line.get("verb") == "write"]
-
-    try:
-        root, vera = (node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=interop", *password_of(user))
-                      for user in ("root", "vera"))
-        wire, pipe, hers = root.both.Connect(), root.greetings.Connect(-1), vera.both.Connect()
-        for number in range(5):
-            wire.OutValue = float(number)
-            pipe.SendPacket(f"hello {number}")
-            hers.OutValue = -1.0
-        gateway.wait_until(lambda: len(recorded()) == 3)
-        gateway.wait_until(lambda: root.both.PeekOutValue()[0] == 4.0)
-        assert sorted(recorded()) == [("refused", "vera", "both"), ("write", "root", "both"), ("write", "root", "greetings")]
-        for each in (root, vera):
-            node.DisconnectService(each)
     finally:
         gateway.stop()
         service.stop()

@@ -12,6 +12,7 @@ import tempfile
 import time
 
 import costs
+import crowds
 from load import Clients, Device, Gateway, running
 from rows import Row, report
 
@@ -90,7 +91,8 @@ def storm(folder, mode, count):
     yield Row("clients that did not come back", count - report["ready"], None, "", promise=0)
 
 
-PARTS = {"age": fan_out, "stall": one_stalls, "storm": storm, "delivery": costs.deliveries, "memory": costs.memory}
+PARTS = {"age": fan_out, "stall": one_stalls, "storm": storm, "delivery": costs.deliveries, "memory": costs.memory,
+         "strangers": crowds.strangers}
 
 
 def measure(mode, count, parts):

@@ -80,6 +80,15 @@ TEST_CASE("certificates, and how devices are checked") {
   CHECK(findings_of(with(R"("tls": {"required": true}, "trusted_proxies": ["127.0.0.1"])")).empty());
 }
 
+TEST_CASE("recordings: a folder, and what is recorded") {
+  finds(with(R"("recordings": {})"), "gateway.json: /recordings/folder: ", "missing");
+  finds(with(R"("recordings": {"folder": ""})"), "gateway.json: /recordings/folder: ", "empty");
+  finds(with(R"("recordings": {"folder": "f", "record": [{"device": "a"}]})"),
+        "gateway.json: /recordings/record/0/service: ", "missing");
+  finds(with(R"("recordings": {"folder": "f", "record": [{"device": "a", "service": "s", "kept_files": 2}]})"),
+        "gateway.json: /recordings/record/0/kept_files: ", "max_file_bytes");
+}
+
 TEST_CASE("leases: what a device needs, and what makes it safe") {
   const auto leases = [](const std::string& text, const std::string& mode = "shared") {
     return R"({"listen": ["127.0.0.1:0"], "devices": [{"name": "a", "url": "rr+tcp://h:1/?service=s", "mode": ")" +
@@ -99,6 +108,14 @@ TEST_CASE("leases: what a device needs, and what makes it safe") {
         "gateway.json: /devices/0/leases/members/0/lease: ", "required, covered, never");
 }
 
+TEST_CASE("pages that are devices") {
+  CHECK_FALSE(parse_config(with(R"("insecure": false)")).config.serve.is_enabled);
+  CHECK(parse_config(with(R"("serve": {})")).config.serve == ServeConfig{true, 16, DeviceMode::shared});
+  CHECK(parse_config(with(R"("serve": {"max_devices": 3, "mode": "relay"})")).config.serve ==
+        ServeConfig{true, 3, DeviceMode::relay});
+  finds(with(R"("serve": {"max_devices": 0})"), "gateway.json: /serve/max_devices: ", "expected");
+}
+
 TEST_CASE("who may do what") {
   const auto parsed = parse_config(R"({
     "listen": ["127.0.0.1:0"], "devices": [], "trusted_proxies": ["127.0.0.1"],
@@ -110,7 +127,8 @@ TEST_CASE("who may do what") {
       "grants": [{"users": ["*@lab"], "roles": ["viewer"]}],
       "rules": [{"roles": ["*"], "devices": ["a"], "services": ["s"], "paths": ["s.*"], "members": [""],
                  "may": ["read", "lock"]},
-                {"roles": ["ops"], "may": ["metrics", "admin"]}]}})");
+                {"roles": ["ops"], "may": ["metrics", "admin"]},
+                {"roles": ["staff"], "devices": ["phone-*"], "may": ["serve"]}]}})");
   REQUIRE(parsed.findings.empty());
   const auto& access = parsed.config.access;
   CHECK(access.users_file == "users");
@@ -119,7 +137,8 @@ TEST_CASE("who may do what") {
   CHECK(access.anonymous_role == "guest");
   CHECK(access.grants == std::vector<RoleGrant>{{{"*@lab"}, {"viewer"}}});
   CHECK(access.rules == std::vector<AccessRule>{{{"*"}, {"a"}, {"s"}, {"s.*"}, {""}, {Verb::read, Verb::lock}},
-                                                {{"ops"}, {}, {}, {}, {}, {Verb::metrics, Verb::admin}}});
+                                                {{"ops"}, {}, {}, {}, {}, {Verb::metrics, Verb::admin}},
+                                                {{"staff"}, {"phone-*"}, {}, {}, {}, {Verb::serve}}});
   CHECK(access.audit.file == "audit");
   CHECK(access.has_users());
   const auto audit =
@@ -131,6 +150,10 @@ TEST_CASE("who may do what") {
     finds(with(R"("access": {)" + part + "}"), "gateway.json: /access" + path + ": ", contains);
   };
   access_finds(R"("rules": [{"roles": ["a"], "may": ["reed"]}])", "/rules/0/may/0", "expected one of");
+  access_finds(R"("rules": [{"roles": ["a"], "devices": ["d"], "may": ["admin"]}])", "/rules/0/may",
+               "names no devices");
+  access_finds(R"("rules": [{"roles": ["a"], "paths": ["s"], "may": ["serve"]}])", "/rules/0/may",
+               "names no services, paths or members");
   const std::string agent = R"("rules": [{"roles": ["a"], "may": ["call"], "agent": )";
   access_finds(agent + R"({"limits": {"v": 3}}}])", "/rules/0/agent/limits/v", "[LEAST, MOST]");
   access_finds(agent + R"({"limits": {"v": [1, 0]}}}])", "/rules/0/agent/limits/v", "[LEAST, MOST]");
@@ -259,6 +282,9 @@ TEST_CASE("every option arrives") {
                "clients": 5, "clients_per_address": 6, "memory": 50000000, "client_queue_bytes": 70000, "opaque_rate": 7000},
     "timeouts": {"connect_ms": 101, "drain_ms": 102, "send_stall_ms": 103, "idle_ms": 104, "unused_session_ms": 105},
     "retry": {"min_ms": 51, "max_ms": 52, "online_ms": 53},
+    "recordings": {"folder": "recordings", "max_bytes": 5000000, "at_once": 2,
+                   "record": [{"device": "a", "service": "s", "members": ["x", "y/*"], "interval_ms": 50,
+                               "max_file_bytes": 1000000, "kept_files": 3}, {"device": "a", "service": "t"}]},
     "log": {"level": "debug", "format": "json"} // the end
   })");
   CHECK(parsed.findings.empty());
@@ -296,6 +322,11 @@ TEST_CASE("every option arrives") {
   CHECK(config.limits == Limits{20000, 2000, 3000, milliseconds(300), 40000, 5, 6, 50000000, 70000, 7000});
   CHECK(config.timeouts ==
         Timeouts{milliseconds(101), milliseconds(102), milliseconds(103), milliseconds(104), milliseconds(105)});
+  CHECK(config.recordings.folder == "recordings");
+  CHECK(config.recordings.max_bytes == 5'000'000);
+  CHECK(config.recordings.at_once == 2);
+  const RecordingWish wish{"a", "s", {"x", "y/*"}, milliseconds(50), milliseconds(0), 1'000'000, 3};
+  CHECK(config.recordings.standing == std::vector<RecordingWish>{wish, {"a", "t"}});
   CHECK(config.retry == Retry{milliseconds(51), milliseconds(52), milliseconds(53)});
   CHECK(config.log == LogConfig{"debug", "json"});
 }

@@ -35,6 +35,8 @@ std::vector<std::string> paths_of(const Route& route) {
     for (const auto action : request_actions) out.push_back(request + std::string(action));
   } else if (route.pattern == "/api/v1/agents/approvals/*") {
     out = {"/api/v1/agents/approvals/{approval}"};
+  } else if (route.pattern == "/api/v1/recordings/*") {
+    out = {std::string("/api/v1/recordings/{recording}") + (route.method == http::verb::post ? "/stop" : "")};
   } else if (route.pattern == "/devices/*") {
     out = {"/devices/{device}"};
   } else if (route.pattern != "/api/*" && route.pattern != "/*" && !route.pattern.starts_with("/docs")) {

@@ -384,6 +384,54 @@ class JsonDoor final : public Door {
   int last_ = 0;
 };
 
+/// The Model Context Protocol.
+class McpDoor final : public Door {
+ public:
+  McpDoor(std::uint16_t port, const Login& login) : port_(port), login_(login) {}
+
+  Outcome does(const Deed& deed, const std::string& path) override {
+    const auto at = "Robot" + url_path(path) + (deed.member.empty() ? "" : "/" + deed.member);
+    const auto& name = deed.name;
+    if (name == "look") return tool("describe", {{"path", at}});
+    if (name == "get" || name == "peek") return tool("read", {{"path", at}});
+    if (name == "read") return tool("read", {{"path", at}, {"offset", {0}}, {"count", {1}}});
+    if (name == "set") return tool("set", {{"path", at}, {"value", 7}, {"why", ""}});
+    if (name == "call") return tool("call", {{"path", at}, {"args", {{"n", 4}}}, {"why", ""}});
+    if (name == "hear" || name == "follow pipe") return tool("wait_for_event", {{"path", at}, {"seconds", 0.01}});
+    return std::nullopt;
+  }
+
+ private:
+  bool tool(const std::string& name, nlohmann::json arguments) const {
+    arguments["device"] = "robot";
+    const nlohmann::json request{{"jsonrpc", "2.0"},
+                                 {"id", 1},
+                                 {"method", "tools/call"},
+                                 {"params", {{"name", name}, {"arguments", arguments}}}};
+    const auto body = request.dump();
+    TestClient client(port_);
+    client.send("POST /mcp HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: " +
+                std::to_string(body.size()) + "\r\n" + login_.header() + "\r\n" + body);
+    auto response = client.receive_response();
+    const bool is_stream = response.status == 200 && response.head.find("text/event-stream") != std::string::npos;
+    if (is_stream) response.body = client.receive_until("\r\n0\r\n\r\n");  // it had to wait
+    INFO(body << ": " << response.head << response.body);
+    if (response.status == 401 || response.status == 403) return false;
+    REQUIRE(response.status == 200);
+    const auto begin = response.body.find('{');
+    const auto end = response.body.rfind('}');
+    REQUIRE(end != std::string::npos);
+    const auto result = nlohmann::json::parse(response.body.substr(begin, end + 1 - begin))["result"];
+    if (result["isError"] == false) return true;
+    const std::string error = result["structuredContent"]["error"]["name"];
+    REQUIRE((error == "RobotRaconteur.PermissionDenied" || error == "RobotRaconteur.AuthenticationError"));
+    return false;
+  }
+
+  std::uint16_t port_;
+  Login login_;
+};
+
 class RandomRules {
  public:
   explicit RandomRules(unsigned seed) : random_(seed) {}
@@ -405,6 +453,10 @@ class RandomRules {
       rule.members = some({"", "number", "t*", "*e*", "packets", "level", "orders", "[a-k]*", "*s*"}, 3);
       for (const auto verb : device_verbs)
         if (pick(2)) rule.may.push_back(verb);
+      if (pick(3) == 0) {  // what agents read, all others read too
+        rule.agent = AgentTerms{.needs_approval = false, .needs_lease = false};
+        std::erase_if(rule.may, [](Verb verb) { return verb == Verb::read || verb == Verb::subscribe; });
+      }
       out.push_back(std::move(rule));
     }
     return out;
@@ -438,6 +490,7 @@ struct Site {
           config.access.users_file = files.write("users", line("viewer") + line("operator"));
           config.access.anonymous_role = "guest";
           config.access.rules = rules;
+          config.mcp.is_enabled = true;
           for (const auto* name : {"robot", "raw"}) {
             DeviceConfig device;
             device.name = name;
@@ -495,11 +548,13 @@ TEST_CASE("rights are the same by every face: what one grants all grant, what on
     CHECK((status == 101) == rules.check_whole_device(who, "raw").has_value());
 
     // Members and objects, one face after the other: callbacks are for the one client that can answer.
-    const auto walk = [&](const char* name, Door& face) {
+    const auto walk = [&](const char* name, Door& face, Face by = Face::none) {
+      auto asker = who;
+      asker.face = by;
       for (const std::string path : {"Robot", "Robot.part[a]", "Robot.part[b]"})
         for (const auto& deed : deeds) {
           const bool expected = std::all_of(deed.verbs.begin(), deed.verbs.end(), [&](Verb verb) {
-            return rules.check(who, {"robot", "Robot", path, deed.member, verb, deed.name == "measure"}).has_value();
+            return rules.check(asker, {"robot", "Robot", path, deed.member, verb, deed.name == "measure"}).has_value();
           });
           INFO(name << ": " << deed.name << " " << deed.member << " of " << path);
           const auto outcome = face.does(deed, path);
@@ -518,5 +573,7 @@ TEST_CASE("rights are the same by every face: what one grants all grant, what on
     walk("HTTP", rest);
     JsonDoor json(port, login, site.robot);
     walk("JSON", json);
+    McpDoor mcp(port, login);
+    walk("MCP", mcp, Face::mcp);
   }
 }

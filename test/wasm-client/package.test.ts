@@ -35,6 +35,7 @@ it("needs no eval, no shared memory, no bundler and nothing of Node in a page", 
 it("names the wasm files where bundlers look for them", () => {
   expect(read("client.js")).toContain('new URL("./rrgate.wasm",import.meta.url)');
   expect(read("usb/nodes.js")).toContain('new URL("./rrgate-usb.wasm",import.meta.url)');
+  expect(read("serve/device.js")).toContain('new URL("./rrgate-serve.wasm",import.meta.url)');
 });
 
 it("loads what speaks to USB devices when there is one to speak to, and not before", () => {
@@ -43,6 +44,11 @@ it("loads what speaks to USB devices when there is one to speak to, and not befo
   }
   expect(read("client.js")).toContain('import("./usb/nodes.js")');
   expect(read("client.js")).toContain('import("./definition/definition.js")');
+});
+
+it("loads what pages that are devices need where it is imported alone", () => {
+  expect(manifest.exports["./serve"]).toMatchObject({ node: "./dist/serve/node.js", default: "./dist/serve/serve.js" });
+  expect(read("client.js")).not.toContain("rrgate-serve");
 });
 
 it("loads two scripts in a page", () => {

@@ -163,6 +163,13 @@ describe("a pace", () => {
     expect(pace.isStale(1590)).toBe(false);
     expect(pace.isStale(1610)).toBe(true);
     expect(pace.rate(1610)).toBe(0);
+    const bunches = new Pace();
+    for (let t = 0; t <= 2000; t += 500) for (let each = 0; each < 10; each++) bunches.hear(t);
+    expect(bunches.rate(2000)).toBeGreaterThan(10);
+    expect(bunches.rate(2000)).toBeLessThan(40); // not a thousand
+    const paused = new Pace();
+    for (const t of [0, 50, 100, 150, 5000, 5050, 5100]) paused.hear(t);
+    expect(paused.rate(5100)).toBe(20);
     const once = new Pace();
     once.hear(0);
     expect(once.isStale(1e6)).toBe(false);

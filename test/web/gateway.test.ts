@@ -52,6 +52,7 @@ describe("list of devices", () => {
       services: [{ name: "Create", type: "experimental.create2.Create" }],
       mode: "shared",
       clients: 3,
+      safe: ["Create.Drive"],
     };
     const { node_id: nodeId, node_name: nodeName, last_error: lastError, ...rest } = device;
     expect(readDevices({ devices: [device] })).toEqual([{ ...rest, nodeId, nodeName, lastError }]);
@@ -69,6 +70,7 @@ describe("list of devices", () => {
         services: [],
         mode: null,
         clients: null,
+        safe: [],
       },
     ]);
   });

@@ -11,9 +11,9 @@ afterEach(() => void vi.useRealTimers());
 function makeDevice() {
   const underWay = new UnderWay();
   const urgent = vi.fn(() => Promise.resolve<unknown>(undefined));
-  const set = vi.fn(() => Promise.resolve());
+  const setNow = vi.fn(() => Promise.resolve());
   const lease = () => Promise.reject(new Error("none"));
-  return { underWay, urgent, set, lease };
+  return { underWay, urgent, setNow, lease };
 }
 
 describe("a stop", () => {
@@ -57,8 +57,8 @@ describe("a stop", () => {
     const device = makeDevice();
     device.urgent.mockRejectedValue(new Error("no halt"));
     await stopDevice(device, ROBOT_STOP, () => undefined);
-    expect(device.set).toHaveBeenCalledWith("command_mode", 0, { timeout: 2_000 });
-    device.set.mockRejectedValue(new Error("no mode"));
+    expect(device.setNow).toHaveBeenCalledWith("command_mode", 0, { timeout: 2_000 });
+    device.setNow.mockRejectedValue(new Error("no mode"));
     await expect(stopDevice(device, ROBOT_STOP, () => undefined)).rejects.toThrow("no halt");
   });
 

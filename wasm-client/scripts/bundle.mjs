@@ -13,15 +13,19 @@ const entries = [
   "losses/losses",
   "node",
   "react/react",
+  "serve/node",
+  "serve/serve",
   "services/find_services",
   "stores/stores",
   "svelte/svelte",
   "usb/nodes",
   "vue/vue",
 ];
+/** What a page that is a device loads, whether it is one or Node in its place. */
+const served = /\/wasm-client\/ts\/serve\/(?!node\.ts$)/;
 /** What all entries have in common: one file of it, whoever loads it. */
 const shared =
-  /\/wasm-client\/ts\/(?!usb\/|lease\/|losses\/|definition\/|react\/|services\/|stores\/|svelte\/|vue\/|(?:index|internal|node)\.ts$)/;
+  /\/wasm-client\/ts\/(?!usb\/|lease\/|losses\/|definition\/|react\/|serve\/|services\/|stores\/|svelte\/|vue\/|(?:index|internal|node)\.ts$)/;
 
 // Bundlers look for files by `new URL("...", import.meta.url)`; not all take the quotes that the minifier prefers. A plugin
 // after it, so that source maps stay right: each quote is one character, too.
@@ -39,14 +43,25 @@ const bundle = await rolldown({
   platform: "neutral",
   external: [/^node:/, "react", "vue", "ws"],
   tsconfig: false,
-  transform: { target: "es2022" },
+  transform: {
+    target: "es2022",
+    // Fields are set before they are read: saying at the beginning that they are undefined is only more to load.
+    assumptions: { setPublicClassFields: true },
+    typescript: { removeClassFieldsWithoutInitializer: true },
+  },
   plugins: [quotes],
 });
 await bundle.write({
   dir: directory,
   format: "es",
   minify: true,
-  codeSplitting: { groups: [{ name: "client", test: shared }] },
+  comments: false, // not even hints for bundlers: what they could leave out is none of them
+  codeSplitting: {
+    groups: [
+      { name: "client", test: shared },
+      { name: "serve/device", test: served },
+    ],
+  },
   chunkFileNames: "[name].js",
   sourcemap: option === "--sourcemap",
 });

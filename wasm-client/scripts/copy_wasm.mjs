@@ -3,9 +3,10 @@ import { copyFile, mkdir, readFile, writeFile } from "node:fs/promises";
 
 const from = new URL("../../build/wasm/wasm-client/", import.meta.url);
 const to = new URL("../dist/", import.meta.url);
-await mkdir(new URL("usb/", to), { recursive: true });
+for (const folder of ["serve/", "usb/"]) await mkdir(new URL(folder, to), { recursive: true });
 for (const [file, place] of [
   ["rrgate.wasm", "rrgate.wasm"],
+  ["rrgate-serve.wasm", "serve/rrgate-serve.wasm"],
   ["rrgate-usb.wasm", "usb/rrgate-usb.wasm"],
 ]) {
   await copyFile(new URL(file, from), new URL(place, to)).catch((error) => {

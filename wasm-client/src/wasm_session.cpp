@@ -1,10 +1,9 @@
 #include "wasm-client/src/wasm_session.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 
 #include "core/session/service_path.hpp"
+#include "wasm-client/src/js_events.hpp"
 #include "wasm-client/src/object_info.hpp"
 #include "wasm-client/src/value_from_js.hpp"
 #include "wasm-client/src/value_to_js.hpp"
@@ -13,34 +12,8 @@ namespace rr {
 
 namespace {
 
-Now make_now(double steady, double utc) {
-  const auto since_start = std::chrono::duration<double, std::milli>(steady);
-  Now now;
-  now.steady = TimePoint(std::chrono::duration_cast<TimePoint::duration>(since_start));
-  const double seconds = std::floor(utc / 1000);
-  now.utc.seconds = static_cast<std::int64_t>(seconds);
-  now.utc.nanoseconds = static_cast<std::int32_t>((utc - seconds * 1000) * 1e6);
-  return now;
-}
-
-/// A month at most: "never" for a page; further would overflow somewhere.
-std::chrono::milliseconds to_milliseconds(double number) {
-  constexpr double a_month = 31.0 * 24 * 3600 * 1000;
-  return std::chrono::milliseconds(static_cast<std::int64_t>(std::min(number, a_month)));
-}
-
-std::string text_of(const JsValue& js) {
-  return js.text().value_or(std::string());
-}
-
-JsValue make_event(std::string_view kind) {
-  const JsValue event = make_js_object();
-  set_js_field(event, "kind", make_js_text(kind));
-  return event;
-}
-
 JsValue make_member_event(std::string_view kind, std::string_view path, std::string_view member) {
-  const JsValue event = make_event(kind);
+  const JsValue event = make_js_event(kind);
   set_js_field(event, "path", make_js_text(path));
   set_js_field(event, "member", make_js_text(member));
   return event;
@@ -52,20 +25,6 @@ JsValue make_pipe_event(std::string_view kind, const Event& event) {
   const JsValue js = make_member_event(kind, event.path, event.member);
   set_js_field(js, "index", make_js_number(event.index));
   return js;
-}
-
-bool is_varvalue(const TypeDefinition& type) {
-  return type.type == DataType::varvalue_t;
-}
-
-/// What came with an event or callback. `member` nullptr where it is not known any more.
-JsValue make_arguments(const std::vector<Value>& values, const MemberDefinition* member, const TypeRegistry& types) {
-  JsValue arguments = make_js_array();
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    const bool brings_type = member && i < member->parameters.size() && is_varvalue(member->parameters[i].type);
-    push_js(arguments, to_js(values[i], types, brings_type));
-  }
-  return arguments;
 }
 
 }  // namespace
@@ -257,15 +216,7 @@ JsValue WasmSession::reply_callback(double id, const JsValue& path, const JsValu
 }
 
 void WasmSession::fail_callback(double id, const JsValue& error) {
-  const auto text = [&](std::string_view field) {
-    const auto found = error.field(field);
-    return found && found->kind() == JsKind::text ? text_of(*found) : std::string();
-  };
-  Error failure{ErrorCode::unknown_error, text("message"), text("name")};
-  failure.sub_name = text("subName");
-  if (const auto code = error.field("code"); code && code->kind() == JsKind::number)
-    failure.code = static_cast<ErrorCode>(code->number());
-  session_.reply_callback(static_cast<CallbackId>(id), failure, now_);
+  session_.reply_callback(static_cast<CallbackId>(id), error_from_js(error), now_);
 }
 
 void WasmSession::cancel(RequestId id) {
@@ -290,9 +241,7 @@ bool WasmSession::wants_close() const {
 }
 
 double WasmSession::poll_timeout() const {
-  const auto at = session_.poll_timeout();
-  if (at == TimePoint::max()) return std::numeric_limits<double>::infinity();
-  return std::chrono::duration<double, std::milli>(at.time_since_epoch()).count();
+  return to_js_time(session_.poll_timeout());
 }
 
 JsValue WasmSession::poll_event() {
@@ -303,14 +252,14 @@ JsValue WasmSession::poll_event() {
 JsValue WasmSession::event_to_js(const ClientEvent& event) {
   const auto& types = session_.types();
   if (const auto* connected = std::get_if<Connected>(&event)) {
-    const JsValue js = make_event("connected");
+    const JsValue js = make_js_event("connected");
     set_js_field(js, "type", make_js_text(connected->object_type));
     return js;
   }
   if (const auto* completed = std::get_if<Completed>(&event)) {
     const bool brings_type = varvalue_replies_.erase(completed->id) > 0;
     const bool is_ok = completed->result.has_value();
-    const JsValue js = make_event(is_ok ? "completed" : "failed");
+    const JsValue js = make_js_event(is_ok ? "completed" : "failed");
     set_js_field(js, "id", make_js_number(completed->id));
     if (is_ok)
       set_js_field(js, "value", to_js(*completed->result, types, brings_type));
@@ -321,14 +270,14 @@ JsValue WasmSession::event_to_js(const ClientEvent& event) {
   if (const auto* received = std::get_if<EventReceived>(&event)) {
     const JsValue js = make_member_event("event", received->path, received->member);
     const auto* member = find_member(received->path, received->member);
-    set_js_field(js, "arguments", make_arguments(received->arguments, member, types));
+    set_js_field(js, "arguments", make_js_arguments(received->arguments, member, types));
     return js;
   }
   if (const auto* called = std::get_if<CallbackCalled>(&event)) {
     const JsValue js = make_member_event("callback", called->path, called->member);
     const auto* member = find_member(called->path, called->member);
     set_js_field(js, "id", make_js_number(static_cast<double>(called->id)));
-    set_js_field(js, "arguments", make_arguments(called->arguments, member, types));
+    set_js_field(js, "arguments", make_js_arguments(called->arguments, member, types));
     return js;
   }
   if (const auto* received = std::get_if<WireValueReceived>(&event)) {
@@ -356,11 +305,11 @@ JsValue WasmSession::event_to_js(const ClientEvent& event) {
   }
   if (const auto* closed = std::get_if<PipeClosedByService>(&event)) return make_pipe_event("pipe_closed", *closed);
   if (const auto* released = std::get_if<PathReleased>(&event)) {
-    const JsValue js = make_event("path_released");
+    const JsValue js = make_js_event("path_released");
     set_js_field(js, "path", make_js_text(released->path));
     return js;
   }
-  const JsValue js = make_event("closed");
+  const JsValue js = make_js_event("closed");
   set_js_field(js, "error", to_js(std::get_if<SessionClosed>(&event)->reason, types));
   return js;
 }

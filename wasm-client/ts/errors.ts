@@ -93,6 +93,13 @@ export function makeError(name: CodeName, message: string): RobotRaconteurError 
 /** The message of whatever was thrown. */
 export const textOf = (thrown: unknown): string => (thrown instanceof Error ? thrown.message : String(thrown));
 
+/** What the other side hears of an exception: errors of the protocol as they are, others by name, as from Python. */
+export function errorFields(error: unknown): ErrorFields {
+  const other = { code: ErrorCode.UnknownError, subName: "" };
+  const { code, subName } = error instanceof RobotRaconteurError ? error : other;
+  return { code, name: error instanceof Error ? error.name : "", subName, message: textOf(error) };
+}
+
 /** Hands an exception of application code to whoever collects those, so that it ends nothing else. */
 export function report(error: unknown): void {
   const { reportError } = globalThis as { reportError?: (error: unknown) => void };

@@ -153,9 +153,12 @@ export class Info implements ObjectInfo {
   }
 
   get urgent(): ObjectInfo["urgent"] {
-    const functions = Object.create(null) as Record<string, (...args: unknown[]) => Promise<RrValue | undefined>>;
+    type Command = (...args: unknown[]) => Promise<RrValue | undefined>;
+    const functions = Object.create(null) as Record<string, Command>;
     for (const [name, handle] of this.#handles) {
-      if (typeof handle === "function") functions[name] = (...args) => this.#session.urgently(() => handle(...args));
+      const { set, poke } = handle as Partial<DynamicMember>;
+      const command = (typeof handle === "function" ? handle : (set ?? poke)) as Command | undefined;
+      if (command) functions[name] = (...args) => this.#session.urgently(() => command(...args));
     }
     return functions;
   }

@@ -1,5 +1,13 @@
 // Drives the core: bytes in and out, timers, and which promise a request belongs to. Layer: wasm-client/ts.
-import { callSafely, connectionLost, ErrorCode, makeError, RobotRaconteurError, textOf } from "./errors.js";
+import {
+  callSafely,
+  connectionLost,
+  ErrorCode,
+  errorFields,
+  makeError,
+  RobotRaconteurError,
+  textOf,
+} from "./errors.js";
 import type { ErrorFields } from "./errors.js";
 import type { Transport } from "./transport.js";
 import type { CallOptions, RrValue } from "./types.js";
@@ -377,16 +385,6 @@ export class Session {
       this.#finish(makeError("InternalError", `the session failed: ${textOf(error)}`));
     }
   }
-}
-
-/** What a service hears of an exception: errors of the protocol as they are, others by name, as from Python. */
-function errorFields(error: unknown): Partial<ErrorFields> {
-  if (error instanceof RobotRaconteurError) {
-    const { code, name, message, subName } = error;
-    return { code, name, message, subName };
-  }
-  if (error instanceof Error) return { code: ErrorCode.UnknownError, name: error.name, message: error.message };
-  return { code: ErrorCode.UnknownError, message: String(error) };
 }
 
 /** @throws RobotRaconteurError InvalidArgument */

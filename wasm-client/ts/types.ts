@@ -172,7 +172,8 @@ export interface ObjectInfo {
   /**
    * The functions of the object, as they are called otherwise, but sent past whatever this side has not handed to the
    * WebSocket yet: `robot.$.urgent.Stop()`. That is all but the last 128 KiB. What it has passed follows it: an older call
-   * that still waits to be sent arrives after it.
+   * that still waits to be sent arrives after it. By the name of a property its value is written, by that of a wire its OutValue:
+   * `robot.$.urgent.speed(0)`.
    */
   readonly urgent: Readonly<Record<string, (...args: unknown[]) => Promise<RrValue | undefined>>>;
   /** A member by name: the way to those whose names JavaScript itself calls ("then", "toString"). */

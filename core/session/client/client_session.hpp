@@ -290,7 +290,7 @@ class ClientSession {
     void add(std::string text);
   };
 
-  // connecting (client_connect.cpp)
+  // connecting (connect.cpp)
   void start_session(Now now);
   void handle_connect_reply(const MessageEntry& entry, EntryType request, Now now);
   void request_special(EntryType type, std::string_view path, Now now);
@@ -325,7 +325,7 @@ class ClientSession {
                              const std::function<Result<>(const MemberDefinition&)>& write);
   RequestId step_generator(GeneratorStep step, std::string_view path, std::string_view function, std::int32_t index,
                            const std::optional<Value>& parameter, Now now);
-  // memories (client_memory.cpp)
+  // memories (memory.cpp)
   RequestId begin_memory(std::string_view path, std::string_view member, MemoryTransfer transfer, EntryType access,
                          Now now);
   void request_memory(RequestId id, const MemberDefinition& member, std::unique_ptr<MemoryTransfer> transfer, Now now);
@@ -365,7 +365,7 @@ class ClientSession {
 
   void handle_callback(const Message& message, const MessageEntry& entry, Now now);
 
-  // pipes (client_pipe.cpp)
+  // pipes (pipe.cpp)
   ClientPipe* find_pipe(std::string_view path, std::string_view member);
   void handle_pipe_reply(const Message& message, const MessageEntry& entry, RequestId id, const Pending& pending,
                          Now now);

@@ -273,7 +273,7 @@ class ServiceSession {
   Ledgers& ended();
   void end_all_wires();
 
-  // node-level requests (service_special.cpp)
+  // node-level requests (special.cpp)
   void handle_special(const Message& message, Now now);
   Result<> answer_special(const Message& message, const MessageEntry& entry, Now now);
   Result<> write_service_desc(const Message& message, const MessageEntry& entry);
@@ -283,13 +283,13 @@ class ServiceSession {
   Result<> connect(std::shared_ptr<HostedService> service, const NodeId& client, std::uint32_t client_endpoint,
                    std::optional<AuthenticatedUser> user, Now now);
   Result<> disconnect(const Message& message, const MessageEntry& entry, Now now);
-  /// A MapString (service_losses.cpp).
+  /// A MapString (losses.cpp).
   Value attributes_with_losses() const;
   Result<> write_attributes(std::string_view element, const HostedService& service);
   /// Those of the service, and of ServiceSessionOptions.
   MapString attributes_of(const HostedService& service) const;
 
-  // logins (service_login.cpp)
+  // logins (login.cpp)
   bool may_use_service() const;
   Result<> check_login(EntryType type) const;
   Result<> begin_login(const Message& message, const MessageEntry& entry, std::shared_ptr<HostedService> service,
@@ -298,7 +298,7 @@ class ServiceSession {
   void finish_authenticate(const OpenLogin& login, Result<AuthenticatedUser> result, Now now);
   Result<> answer_session_op(const Message& message, const MessageEntry& entry, Now now);
 
-  // locks (service_locks.cpp)
+  // locks (locks.cpp)
   Result<> check_locks(const MessageEntry& entry, const HostedService::Found& found, const MemberDefinition& member,
                        Now now);
   Result<> answer_object_lock(const MessageEntry& entry);
@@ -330,7 +330,7 @@ class ServiceSession {
   Result<> answer_service_index(const MessageEntry& entry, const MemberDefinition& member, Now now);
   void handle_wire_packet(const Message& message, const MessageEntry& entry);
 
-  // remote services (service_remote.cpp)
+  // remote services (remote.cpp)
   bool must_wait_for_object(const MessageEntry& entry) const;
   Result<> park(const Message& message, const MessageEntry& entry);
   Result<> ask_for_lock(const Message& message, const MessageEntry& entry, Now now);
@@ -348,12 +348,12 @@ class ServiceSession {
   void answer_pass(const MessageEntry& answer);
   std::shared_ptr<RequestPass> release_pass(std::uint32_t request_id);
 
-  // callbacks (service_callback.cpp)
+  // callbacks (callback.cpp)
   void handle_callback_reply(const Message& message, const MessageEntry& entry);
   void expire_callbacks(Now now);
   void end_callbacks(const Error& reason);
 
-  // pipes (service_pipe.cpp)
+  // pipes (pipe.cpp)
   Result<> connect_pipe(const Message& message, const MessageEntry& entry, const HostedService::Found& found,
                         const MemberDefinition& member);
   Result<> disconnect_pipe(const Message& message, const MessageEntry& entry, const MemberDefinition& member, Now now);
@@ -370,7 +370,7 @@ class ServiceSession {
   template <class Send>
   Result<std::uint32_t> send_numbered(PipeId id, Now now, Send&& send);
 
-  // generators (service_generator.cpp)
+  // generators (generator.cpp)
   Result<> open_generator(const Message& message, const MessageEntry& entry, HostedService::Found found,
                           const MemberDefinition& member);
   Result<> step_generator(const Message& message, const MessageEntry& entry, HostedService::Found found,
@@ -379,7 +379,7 @@ class ServiceSession {
   void finish_generator_call(const OpenCall& call, bool has_failed, Now now);
   void end_generators(const std::vector<GeneratorId>& ended);
 
-  // memories (service_memory.cpp)
+  // memories (memory.cpp)
   Result<> answer_memory(const Message& message, const MessageEntry& entry, HostedService::Found found,
                          const MemberDefinition& member, Now now);
   Result<> check_memory_size(const MemoryRange& range, const MemberDefinition& member) const;

@@ -22,7 +22,4 @@ struct DescribedService {
 Response device_document(std::string_view document, std::string_view device, const std::string& base,
                          const std::vector<DescribedService>& services, const std::vector<std::string>& unavailable);
 
-/// With an ETag of its content; 304 where the request has it already.
-Response with_etag(Response response, const Request& request);
-
 }  // namespace rrgate

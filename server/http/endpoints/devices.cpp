@@ -16,6 +16,19 @@ nlohmann::ordered_json websocket_url(const Arrival& arrival, const std::string& 
   return (arrival.is_encrypted ? "wss://" : "ws://") + arrival.host + arrival.prefix + "/devices/" + device;
 }
 
+/// What makes the device safe when a lease ends, as "path.member", as far as the asker may have a lease of it.
+nlohmann::ordered_json safe_members(const Device& device, const Identity& asker, const Access& access) {
+  auto out = nlohmann::ordered_json::array();
+  const auto& config = device.config();
+  if (!device.is_shared() || !config.leases.is_offered) return out;
+  for (const auto& action : config.leases.safe) {
+    const auto service = std::string_view(action.path).substr(0, action.path.find('.'));
+    const AccessRequest lease{.device = config.name, .service = service, .path = action.path, .verb = Verb::lock};
+    if (access.state().rules.check(asker, lease)) out.push_back(action.path + "." + action.member);
+  }
+  return out;
+}
+
 nlohmann::ordered_json describe(const Device& device, const Request& request, const Access& access) {
   const auto& arrival = request.arrival;
   nlohmann::ordered_json out;
@@ -24,6 +37,7 @@ nlohmann::ordered_json describe(const Device& device, const Request& request, co
   out["websocket_url"] = websocket_url(arrival, device.config().name);
   out["mode"] = device.is_shared() ? "shared" : "relay";
   out["found"] = device.config().is_found;
+  out["served"] = device.config().is_served;
   out["node_id"] = nullptr;
   out["node_name"] = nullptr;
   const auto& identity = device.identity();
@@ -40,6 +54,7 @@ nlohmann::ordered_json describe(const Device& device, const Request& request, co
       if (access.sees(request.identity, device.config().name, service.name))
         out["services"].push_back({{"name", service.name}, {"type", service.type}, {"implements", service.implements}});
   out["clients"] = device.clients();
+  out["safe"] = safe_members(device, request.identity, access);
   return out;
 }
 

@@ -2,6 +2,7 @@
 
 #include "server/http/endpoints/device_documents.hpp"
 #include "server/http/endpoints/gateway_openapi.hpp"
+#include "server/http/etag.hpp"
 #include "server/state/gateway_state.hpp"
 
 namespace rrgate {

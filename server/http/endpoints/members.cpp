@@ -42,18 +42,19 @@ rr::awaitable<rr::Value> body_value(const ObjectRequest& request, const Target& 
       rr::value_from_json(*body, target.member->type, target.types(), request.form(), target.member->name));
 }
 
-rr::awaitable<Response> answer_property(const ObjectRequest& request, const Target& target) {
-  const auto& member = *target.member;
-  const auto direction = member.direction();
+/// A property, or a wire as a value: the newest in, the newest out.
+rr::awaitable<Response> answer_value(const ObjectRequest& request, const Target& target, rr::CallKind read,
+                                     rr::CallKind write) {
+  const auto direction = target.member->direction();
   const bool can_read = direction != rr::MemberDirection::writeonly;
   const bool can_write = direction != rr::MemberDirection::readonly;
   if (request.is_read() && can_read) {
-    const auto value = co_await target.ask(rr::CallKind::property_get);
+    const auto value = co_await target.ask(read);
     co_return co_await value_response(request, target, value);
   }
   if (request.method() == http::verb::put && can_write) {
     auto value = co_await body_value(request, target);
-    co_await target.ask(rr::CallKind::property_set, std::move(value));
+    co_await target.ask(write, std::move(value));
     co_return request.written_response();
   }
   co_return request.method_response(!can_write ? "GET, HEAD" : !can_read ? "PUT" : "GET, HEAD, PUT");
@@ -71,24 +72,6 @@ rr::awaitable<Response> answer_function(const ObjectRequest& request, const Targ
   auto result = rr::OrderedJson::object();
   rr::add_key(result, "result") = to_json(request, target, value, member.type);
   co_return co_await request.value_response(result);
-}
-
-/// A wire as a value: the newest in, the newest out.
-rr::awaitable<Response> answer_wire(const ObjectRequest& request, const Target& target) {
-  const auto& member = *target.member;
-  const auto direction = member.direction();
-  const bool has_in = direction != rr::MemberDirection::writeonly;
-  const bool has_out = direction != rr::MemberDirection::readonly;
-  if (request.is_read() && has_in) {
-    const auto value = co_await target.ask(rr::CallKind::peek_in);
-    co_return co_await value_response(request, target, value);
-  }
-  if (request.method() == http::verb::put && has_out) {
-    auto value = co_await body_value(request, target);
-    co_await target.ask(rr::CallKind::poke_out, std::move(value));
-    co_return request.written_response();
-  }
-  co_return request.method_response(!has_out ? "GET, HEAD" : !has_in ? "PUT" : "GET, HEAD, PUT");
 }
 
 // --- memories ---
@@ -253,13 +236,13 @@ rr::awaitable<void> answer_member(const ObjectRequest& request, const Target& ta
   Response response;
   switch (target.member->kind) {
     case rr::MemberKind::property:
-      response = co_await answer_property(request, target);
+      response = co_await answer_value(request, target, rr::CallKind::property_get, rr::CallKind::property_set);
       break;
     case rr::MemberKind::function:
       response = co_await answer_function(request, target);
       break;
     case rr::MemberKind::wire:
-      response = co_await answer_wire(request, target);
+      response = co_await answer_value(request, target, rr::CallKind::peek_in, rr::CallKind::poke_out);
       break;
     case rr::MemberKind::memory:
       response = co_await answer_memory(request, target);

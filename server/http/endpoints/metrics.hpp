@@ -7,8 +7,8 @@ namespace rrgate {
 
 class GatewayState;
 
-/// Labels are the names of devices, of which there are as many as the configuration and discover.max_devices allow,
-/// and words that are listed in metrics.hpp.
+/// Labels are the names of devices, of which there are as many as the configuration, discover.max_devices and
+/// serve.max_devices allow, and words that are listed in metrics.hpp.
 Handler metrics_endpoint(GatewayState& gateway);
 
 }  // namespace rrgate

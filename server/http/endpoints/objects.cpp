@@ -12,6 +12,7 @@
 #include "server/http/endpoints/leases.hpp"
 #include "server/http/endpoints/member_values.hpp"
 #include "server/http/endpoints/members.hpp"
+#include "server/http/etag.hpp"
 #include "server/log/log.hpp"
 #include "server/state/http_access.hpp"
 
@@ -244,8 +245,8 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
   std::shared_ptr<Target> target;
   if (client) {
     auto used = *client;
-    if (const auto key = writer.request().header(lease_header); !key.empty()) {
-      const auto holder = gateway.lease_holders().find(key);
+    if (const auto lease = writer.request().header(lease_header); !lease.empty()) {
+      const auto holder = gateway.lease_holders().find(lease);
       // A key that is none any more: its commands are those of a client without a lease.
       if (holder != gateway.lease_holders().end() && holder->second->upstream() == used->upstream())
         used = holder->second;

@@ -60,6 +60,10 @@ TEST_CASE("the first occurrence of a name wins and values are decoded") {
   const auto url = parsed("rr+tcp://h?service=a%2Bb&service=c&other=");
   CHECK(url.service == "a+b");
   CHECK(url.port == 48653);
+  const auto twice =
+      parsed("rr+tcp://h?service=a&nodeid=" + std::string(id_text) + "&nodeid=none&nodename=b&nodename=1");
+  CHECK(twice.node_id == parse_node_id(id_text).value());
+  CHECK(twice.node_name == "b");
 }
 
 TEST_CASE("an IPv6 zone is accepted raw and in URI form and kept raw") {
@@ -103,6 +107,8 @@ TEST_CASE("bad URLs say what was found and what was expected") {
   refused("rr+local:///?service=b", "needs nodeid or nodename");
   refused("rr+local://localhost:1/?nodename=a&service=b", "no port");
   refused("rr+intra://localhost/?nodename=a&service=b", "names a node");
+  refused("rr+intra://alice@localhost/?nodename=a&service=b", "names a node");
+  refused("rr+tcp://[fe80::1%]:1?service=a", "IPv6 zone ''");
   refused("rr+local://1a@localhost/?nodename=a&service=b", "user");
   refused("rr+tcp://h?nodeid=&service=a", "NodeID", ErrorCode::invalid_argument);
   refused("rr+tcp://h?nodeid=0&service=a", "NodeID", ErrorCode::invalid_argument);

@@ -8,6 +8,8 @@ import { startChromium } from "../engine";
 import type { Engine } from "../engine";
 import { startFirefox } from "../firefox";
 import { GuardedLab, password } from "../guarded_lab";
+import { startPeer } from "../peers";
+import type { Peer } from "../peers";
 import { repositoryRoot, rrgate, startTestService, webRoot } from "../processes";
 import { lacks } from "../machine";
 import { button, field, link, Visitor } from "../visitor";
@@ -22,6 +24,7 @@ const engines: Readonly<Record<string, { start: () => Promise<Engine>; needs?: s
 const phone = [412, 839] as const;
 
 let lab: GuardedLab;
+let arm: Peer;
 let service: Awaited<ReturnType<typeof startTestService>>;
 
 /** The client as it is published, an empty page, and a certificate: the gateway's port takes both ws and wss. */
@@ -33,14 +36,18 @@ async function startClientSite(): Promise<typeof service> {
   execFileSync(rrgate, ["cert", "ca", keys]);
   execFileSync(rrgate, ["cert", "web", keys, "127.0.0.1"]);
   const file = (end: string): string => path.join(keys, `127.0.0.1.${end}`);
-  return startTestService(site, { tls: { certificates: [{ cert: file("pem"), key: file("key") }] } });
+  return startTestService(site, () => ({ tls: { certificates: [{ cert: file("pem"), key: file("key") }] } }));
 }
 
 test.beforeAll(async () => {
-  [lab, service] = await Promise.all([GuardedLab.start(webRoot, { hasCamera: true }), startClientSite()]);
+  [lab, arm, service] = await Promise.all([
+    GuardedLab.start(webRoot, { hasCamera: true }),
+    startPeer("test/interop/peers/standard_robot.py", "robot", /ready/),
+    startClientSite(),
+  ]);
 });
 
-test.afterAll(() => Promise.all([lab?.stop(), service?.stop()]));
+test.afterAll(() => Promise.all([lab?.stop(), arm?.stop(), service?.stop()]));
 
 for (const [name, { start, needs }] of Object.entries(engines)) {
   test.describe(name, () => {
@@ -55,6 +62,19 @@ for (const [name, { start, needs }] of Object.entries(engines)) {
     });
 
     test.afterAll(() => engine?.close());
+
+    test("jogs a joint of a standard robot while a button is held, and stops it", async () => {
+      await visitor.open(`${arm.url}#/devices/peer/robot`);
+      await visitor.see({ css: ".robot-words" }, /ready/);
+      await visitor.press(button("Jog"));
+      const letGo = await visitor.hold(button("joint_1 forward"));
+      await visitor.see({ css: '[data-position="1"]' }, /^0\.0*[1-9]/);
+      await letGo();
+      await visitor.see({ css: '[data-position="0"]' }, /^0 rad$/);
+      await visitor.press(button("Stop"));
+      await visitor.see({ css: '[data-stop="arrived"]' });
+      expect(await visitor.complaints()).toEqual([]);
+    });
 
     test("signs in, drives, looks at camera and plot, makes a board, and opens it on a phone", async () => {
       await visitor.open(lab.url);

@@ -127,6 +127,78 @@ class ConferenceRoom(unittest.TestCase):
         self.assertNotEqual(ran("get", self.lights, "lights/8/level").returncode, 0)
 
 
+class Microassembly(unittest.TestCase):
+    def setUp(self):
+        self.gateway = Program(self, RRGATE, "demo", "microassembly", "--port", 0)
+        self.addCleanup(self.gateway.process.terminate)
+        pages = self.gateway.url("rrgate demo: http://127")
+        self.cell = f"{pages}devices/cell?service=Cell"
+        self.cameras = f"{pages}devices/cameras?service=Cameras"
+        self.wait_for_all()
+
+    def wait_for_all(self):
+        wait_for(lambda: '"Stages Cameras Illuminators"' in ran("get", self.cell, "parts", "--json").stdout)
+        wait_for(lambda: ran("get", self.cell, "poses").returncode == 0)
+
+    def poses(self):
+        return [[pose[name] for name in ("x", "y", "z", "theta")] for pose in get(self.cell, "poses")]
+
+    def brightness(self, microscope=0):
+        return sum(self.picture(microscope))
+
+    def picture(self, microscope=0):
+        return get(self.cameras, f"microscopes/{microscope}/picture")["data"]
+
+    def processes(self):
+        """The nodes' command lines by their parts."""
+        found = {}
+        for pid in filter(str.isdigit, os.listdir("/proc")):
+            try:
+                words = open(f"/proc/{pid}/cmdline").read().split("\0")[:-1]
+                parent = int(open(f"/proc/{pid}/stat").read().rsplit(")", 1)[1].split()[1])
+            except OSError:
+                continue  # it has ended
+            if parent == self.gateway.process.pid:
+                found[words[1]] = int(pid), words
+        return found
+
+    def test_a_probe_is_moved_and_seen(self):
+        before = self.poses()
+        self.assertEqual(len(before), 6)
+        wait_for(lambda: self.brightness() > 0)
+        rrgate("call", self.cell, "move", "2", "[0.5, -0.25, 0.5, 0.3]")
+        target = [now + by for now, by in zip(before[2], (0.5, -0.25, 0.5, 0.3))]
+        wait_for(lambda: all(abs(now - wanted) < 1e-9 for now, wanted in zip(self.poses()[2], target)))
+        self.assertEqual(self.poses()[0], before[0])
+        lit = self.brightness()
+        for illuminator in range(3):
+            rrgate("call", self.cell, "illuminate", str(illuminator), "0")
+        wait_for(lambda: self.brightness() < lit / 2)
+        rrgate("call", self.cell, "focus", "1", "0.5")
+        wait_for(lambda: get(self.cameras, "focus") == [1, 0.5, 1])
+
+    def test_what_makes_no_sense_is_refused(self):
+        for arguments in (("move", "6", "[0, 0, 0, 0]"), ("move", "0", "[9, 0, 0, 0]"), ("illuminate", "0", "2"), ("focus", "3", "1")):
+            refused = ran("call", self.cell, *arguments)
+            self.assertNotEqual(refused.returncode, 0)
+            self.assertRegex(refused.stderr, "expected|outside of")
+
+    def test_any_node_may_end_and_come_back(self):
+        for part in ("stages", "illuminators", "cameras", "cell"):
+            pid, words = self.processes()[part]
+            os.kill(pid, 9)
+            if part == "stages":
+                wait_for(lambda: "not there" in ran("call", self.cell, "move", "0", "[0, 0, 0, 0]").stderr)
+            again = subprocess.Popen(words, stdout=subprocess.DEVNULL)
+            self.addCleanup(again.wait)
+            self.addCleanup(again.kill)
+            self.wait_for_all()
+            wait_for(lambda: ran("call", self.cell, "move", "1", "[-0.1, 0, 0, 0]").returncode == 0)
+            wait_for(lambda: ran("call", self.cell, "illuminate", "0", "0.5").returncode == 0)
+            wait_for(lambda: ran("call", self.cell, "focus", "0", "1.5").returncode == 0)
+            wait_for(lambda: ran("get", self.cameras, "microscopes/3/picture").returncode == 0)
+
+
 class Robot:
     """The bytes of an iRobot Create, on a terminal in the place of a serial line."""
 

@@ -1,14 +1,28 @@
 """Strangers at many addresses: flood.py PORT CONNECTIONS ADDRESSES. Each says one of the things below, and then nothing; who is
 sent away comes again. Prints a line when so many have come, and goes on until its input ends."""
+import base64
 import errno
 import os
 import random
 import selectors
 import socket
+import ssl
 import sys
 
 PORT, CONNECTIONS, ADDRESSES = (int(each) for each in sys.argv[1:4])
 CHANCE = random.Random(1)
+
+
+def client_hello():
+    """What a client of TLS says first."""
+    said = ssl.MemoryBIO()
+    context = ssl.create_default_context()
+    try:
+        context.wrap_bio(ssl.MemoryBIO(), said, server_hostname="localhost").do_handshake()
+    except ssl.SSLWantReadError:
+        return said.read()
+
+
 KINDS = (
     b"",
     b"GET /api/v1/devices HTTP/1.1\r\nHost: localhost\r\nX-",
@@ -21,6 +35,9 @@ KINDS = (
     b"RRAC\x00\x00\x10\x00\x02\x00" + b"\x00" * 6000,
     b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n" * 50,
     bytes(CHANCE.randrange(256) for _ in range(2000)),
+    client_hello(),
+    client_hello()[:-20],
+    b"GET /api/v1/devices HTTP/1.1\r\nHost: localhost\r\nAuthorization: Basic " + base64.b64encode(b"alice:wrong") + b"\r\n\r\n",
 )
 
 chosen = selectors.DefaultSelector()

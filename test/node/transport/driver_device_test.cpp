@@ -317,3 +317,14 @@ TEST_CASE("a watch hands out the list at once and again") {
   io.run_for(100ms);
   CHECK(seen.size() == 2);  // no call any more
 }
+
+TEST_CASE("a watch that is ended by what it calls leaves nothing to wait for") {
+  const Machine machine;
+  asio::io_context io{1};
+  std::unique_ptr<HardwareWatch> watch;
+  watch = std::make_unique<HardwareWatch>(
+      io.get_executor(), [&](const std::vector<HardwareNode>&) { watch.reset(); }, 30s, machine.roots());
+  io.run_for(10s);
+  CHECK_FALSE(watch);
+  CHECK(io.stopped());
+}

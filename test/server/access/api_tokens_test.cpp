@@ -30,6 +30,10 @@ TEST_CASE("API tokens: made, kept as a hash, good until their last day") {
   CHECK(found->name == "ci");
   CHECK(found->roles == std::vector<std::string>{"operator", "viewer"});
   CHECK(found->proof == Proof::token);
+  const auto again = tokens->find(found->credential, at("2030-06-30"));
+  REQUIRE(again);
+  CHECK(*again == *found);
+  CHECK_FALSE(tokens->find("", at("2030-06-30")));
   const auto late = tokens->verify(token, at("2030-07-01"));
   REQUIRE_FALSE(late);
   CHECK(late.error().code == rr::ErrorCode::authentication_error);
@@ -54,7 +58,8 @@ TEST_CASE("API tokens: what is wrong with a file") {
 
 TEST_CASE("days as text") {
   for (const auto* day : {"1970-01-01", "2028-02-29", "2030-12-31"}) CHECK(format_day(*parse_day(day)) == day);
-  for (const auto* text : {"", "2030-1-1", "2030-13-01", "2029-02-29", "2030/01/01", "+030-01-01", "2030-01-01 "})
+  for (const auto* text : {"", "2030-1-1", "2030-13-01", "2029-02-29", "2030/01/01", "+030-01-01", "2030-01-01 ",
+                           "2030-1x-01", "2030-01-1x"})
     CHECK_FALSE(parse_day(text));
 }
 

@@ -67,6 +67,15 @@ TEST_CASE("approvals: nobody can allow what is too old, and nobody allows himsel
   CHECK(approvals.answer(id, who("mind", Proof::password), true, minutes(0), start));  // a user of the token's name
 }
 
+TEST_CASE("approvals: an answer for once takes back nothing that was allowed for some minutes") {
+  Approvals approvals;
+  const auto first = *approvals.ask(drive(), ignore, end, start);
+  const auto second = *approvals.ask(drive(), ignore, end, start);
+  REQUIRE(approvals.answer(first->approval().id, who("root"), true, minutes(5), start));
+  REQUIRE(approvals.answer(second->approval().id, who("root"), true, minutes(0), start));
+  CHECK(approvals.is_granted(drive(), start + minutes(4)));
+}
+
 TEST_CASE("approvals: for some minutes the same agent may do the same again, and nobody else anything") {
   Approvals approvals;
   const auto asked = *approvals.ask(drive(), ignore, end, start);

@@ -167,6 +167,11 @@ TEST_CASE("JWT: keys by name, and what is wrong with a key set") {
   auto off_curve = JwtSigner("ES256").jwk();
   off_curve["x"] = encode_base64url(rr::Bytes(32, 1));
   CHECK_THAT(problem(jwks({off_curve})), Catch::Contains("no point"));
+  std::vector<Json> many;
+  for (int i = 0; i < 64; ++i) many.push_back(first.jwk(std::to_string(i)));
+  CHECK(problem(jwks(many)) == "good");
+  many.push_back(first.jwk("64"));
+  CHECK_THAT(problem(jwks(many)), Catch::Contains("at most 64 keys"));
   CHECK_THAT(problem("[]"), Catch::Contains("keys"));
   CHECK_THAT(problem("{"), Catch::Contains("JSON") || !Catch::Contains("good"));
   CHECK_FALSE(JwtVerifier::from_secret("short\n", {}));

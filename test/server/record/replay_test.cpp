@@ -89,7 +89,7 @@ Recorded record(const test::Folder& folder, const std::vector<std::string>& memb
   auto writer = RecordingWriter::create(folder.path("dev.mcap")).value();
   Recorded out{writer.path()};
   bool has_begun = false;
-  Recorder::Listener listener;
+  RecordListener listener;
   listener.begun = [&](const rr::Result<>& outcome) {
     out.begun = outcome;
     has_begun = true;
@@ -97,8 +97,8 @@ Recorded record(const test::Folder& folder, const std::vector<std::string>& memb
   listener.problem = [&](const std::string& problem) { out.problems.push_back(problem); };
   listener.failed = [&](const rr::Error& error) { out.problems.push_back(error.message); };
   const RecorderOptions how{members, std::chrono::milliseconds(1)};
-  const auto recorder = std::make_shared<Recorder>(io, writer, how, listener);
-  recorder->start(device.node->url("Dev"), {});
+  const auto recorder = std::make_shared<Recorder>(io, writer, device.node->url("Dev"), how, listener);
+  recorder->start({});
   REQUIRE(run_until(io, [&] { return has_begun; }));
   for (std::int32_t i = 1; out.begun && i <= values; ++i) {
     const auto before = writer.message_count();
@@ -321,12 +321,12 @@ TEST_CASE("a property that is slow to answer holds up no other") {
   rr::RunningNode node([&](rr::Node& added) { added.add(service); });
   boost::asio::io_context io(1);
   auto writer = RecordingWriter::create(folder.path("dev.mcap")).value();
-  Recorder::Listener listener;
+  RecordListener listener;
   listener.begun = [](const rr::Result<>& outcome) { CHECK(outcome); };
   listener.problem = [](const std::string& problem) { FAIL_CHECK(problem); };
   const RecorderOptions how{{"slow", "gain"}, std::chrono::milliseconds(1)};
-  const auto recorder = std::make_shared<Recorder>(io, writer, how, listener);
-  recorder->start(node.url("Dev"), {});
+  const auto recorder = std::make_shared<Recorder>(io, writer, node.url("Dev"), how, listener);
+  recorder->start({});
   CHECK(run_until(io, [&] { return writer.message_count() >= 3; }));
   recorder->close();
   node.stop();
@@ -340,14 +340,14 @@ TEST_CASE("an object that is first there after a reconnection is recorded from t
   const auto port = device->node->port();
   boost::asio::io_context io(1);
   auto writer = RecordingWriter::create(folder.path("dev.mcap")).value();
-  Recorder::Listener listener;
+  RecordListener listener;
   listener.begun = [](const rr::Result<>& outcome) { CHECK(outcome); };
   std::vector<std::string> problems;
   listener.problem = [&](const std::string& problem) { problems.push_back(problem); };
   listener.failed = [](const rr::Error& error) { FAIL_CHECK(error.message); };
   const RecorderOptions how{{"count", "axes/x%20y/*"}, std::chrono::milliseconds(1)};
-  const auto recorder = std::make_shared<Recorder>(io, writer, how, listener);
-  recorder->start(url, {});
+  const auto recorder = std::make_shared<Recorder>(io, writer, url, how, listener);
+  recorder->start({});
   const auto records = [&](std::uint64_t messages, std::size_t members) {
     return run_until(io, [&] {
       device->tell(1);

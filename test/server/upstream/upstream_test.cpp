@@ -117,6 +117,37 @@ TEST_CASE("a device that drops each session at once is tried ever more rarely, u
   CHECK(attempts.times.back() - lost < 320ms);  // half of what would come next, had it not lasted
 }
 
+TEST_CASE("who waits for a session that is lost as soon as it is open hears that; the next one gets in") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  bool is_first = true;
+  bench.upstream->keep_open({10s, 10s, 10s}, [&]() -> rr::Result<> {
+    const auto cut = rr::make_error(rr::ErrorCode::connection_error, "the line was cut");
+    if (std::exchange(is_first, false)) bench.upstream->connection()->close(cut);
+    return {};
+  });
+  const auto first = bench.wait_for(bench.upstream->opened());
+  REQUIRE_FALSE(first.has_value());
+  CHECK(first.error().message == "connection_lost: device 'device': the line was cut");
+  CHECK(bench.wait_for(bench.upstream->opened()).has_value());
+  CHECK(bench.upstream->is_open());
+}
+
+TEST_CASE("a session that nobody has wanted yet rests once it is known what the service is; one that is wanted stays") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  bench.upstream->rest_unused(1h);
+  bench.upstream->keep_open({10s, 10s, 10s});
+  REQUIRE(bench.run_until([&] { return bench.upstream->is_resting(); }));
+  CHECK(bench.upstream->has_tried());
+  REQUIRE(bench.upstream->types());
+  CHECK(bench.upstream->types()->find_entity("test.bench.Bench"));
+  CHECK(bench.run_until([&] { return bench.node.client_count() == 0; }));
+  CHECK(bench.wait_for(bench.upstream->opened()).has_value());
+  CHECK(bench.find("bench").has_value());
+  CHECK(bench.upstream->is_open());
+}
+
 TEST_CASE("a generator that opens when its client has gone is nobody else's") {
   Counting device;
   UpstreamBench bench(device.service);

@@ -14,10 +14,12 @@ import type { DeviceList } from "../gateway/devices";
 import type { UsbDeviceList } from "../gateway/usb_devices";
 import type { AccessDesk } from "../gateway/access";
 import type { AgentsDesk } from "../gateway/agents";
+import type { RecordingDesk } from "../gateway/recordings";
 import { mustSignIn } from "../gateway/session";
 import type { Session } from "../gateway/session";
 import { DevicesPage } from "../pages/devices_page";
 import { ServicePage } from "../pages/service_page";
+import { RecordingsPage } from "../pages/recordings_page";
 import { AgentsPart } from "../pages/agents_part";
 import { Account, SignInPage } from "../pages/sign_in_page";
 import { Mark, SunMoonIcon } from "../ui/icons";
@@ -28,10 +30,11 @@ interface AppParts {
   usb: UsbDeviceList;
   access: AccessDesk;
   agents: AgentsDesk;
+  recordings: RecordingDesk;
   session: Session;
 }
 
-export function App({ route, list, usb, access, agents, session }: AppParts) {
+export function App({ route, list, usb, access, agents, recordings, session }: AppParts) {
   const where = useStore(route);
   const main = useRef<HTMLElement>(null);
   const who = useStore(session.who);
@@ -63,16 +66,19 @@ export function App({ route, list, usb, access, agents, session }: AppParts) {
       <main id="main" ref={main} tabIndex={-1}>
         {isForm && <SignInPage session={session} done={() => setAsked(false)} />}
         {!isForm && <AgentsPart agents={agents} />}
-        {!isForm && <Page route={where} list={list} usb={usb} access={access} />}
+        {!isForm && <Page route={where} list={list} usb={usb} access={access} recordings={recordings} />}
       </main>
     </>
   );
 }
 
-function Page({ route: where, list, usb, access }: Omit<AppParts, "route" | "session" | "agents"> & { route: Route }) {
+type PageParts = Omit<AppParts, "route" | "session" | "agents"> & { route: Route };
+
+function Page({ route: where, list, usb, access, recordings }: PageParts) {
   return (
     <>
       {where.page === "devices" && <DevicesPage list={list} usb={usb} access={access} />}
+      {where.page === "recordings" && <RecordingsPage desk={recordings} list={list} />}
       {where.page === "service" && <ServicePage key={`${where.device}/${where.service}`} route={where} list={list} />}
       {where.page === "unknown" && <UnknownPage address={where.address} />}
     </>
@@ -153,6 +159,7 @@ function UnknownPage({ address }: { address: string }) {
 
 function titleOf(route: Route): string {
   if (route.page === "devices") return t("Devices");
+  if (route.page === "recordings") return t("Recordings");
   if (route.page === "unknown") return t("No such page");
   const last = route.path[route.path.length - 1];
   return last ? t("{0} of {1}", formatStep(last), route.device) : route.device;

@@ -1,4 +1,4 @@
-// Addresses of the pages: `#/` and `#/devices/<device>/<service>[/<object>...][?view=members|board][&board=...]`.
+// Addresses of the pages: `#/`, `#/recordings` and `#/devices/<device>/<service>[/<object>...][?view=members|board][&board=...]`.
 // Layer: web/app. A fragment, so that any static file server can hold the page.
 
 import { Store } from "./store";
@@ -15,6 +15,7 @@ const VIEWS: readonly string[] = ["drive", "board", "members"];
 
 export type Route =
   | { page: "devices" }
+  | { page: "recordings" }
   | { page: "service"; device: string; service: string; path: PathStep[]; view: View; board: string | null }
   | { page: "unknown"; address: string };
 
@@ -28,6 +29,7 @@ export function parseRoute(hash: string): Route {
     return { page: "unknown", address };
   }
   if (segments.length === 0) return { page: "devices" };
+  if (segments.length === 1 && segments[0] === "recordings") return { page: "recordings" };
   const [kind, device, service, ...steps] = segments;
   if (kind !== "devices" || !device || !service) return { page: "unknown", address };
   const given = new URLSearchParams(query);

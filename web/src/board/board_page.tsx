@@ -68,7 +68,7 @@ export default function BoardPage({ link, route, list }: { link: Link; route: Se
   return (
     <div class="board-page" data-kept={isKept}>
       <div class="board-bar">
-        {stop && <StopButton object={object} stop={stop} />}
+        <StopButton object={object} stop={stop} place={route} list={list} />
         {silent !== null && (
           <p class="failure board-silent" role="alert">
             {t("The device has not answered for {0}.", oldness(silent))}

@@ -49,6 +49,8 @@ export function PanelFrame({
   const name = nameOf(panel);
   const [device = place.device, service = place.service] =
     panel.from === "" ? [] : panel.from.split("/").map(decodeURIComponent);
+  const kind = t(KINDS[panel.kind].title);
+  const remarks = [panel.from === "" ? "" : device, panel.object, kind].filter((each) => each !== "" && each !== name);
   const drag = useDrag(panel, move);
   return (
     <div
@@ -89,9 +91,7 @@ export function PanelFrame({
         ) : (
           <h2>
             {name}
-            {(panel.from !== "" || panel.object !== "") && (
-              <small> {[panel.from === "" ? "" : device, panel.object].filter(Boolean).join(" · ")}</small>
-            )}
+            {remarks.length > 0 && <small> {remarks.join(" · ")}</small>}
           </h2>
         )}
       </header>

@@ -18,7 +18,17 @@ export interface Described {
   scope: string;
 }
 
-type Spec = [kind: PanelKind, x: number, y: number, w: number, h: number, settings?: Settings, title?: string];
+/** `place`: whose members, as those of a Panel: "device/service object". */
+type Spec = [
+  kind: PanelKind,
+  x: number,
+  y: number,
+  w: number,
+  h: number,
+  settings?: Settings,
+  title?: string,
+  place?: string,
+];
 
 const ROBOT = "com.robotraconteur.robotics.robot.Robot";
 const STANDARD: Readonly<Record<string, { stop: StopCall | null; panels: readonly Spec[] }>> = {
@@ -64,6 +74,20 @@ const STANDARD: Readonly<Record<string, { stop: StopCall | null; panels: readonl
       ["form", 8, 10, 4, 8, { member: "trapezoidal_move" }],
     ],
   },
+  // Of `rrgate demo microassembly`, whose cameras are another device.
+  ["experimental.microassembly.Cell"]: {
+    stop: { call: "halt", args: [] },
+    panels: [
+      ["image", 0, 0, 4, 8, { member: "picture" }, "Microscope 0", "cameras/Cameras microscopes[0]"],
+      ["image", 4, 0, 4, 8, { member: "picture" }, "Microscope 1", "cameras/Cameras microscopes[1]"],
+      ["image", 0, 8, 4, 8, { member: "picture" }, "Microscope 2", "cameras/Cameras microscopes[2]"],
+      ["image", 4, 8, 4, 8, { member: "picture" }, "Microscope 3", "cameras/Cameras microscopes[3]"],
+      ["form", 8, 0, 4, 9, { members: ["move"] }, "Probes"],
+      ["form", 8, 9, 4, 7, { members: ["focus", "illuminate"] }, "Focus and light"],
+      ["table", 0, 16, 8, 8, { member: "poses" }],
+      ["table", 8, 16, 4, 4, { member: "parts" }],
+    ],
+  },
   ["com.robotraconteur.sensor.Sensor"]: {
     stop: null,
     panels: [
@@ -90,7 +114,7 @@ export function presetFor(object: Described): Board {
   const standard = standardOf(object.type, object.definitions);
   if (!standard) return { panels: settle(byMembers(object)), stop: stopFor(object) };
   const panels = standard.panels
-    .filter(([, , , , , settings]) => isThere(settings, object.members))
+    .filter(([, , , , , settings, , place]) => place !== undefined || isThere(settings, object.members))
     .map((spec) => makePanel(spec));
   return { panels: settle(panels), stop: stopFor(object) };
 }
@@ -172,6 +196,7 @@ function isThere(settings: Settings | undefined, members: readonly Member[]): bo
   return named === undefined || members.some(({ name }) => name === named);
 }
 
-function makePanel([kind, x, y, w, h, settings = {}, title = ""]: Spec): Panel {
-  return { id: makeId(), kind, title, from: "", object: "", x, y, w, h, settings };
+function makePanel([kind, x, y, w, h, settings = {}, title = "", place = ""]: Spec): Panel {
+  const [from = "", object = ""] = place.split(" ", 2);
+  return { id: makeId(), kind, title, from, object, x, y, w, h, settings };
 }

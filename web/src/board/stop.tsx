@@ -3,11 +3,15 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
+import type { DeviceList } from "../gateway/devices";
+import { devicesOf } from "../gateway/devices";
+import { makeSafe, safeOf } from "../gateway/safe";
 import { tellStop } from "../robot/control";
 import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
 import { stopDevice } from "../robot/stop";
 import type { StopCall } from "../robot/stop";
+import { useStore } from "../app/store";
 import { clockTime } from "../ui/words";
 
 type State =
@@ -16,23 +20,50 @@ type State =
   | { kind: "arrived"; tookMs: number; time: number }
   | { kind: "failed"; why: string };
 
-export function StopButton({ object, stop }: { object: Remote | null; stop: StopCall }) {
+/** By a call where it is known how, else by what the gateway does when a lease ends; nothing where neither is known. */
+export function StopButton({ object, stop, place, list }: StopButtonProps) {
+  const safe = useSafe(place, list);
+  if (stop) {
+    const send = object && ((failed: (error: unknown) => void) => stopDevice(object, stop, failed));
+    return <Button send={send} words={t("calls {0}; Esc, too", `${stop.call}(${stop.args.join(", ")})`)} />;
+  }
+  if (safe.length === 0) return null;
+  const send = (): Promise<void> => {
+    tellStop();
+    return makeSafe(place.device, place.service);
+  };
+  return <Button send={send} words={t("lets the gateway make it safe: {0}; Esc, too", safe.join(", "))} />;
+}
+
+export interface StopButtonProps {
+  object: Remote | null;
+  stop: StopCall | null;
+  place: { device: string; service: string };
+  list: DeviceList;
+}
+
+function useSafe({ device, service }: StopButtonProps["place"], list: DeviceList): string[] {
+  const known = devicesOf(useStore(list.state))?.find(({ name }) => name === device);
+  return safeOf(known?.safe ?? [], service);
+}
+
+/** `failed` hears of what fails later. */
+type Send = (failed: (error: unknown) => void) => Promise<void>;
+
+function Button({ send: sendStop, words }: { send: Send | null; words: string }) {
   const [state, setState] = useState<State>({ kind: "ready" });
-  const latest = useRef(object);
-  latest.current = object;
+  const latest = useRef(sendStop);
+  latest.current = sendStop;
   const send = (): void => {
     const at = performance.now();
-    const device = latest.current;
-    if (!device) {
+    const stop = latest.current;
+    if (!stop) {
       tellStop();
       return setState({ kind: "failed", why: t("not connected: nothing was sent") });
     }
     setState({ kind: "sent", at }); // each press sends again
     const fail = (error: unknown): void => setState({ kind: "failed", why: explain(error) });
-    stopDevice(device, stop, fail).then(
-      () => setState({ kind: "arrived", tookMs: performance.now() - at, time: Date.now() }),
-      fail,
-    );
+    stop(fail).then(() => setState({ kind: "arrived", tookMs: performance.now() - at, time: Date.now() }), fail);
   };
   const sendNow = useRef(send);
   sendNow.current = send;
@@ -56,16 +87,16 @@ export function StopButton({ object, stop }: { object: Remote | null; stop: Stop
         {t("Stop")}
       </button>
       <p class={`stop-words ${state.kind === "failed" ? "is-bad" : ""}`} role="status" data-stop={state.kind}>
-        {wordsOf(state, stop)}
+        {wordsOf(state, words)}
       </p>
     </div>
   );
 }
 
-function wordsOf(state: State, stop: StopCall): string {
+function wordsOf(state: State, ready: string): string {
   switch (state.kind) {
     case "ready":
-      return t("calls {0}; Esc, too", `${stop.call}(${stop.args.join(", ")})`);
+      return ready;
     case "sent":
       return t("sent, no answer yet");
     case "arrived":

@@ -30,6 +30,8 @@ export interface Device {
   /** null: not the gateway's, or an older gateway does not say. */
   mode: DeviceMode | null;
   clients: number | null;
+  /** "path.member" of what makes it safe when a lease of it ends. */
+  safe: string[];
 }
 
 export type GatewayState =
@@ -99,6 +101,7 @@ export function readDevices(answer: unknown): Device[] {
     services: readServices(device["services"]),
     mode: device["mode"] === "relay" || device["mode"] === "shared" ? device["mode"] : null,
     clients: typeof device["clients"] === "number" ? device["clients"] : null,
+    safe: Array.isArray(device["safe"]) ? device["safe"].map(text) : [],
   }));
 }
 

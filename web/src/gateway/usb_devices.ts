@@ -70,6 +70,7 @@ async function describe(node: UsbNode): Promise<Device> {
     services: [],
     mode: null,
     clients: null,
+    safe: [],
   };
   if (node.url === undefined) return device;
   try {

@@ -58,9 +58,10 @@ export function useObject(
     return () => void (isCurrent = false);
   }, [root, path]);
   const isThere = found !== null && found.root === root && found.path === path;
+  const object = path === "" ? root : isThere ? found.object : null; // the root needs no way to it: a stop is ready at once
   return {
-    object: isThere ? found.object : null,
-    last: found?.path === path ? found.object : null,
+    object,
+    last: object ?? (found?.path === path ? found.object : null),
     failure: failure ?? (from !== "" && state.kind === "lost" ? state.reason : null),
   };
 }

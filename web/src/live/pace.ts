@@ -3,6 +3,7 @@
 
 const INTERVALS = 16;
 const PERIODS = 3;
+const BUNCH_MS = 2;
 const SHORTEST_MS = 250; // a hiccup of the page is no old value
 
 export class Pace {
@@ -29,11 +30,15 @@ export class Pace {
     return this.#heardAt;
   }
 
-  /** Milliseconds between two, by the middle of the last ones; null before the third. */
+  /**
+   * Milliseconds between two, by the middle of the last ones; null before the third. Of those that a busy page hears in bunches, most
+   * have no time between them: then on the average.
+   */
   get periodMs(): number | null {
-    if (this.#intervals.length < 2) return null;
-    const sorted = [...this.#intervals].sort((a, b) => a - b);
-    return sorted[sorted.length >> 1] ?? null;
+    const count = this.#intervals.length;
+    if (count < 2) return null;
+    const middle = [...this.#intervals].sort((a, b) => a - b)[count >> 1] ?? 0;
+    return middle >= BUNCH_MS ? middle : this.#intervals.reduce((sum, each) => sum + each, 0) / count;
   }
 
   ageMs(now: number): number | null {

@@ -5,6 +5,7 @@ import { useCallback, useEffect, useRef, useState } from "preact/hooks";
 import type { Route } from "../app/router";
 import { explain } from "../robot/remote";
 import type { Member, Remote } from "../robot/remote";
+import { flowing } from "../ui/words";
 
 export interface MemberRowProps {
   object: Remote;
@@ -25,7 +26,7 @@ export function RowHead({ member, signature }: { member: Member; signature?: str
           </span>
         ))}
       </div>
-      {member.documentation !== "" && <p class="note row-documentation">{member.documentation}</p>}
+      {member.documentation !== "" && <p class="note row-documentation">{flowing(member.documentation)}</p>}
     </>
   );
 }

@@ -24,6 +24,9 @@ export function DevicesPage({ list, usb, access }: { list: DeviceList; usb: UsbD
       {devices && devices.length === 0 && state.kind === "known" && <NoDevices />}
       {devices && devices.length > 0 && <DeviceParts devices={devices} stale={state.kind === "away"} />}
       {usb.isPossible && <UsbPart usb={usb} />}
+      <p>
+        <a href="#/recordings">{t("Recordings")}</a>
+      </p>
       <AccessPart access={access} />
     </div>
   );

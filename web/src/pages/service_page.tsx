@@ -43,7 +43,7 @@ export function ServicePage({ route, list }: { route: ServiceRoute; list: Device
         {link && <LinkStrip link={link} list={list} device={device} service={service} />}
         {link && <Views route={route} shown={shown} first={first} drives={drives} />}
       </div>
-      {link && shown === "members" && <HeadStop link={link} path={path} list={list} />}
+      {link && shown === "members" && <HeadStop link={link} route={route} list={list} />}
       {drives && link && (
         <div hidden={shown !== "drive"}>
           <RobotPage link={link} list={list} device={device} shown={shown === "drive"} />
@@ -82,13 +82,13 @@ function Views({ route, shown, first, drives }: { route: ServiceRoute; shown: Vi
   );
 }
 
-/** Of the object that is shown, else of the service: where its type says how. A board and the demo robot have their own. */
-function HeadStop({ link, path, list }: { link: Link; path: readonly PathStep[]; list: DeviceList }) {
-  const shown = useObject(link, "", path.map(formatStep).join("."), list);
+/** Of the object that is shown, else of the service. A board and the demo robot have their own. */
+function HeadStop({ link, route, list }: { link: Link; route: ServiceRoute; list: DeviceList }) {
+  const shown = useObject(link, "", route.path.map(formatStep).join("."), list);
   const root = useObject(link, "", "", list);
   const [own, service] = [useStop(shown.last), useStop(root.last)];
-  if (own) return <StopButton object={shown.object} stop={own} />;
-  return service && <StopButton object={root.object} stop={service} />;
+  if (own) return <StopButton object={shown.object} stop={own} place={route} list={list} />;
+  return <StopButton object={root.object} stop={service} place={route} list={list} />;
 }
 
 function useStop(object: Remote | null): StopCall | null {

@@ -72,7 +72,7 @@ export function SignInPage({ session, done }: { session: Session; done: () => vo
           />
         </label>
         <Failure text={failure ?? expired} />
-        <button class="button" type="submit" aria-disabled={isBusy}>
+        <button class="button button-main" type="submit" aria-disabled={isBusy}>
           {isBusy ? t("Signing in") : t("Sign in")}
         </button>
       </form>

@@ -6,7 +6,7 @@ import { t } from "../app/language";
 import { useAction } from "../members/row";
 import type { Member } from "../robot/remote";
 import { Failure } from "../ui/failure";
-import { clockTime } from "../ui/words";
+import { clockTime, flowing } from "../ui/words";
 import { draftOf, jsonOf, makeDraft, valueOf } from "../values/draft";
 import type { Draft } from "../values/draft";
 import { rowsOf } from "../values/rows";
@@ -108,7 +108,7 @@ function MemberForm({ object, member, definitions, scope, place, withMore = fals
   const [newest] = done;
   return (
     <form class="member-form" onSubmit={submit} data-form={member.name}>
-      {member.documentation !== "" && withMore && <p class="note row-documentation">{member.documentation}</p>}
+      {member.documentation !== "" && withMore && <p class="note row-documentation">{flowing(member.documentation)}</p>}
       {inputs.map(({ name, type }, i) => (
         <DraftInput
           key={name}

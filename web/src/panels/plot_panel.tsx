@@ -123,7 +123,10 @@ function Canvas({ trace, labels, seconds, paused }: CanvasProps) {
     let plot = makePlot(box, labels);
     const draw = (): void => {
       if (latest.current.paused || document.hidden) return;
-      plot.setData(trace.window(latest.current.seconds) as uPlot.AlignedData);
+      const data = trace.window(latest.current.seconds) as uPlot.AlignedData;
+      plot.setData(data);
+      const isPointedAt = (plot.cursor.left ?? -1) >= 0;
+      if (!isPointedAt && data[0].length > 0) plot.setLegend({ idx: data[0].length - 1 }); // the newest values
     };
     const fit = new ResizeObserver(() => plot.setSize(sizeOf(box, plot)));
     fit.observe(box);
@@ -151,7 +154,10 @@ function makePlot(box: HTMLElement, labels: readonly string[]): uPlot {
     {
       width: Math.max(box.clientWidth, 40),
       height: Math.max(box.clientHeight - 40, 60),
-      scales: { x: { time: false } },
+      scales: {
+        x: { time: false },
+        y: { range: (_, low, high) => (low === high ? [low - 1, high + 1] : uPlot.rangeNum(low, high, 0.1, true)) },
+      },
       cursor: { drag: { x: true, y: true, uni: 20 } },
       legend: { live: true },
       axes: [
@@ -165,6 +171,7 @@ function makePlot(box: HTMLElement, labels: readonly string[]): uPlot {
           stroke: palette.series[i % palette.series.length] ?? palette.accent,
           width: 1.75,
           spanGaps: true,
+          points: { show: (plot: uPlot) => plot.data[0].length < 3 }, // where there is no line yet
           value: (_: uPlot, value: number | null) => (value === null ? "–" : String(Number(value.toPrecision(6)))),
         })),
       ],

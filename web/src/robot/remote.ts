@@ -35,6 +35,8 @@ export interface Remote {
   lease(options: LeaseOptions): Promise<Lease>;
   get(name: string): Promise<unknown>;
   set(name: string, value: unknown, options?: CallOptions): Promise<void>;
+  /** Writes a property past whatever waits to be sent. */
+  setNow(name: string, value: unknown, options?: CallOptions): Promise<void>;
   /** Values of a wire from now on, the newest only; ends with the connection or with `signal`. */
   wire(name: string, signal: AbortSignal): AsyncGenerator<unknown, void>;
   poke(name: string, value: unknown): Promise<void>;
@@ -104,6 +106,11 @@ export function remoteOf(object: RemoteObject, underWay = new UnderWay()): Remot
     lease: async (options) => lease(object, options),
     get: async (name) => member(name).get(),
     set: (name, value, options) => underWay.follow((async () => member(name).set(value, options))()),
+    setNow: async (name, value, options) => {
+      const write = info.urgent[name];
+      if (!write) throw new Error(`${info.type} has no property "${name}" that can be written at once`);
+      await write(value, ...(options ? [options] : []));
+    },
     wire: (name, signal) => valuesOf(() => member(name).connect({ signal }), signal),
     pipe: (name, signal) => valuesOf(() => member(name).connect(-1, { signal }), signal),
     dimensions: async (name) => member(name).dimensions(),

@@ -34,10 +34,23 @@ export function staleAge(ageMs: number): string | null {
   return ageMs < STALE_MS ? null : t("{0} old", span(ageMs + 500));
 }
 
+/** A text whose lines were broken for an editor, in paragraphs: lists and empty lines stay as they are. */
+export function flowing(text: string): string {
+  return text.trim().replace(/(\S)[ \t]*\n(?!\s|[-*•]|\d+[.)])/g, "$1 ");
+}
+
 /** The same text with an end. */
 export function sentence(text: string): string {
   const trimmed = text.trim();
   return /[.!?]$/.test(trimmed) ? trimmed : `${trimmed}.`;
+}
+
+/** `0 B`, `12 kB`, `3.4 MB`. */
+export function bytesText(bytes: number): string {
+  const units = ["B", "kB", "MB", "GB", "TB"];
+  let [value, unit] = [bytes, 0];
+  for (; value >= 1000 && unit < units.length - 1; unit++) value /= 1000;
+  return `${unit === 0 || value >= 100 ? Math.round(value) : value.toFixed(1)} ${units[unit]}`;
 }
 
 /** `0.4 ms`, `12 ms`, `1.5 s`: how old a value is. */

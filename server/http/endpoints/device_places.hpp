@@ -1,0 +1,49 @@
+// The members that a device offers over HTTP, and what all documents say of them. Layer: server/http/endpoints.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/http/endpoints/device_documents.hpp"
+
+namespace rrgate {
+
+/// A member and the URL path that leads to it.
+struct DocumentedMember {
+  const DescribedService* service;
+  const rr::MemberDefinition* member;
+  std::string path;         ///< "/api/v1/devices/d/Create/axes/{axes}/position"
+  std::string object_path;  ///< "Create.axes[{axes}]"
+  std::vector<std::string> indices;
+  std::string id;  ///< "Create_axes_position"
+};
+
+/// Every member that a path leads to. An object type within itself is listed once; what is behind a varobject is known
+/// at run time only.
+std::vector<DocumentedMember> places_of(const std::string& base, const std::vector<DescribedService>& services);
+/// Of the named types of all services.
+rr::OrderedJson schemas_of(const std::vector<DescribedService>& services);
+rr::OrderedJson arguments_schema(const std::vector<rr::ParameterDefinition>& parameters);
+/// The documents say what they are about as every device of its kind does.
+void add_info(rr::OrderedJson& out, std::string_view device);
+
+inline bool can_read(const rr::MemberDefinition& member) {
+  return member.direction() != rr::MemberDirection::writeonly;
+}
+inline bool can_write(const rr::MemberDefinition& member) {
+  return member.direction() != rr::MemberDirection::readonly;
+}
+bool takes_values_while_running(const rr::MemberDefinition& member);
+
+// The documents.
+
+rr::OrderedJson open_api(std::string_view device, const std::vector<DocumentedMember>& places, rr::OrderedJson schemas,
+                         const std::vector<std::string>& unavailable);
+rr::OrderedJson async_api(std::string_view device, const std::string& base,
+                          const std::vector<DescribedService>& services, const std::vector<DocumentedMember>& places,
+                          rr::OrderedJson schemas);
+rr::OrderedJson thing_description(std::string_view device, const std::vector<DocumentedMember>& places,
+                                  rr::OrderedJson schemas);
+
+}  // namespace rrgate

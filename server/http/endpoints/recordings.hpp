@@ -1,0 +1,18 @@
+// Recordings that the gateway makes: list, begin, stop, download, delete. Layer: server/http/endpoints. See
+// docs/recording.md.
+#pragma once
+
+#include "server/http/router.hpp"
+
+namespace rrgate {
+
+class GatewayState;
+
+Handler recordings_endpoint(GatewayState& gateway);
+Handler begin_recording_endpoint(GatewayState& gateway);
+/// Of a recording, by its name; or one of its files.
+Handler recording_endpoint(GatewayState& gateway);
+Handler stop_recording_endpoint(GatewayState& gateway);
+Handler delete_recording_endpoint(GatewayState& gateway);
+
+}  // namespace rrgate

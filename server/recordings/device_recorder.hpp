@@ -1,0 +1,49 @@
+// Records a service of a device by the session that the gateway has with it. Layer: server/recordings.
+#pragma once
+
+#include <boost/asio/steady_timer.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "node/driver/backoff.hpp"
+#include "server/record/service_record.hpp"
+#include "server/upstream/value_client.hpp"
+
+namespace rrgate {
+
+/// For as long as it lives; the session connects again after each loss. For the gateway's thread.
+class DeviceRecorder : public std::enable_shared_from_this<DeviceRecorder> {
+ public:
+  /// `clients`, `writer`  outlive close().
+  DeviceRecorder(std::shared_ptr<Device> device, std::string service, ValueClients& clients, RecordingWriter& writer,
+                 RecorderOptions options, RecordListener listener);
+
+  /// RecordListener::failed hears, too, why there is nothing to record, now or from now on; begun hears of success
+  /// alone.
+  void start();
+  /// Nothing is written any more.
+  void close();
+  const Device& device() const { return *device_; }
+  /// Whether the session is there, and is recorded.
+  bool is_following() const { return client_ && client_->upstream()->is_open(); }
+
+ private:
+  boost::asio::awaitable<void> run();
+  boost::asio::awaitable<void> wait(std::chrono::milliseconds time);
+  boost::asio::awaitable<void> record(std::shared_ptr<ValueClient> client);
+  boost::asio::awaitable<void> follow(std::shared_ptr<ValueClient> client, RecordedMemberPlace member,
+                                      std::shared_ptr<const rr::TypeRegistry> types);
+
+  std::shared_ptr<Device> device_;
+  std::string service_;
+  ValueClients& clients_;
+  std::function<void(const rr::Error&)> failed_;
+  std::shared_ptr<ServiceRecord> record_;
+  std::vector<ValueClient::ListenerPtr> listeners_;
+  rr::Backoff backoff_;
+  boost::asio::steady_timer wake_;
+  std::shared_ptr<ValueClient> client_;  ///< that is recorded
+};
+
+}  // namespace rrgate

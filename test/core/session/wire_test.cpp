@@ -1,0 +1,181 @@
+// Wires between a client and a service session: the newest value, both ways, to all who have connected.
+#include <catch2/catch.hpp>
+
+#include "test/core/session/loopback.hpp"
+#include "test/support/print.hpp"
+
+using namespace rr;
+using namespace rr::test;
+
+namespace {
+
+Value pose(double x) {
+  return Structure{"experimental.loopback.Pose", {{"x", Value(x)}, {"joints", Value(std::vector<double>{1, 2, 3})}}};
+}
+
+}  // namespace
+
+TEST_CASE("the reply to a connect connects no wire that was asked for after it") {
+  Loopback pair;
+  pair.connect();
+  const auto* torque = pair.client->object_type("arm")->find_member("torque");
+  const auto first = pair.client->connect_wire("arm", "torque", pair.now);
+  pair.carry(*pair.client, *pair.service, 1u << 20);
+  pair.next_service<WireConnected>();
+  REQUIRE(pair.service->send_wire("arm", *torque, Value(1.0), pair.now));
+  pair.client->disconnect_wire("arm", "torque", pair.now);
+  const auto second = pair.client->connect_wire("arm", "torque", pair.now);
+  pair.carry(*pair.service, *pair.client, 1u << 20);
+  CHECK(pair.next_client<Completed>().id == first);
+  CHECK_FALSE(pair.client->poll_event());
+  pair.pump();
+  pair.next_client<Completed>();
+  CHECK(pair.next_client<Completed>().id == second);
+  CHECK(pair.client->send_wire("arm", "torque", Value(2.0), pair.now));
+}
+
+TEST_CASE("the end of a wire's connection is not the end of the next one") {
+  Loopback pair;
+  pair.connect();
+  const auto* torque = pair.client->object_type("arm")->find_member("torque");
+  CHECK(pair.completion(pair.client->connect_wire("arm", "torque", pair.now)));
+  pair.service->close_wire("arm", *torque, pair.now);
+  pair.client->disconnect_wire("arm", "torque", pair.now);
+  const auto again = pair.client->connect_wire("arm", "torque", pair.now);
+  pair.pump();
+  CHECK(pair.next_client<Completed>().result.error().message == "Invalid wire connection");
+  CHECK(pair.next_client<Completed>().id == again);
+  CHECK(pair.client->send_wire("arm", "torque", Value(2.0), pair.now));
+}
+
+TEST_CASE("wires carry the newest value both ways") {
+  Loopback pair;
+  pair.connect();
+  const auto& torque = *pair.service->service()->root_type().find_member("torque");
+  auto id = pair.client->connect_wire("arm", "torque", pair.now);
+  CHECK(pair.completion(id).value().is_null());
+  const auto connected = pair.next_service<WireConnected>();
+  CHECK(connected.path == "arm");
+  CHECK(pair.service->has_wire("arm", "torque"));
+
+  REQUIRE(pair.service->send_wire("arm", torque, Value(1.5), pair.now));
+  REQUIRE(pair.service->send_wire("arm", torque, Value(2.5), pair.now));
+  pair.pump();
+  const auto first = pair.next_client<WireValueReceived>();
+  const auto second = pair.next_client<WireValueReceived>();
+  CHECK(first.value == Value(1.5));
+  CHECK(second.value == Value(2.5));
+  CHECK(first.time < second.time);  // same clock reading, strictly later stamp
+
+  REQUIRE(pair.client->send_wire("arm", "torque", Value(-1.0), pair.now));
+  pair.pump();
+  CHECK(pair.next_service<WireReceived>().value == Value(-1.0));
+
+  id = pair.client->peek_in_value("arm", "torque", pair.now);
+  pair.pump();
+  auto called = pair.next_service<Called>();
+  CHECK(called.kind == CallKind::peek_in);
+  pair.service->reply(called.id, Value(9.0), pair.now);
+  CHECK(pair.completion(id).value() == Value(9.0));
+
+  id = pair.client->poke_out_value("arm", "torque", Value(7.0), pair.now);
+  pair.pump();
+  called = pair.next_service<Called>();
+  CHECK(called.kind == CallKind::poke_out);
+  CHECK(called.arguments.front() == Value(7.0));
+  pair.service->reply(called.id, Value{}, pair.now);
+  CHECK(pair.completion(id).value().is_null());
+
+  CHECK_FALSE(pair.client->send_wire("arm", "state", pose(1), pair.now));
+  CHECK(pair.completion(pair.client->poke_out_value("arm", "state", pose(1), pair.now)).error().code ==
+        ErrorCode::read_only_member);
+  CHECK(pair.completion(pair.client->disconnect_wire("arm", "torque", pair.now)).value().is_null());
+  CHECK(pair.completion(pair.client->disconnect_wire("arm", "torque", pair.now)).error().code ==
+        ErrorCode::service_error);
+  CHECK_FALSE(pair.service->has_wire("arm", "torque"));
+}
+
+TEST_CASE("one packet of a wire serves all its clients, each as it speaks") {
+  std::vector<std::unique_ptr<Loopback>> pairs;
+  for (const auto& features :
+       {Features{}, Features{}, Features{.string_table = {.local = false, .standard = false}}, legacy_features}) {
+    auto& pair = *pairs.emplace_back(std::make_unique<Loopback>(features));
+    pair.connect();
+    pair.completion(pair.client->connect_wire("arm", "state", pair.now)).value();
+    pair.next_service<WireConnected>();
+  }
+  pairs.push_back(std::make_unique<Loopback>());  // has not connected the wire
+  pairs.back()->connect();
+  const auto& state = *pairs.front()->service->service()->root_type().find_member("state");
+  const auto send = [&](const Value& value, TimeSpec time) {
+    WirePacket packet("arm", state, value, time, pairs.front()->now.steady);
+    for (const auto& pair : pairs) REQUIRE(pair->service->send_wire(packet, pair->now));
+    for (const auto& pair : pairs) pair->pump();
+  };
+  send(pose(1), {50, 1});
+  send(pose(2), {50, 2});
+  send(pose(3), {40, 0});  // the clock was set back
+  pairs.pop_back();
+  CHECK(pairs.front()->client->connection().features().v4);
+  CHECK_FALSE(pairs.back()->client->connection().features().v4);
+  for (const auto& pair : pairs) {
+    for (std::int32_t i = 1; i <= 3; ++i) {
+      const auto received = pair->next_client<WireValueReceived>();
+      CHECK(received.value == pose(i));
+      CHECK(received.time == TimeSpec{50, i});
+    }
+    CHECK_FALSE(pair->client->poll_event());
+    CHECK(pair->service->total_ledgers().wires.delivered == 3);
+  }
+}
+
+TEST_CASE("a value that does not fit its wire goes to nobody") {
+  Loopback pair;
+  pair.connect();
+  pair.completion(pair.client->connect_wire("arm", "state", pair.now)).value();
+  const auto& state = *pair.service->service()->root_type().find_member("state");
+  const Value text("no pose");
+  WirePacket packet("arm", state, text, {50, 1}, pair.now.steady);
+  for (int i = 0; i < 2; ++i) {
+    const auto sent = pair.service->send_wire(packet, pair.now);
+    REQUIRE_FALSE(sent);
+    CHECK(sent.error().code == ErrorCode::data_type_mismatch);
+  }
+  CHECK(pair.service->poll_transmit().empty());
+  CHECK(pair.service->total_ledgers().wires.delivered == 0);
+}
+
+TEST_CASE("a slow stream replaces wire values instead of queueing them") {
+  Loopback pair;
+  pair.connect();
+  const auto& state = *pair.service->service()->root_type().find_member("state");
+  pair.completion(pair.client->connect_wire("arm", "state", pair.now)).value();
+  pair.next_service<WireConnected>();
+  const auto big = [](double x) {
+    return Value(
+        Structure{"experimental.loopback.Pose", {{"x", Value(x)}, {"joints", Value(std::vector<double>(10'000))}}});
+  };
+  for (int i = 0; i < 100; ++i) REQUIRE(pair.service->send_wire("arm", state, big(i), pair.now));
+  CHECK(pair.service->connection().queued_bytes() < 200'000);
+  pair.pump();
+  Value last;
+  int received = 0;
+  while (auto event = pair.client->poll_event()) {
+    last = std::get<WireValueReceived>(*event).value;
+    ++received;
+  }
+  CHECK(received == 2);
+  CHECK(last == big(99));
+}
+
+TEST_CASE("one client connects a bounded number of wires") {
+  Loopback pair;
+  ServiceSessionOptions options;
+  options.max_wires = 1;
+  pair.service = std::make_unique<ServiceSession>(pair.directory, options, pair.now);
+  pair.connect();
+  CHECK(pair.completion(pair.client->connect_wire("arm", "torque", pair.now)).has_value());
+  CHECK(pair.completion(pair.client->connect_wire("arm", "state", pair.now)).error().code ==
+        ErrorCode::out_of_system_resource);
+  CHECK(pair.completion(pair.client->connect_wire("arm", "torque", pair.now)).has_value());
+}

@@ -1,0 +1,77 @@
+// The example examples/phone: a page that is a device, with the camera of a browser that has an invented one.
+import { cpSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import path from "node:path";
+import { expect, test } from "@playwright/test";
+import launch from "../chromium.json" with { type: "json" };
+import { Program, freePort, repositoryRoot, rrgate } from "../processes";
+
+const camera = ["--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream"];
+test.use({ launchOptions: { ...launch, args: [...launch.args, ...camera] } });
+
+let folder: string;
+let gateway: Program;
+let url: string;
+
+test.beforeAll(async () => {
+  folder = mkdtempSync(path.join(tmpdir(), "rrgate-phone-"));
+  cpSync(path.join(repositoryRoot, "examples/phone"), folder, { recursive: true });
+  const client = path.join(repositoryRoot, "wasm-client/dist");
+  cpSync(client, path.join(folder, "site/rrgate-client"), { recursive: true });
+  const port = await freePort();
+  url = `http://127.0.0.1:${port}/`;
+  const config = path.join(folder, "gateway.json");
+  writeFileSync(config, readFileSync(config, "utf8").replace("127.0.0.1:8080", `127.0.0.1:${port}`));
+  gateway = new Program(rrgate, ["serve", "--config", config]);
+  gateway.start();
+  await gateway.waitForOutput(/listening/);
+});
+
+test.afterAll(async () => {
+  await gateway?.kill("SIGTERM");
+  rmSync(folder, { recursive: true, force: true });
+});
+
+const member = (name: string) => `${url}api/v1/devices/phone/Phone/${name}`;
+const devices = async () => ((await (await fetch(`${url}api/v1/devices`)).json()) as { devices: unknown[] }).devices;
+
+test("a page is a device with camera, motion and touch, and no more when it is closed", async ({ page }) => {
+  const complaints: string[] = [];
+  page.on("pageerror", (error) => complaints.push(String(error)));
+  await page.goto(url);
+  await page.getByRole("button").click();
+  await expect(page.locator("output")).toHaveText('device "phone"');
+  await expect.poll(devices).toMatchObject([{ name: "phone", state: "online", served: true }]);
+
+  const written = await fetch(member("text"), { method: "PUT", body: JSON.stringify("hello") });
+  expect(written.status).toBe(204);
+  await expect(page.locator("q")).toHaveText("hello");
+
+  // What it feels.
+  await page.evaluate(() => {
+    const accelerationIncludingGravity = { x: 1, y: 2, z: 9.5 };
+    dispatchEvent(new DeviceMotionEvent("devicemotion", { accelerationIncludingGravity }));
+  });
+  await expect.poll(async () => (await fetch(member("acceleration"))).json()).toEqual([1, 2, 9.5]);
+
+  // What it sees: a picture that any <img> shows.
+  const stop = new AbortController();
+  const pictures = await fetch(`${member("frames")}?as=mjpeg`, { signal: stop.signal });
+  expect(pictures.headers.get("content-type")).toContain("multipart/x-mixed-replace");
+  const { value } = await pictures.body!.getReader().read();
+  expect(Buffer.from(value!).toString("latin1")).toContain("Content-Type: image/jpeg");
+  stop.abort();
+
+  // What touches it.
+  const touches = await fetch(member("touched"), { headers: { Accept: "text/event-stream" } });
+  const heard = touches.body!.pipeThrough(new TextDecoderStream()).getReader();
+  await page.mouse.click(64, 80);
+  let text = "";
+  while (!text.includes('"x"')) text += (await heard.read()).value ?? "";
+  expect(text).toContain('"x":0.05');
+  await heard.cancel();
+
+  await page.close();
+  await expect.poll(devices).toEqual([]);
+  expect(complaints).toEqual([]);
+});

@@ -1,0 +1,109 @@
+#!/usr/bin/env python3
+"""Measures a gateway to many devices that nobody uses: fleet.py --report FILE [--devices N]
+
+Ends with 1 where something is missed. Builds are those of RR_BUILD, build/release where it is not set.
+"""
+import argparse
+import json
+import pathlib
+import sys
+import tempfile
+import time
+
+from load import PROGRAMS, cpu_seconds, resident_bytes, running
+from rows import Row, report
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "interop"))
+
+import gateways  # noqa: E402
+from http_api import fetch  # noqa: E402
+from processes import Background  # noqa: E402
+
+IDLE_SECONDS = 30
+OFFLINE_SECONDS = 60
+
+
+class Fleet:
+    """So many devices in one process."""
+
+    def __init__(self, folder, count):
+        self.process = Background([PROGRAMS / "fleet_device", count], folder / "fleet.log")
+        self.ports = json.loads(self.process.next_line(60))
+        self.pid = self.process.process.pid
+
+    def devices(self):
+        return [{"name": f"sensor-{i}", "url": f"rr+tcp://127.0.0.1:{port}/?service=Sensor"}
+                for i, port in enumerate(self.ports)]
+
+    def stop(self):
+        self.process.stop()
+
+
+class Gateway(gateways.Gateway):
+    def __init__(self, folder, devices):
+        super().__init__(folder, {"devices": devices, "log": {"format": "json", "level": "warning"}})
+        self.pid = self.process.process.pid
+
+    def wait_until_ready(self):
+        self.process.wait_until(self._answers)
+
+    def _answers(self):
+        try:
+            return fetch(self.port, "/healthz")[0] == 200
+        except OSError:
+            return False
+
+    def wait_for_online(self, is_wanted, within):
+        """Until as many devices are online as wanted. Returns how long it took, in s."""
+        begin = time.monotonic()
+        while not is_wanted(online := json.loads(fetch(self.port, "/readyz")[2])["devices_online"]):
+            if time.monotonic() - begin > within:
+                raise SystemExit(f"{online} devices online after {within} s")
+            time.sleep(0.1)
+        return time.monotonic() - begin
+
+    def stop(self):
+        self.process.stop()
+
+
+def share_of_a_core(pid, seconds):
+    begin, before = time.monotonic(), cpu_seconds(pid)
+    time.sleep(seconds)
+    return (cpu_seconds(pid) - before) / (time.monotonic() - begin)
+
+
+def measure(folder, count):
+    with running(Fleet(folder, count)) as fleet:
+        begin = time.monotonic()
+        with running(Gateway(folder, fleet.devices())) as gateway:
+            gateway.wait_for_online(lambda online: online == count, 120)
+            online = time.monotonic() - begin
+            idle = share_of_a_core(gateway.pid, IDLE_SECONDS)
+            resident = resident_bytes(gateway.pid)
+            fleet.stop()
+            offline = gateway.wait_for_online(lambda online: online == 0, 600)
+    (folder / "none").mkdir()
+    with running(Gateway(folder / "none", [])) as gateway:
+        empty = resident_bytes(gateway.pid)
+    yield Row(f"{count} devices: until all are online", online, None, "s", promise=60)
+    yield Row("memory of the gateway for each", (resident - empty) / count / 1e3, None, "kB", promise=20)
+    yield Row("CPU while nobody uses them", idle * 100, None, "% of a core", promise=5)
+    yield Row("until all are seen as offline", offline, None, "s", promise=OFFLINE_SECONDS)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--report", type=pathlib.Path, required=True)
+    parser.add_argument("--devices", type=int, default=5000)
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as scratch:
+        rows = list(measure(pathlib.Path(scratch), arguments.devices))
+    text = report("fleet", rows)
+    arguments.report.parent.mkdir(parents=True, exist_ok=True)
+    arguments.report.write_text("# Fleet\n\n" + text, encoding="utf-8")
+    print(text)
+    return 0 if all(row.is_met for row in rows) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,38 @@
+#include "server/upstream/look_pace.hpp"
+
+#include <catch2/catch_test_macros.hpp>
+
+using rrgate::LookPace;
+using namespace std::chrono_literals;
+
+namespace {
+
+/// When the last of so many looks begins that are wanted at once.
+std::chrono::steady_clock::duration last_turn(LookPace& pace, LookPace::Look look, LookPace::TimePoint now, int count) {
+  auto turn = now;
+  for (int i = 0; i < count; ++i) turn = pace.take_turn(look, now);
+  return turn - now;
+}
+
+}  // namespace
+
+TEST_CASE("few devices are looked at without waiting") {
+  LookPace pace;
+  LookPace::TimePoint now{1h};
+  for (int round = 0; round < 10; ++round, now += 10s) {
+    CHECK(last_turn(pace, LookPace::Look::first, now, LookPace::at_once) == 0s);
+    CHECK(last_turn(pace, LookPace::Look::later, now, LookPace::at_once) == 0s);
+  }
+}
+
+TEST_CASE("thousands of devices are looked at one after another, the first time sooner") {
+  LookPace pace;
+  const LookPace::TimePoint now{1h};
+  const auto first = last_turn(pace, LookPace::Look::first, now, 5000);
+  CHECK(first == 4900ms);
+  const auto later = last_turn(pace, LookPace::Look::later, now, 5000);
+  CHECK(later == 39200ms);
+  // They took their turns: whoever comes now is behind them, and none waits once those are over.
+  CHECK(pace.take_turn(LookPace::Look::later, now + 20s) - now == 39208ms);
+  CHECK(pace.take_turn(LookPace::Look::later, now + 60s) == now + 60s);
+}

@@ -1,0 +1,295 @@
+// serve(): a page as a device, with a gateway that is not one. Through a real one: test/interop/test_page_device.py.
+import { readFileSync } from "node:fs";
+import { ErrorCode, RobotRaconteurError } from "../../wasm-client/dist/node.js";
+import { serve, type ServedDevice, type ServeOptions } from "../../wasm-client/dist/serve/node.js";
+import { FakeGateway, type PageSocket } from "./fake_gateway.js";
+
+const definition = `
+service test.phone
+object Phone
+    property string note
+    property double level
+    property double broken [readonly]
+    function double add(double left, double right)
+    function void fail(string how)
+    function double{generator} count(int32 to)
+    function double wait_for_client()
+    event tapped(double x, double y)
+    wire double[] motion [readonly]
+    wire double light
+    pipe uint8[] frames
+    memory double[] samples
+    memory int16[*] grid
+    callback double ask(string question)
+    function double askMe(string question)
+    objref Lamp{string} lamps
+    objref varobject thing
+end
+object Lamp
+    property double level
+    event burnt()
+end`;
+
+interface Lamp {
+  level: { get(): Promise<number>; set(value: number): Promise<void> };
+}
+interface Phone {
+  note: { get(): Promise<string>; set(value: string): Promise<void> };
+  level: { get(): Promise<number>; set(value: number): Promise<void> };
+  broken: { get(): Promise<number> };
+  add(left: number, right: number): Promise<number>;
+  fail(how: string): Promise<void>;
+  count(to: number): AsyncGenerator<number>;
+  tapped: { on(handler: (x: number, y: number) => void): () => void };
+  motion: { peek(): Promise<Float64Array> };
+  light: { poke(value: number): Promise<void>; peekOut(): Promise<number> };
+  lamps: { get(index: string): Promise<Lamp> };
+}
+
+let gateway: FakeGateway;
+let device: ServedDevice;
+
+const implementation = () => ({
+  note: "",
+  level: {
+    get: () => Promise.resolve(implementationLevel),
+    set: (value: number) => void (implementationLevel = value),
+  },
+  broken: "no number",
+  add: (left: number, right: number) => Promise.resolve(left + right),
+  fail(how: string) {
+    if (how === "protocol")
+      throw new RobotRaconteurError({
+        code: ErrorCode.OutOfRange,
+        name: "RobotRaconteur.OutOfRange",
+        message: "too far",
+      });
+    throw new TypeError("a slip");
+  },
+  *count(to: number) {
+    try {
+      for (let i = 1; i <= to; ++i) yield i;
+    } finally {
+      ++ended;
+    }
+  },
+  samples: new Float64Array([1, 2, 3, 4]),
+  grid: { dims: [3, 2], data: new Int16Array([1, 2, 3, 4, 5, 6]) },
+  askMe: (question: string) => device.caller!.call(device.root, "ask", question),
+  lamps: { left: { level: 1 }, right: { level: 2 } },
+  thing: () => {
+    device.emit("tapped", 1, 2);
+    return { rrType: "test.phone.Lamp", level: 7 };
+  },
+});
+let implementationLevel = 0;
+let ended = 0;
+
+const begin = (more: Partial<ServeOptions> = {}) =>
+  serve({
+    url: "ws://gateway/below",
+    name: "phone",
+    definition,
+    type: "test.phone.Phone",
+    object: implementation(),
+    ...more,
+  });
+
+beforeEach(async () => {
+  gateway = new FakeGateway();
+  device = await begin();
+});
+afterEach(() => device.close());
+
+const failure = (promise: Promise<unknown>) =>
+  promise.then(
+    () => expect.unreachable("it has not failed"),
+    (error: unknown) => error as RobotRaconteurError,
+  );
+
+it("asks the gateway for its name, below the gateway's path", () => {
+  expect(gateway.control.url).toBe("ws://gateway/below/serve/phone");
+  expect(gateway.control.protocols).toEqual(["rrgate.serve.v1"]);
+  expect(device.isServed).toBe(true);
+});
+
+it("answers clients by fields, accessors and functions", async () => {
+  const phone = await gateway.connect<Phone>();
+  await phone.note.set("hello");
+  expect(await phone.note.get()).toBe("hello");
+  await phone.level.set(4);
+  expect([await phone.level.get(), implementationLevel]).toEqual([4, 4]);
+  expect(await phone.add(1, 2)).toBe(3);
+  const lamp = await phone.lamps.get("left");
+  await lamp.level.set(9);
+  expect(await (await phone.lamps.get("left")).level.get()).toBe(9);
+  expect((await failure(phone.lamps.get("middle"))).code).toBe(ErrorCode.ObjectNotFound);
+  await phone.$.close();
+});
+
+it("hands on what was thrown, and what is wrong with an answer", async () => {
+  const phone = await gateway.connect<Phone>();
+  expect(await failure(phone.fail("protocol"))).toMatchObject({ code: ErrorCode.OutOfRange, message: "too far" });
+  expect(await failure(phone.fail("other"))).toMatchObject({ name: "TypeError", message: "a slip" });
+  const reported: unknown[] = [];
+  const report = vi.spyOn(console, "error").mockImplementation((error) => void reported.push(error));
+  expect((await failure(phone.broken.get())).message).toContain("broken");
+  report.mockRestore();
+  expect(reported).toHaveLength(1); // whoever wrote it sees it, too
+  await phone.$.close();
+});
+
+it("does nothing else while an object is looked for", async () => {
+  const phone = await gateway.connect<{ thing: { get(): Promise<unknown> } } & Phone>();
+  const error = await failure(phone.thing.get());
+  expect(error).toMatchObject({ code: ErrorCode.InvalidOperation });
+  expect(error.message).toContain("may not use members of the device");
+  expect(await phone.add(1, 2)).toBe(3);
+  await phone.$.close();
+});
+
+it("ends the generators of a client that goes", async () => {
+  ended = 0;
+  const phone = await gateway.connect<Phone>();
+  const generator = phone.count(5);
+  expect((await generator.next()).value).toBe(1);
+  await phone.$.close();
+  await vi.waitFor(() => expect(ended).toBe(1));
+});
+
+it("tells values of wires to those who come later, and errors to those who set what does not fit", async () => {
+  device.root.setWire("motion", [1, 2, 3]);
+  const phone = await gateway.connect<Phone>();
+  expect(Array.from(await phone.motion.peek())).toEqual([1, 2, 3]);
+  expect((await failure(phone.light.peekOut())).code).toBe(ErrorCode.ValueNotSet);
+  await phone.light.poke(0.5);
+  expect(await phone.light.peekOut()).toBe(0.5);
+  expect(() => device.root.setWire("motion", "fast")).toThrow(/motion/);
+  expect(() => device.root.setWire("tapped", 1)).toThrow(/no wire "tapped"/);
+  expect(() => device.emit("tapped", 1, "two")).toThrow(/y/);
+  await phone.$.close();
+});
+
+it("lets a sender of packets wait for the slowest client, and not for one that goes", async () => {
+  let socket: PageSocket | undefined;
+  const phone = await gateway.connect<{ frames: { connect(): Promise<{ close(): Promise<void> }> } }>(
+    (made) => (socket = made),
+  );
+  await phone.frames.connect();
+  const pipe = device.root.pipe("frames");
+  expect(pipe.endpoints.size).toBe(1);
+  await pipe.send(new Uint8Array(1000));
+  socket!.bufferedAmount = 10_000_000;
+  let isSent = false;
+  const sending = pipe.send(new Uint8Array(1000)).then(() => (isSent = true));
+  await new Promise((resolve) => setTimeout(resolve));
+  expect(isSent).toBe(false);
+  socket!.end(1006, "");
+  await sending;
+  expect(pipe.endpoints.size).toBe(0);
+});
+
+it("answers calls back and gives events to all", async () => {
+  const both = await Promise.all([gateway.connect<Phone>(), gateway.connect<Phone>()]);
+  const heard = both.map((phone) => new Promise((resolve) => phone.tapped.on((x, y) => resolve([x, y]))));
+  device.emit("tapped", 1, 2);
+  expect(await Promise.all(heard)).toEqual([
+    [1, 2],
+    [1, 2],
+  ]);
+  const [asking] = both as unknown as [{ ask: unknown; askMe(question: string): Promise<number> }];
+  (asking.ask as { handler: unknown }).handler = (question: string) => question.length;
+  expect(await asking.askMe("four")).toBe(4);
+  for (const phone of both) await phone.$.close();
+});
+
+it("comes back when the connection is lost, and not when it is closed", async () => {
+  const news: [boolean, string][] = [];
+  await device.close();
+  device = await begin({ onChange: (...change) => void news.push(change) });
+  const { nodeId } = device;
+  gateway.control.end(1001, "the gateway is stopping");
+  expect(device.isServed).toBe(false);
+  await vi.waitFor(() => expect(device.isServed).toBe(true));
+  expect(news).toEqual([
+    [true, ""],
+    [false, "the gateway is stopping"],
+    [true, ""],
+  ]);
+  expect(device.nodeId).toBe(nodeId);
+  const count = gateway.controls.length;
+  await device.close();
+  expect(gateway.control.isClosed).toBe(true);
+  expect(gateway.controls).toHaveLength(count);
+});
+
+it("rejects with what the gateway says", async () => {
+  gateway.answer = (control) => control.end(1008, "there is a device 'phone' already");
+  const error = await failure(begin());
+  expect(error).toMatchObject({ code: ErrorCode.ConnectionError });
+  expect(error.message).toContain("there is a device 'phone' already");
+  gateway.answer = () => undefined;
+  expect((await failure(begin({ timeout: 20 }))).code).toBe(ErrorCode.RequestTimeout);
+});
+
+it("rejects definitions that are wrong, and what is no object of them", async () => {
+  const wrong = await failure(begin({ definition: definition.replace("double level", "dubble level") }));
+  expect(wrong.code).toBe(ErrorCode.ServiceDefinitionError);
+  expect(wrong.message).toContain("dubble");
+  expect((await failure(begin({ type: "test.phone.Tablet" }))).code).toBe(ErrorCode.ServiceDefinitionError);
+  expect((await failure(begin({ nodeId: "me" }))).code).toBe(ErrorCode.InvalidArgument);
+});
+
+it("ends a client that talks garbage, and no other", async () => {
+  const phone = await gateway.connect<Phone>();
+  const noise = await gateway.open();
+  await new Promise((resolve) => setTimeout(resolve)); // the page listens
+  noise.tell(new TextEncoder().encode("RRACnonsense".repeat(9)).buffer);
+  expect(noise.isClosed).toBe(true);
+  expect(await phone.add(1, 2)).toBe(3);
+  await phone.$.close();
+});
+
+it("does what the documentation says", async () => {
+  await device.close();
+  const page = readFileSync(new URL("../../docs/serve.md", import.meta.url), "utf8");
+  const code = /```js\n(.*?)```/s
+    .exec(page)![1]!
+    .replace(/^import .*$/m, "")
+    .replace('url: "/"', 'url: "ws://gateway/"');
+  const handlers: Record<string, (event: object) => void> = {};
+  const listen = (name: string, handler: (event: object) => void) => void (handlers[name] = handler);
+  const document = { body: { style: { opacity: "1" } } };
+  const AsyncFunction = (async () => undefined).constructor as new (
+    ...text: string[]
+  ) => (...given: unknown[]) => Promise<ServedDevice>;
+  const example = new AsyncFunction("serve", "addEventListener", "document", `${code}; return device;`);
+  device = await example(serve, listen, document);
+  handlers["devicemotion"]!({ acceleration: { x: 1, y: 2, z: 3 } });
+
+  interface Example extends Omit<Phone, "motion" | "light" | "ask_me"> {
+    acceleration: Phone["motion"];
+    brightness: { poke(value: number): Promise<void> };
+    chat: { connect(): Promise<AsyncIterable<string> & { send(text: string): Promise<void> }> };
+    samples: { read(position: number, count: number): Promise<Float64Array> };
+  }
+  const phone = await gateway.connect<Example>();
+  expect(Array.from(await phone.acceleration.peek())).toEqual([1, 2, 3]);
+  await phone.brightness.poke(0.5);
+  expect(document.body.style.opacity).toBe("0.5");
+  const counted: number[] = [];
+  for await (const number of phone.count(3)) counted.push(number);
+  expect(counted).toEqual([1, 2, 3]);
+  const chat = await phone.chat.connect();
+  await chat.send("hello");
+  for await (const text of chat) {
+    expect(text).toBe("HELLO");
+    break;
+  }
+  expect(await phone.samples.read(98, 2)).toEqual(new Float64Array(2));
+  const tapped = new Promise((resolve) => phone.tapped.on((x, y) => resolve([x, y])));
+  handlers["pointerdown"]!({ clientX: 4, clientY: 5 });
+  expect(await tapped).toEqual([4, 5]);
+  expect(await (await phone.lamps.get("right")).level.get()).toBe(0);
+  await phone.$.close();
+});

@@ -1,0 +1,146 @@
+// The recordings that the gateway makes: beginning, stopping, getting and deleting them.
+// Layer: web/pages.
+
+import { useEffect, useState } from "preact/hooks";
+import { language, t } from "../app/language";
+import { useStore } from "../app/store";
+import { devicesOf } from "../gateway/devices";
+import type { DeviceList } from "../gateway/devices";
+import { fileAddress, isUnderWay } from "../gateway/recordings";
+import type { Recording, RecordingDesk } from "../gateway/recordings";
+import { isUsb } from "../gateway/usb_devices";
+import { Failure } from "../ui/failure";
+import { bytesText, sentence, span } from "../ui/words";
+
+export function RecordingsPage({ desk, list }: { desk: RecordingDesk; list: DeviceList }) {
+  const state = useStore(desk.state);
+  const trouble = useStore(desk.trouble);
+  useEffect(() => {
+    desk.start();
+    return () => desk.stop();
+  }, [desk]);
+  return (
+    <div class="page page-narrow">
+      <h1>{t("Recordings")}</h1>
+      {state && !state.enabled && <p>{t("This gateway records nothing: its configuration has no recordings.")}</p>}
+      {state?.enabled && (
+        <>
+          <BeginForm desk={desk} list={list} />
+          <p class="note">{t("{0} of {1} taken", bytesText(state.bytes), bytesText(state.maxBytes))}</p>
+          {state.list.length === 0 && <p>{t("There are no recordings yet.")}</p>}
+          <ul class="devices">
+            {state.list.map((each) => (
+              <RecordingRow key={each.name} recording={each} desk={desk} />
+            ))}
+          </ul>
+        </>
+      )}
+      <Failure text={trouble} />
+    </div>
+  );
+}
+
+function BeginForm({ desk, list }: { desk: RecordingDesk; list: DeviceList }) {
+  const devices = devicesOf(useStore(list.state)) ?? [];
+  const choices = devices
+    .filter(({ name }) => !isUsb(name))
+    .flatMap(({ name, services }) => services.map((service) => ({ device: name, service: service.name })));
+  const [chosen, setChosen] = useState("");
+  const choice = choices.find((each) => keyOf(each) === chosen) ?? choices[0];
+  return (
+    <form
+      class="row-line"
+      aria-label={t("New recording")}
+      onSubmit={(event) => {
+        event.preventDefault();
+        if (choice) void desk.begin(choice.device, choice.service);
+      }}
+    >
+      <label>
+        <span class="unseen">{t("Service to record")}</span>
+        <select
+          class="field"
+          value={choice ? keyOf(choice) : ""}
+          onChange={(event) => setChosen(event.currentTarget.value)}
+        >
+          {choices.map((each) => (
+            <option key={keyOf(each)} value={keyOf(each)}>
+              {each.device} · {each.service}
+            </option>
+          ))}
+        </select>
+      </label>
+      <button class="button" type="submit" disabled={!choice}>
+        {t("Record")}
+      </button>
+    </form>
+  );
+}
+
+function keyOf({ device, service }: { device: string; service: string }): string {
+  return `${device}/${service}`;
+}
+
+const STATES: Readonly<Record<string, string>> = {
+  recording: "is recording",
+  waiting: "waits for the device",
+  ended: "has ended",
+  failed: "has failed",
+};
+
+function RecordingRow({ recording, desk }: { recording: Recording; desk: RecordingDesk }) {
+  const { name, device, service, state, standing, problem, beginMs, seconds, bytes, files } = recording;
+  const [asks, setAsks] = useState(false);
+  return (
+    <li class="device" data-recording={name} data-state={state}>
+      <div class="device-head">
+        <h2 class="place-name">
+          {device} · {service}
+        </h2>
+        <span>{t(STATES[state] ?? state)}</span>
+      </div>
+      <dl class="device-facts">
+        <Fact name={t("Begun")} value={new Date(beginMs).toLocaleString(language)} />
+        <Fact name={t("Duration")} value={span(seconds * 1000)} />
+        <Fact name={t("Size")} value={bytesText(bytes)} />
+      </dl>
+      {problem !== "" && <p class="device-trouble">{sentence(problem)}</p>}
+      <div class="row-line">
+        {files.map((file, index) => (
+          <a key={file.name} class="button" href={fileAddress(file)} download={file.name}>
+            {files.length === 1 ? t("Download") : t("Download part {0}", index + 1)}
+          </a>
+        ))}
+        {isUnderWay(recording) && !standing && (
+          <button class="button" type="button" onClick={() => void desk.end(recording)}>
+            {t("Stop recording")}
+          </button>
+        )}
+        {!isUnderWay(recording) && !asks && (
+          <button class="button" type="button" onClick={() => setAsks(true)}>
+            {t("Delete")}
+          </button>
+        )}
+        {!isUnderWay(recording) && asks && (
+          <>
+            <button class="button" type="button" onClick={() => void desk.remove(recording)}>
+              {t("Delete it for good")}
+            </button>
+            <button class="button" type="button" onClick={() => setAsks(false)}>
+              {t("Keep it")}
+            </button>
+          </>
+        )}
+      </div>
+    </li>
+  );
+}
+
+function Fact({ name, value }: { name: string; value: string }) {
+  return (
+    <div>
+      <dt>{name}</dt>
+      <dd>{value}</dd>
+    </div>
+  );
+}
