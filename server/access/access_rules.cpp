@@ -9,8 +9,8 @@ namespace rrgate {
 
 namespace {
 
-constexpr std::string_view verb_names[] = {"read", "write", "call",    "subscribe", "lock",
-                                            "record", "serve", "metrics", "admin"};
+constexpr std::string_view verb_names[] = {"read",   "write", "call",    "subscribe", "lock",
+                                           "record", "serve", "metrics", "admin"};
 
 bool fits(const std::vector<std::string>& patterns, std::string_view text) {
   return patterns.empty() || std::any_of(patterns.begin(), patterns.end(),
