@@ -1,6 +1,6 @@
 #include "server/upstream/look_pace.hpp"
 
-#include <catch2/catch_test_macros.hpp>
+#include <catch2/catch.hpp>
 
 using rrgate::LookPace;
 using namespace std::chrono_literals;
