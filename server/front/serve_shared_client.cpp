@@ -42,14 +42,17 @@ constexpr std::chrono::milliseconds look_period{10};
 rr::awaitable<bool> wait_until_ready(GatewayState& gateway, const Destination& destination, const Identity& who,
                                      asio::any_io_executor executor) {
   const auto sees = [&](const Device& device) { return gateway.access().sees(who, device.config().name); };
-  if (!destination.device) gateway.shared().wake(sees);
   asio::steady_timer look(executor);
   const auto deadline = std::chrono::steady_clock::now() + gateway.config().timeouts.connect;
   for (;;) {
     auto& shared = gateway.shared();
     auto* device = destination.device ? shared.find(*destination.device) : nullptr;
     if (destination.device && !device) co_return false;
-    if (device && sees(*destination.device)) device->wake();
+    // Each time: services are first known when their device has answered.
+    if (!destination.device)
+      shared.wake(sees);
+    else if (sees(*destination.device))
+      device->wake();
     const bool is_ready = device ? device->is_ready() : shared.is_ready();
     if (is_ready || gateway.is_stopping() || std::chrono::steady_clock::now() >= deadline) co_return true;
     look.expires_after(look_period);

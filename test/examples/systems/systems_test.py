@@ -2,6 +2,7 @@
 
 systems_test.py BUILD_DIR
 """
+import base64
 import json
 import os
 import pty
@@ -14,6 +15,7 @@ import threading
 import time
 import tty
 import unittest
+from pathlib import Path
 
 BUILD = sys.argv.pop(1)
 RRGATE = os.path.join(BUILD, "server", "rrgate")
@@ -147,15 +149,15 @@ class Microassembly(unittest.TestCase):
         return sum(self.picture(microscope))
 
     def picture(self, microscope=0):
-        return get(self.cameras, f"microscopes/{microscope}/picture")["data"]
+        return base64.b64decode(get(self.cameras, f"microscopes/{microscope}/picture")["data"])
 
     def processes(self):
         """The nodes' command lines by their parts."""
         found = {}
         for pid in filter(str.isdigit, os.listdir("/proc")):
             try:
-                words = open(f"/proc/{pid}/cmdline").read().split("\0")[:-1]
-                parent = int(open(f"/proc/{pid}/stat").read().rsplit(")", 1)[1].split()[1])
+                words = Path(f"/proc/{pid}/cmdline").read_text().split("\0")[:-1]
+                parent = int(Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[1])
             except OSError:
                 continue  # it has ended
             if parent == self.gateway.process.pid:

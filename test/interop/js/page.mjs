@@ -152,7 +152,7 @@ const interop = {
 /** Properties that only store. */
 for (const [, type, name] of definition.matchAll(/^ {4}property (\S+) (p_\w+)$/gm)) {
   const isNumber = /^u?int\d+$|^double$|^single$/.test(type);
-  interop[name] = isNumber ? (type.endsWith("64") ? 0n : 0) : { bool: false, string: "", Color: 1 }[type] ?? null;
+  interop[name] = isNumber ? (type.endsWith("64") ? 0n : 0) : ({ bool: false, string: "", Color: 1 }[type] ?? null);
   if (/^c(double|single)$/.test(type)) interop[name] = { re: 0, im: 0 };
 }
 
