@@ -156,12 +156,14 @@ rr::awaitable<void> serve_page(GatewayState& gateway, Connection& connection, st
     return !device || (device->is_wanted() && standing->is_good() &&
                        gateway.access().state().rules.check(standing->identity(), wanted).has_value());
   };
-  auto take = [socket](const std::string&) -> rr::awaitable<void> {
+  // g++ 12 destroys functions twice where they are made within an expression that waits.
+  std::function<rr::awaitable<void>(const std::string&)> take = [socket](const std::string&) -> rr::awaitable<void> {
     socket->stop({1008, "a page has nothing to say here"});
     co_return;
   };
   // The device is gone as soon as its page is, not once the socket is closed.
-  const auto reason = co_await socket->run(take, [&device] { device.reset(); });
+  std::function<void()> stopped = [&device] { device.reset(); };
+  const auto reason = co_await socket->run(std::move(take), std::move(stopped));
   device.reset();
   connection.is_good = nullptr;
   connection.stop = [](const rr::EndReason&) {};

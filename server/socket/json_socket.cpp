@@ -53,9 +53,12 @@ rr::awaitable<void> serve_json_socket(GatewayState& gateway, Connection& connect
   };
   log(LogLevel::info, "client connected", {{"device", device}, {"peer", connection.client}, {"as", "json"}});
 
-  const auto reason =
-      co_await socket->run([operations](const std::string& message) { return operations->take(message); },
-                           [operations] { operations->stop(); });
+  // g++ 12 destroys functions twice where they are made within an expression that waits.
+  std::function<rr::awaitable<void>(const std::string&)> take = [operations](const std::string& message) {
+    return operations->take(message);
+  };
+  std::function<void()> stopped = [operations] { operations->stop(); };
+  const auto reason = co_await socket->run(std::move(take), std::move(stopped));
 
   connection.device = nullptr;
   connection.is_good = nullptr;
