@@ -43,7 +43,11 @@ test("a page is a device with camera, motion and touch, and no more when it is c
   await expect(page.locator("output")).toHaveText('device "phone"');
   await expect.poll(devices).toMatchObject([{ name: "phone", state: "online", served: true }]);
 
-  const written = await fetch(member("text"), { method: "PUT", body: JSON.stringify("hello") });
+  const written = await fetch(member("text"), {
+    method: "PUT",
+    headers: { "Content-Type": "application/json" },
+    body: JSON.stringify("hello"),
+  });
   expect(written.status).toBe(204);
   await expect(page.locator("q")).toHaveText("hello");
 
@@ -58,8 +62,10 @@ test("a page is a device with camera, motion and touch, and no more when it is c
   const stop = new AbortController();
   const pictures = await fetch(`${member("frames")}?as=mjpeg`, { signal: stop.signal });
   expect(pictures.headers.get("content-type")).toContain("multipart/x-mixed-replace");
-  const { value } = await pictures.body!.getReader().read();
-  expect(Buffer.from(value!).toString("latin1")).toContain("Content-Type: image/jpeg");
+  const reader = pictures.body!.getReader();
+  let head = "";
+  while (!head.includes("\r\n\r\n")) head += Buffer.from((await reader.read()).value!).toString("latin1");
+  expect(head).toContain("Content-Type: image/jpeg");
   stop.abort();
 
   // What touches it.

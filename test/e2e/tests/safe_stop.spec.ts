@@ -21,10 +21,7 @@ for (const view of ["members", "board"]) {
   test(`Stop, and Escape, let the gateway make the device safe: ${view}`, async ({ page }) => {
     await page.goto(`${lab.url}#/devices/big/interop?view=${view}`);
     await expect(page.locator('[data-stop="ready"]')).toContainText("interop.p_double");
-    for (const stop of [
-      () => page.getByRole("button", { name: "Stop", exact: true }).click(),
-      () => page.keyboard.press("Escape"),
-    ]) {
+    for (const stop of [() => page.locator("button.stop-button").click(), () => page.keyboard.press("Escape")]) {
       await put(page);
       await stop();
       await expect.poll(() => read(page)).toBe(0);
@@ -40,6 +37,6 @@ test("Stop says why the device may not be safe", async ({ page }) => {
   await page.route("**/interop?lease=take*", (route) =>
     route.fulfill({ status: 403, json: { detail: "not for you" } }),
   );
-  await page.getByRole("button", { name: "Stop", exact: true }).click();
+  await page.locator("button.stop-button").click();
   await expect(page.locator('[data-stop="failed"]')).toHaveText("NOT STOPPED: not for you");
 });
