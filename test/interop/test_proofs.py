@@ -180,6 +180,7 @@ def test_a_certificate_that_expires_ends_what_goes_on_by_it(device, tmp_path):
         assert ends(stream.connection.sock or stream.response.fp.raw._sock) < 6
         kept.request("GET", BASE + "/p_double")
         assert kept.getresponse().status in (401, 403)
+        gateway.wait_for("client ended: what it has shown was revoked or has expired")
         assert len(gateway.events("client ended: what it has shown was revoked or has expired")) == 1  # the other goes on
         stream.close()
         lasting.close()
@@ -245,6 +246,7 @@ def test_a_certificate_that_is_revoked_ends_what_goes_on_by_it(device, tmp_path)
         assert status(kept)[0] in (401, 403)
         assert upgrade_status(gateway.port, BASE + "?ticket=" + ticket, {"Sec-WebSocket-Protocol": "rrgate.json.v1"}) in (401, 403)
         assert status(others)[0] == 200
+        gateway.wait_for("client ended: what it has shown was revoked or has expired", 2)
         assert len(gateway.events("client ended: what it has shown was revoked or has expired")) == 2
         for each in (stream, lasting, kept, others, page):
             each.close()
@@ -265,6 +267,7 @@ def test_a_ca_that_is_revoked_ends_what_goes_on_by_its_certificates(device, tmp_
         lasting, ended = stream(people.certificate("vera")), stream(room.certificate("alice"))
         people.revoke(room.ca)
         ends(ended.connection.sock or ended.response.fp.raw._sock)
+        gateway.wait_for("client ended: what it has shown was revoked or has expired")
         assert len(gateway.events("client ended: what it has shown was revoked or has expired")) == 1
         ended.close()
         lasting.close()
