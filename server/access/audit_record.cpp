@@ -1,10 +1,9 @@
 #include "server/access/audit_record.hpp"
 
 #include <algorithm>
-#include <array>
 #include <charconv>
-#include <ctime>
 
+#include "core/support/time.hpp"
 #include "node/tls/digest.hpp"
 #include "server/json/json.hpp"
 
@@ -44,15 +43,7 @@ std::string_view to_string(Outcome outcome) {
 }
 
 std::string format_audit_time(std::chrono::system_clock::time_point now) {
-  const auto seconds = std::chrono::floor<std::chrono::seconds>(now);
-  const auto time = std::chrono::system_clock::to_time_t(seconds);
-  std::tm parts{};
-  ::gmtime_r(&time, &parts);
-  std::array<char, 32> text{};
-  const auto size = std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%S", &parts);
-  const auto fraction = std::chrono::duration_cast<std::chrono::milliseconds>(now - seconds).count();
-  const auto digits = std::to_string(fraction);
-  return std::string(text.data(), size) + "." + std::string(3 - digits.size(), '0') + digits + "Z";
+  return rr::format_utc(rr::to_time_spec(now), 3);
 }
 
 std::string format_audit_event(const AuditEvent& event, std::chrono::system_clock::time_point now) {

@@ -6,6 +6,8 @@
 #include <iostream>
 #include <optional>
 
+#include "core/support/time.hpp"
+#include "node/driver/clocks.hpp"
 #include "server/cli/csv.hpp"
 #include "server/cli/remote_service.hpp"
 #include "server/json/arguments.hpp"
@@ -24,24 +26,16 @@ void interrupt(int) {
 
 enum class WatchForm : std::uint8_t { text, json, csv };
 
-std::string time_text(rr::TimeSpec time, bool is_short) {
+/// "15:00:00.000", by the clock on the wall.
+std::string local_time(rr::TimeSpec time) {
   const auto seconds = static_cast<std::time_t>(time.seconds);
   std::tm parts{};
-  if (is_short)
-    ::localtime_r(&seconds, &parts);
-  else
-    ::gmtime_r(&seconds, &parts);
+  ::localtime_r(&seconds, &parts);
   char text[40];
-  const auto size = std::strftime(text, sizeof(text), is_short ? "%H:%M:%S" : "%Y-%m-%dT%H:%M:%S", &parts);
+  const auto size = std::strftime(text, sizeof(text), "%H:%M:%S", &parts);
   char fraction[8];
   std::snprintf(fraction, sizeof(fraction), ".%03d", static_cast<int>(time.nanoseconds / 1'000'000));
-  return std::string(text, size) + fraction + (is_short ? "" : "Z");
-}
-
-rr::TimeSpec time_now() {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(now);
-  return {seconds.count(), static_cast<std::int32_t>(std::chrono::nanoseconds(now - seconds).count())};
+  return std::string(text, size) + fraction;
 }
 
 /// In s; negative where the device's clock is ahead of this machine's.
@@ -63,18 +57,18 @@ class ValuePrinter {
   void print(const rr::OrderedJson& value, std::optional<rr::TimeSpec> sent = std::nullopt) {
     if (is_done()) return;
     ++count_;
-    const auto now = time_now();
+    const auto now = rr::read_clocks().utc;
     if (form_ == WatchForm::csv) return print_csv(value, now, sent);
     if (form_ == WatchForm::text) {
-      std::cout << time_text(now, true);
-      if (sent) std::cout << "  sent " << time_text(*sent, true) << ", age " << age_text(age_of(*sent, now)) << " s";
+      std::cout << local_time(now);
+      if (sent) std::cout << "  sent " << local_time(*sent) << ", age " << age_text(age_of(*sent, now)) << " s";
       std::cout << "  " << text_for_output(rr::write_json(value)) << std::endl;
       return;
     }
     auto line = rr::OrderedJson::object();
-    line["time"] = time_text(now, false);
+    line["time"] = rr::format_utc(now, 3);
     if (sent) {
-      line["device_time"] = time_text(*sent, false);
+      line["device_time"] = rr::format_utc(*sent, 3);
       line["age"] = std::round(age_of(*sent, now) * 1e6) / 1e6;
     }
     line["value"] = value;
@@ -95,8 +89,8 @@ class ValuePrinter {
       }
       std::cout << "\n";
     }
-    std::cout << time_text(now, false);
-    if (sent) std::cout << "," << time_text(*sent, false) << "," << age_text(age_of(*sent, now));
+    std::cout << rr::format_utc(now, 3);
+    if (sent) std::cout << "," << rr::format_utc(*sent, 3) << "," << age_text(age_of(*sent, now));
     for (const auto& column : columns_) {
       const auto cell = cells.find(column);
       std::cout << "," << (cell == cells.end() ? "" : csv_cell(*cell));

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <ctime>
 
 #include "core/support/node_id.hpp"
+#include "core/support/time.hpp"
 
 namespace rrgate {
 
@@ -202,14 +202,8 @@ rr::Result<rr::Json> Recording::read_document(const McapMessage& message) const 
 }
 
 std::string mcap_time_text(McapTime time) {
-  const auto seconds = static_cast<std::time_t>(time / 1'000'000'000u);
-  std::tm parts{};
-  ::gmtime_r(&seconds, &parts);
-  char text[40];
-  const auto size = std::strftime(text, sizeof(text), "%Y-%m-%dT%H:%M:%S", &parts);
-  char fraction[16];
-  std::snprintf(fraction, sizeof(fraction), ".%09dZ", static_cast<int>(time % 1'000'000'000u));
-  return std::string(text, size) + fraction;
+  constexpr McapTime second = 1'000'000'000;
+  return rr::format_utc({static_cast<std::int64_t>(time / second), static_cast<std::int32_t>(time % second)}, 9);
 }
 
 }  // namespace rrgate

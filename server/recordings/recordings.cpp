@@ -4,6 +4,7 @@
 #include <boost/asio/post.hpp>
 #include <filesystem>
 
+#include "core/support/time.hpp"
 #include "server/config/version.hpp"
 #include "server/log/log.hpp"
 
@@ -23,15 +24,8 @@ constexpr std::size_t most_ended = 100;  ///< recordings that are remembered wit
 
 /// "20261125T083000123Z"
 std::string name_of_time(SystemClock::time_point time) {
-  const auto ms = std::chrono::time_point_cast<std::chrono::milliseconds>(time);
-  const auto day = std::chrono::floor<std::chrono::days>(ms);
-  const std::chrono::year_month_day date(day);
-  const std::chrono::hh_mm_ss clock(ms - day);
-  char text[32];
-  std::snprintf(text, sizeof(text), "%04d%02u%02uT%02d%02d%02d%03dZ", static_cast<int>(date.year()),
-                static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()),
-                static_cast<int>(clock.hours().count()), static_cast<int>(clock.minutes().count()),
-                static_cast<int>(clock.seconds().count()), static_cast<int>(clock.subseconds().count()));
+  auto text = rr::format_utc(rr::to_time_spec(time), 3);
+  std::erase_if(text, [](char c) { return c == '-' || c == ':' || c == '.'; });
   return text;
 }
 
