@@ -6,6 +6,10 @@
 #include <array>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/this_coro.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <chrono>
 #include <future>
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -90,6 +94,17 @@ Config config_for(const McpOptions& options) {
   return std::move(read.config);
 }
 
+/// What an agent asks first waits until it is known whether the device is there.
+rr::awaitable<void> wait_for_look(Gateway& gateway, std::chrono::milliseconds longest) {
+  asio::steady_timer again(co_await asio::this_coro::executor);
+  const auto deadline = std::chrono::steady_clock::now() + longest;
+  while (gateway.devices().all().front()->state() == DeviceState::connecting &&
+         std::chrono::steady_clock::now() < deadline) {
+    again.expires_after(std::chrono::milliseconds(20));
+    co_await again.async_wait(asio::use_awaitable);
+  }
+}
+
 /// Hands each line of standard input to the loop's thread, and waits until it is taken: the client waits too then.
 void read_lines(asio::io_context& io, McpBridge& bridge) {
   const auto on_loop = [&io](const std::function<void()>& work) {
@@ -143,7 +158,10 @@ int run_mcp(const McpOptions& options) {
     Gateway gateway(io, std::move(config));
     if (const auto started = gateway.start(); !started) throw rr::ClientException(started.error());
     McpServer server;
-    server.connect = [&gateway]() -> rr::awaitable<Connected> { co_return gateway.connect_inside(); };
+    server.connect = [&gateway, longest = gateway.config().timeouts.connect]() -> rr::awaitable<Connected> {
+      co_await wait_for_look(gateway, longest);
+      co_return gateway.connect_inside();
+    };
     server.authority = "localhost";
     serve_lines(io, std::move(server), [&gateway] {
       gateway.stop([] {});
