@@ -10,7 +10,6 @@
 #include "server/http/endpoints/refusal.hpp"
 #include "server/mcp/mcp_describe.hpp"
 #include "server/mcp/mcp_tools.hpp"
-#include "server/state/agent_requests.hpp"
 
 namespace rrgate {
 
@@ -271,7 +270,7 @@ rr::awaitable<void> answer_message(GatewayState& gateway, ResponseWriter& writer
     message = read_message(writer.request());
     take_revision(message, writer.request());
     const auto session = session_of(writer.request());
-    auto& requests = AgentRequests::of(writer.executor());
+    auto& requests = gateway.agent_requests();
     if (message.id.is_null()) {
       if (message.method == "notifications/cancelled") cancel(requests, message, session);
       Response accepted;
@@ -322,9 +321,8 @@ rr::awaitable<void> answer_mcp(GatewayState& gateway, ResponseWriter& writer) {
   co_await answer_message(gateway, writer, message);
 }
 
-rr::awaitable<void> end_session(ResponseWriter& writer) {
-  if (const auto session = session_of(writer.request()); !session.empty())
-    AgentRequests::of(writer.executor()).cancel_all(session);
+rr::awaitable<void> end_session(GatewayState& gateway, ResponseWriter& writer) {
+  if (const auto session = session_of(writer.request()); !session.empty()) gateway.agent_requests().cancel_all(session);
   Response response;
   response.status = 204;
   co_await writer.send(response);
@@ -340,10 +338,10 @@ Handler mcp_endpoint(GatewayState& gateway) {
   };
 }
 
-Handler end_mcp_endpoint() {
-  return [](const Request&, std::string_view) {
+Handler end_mcp_endpoint(GatewayState& gateway) {
+  return [&gateway](const Request&, std::string_view) {
     Response response;
-    response.answer_later = end_session;
+    response.answer_later = [&gateway](ResponseWriter& writer) { return end_session(gateway, writer); };
     return response;
   };
 }

@@ -14,7 +14,7 @@ class GatewayState;
 /// Answers one message of a client. Nothing is kept between two of them.
 Handler mcp_endpoint(GatewayState& gateway);
 /// The client's session is over: what it still waits for is cancelled.
-Handler end_mcp_endpoint();
+Handler end_mcp_endpoint(GatewayState& gateway);
 /// Which issuer's tokens clients show at mcp_path, where one is configured. Source: RFC 9728.
 Handler mcp_metadata_endpoint(GatewayState& gateway);
 /// 405: the gateway sends nothing that no request has asked for.

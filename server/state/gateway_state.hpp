@@ -18,6 +18,7 @@
 #include "server/log/metrics.hpp"
 #include "server/rr/shared_devices.hpp"
 #include "server/state/admission.hpp"
+#include "server/state/agent_requests.hpp"
 #include "server/state/connection.hpp"
 #include "server/state/handshake_turns.hpp"
 #include "server/state/http_access.hpp"
@@ -73,6 +74,8 @@ class GatewayState {
   Access& access() { return access_; }
   /// What agents ask a person for.
   Approvals& approvals() { return approvals_; }
+  /// What agents wait for.
+  AgentRequests& agent_requests() { return agent_requests_; }
   /// Who is judged for what he logs in as.
   Logins& logins() { return logins_; }
   /// How clients of HTTP show who they are, and how much they may ask for.
@@ -98,6 +101,7 @@ class GatewayState {
   MemoryBudget memory_;
   Access access_;
   Approvals approvals_;
+  AgentRequests agent_requests_;
   Logins logins_;
   IssuerKeys issuer_keys_;
   HttpAccess http_access_;

@@ -267,6 +267,16 @@ def test_every_agent_may_stop_past_leases(lab):
     assert "declares no" in made.refusal(nothing)
 
 
+def test_an_agent_is_told_what_it_may_and_on_which_terms(lab):
+    made = lab({"roles": ["agent"], "members": ["speed"], "may": ["read", "write"],
+                "agent": {"limits": {"speed": [0, 1]}, "lease": False}})
+    described = call(made.port, "describe", made.agent, device="interop", path="plain/speed")
+    assert not described.is_error, described.structured_content
+    (speed,) = described.structured_content["members"]
+    assert speed["may"] == ["read", "write"]
+    assert speed["terms"] == {"limits": {"speed": [0, 1]}, "approval": "ask", "lease": False}
+
+
 def test_agents_write_to_nothing_but_properties_and_call_no_generators(lab):
     made = lab({"roles": ["agent"], "may": ["write", "call"], "agent": {"approval": "none"}})
     for tool, path, more in (("set", "target", {"value": 1}), ("set", "move", {"value": 1}), ("call", "speed", {"args": {}}),
