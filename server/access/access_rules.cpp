@@ -66,8 +66,8 @@ std::string describe(const Identity& who) {
 }
 
 std::string describe(const AccessRequest& what) {
-  if (!is_device_verb(what.verb) && what.verb != Verb::serve)
-    return what.verb == Verb::metrics ? "read the gateway's metrics" : "manage the gateway";
+  if (what.verb == Verb::metrics) return "read the gateway's metrics";
+  if (what.verb == Verb::admin) return "manage the gateway";
   std::string out(to_string(what.verb));
   if (!what.member.empty()) out += " " + rr::quote(what.member) + " of";
   const auto path = what.path.empty() ? what.service : what.path;

@@ -98,6 +98,8 @@ class JsonOperations : public std::enable_shared_from_this<JsonOperations> {
 
   /// Takes the request's id for what it opens. Throws   rr::Exception: no id, one that is in use, too many.
   std::string reserve(const JsonRequest& request);
+  /// Keeps what a reserved id has opened. Throws   rr::Exception: it could not be opened; the id is free again.
+  void keep(const std::string& id, rr::Result<ValueClient::ListenerPtr> listener, const Target& target);
   Generator& generator_of(const JsonRequest& request);
   rr::awaitable<rr::OrderedJson> end_generator(JsonRequestPtr request, rr::CallKind how);
 

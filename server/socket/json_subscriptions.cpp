@@ -67,13 +67,17 @@ rr::awaitable<rr::OrderedJson> JsonOperations::subscribe(JsonRequestPtr request,
   auto place = target->place();
   const auto from = after ? after->get<std::uint64_t>() : 0;
   auto listening = co_await target->client->listen(std::move(place), from, std::move(handler));
-  if (!listening || is_stopped_ || !open_.contains(id)) {
-    open_.erase(id);
-    value_or_throw(std::move(listening));
-    co_return nullptr;
-  }
-  open_[id] = Subscription{std::move(*listening), target->path(), member.name};
+  keep(id, std::move(listening), *target);
   co_return nullptr;
+}
+
+void JsonOperations::keep(const std::string& id, rr::Result<ValueClient::ListenerPtr> listener, const Target& target) {
+  if (listener && !is_stopped_ && open_.contains(id)) {
+    open_[id] = Subscription{std::move(*listener), target.path(), target.member->name};
+    return;
+  }
+  open_.erase(id);
+  value_or_throw(std::move(listener));
 }
 
 rr::awaitable<rr::OrderedJson> JsonOperations::unsubscribe(JsonRequestPtr request, TargetPtr) {
@@ -134,7 +138,7 @@ void JsonOperations::review() {
 // --- the device asks ---
 
 rr::awaitable<rr::OrderedJson> JsonOperations::callback(JsonRequestPtr request, TargetPtr target) {
-  const auto& member = expect_member(*target, "callback", {rr::MemberKind::callback});
+  expect_member(*target, "callback", {rr::MemberKind::callback});
   const auto id = reserve(*request);
   const auto asked = std::make_shared<Target>(*target);
   asked->client.reset();
@@ -146,12 +150,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::callback(JsonRequestPtr request, 
       reply(client_gone());
   };
   auto answering = target->client->answer_callback(target->place(), std::move(handler));
-  if (!answering || is_stopped_ || !open_.contains(id)) {
-    open_.erase(id);
-    value_or_throw(std::move(answering));
-    co_return nullptr;
-  }
-  open_[id] = Subscription{std::move(*answering), target->path(), member.name};
+  keep(id, std::move(answering), *target);
   co_return nullptr;
 }
 
