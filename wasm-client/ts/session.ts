@@ -9,22 +9,12 @@ import {
   textOf,
 } from "./errors.js";
 import type { ErrorFields } from "./errors.js";
+import { lookTimer, roomMark, transmitMark } from "./outflow.js";
+import type { LookTimer } from "./outflow.js";
 import type { Transport } from "./transport.js";
 import type { CallOptions, RrValue } from "./types.js";
 import type { Core, CoreEvent } from "./wasm_module.js";
 import { checkSignal } from "./within.js";
-
-/**
- * Above this many bytes in the transport, the core keeps what it has: there newer wire values replace older ones, and
- * urgent requests go ahead. One more frame may be on top of it. With the time below, Chromium sends 28 MB/s by it; with
- * 32 KiB it is 15.
- */
-const transmitMark = 64 * 1024;
-/** While this many bytes wait for the network, in the transport and in the core, so do senders that ask for room. */
-const roomMark = 256 * 1024;
-/** WebSockets do not say when they have room again. */
-const drainPollMs = 4;
-const longestTimerMs = 2 ** 31 - 1;
 
 interface Pending {
   resolve(value: RrValue): void;
@@ -52,8 +42,7 @@ export class Session {
   #isUrgent = false;
   /** What time commands of an object have, where a lease says so. */
   timeoutAt?: ((path: string) => number | undefined) | undefined;
-  #timer: ReturnType<typeof setTimeout> | undefined;
-  #timerAt = Infinity;
+  readonly #timer: LookTimer;
   readonly #pending = new Map<number, Pending>();
   /** Those that wait for room. */
   #senders: { resolve(): void; reject(reason: unknown): void }[] = [];
@@ -75,6 +64,14 @@ export class Session {
     this.#connected = new Promise((resolve, reject) => (this.#settleConnected = { resolve, reject }));
     this.#connected.catch(() => undefined); // whoever waits for it hears of it
     this.#closed = new Promise((resolve) => (this.#settleClosed = resolve));
+    this.#timer = lookTimer(
+      transport,
+      () => core.pollTimeout(),
+      () => {
+        this.#guarded(() => core.handleTimeout());
+        this.#pump();
+      },
+    );
   }
 
   /** Begins the handshake. Resolves with the root object's type. */
@@ -231,7 +228,7 @@ export class Session {
     if (this.#isClosed) return;
     this.#end ??= { reason, isLocal: false };
     this.#isClosed = true;
-    clearTimeout(this.#timer);
+    this.#timer.stop();
     this.#rejectPending(this.#end.reason);
     this.transport.close();
     const closers = [...this.#closers];
@@ -265,7 +262,7 @@ export class Session {
     this.#isPumping = false;
     if (this.#isClosed) return;
     if (this.#senders.length > 0 && this.#hasRoom()) for (const { resolve } of this.#senders.splice(0)) resolve();
-    this.#armTimer();
+    this.#timer.arm();
   }
 
   #hasRoom(): boolean {
@@ -359,22 +356,6 @@ export class Session {
     const listeners = this.#listeners.get(`${path} ${member}`);
     if (!listeners) return;
     for (const listener of [...listeners]) callSafely(() => what(listener));
-  }
-
-  #armTimer(): void {
-    const isHeldBack = this.transport.buffered >= transmitMark;
-    const due = isHeldBack ? performance.now() + drainPollMs : this.core.pollTimeout();
-    if (due >= this.#timerAt) return; // the running timer looks again when it fires
-    clearTimeout(this.#timer);
-    this.#timerAt = due;
-    // Rounded up: a timer that fires early would only be set anew.
-    const delay = Math.min(Math.max(Math.ceil(due - performance.now()), 0), longestTimerMs);
-    this.#timer = setTimeout(() => {
-      this.#timerAt = Infinity;
-      if (this.#isClosed) return;
-      this.#guarded(() => this.core.handleTimeout());
-      this.#pump();
-    }, delay);
   }
 
   /** An exception here is a trap in the core (memory at its end) or a broken transport: the session is over. */

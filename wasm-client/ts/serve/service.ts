@@ -1,6 +1,8 @@
 // The service of a page that is a device, and its clients: bytes in and out, timers, and who answers what. Layer:
 // wasm-client/ts.
 import { callSafely, makeError, report, RobotRaconteurError, textOf } from "../errors.js";
+import { lookTimer, roomMark, transmitMark } from "../outflow.js";
+import type { LookTimer } from "../outflow.js";
 import type { Transport } from "../transport.js";
 import type { MemberInfo, RrValue } from "../types.js";
 import { Answers, childOf, takeOutValue } from "./answers.js";
@@ -8,12 +10,6 @@ import { Caller, ServedEndpoint, ServedObject } from "./served_object.js";
 import type { Implementation, ServiceOfObject } from "./served_object.js";
 import { ServiceCore } from "./service_module.js";
 import type { ServiceCall, ServiceEvent, ServiceOptions } from "./service_module.js";
-
-/** As in session.ts. */
-const transmitMark = 64 * 1024;
-const roomMark = 256 * 1024;
-const drainPollMs = 4;
-const longestTimerMs = 2 ** 31 - 1;
 
 export class Service implements ServiceOfObject {
   #core!: ServiceCore;
@@ -163,8 +159,7 @@ class ServedClient {
   readonly number: number;
   #isOver = false;
   #isPumping = false;
-  #timer: ReturnType<typeof setTimeout> | undefined;
-  #timerAt = Infinity;
+  readonly #timer: LookTimer;
   readonly #answers = new Answers();
   readonly #pipes = new Map<number, ServedEndpoint>();
   readonly #callbacks = new Map<number, Pending>();
@@ -177,6 +172,14 @@ class ServedClient {
     url: string,
   ) {
     this.number = core.open(url);
+    this.#timer = lookTimer(
+      transport,
+      () => core.pollTimeout(this.number),
+      () => {
+        this.#guarded(() => core.handleTimeout(this.number));
+        this.pump();
+      },
+    );
   }
 
   received(bytes: Uint8Array): void {
@@ -222,7 +225,7 @@ class ServedClient {
     if (!this.#isOver && this.core.wantsClose(this.number)) this.#finish();
     if (this.#isOver) return;
     if (this.#hasRoom()) for (const resolve of this.#senders.splice(0)) resolve();
-    this.#armTimer();
+    this.#timer.arm();
   }
 
   #hasRoom(): boolean {
@@ -310,25 +313,10 @@ class ServedClient {
     }
   }
 
-  #armTimer(): void {
-    const isHeldBack = this.transport.buffered >= transmitMark;
-    const due = isHeldBack ? performance.now() + drainPollMs : this.core.pollTimeout(this.number);
-    if (due >= this.#timerAt) return; // the running timer looks again when it fires
-    clearTimeout(this.#timer);
-    this.#timerAt = due;
-    const delay = Math.min(Math.max(Math.ceil(due - performance.now()), 0), longestTimerMs);
-    this.#timer = setTimeout(() => {
-      this.#timerAt = Infinity;
-      if (this.#isOver) return;
-      this.#guarded(() => this.core.handleTimeout(this.number));
-      this.pump();
-    }, delay);
-  }
-
   #finish(): void {
     if (this.#isOver) return;
     this.#isOver = true;
-    clearTimeout(this.#timer);
+    this.#timer.stop();
     this.transport.close();
     this.#answers.endAll();
     for (const pipe of this.#pipes.values()) pipe.closed();
