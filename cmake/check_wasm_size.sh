@@ -1,9 +1,8 @@
 #!/usr/bin/env bash
 # Adds up what a page has to load of a built client package (.wasm and .js, after brotli) and holds it to the budgets:
-# one for what every page loads, one for usb/, which a page loads when it speaks to a USB device, one for lease/, which
-# it loads when it takes a lease, one for serve/, which it loads when it is a device, one for losses/, which it loads when it asks what was lost, one for definition/, which
-# it loads when it asks for a definition, one for services/, which it loads when it looks for services, and one for what
-# it has of a framework.
+# one for what every page loads, and one each for what it loads when it wants it: usb/ for a USB device, lease/ for a lease,
+# serve/ to be a device, losses/ to ask what was lost, definition/ for a definition, services/ to look for services, and
+# what it has of a framework.
 # Usage: check_wasm_size.sh DIRECTORY [LIMIT_KB [USB_LIMIT_KB]]
 set -euo pipefail
 

@@ -11,7 +11,7 @@ import tempfile
 import time
 
 from load import PROGRAMS, cpu_seconds, resident_bytes, running
-from rows import Row, report
+from rows import Row, publish
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "interop"))
 
@@ -97,12 +97,7 @@ def main():
     parser.add_argument("--devices", type=int, default=5000)
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
-        rows = list(measure(pathlib.Path(scratch), arguments.devices))
-    text = report("fleet", rows)
-    arguments.report.parent.mkdir(parents=True, exist_ok=True)
-    arguments.report.write_text("# Fleet\n\n" + text, encoding="utf-8")
-    print(text)
-    return 0 if all(row.is_met for row in rows) else 1
+        return publish(arguments.report, "Fleet", "fleet", measure(pathlib.Path(scratch), arguments.devices))
 
 
 if __name__ == "__main__":

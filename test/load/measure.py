@@ -14,7 +14,7 @@ import time
 import costs
 import crowds
 from load import Clients, Device, Gateway, running
-from rows import Row, report
+from rows import Row, publish
 
 SECONDS = 10
 OLDEST_MS = 50  # what is promised of a value that a thousand clients follow, at the 99th percentile
@@ -109,12 +109,8 @@ def main():
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"all, or some of: {' '.join(PARTS)}")
     arguments = parser.parse_args()
     mode = {} if arguments.mode == "relay" else {"mode": arguments.mode}
-    rows = list(measure(mode, arguments.clients, arguments.parts or PARTS))
-    text = report(f"load, mode {arguments.mode}", rows)
-    arguments.report.parent.mkdir(parents=True, exist_ok=True)
-    arguments.report.write_text("# Load\n\n" + text, encoding="utf-8")
-    print(text)
-    return 0 if all(row.is_met for row in rows) else 1
+    rows = measure(mode, arguments.clients, arguments.parts or PARTS)
+    return publish(arguments.report, "Load", f"load, mode {arguments.mode}", rows)
 
 
 if __name__ == "__main__":

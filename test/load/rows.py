@@ -35,3 +35,13 @@ def report(title, rows):
     aims = sum(row.limit is not None or row.promise is not None for row in rows)
     lines += ["", f"{aims - missed} aims met, {missed} missed; {platform.machine()}, {platform.processor() or 'processor unknown'}"]
     return "\n".join(lines) + "\n"
+
+
+def publish(path, title, heading, rows):
+    """Writes the report and prints it. Returns the exit status: 1 where an aim is missed."""
+    rows = list(rows)
+    text = report(heading, rows)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(f"# {title}\n\n{text}", encoding="utf-8")
+    print(text)
+    return 0 if all(row.is_met for row in rows) else 1
