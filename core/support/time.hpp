@@ -4,7 +4,6 @@
 #include <chrono>
 #include <compare>
 #include <cstdint>
-#include <string>
 
 namespace rr {
 
@@ -19,11 +18,6 @@ struct TimeSpec {
   // clang-tidy 14 takes the 0 that a rewritten comparison compares with for a pointer.
   auto operator<=>(const TimeSpec&) const = default;  // NOLINT(modernize-use-nullptr)
 };
-
-TimeSpec to_time_spec(std::chrono::system_clock::time_point time);
-/// "2026-11-24T15:00:00.000Z", with so many digits behind the point, 1 to 9. `time` is normalized, and no earlier than
-/// 1970.
-std::string format_utc(TimeSpec time, int digits);
 
 /// One reading of the clocks, taken by the driver and handed to every call that depends on time.
 /// `steady` drives deadlines; `utc` stamps wire packets.

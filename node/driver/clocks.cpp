@@ -2,6 +2,8 @@
 
 #include <chrono>
 
+#include "node/platform/utc_time.hpp"
+
 namespace rr {
 
 Now read_clocks() {

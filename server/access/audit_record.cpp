@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <charconv>
 
-#include "core/support/time.hpp"
+#include "node/platform/utc_time.hpp"
 #include "node/tls/digest.hpp"
 #include "server/json/json.hpp"
 

@@ -6,8 +6,8 @@
 #include <iostream>
 #include <optional>
 
-#include "core/support/time.hpp"
 #include "node/driver/clocks.hpp"
+#include "node/platform/utc_time.hpp"
 #include "server/cli/csv.hpp"
 #include "server/cli/remote_service.hpp"
 #include "server/json/arguments.hpp"

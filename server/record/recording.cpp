@@ -4,7 +4,7 @@
 #include <array>
 
 #include "core/support/node_id.hpp"
-#include "core/support/time.hpp"
+#include "node/platform/utc_time.hpp"
 
 namespace rrgate {
 

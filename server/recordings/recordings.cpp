@@ -4,7 +4,7 @@
 #include <boost/asio/post.hpp>
 #include <filesystem>
 
-#include "core/support/time.hpp"
+#include "node/platform/utc_time.hpp"
 #include "server/config/version.hpp"
 #include "server/log/log.hpp"
 
@@ -193,7 +193,7 @@ void Recordings::forget_ended(const RecordingWish* failed) {
   }
 }
 
-rr::Result<std::string> Recordings::begin(RecordingWish wish) {
+rr::Result<std::string> Recordings::begin(const RecordingWish& wish) {
   const auto is_of_clients = [](const auto& each) { return each.second->writer && !each.second->info.is_standing; };
   if (static_cast<std::size_t>(std::count_if(runs_.begin(), runs_.end(), is_of_clients)) >= config_.recordings.at_once)
     return rr::make_error(rr::ErrorCode::out_of_system_resource,
@@ -397,6 +397,7 @@ std::vector<RecordingInfo> Recordings::list() const {
     info.messages = run->writer->message_count();
   }
   std::vector<RecordingInfo> out;
+  out.reserve(found.size());
   for (auto& [name, info] : found) out.push_back(std::move(info));
   std::stable_sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.begin > b.begin; });
   return out;

@@ -67,7 +67,7 @@ class Recordings {
   /// Returns its name. Errors   invalid_state: the configuration has no folder; resource_not_found: no such device;
   /// out_of_system_resource: too many, or the folder is full; system_resource_error: the file, and what the system
   /// says.
-  rr::Result<std::string> begin(RecordingWish wish);
+  rr::Result<std::string> begin(const RecordingWish& wish);
   /// The one that is ended already stays as it is. Errors   resource_not_found; invalid_state: the configuration wants
   /// it.
   rr::Result<> end(std::string_view name);
@@ -80,11 +80,11 @@ class Recordings {
   std::optional<RecordingInfo> find(std::string_view name) const;
   /// Where a file is that a recording has.
   std::string path_of(const RecordingFile& file) const;
-  /// What all files in the folder take.
-  std::uint64_t used_bytes() const;
 
  private:
   struct Run;
+  /// What all files in the folder take.
+  std::uint64_t used_bytes() const;
   rr::Result<std::string> begin_run(const RecordingWish& wish, bool is_standing);
   void begin_standing();
   /// Those that have ended are told of by their files alone, where they are many.

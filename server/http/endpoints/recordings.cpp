@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <numeric>
 
 #include "core/session/service/service_index.hpp"
 #include "server/http/endpoints/gateway_request.hpp"
@@ -210,11 +211,13 @@ Handler recordings_endpoint(GatewayState& gateway) {
     const auto& limits = gateway.config().recordings;
     const auto& rules = gateway.access().state().rules;
     Json out;
+    const auto all = gateway.recordings().list();
     out["enabled"] = !limits.folder.empty();
-    out["bytes"] = gateway.recordings().used_bytes();
+    out["bytes"] = std::accumulate(all.begin(), all.end(), std::uint64_t{0},
+                                   [](std::uint64_t sum, const auto& each) { return sum + each.bytes(); });
     out["max_bytes"] = limits.max_bytes;
     auto& list = out["recordings"] = Json::array();
-    for (const auto& each : gateway.recordings().list())
+    for (const auto& each : all)
       if (rules.check(request.identity, wanted_of(each))) list.push_back(described(each));
     auto response = json_answer(200, out);
     response.set("Cache-Control", "no-store");

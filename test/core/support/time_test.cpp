@@ -20,13 +20,6 @@ TEST_CASE("time: seconds and nanoseconds get one sign", "[support]") {
   CHECK(TimeSpec{-1, -2'000'000'001}.normalized() == TimeSpec{-3, -1});
 }
 
-TEST_CASE("time: UTC as text, cut behind the digits that are wanted", "[support]") {
-  CHECK(rr::format_utc({0, 1}, 9) == "1970-01-01T00:00:00.000000001Z");
-  CHECK(rr::format_utc({1'795'532'400, 999'999'999}, 3) == "2026-11-24T15:00:00.999Z");
-  const auto time = std::chrono::system_clock::time_point(std::chrono::milliseconds(-1));
-  CHECK(rr::to_time_spec(time) == TimeSpec{-1, 999'000'000});
-}
-
 TEST_CASE("time: what no time can tell becomes the first or the last one", "[support]") {
   const TimeSpec last{max_seconds, 999'999'999};
   const TimeSpec first{min_seconds, -999'999'999};
