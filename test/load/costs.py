@@ -3,6 +3,8 @@ import contextlib
 import json
 import pathlib
 import re
+import selectors
+import socket
 import subprocess
 import sys
 import time
@@ -24,6 +26,7 @@ IDLE_BYTES = 16384  # of a client that is connected and does nothing
 CLIENTS, ROUNDS = 1000, 10
 LARGE = 7_000_000
 DEADLINE = 30.0
+FOLLOW = b"GET /api/v1/devices/load/Load/state HTTP/1.1\r\nHost: localhost\r\nAccept: text/event-stream\r\n\r\n"
 SENDERS = {"wire": ({"rate": RATE}, {"wire": "state"}),
            "event": ({"rate": 0, "event_rate": RATE}, {"wire": "", "event": "moved"}),
            "pipe": ({"rate": 0, "packet_rate": RATE, "packet_bytes": 80}, {"wire": "", "pipe": "packets"})}
@@ -58,6 +61,35 @@ def delivery(folder, gateway, scheme, listens, seconds=SECONDS):
     rate = (end["values"] + end["packets"]) / end["window_seconds"]
     header = 0 if scheme == "rr+tcp" else 2 if payload < 126 else 4
     return share / rate * 1e6, payload + header
+
+
+def json_deliveries(folder, mode):
+    """The same for those who follow a wire as JSON, by an event stream."""
+    with running(Device(folder, rate=RATE)) as device, running(Gateway(folder, device.url, mode)) as gateway:
+        with contextlib.ExitStack() as stack, selectors.DefaultSelector() as streams:
+            for _ in range(FOLLOWERS):
+                stream = stack.enter_context(socket.create_connection(("127.0.0.1", gateway.port)))
+                stream.sendall(FOLLOW)
+                streams.register(stream, selectors.EVENT_READ)
+            values_in(streams, 1)  # all are there
+            cpu = gateway.cpu_seconds()
+            count, size = values_in(streams, SECONDS)
+            ours = (gateway.cpu_seconds() - cpu) / count * 1e6
+    yield Row(f"CPU of the gateway for a value of {size} bytes as JSON, wire at {RATE} Hz to {FOLLOWERS} event streams, against a "
+              "bare send", ours, bare_send(size), "us")
+
+
+def values_in(streams, seconds):
+    """How many came in this time, and the bytes of one."""
+    count = received = 0
+    until = time.monotonic() + seconds
+    while (left := until - time.monotonic()) > 0:
+        for key, _ in streams.select(left):
+            news = key.fileobj.recv(65536)
+            assert news, "the gateway has ended a stream"
+            count += news.count(b"data: ")
+            received += len(news)
+    return count, round(received / max(count, 1))
 
 
 def sent(gateway):

@@ -91,8 +91,8 @@ def storm(folder, mode, count):
     yield Row("clients that did not come back", count - report["ready"], None, "", promise=0)
 
 
-PARTS = {"age": fan_out, "stall": one_stalls, "storm": storm, "delivery": costs.deliveries, "memory": costs.memory,
-         "strangers": crowds.strangers}
+PARTS = {"age": fan_out, "stall": one_stalls, "storm": storm, "delivery": costs.deliveries, "json": costs.json_deliveries,
+         "memory": costs.memory, "strangers": crowds.strangers}
 
 
 def measure(mode, count, parts):
