@@ -8,7 +8,7 @@
 //   const auto now = co_await reading.next();
 //
 // By type, as they are found on the network: rr::subscribe_service_by_type() in
-// node/discovery/subscribe_service_by_type.hpp.
+// node/subscribe/subscribe_service_by_type.hpp.
 #pragma once
 
 #include <functional>
