@@ -31,6 +31,7 @@ export default defineConfig(
           "wasm-client/tsconfig.test.json",
           "wasm-client/tsconfig.json",
           "web/tsconfig.json",
+          "test/consumers/tsconfig.json",
           "test/e2e/tsconfig.json",
         ],
         tsconfigRootDir: import.meta.dirname,

@@ -8,7 +8,7 @@ export default defineConfig({
   resolve: {
     alias: [
       { find: /^svelte\/store$/, replacement: `${modules}/svelte/src/store/index-client.js` },
-      { find: /^(esbuild|happy-dom|react|react-dom|rollup|vite|vue|webpack)(?=$|\/)/, replacement: `${modules}/$1` },
+      { find: /^(happy-dom|react|react-dom|vue)(?=$|\/)/, replacement: `${modules}/$1` },
     ],
   },
   test: {

@@ -22,7 +22,7 @@ int serve(const ServeOptions& options) {
 
 void add_serve(Commands& commands) {
   const auto [app, options] = commands.add("serve", "Run the gateway", serve);
-  app.add_option("--config", options.config, "Configuration")->required()->option_text("FILE");
+  app.add_option("FILE,--config", options.config, "Configuration")->required()->option_text(" ");
 }
 
 }  // namespace rrgate

@@ -17,6 +17,7 @@ export default defineConfig({
   expect: { timeout: 15_000 },
   workers: 1,
   forbidOnly: !!process.env["CI"],
+  snapshotPathTemplate: "../../docs/images/page/{arg}{ext}",
   reporter: [
     ["list"],
     ["./assertions_reporter.ts"],

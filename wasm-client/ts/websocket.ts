@@ -18,12 +18,13 @@ const inPage = page && `nobody answers there, or does not let pages of ${page} i
 export async function openWebsocket(url: URL, listener: TransportListener, proof: Proof = {}): Promise<Transport> {
   const WebSocketClass = await platform.findWebsocket(url, proof);
   const where = `${url.protocol}//${url.host}${url.pathname}`;
+  const refused = `could not connect to ${where}`;
   let socket: WebSocket;
   try {
     socket = new WebSocketClass(url.href, [subprotocol]);
   } catch (error) {
     // A page that came encrypted may not open ws:.
-    throw makeError("ConnectionError", `could not connect to ${where}: ${textOf(error)}`);
+    throw makeError("ConnectionError", `${refused}: ${textOf(error)}`);
   }
   socket.binaryType = "arraybuffer";
   let isOpen = false;
@@ -43,23 +44,21 @@ export async function openWebsocket(url: URL, listener: TransportListener, proof
   socket.addEventListener("message", (event: MessageEvent) => {
     if (isTold) return;
     if (event.data instanceof ArrayBuffer) listener.received(new Uint8Array(event.data));
-    else socket.close(1003, "text frames are not part of the protocol");
+    else socket.close(1003, "expected binary frames");
   });
   // Browsers do not say what went wrong; other engines may.
   socket.addEventListener("error", (event: Event) => {
-    const { message } = event as { message?: unknown };
-    if (typeof message === "string") failure = message;
+    failure = (event as { message?: string }).message ?? failure;
   });
   socket.addEventListener("close", (event: CloseEvent) => {
-    const why = event.reason || failure;
-    if (isOpen)
-      tellClosed(`the connection to ${where} was closed${why ? `: ${why}` : ` (WebSocket code ${event.code})`}`);
-    else tellClosed(`could not connect to ${where}${why || inPage ? `: ${why || inPage}` : ""}`);
+    const why = event.reason || failure || (isOpen ? `WebSocket code ${event.code}` : inPage);
+    const what = isOpen ? `the connection to ${where} was closed` : refused;
+    tellClosed(why ? `${what}: ${why}` : what);
   });
   return {
     send: (bytes) => socket.send(bytes as Uint8Array<ArrayBuffer>),
     get buffered() {
-      return socket.bufferedAmount;
+      return (socket as { bufferedAmount?: number }).bufferedAmount ?? 0; // Cloudflare's has none
     },
     close: () => {
       isTold = true;

@@ -20,7 +20,8 @@ struct Version {
   std::uint32_t tweak = 0;
 
   bool is_unspecified() const { return *this == Version{}; }
-  auto operator<=>(const Version&) const = default;
+  // clang-tidy 14 takes the 0 that a rewritten comparison compares with for a pointer.
+  auto operator<=>(const Version&) const = default;  // NOLINT(modernize-use-nullptr)
 };
 
 Result<Version> parse_version(std::string_view text);

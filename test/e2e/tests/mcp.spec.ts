@@ -3,6 +3,9 @@ import { Client } from "@modelcontextprotocol/sdk/client/index.js";
 import { StdioClientTransport } from "@modelcontextprotocol/sdk/client/stdio.js";
 import { StreamableHTTPClientTransport } from "@modelcontextprotocol/sdk/client/streamableHttp.js";
 import { expect, test } from "@playwright/test";
+import { execFile } from "node:child_process";
+import { join } from "node:path";
+import { promisify } from "node:util";
 import { deviceProgram, Program, rrgate, startGateway, webRoot } from "../processes";
 
 const drive = { device: "create", path: "Create/Drive", why: "to see it move" };
@@ -114,3 +117,19 @@ for (const [way, connect] of Object.entries(ways)) {
     });
   });
 }
+
+test("the inspector of the protocol finds nothing to complain about", async () => {
+  const program = join(import.meta.dirname, "../node_modules/.bin/mcp-inspector");
+  const inspect = async (...args: string[]) => {
+    const target = ["--cli", new URL("mcp", gateway.url).href, "--transport", "http"];
+    return promisify(execFile)(program, [...target, ...args], { timeout: 20_000 });
+  };
+  const tools = await inspect("--method", "tools/list", "--strict");
+  expect(tools.stdout).toContain('"inputSchema"');
+  expect(tools.stderr).not.toMatch(/Error:|Warning:/);
+  const read = await inspect("--method", "resources/read", "--uri", "rrgate://create/Create/DistanceTraveled");
+  expect(read.stdout).toContain('"mimeType": "application/json"');
+  const args = JSON.stringify({ ...drive, args: { velocity: 100, radius: 0 }, ["dry_run"]: true });
+  const call = await inspect("--method", "tools/call", "--tool-name", "call", "--tool-args-json", args);
+  expect(call.stdout).toContain("would_send");
+});

@@ -24,7 +24,7 @@ export function DevicesPage({ list, usb, access }: { list: DeviceList; usb: UsbD
       {devices && devices.length === 0 && state.kind === "known" && <NoDevices />}
       {devices && devices.length > 0 && <DeviceParts devices={devices} stale={state.kind === "away"} />}
       {usb.isPossible && <UsbPart usb={usb} />}
-      <p>
+      <p class="devices-more">
         <a href="#/recordings">{t("Recordings")}</a>
       </p>
       <AccessPart access={access} />
