@@ -39,8 +39,6 @@ class SafeValues : public std::enable_shared_from_this<SafeValues> {
   /// Sends all at and below a path, past whatever waits. False: there is no session, or it was lost at this moment;
   /// they are sent as soon as there is one.
   bool send(const std::string& path, const std::shared_ptr<Upstream>& by);
-  /// Whether something is to be sent as soon as there is a session.
-  bool is_owing() const { return !owed_.empty(); }
 
  private:
   struct Item {

@@ -272,7 +272,6 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   void watch_object(const std::string& path, const rr::EntityDefinition& type);
   void look_up_again();
   void handle_released(const std::string& path);
-  void forget_below(const std::string& path);
   void share_read(const std::string& path, const std::string& property, Completion done);
   void begin_request(const rr::Called& called, const std::string& path, Completion done);
   void send_safe(const SafeRequest& request, Completion done);
