@@ -14,6 +14,8 @@ struct JsonForm {
   /// For CBOR: arrays of real numbers as byte strings, uint8 plain, others with the typed-array tag of RFC 8746.
   bool has_bytes = false;
   bool ignores_unknown = false;  ///< when reading: fields that a structure doesn't declare
+
+  bool operator==(const JsonForm&) const = default;
 };
 
 /// `value`  as unpack() gives it for `type`.

@@ -1,6 +1,7 @@
 // What stays open for a client of a JSON WebSocket: what it has subscribed to, sends on, and answers. Layer:
 // server/socket. See docs/http-api.md.
 #include "server/http/endpoints/member_values.hpp"
+#include "server/http/endpoints/sample_text.hpp"
 #include "server/socket/json_operations.hpp"
 
 namespace rrgate {
@@ -16,16 +17,16 @@ std::string news_of(const std::string& id, rr::OrderedJson news) {
 }
 
 /// A sample as the client gets it; also why it can't get it.
-std::string sample_text(const std::string& id, const Sample& sample, const Target& target, const rr::JsonForm& form) {
-  auto out = rr::OrderedJson::object();
-  auto value = sample_to_json(sample, *target.member, target.types(), form);
+std::string value_news(const std::string& id, const Sample& sample, const Target& target, const rr::JsonForm& form,
+                       MemoryBudget& memory) {
+  const auto& value = sample_text(sample, *target.member, target.types(), form, memory);
   if (!value) return news_of(id, rr::error_to_json(value.error(), target.types()));
-  rr::add_key(out, "value") = std::move(*value);
-  if (target.member->kind == rr::MemberKind::event) rr::add_key(out, "number") = sample.number;
+  auto out = "{\"subscription\":" + id + ",\"value\":" + *value;
+  if (target.member->kind == rr::MemberKind::event) out += ",\"number\":" + std::to_string(sample.number);
   if (target.member->kind == rr::MemberKind::wire)
-    rr::add_key(out, "time") = {{"seconds", std::to_string(sample.time.seconds)},
-                                {"nanoseconds", sample.time.nanoseconds}};
-  return news_of(id, std::move(out));
+    out += ",\"time\":{\"seconds\":\"" + std::to_string(sample.time.seconds) +
+           "\",\"nanoseconds\":" + std::to_string(sample.time.nanoseconds) + "}";
+  return out + "}";
 }
 
 }  // namespace
@@ -51,17 +52,18 @@ rr::awaitable<rr::OrderedJson> JsonOperations::subscribe(JsonRequestPtr request,
   const auto id = reserve(*request);
   const auto told = std::make_shared<Target>(*target);
   told->client.reset();  // it would keep itself
-  SampleHandler handler = [outbox = outbox_, id, told, form = place_.form](const SamplePtr& sample,
-                                                                           const rr::Error* error) {
+  SampleHandler handler = [outbox = outbox_, id, told, form = place_.form, memory = &gateway_.memory()](
+                              const SamplePtr& sample, const rr::Error* error) {
     if (!sample) {
       auto out = rr::OrderedJson::object();
       rr::add_key(out, "state") = state_name(error);
       if (error) rr::add_key(out, "detail") = rr::error_to_json(*error, told->types())["error"]["message"];
       outbox->add(news_of(id, std::move(out)));
     } else if (told->member->kind == rr::MemberKind::wire) {
-      outbox->add_newest(id, [id, told, form, sample] { return sample_text(id, *sample, *told, form); });
+      outbox->add_newest(id,
+                         [id, told, form, memory, sample] { return value_news(id, *sample, *told, form, *memory); });
     } else {
-      outbox->add(sample_text(id, *sample, *told, form));
+      outbox->add(value_news(id, *sample, *told, form, *memory));
     }
   };
   auto place = target->place();

@@ -91,11 +91,12 @@ rr::awaitable<rr::Result<ValueClient::ListenerPtr>> ValueClient::listen(MemberPl
   auto listener = std::make_unique<Listener>(self, key, id);
   auto& topic = topics_[key];
   if (!topic.place.member) topic.place = std::move(place);
-  const bool is_wire = topic.place.member->kind == rr::MemberKind::wire;
+  const auto kind = topic.place.member->kind;
+  const bool is_wire = kind == rr::MemberKind::wire;
   topic.handlers[id] = kept;
   const auto recent = topic.recent;  // handlers may leave
   for (const auto& sample : recent)
-    if (is_wire || (after > 0 && sample->number > after)) (*kept)(sample, nullptr);
+    if (is_wire || (after > 0 && sample->number > after)) hand_out(sample, kind, {{id, kept}});
   const auto joined = co_await join(key);
   if (!joined) co_return joined.error();
   co_return listener;
@@ -192,7 +193,14 @@ void ValueClient::publish(const Key& key, Sample sample) {
   const auto shared = std::make_shared<const Sample>(std::move(sample));
   if (kind != rr::MemberKind::pipe) keep(topic, shared);
   const auto handlers = topic.handlers;  // they may leave
-  for (const auto& [id, handler] : handlers) (*handler)(shared, nullptr);
+  hand_out(shared, kind, handlers);
+}
+
+/// Only a wire's value is handed out later, too: by listeners that skip values, and to who comes anew. The texts of
+/// events would be held for nobody.
+void ValueClient::hand_out(const SamplePtr& sample, rr::MemberKind kind, const Handlers& handlers) {
+  for (const auto& [id, handler] : handlers) (*handler)(sample, nullptr);
+  if (kind != rr::MemberKind::wire) sample->texts.reset();
 }
 
 /// A wire's newest value in any case; events as long as there is room for them.

@@ -19,14 +19,16 @@
 namespace rrgate {
 
 struct SampleJpeg;
+struct SampleTexts;
 
 /// What a wire, a pipe or an event brought.
 struct Sample {
-  std::uint64_t number = 0;                       ///< counts within a member, from 1
-  rr::TimeSpec time;                              ///< of a wire's value
-  std::vector<rr::Value> values;                  ///< an event's arguments; else one
-  std::size_t bytes = 0;                          ///< that it takes, about
-  mutable std::shared_ptr<SampleJpeg> jpeg = {};  ///< of a camera's frame, once somebody wants it (sample_jpeg.hpp)
+  std::uint64_t number = 0;                         ///< counts within a member, from 1
+  rr::TimeSpec time;                                ///< of a wire's value
+  std::vector<rr::Value> values;                    ///< an event's arguments; else one
+  std::size_t bytes = 0;                            ///< that it takes, about
+  mutable std::shared_ptr<SampleJpeg> jpeg = {};    ///< of a camera's frame, once somebody wants it (sample_jpeg.hpp)
+  mutable std::shared_ptr<SampleTexts> texts = {};  ///< as JSON, once somebody wants it (sample_text.hpp)
 };
 using SamplePtr = std::shared_ptr<const Sample>;
 
@@ -104,10 +106,11 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
 
  private:
   using Key = Listener::Key;  // path, member
+  using Handlers = std::map<std::uint64_t, std::shared_ptr<SampleHandler>>;
   enum class TopicState : std::uint8_t { idle, joining, joined };
   struct Topic {
     MemberPlace place;
-    std::map<std::uint64_t, std::shared_ptr<SampleHandler>> handlers;
+    Handlers handlers;
     std::deque<SamplePtr> recent;  ///< a wire's newest value; an event's last ones
     std::size_t recent_bytes = 0;
     std::shared_ptr<CallbackHandler> callback;
@@ -151,6 +154,8 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   /// The device has ended it, not the connection.
   void closed(const Key& key, const rr::Error& reason);
   void publish(const Key& key, Sample sample);
+  /// To handlers, which may leave meanwhile.
+  static void hand_out(const SamplePtr& sample, rr::MemberKind kind, const Handlers& handlers);
   void keep(Topic& topic, const SamplePtr& sample);
   void forget_oldest(Topic& topic);
   void tell(const Key& key, const rr::Error* error);

@@ -8,6 +8,7 @@
 #include "server/http/endpoints/member_values.hpp"
 #include "server/http/endpoints/members.hpp"
 #include "server/http/endpoints/sample_jpeg.hpp"
+#include "server/http/endpoints/sample_text.hpp"
 #include "server/log/log.hpp"
 
 namespace rrgate {
@@ -75,8 +76,8 @@ std::string state_text(const rr::Error* error) {
   return "event: state\ndata: " + rr::write_json(out) + "\n\n";
 }
 
-std::string event_text(const rr::OrderedJson& json, std::uint64_t number, bool has_number) {
-  return (has_number ? "id: " + std::to_string(number) + "\n" : "") + "data: " + rr::write_json(json) + "\n\n";
+std::string event_text(const std::string& json, std::uint64_t number, bool has_number) {
+  return (has_number ? "id: " + std::to_string(number) + "\n" : "") + "data: " + json + "\n\n";
 }
 
 Response stream_head(std::string_view content_type) {
@@ -94,10 +95,10 @@ rr::awaitable<void> stream_topic(const ObjectRequest& request, const Target& tar
   const auto outbox = std::make_shared<Outbox>(writer.executor(), writer.memory().sibling());
   const bool is_wire = member.kind == rr::MemberKind::wire;
   const bool is_event = member.kind == rr::MemberKind::event;
-  SampleHandler handler = [outbox, types = target.registry, &member, is_wire, is_event, form = request.form()](
-                              const SamplePtr& sample, const rr::Error* error) {
+  SampleHandler handler = [outbox, types = target.registry, &member, is_wire, is_event, form = request.form(),
+                           memory = &request.gateway().memory()](const SamplePtr& sample, const rr::Error* error) {
     if (!sample) return outbox->add(state_text(error), false);
-    const auto json = sample_to_json(*sample, member, *types, form);
+    const auto& json = sample_text(*sample, member, *types, form, *memory);
     if (json)
       outbox->add(event_text(*json, sample->number, is_event), is_wire);
     else
