@@ -329,6 +329,9 @@ TEST_CASE("a property that is slow to answer holds up no other") {
   recorder->start({});
   CHECK(run_until(io, [&] { return writer.message_count() >= 3; }));
   recorder->close();
+  io.restart();
+  io.run_for(std::chrono::seconds(10));
+  CHECK(io.stopped());  // the request that is not answered keeps nothing
   node.stop();
   node.join();
 }
