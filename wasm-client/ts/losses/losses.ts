@@ -1,5 +1,5 @@
 // What a service tells of this session's own subscriptions. Loaded when it is asked for. Layer: wasm-client/ts.
-// Source: core/session/subscription_losses.hpp.
+// Source: core/session/service/subscription_losses.hpp.
 import type { CallOptions, Losses, RrValue } from "../types.js";
 import type { MemberContext } from "../members/member.js";
 
