@@ -346,7 +346,7 @@ void UsbLink::end_stream(UsbStreamKey key, Stream& stream, Error reason) {
   events_.push_back({UsbEventKind::closed, key, std::move(reason)});
 }
 
-void UsbLink::fail(const Error& reason, bool is_gone) {
+void UsbLink::fail(Error reason, bool is_gone) {
   if (state_ == UsbLinkState::closing || state_ == UsbLinkState::closed) return;
   state_ = is_gone ? UsbLinkState::closed : UsbLinkState::closing;
   to_connect_.clear();

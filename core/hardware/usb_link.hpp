@@ -147,7 +147,7 @@ class UsbLink {
   void handle_sub_packet(ByteSpan transfer, TimePoint now);
   void handle_notice(UsbStreamKey key, Stream& stream, std::uint16_t code);
   void end_stream(UsbStreamKey key, Stream& stream, Error reason);
-  void fail(const Error& reason, bool is_gone);
+  void fail(Error reason, bool is_gone);
   void update_read_deadline(TimePoint now);
   bool has_stale_writes() const;
   bool is_reading_stalled() const;

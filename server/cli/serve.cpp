@@ -12,6 +12,7 @@ struct ServeOptions {
 };
 
 int serve(const ServeOptions& options) {
+  if (options.config.empty()) return usage_error("serve", "FILE is required");
   auto config = load_config(options.config);
   if (!report_findings(options.config, config)) return exit_usage;
   return run_gateway(
@@ -22,7 +23,8 @@ int serve(const ServeOptions& options) {
 
 void add_serve(Commands& commands) {
   const auto [app, options] = commands.add("serve", "Run the gateway", serve);
-  app.add_option("FILE,--config", options.config, "Configuration")->required()->option_text(" ");
+  auto* file = app.add_option("FILE", options.config, "Configuration")->option_text(" ");
+  app.add_option("--config", options.config, "The same")->option_text("FILE")->excludes(file);
 }
 
 }  // namespace rrgate

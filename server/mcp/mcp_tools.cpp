@@ -3,8 +3,10 @@
 #include <algorithm>
 
 #include "node/tls/base64.hpp"
+#include "node/values/exception.hpp"
 #include "server/http/endpoints/call_log.hpp"
 #include "server/http/endpoints/large_json.hpp"
+#include "server/http/endpoints/refusal.hpp"
 #include "server/mcp/mcp_describe.hpp"
 
 namespace rrgate {

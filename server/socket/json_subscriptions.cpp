@@ -12,7 +12,7 @@ namespace {
 constexpr std::size_t max_open = 256;
 
 /// {"subscription": id, ...}
-std::string news_of(const std::string& id, rr::OrderedJson news) {
+std::string news_of(const std::string& id, const rr::OrderedJson& news) {
   return "{\"subscription\":" + id + "," + rr::write_json(news).substr(1);
 }
 
@@ -58,7 +58,7 @@ rr::awaitable<rr::OrderedJson> JsonOperations::subscribe(JsonRequestPtr request,
       auto out = rr::OrderedJson::object();
       rr::add_key(out, "state") = state_name(error);
       if (error) rr::add_key(out, "detail") = rr::error_to_json(*error, told->types())["error"]["message"];
-      outbox->add(news_of(id, std::move(out)));
+      outbox->add(news_of(id, out));
     } else if (told->member->kind == rr::MemberKind::wire) {
       outbox->add_newest(id,
                          [id, told, form, memory, sample] { return value_news(id, *sample, *told, form, *memory); });
@@ -132,7 +132,7 @@ void JsonOperations::review() {
     auto news = rr::OrderedJson::object();
     rr::add_key(news, "state") = "ended";
     rr::add_key(news, "detail") = allowed.error().message;
-    outbox_->add(news_of(it->first, std::move(news)));
+    outbox_->add(news_of(it->first, news));
     it = open_.erase(it);
   }
 }

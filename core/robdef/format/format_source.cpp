@@ -25,8 +25,8 @@ std::string wrap_member(std::string line, std::string_view indent) {
     const auto first = line.find_first_not_of(' ');
     const auto blank = line.rfind(' ', last);
     if (blank == std::string::npos || blank < first) break;
-    out.append(line, 0, blank).append(" \\\n");
-    line.replace(0, blank + 1, next_indent);
+    out += line.substr(0, blank) + " \\\n";
+    line = next_indent + line.substr(blank + 1);
   }
   return out + line;
 }

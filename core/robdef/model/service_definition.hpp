@@ -20,8 +20,7 @@ struct Version {
   std::uint32_t tweak = 0;
 
   bool is_unspecified() const { return *this == Version{}; }
-  // clang-tidy 14 takes the 0 that a rewritten comparison compares with for a pointer.
-  auto operator<=>(const Version&) const = default;  // NOLINT(modernize-use-nullptr)
+  auto operator<=>(const Version&) const = default;
 };
 
 Result<Version> parse_version(std::string_view text);

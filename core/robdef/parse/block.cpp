@@ -38,7 +38,7 @@ void DefinitionParser::parse_enum(StatementReader& reader) {
   const bool is_good =
       reader.expect_blank(expected) && reader.expect_word(expected, enumeration.name) && reader.expect_end();
   EnumReader values(enumeration);
-  parse_block(reader.line(), "enum", is_good, [&](const LogicalLine& line) {
+  parse_block(reader.line(), "enum", is_good, [&](LogicalLine line) {
     auto documentation = documentation_.take();
     if (line.is_bad()) return;
     StatementReader item(line, reporter_);
@@ -101,7 +101,7 @@ void DefinitionParser::parse_block(const LogicalLine& header, std::string_view k
 }
 
 void DefinitionParser::skip_block(const LogicalLine& header, std::string_view keyword) {
-  parse_block(header, keyword, false, [](const LogicalLine&) {});
+  parse_block(header, keyword, false, [](LogicalLine) {});
 }
 
 void DefinitionParser::parse_end(const LogicalLine& line, std::string_view keyword) {

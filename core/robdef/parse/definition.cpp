@@ -50,7 +50,7 @@ ParseResult DefinitionParser::parse() {
   return {std::move(definition_), reporter_.take()};
 }
 
-void DefinitionParser::parse_top_level(const LogicalLine& line) {
+void DefinitionParser::parse_top_level(LogicalLine line) {
   const std::string keyword(first_word(line));
   const auto kind = entity_kind(keyword);
   if (line.is_bad()) {

@@ -32,7 +32,7 @@ class DefinitionParser {
   /// Statements outside of blocks stand in this order.
   enum class Group : std::uint8_t { service, version, imports, usings, declarations, entities };
 
-  void parse_top_level(const LogicalLine& line);
+  void parse_top_level(LogicalLine line);
   bool check_order(StatementReader& reader, std::string_view keyword, Group group);
   void parse_service(StatementReader& reader);
   void parse_stdver(StatementReader& reader);

@@ -42,7 +42,7 @@ void verify_modifiers(VerifyScope& scope, const MemberDefinition& member, const 
   const auto place = std::string(member_kind_name(member.kind)) + ' ' + quote(member.name) + ": ";
   std::unordered_set<std::string_view> names;
   for (const auto& modifier : member.modifiers) {
-    const auto warn = [&](std::string_view code, std::string_view word, const std::string& message) {
+    const auto warn = [&](std::string_view code, std::string_view word, std::string message) {
       scope.warning(code, member.line, word, place + message, member.name);
     };
     if (!is_known_modifier(member, modifier)) {
