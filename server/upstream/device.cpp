@@ -13,6 +13,7 @@
 #include "node/transport/race.hpp"
 #include "server/log/log.hpp"
 #include "server/upstream/service_locks.hpp"
+#include "server/upstream/upstream.hpp"
 
 namespace rrgate {
 
@@ -282,6 +283,9 @@ void Device::note_answer(const rr::Result<ProbeResult>& result, DeviceState befo
     state_ = DeviceState::online;
     identity_ = *result;
     last_error_.clear();
+    if (before != state_)
+      for (const auto& [service, known] : shared_)
+        if (const auto upstream = known.lock()) upstream->retry_now();
     return;
   }
   state_ = DeviceState::offline;

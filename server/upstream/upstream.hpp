@@ -111,6 +111,8 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   bool is_resting() const { return is_resting_; }
   /// Has it opened again where it rests.
   void wake();
+  /// The device answers again: one that waits for its next attempt makes it now.
+  void retry_now();
   /// Whether the first attempt to open it, or to open it again after a rest, is over, well or not.
   bool has_tried() const { return attempts_ > 0 && !is_waking_; }
   /// For one that is kept open: waits for an attempt that is under way, or begins one now. Errors   those of open().

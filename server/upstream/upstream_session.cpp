@@ -201,6 +201,10 @@ void Upstream::wake() {
   wake_.cancel();
 }
 
+void Upstream::retry_now() {
+  if (!is_open() && !is_attempting_ && !is_resting_) wake_.cancel();
+}
+
 rr::awaitable<rr::Result<>> Upstream::opened() {
   const auto self = shared_from_this();
   if (is_open() && !is_attempting_) co_return rr::Result<>();

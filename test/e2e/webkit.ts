@@ -6,7 +6,7 @@ import { freePort } from "./processes";
 const browser = { binary: "/usr/bin/epiphany", args: ["--automation-mode"] };
 
 /** What says `Bail out` at its start, as Epiphany does at times, is started again. */
-export async function startWebkit(attempts = 3): Promise<Engine> {
+export async function startWebkit(attempts = 5): Promise<Engine> {
   const port = await freePort();
   const screen = "-screen 0 1600x1200x24";
   const family = new Family(
@@ -58,7 +58,8 @@ export async function startWebkit(attempts = 3): Promise<Engine> {
     };
   } catch (error) {
     await family.end();
-    if (attempts <= 1) throw error;
+    if (attempts <= 1) throw new Error(`${String(error)}\n${family.output}`);
+    await new Promise((resolve) => setTimeout(resolve, 1_000));
     return startWebkit(attempts - 1);
   }
 }

@@ -1,6 +1,7 @@
 import { Driver } from "../../web/src/robot/driver";
 import { Holds } from "../../web/src/robot/holds";
 import { advance, ORIGIN, Reckoner, wrapAngle } from "../../web/src/robot/reckoning";
+import { RobotModel } from "../../web/src/robot/robot_model";
 import { loopsOf, obstaclesOf, poseOf, wallsOf } from "../../web/src/robot/room";
 import { readSensorPacket } from "../../web/src/robot/sensor_packet";
 import { rateOf, Series } from "../../web/src/robot/series";
@@ -336,6 +337,43 @@ describe("series", () => {
     for (let t = 0; t < 4000; t += 50) series.push(t, 1);
     expect(rateOf(series, 3999)).toBe(20);
     expect(rateOf(series, 9000)).toBe(0);
+  });
+});
+
+describe("what the robot tells", () => {
+  beforeEach(() => void vi.useFakeTimers());
+  afterEach(() => void vi.useRealTimers());
+
+  it("is asked for again where that failed, or the device closed it, and that is told of meanwhile", async () => {
+    const poses = [1, 2].map((x) => ({ x, y: 0, heading: 0 }));
+    let isThere = false;
+    let isClosed = true;
+    const stop = new AbortController();
+    const present = <T>(value: T): Promise<T> => (isThere ? Promise.resolve(value) : Promise.reject(new Error("away")));
+    const model = new RobotModel();
+    const remote = {
+      has: (name: string, kind: string) =>
+        `${kind} ${name}` === "wire state" || `${kind} ${name}` === "property radius",
+      get: () => present(0.2),
+      wire: async function* () {
+        yield await present(null).then(() => poses.shift());
+        if (!isClosed) await new Promise((resolve) => stop.signal.addEventListener("abort", resolve));
+      },
+    };
+    model.attach(remote as never, stop.signal);
+    await vi.advanceTimersByTimeAsync(10);
+    expect(model.trouble.value).toBe("wire state: away");
+    expect(model.heardAt("pose")).toBeNull();
+
+    isThere = true;
+    await vi.advanceTimersByTimeAsync(1_000);
+    expect([model.radiusM, model.pose.x, model.trouble.value]).toEqual([0.2, 1, "wire state: the device closed it"]);
+    isClosed = false;
+    await vi.advanceTimersByTimeAsync(1_000);
+    expect([model.pose.x, model.trouble.value]).toEqual([2, null]);
+    stop.abort();
+    await vi.advanceTimersByTimeAsync(10_000);
+    expect(model.trouble.value).toBeNull();
   });
 });
 

@@ -47,6 +47,7 @@ for (const [name, open] of Object.entries(pages))
         await page.emulateMedia({ colorScheme, reducedMotion: "reduce" });
         await open(page, lab.url);
         await page.mouse.move(0, 0);
+        await page.evaluate(() => window.scrollTo(0, 0)); // a click may have scrolled to its button
         // Times, ages and plots differ a little each time.
         const picture = `${name}-${size}-${colorScheme}.png`;
         await expect(async () =>

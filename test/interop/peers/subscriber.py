@@ -29,7 +29,7 @@ class Subscribed:
         while True:
             try:
                 return {"value": self.client().add(1, 2), "losses": self.losses}
-            except RR.ConnectionException:
+            except (RR.ConnectionException, RR.InvalidEndpointException):
                 # A subscription hands out a client whose connection has ended until it has seen the end itself.
                 if time.monotonic() > end:
                     raise

@@ -60,12 +60,13 @@ export class RobotModel {
     rightWheel: new Series(),
     packets: new Series(5_000),
   };
-  /** The last thing that failed while reading, shown beside the values; null when all is well. */
+  /** What fails while reading, shown beside the values; null when all is well. */
   readonly trouble = new Store<string | null>(null);
 
   readonly #reckoner = new Reckoner();
   readonly #moved = new Set<() => void>();
   readonly #heard = new Map<Told, number>();
+  readonly #troubles = new Map<string, string>();
   #latest: Readings = NO_READINGS;
   #showTimer: ReturnType<typeof setTimeout> | undefined;
   #bumpCount = 0;
@@ -83,19 +84,16 @@ export class RobotModel {
 
   /** Follows a connected robot until `signal` aborts. */
   attach(remote: Remote, signal: AbortSignal): void {
+    this.#troubles.clear();
     this.trouble.value = null;
     this.#reckoner.rebase();
-    const guard = (what: string, work: Promise<void>): void => {
-      work.catch((error: unknown) => {
-        if (!signal.aborted) this.trouble.value = `${what}: ${explain(error)}`;
-      });
-    };
-    guard("reading the room", this.#readRoom(remote));
-    const state = remote.members.find((m) => m.kind === "wire" && m.name === "state");
-    this.poseSource.value = state ? "device" : "reckoned";
-    if (state) guard(`wire ${state.name}`, this.#followState(remote, state.name, signal));
-    void this.#keepPolling(remote, signal);
-    if (remote.has("packets", "wire")) guard("wire packets", this.#followPackets(remote, signal));
+    void this.#keep("reading the room", signal, () => this.#readRoom(remote));
+    const hasState = remote.has("state", "wire");
+    this.poseSource.value = hasState ? "device" : "reckoned";
+    if (hasState) void this.#keep("wire state", signal, () => this.#followState(remote, signal));
+    void this.#keep("reading values", signal, () => this.#poll(remote, signal));
+    if (remote.has("packets", "wire"))
+      void this.#keep("wire packets", signal, () => this.#followPackets(remote, signal));
     if (remote.has("Bump", "event")) this.#followBumps(remote, signal);
   }
 
@@ -105,37 +103,55 @@ export class RobotModel {
     this.#redraw();
   }
 
+  /** Until `work` is done: where it fails, that is shown, and it begins anew a second later. */
+  async #keep(what: string, signal: AbortSignal, work: () => Promise<void>): Promise<void> {
+    while (!signal.aborted) {
+      try {
+        return await work();
+      } catch (error) {
+        if (signal.aborted) return;
+        this.#troubles.set(what, explain(error));
+        this.#tellTrouble();
+      }
+      await pause(RETRY_MS, signal);
+    }
+  }
+
+  #works(what: string): void {
+    if (this.#troubles.delete(what)) this.#tellTrouble();
+  }
+
+  #tellTrouble(): void {
+    const [first] = this.#troubles;
+    this.trouble.value = first ? first.join(": ") : null;
+  }
+
   async #readRoom(remote: Remote): Promise<void> {
     const read = async (name: string): Promise<unknown> => (remote.has(name, "property") ? remote.get(name) : null);
     const [walls, obstacles, radius] = await Promise.all([read("walls"), read("obstacles"), read("radius")]);
     this.room.value = { walls: wallsOf(walls), obstacles: obstaclesOf(obstacles) };
     if (typeof radius === "number" && radius > 0) this.radiusM = radius;
+    this.#works("reading the room");
     this.#redraw();
   }
 
-  async #followState(remote: Remote, wire: string, signal: AbortSignal): Promise<void> {
-    for await (const value of remote.wire(wire, signal)) {
+  async #followState(remote: Remote, signal: AbortSignal): Promise<void> {
+    for await (const value of remote.wire("state", signal)) {
+      this.#works("wire state");
       const pose = poseOf(value);
       if (pose) this.#moveTo(pose);
       const { bumpers } = (value ?? {}) as { bumpers?: unknown };
       if (typeof bumpers === "number") this.#show({ bumpers });
     }
+    throw new Error("the device closed it");
   }
 
-  /** Each round begins after the one before it is answered; a failed one is shown and tried again a second later. */
-  async #keepPolling(remote: Remote, signal: AbortSignal): Promise<void> {
-    let failed = false;
+  /** Each round begins after the one before it is answered. */
+  async #poll(remote: Remote, signal: AbortSignal): Promise<void> {
     while (!signal.aborted) {
-      try {
-        await this.#pollOnce(remote, signal);
-        if (failed) this.trouble.value = null;
-        failed = false;
-      } catch (error) {
-        if (signal.aborted) return;
-        failed = true;
-        this.trouble.value = `reading values: ${explain(error)}`;
-      }
-      await pause(failed ? RETRY_MS : POLL_MS, signal);
+      await this.#pollOnce(remote, signal);
+      this.#works("reading values");
+      await pause(POLL_MS, signal);
     }
   }
 
@@ -158,11 +174,14 @@ export class RobotModel {
   }
 
   async #followPackets(remote: Remote, signal: AbortSignal): Promise<void> {
-    const values = remote.wire("packets", signal);
     // Counted per client on some robots, one switch for all on others: so it is never stopped from here. The count ends
     // with the connection, and a switch is not ours to turn off.
     if (remote.has("StartStreaming", "function")) await remote.call("StartStreaming", []);
-    for await (const value of values) this.#takePacket(value);
+    for await (const value of remote.wire("packets", signal)) {
+      this.#works("wire packets");
+      this.#takePacket(value);
+    }
+    throw new Error("the device closed it");
   }
 
   #takePacket(value: unknown): void {
