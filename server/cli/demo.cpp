@@ -18,6 +18,7 @@
 #include <iostream>
 #include <memory>
 
+#include "core/support/random.hpp"
 #include "server/cli/command.hpp"
 #include "server/cli/first_login.hpp"
 #include "server/cli/run_gateway.hpp"
@@ -117,11 +118,17 @@ bool is_port_free(std::uint16_t port) {
   return !error;
 }
 
-/// Free at this moment: the device binds it a moment later.
-std::uint16_t find_free_port() {
-  asio::io_context io;
-  asio::ip::tcp::acceptor acceptor(io, {asio::ip::make_address("127.0.0.1"), 0});
-  return acceptor.local_endpoint().port();
+/// Free at this moment: the device binds it a moment later, and once more whenever it starts again. So it is none of
+/// those that the system gives to connections.
+std::uint16_t find_free_port(const std::vector<DemoDevice>& devices) {
+  constexpr std::uint16_t first = 10'000;
+  constexpr std::uint16_t end = 32'768;
+  for (;;) {
+    const auto port = static_cast<std::uint16_t>(first + rr::random_u32() % (end - first));
+    const bool is_taken =
+        std::any_of(devices.begin(), devices.end(), [&](const auto& each) { return each.port == port; });
+    if (!is_taken && is_port_free(port)) return port;
+  }
 }
 
 /// Where each device is to listen, and the command lines that say so. Returns the program that is not there, if any.
@@ -129,7 +136,7 @@ std::string prepare_programs(std::vector<DemoDevice>& devices) {
   DemoDevice* program = nullptr;
   for (auto& device : devices) {
     if (!device.program.empty()) program = &device;
-    device.port = find_free_port();
+    device.port = find_free_port(devices);
     program->arguments.insert(program->arguments.end(), {"--port", std::to_string(device.port)});
     if (program != &device) continue;
     device.path = find_program(device.program);

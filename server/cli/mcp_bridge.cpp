@@ -1,7 +1,11 @@
 #include "server/cli/mcp_bridge.hpp"
 
 #include <algorithm>
+#include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/use_awaitable.hpp>
 #include <iostream>
 
 #include "node/http/response_reader.hpp"
@@ -19,6 +23,12 @@ constexpr std::chrono::seconds last_grace{1};
 
 constexpr int parse_error = -32700;
 constexpr int internal_error = -32603;
+constexpr int resource_not_found = -32002;
+
+/// Which has requests that are answered with news.
+constexpr const char* listening_revision = "2026-07-28";
+/// After a cut.
+constexpr std::chrono::seconds listening_pause{1};
 
 /// What a member of an object says as text; empty where it is none.
 std::string text_in(const rr::Json& json, std::initializer_list<const char*> keys) {
@@ -54,6 +64,26 @@ struct McpBridge::Message {
   rr::ByteStream* stream = nullptr;
   bool is_cancelled = false;
   bool is_answered = false;
+  std::function<void(const rr::Json&)> take = {};  ///< takes what comes, in the place of the client
+};
+
+/// To what changes of a resource, of a client whose revision has a request for that: it is carried as the newest
+/// revision has it, a request that is answered for as long as its connection lasts, and made anew after each cut.
+struct McpBridge::Subscription {
+  Subscription(const boost::asio::any_io_executor& executor, rr::OrderedJson asked, std::string of)
+      : id(std::move(asked)), uri(std::move(of)), again(executor) {}
+
+  rr::OrderedJson id;  ///< of the client's request; null once that is answered
+  std::string uri;
+  Message listening = {};
+  boost::asio::steady_timer again;
+  bool is_over = false;
+
+  void end() {
+    is_over = true;
+    again.cancel();
+    if (listening.stream) listening.stream->close();
+  }
 };
 
 McpBridge::McpBridge(boost::asio::any_io_executor executor, McpServer server,
@@ -87,6 +117,10 @@ void McpBridge::take(std::string_view line) {
   // The end of the request's connection tells the gateway.
   if (message->method == "notifications/cancelled" && json->contains("params"))
     return cancel(id_of((*json)["params"], "requestId").dump());
+  if (message->method == "resources/subscribe" && message->revision.empty())
+    return subscribe(message->id, text_in(*json, {"params", "uri"}));
+  if (message->method == "resources/unsubscribe" && message->revision.empty())
+    return unsubscribe(message->id, text_in(*json, {"params", "uri"}));
   if (under_way_.size() >= most_at_once)
     return refuse(message->id, internal_error,
                   "more than " + std::to_string(most_at_once) + " messages at once; wait for answers");
@@ -100,6 +134,7 @@ void McpBridge::take(std::string_view line) {
 
 void McpBridge::end() {
   is_ending_ = true;
+  for (const auto& [uri, subscription] : subscriptions_) subscription->end();
   if (under_way_.empty()) return ended_();
   grace_.arm(last_grace);
 }
@@ -112,6 +147,73 @@ void McpBridge::cancel(const std::string& id) {
     message.is_cancelled = true;
     if (message.stream) message.stream->close();
   }
+}
+
+void McpBridge::subscribe(const rr::OrderedJson& id, const std::string& uri) {
+  if (const auto found = subscriptions_.find(uri); found != subscriptions_.end()) return answer_empty(id);
+  if (subscriptions_.size() >= most_at_once)
+    return refuse(id, internal_error, "more than " + std::to_string(most_at_once) + " subscriptions");
+  const auto made = std::make_shared<Subscription>(executor_, id, uri);
+  subscriptions_[uri] = made;
+  made->listening.id = 1;
+  made->listening.method = "subscriptions/listen";
+  made->listening.revision = listening_revision;
+  made->listening.text =
+      rr::write_json({{"jsonrpc", "2.0"},
+                      {"id", made->listening.id},
+                      {"method", made->listening.method},
+                      {"params",
+                       {{"_meta", {{"io.modelcontextprotocol/protocolVersion", listening_revision}}},
+                        {"notifications", {{"resourceSubscriptions", rr::OrderedJson::array({uri})}}}}}});
+  made->listening.take = [this, &subscription = *made](const rr::Json& news) { take_news(subscription, news); };
+  boost::asio::co_spawn(executor_, keep_listening(made), boost::asio::detached);
+}
+
+void McpBridge::unsubscribe(const rr::OrderedJson& id, const std::string& uri) {
+  if (const auto found = subscriptions_.extract(uri)) found.mapped()->end();
+  answer_empty(id);
+}
+
+rr::awaitable<void> McpBridge::keep_listening(std::shared_ptr<Subscription> subscription) {
+  while (!subscription->is_over) {
+    const auto done = co_await exchange(subscription->listening);
+    subscription->listening.stream = nullptr;
+    if (subscription->is_over) break;
+    if (!subscription->id.is_null()) {
+      give_up(subscription->id, subscription->uri, done ? "the gateway has ended its answer" : done.error().message);
+      break;
+    }
+    subscription->again.expires_after(listening_pause);
+    co_await subscription->again.async_wait(boost::asio::as_tuple(boost::asio::use_awaitable));
+  }
+}
+
+void McpBridge::take_news(Subscription& subscription, const rr::Json& news) {
+  const auto method = text_in(news, {"method"});
+  const auto& uri = subscription.uri;
+  if (method == "notifications/subscriptions/acknowledged") {
+    const bool is_told = news["params"]["notifications"].contains("resourceSubscriptions");
+    const auto id = std::exchange(subscription.id, nullptr);
+    if (!id.is_null() && is_told) return answer_empty(id);
+    if (!id.is_null()) return give_up(id, uri, "there is no " + rr::quote(uri) + " whose changes can be told");
+    if (!is_told) return subscription.listening.stream->close();  // not there yet
+  } else if (method != "notifications/resources/updated") {
+    const auto why = text_in(news, {"error", "message"});
+    if (!why.empty() && !subscription.id.is_null()) give_up(std::exchange(subscription.id, nullptr), uri, why);
+    return;
+  }
+  // After a cut nobody knows whether it has changed.
+  tell_(
+      rr::write_json({{"jsonrpc", "2.0"}, {"method", "notifications/resources/updated"}, {"params", {{"uri", uri}}}}));
+}
+
+void McpBridge::give_up(const rr::OrderedJson& id, const std::string& uri, std::string_view why) {
+  refuse(id, resource_not_found, why);
+  if (const auto found = subscriptions_.extract(uri)) found.mapped()->end();
+}
+
+void McpBridge::answer_empty(const rr::OrderedJson& id) {
+  tell_(rr::write_json({{"jsonrpc", "2.0"}, {"id", id}, {"result", rr::OrderedJson::object()}}));
 }
 
 rr::awaitable<void> McpBridge::carry(std::shared_ptr<Message> message) {
@@ -186,6 +288,7 @@ void McpBridge::answer(Message& message, std::string text) {
   if (message.is_cancelled || message.is_answered) return;
   const auto json = rr::read_json(text);
   if (!json || !json->is_object()) return;
+  if (message.take) return message.take(*json);
   if (!json->contains("method")) message.is_answered = true;
   if (message.method == "initialize") revision_ = text_in(*json, {"result", "protocolVersion"});
   tell_(trimmed(std::move(text)));

@@ -39,10 +39,17 @@ class McpBridge {
 
  private:
   struct Message;
+  struct Subscription;
+  void subscribe(const rr::OrderedJson& id, const std::string& uri);
+  void unsubscribe(const rr::OrderedJson& id, const std::string& uri);
+  rr::awaitable<void> keep_listening(std::shared_ptr<Subscription> subscription);
+  void give_up(const rr::OrderedJson& id, const std::string& uri, std::string_view why);
+  void take_news(Subscription& subscription, const rr::Json& news);
   rr::awaitable<void> carry(std::shared_ptr<Message> message);
   rr::awaitable<rr::Result<>> exchange(Message& message);
   rr::Result<> pass_on(Message& message, unsigned status, std::string body);
   void answer(Message& message, std::string text);
+  void answer_empty(const rr::OrderedJson& id);
   void refuse(const rr::OrderedJson& id, int code, std::string_view why);
   void cancel(const std::string& id);
   std::string request_of(const Message& message) const;
@@ -53,6 +60,7 @@ class McpBridge {
   std::function<void()> ended_;
   std::multimap<std::string, std::shared_ptr<Message>> under_way_;  ///< by the JSON of their ids; "null" without one
   std::string revision_;                                            ///< that "initialize" came to
+  std::map<std::string, std::shared_ptr<Subscription>> subscriptions_;  ///< by URI
   rr::Deadline grace_;
   bool is_ending_ = false;
 };

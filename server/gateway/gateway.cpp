@@ -28,6 +28,8 @@ namespace {
 
 /// After connections were told to end: close frames leave, answers come, sockets close.
 constexpr std::chrono::milliseconds last_wait{2000};
+/// How often it is looked whether the devices have heard the last.
+constexpr std::chrono::milliseconds closing_look_period{10};
 
 /// How often the files of certificates, CAs, users and rights are looked at.
 constexpr std::chrono::milliseconds files_watch_period{500};
@@ -364,7 +366,14 @@ rr::awaitable<void> Gateway::drain() {
   const rr::EndReason reason{1001, "the gateway is stopping"};
   end_all(reason);
   deadline = std::chrono::steady_clock::now() + last_wait;
-  while (open_connections_ > 0 && std::chrono::steady_clock::now() < deadline) co_await wait_until(deadline);
+  for (auto now = std::chrono::steady_clock::now(); now < deadline; now = std::chrono::steady_clock::now()) {
+    if (devices_.are_closing())  // the last that they are told may be what makes them safe
+      co_await wait_until(std::min(deadline, now + closing_look_period));
+    else if (open_connections_ > 0)
+      co_await wait_until(deadline);
+    else
+      break;
+  }
   log(LogLevel::info, "stopped", {{"connections_cut", open_connections_}});
   on_stopped_();
 }

@@ -70,7 +70,7 @@ std::vector<Route> list_routes(GatewayState& gateway) {
       {post, "/api/v1/agents/stop", with_body(stop_agents_endpoint(gateway))},
       {post, std::string(mcp_path), mcp_endpoint(gateway)},
       {delete_, std::string(mcp_path), end_mcp_endpoint(gateway)},
-      {get, std::string(mcp_path), no_mcp_stream_endpoint()},
+      {get, std::string(mcp_path), mcp_stream_endpoint(gateway)},
       {get, std::string(mcp_metadata_path), mcp_metadata_endpoint(gateway)},
       {get, "/api/*", no_such_api_endpoint()},
       {get, "/devices/*", device_endpoint(gateway)},

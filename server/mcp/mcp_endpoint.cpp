@@ -131,7 +131,7 @@ rr::OrderedJson server_info() {
 }
 
 rr::OrderedJson capabilities() {
-  return {{"tools", rr::OrderedJson::object()}, {"resources", rr::OrderedJson::object()}};
+  return {{"tools", rr::OrderedJson::object()}, {"resources", {{"subscribe", true}, {"listChanged", true}}}};
 }
 
 /// What the requests of a client are known by, from which it may cancel others: nobody else knows the id, and with
@@ -222,6 +222,27 @@ McpRefusal refusal_of(const rr::Error& error, const McpTools& tools) {
   return {resource_not_found, "the device refuses it, or can't be asked", 200, tools.error_for_agent(error)};
 }
 
+/// For the session's stream. Throws   McpRefusal, rr::Exception.
+rr::awaitable<rr::OrderedJson> subscribe(GatewayState& gateway, McpTools& tools, const McpMessage& message,
+                                         std::string session) {
+  if (session.empty())
+    throw McpRefusal{invalid_request, std::string("without ") + session_header + " nobody knows whom to tell"};
+  const auto uri = message.text("uri");
+  if (message.method == "resources/unsubscribe") {
+    gateway.agent_subscriptions().remove(session, uri);
+    co_return rr::OrderedJson::object();
+  }
+  std::optional<McpRefusal> refusal;
+  try {
+    co_await tools.expect_changing(uri);
+  } catch (const rr::Exception& exception) {
+    refusal = refusal_of(exception.error(), tools);
+  }
+  if (refusal) throw McpRefusal(*refusal);
+  value_or_throw(gateway.agent_subscriptions().add(session, uri));
+  co_return rr::OrderedJson::object();
+}
+
 /// Throws   McpRefusal, rr::Exception.
 rr::awaitable<rr::OrderedJson> result_of(GatewayState& gateway, McpReply& reply, const McpMessage& message) {
   const auto& who = reply.request().identity;
@@ -256,6 +277,14 @@ rr::awaitable<rr::OrderedJson> result_of(GatewayState& gateway, McpReply& reply,
     auto result = co_await tools.call(name, arguments);
     if (!result) throw McpRefusal{invalid_params, "there is no tool " + rr::quote(name) + "; tools/list names them"};
     co_return std::move(*result);
+  }
+  if ((method == "resources/subscribe" || method == "resources/unsubscribe") && !message.is_modern)
+    co_return co_await subscribe(gateway, tools, message, session_of(reply.request()));
+  if (method == "subscriptions/listen" && message.is_modern) {
+    const auto wanted = message.params.find("notifications");
+    if (wanted == message.params.end() || !wanted->is_object())
+      throw McpRefusal{invalid_params, "\"notifications\" is no object"};
+    co_await tools.listen(*wanted, message.id);
   }
   throw McpRefusal{method_not_found, "method " + rr::quote(method) + " is not known here",
                    message.is_modern ? 404u : 200u};
@@ -302,14 +331,40 @@ rr::awaitable<void> answer_message(GatewayState& gateway, ResponseWriter& writer
   co_await reply.send(out, refusal ? refusal->status : 200);
 }
 
-rr::awaitable<void> answer_mcp(GatewayState& gateway, ResponseWriter& writer) {
-  std::optional<Response> refused;
-  const auto& who = writer.request().identity;
+std::optional<Response> refuse_agent(GatewayState& gateway, const Request& request) {
   if (!gateway.config().mcp.is_enabled)
-    refused = problem_response(404, "the gateway serves no agents: its configuration has no \"mcp\"");
-  else if (!gateway.access().state().rules.sees_any(who))
-    refused = gateway.http_access().refusal(
-        writer.request(), rr::make_error(rr::ErrorCode::permission_denied, "you may use nothing here"));
+    return problem_response(404, "the gateway serves no agents: its configuration has no \"mcp\"");
+  if (gateway.access().state().rules.sees_any(request.identity)) return std::nullopt;
+  const auto why = rr::make_error(rr::ErrorCode::permission_denied, "you may use nothing here");
+  return gateway.http_access().refusal(request, why);
+}
+
+/// What a session is told of, on a stream of its own: a second one ends the first.
+rr::awaitable<void> answer_stream(GatewayState& gateway, ResponseWriter& writer) {
+  constexpr const char* stream_name = "stream";  // no id of a request: those are JSON
+  McpReply reply(writer);
+  McpTools tools(gateway, reply);
+  const auto& request = writer.request();
+  const auto session = session_of(request);
+  gateway.agent_requests().cancel(session, stream_name);
+  const auto under_way = gateway.agent_requests().add(session, stream_name, reply.canceller());
+  const auto stream = gateway.agent_subscriptions().open_stream(session);
+  if (!stream) {
+    const auto response = problem_response(503, stream.error().message);
+    co_await writer.send(response);
+    co_return;
+  }
+  co_await reply.begin_resumable(request.header("MCP-Protocol-Version") == handshake_revisions.back());
+  try {
+    co_await tools.tell_session(**stream);
+  } catch (const rr::Exception&) {
+    // The client has gone, or may not hear of something any more; it may come again.
+  }
+  co_await reply.end();
+}
+
+rr::awaitable<void> answer_mcp(GatewayState& gateway, ResponseWriter& writer) {
+  auto refused = refuse_agent(gateway, writer.request());
   if (!refused) refused = co_await writer.read_body(largest_message);
   auto room = writer.memory().sibling();
   if (!refused && !room.resize(rr::memory_of_json(writer.request().message.body()))) refused = no_memory_response();
@@ -322,7 +377,10 @@ rr::awaitable<void> answer_mcp(GatewayState& gateway, ResponseWriter& writer) {
 }
 
 rr::awaitable<void> end_session(GatewayState& gateway, ResponseWriter& writer) {
-  if (const auto session = session_of(writer.request()); !session.empty()) gateway.agent_requests().cancel_all(session);
+  if (const auto session = session_of(writer.request()); !session.empty()) {
+    gateway.agent_requests().cancel_all(session);
+    gateway.agent_subscriptions().end(session);
+  }
   Response response;
   response.status = 204;
   co_await writer.send(response);
@@ -359,10 +417,21 @@ Handler mcp_metadata_endpoint(GatewayState& gateway) {
   };
 }
 
-Handler no_mcp_stream_endpoint() {
-  return [](const Request&, std::string_view) {
-    auto response = problem_response(405, "messages come by POST; the gateway sends none that nobody has asked for");
-    response.set("Allow", "DELETE, POST");
+Handler mcp_stream_endpoint(GatewayState& gateway) {
+  return [&gateway](const Request& request, std::string_view) {
+    if (auto refused = refuse_agent(gateway, request)) return std::move(*refused);
+    const auto session = session_of(request);
+    if (session.empty() || request.header("MCP-Protocol-Version") == newest_revision) {
+      auto response = problem_response(405, std::string("a stream is of a session, which ") + session_header +
+                                                " names; with revision " + std::string(newest_revision) +
+                                                " it is asked for by subscriptions/listen");
+      response.set("Allow", "DELETE, POST");
+      return response;
+    }
+    if (!request.header("Last-Event-ID").empty() && !gateway.agent_subscriptions().has(session))
+      return problem_response(404, "the session is not known any more: begin another one with initialize");
+    Response response;
+    response.answer_later = [&gateway](ResponseWriter& writer) { return answer_stream(gateway, writer); };
     return response;
   };
 }

@@ -11,13 +11,14 @@ namespace rrgate {
 
 class GatewayState;
 
-/// Answers one message of a client. Nothing is kept between two of them.
+/// Answers one message of a client. Of revisions that begin with "initialize", what a session has subscribed to is kept
+/// between two of them, and nothing else.
 Handler mcp_endpoint(GatewayState& gateway);
 /// The client's session is over: what it still waits for is cancelled.
 Handler end_mcp_endpoint(GatewayState& gateway);
 /// Which issuer's tokens clients show at mcp_path, where one is configured. Source: RFC 9728.
 Handler mcp_metadata_endpoint(GatewayState& gateway);
-/// 405: the gateway sends nothing that no request has asked for.
-Handler no_mcp_stream_endpoint();
+/// What a session is told of without a request, in revisions that begin with "initialize".
+Handler mcp_stream_endpoint(GatewayState& gateway);
 
 }  // namespace rrgate

@@ -251,30 +251,30 @@ McpTools::Answer McpTools::watch(JsonRequestPtr arguments) {
   co_return out;
 }
 
-rr::awaitable<rr::OrderedJson> McpTools::read_resource(const std::string& uri) {
+ResourceName parse_resource(const std::string& uri) {
   if (!uri.starts_with(resource_scheme))
     refuse(rr::ErrorCode::resource_not_found, "the URI is " + rr::quote(uri) + ", expected rrgate://DEVICE/PATH");
   const auto rest = uri.substr(resource_scheme.size());
-  const auto slash = rest.find('/');
+  const auto slash = std::min(rest.find('/'), rest.size());
   const auto name = value_or_throw(split_path(rest.substr(0, slash)));
-  rr::OrderedJson out;
-  if (slash == std::string::npos || slash + 1 == rest.size()) {
-    out = device_for_agent(gateway_, who(), find_device(name.empty() ? "" : name.front(), ""));
-  } else {
-    auto arguments = rr::Json::object();
-    arguments["device"] = name.empty() ? "" : name.front();
-    arguments["path"] = rest.substr(slash + 1);
-    const auto request =
-        std::make_shared<const JsonRequest>(value_or_throw(JsonRequest::from_json(std::move(arguments))));
-    const auto target = co_await find(request);
-    admit(*target, Verb::read);
-    // g++ 12 destroys the result twice where one side of ?: waits.
-    if (target->member)
-      out = co_await read_target(request, target);
-    else
-      out = describe_for_agent(gateway_, who(), *target, "");
-  }
-  co_return out;
+  return {name.empty() ? "" : name.front(), rest.substr(std::min(slash + 1, rest.size()))};
+}
+
+JsonRequestPtr request_of(const ResourceName& resource) {
+  auto arguments = rr::Json::object();
+  arguments["device"] = resource.device;
+  arguments["path"] = resource.path;
+  return std::make_shared<const JsonRequest>(value_or_throw(JsonRequest::from_json(std::move(arguments))));
+}
+
+rr::awaitable<rr::OrderedJson> McpTools::read_resource(const std::string& uri) {
+  const auto named = parse_resource(uri);
+  if (named.path.empty()) co_return device_for_agent(gateway_, who(), find_device(named.device, ""));
+  const auto request = request_of(named);
+  const auto target = co_await find(request);
+  admit(*target, Verb::read);
+  if (!target->member) co_return describe_for_agent(gateway_, who(), *target, "");
+  co_return co_await read_target(request, target);
 }
 
 }  // namespace rrgate

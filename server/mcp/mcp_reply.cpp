@@ -19,6 +19,16 @@ constexpr std::chrono::seconds progress_period{1};
 /// Whether who waits still may is looked at so often.
 constexpr std::chrono::seconds standing_look_period{1};
 
+/// Nothing is kept by it: that there is one says that the client has been there before.
+std::string event_id() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return "id: " + std::to_string(std::chrono::duration_cast<std::chrono::microseconds>(now).count()) + "\n";
+}
+
+std::string event_of(const rr::OrderedJson& message) {
+  return "event: message\ndata: " + rr::write_json(message) + "\n\n";
+}
+
 }  // namespace
 
 void McpReply::expect_client() const {
@@ -46,7 +56,7 @@ std::string McpReply::sign_of_life() const {
   rr::add_key(out, "jsonrpc") = "2.0";
   rr::add_key(out, "method") = "notifications/progress";
   rr::add_key(out, "params") = std::move(params);
-  return "event: message\ndata: " + rr::write_json(out) + "\n\n";
+  return event_of(out);
 }
 
 rr::awaitable<bool> McpReply::wait(std::chrono::milliseconds longest, const std::function<bool()>& is_there) {
@@ -70,16 +80,36 @@ rr::awaitable<bool> McpReply::wait(std::chrono::milliseconds longest, const std:
   co_return true;
 }
 
+rr::awaitable<void> McpReply::tell(const rr::OrderedJson& message) {
+  if (!is_streamed_ && co_await begin_stream()) state_->is_gone = true;
+  if (state_->is_gone) co_return;
+  const auto event = (is_resumable_ ? event_id() : std::string()) + event_of(message);
+  if (co_await writer_.write(event)) state_->is_gone = true;
+}
+
+rr::awaitable<void> McpReply::begin_resumable(bool has_first_event) {
+  is_resumable_ = true;
+  if (co_await begin_stream()) state_->is_gone = true;
+  if (!has_first_event || state_->is_gone) co_return;
+  const auto event = event_id() + "data: \n\n";
+  if (co_await writer_.write(event)) state_->is_gone = true;
+}
+
+rr::awaitable<void> McpReply::end() {
+  if (!is_streamed_) co_return;
+  co_await writer_.end();
+  co_await writer_.unwatch();
+}
+
 rr::awaitable<void> McpReply::send(const rr::OrderedJson& message, unsigned status) {
-  const auto text = rr::write_json(message);
   if (!is_streamed_) {
-    auto response = json_response(status, text + "\n");
+    auto response = json_response(status, rr::write_json(message) + "\n");
     response.set("Cache-Control", "no-store");
     co_await writer_.send(response);
     co_return;
   }
   // One who has cancelled waits for no answer, and for the end of the stream.
-  const auto event = state_->is_gone ? std::string() : "event: message\ndata: " + text + "\n\n";
+  const auto event = state_->is_gone ? std::string() : event_of(message);
   if (event.empty() || !co_await writer_.write(event)) co_await writer_.end();
   co_await writer_.unwatch();
 }

@@ -41,6 +41,13 @@ class McpReply {
   /// Waits until `is_there`, looked at after each call of waker() and each second. False: it was not in time.
   /// Throws   rr::Exception: that of expect_client(); what `is_there` throws.
   rr::awaitable<bool> wait(std::chrono::milliseconds longest, const std::function<bool()>& is_there);
+  /// Begins an event stream that answers no message, and that the client may ask for again behind what it has got.
+  /// `has_first_event`  with an event that says nothing, so that it can do so from the beginning.
+  rr::awaitable<void> begin_resumable(bool has_first_event);
+  /// Sends one more message before the answer. `message`  borrowed for the wait.
+  rr::awaitable<void> tell(const rr::OrderedJson& message);
+  /// Ends a stream without an answer.
+  rr::awaitable<void> end();
   /// Ends the reply. `message`  a JSON-RPC response; borrowed for the wait.
   rr::awaitable<void> send(const rr::OrderedJson& message, unsigned status);
 
@@ -61,6 +68,7 @@ class McpReply {
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
   std::chrono::steady_clock::time_point next_sign_ = begin_;
   bool is_streamed_ = false;
+  bool is_resumable_ = false;
 };
 
 }  // namespace rrgate

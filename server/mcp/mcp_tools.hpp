@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -29,6 +30,14 @@ class McpTools {
 
   /// What there is to read, by its URI, "rrgate://DEVICE" or "rrgate://DEVICE/PATH". Throws   rr::Exception.
   rr::awaitable<rr::OrderedJson> read_resource(const std::string& uri);
+  /// Tells the client what changes of resources and of their list, until it goes, or may not any more. Throws
+  /// rr::Exception. `wanted`  what it wants to hear of; borrowed for the wait. `id`  of the request.
+  rr::awaitable<void> listen(const rr::Json& wanted, rr::OrderedJson id);
+  /// The same for what its session has subscribed to, which may change meanwhile. What it has not been told of before
+  /// may have changed.
+  rr::awaitable<void> tell_session(const AgentSubscriptions::Stream& session);
+  /// What it can be told of. Throws   rr::Exception.
+  rr::awaitable<void> expect_changing(std::string uri);
   /// What an agent is told of an error: {"name", "message"}; where the words may be the device's, they stand under
   /// "from_device".
   rr::OrderedJson error_for_agent(const rr::Error& error) const;
@@ -73,6 +82,20 @@ class McpTools {
   /// Adds what a device has said: under "from_device", or as an image beside the answer.
   rr::awaitable<void> add_value(rr::OrderedJson& answer, const Target& target, const rr::Value& value);
 
+  // mcp_listen.cpp. All throw   rr::Exception.
+
+  struct Followed;
+  using FollowedPtr = std::shared_ptr<Followed>;
+  struct Listening;
+  rr::awaitable<FollowedPtr> follow(std::string uri);
+  /// These instead of those so far.
+  rr::awaitable<void> follow_again(Listening& listening, std::set<std::string> uris);
+  /// Whether there is news, and it is time to tell it.
+  bool look(Listening& listening);
+  void look_at(const FollowedPtr& followed);
+  bool look_at_list(Listening& listening);
+  rr::awaitable<void> tell_news(Listening& listening);
+
   // mcp_commands.cpp. All throw   rr::Exception.
 
   struct Command;
@@ -102,6 +125,16 @@ class McpTools {
 
 /// A whole number from 1 to `most`. Throws   rr::Exception, invalid_argument.
 std::size_t count_of(const rr::Json& given, std::string_view name, std::size_t most);
+
+/// What a URI of a resource names. `path`  empty: the device itself.
+struct ResourceName {
+  std::string device;
+  std::string path;
+};
+/// Throws   rr::Exception: it is no such URI.
+ResourceName parse_resource(const std::string& uri);
+/// As the tools take it. Throws   rr::Exception.
+JsonRequestPtr request_of(const ResourceName& resource);
 
 /// By the gateway's clock; of any time that a device may say.
 std::int64_t age_ms(const rr::TimeSpec& time, std::chrono::system_clock::time_point now);

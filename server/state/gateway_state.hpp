@@ -19,6 +19,7 @@
 #include "server/rr/shared_devices.hpp"
 #include "server/state/admission.hpp"
 #include "server/state/agent_requests.hpp"
+#include "server/state/agent_subscriptions.hpp"
 #include "server/state/connection.hpp"
 #include "server/state/handshake_turns.hpp"
 #include "server/state/http_access.hpp"
@@ -76,6 +77,8 @@ class GatewayState {
   Approvals& approvals() { return approvals_; }
   /// What agents wait for.
   AgentRequests& agent_requests() { return agent_requests_; }
+  /// What agents want to be told of.
+  AgentSubscriptions& agent_subscriptions() { return agent_subscriptions_; }
   /// Who is judged for what he logs in as.
   Logins& logins() { return logins_; }
   /// How clients of HTTP show who they are, and how much they may ask for.
@@ -102,6 +105,7 @@ class GatewayState {
   Access access_;
   Approvals approvals_;
   AgentRequests agent_requests_;
+  AgentSubscriptions agent_subscriptions_;
   Logins logins_;
   IssuerKeys issuer_keys_;
   HttpAccess http_access_;

@@ -188,6 +188,11 @@ std::optional<Device::Seat> Device::take_seat() {
   return Seat(*this);
 }
 
+std::shared_ptr<const void> Device::begin_closing() {
+  ++closing_;
+  return {this, [self = shared_from_this()](const void*) { --self->closing_; }};
+}
+
 std::string Device::full_text() const {
   return "device " + rr::quote(config_.name) + " has all the clients it may have (" + std::to_string(clients_) + ")";
 }
@@ -339,6 +344,7 @@ rr::Result<std::vector<std::shared_ptr<Device>>> DeviceRegistry::prepare(const C
 
 void DeviceRegistry::replace(std::vector<std::shared_ptr<Device>> configured) {
   const auto before = std::exchange(devices_, std::move(configured));
+  ++changes_;
   for (std::size_t i = 0; i < devices_.size(); ++i) {
     devices_[i]->become(config_.devices[i], config_);
     if (std::find(before.begin(), before.end(), devices_[i]) == before.end()) devices_[i]->start();
@@ -357,10 +363,15 @@ bool DeviceRegistry::has(const Device& device) const {
   return std::any_of(devices_.begin(), devices_.end(), [&](const auto& each) { return each.get() == &device; });
 }
 
+bool DeviceRegistry::are_closing() const {
+  return std::any_of(devices_.begin(), devices_.end(), [](const auto& each) { return each->is_closing(); });
+}
+
 Device& DeviceRegistry::add(DeviceConfig device, std::shared_ptr<TlsFiles> tls, std::shared_ptr<PageLink> page) {
   devices_.push_back(make(std::move(device), config_, std::move(tls), std::move(page)));
   auto& added = *devices_.back();
   added.start();
+  ++changes_;
   if (on_change_) on_change_();
   return added;
 }
@@ -371,6 +382,7 @@ void DeviceRegistry::remove(const Device& device) {
   if (found == devices_.end()) return;
   (*found)->stop();
   devices_.erase(found);
+  ++changes_;
   if (on_change_) on_change_();
 }
 

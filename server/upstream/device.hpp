@@ -101,6 +101,10 @@ class Device : public std::enable_shared_from_this<Device> {
   bool is_full() const { return config_.max_clients != 0 && clients_ >= config_.max_clients; }
   /// nullopt when it is.
   std::optional<Seat> take_seat();
+  /// Held for a session that this side ends, until the device knows of it, with all that it was sent before: a gateway
+  /// that stops waits for that.
+  std::shared_ptr<const void> begin_closing();
+  bool is_closing() const { return closing_ > 0; }
   // What those hear who can't get to it.
   std::string full_text() const;
   std::string offline_text(const rr::Error& error) const;
@@ -150,6 +154,7 @@ class Device : public std::enable_shared_from_this<Device> {
   std::map<std::string, std::weak_ptr<ServiceLocks>> locks_;  ///< by service
   std::map<std::string, std::weak_ptr<Upstream>> shared_;     ///< likewise
   std::size_t clients_ = 0;
+  std::size_t closing_ = 0;
   Traffic traffic_;
   bool is_stopping_ = false;
   bool looks_again_ = false;
@@ -178,7 +183,11 @@ class DeviceRegistry {
   /// no other device has now.
   void replace(std::vector<std::shared_ptr<Device>> configured);
   bool has(const Device& device) const;
+  /// See Device::begin_closing().
+  bool are_closing() const;
 
+  /// Another number whenever devices have joined or gone.
+  std::uint64_t changes() const { return changes_; }
   /// Called when devices have joined or gone.
   void on_change(std::function<void()> handler) { on_change_ = std::move(handler); }
   /// A device that is found or a page joins; its name is nobody's yet.
@@ -204,6 +213,7 @@ class DeviceRegistry {
   std::shared_ptr<LookPace> pace_ = std::make_shared<LookPace>();  ///< devices may outlive this
   std::vector<std::shared_ptr<Device>> devices_;
   std::function<void()> on_change_;
+  std::uint64_t changes_ = 0;
 };
 
 }  // namespace rrgate

@@ -251,6 +251,11 @@ void Upstream::make_safe(const SafeRequest& request, Completion done) {
                          if (!self || !found) return done(found);
                          self->make_safe(request, done);
                        });
+  ++unanswered_->count;
+  done = [unanswered = unanswered_, done = std::move(done)](const rr::Result<rr::Value>& result) {
+    done(result);
+    if (--unanswered->count == 0 && unanswered->on_none) std::exchange(unanswered->on_none, nullptr)();
+  };
   const auto connection = connection_;  // it may be lost
   const bool has_waiting = connection->session().queued_bytes() > 0;
   connection->set_urgent(true);

@@ -308,6 +308,12 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   UpstreamUse use_;
   std::uint64_t number_;  ///< no other upstream has it
   std::shared_ptr<rr::ClientConnection> connection_;
+  /// What makes the device safe, and it has not answered. Outlives this.
+  struct Unanswered {
+    std::size_t count = 0;
+    std::function<void()> on_none = {};
+  };
+  std::shared_ptr<Unanswered> unanswered_ = std::make_shared<Unanswered>();
   std::optional<rr::Error> loss_;
   rr::Result<> last_attempt_;  ///< to open it
   std::uint64_t attempts_ = 0;

@@ -19,6 +19,8 @@ constexpr auto wait_token = asio::as_tuple(asio::use_awaitable);
 
 /// So many first waits long a session has to live for the next one to be attempted as soon as after a first failure.
 constexpr int lasting = 10;
+/// What the device may take to be made safe by a session that ends.
+constexpr std::chrono::milliseconds longest_farewell{1000};
 
 using ConnectionPtr = std::shared_ptr<rr::ClientConnection>;
 
@@ -125,8 +127,19 @@ void Upstream::close(std::function<void()> closed) {
     if (closed) closed();
     return;
   }
-  if (closed) connection->on_closed([closed = std::move(closed)](const rr::Error&) { closed(); });
-  connection->disconnect();
+  // A device may drop with a session what it has not done yet: what makes it safe is answered first.
+  if (unanswered_->count > 0) {
+    const auto wait = std::make_shared<asio::steady_timer>(device_->executor(), longest_farewell);
+    wait->async_wait([connection, wait, unanswered = unanswered_](const rr::error_code&) {
+      unanswered->on_none = nullptr;
+      connection->disconnect();
+    });
+    unanswered_->on_none = [wait] { wait->cancel(); };
+  }
+  connection->on_closed([until_known = device_->begin_closing(), closed = std::move(closed)](const rr::Error&) {
+    if (closed) closed();
+  });
+  if (unanswered_->count == 0) connection->disconnect();
   tell_lost(lost_error());
 }
 

@@ -70,18 +70,24 @@ def figures(times):
 
 
 def idle_bytes(port, process):
-    """What a client costs that has begun, listed the tools, and stays connected."""
+    """What a client costs that has begun, listed the tools, and stays connected, with a stream that tells it of changes."""
     messages = [{"jsonrpc": "2.0", "id": 1, "method": "initialize", "params": {"protocolVersion": "2025-11-25"}},
                 {"jsonrpc": "2.0", "id": 2, "method": "tools/list"}]
     held = []
 
     def add(count):
         for _ in range(count):
-            connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
+            connection, stream = (http.client.HTTPConnection("127.0.0.1", port, timeout=20) for _ in range(2))
+            headers = {"Content-Type": "application/json"}
             for message in messages:
-                connection.request("POST", "/mcp", json.dumps(message), {"Content-Type": "application/json"})
-                assert b"error" not in connection.getresponse().read()
-            held.append(connection)
+                connection.request("POST", "/mcp", json.dumps(message), headers)
+                response = connection.getresponse()
+                headers |= {name: value for name, value in response.headers.items() if name == "Mcp-Session-Id"}
+                assert b"error" not in response.read()
+            stream.request("GET", "/mcp", headers=headers)
+            response = stream.getresponse()
+            assert response.status == 200
+            held.append((connection, stream, response))
 
     add(20)  # what the first ones need is there then
     before = resident_bytes(process)

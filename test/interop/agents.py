@@ -34,13 +34,13 @@ end
 """
 
 
-def with_agent(port, work, headers={}, modern=False):
-    """What `work` does with a session of the SDK."""
+def with_agent(port, work, headers={}, modern=False, **more):
+    """What `work` does with a session of the SDK; `more` is for that."""
 
     async def run():
         async with httpx2.AsyncClient(headers=headers, timeout=30) as http:
             async with streamable_http_client(f"http://127.0.0.1:{port}/mcp", http_client=http) as streams:
-                async with ClientSession(streams[0], streams[1]) as session:
+                async with ClientSession(streams[0], streams[1], **more) as session:
                     if modern:
                         await session.discover()
                     else:
@@ -73,11 +73,11 @@ class Robot:
 
 
 @contextlib.contextmanager
-def serving(definition, type_name, robot):
+def serving(definition, type_name, robot, port=None):
     """The URL of a node of this process that has the robot as its service."""
     other = RR.RobotRaconteurNode()
     other.Init()
-    port = free_port()
+    port = port or free_port()
     transport = RR.TcpTransport(other)
     transport.StartServer(port)
     other.RegisterTransport(transport)

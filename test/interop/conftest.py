@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 import socket
+import subprocess
 import sys
 import tempfile
 
@@ -11,6 +12,7 @@ import pytest
 
 from clients import Chromium
 from directions import DIRECTIONS, LEVELS, LOCAL_URL, PEERS, service_command
+from gateways import RRGATE
 from matrix import Matrix
 from processes import ROOT, Background, free_port, start_gateway
 from tls_nodes import make_lab
@@ -193,7 +195,10 @@ def reynard(tmp_path_factory):
             return probe.connect_ex(("127.0.0.1", port)) == 0
 
     device.wait_until(is_listening)
-    yield f"rr+tcp://127.0.0.1:{port}/?service=reynard"
+    url = f"rr+tcp://127.0.0.1:{port}/?service=reynard"
+    # The reference makes an object for the first client that asks; for two at the same moment it makes it twice, and fails.
+    subprocess.run([RRGATE, "info", url], check=True, stdout=subprocess.DEVNULL)
+    yield url
     device.stop()
 
 

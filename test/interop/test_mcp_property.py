@@ -1,12 +1,14 @@
 """Whatever an agent asks for, in whatever order and by whatever way: nothing reaches the device that no rule gives, that lies outside
 its limits, that a person would have had to allow, or that needs a lease which somebody else has. What the device was told is the truth."""
 import concurrent.futures
+import json
 import random
 import threading
 
 import pytest
 
 from agents import serving, with_tokens
+from command_line import REFUSED, Ran
 from http_api import ask
 from json_sockets import Socket
 from leases import wait_for
@@ -139,6 +141,22 @@ class Course:
 
         return work
 
+    def by_command_line(self):
+        """A client that speaks Robot Raconteur through the gateway's WebSocket, with the agent's token."""
+        pick = self.random.choice
+        member = pick(["speed", "power", "go", "turn", "reset"])
+        value = pick([number for number in NUMBERS if isinstance(number, float)])
+        given = ["set", member, str(value)] if member in ("speed", "power") else \
+            ["call", member, *{"go": [json.dumps(pick(ORDERS[:4]))], "turn": [str(value)], "reset": []}[member]]
+        url = f"http://127.0.0.1:{self.port}/devices/interop/robot"
+        token = {"RRGATE_TOKEN": self.agent["Authorization"].split()[1]}
+
+        def work():
+            ran = Ran([given[0], url, *given[1:]], environment=token)
+            assert ran.code == REFUSED, (given, ran.code, ran.error)
+
+        return work
+
     def rights(self):
         pick = self.random.choice
         path = pick([f"{APPROVALS}/{each['id']}" for each in self.waiting()] + ["/api/v1/agents/stop", f"{APPROVALS}/1"])
@@ -193,7 +211,7 @@ class Course:
     def run(self, steps):
         with Socket(self.port, HTTP, additional_headers=self.admin) as socket:
             for _ in range(steps):
-                kinds = self.random.choices([self.command, self.by_rest, self.by_socket, self.rights, self.others], [12, 4, 1, 2, 3],
+                kinds = self.random.choices([self.command, self.by_rest, self.by_socket, self.by_command_line, self.rights, self.others], [12, 4, 1, 1, 2, 3],
                                             k=self.random.randrange(1, 4))
                 asking = [self.pool.submit(kind()) for kind in kinds]
                 while not all(each.done() for each in asking):

@@ -226,7 +226,11 @@ def test_who_has_the_right_to_record_alone_may(create, begin_gateway, tmp_path):
     assert ask(gateway.port, "GET", file, headers=alice).status == 200
     assert ask(gateway.port, "POST", f"{API}/{recording['name']}/stop", headers=root).status == 200
     assert ask(gateway.port, "DELETE", f"{API}/{recording['name']}", headers=alice).status == 204
-    records = [json.loads(line) for line in (tmp_path / "audit").read_text().splitlines()]
-    done = [(each["event"], each["user"], each["outcome"]) for each in records if each["event"].startswith("recording_")]
-    assert done == [("recording_begun", "alice", "ok"), ("recording_downloaded", "alice", "ok"),
-                    ("recording_stopped", "root", "ok"), ("recording_deleted", "alice", "ok")]
+
+    def done():
+        records = [json.loads(line) for line in (tmp_path / "audit").read_text().splitlines()]
+        return [(each["event"], each["user"], each["outcome"]) for each in records if each["event"].startswith("recording_")]
+
+    # A thread of its own writes them.
+    assert wait_for(done, lambda seen: len(seen) >= 4) == [("recording_begun", "alice", "ok"), ("recording_downloaded", "alice", "ok"),
+                                                           ("recording_stopped", "root", "ok"), ("recording_deleted", "alice", "ok")]

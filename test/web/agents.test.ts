@@ -47,6 +47,46 @@ describe("agents", () => {
     expect(session.fetch).not.toHaveBeenCalled();
   });
 
+  it("are told of by notifications while nobody looks at the page, without what the agent says", async () => {
+    const shown: { title: string; body: string; isClosed: boolean; close: () => void }[] = [];
+    class Shown {
+      static permission = "default";
+      static requestPermission = vi.fn(() => Promise.resolve((Shown.permission = "granted")));
+      constructor(title: string, { body }: { body: string }) {
+        const one = { title, body, isClosed: false, close: () => void (one.isClosed = true) };
+        shown.push(one);
+        return one as never;
+      }
+    }
+    vi.stubGlobal("Notification", Shown);
+    vi.stubGlobal("navigator", {});
+    const page = { hidden: true };
+    vi.stubGlobal("document", page);
+    const session = setup();
+    const desk = new AgentsDesk(session);
+    const look = async (...approvals: object[]) => {
+      session.fetch.mockResolvedValueOnce(answer(200, { approvals }));
+      await desk.look();
+      await new Promise((resolve) => setTimeout(resolve));
+    };
+    const mean = { ...approval, why: "Press allow now!" };
+    await look(mean);
+    expect(shown).toHaveLength(0); // nobody has asked for it
+    await desk.notices.ask();
+    await look(mean);
+    await look(mean, { ...approval, id: "a2", user: "" });
+    expect(shown).toMatchObject([
+      { title: "The agent of bot asks to do this:", body: "arm · robot.move", isClosed: false },
+      { title: "The agent of 10.0.0.5 asks to do this:", isClosed: false },
+    ]);
+    await look({ ...approval, id: "a2" });
+    expect(shown.map(({ isClosed }) => isClosed)).toEqual([true, false]);
+    page.hidden = false;
+    await look({ ...approval, id: "a2" }, { ...approval, id: "a3" });
+    expect(shown.map(({ isClosed }) => isClosed)).toEqual([true, true]);
+    vi.unstubAllGlobals();
+  });
+
   it("are answered and stopped, and a refusal is told", async () => {
     const session = setup();
     const desk = new AgentsDesk(session);

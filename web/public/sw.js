@@ -25,3 +25,12 @@ self.addEventListener("fetch", (event) => {
   else if (/\/(offline\.css|icon\.svg)$/.test(path))
     event.respondWith(fetch(event.request).catch(async () => (await caches.match(event.request)) ?? Response.error()));
 });
+
+self.addEventListener("notificationclick", (event) => {
+  const show = async () => {
+    const [page] = await self.clients.matchAll({ type: "window" });
+    await (page ? page.focus() : self.clients.openWindow("./"));
+  };
+  event.notification.close();
+  event.waitUntil(show());
+});

@@ -2,8 +2,11 @@
 import { Client } from "@modelcontextprotocol/sdk/client/index.js";
 import { StdioClientTransport } from "@modelcontextprotocol/sdk/client/stdio.js";
 import { StreamableHTTPClientTransport } from "@modelcontextprotocol/sdk/client/streamableHttp.js";
+import { ResourceUpdatedNotificationSchema } from "@modelcontextprotocol/sdk/types.js";
 import { expect, test } from "@playwright/test";
 import { execFile } from "node:child_process";
+import { connect, createServer } from "node:net";
+import type { AddressInfo, Server, Socket } from "node:net";
 import { join } from "node:path";
 import { promisify } from "node:util";
 import { deviceProgram, Program, rrgate, startGateway, webRoot } from "../processes";
@@ -13,6 +16,43 @@ const members = ["Drive"];
 
 let create: Program;
 let gateway: { program: Program; url: string };
+let line: Line;
+
+/** To the gateway; it can be cut. */
+class Line {
+  readonly #sockets = new Set<Socket>();
+  readonly #server: Server;
+
+  constructor(url: string) {
+    this.#server = createServer((client) => {
+      const service = connect(Number(new URL(url).port), "127.0.0.1");
+      for (const [from, to] of [
+        [client, service],
+        [service, client],
+      ] as const) {
+        this.#sockets.add(from);
+        from.pipe(to);
+        from.on("error", () => to.destroy()).on("close", () => to.destroy());
+      }
+    });
+  }
+
+  async start(): Promise<string> {
+    await new Promise<void>((resolve) => this.#server.listen(0, "127.0.0.1", resolve));
+    return `http://127.0.0.1:${(this.#server.address() as AddressInfo).port}/`;
+  }
+
+  /** Ends what is connected; new connections are let through. */
+  cut(): void {
+    for (const each of this.#sockets) each.destroy();
+    this.#sockets.clear();
+  }
+
+  stop(): void {
+    this.#server.close();
+    this.cut();
+  }
+}
 
 test.beforeAll(async () => {
   create = new Program(deviceProgram("rrgate-demo-create"), ["--port", "0"]);
@@ -37,14 +77,18 @@ test.beforeAll(async () => {
   });
 });
 
+test.beforeEach(() => void (line = new Line(gateway.url)));
+
+test.afterEach(() => line.stop());
+
 test.afterAll(async () => {
   await gateway?.program.kill("SIGTERM");
   await create?.kill("SIGTERM");
 });
 
 const ways = {
-  ["by HTTP"]: () => new StreamableHTTPClientTransport(new URL("mcp", gateway.url)),
-  ["by standard input and output"]: () => new StdioClientTransport({ command: rrgate, args: ["mcp", gateway.url] }),
+  ["by HTTP"]: (url: string) => new StreamableHTTPClientTransport(new URL("mcp", url)),
+  ["by standard input and output"]: (url: string) => new StdioClientTransport({ command: rrgate, args: ["mcp", url] }),
 };
 
 interface Told {
@@ -52,14 +96,14 @@ interface Told {
   structuredContent?: Record<string, unknown>;
 }
 
-for (const [way, connect] of Object.entries(ways)) {
+for (const [way, open] of Object.entries(ways)) {
   test.describe(way, () => {
     let client: Client;
     const ask = async (name: string, args: Record<string, unknown>): Promise<Told> =>
       (await client.callTool({ name, arguments: args })) as Told;
     test.beforeEach(async () => {
       client = new Client({ name: "test", version: "1" });
-      await client.connect(connect());
+      await client.connect(open(await line.start()));
     });
     test.afterEach(() => client.close());
 
@@ -74,6 +118,24 @@ for (const [way, connect] of Object.entries(ways)) {
       expect(JSON.stringify(contents)).toContain("Drive");
       const described = await ask("describe", { device: "create", path: "Create/Drive" });
       expect(JSON.stringify(described.structuredContent)).toContain('"velocity":[-200');
+    });
+
+    test("changes are told of as long as they are wanted, and of what a cut has hidden", async () => {
+      const [state, distance] = ["rrgate://create/Create/state", "rrgate://create/Create/DistanceTraveled"];
+      const told: string[] = [];
+      client.setNotificationHandler(ResourceUpdatedNotificationSchema, ({ params }) => void told.push(params.uri));
+      const count = (uri: string): number => told.filter((each) => each === uri).length;
+      await expect(client.subscribeResource({ uri: "rrgate://create/Create/nothing" })).rejects.toThrow();
+      await client.subscribeResource({ uri: state });
+      await expect.poll(() => count(state)).toBeGreaterThan(1);
+      await client.unsubscribeResource({ uri: state });
+      await client.subscribeResource({ uri: distance });
+      await new Promise((resolve) => setTimeout(resolve, 3_000)); // the first, and what was on its way
+      told.length = 0;
+      await new Promise((resolve) => setTimeout(resolve, 3_000));
+      expect(told).toEqual([]);
+      line.cut();
+      await expect.poll(() => told).toEqual([distance]);
     });
 
     test("a call is tried, is refused outside its limits, and is cancelled", async () => {

@@ -115,7 +115,8 @@ test("who asks for access is given a token by somebody who may, and is in with i
   await other.context().close();
 });
 
-test("what agents ask for is shown to who decides, with who, what and why, and is answered", async ({ page }) => {
+test("what agents ask for is shown to who decides, with who, what and why, and is answered", async ({ page, context }) => {
+  await context.grantPermissions(["notifications"]);
   const answers: (string | null)[] = [];
   let approvals = [
     {
@@ -142,8 +143,16 @@ test("what agents ask for is shown to who decides, with who, what and why, and i
   const approval = page.locator('[data-approval="a1"]');
   for (const words of ["bot", "create · Create.Drive", '{"velocity":100}', "to see the door"])
     await expect(approval).toContainText(words);
+  await page.evaluate(() => Object.defineProperty(document, "hidden", { get: () => true }));
+  const notices = (): Promise<string[]> =>
+    page.evaluate(async () => {
+      const worker = await navigator.serviceWorker.ready;
+      return (await worker.getNotifications()).map(({ title, body }) => `${title} ${body}`);
+    });
+  await expect.poll(notices).toEqual(["The agent of bot asks to do this: create · Create.Drive"]);
   await approval.getByRole("button", { name: "Allow once" }).click();
   await expect(approval).toBeHidden();
+  await expect.poll(notices).toEqual([]);
   expect(answers).toEqual(['{"answer":"once"}']);
   await expect(page.getByRole("button", { name: "Stop all agents" })).toBeVisible();
 });
@@ -161,7 +170,7 @@ test("the form fits a phone and is used with the keyboard", async ({ page }) => 
   expect(await overflow()).toBeLessThanOrEqual(0);
   await page.keyboard.press("Enter");
   await expect(signOut(page)).toBeVisible();
-  expect(await overflow()).toBeLessThanOrEqual(0);
+  await expect.poll(overflow).toBeLessThanOrEqual(0); // once the list is there
   const box = await signOut(page).boundingBox();
   expect((box?.x ?? 999) + (box?.width ?? 999)).toBeLessThanOrEqual(320);
 });

@@ -2,6 +2,7 @@
 // Layer: web/gateway. Source: /api/v1/agents. A gateway that has no agents answers 404.
 
 import { Store } from "../app/store";
+import { ApprovalNotices } from "./approval_notices";
 import { isRecord, text } from "./fields";
 import { problemOf } from "./session";
 import type { Session } from "./session";
@@ -36,6 +37,7 @@ export class AgentsDesk {
   /** null: the gateway has none, or this user does not decide. */
   readonly state = new Store<Agents | null>(null);
   readonly trouble = new Store<string | null>(null);
+  readonly notices = new ApprovalNotices();
   readonly #session: Pick<Session, "fetch" | "who">;
 
   constructor(session: Pick<Session, "fetch" | "who">) {
@@ -57,6 +59,7 @@ export class AgentsDesk {
       const response = await this.#session.fetch(`${PATH}/approvals`);
       const answer: unknown = response.ok ? await response.json() : null;
       this.state.value = response.ok && this.#session.who.value?.admin ? readAgents(answer) : null;
+      this.notices.show(this.state.value?.approvals ?? []);
       return response.status !== 404;
     } catch {
       return true; // the list of devices tells that the gateway is away
@@ -87,7 +90,8 @@ export class AgentsDesk {
   }
 
   async #lookAgain(): Promise<void> {
-    const isThere = document.hidden || (await this.look());
+    const isAsleep = document.hidden && this.notices.permission.value !== "granted";
+    const isThere = isAsleep || (await this.look());
     setTimeout(() => void this.#lookAgain(), isThere ? POLL_MS : RARE_POLL_MS);
   }
 }

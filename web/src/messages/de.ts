@@ -413,6 +413,7 @@ const german: Readonly<Record<string, string>> = {
   "Agents are stopped for {0}.": "Agenten sind für {0} angehalten.",
   "Let agents go on": "Agenten weitermachen lassen",
   "Stop all agents": "Alle Agenten anhalten",
+  "Notify me of requests": "Anfragen als Mitteilung zeigen",
   "The agent of {0} asks to do this:": "Der Agent von {0} möchte dies tun:",
   "It does not say why.": "Er sagt nicht, warum.",
   "It says why: {0}": "Er sagt, warum: {0}",

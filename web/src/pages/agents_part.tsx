@@ -13,6 +13,7 @@ const STOP_MINUTES = 10;
 export function AgentsPart({ agents }: { agents: AgentsDesk }) {
   const state = useStore(agents.state);
   const trouble = useStore(agents.trouble);
+  const permission = useStore(agents.notices.permission);
   if (!state) return null;
   const { approvals, stoppedForS } = state;
   return (
@@ -33,6 +34,11 @@ export function AgentsPart({ agents }: { agents: AgentsDesk }) {
         ) : (
           <button class="button agents-stop" type="button" onClick={() => void agents.stop(STOP_MINUTES)}>
             {t("Stop all agents")}
+          </button>
+        )}
+        {permission === "default" && (
+          <button class="button" type="button" onClick={() => void agents.notices.ask()}>
+            {t("Notify me of requests")}
           </button>
         )}
       </div>

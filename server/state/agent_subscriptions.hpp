@@ -1,0 +1,59 @@
+// What agents want to be told of, where their revision of the protocol says so apart from the stream on which they are
+// told. Layer: server/state. See docs/mcp.md.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+
+#include "core/support/error.hpp"
+
+namespace rrgate {
+
+/// By session, whose name nobody else knows. Sessions without a stream are forgotten when there are too many, those
+/// that were used last at the end. For one thread.
+class AgentSubscriptions {
+  struct Session {
+    std::set<std::string> uris;
+    std::uint64_t changes = 0;
+    std::chrono::steady_clock::time_point used;
+    std::size_t streams = 0;
+  };
+
+ public:
+  static constexpr std::size_t most_resources = 64;  ///< of a session
+  static constexpr std::size_t most_sessions = 256;
+
+  /// Errors   out_of_system_resource: it has as many as it may have, or there are too many sessions with streams.
+  rr::Result<> add(const std::string& session, const std::string& uri);
+  void remove(const std::string& session, const std::string& uri);
+  void end(const std::string& session);
+  bool has(const std::string& session) const { return sessions_.contains(session); }
+
+  /// What a session's stream tells of, while there is one. Outlives this.
+  class Stream {
+   public:
+    explicit Stream(std::shared_ptr<Session> session) : session_(std::move(session)) { ++session_->streams; }
+    ~Stream() { --session_->streams; }
+    Stream(const Stream&) = delete;
+    Stream& operator=(const Stream&) = delete;
+    const std::set<std::string>& uris() const { return session_->uris; }
+    /// Another number whenever uris() has changed.
+    std::uint64_t changes() const { return session_->changes; }
+
+   private:
+    std::shared_ptr<Session> session_;
+  };
+  /// Errors   out_of_system_resource.
+  rr::Result<std::unique_ptr<Stream>> open_stream(const std::string& session);
+
+ private:
+  rr::Result<std::shared_ptr<Session>> find_or_make(const std::string& session);
+
+  std::map<std::string, std::shared_ptr<Session>> sessions_;
+};
+
+}  // namespace rrgate
