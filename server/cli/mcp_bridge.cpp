@@ -56,7 +56,7 @@ std::string trimmed(std::string text) {
 
 }  // namespace
 
-struct McpBridge::Message {
+struct McpBridge::Message {      // NOLINT(bugprone-exception-escape): JSON's null throws nothing
   rr::OrderedJson id = nullptr;  ///< null: a notification; nobody waits for an answer
   std::string method = {};
   std::string revision = {};  ///< that the message says it is of; empty: as agreed
@@ -307,7 +307,7 @@ std::string McpBridge::request_of(const Message& message) const {
   const bool is_first = message.method == "initialize";
   if (!revision.empty() && !is_first) out += "MCP-Protocol-Version: " + revision + "\r\n";
   if (!message.method.empty()) out += "Mcp-Method: " + message.method + "\r\n";
-  for (const auto& [name, value] : server_.headers) out += name + ": " + value + "\r\n";
+  for (const auto& [name, value] : server_.headers) out.append(name).append(": ").append(value).append("\r\n");
   return out + "\r\n" + message.text;
 }
 

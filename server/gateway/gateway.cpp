@@ -280,7 +280,7 @@ rr::Result<std::unique_ptr<rr::ByteStream>> Gateway::connect_inside() {
   int pair[2];
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair) != 0)
     return rr::make_error(rr::ErrorCode::system_resource_error,
-                          std::string("no pair of sockets: ") + std::strerror(errno));
+                          "no pair of sockets: " + std::error_code(errno, std::system_category()).message());
   const auto stream_of = [this](int socket) {
     return std::make_unique<rr::SocketStream>(rr::SocketStream::Socket(io_, {AF_UNIX, 0}, socket), "this process",
                                               config_.timeouts.send_stall);
@@ -298,7 +298,7 @@ void Gateway::serve(std::unique_ptr<rr::ByteStream> stream, const asio::ip::tcp:
                     const asio::ip::tcp::endpoint& local, Admission::Ticket ticket) {
   ++open_connections_;
   auto serving = serve_connection(*this, std::move(stream), peer, local, std::move(ticket));
-  asio::co_spawn(io_, std::move(serving), [this](std::exception_ptr failure) {
+  asio::co_spawn(io_, std::move(serving), [this](const std::exception_ptr& failure) {
     --open_connections_;
     if (is_stopping_) drained_.cancel();
     if (!failure) return;

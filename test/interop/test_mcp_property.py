@@ -148,7 +148,7 @@ class Course:
         value = pick([number for number in NUMBERS if isinstance(number, float)])
         given = ["set", member, str(value)] if member in ("speed", "power") else \
             ["call", member, *{"go": [json.dumps(pick(ORDERS[:4]))], "turn": [str(value)], "reset": []}[member]]
-        url = f"http://127.0.0.1:{self.port}/devices/interop/robot"
+        url = f"http://127.0.0.1:{self.port}/devices/interop?service=robot"
         token = {"RRGATE_TOKEN": self.agent["Authorization"].split()[1]}
 
         def work():
@@ -236,7 +236,7 @@ def test_no_course_of_requests_moves_a_device_but_on_the_terms_of_its_rules(node
         try:
             with concurrent.futures.ThreadPoolExecutor(4) as pool:
                 course = Course(seed, port, robot, agent, admin, pool)
-                course.run(600)
+                course.run(1500)
             wait_for(lambda: robot.speed == 0)  # whoever has moved it, and by whatever its lease has ended
             course.check()
         finally:

@@ -55,7 +55,7 @@ describe("agents", () => {
       constructor(title: string, { body }: { body: string }) {
         const one = { title, body, isClosed: false, close: () => void (one.isClosed = true) };
         shown.push(one);
-        return one as never;
+        return one;
       }
     }
     vi.stubGlobal("Notification", Shown);

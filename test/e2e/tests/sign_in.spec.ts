@@ -115,7 +115,10 @@ test("who asks for access is given a token by somebody who may, and is in with i
   await other.context().close();
 });
 
-test("what agents ask for is shown to who decides, with who, what and why, and is answered", async ({ page, context }) => {
+test("what agents ask for is shown to who decides, with who, what and why, and is answered", async ({
+  page,
+  context,
+}) => {
   await context.grantPermissions(["notifications"]);
   const answers: (string | null)[] = [];
   let approvals = [

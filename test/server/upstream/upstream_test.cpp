@@ -178,3 +178,38 @@ TEST_CASE("what a device was asked when its service ended is told to be lost wit
   REQUIRE_FALSE((**asked).has_value());
   CHECK((*asked)->error().message == "connection_lost: device 'device': the service was closed");
 }
+
+TEST_CASE("a session is ended behind the answer of what makes the device safe, and that is waited for") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  bench.open();
+  bool is_gone = false;
+  bool is_safe = false;
+  device.service->on_client_gone([&](rr::ClientId) { is_gone = true; });
+  const SafeRequest request{SafeAction::Kind::call, "bench", "wait", {}};
+  bench.upstream->make_safe(request, [&](const rr::Result<rr::Value>& result) { is_safe = result.has_value(); });
+  bench.upstream->close();
+  REQUIRE(bench.run_until([&] { return device.waiting.has_value(); }));
+  bool has_passed = false;
+  boost::asio::steady_timer while_it_waits(bench.io, 100ms);
+  while_it_waits.async_wait([&](const auto&) { has_passed = true; });
+  REQUIRE(bench.run_until([&] { return has_passed; }));
+  CHECK_FALSE(is_gone);
+  CHECK(bench.device->is_closing());
+  (*device.waiting)();
+  REQUIRE(bench.run_until([&] { return is_gone && !bench.device->is_closing(); }));
+  CHECK(is_safe);
+}
+
+TEST_CASE("a device that does not answer what makes it safe holds the end of a session up for a second alone") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  bench.open();
+  bool is_gone = false;
+  device.service->on_client_gone([&](rr::ClientId) { is_gone = true; });
+  const auto begin = std::chrono::steady_clock::now();
+  bench.upstream->make_safe({SafeAction::Kind::call, "bench", "wait", {}}, ignore_result);
+  bench.upstream->close();
+  REQUIRE(bench.run_until([&] { return is_gone && !bench.device->is_closing(); }));
+  CHECK(std::chrono::steady_clock::now() - begin >= 1s);
+}
