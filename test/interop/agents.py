@@ -2,14 +2,16 @@
 import asyncio
 import contextlib
 import json
+import os
 import threading
 
 import httpx2
 import RobotRaconteur as RR
-from mcp import ClientSession
+from mcp import ClientSession, StdioServerParameters
+from mcp.client.stdio import stdio_client
 from mcp.client.streamable_http import streamable_http_client
 
-from gateways import rrgate
+from gateways import RRGATE, rrgate
 from processes import free_port
 from users import bearer
 
@@ -48,6 +50,23 @@ def with_agent(port, work, headers={}, modern=False, **more):
                     return await work(session)
 
     return asyncio.run(run())
+
+
+def with_lines(arguments, work, environment={}, modern=False):
+    """What `work` does with a session of the SDK, and what the program wrote on standard error."""
+
+    async def run(errors):
+        parameters = StdioServerParameters(command=str(RRGATE), args=["mcp", *map(str, arguments)], env=environment)
+        async with stdio_client(parameters, errlog=errors) as streams:
+            async with ClientSession(*streams) as session:
+                await (session.discover() if modern else session.initialize())
+                return await work(session)
+
+    read, write = os.pipe()
+    with os.fdopen(read) as shown, os.fdopen(write, "w") as errors:
+        result = asyncio.run(run(errors))
+        errors.close()
+        return result, shown.read()
 
 
 def call(port, tool, headers={}, modern=False, **arguments):

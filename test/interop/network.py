@@ -77,10 +77,10 @@ class Network:
         self._ip("-n", self._names[host + 1], "link", "set", "eth0", "up")
 
     @contextlib.contextmanager
-    def losing_packets(self, host, percent):
-        """Of the TCP segments that the host sends. Gives a function that says how many were lost so far."""
+    def losing_packets(self, host, nth):
+        """Every `nth` of the TCP segments that the host sends. Gives a function that says how many were lost so far."""
         need("packet-loss")
-        rule = ["-p", "tcp", "-m", "statistic", "--mode", "random", "--probability", str(percent / 100), "-j", "DROP"]
+        rule = ["-p", "tcp", "-m", "statistic", "--mode", "nth", "--every", str(nth), "--packet", str(nth // 2), "-j", "DROP"]
         done = run(*self.on(host, "iptables", "-A", "OUTPUT", *rule))
         assert done.returncode == 0, done.stderr
         try:

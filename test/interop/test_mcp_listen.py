@@ -10,12 +10,11 @@ import pytest
 from mcp import MCPError, types
 from mcp.client.subscriptions import ResourcesListChanged, ResourceUpdated, SubscriptionLost, listen
 
-from agents import lose_role, records, serving, with_agent, with_tokens
+from agents import lose_role, records, serving, with_agent, with_lines, with_tokens
 from http_api import ask
 from processes import start_gateway
 from shared_sites import port_of
 from tap import Tap
-from test_mcp_stdio import with_lines
 
 DEFINITION = """service experimental.lamp
 stdver 0.10

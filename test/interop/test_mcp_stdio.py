@@ -1,14 +1,10 @@
 """`rrgate mcp`: the Model Context Protocol on standard input and output, with the official Python SDK at the other end."""
-import asyncio
 import contextlib
 import json
-import os
 
 import pytest
-from mcp import ClientSession, StdioServerParameters
-from mcp.client.stdio import stdio_client
 
-from agents import hostile_robot, records, with_tokens
+from agents import hostile_robot, records, with_lines, with_tokens
 from command_line import NOT_UNDERSTOOD, Ran
 from gateways import RRGATE, make_web_certificates
 from leases import LEASES, wait_for
@@ -17,23 +13,6 @@ from shared_sites import Site
 
 SPEED = {"roles": ["agent"], "paths": ["plain"], "members": ["speed"], "may": ["write"],
          "agent": {"limits": {"speed": [0, 2]}, "approval": "none", "hold_seconds": 50}}
-
-
-def with_lines(arguments, work, environment={}, modern=False):
-    """What `work` does with a session of the SDK, and what the program wrote on standard error."""
-
-    async def run(errors):
-        parameters = StdioServerParameters(command=str(RRGATE), args=["mcp", *map(str, arguments)], env=environment)
-        async with stdio_client(parameters, errlog=errors) as streams:
-            async with ClientSession(*streams) as session:
-                await (session.discover() if modern else session.initialize())
-                return await work(session)
-
-    read, write = os.pipe()
-    with os.fdopen(read) as shown, os.fdopen(write, "w") as errors:
-        result = asyncio.run(run(errors))
-        errors.close()
-        return result, shown.read()
 
 
 @contextlib.contextmanager

@@ -189,6 +189,7 @@ class Microassembly(unittest.TestCase):
         for part in ("stages", "illuminators", "cameras", "cell"):
             pid, words = self.processes()[part]
             os.kill(pid, 9)
+            wait_for(lambda: not os.path.exists(f"/proc/{pid}"))  # it holds its port until then
             if part == "stages":
                 wait_for(lambda: "not there" in ran("call", self.cell, "move", "0", "[0, 0, 0, 0]").stderr)
             again = subprocess.Popen(words, stdout=subprocess.DEVNULL)

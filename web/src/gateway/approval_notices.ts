@@ -19,7 +19,7 @@ export class ApprovalNotices {
 
   /** Shows what is new where the page is not looked at, and takes away what waits no more, or is looked at now. */
   show(waiting: readonly Approval[]): void {
-    const wanted = document.hidden && this.permission.value === "granted" ? waiting : [];
+    const wanted = this.permission.value === "granted" && document.hidden ? waiting : [];
     const ids = new Set(wanted.map(({ id }) => id));
     for (const [id, close] of this.#shown) {
       if (ids.has(id)) continue;
