@@ -28,16 +28,19 @@ export class Program {
   #output = "";
   readonly #file: string;
   readonly #args: readonly string[];
+  readonly #environment: Readonly<Record<string, string>>;
 
-  constructor(file: string, args: readonly string[]) {
+  constructor(file: string, args: readonly string[], environment: Readonly<Record<string, string>> = {}) {
     this.#file = file;
     this.#args = args;
+    this.#environment = environment;
   }
 
   start(): void {
     if (this.#child) throw new Error(`${this.#file} runs already`);
     this.#output = "";
-    const child = spawn(this.#file, this.#args, { stdio: ["pipe", "pipe", "pipe"] });
+    const env = { ...process.env, ...this.#environment };
+    const child = spawn(this.#file, this.#args, { env, stdio: ["pipe", "pipe", "pipe"] });
     const keep = (chunk: Buffer): void => void (this.#output = (this.#output + chunk.toString()).slice(-20_000));
     child.stdout.on("data", keep);
     child.stderr.on("data", keep);

@@ -1,8 +1,14 @@
 // Debian's WebKitGTK: Epiphany on a display of its own, by WebKitWebDriver. Source: w3.org/TR/webdriver2.
+import { once } from "node:events";
+import { request } from "node:http";
+import type { IncomingMessage } from "node:http";
+import { json } from "node:stream/consumers";
 import { Family, keyActions, pointerActions, reach } from "./engine";
 import type { Engine } from "./engine";
 import { freePort } from "./processes";
 
+/** Of a script: one is lost at times where a page has just begun. Source: WebDriver, 8.5. */
+const timeouts = { script: 20_000 };
 const browser = { binary: "/usr/bin/epiphany", args: ["--automation-mode"] };
 
 /** What says `Bail out` at its start, as Epiphany does at times, is started again. */
@@ -15,15 +21,16 @@ export async function startWebkit(attempts = 5): Promise<Engine> {
     { ["WEBKIT_DISABLE_SANDBOX_THIS_IS_DANGEROUS"]: "1" }, // root has no user namespace to give
   );
   const send = async (method: string, path: string, body?: object): Promise<unknown> => {
-    const given = body === undefined ? {} : { body: JSON.stringify(body) };
-    const answer = await fetch(`http://127.0.0.1:${port}${path}`, { method, ...given });
-    const { value } = (await answer.json()) as { value: unknown };
-    if (!answer.ok) throw new Error(`${method} ${path}: ${JSON.stringify(value)}`);
+    const asked = request({ host: "127.0.0.1", port, method, path, agent: false }); // it closes connections in use
+    asked.end(body === undefined ? undefined : JSON.stringify(body));
+    const [answer] = (await once(asked, "response")) as [IncomingMessage];
+    const { value } = (await json(answer)) as { value: unknown };
+    if (answer.statusCode !== 200) throw new Error(`${method} ${path}: ${JSON.stringify(value)}`);
     return value;
   };
   try {
     await reach(family, () => send("GET", "/status"));
-    const capabilities = { alwaysMatch: { acceptInsecureCerts: true, "webkitgtk:browserOptions": browser } };
+    const capabilities = { alwaysMatch: { acceptInsecureCerts: true, timeouts, "webkitgtk:browserOptions": browser } };
     const { sessionId } = (await send("POST", "/session", { capabilities })) as { sessionId: string };
     const at = `/session/${sessionId}`;
     const run: Engine["run"] = async (source, args) => {
@@ -46,7 +53,10 @@ export async function startWebkit(attempts = 5): Promise<Engine> {
       });
     await resize({ width: 1280, height: 800 });
     return {
-      open: async (url) => void (await send("POST", `${at}/url`, { url })),
+      open: async (url) => {
+        await send("POST", `${at}/url`, { url });
+        await reach(family, () => run("() => document.readyState", []));
+      },
       run,
       pointer: async (...to) => void (await send("POST", `${at}/actions`, { actions: pointerActions(...to) })),
       key: async (...to) => void (await send("POST", `${at}/actions`, { actions: keyActions(...to) })),

@@ -258,7 +258,7 @@ def test_proxy_protocol(device, tmp_path, monkeypatch, version):
                 link.sendall(bytes([byte]))
             link.sendall(b"nonsense")
             link.recv(4096)
-        assert "192.0.2.7:4711" in log.read_text()
+        process.wait_until(lambda: "192.0.2.7:4711" in log.read_text())  # it is written behind the answer
     finally:
         proxy.stop()
         process.stop()

@@ -98,8 +98,7 @@ TEST_CASE("whatever the gateway's document refers to is in it") {
     for (const auto& [method, details] : item.items()) {
       if (method == "parameters") continue;
       INFO(method << " " << path);
-      const bool is_open = path == "/healthz" || path == "/readyz" || path.starts_with("/.well-known/") ||
-                           (path == "/mcp" && method == "get");
+      const bool is_open = path == "/healthz" || path == "/readyz" || path.starts_with("/.well-known/");
       CHECK(details["responses"].contains("401") != is_open);
       CHECK(details["responses"].contains("429") != is_open);
     }
