@@ -87,6 +87,29 @@ rr::awaitable<Protocol> look_at_first_bytes(GatewayState& gateway, rr::ByteStrea
   co_return protocol;
 }
 
+/// Waits until the first record of TLS is there as a whole, which is the client's hello, and puts it back. OpenSSL
+/// takes 50 kB for a handshake: only who has said something gets that, and a turn. Returns false where it does not
+/// come.
+rr::awaitable<bool> wait_for_hello(GatewayState& gateway, rr::ByteStream& stream) {
+  constexpr std::size_t header_size = 5;  // kind, version, length of what follows
+  constexpr std::size_t chunk = 1024;
+  constexpr std::size_t most = header_size + 16 * 1024;  // OpenSSL refuses a longer one
+  rr::Deadline limit(stream.executor(), [&stream] { stream.close(); });
+  limit.arm(gateway.config().limits.header_timeout);
+  rr::Bytes record;
+  std::size_t wanted = header_size;
+  while (record.size() < wanted) {
+    const auto size = record.size();
+    record.resize(size + chunk);
+    const auto read = co_await stream.read_some(std::span(record).subspan(size));
+    if (read.error || read.is_end()) co_return false;
+    record.resize(size + read.bytes);
+    if (record.size() >= header_size) wanted = std::min(most, header_size + (std::size_t{record[3]} << 8) + record[4]);
+  }
+  stream.put_back(record);
+  co_return true;
+}
+
 /// The stream inside TLS; null where there is none.
 rr::awaitable<std::unique_ptr<rr::ByteStream>> accept_https(GatewayState& gateway, Connection& connection,
                                                             std::unique_ptr<rr::ByteStream> stream) {
@@ -94,6 +117,12 @@ rr::awaitable<std::unique_ptr<rr::ByteStream>> accept_https(GatewayState& gatewa
   if (!context) {
     gateway.reject(Rejection::unknown_protocol);
     gateway.log_refusal(LogLevel::info, "connection closed: TLS is not served here", connection.client,
+                        {{"peer", connection.client}});
+    co_return nullptr;
+  }
+  if (!co_await wait_for_hello(gateway, *stream)) {
+    gateway.reject(Rejection::tls);
+    gateway.log_refusal(LogLevel::info, "connection closed: it began TLS, and said no more", connection.client,
                         {{"peer", connection.client}});
     co_return nullptr;
   }

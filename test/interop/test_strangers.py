@@ -205,7 +205,7 @@ def test_a_crowd_of_strangers_costs_little_memory(tmp_path):
 
 
 def test_silent_handshakes_of_one_address_keep_out_no_other(tmp_path):
-    """So many are begun at a time, and others wait for their turn."""
+    """So many are begun at a time, and others wait for their turn. Who has not said a whole hello has none."""
     context = ssl.create_default_context()
     context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
 
@@ -216,13 +216,24 @@ def test_silent_handshakes_of_one_address_keep_out_no_other(tmp_path):
                 return encrypted.version()
 
     with crowds.site(tmp_path) as gateway:
-        silent = [socket.create_connection(("127.0.0.1", gateway.port), 20, ("127.0.0.2", 0)) for _ in range(4)]
+        halves, silent = ([socket.create_connection(("127.0.0.1", gateway.port), 20, ("127.0.0.2", 0)) for _ in range(4)]
+                          for _ in range(2))
+        said = ssl.MemoryBIO()
+        with pytest.raises(ssl.SSLWantReadError):
+            context.wrap_bio(ssl.MemoryBIO(), said).do_handshake()
+        hello = said.read()
+        for link in halves:
+            link.sendall(hello[:-20])
+        assert shake(gateway, "127.0.0.2", 20) == "TLSv1.3"
         for link in silent:
-            link.sendall(bytes.fromhex("160301"))
+            link.sendall(hello)
+            assert link.recv(1) == b"\x16"
         assert shake(gateway, "127.0.0.3", 20) == "TLSv1.3"
         with pytest.raises(TimeoutError):
             shake(gateway, "127.0.0.2", 0.5)
         silent.pop().close()
         assert shake(gateway, "127.0.0.2", 20) == "TLSv1.3"
-        for link in silent:
+        halves[0].sendall(hello[-20:])
+        assert halves[0].recv(1) == b"\x16"
+        for link in silent + halves:
             link.close()
