@@ -19,6 +19,10 @@ install(
 install(TARGETS rrgate-create-serial rrgate-demo-conference-room rrgate-demo-create rrgate-demo-microassembly
                 rrgate-demo-webcams
         RUNTIME DESTINATION "${CMAKE_INSTALL_LIBEXECDIR}/rrgate" COMPONENT runtime)
+install(FILES examples/baxter/baxter.py RENAME rrgate-demo-baxter.py
+        DESTINATION "${CMAKE_INSTALL_LIBEXECDIR}/rrgate" COMPONENT runtime)
+install(FILES examples/baxter/experimental.baxter.robdef
+        DESTINATION "${CMAKE_INSTALL_LIBEXECDIR}/rrgate" COMPONENT runtime)
 
 # Headers by task are the API. What they include lies in internal/, for templates and inline functions.
 install(DIRECTORY include/rrgate DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" COMPONENT dev FILES_MATCHING PATTERN "*.hpp")

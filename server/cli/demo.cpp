@@ -34,11 +34,11 @@ constexpr std::uint16_t preferred_port = 8080;
 
 struct DemoDevice {
   std::string_view name;
-  std::string_view program;  ///< empty: a further node of the program before
+  std::string_view program;  ///< empty: a further node of the program before; one in Python ends with ".py"
   std::string_view service;
   LeaseConfig leases = {};
   std::vector<CallbackRule> callbacks = {};
-  std::string path = {};
+  std::string path = {};  ///< of the program, or of its interpreter by its name
   std::uint16_t port = 0;
   std::vector<std::string> arguments = {};
   bool follows_first = false;  ///< is told where the first device is
@@ -63,9 +63,16 @@ struct DemoSystem {
 /// The first is the one that is run where none is named.
 std::vector<DemoSystem> list_systems() {
   // Whoever drives it under a lease and goes away leaves a robot that stands.
-  const LeaseConfig leases{true,
-                           {{"Create.StartStreaming", LeaseNeed::never}},
-                           {{SafeAction::Kind::call, "Create", "Drive", "[0, 0]"}},
+  using Safe = SafeAction::Kind;
+  const LeaseConfig leases{
+      true, {{"Create.StartStreaming", LeaseNeed::never}}, {{Safe::call, "Create", "Drive", "[0, 0]"}}, {"*"}};
+  const LeaseConfig baxter{true,
+                           {},
+                           {{Safe::call, "base", "halt", "[]"},
+                            {Safe::property, "left_arm", "command_mode", "0"},
+                            {Safe::property, "right_arm", "command_mode", "0"},
+                            {Safe::call, "left_gripper", "halt", "[]"},
+                            {Safe::call, "right_gripper", "halt", "[]"}},
                            {"*"}};
   const DemoDevice create{
       "create", "rrgate-demo-create", "Create", leases, {{"Create.play_callback", CallbackPolicy::first}}};
@@ -89,7 +96,10 @@ std::vector<DemoSystem> list_systems() {
           {"microassembly",
            "six probes under four microscopes, on nodes that find one another",
            {assembly("cell", "Cell"), assembly("stages", "Stages"), assembly("cameras", "Cameras"),
-            assembly("illuminators", "Illuminators")}}};
+            assembly("illuminators", "Illuminators")}},
+          {"baxter",
+           "two arms with grippers and cameras on a wheelchair, in Python (robotraconteur-abstract-robot)",
+           {{"baxter", "rrgate-demo-baxter.py", "base", baxter}}}};
 }
 
 int print_systems() {
@@ -141,6 +151,8 @@ std::string prepare_programs(std::vector<DemoDevice>& devices) {
     if (program != &device) continue;
     device.path = find_program(device.program);
     if (device.path.empty()) return std::string(device.program);
+    if (device.path.ends_with(".py"))
+      device.arguments.insert(device.arguments.begin(), std::exchange(device.path, "python3"));
     if (device.has_group)
       device.arguments.insert(device.arguments.end(), {"--group", "microassembly" + std::to_string(::getpid())});
     if (device.follows_first) device.arguments.insert(device.arguments.end(), {"--robot", devices.front().url()});
@@ -159,7 +171,7 @@ pid_t start_program(const std::string& path, const std::vector<std::string>& arg
   ::prctl(PR_SET_PDEATHSIG, SIGTERM);
   if (::getppid() != parent) ::_exit(1);
   ::setpgid(0, 0);  // Ctrl-C reaches us alone; we stop the devices when the gateway has let them go
-  ::execv(path.c_str(), texts.data());
+  ::execvp(path.c_str(), texts.data());
   ::_exit(127);
 }
 

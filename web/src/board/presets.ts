@@ -88,6 +88,35 @@ const STANDARD: Readonly<Record<string, { stop: StopCall | null; panels: readonl
       ["table", 8, 16, 4, 4, { member: "parts" }],
     ],
   },
+  // Of `rrgate demo baxter`: its arms, cameras and grippers are other services of the device.
+  ["experimental.baxter.Base"]: {
+    stop: { call: "halt", args: [] },
+    panels: [
+      [
+        "teleop",
+        0,
+        0,
+        4,
+        11,
+        {
+          member: "drive",
+          axes: [
+            { stick: "right-y", path: "speed", scale: 0.8 },
+            { stick: "right-x", path: "turn", scale: -1 },
+          ],
+          neutral: ["0", "0"],
+        },
+      ],
+      ["image", 4, 0, 5, 11, { member: "frame_stream_compressed" }, "Head", "baxter/head_camera"],
+      ["table", 9, 0, 3, 6, { member: "state" }],
+      ["form", 9, 6, 3, 5, { members: ["open", "close"] }, "Left gripper", "baxter/left_gripper"],
+      ["robot", 0, 11, 6, 13, {}, "Left arm", "baxter/left_arm"],
+      ["robot", 6, 11, 6, 13, {}, "Right arm", "baxter/right_arm"],
+      ["image", 0, 24, 4, 9, { member: "frame_stream_compressed" }, "Left hand", "baxter/left_camera"],
+      ["form", 4, 24, 4, 5, { members: ["open", "close"] }, "Right gripper", "baxter/right_gripper"],
+      ["image", 8, 24, 4, 9, { member: "frame_stream_compressed" }, "Right hand", "baxter/right_camera"],
+    ],
+  },
   ["com.robotraconteur.sensor.Sensor"]: {
     stop: null,
     panels: [
