@@ -74,12 +74,20 @@ class Site:
             self.gateway.wait_until(lambda: number in self.frames or is_so())
 
     def publish_until_held(self):
-        """The other one stops reading. Returns how many frames had been published when the device was held back."""
+        """The other one stops reading."""
         self.publish_until(lambda: len(self.frames) == 3)
         self.gateway.wait_until(lambda: self.slow.numbers() == self.frames)
         self.slow.pause()
         self.publish_until(lambda: self.has_logged(SLOW))
-        return self._published
+
+    def publish_until_nothing_comes(self):
+        """At first the sockets on the way to the slow one take more yet, and the device may go on: how much, the kernel says."""
+        for _ in range(10):
+            before = len(self.frames)
+            self.publish_many()
+            if len(self.frames) == before:
+                return
+        pytest.fail(f"the device is not held back: {len(self.frames)} frames of {self._published} have come")
 
     def publish_many(self):
         """More than may wait for a client. Each is followed by a call, in whose time an acknowledgement would come."""
@@ -97,10 +105,8 @@ class Site:
 def test_the_slowest_reader_sets_the_pace(tmp_path, node, device):
     site = Site(tmp_path, node, device[1], send_stall_ms=60_000)
     try:
-        held_at = site.publish_until_held()
-        site.publish_many()
-        # What was read from the device in one go is acknowledged before it is handed on.
-        assert len(site.frames) <= held_at + 3 * BACKLOG, (held_at, site.frames)
+        site.publish_until_held()
+        site.publish_until_nothing_comes()
         site.slow.resume()
         site.gateway.wait_until(lambda: site.slow.numbers() == site.frames)
         before = len(site.frames)
