@@ -110,8 +110,8 @@ void read_rule(ObjectReader& in, AccessRule& rule) {
     in.finding("may",
                "serve is of a device as a whole; expected it in a rule that names no services, paths or members");
   in.object("agent", [&](ObjectReader& part) { read_agent(part, rule.agent.emplace()); });
-  if (rule.agent && gives([](Verb verb) { return verb >= Verb::lock; }))
-    in.finding("may", "expected read, write, call and subscribe alone in a rule with \"agent\"");
+  if (rule.agent && gives([](Verb verb) { return verb >= Verb::lock && verb != Verb::record; }))
+    in.finding("may", "expected read, write, call, subscribe and record alone in a rule with \"agent\"");
 }
 
 bool is_loopback(const std::string& host) {

@@ -178,10 +178,15 @@ rr::OrderedJson device_for_agent(GatewayState& gateway, const Identity& who, con
   return out;
 }
 
-rr::OrderedJson list_for_agent(GatewayState& gateway, const Identity& who, const std::string& cursor) {
-  std::vector<const Device*> seen;
+std::vector<const Device*> devices_for_agent(GatewayState& gateway, const Identity& who) {
+  std::vector<const Device*> out;
   for (const auto& device : gateway.devices().all())
-    if (gateway.access().sees(who, device->config().name)) seen.push_back(device.get());
+    if (gateway.access().sees(who, device->config().name)) out.push_back(device.get());
+  return out;
+}
+
+rr::OrderedJson list_for_agent(GatewayState& gateway, const Identity& who, const std::string& cursor) {
+  const auto seen = devices_for_agent(gateway, who);
   const auto page = page_of(seen.size(), cursor);
   auto out = rr::OrderedJson::object();
   auto& devices = rr::add_key(out, "devices") = rr::OrderedJson::array();

@@ -32,6 +32,7 @@ struct McpPage {
 McpPage page_of(std::size_t count, const std::string& cursor);
 
 /// The devices that the asker may use anything of.
+std::vector<const Device*> devices_for_agent(GatewayState& gateway, const Identity& who);
 rr::OrderedJson list_for_agent(GatewayState& gateway, const Identity& who, const std::string& cursor);
 /// One of them.
 rr::OrderedJson device_for_agent(GatewayState& gateway, const Identity& who, const Device& device);

@@ -9,6 +9,7 @@
 #include "server/http/endpoints/large_json.hpp"
 #include "server/http/endpoints/refusal.hpp"
 #include "server/mcp/mcp_describe.hpp"
+#include "server/mcp/mcp_recordings.hpp"
 #include "server/mcp/mcp_tools.hpp"
 
 namespace rrgate {
@@ -175,22 +176,31 @@ rr::OrderedJson discover() {
 }
 
 rr::OrderedJson list_resources(GatewayState& gateway, const Identity& who, const std::string& cursor) {
-  auto listed = list_for_agent(gateway, who, cursor);
+  const auto devices = devices_for_agent(gateway, who);
+  const auto recordings = recordings_for_agent(gateway, who);
+  const auto page = page_of(devices.size() + recordings.size(), cursor);
   auto out = rr::OrderedJson::object();
   auto& resources = rr::add_key(out, "resources") = rr::OrderedJson::array();
-  for (const auto& device : listed["devices"]) {
-    const auto name = device["name"].get<std::string>();
-    resources.push_back({{"uri", "rrgate://" + name}, {"name", name}, {"mimeType", "application/json"}});
+  for (auto i = page.first; i < page.last; ++i) {
+    const bool is_device = i < devices.size();
+    const auto& name = is_device ? devices[i]->config().name : recordings[i - devices.size()];
+    const auto uri = std::string(is_device ? device_scheme : recording_scheme) + name;
+    resources.push_back({{"uri", uri}, {"name", name}, {"mimeType", "application/json"}});
   }
-  if (listed.contains("nextCursor")) rr::add_key(out, "nextCursor") = listed["nextCursor"];
+  if (!page.next.empty()) rr::add_key(out, "nextCursor") = page.next;
   return out;
 }
 
 rr::OrderedJson resource_templates() {
   return {{"resourceTemplates",
-           {{{"uriTemplate", "rrgate://{device}/{+path}"},
+           {{{"uriTemplate", std::string(device_scheme) + "{device}/{+path}"},
              {"name", "member"},
              {"description", "An object's members, or the value of a property, a memory or a wire."},
+             {"mimeType", "application/json"}},
+            {{"uriTemplate", std::string(recording_scheme) + "{recording}/{+path}"},
+             {"name", "recorded member"},
+             {"description", "What a recording holds of a member: first and last value, and for each number the "
+                             "minimum, the maximum and the mean."},
              {"mimeType", "application/json"}}}}};
 }
 

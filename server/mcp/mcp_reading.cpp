@@ -5,6 +5,7 @@
 #include "server/http/endpoints/large_json.hpp"
 #include "server/http/endpoints/member_values.hpp"
 #include "server/mcp/mcp_describe.hpp"
+#include "server/mcp/mcp_recordings.hpp"
 #include "server/mcp/mcp_summary.hpp"
 #include "server/mcp/mcp_tools.hpp"
 
@@ -19,8 +20,6 @@ constexpr std::chrono::milliseconds wire_wait{500};
 /// Of events and packets that are told together: what comes then is for the next request.
 constexpr std::size_t most_heard = 100;
 constexpr std::size_t most_heard_bytes = 1024u * 1024;
-
-constexpr std::string_view resource_scheme = "rrgate://";
 
 milliseconds wait_of(const JsonRequest& arguments, milliseconds longest) {
   const auto* wanted = arguments.find("seconds");
@@ -252,9 +251,9 @@ McpTools::Answer McpTools::watch(JsonRequestPtr arguments) {
 }
 
 ResourceName parse_resource(const std::string& uri) {
-  if (!uri.starts_with(resource_scheme))
+  if (!uri.starts_with(device_scheme))
     refuse(rr::ErrorCode::resource_not_found, "the URI is " + rr::quote(uri) + ", expected rrgate://DEVICE/PATH");
-  const auto rest = uri.substr(resource_scheme.size());
+  const auto rest = uri.substr(device_scheme.size());
   const auto slash = std::min(rest.find('/'), rest.size());
   const auto name = value_or_throw(split_path(rest.substr(0, slash)));
   return {name.empty() ? "" : name.front(), rest.substr(std::min(slash + 1, rest.size()))};
@@ -268,6 +267,7 @@ JsonRequestPtr request_of(const ResourceName& resource) {
 }
 
 rr::awaitable<rr::OrderedJson> McpTools::read_resource(const std::string& uri) {
+  if (uri.starts_with(recording_scheme)) co_return co_await read_recording(uri);
   const auto named = parse_resource(uri);
   if (named.path.empty()) co_return device_for_agent(gateway_, who(), find_device(named.device, ""));
   const auto request = request_of(named);

@@ -28,7 +28,8 @@ class McpTools {
   /// The image that stands beside the answer; null: there is none.
   const McpImage* image() const { return image_ ? &*image_ : nullptr; }
 
-  /// What there is to read, by its URI, "rrgate://DEVICE" or "rrgate://DEVICE/PATH". Throws   rr::Exception.
+  /// What there is to read, by its URI: "rrgate://DEVICE", "rrgate://DEVICE/PATH", or of a recording (see
+  /// mcp_recordings.hpp). Throws   rr::Exception.
   rr::awaitable<rr::OrderedJson> read_resource(const std::string& uri);
   /// Tells the client what changes of resources and of their list, until it goes, or may not any more. Throws
   /// rr::Exception. `wanted`  what it wants to hear of; borrowed for the wait. `id`  of the request.
@@ -82,6 +83,8 @@ class McpTools {
   /// Adds what a device has said: under "from_device", or as an image beside the answer.
   rr::awaitable<void> add_value(rr::OrderedJson& answer, const Target& target, const rr::Value& value);
 
+  rr::awaitable<rr::OrderedJson> read_recording(const std::string& uri);  // mcp_recordings.cpp
+
   // mcp_listen.cpp. All throw   rr::Exception.
 
   struct Followed;
@@ -126,7 +129,9 @@ class McpTools {
 /// A whole number from 1 to `most`. Throws   rr::Exception, invalid_argument.
 std::size_t count_of(const rr::Json& given, std::string_view name, std::size_t most);
 
-/// What a URI of a resource names. `path`  empty: the device itself.
+inline constexpr std::string_view device_scheme = "rrgate://";
+
+/// What a URI of a device's resource names. `path`  empty: the device itself.
 struct ResourceName {
   std::string device;
   std::string path;

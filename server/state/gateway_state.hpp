@@ -79,6 +79,8 @@ class GatewayState {
   AgentRequests& agent_requests() { return agent_requests_; }
   /// What agents want to be told of.
   AgentSubscriptions& agent_subscriptions() { return agent_subscriptions_; }
+  /// Agents that read recordings now.
+  RateGate& recording_readers() { return recording_readers_; }
   /// Who is judged for what he logs in as.
   Logins& logins() { return logins_; }
   /// How clients of HTTP show who they are, and how much they may ask for.
@@ -106,6 +108,7 @@ class GatewayState {
   Approvals approvals_;
   AgentRequests agent_requests_;
   AgentSubscriptions agent_subscriptions_;
+  RateGate recording_readers_;
   Logins logins_;
   IssuerKeys issuer_keys_;
   HttpAccess http_access_;
