@@ -1,9 +1,11 @@
 import {
   AT_REST,
   commandOf,
+  Commands,
   deflectionOfGamepad,
   deflectionOfKeys,
   readAxes,
+  tell,
   together,
   worthOf,
 } from "../../web/src/panels/teleop";
@@ -71,6 +73,45 @@ describe("teleop", () => {
     const axes = [up, null, 3, { stick: "middle", path: "x" }, { stick: "left-x", path: "y", scale: "9", deadZone: 7 }];
     expect(readAxes({ axes })).toEqual([up, { stick: "left-x", path: "y", scale: 1, deadZone: 0.9 }]);
     expect(readAxes({ axes: "none" })).toEqual([]);
+  });
+});
+
+describe("at rest", () => {
+  const inputs = [{ name: "velocity", type: "double" }];
+  const mapping = (path: string, text: string) => ({
+    axes: [{ ...up, path }],
+    neutral: [{ kind: "text", text } as const],
+  });
+  const given = (commands: Commands, path: string, text: string, deflection = AT_REST) =>
+    commands.of(mapping(path, text), inputs, deflection, nothing, "");
+
+  it("what is typed while it moves does not keep it from stopping", () => {
+    const commands = new Commands();
+    expect(given(commands, "velocity", "0", full)).toEqual([200]);
+    expect(() => given(commands, "velo", "0", full)).toThrow('"velo" is no number');
+    expect(given(commands, "velo", "0")).toEqual([0]);
+    given(commands, "velocity", "1", full);
+    given(commands, "velocity", "12", full);
+    expect(given(commands, "velocity", "12")).toEqual([1]); // of when it began to move
+    expect(given(commands, "velocity", "")).toEqual([1]);
+    expect(given(commands, "velocity", "3")).toEqual([3]);
+    expect(given(new Commands(), "velo", "0")).toEqual([0]);
+    expect(() => given(new Commands(), "velocity", "")).toThrow("is not a number");
+  });
+
+  it.each([
+    ["function", "urgent", "call"],
+    ["wire", "setNow", "poke"],
+    ["property", "setNow", "set"],
+  ] as const)("a %s is told past what waits, and always with a deadline", async (kind, rest, move) => {
+    const ways = ["call", "urgent", "set", "setNow", "poke"] as const;
+    const object = Object.fromEntries(ways.map((way) => [way, vi.fn(() => Promise.resolve())]));
+    const member = { name: "velocity", kind, type: "double", parameters: [], modifiers: [], documentation: "" };
+    await tell(object as never, member, [0], true);
+    await tell(object as never, member, [5], false);
+    const wrapped = (value: number) => ["velocity", kind === "function" ? [value] : value, { timeout: 2_000 }];
+    for (const way of ways)
+      expect(object[way]?.mock.calls, way).toEqual(way === rest ? [wrapped(0)] : way === move ? [wrapped(5)] : []);
   });
 });
 

@@ -35,11 +35,11 @@ export interface Remote {
   lease(options: LeaseOptions): Promise<Lease>;
   get(name: string): Promise<unknown>;
   set(name: string, value: unknown, options?: CallOptions): Promise<void>;
-  /** Writes a property past whatever waits to be sent. */
+  /** Writes a property, or pokes a wire, past whatever waits to be sent. */
   setNow(name: string, value: unknown, options?: CallOptions): Promise<void>;
   /** Values of a wire from now on, the newest only; ends with the connection or with `signal`. */
   wire(name: string, signal: AbortSignal): AsyncGenerator<unknown, void>;
-  poke(name: string, value: unknown): Promise<void>;
+  poke(name: string, value: unknown, options?: CallOptions): Promise<void>;
   /** All packets of a new pipe endpoint; ends when the device closes it, with the connection or with `signal`. */
   pipe(name: string, signal: AbortSignal): AsyncGenerator<unknown, void>;
   /** Items of a memory in each dimension. */
@@ -108,7 +108,7 @@ export function remoteOf(object: RemoteObject, underWay = new UnderWay()): Remot
     set: (name, value, options) => underWay.follow((async () => member(name).set(value, options))()),
     setNow: async (name, value, options) => {
       const write = info.urgent[name];
-      if (!write) throw new Error(`${info.type} has no property "${name}" that can be written at once`);
+      if (!write) throw new Error(`${info.type} has no property or wire "${name}" that can be written at once`);
       await write(value, ...(options ? [options] : []));
     },
     wire: (name, signal) => valuesOf(() => member(name).connect({ signal }), signal),
@@ -131,7 +131,7 @@ export function remoteOf(object: RemoteObject, underWay = new UnderWay()): Remot
       callback.handler = handler;
       return () => void (callback.handler = null);
     },
-    poke: (name, value) => underWay.follow((async () => member(name).poke(value))()),
+    poke: (name, value, options) => underWay.follow((async () => member(name).poke(value, options))()),
     on: (name, heard) => member(name).on(heard),
     child: async (name, index) =>
       remoteOf(await (index === undefined ? member(name).get<RemoteObject>() : member(name).get(index)), underWay),
