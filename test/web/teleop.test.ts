@@ -4,6 +4,7 @@ import {
   Commands,
   deflectionOfGamepad,
   deflectionOfKeys,
+  findGamepad,
   readAxes,
   tell,
   together,
@@ -136,6 +137,7 @@ describe("sticks that were let go of", () => {
   });
   it("wait, of a gamepad, until each axis was in the middle", () => {
     const held = new HeldSticks();
+    held.poll([0, 0, 0, 0], true);
     expect(held.poll([0, -1, 0.5, 0], true)).toBe(true);
     held.letGo();
     held.poll([0, -1, 0.5, 0], true);
@@ -147,6 +149,23 @@ describe("sticks that were let go of", () => {
     held.poll([0, 0.01, 0.4, 0], true);
     held.poll([0, -0.8, 0.4, 0], true);
     expect(held.deflection).toEqual({ ...AT_REST, "left-y": 0.8, "right-x": 0.4 });
+  });
+  it("wait, too, when a gamepad is first seen, and when it was away", () => {
+    const held = new HeldSticks();
+    expect(held.poll([0, -1, 0, 0], true)).toBe(false);
+    held.poll([0, 0, 0, 0], true);
+    held.poll([0, -1, 0, 0], true);
+    expect(held.deflection["left-y"]).toBe(1);
+    held.poll(null, true);
+    held.poll([0, -1, 0, 0], true);
+    expect(held.deflection).toEqual(AT_REST);
+  });
+  it("are those of a gamepad whose axes are known", () => {
+    const pad = (id: string, mapping: string, axes: number[]) => ({ id, mapping, axes, connected: true }) as never;
+    const wheel = pad("Wheel", "", [0, 0, -1, -1]);
+    expect(findGamepad([null, wheel])).toEqual({ axes: null, ignored: "Wheel" });
+    expect(findGamepad([wheel, pad("Pad", "standard", [1, 0])])).toEqual({ axes: [1, 0], ignored: "" });
+    expect(findGamepad([null])).toEqual({ axes: null, ignored: "" });
   });
   it("are free again past the middle, and where they may not drive", () => {
     const held = new HeldSticks();

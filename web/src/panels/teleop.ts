@@ -41,6 +41,16 @@ export function deflectionOfKeys(held: ReadonlySet<string>): Deflection {
   return sum;
 }
 
+/**
+ * The axes of the first gamepad that is known to have the standard mapping: of another, an axis may be a trigger that rests at -1.
+ * `ignored`: the name of such a one, where there is no better.
+ */
+export function findGamepad(pads: readonly (Gamepad | null)[]): { axes: readonly number[] | null; ignored: string } {
+  const connected = pads.filter((pad): pad is Gamepad => pad?.connected === true);
+  const axes = connected.find(({ mapping }) => mapping === "standard")?.axes ?? null;
+  return { axes, ignored: axes === null ? (connected[0]?.id ?? "") : "" };
+}
+
 export function deflectionOfGamepad(axes: readonly number[]): Deflection {
   const at = (i: number): number => (Number.isFinite(axes[i]) ? (axes[i] as number) : 0);
   return { "left-x": at(0), "left-y": -at(1), "right-x": at(2), "right-y": -at(3) };

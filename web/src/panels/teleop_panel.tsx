@@ -17,7 +17,7 @@ import type { PanelProps } from "./panel";
 import { MemberSelect } from "./parts";
 import { StickPad } from "./stick";
 import type { StickMoves } from "./stick";
-import { AT_REST, commandOf, Commands, isStickKey, readAxes, readNeutral, STICKS, tell } from "./teleop";
+import { AT_REST, commandOf, Commands, findGamepad, isStickKey, readAxes, readNeutral, STICKS, tell } from "./teleop";
 import type { Axis, Deflection } from "./teleop";
 
 const REPEAT_MS = 100;
@@ -65,7 +65,11 @@ export default function TeleopPanel(props: PanelProps) {
   }, [object, control, member, commands, driver]);
 
   const enabled = object !== null && isOpen && mapping.axes.length > 0;
-  const { shown, pad, sticks, stop, hasGamepad } = useSticks(driver, enabled, () => control?.mayCommand === true);
+  const { shown, pad, sticks, stop, hasGamepad, ignored } = useSticks(
+    driver,
+    enabled,
+    () => control?.mayCommand === true,
+  );
   const setAxes = (axes: readonly Axis[]): void => change({ ...settings, axes });
   return (
     <div class="teleop panel-scroll">
@@ -90,7 +94,9 @@ export default function TeleopPanel(props: PanelProps) {
       <p class="note" data-gamepad={hasGamepad}>
         {hasGamepad
           ? t("A gamepad drives while you are in control.")
-          : t("Click here for the keys. Press a button of a gamepad to use it.")}
+          : ignored !== ""
+            ? t("{0} is ignored: the browser does not know which of its axes are the sticks of a gamepad.", ignored)
+            : t("Click here for the keys. Press a button of a gamepad to use it.")}
       </p>
       <Sent {...{ mapping, inputs, definitions, scope, shown }} />
       <Failure text={failure} />
@@ -150,6 +156,7 @@ function Sent({ mapping, inputs, definitions, scope, shown }: Shown) {
 function useSticks(driver: Driver<Deflection>, enabled: boolean, mayPoll: () => boolean) {
   const [shown, setShown] = useState<Deflection>(AT_REST);
   const [hasGamepad, setHasGamepad] = useState(false);
+  const [ignored, setIgnored] = useState("");
   const latest = useRef({ enabled, mayPoll });
   latest.current = { enabled, mayPoll };
   const actions = useMemo(() => {
@@ -185,9 +192,10 @@ function useSticks(driver: Driver<Deflection>, enabled: boolean, mayPoll: () => 
       if (held.releaseKey(event.code)) apply();
     };
     const poll = (): void => {
-      const found = (navigator.getGamepads?.() ?? []).find((each) => each?.connected) ?? null;
-      setHasGamepad(found !== null);
-      if (held.poll(found?.axes ?? null, latest.current.mayPoll() && document.hasFocus())) apply();
+      const { axes, ignored: other } = findGamepad(navigator.getGamepads?.() ?? []);
+      setHasGamepad(axes !== null);
+      setIgnored(other);
+      if (held.poll(axes, latest.current.mayPoll() && document.hasFocus())) apply();
     };
     return {
       letGo,
@@ -226,6 +234,7 @@ function useSticks(driver: Driver<Deflection>, enabled: boolean, mayPoll: () => 
   return {
     shown,
     hasGamepad,
+    ignored,
     pad: actions.pad,
     stop: actions.stop,
     sticks: { left: actions.left, right: actions.right },
