@@ -9,6 +9,7 @@ import { Pace } from "../../web/src/live/pace";
 import { splitSteps } from "../../web/src/app/router";
 import { asCode } from "../../web/src/panels/code";
 import { hexLines, greyPicture } from "../../web/src/panels/bytes";
+import { fitDrafts } from "../../web/src/panels/form_drafts";
 import { Trace, toCsv } from "../../web/src/panels/trace";
 import { readPicture } from "../../web/src/camera/pixels";
 import type { Member } from "../../web/src/robot/remote";
@@ -106,6 +107,26 @@ describe("drafts", () => {
     const again = draftOf(value, "Arm", definitions, scope);
     expect(again.kind === "struct" && again.fields?.get("id")).toEqual(draft.fields.get("id"));
     expect(({} as Record<string, unknown>)["7"]).toBeUndefined();
+  });
+
+  test("stay in a form over an outage, unless their type is another one", () => {
+    const inputs = [
+      { name: "arm", type: "Arm" },
+      { name: "speed", type: "double" },
+      { name: "mode", type: "Mode" },
+    ];
+    const typed = (draft: string) => ({ kind: "text", text: draft }) as const;
+    const form = fitDrafts(null, inputs, definitions, scope);
+    const [arm = typed("")] = form.drafts;
+    const drafts = [arm, typed("30"), typed("jog")];
+    const kept = fitDrafts({ ...form, drafts }, inputs, new Definitions([uuid, text, "service new"]), scope);
+    expect(kept).toEqual({ ...form, drafts });
+    const other = new Definitions([text.replace("jog = 0x10", "walk"), uuid]);
+    const fitted = fitDrafts(kept, inputs, other, scope);
+    expect(fitted.drafts).toEqual([makeDraft("Arm", other, scope), typed("30"), typed("off")]);
+    expect(fitted.emptied).toEqual(["mode"]); // in the others nothing was typed, or nothing is lost
+    const renamed = [{ name: "speed", type: "single" }];
+    expect(fitDrafts(kept, renamed, definitions, scope)).toMatchObject({ drafts: [typed("0")], emptied: ["speed"] });
   });
 
   test("say which field is wrong", () => {

@@ -18,6 +18,7 @@ const german: Readonly<Record<string, string>> = {
   "Copy as code": "Als Code kopieren",
   Done: "Fertig",
   Drive: "Fahren",
+  "Emptied, since its type has changed: {0}": "Geleert, weil der Typ ein anderer ist: {0}",
   Events: "Ereignisse",
   "Fill in": "Ausfüllen",
   Form: "Formular",

@@ -47,6 +47,17 @@ export function shapeOf(type: string, definitions: Definitions, scope: string): 
   return { kind: "text", type };
 }
 
+/** All that the shape of a type's drafts depends on: where it is the same, a draft still fits. */
+export function shapeText(type: string, definitions: Definitions, scope: string, seen = new Set<string>()): string {
+  const shape = shapeOf(type, definitions, scope);
+  const inner = (of: string, within: string): string => shapeText(of, definitions, within, seen);
+  if (shape.kind === "list" || shape.kind === "map") return `${type} of ${inner(shape.item, scope)}`;
+  if (shape.kind === "enum") return `${type} ${shape.names.join(" ")}`;
+  if (shape.kind !== "struct" || seen.has(shape.name)) return `${shape.kind} ${type}`;
+  seen.add(shape.name); // it may contain itself
+  return `${shape.name} {${shape.fields.map((field) => `${field.name} ${inner(field.type, shape.scope)}`).join(", ")}}`;
+}
+
 /** An empty value. */
 export function makeDraft(type: string, definitions: Definitions, scope: string, depth = 0): Draft {
   const shape = shapeOf(type, definitions, scope);
