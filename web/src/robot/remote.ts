@@ -46,7 +46,7 @@ export interface Remote {
   dimensions(memory: string): Promise<number[]>;
   read(memory: string, position: readonly number[], count: readonly number[]): Promise<unknown>;
   write(memory: string, position: readonly number[], value: unknown): Promise<void>;
-  /** An endpoint to send with; what it receives is not read. */
+  /** An endpoint to send with; what it receives is dropped. */
   openPipe(name: string): Promise<Sender>;
   /** A run of a generator function. */
   generate(name: string, args: readonly unknown[]): AsyncGenerator<unknown, void, unknown>;
@@ -62,6 +62,7 @@ export interface Remote {
 }
 
 export interface Sender {
+  readonly isClosed: boolean;
   send(value: unknown): Promise<void>;
   close(): Promise<void>;
 }
@@ -116,7 +117,11 @@ export function remoteOf(object: RemoteObject, underWay = new UnderWay()): Remot
     dimensions: async (name) => member(name).dimensions(),
     read: async (name, position, count) => member(name).read(position, count),
     write: async (name, position, value) => member(name).write(position, value),
-    openPipe: async (name) => member(name).connect(-1, {}),
+    openPipe: async (name) => {
+      const endpoint = await member(name).connect(-1, {});
+      void drop(endpoint).catch(() => undefined); // who sends hears that it is closed
+      return endpoint;
+    },
     generate: (name, args) => member(name)(...args),
     lock: async (kind) => info.lock(kind),
     unlock: async () => info.unlock(),
@@ -147,6 +152,11 @@ function smallest(members: readonly Member[]): Member | undefined {
     words.find(({ kind }) => kind === "wire") ??
     readable.find(({ kind }) => kind === "wire")
   );
+}
+
+/** An endpoint that nobody reads would keep all packets, and be closed when they are too many. */
+async function drop(packets: AsyncIterable<unknown>): Promise<void> {
+  for await (const _ of packets);
 }
 
 /** Leaving the loop, or `signal`, closes the wire's connection or the pipe's endpoint. */
