@@ -88,6 +88,7 @@ export function remoteOf(object: RemoteObject, underWay = new UnderWay()): Remot
     if (!info.members.some((m) => m.name === name)) throw new Error(`${info.type} has no member "${name}"`);
     return info.member(name);
   };
+  const children = new WeakMap<RemoteObject, Remote>(); // who asks for one again gets the same: what is known of it is kept by it
   return {
     type: info.type,
     members: info.members,
@@ -138,8 +139,12 @@ export function remoteOf(object: RemoteObject, underWay = new UnderWay()): Remot
     },
     poke: (name, value, options) => underWay.follow((async () => member(name).poke(value, options))()),
     on: (name, heard) => member(name).on(heard),
-    child: async (name, index) =>
-      remoteOf(await (index === undefined ? member(name).get<RemoteObject>() : member(name).get(index)), underWay),
+    child: async (name, index) => {
+      const found = await (index === undefined ? member(name).get<RemoteObject>() : member(name).get(index));
+      const child = children.get(found) ?? remoteOf(found, underWay);
+      children.set(found, child);
+      return child;
+    },
   };
 }
 
