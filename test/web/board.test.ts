@@ -15,7 +15,7 @@ import { readPicture } from "../../web/src/camera/pixels";
 import type { Member } from "../../web/src/robot/remote";
 import { ROBOT_STOP } from "../../web/src/robot/stop";
 import { Definitions, flagNames, scopeOf } from "../../web/src/values/definitions";
-import { draftOf, formatUuid, makeDraft, readUuid, valueOf } from "../../web/src/values/draft";
+import { draftOf, formatUuid, jsonOf, makeDraft, readUuid, valueOf } from "../../web/src/values/draft";
 import { numberAt, numberPaths } from "../../web/src/values/paths";
 import { rowsOf } from "../../web/src/values/rows";
 import { unitOf } from "../../web/src/values/units";
@@ -342,6 +342,33 @@ test("code quotes what comes from the device", () => {
   expect(asCode("Python", "https://h/", place, { ...member, kind: "wire" }, [null], types)).toContain(
     'robot.get_Arms("x.y").Drive.PokeOutValue(None)',
   );
+});
+
+test("code, tables and forms round no 64-bit integer, and keep numbers that JSON has not", () => {
+  const wide = 9007199254740993n;
+  const member: Member = {
+    name: "count",
+    kind: "property",
+    type: "uint64",
+    parameters: [],
+    modifiers: [],
+    documentation: "",
+  };
+  const place = { device: "d", service: "s", object: "" };
+  const types = { definitions, scope };
+  const value = { ["__proto__"]: [NaN], at: BigInt64Array.of(wide), of: new Map([[-1, -Infinity]]) };
+  expect(JSON.stringify(jsonOf(value))).toBe('{"__proto__":["NaN"],"at":["9007199254740993"],"of":{"-1":"-Infinity"}}');
+  expect(asCode("curl", "http://h/", place, member, [wide], types)).toContain(`-d '"9007199254740993"'`);
+  const script = asCode("JavaScript", "http://h/", place, member, [value], types);
+  expect(script).toContain(
+    '.set({ ["__proto__"]: [NaN], "at": [9007199254740993n], "of": new Map([[-1, -Infinity]]) })',
+  );
+  for (const [type, given] of [
+    ["int64", wide],
+    ["double", NaN],
+    ["bool", true],
+  ] as const)
+    expect(valueOf(draftOf(given, type, definitions, scope), type, definitions, scope), type).toBe(given);
 });
 
 test("memories are shown as bytes and as grey values", () => {

@@ -149,9 +149,9 @@ export function draftOf(value: unknown, type: string, definitions: Definitions, 
   return { kind: "text", text: textOf(value) };
 }
 
-/** As JSON of the gateway's HTTP API, for examples of code. */
+/** As JSON of the gateway's HTTP API, for examples of code. 64-bit integers, and numbers that JSON has not, are texts there. */
 export function jsonOf(value: unknown): unknown {
-  if (typeof value === "bigint") return Number(value);
+  if (typeof value === "bigint" || (typeof value === "number" && !Number.isFinite(value))) return String(value);
   if (ArrayBuffer.isView(value)) return Array.from(value as unknown as ArrayLike<number | bigint>, jsonOf);
   if (Array.isArray(value)) return value.map(jsonOf);
   if (value instanceof Map) return objectOf([...value].map(([key, item]) => [String(key), jsonOf(item)]));
@@ -246,5 +246,6 @@ function emptyText(type: string): string {
 function textOf(value: unknown): string {
   if (value === null || value === undefined) return "";
   if (ArrayBuffer.isView(value)) return Array.from(value as unknown as ArrayLike<number>).join(", ");
-  return typeof value === "string" ? value : JSON.stringify(jsonOf(value));
+  const json = jsonOf(value);
+  return typeof json === "string" ? json : JSON.stringify(json);
 }
