@@ -10,13 +10,13 @@ import { splitSteps } from "../../web/src/app/router";
 import { asCode } from "../../web/src/panels/code";
 import { hexLines, greyPicture } from "../../web/src/panels/bytes";
 import { fitDrafts } from "../../web/src/panels/form_drafts";
-import { Trace, toCsv } from "../../web/src/panels/trace";
+import { lonely, Trace, toCsv } from "../../web/src/panels/trace";
 import { readPicture } from "../../web/src/camera/pixels";
 import type { Member } from "../../web/src/robot/remote";
 import { ROBOT_STOP } from "../../web/src/robot/stop";
 import { Definitions, flagNames, scopeOf } from "../../web/src/values/definitions";
 import { draftOf, formatUuid, jsonOf, makeDraft, readUuid, valueOf } from "../../web/src/values/draft";
-import { numberAt, numberPaths } from "../../web/src/values/paths";
+import { numberPaths, numberReader } from "../../web/src/values/paths";
 import { rowsOf } from "../../web/src/values/rows";
 import { unitOf } from "../../web/src/values/units";
 
@@ -161,6 +161,7 @@ describe("tables and plots", () => {
 
   test("find numbers by path, and own fields only", () => {
     expect(numberPaths(value)).toEqual(expect.arrayContaining(["pose.x", "pose.q[2]", 'limits["a"]']));
+    const numberAt = (of: unknown, path: string) => numberReader(path)(of);
     expect(numberAt(value, "pose.q[2]")).toBe(3);
     expect(numberAt(value, 'limits["a"]')).toBe(1);
     expect(numberAt(value, "pose.constructor.length")).toBeUndefined();
@@ -169,10 +170,28 @@ describe("tables and plots", () => {
 
   test("keep what a window shows, and write a file that no spreadsheet runs", () => {
     const trace = new Trace(2);
-    for (let i = 0; i <= 10; i++) trace.push(i * 1000, [i, null]);
+    for (let i = 0; i <= 10; i++) trace.push(i * 1000, [i]);
     expect(trace.window(3)[0]).toEqual([-3, -2, -1, 0]);
     expect(toCsv(["time_s", '=A1,"x"'], new Trace(1))).toBe(`time_s,"'=A1,""x"""\n`);
     expect(toCsv(["t", "a", "b"], trace).split("\n")[2]).toBe("1,1,");
+  });
+
+  test("draw no line over an outage, and leave out what is no finite number", () => {
+    const trace = new Trace(2);
+    trace.breakOff(); // nothing came before
+    trace.push(0, [1, NaN]);
+    trace.push(1000, [2, Infinity]);
+    const before = trace.pushed;
+    trace.breakOff();
+    trace.push(9000, [3, 4]);
+    expect(trace.pushed).toBe(before + 2);
+    expect(trace.window(30)).toEqual([
+      [-9, -8, -8, 0],
+      [1, 2, null, 3],
+      [null, null, null, 4],
+    ]);
+    expect(lonely(trace.window(30)[1] ?? [])).toEqual([3]);
+    expect(lonely([1, 2, null])).toBeNull();
   });
 });
 
