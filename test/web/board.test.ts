@@ -11,6 +11,7 @@ import { asCode } from "../../web/src/panels/code";
 import { hexLines, greyPicture } from "../../web/src/panels/bytes";
 import { fitDrafts } from "../../web/src/panels/form_drafts";
 import { lonely, Trace, toCsv } from "../../web/src/panels/trace";
+import type { Frame } from "../../web/src/camera/frame";
 import { readPicture } from "../../web/src/camera/pixels";
 import type { Member } from "../../web/src/robot/remote";
 import { ROBOT_STOP } from "../../web/src/robot/stop";
@@ -399,12 +400,15 @@ test("memories are shown as bytes and as grey values", () => {
 
 test("pictures of the standard types are read by their encoding", () => {
   const info = { width: 1, height: 1, step: 3, encoding: 0x1000 };
-  expect([...(readPicture({ image_info: info, data: Uint8Array.of(1, 2, 3) }).rgba ?? [])]).toEqual([1, 2, 3, 255]);
+  expect(rgbaOf(readPicture({ image_info: info, data: Uint8Array.of(1, 2, 3) }))).toEqual([1, 2, 3, 255]);
   const bgr = readPicture({ image_info: { ...info, encoding: 0x1002 }, data: Uint8Array.of(1, 2, 3) });
-  expect([...(bgr.rgba ?? [])]).toEqual([3, 2, 1, 255]);
+  expect(rgbaOf(bgr)).toEqual([3, 2, 1, 255]);
   const depth = { image_info: { width: 2, height: 1, step: 4, encoding: 0x4000 }, data: Uint8Array.of(0, 0, 16, 39) };
-  expect([...(readPicture(depth).rgba ?? [])]).toEqual([0, 0, 0, 255, 255, 255, 255, 255]);
-  expect(readPicture({ image_info: info, data: Uint8Array.of(255, 216, 255) }).encoded).not.toBeNull();
+  expect(rgbaOf(readPicture(depth))).toEqual([0, 0, 0, 255, 255, 255, 255, 255]);
+  const jpeg = Uint8Array.of(255, 216, 255);
+  expect(readPicture({ image_info: info, data: jpeg }).encoded).toBe(jpeg); // not copied
+  const grey = { image_info: { width: 2, height: 1, step: 2, encoding: "mono8" }, data: Uint8Array.of(7, 255) };
+  expect(rgbaOf(readPicture(grey))).toEqual([7, 7, 7, 255, 255, 255, 255, 255]);
   expect(() => readPicture({ image_info: { ...info, width: 9 }, data: Uint8Array.of(1, 2, 3) })).toThrow(
     "the picture has 3 bytes",
   );
@@ -432,3 +436,9 @@ test("a board is written at once and then not too often, and the address only wh
   ) as [Board, Board];
   expect([sameBoard(one, { ...one, panels: [...one.panels] }), sameBoard(one, other)]).toEqual([true, false]);
 });
+
+function rgbaOf({ width, height, paint }: Frame): number[] {
+  const pixels = new Uint32Array(width * height);
+  paint?.(pixels);
+  return [...new Uint8Array(pixels.buffer)];
+}
