@@ -155,12 +155,12 @@ function Canvas({ trace, labels, seconds, paused }: CanvasProps) {
     let [drawn, isInView] = ["", true];
     const draw = (): void => {
       if (latest.current.paused || document.hidden || !isInView) return;
-      const next = `${trace.pushed} ${latest.current.seconds}`;
+      const isPointedAt = (plot.cursor.left ?? -1) >= 0;
+      const next = `${trace.pushed} ${latest.current.seconds} ${isPointedAt}`;
       if (next === drawn) return;
       drawn = next;
       const data = trace.window(latest.current.seconds) as uPlot.AlignedData;
       plot.setData(data);
-      const isPointedAt = (plot.cursor.left ?? -1) >= 0;
       if (!isPointedAt && data[0].length > 0) plot.setLegend({ idx: data[0].length - 1 }); // the newest values
     };
     const fit = new ResizeObserver(() => plot.setSize(sizeOf(box, plot)));
