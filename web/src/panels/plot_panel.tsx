@@ -170,6 +170,7 @@ function Canvas({ trace, labels, seconds, paused }: CanvasProps) {
     const unwatch = onColoursChanged(() => {
       plot.destroy();
       plot = makePlot(box, labels);
+      drawn = "";
       plot.setData(trace.window(latest.current.seconds) as uPlot.AlignedData);
     });
     const timer = setInterval(draw, DRAW_MS);
