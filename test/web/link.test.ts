@@ -1,4 +1,4 @@
-import { Link } from "../../web/src/robot/link";
+import { Link, openIn } from "../../web/src/robot/link";
 
 /** A subscription in the hands of the test. */
 function setup() {
@@ -39,11 +39,12 @@ describe("link", () => {
       since: 1_000_000,
       reason: "device create is down",
       retryAt: 1_000_500,
+      remote: null,
     });
     vi.advanceTimersByTime(700);
     tell("failed", new Error("refused"));
     tell("waiting", 1000);
-    expect(link.state.value).toEqual({ kind: "lost", since: 1_000_000, reason: "refused", retryAt: 1_001_700 });
+    expect(link.state.value).toMatchObject({ since: 1_000_000, reason: "refused", retryAt: 1_001_700 });
     tell("connected", client);
     expect(link.state.value).toMatchObject({ kind: "online", since: 1_000_700 });
   });
@@ -55,18 +56,22 @@ describe("link", () => {
     expect(subscription.retryNow).toHaveBeenCalledOnce();
     expect(link.state.value).toMatchObject({ kind: "lost", retryAt: 1_000_000 });
   });
-  it("is lost while the gateway says that the device is away, and anew when it is back", () => {
+  it("is lost while the gateway says that the device is away, but for a stop, until it is back", () => {
     const { link, tell } = setup();
     link.setAway("refused");
     expect(link.state.value.kind).toBe("connecting");
     tell("connected", client);
-    const before = link.state.value;
+    const remote = openIn(link.state.value);
+    expect(remote).not.toBeNull();
     link.setAway("refused");
     expect(link.state.value).toMatchObject({ kind: "lost", reason: "refused" });
+    tell("waiting", 500);
+    expect(openIn(link.state.value)).toBe(remote);
     link.setAway(null);
-    expect(link.state.value.kind).toBe("online");
-    expect(link.state.value).not.toBe(before);
+    expect(link.state.value).toMatchObject({ kind: "online", remote });
+    link.setAway("refused");
     tell("lost", new Error("closed"));
+    expect(openIn(link.state.value)).toBeNull();
     link.setAway(null);
     expect(link.state.value).toMatchObject({ kind: "lost", reason: "closed" });
   });

@@ -86,12 +86,15 @@ describe("a feed", () => {
   });
 });
 
-it("a connection hears that its device is away, and that it is back", () => {
+it("a connection hears that its device is away where it is shared, and that it is back", () => {
   const link = { setAway: vi.fn(), retryNow: vi.fn() };
   const hear = follow(link, "arm");
-  const said = (state: string) => hear({ kind: "known", devices: [{ name: "arm", state, lastError: null }] } as never);
+  const said = (state: string, mode = "shared") =>
+    hear({ kind: "known", devices: [{ name: "arm", state, mode, lastError: null }] } as never);
+  said("offline", "relay"); // it may have no ear for the gateway while this page has its only connection
+  expect(link.setAway).not.toHaveBeenCalled();
   said("online");
-  expect(link.retryNow).not.toHaveBeenCalled();
+  link.retryNow.mockClear();
   said("offline");
   expect(link.setAway).toHaveBeenLastCalledWith("offline");
   said("online");

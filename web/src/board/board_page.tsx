@@ -40,7 +40,7 @@ type ServiceRoute = Route & { page: "service" };
 export default function BoardPage({ link, route, list }: { link: Link; route: ServiceRoute; list: DeviceList }) {
   const path = route.path.map(formatStep).join(".");
   const key = boardKey(route);
-  const { object, last, failure } = useObject(link, "", path, list);
+  const { object, reach, last, failure } = useObject(link, "", path, list);
   const preset = useMemo(() => {
     if (!last) return null;
     return presetFor({
@@ -68,7 +68,7 @@ export default function BoardPage({ link, route, list }: { link: Link; route: Se
   return (
     <div class="board-page" data-kept={isKept}>
       <div class="board-bar">
-        <StopButton object={object} stop={stop} place={route} list={list} />
+        <StopButton object={reach} stop={stop} place={route} list={list} />
         {silent !== null && (
           <p class="failure board-silent" role="alert">
             {t("The device has not answered for {0}.", oldness(silent))}

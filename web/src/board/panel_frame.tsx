@@ -42,7 +42,7 @@ export function PanelFrame({
   remove,
 }: PanelFrameProps) {
   const path = [place.object, panel.object].filter((each) => each !== "" && panel.from === "").join(".");
-  const { object, last, failure } = useObject(link, panel.from, panel.from === "" ? path : panel.object, list);
+  const { object, reach, last, failure } = useObject(link, panel.from, panel.from === "" ? path : panel.object, list);
   const count = last?.definitions.length ?? 0;
   const definitions = useMemo(() => new Definitions(last?.definitions ?? []), [last, count]);
   const Shown = useLoaded(panel.kind);
@@ -127,6 +127,7 @@ export function PanelFrame({
           <Guard key={panel.kind}>
             <Shown
               object={object}
+              reach={reach}
               members={last.members}
               definitions={definitions}
               scope={scopeOf(last.type)}

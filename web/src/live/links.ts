@@ -6,6 +6,7 @@ import { Store, useStore } from "../app/store";
 import type { DeviceList } from "../gateway/devices";
 import { linkTo } from "../gateway/link_to";
 import type { Link } from "../robot/link";
+import { openIn } from "../robot/link";
 import type { LinkState } from "../robot/link";
 import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
@@ -28,13 +29,18 @@ function openLink(place: string, list: DeviceList): { link: Link; close: () => v
   return { link: entry.link, close };
 }
 
+export interface ObjectState {
+  /** For commands and values; null while there is no connection, or the device is away. */
+  object: Remote | null;
+  /** For a stop: also while the device is only said to be away. */
+  reach: Remote | null;
+  /** For what was known of it. */
+  last: Remote | null;
+  failure: string | null;
+}
+
 /** The object at `path` ("Webcams[0].lens") of the page's service, or of another one ("device/service"). */
-export function useObject(
-  own: Link,
-  from: string,
-  path: string,
-  list: DeviceList,
-): { object: Remote | null; last: Remote | null; failure: string | null } {
+export function useObject(own: Link, from: string, path: string, list: DeviceList): ObjectState {
   const [other, setOther] = useState<Link | null>(null);
   useEffect(() => {
     if (from === "") return setOther(null);
@@ -43,7 +49,7 @@ export function useObject(
     return close;
   }, [from, list]);
   const state = useStore(from === "" ? own.state : (other?.state ?? nowhere));
-  const root = state.kind === "online" ? state.remote : null;
+  const root = openIn(state);
   const [found, setFound] = useState<{ object: Remote; root: Remote; path: string } | null>(null);
   const [failure, setFailure] = useState<string | null>(null);
   useEffect(() => {
@@ -58,10 +64,11 @@ export function useObject(
     return () => void (isCurrent = false);
   }, [root, path]);
   const isThere = found !== null && found.root === root && found.path === path;
-  const object = path === "" ? root : isThere ? found.object : null; // the root needs no way to it: a stop is ready at once
+  const reach = path === "" ? root : isThere ? found.object : null; // the root needs no way to it: a stop is ready at once
   return {
-    object,
-    last: object ?? (found?.path === path ? found.object : null),
+    object: state.kind === "online" ? reach : null,
+    reach,
+    last: reach ?? (found?.path === path ? found.object : null),
     failure: failure ?? (from !== "" && state.kind === "lost" ? state.reason : null),
   };
 }

@@ -46,7 +46,7 @@ export function ServicePage({ route, list }: { route: ServiceRoute; list: Device
       {link && shown === "members" && <HeadStop link={link} route={route} list={list} />}
       {drives && link && (
         <div hidden={shown !== "drive"}>
-          <RobotPage link={link} list={list} device={device} shown={shown === "drive"} />
+          <RobotPage link={link} list={list} device={device} service={service} shown={shown === "drive"} />
         </div>
       )}
       {link && shown === "board" && <LoadedBoard link={link} route={route} list={list} />}
@@ -87,8 +87,8 @@ function HeadStop({ link, route, list }: { link: Link; route: ServiceRoute; list
   const shown = useObject(link, "", route.path.map(formatStep).join("."), list);
   const root = useObject(link, "", "", list);
   const [own, service] = [useStop(shown.last), useStop(root.last)];
-  if (own) return <StopButton object={shown.object} stop={own} place={route} list={list} />;
-  return <StopButton object={root.object} stop={service} place={route} list={list} />;
+  if (own) return <StopButton object={shown.reach} stop={own} place={route} list={list} />;
+  return <StopButton object={root.reach} stop={service} place={route} list={list} />;
 }
 
 function useStop(object: Remote | null): StopCall | null {

@@ -12,18 +12,22 @@ export interface Driving {
   held: ReadonlySet<Direction>;
   press: (source: string, direction: Direction) => void;
   release: (source: string) => void;
-  /** Lets go of everything and stops the robot, whoever moves it. */
+  /** Lets go of everything and stops the robot, whoever moves it; `unsent` hears where that cannot be sent. */
   stop: () => void;
 }
 
 const NOTHING: ReadonlySet<Direction> = new Set();
 
 /** While `enabled`, follows the keyboard of the whole page; `press` and `release` are for buttons. */
-export function useDriving(driver: Driver<DriveCommand>, speed: number, enabled: boolean): Driving {
+export function useDriving(
+  driver: Driver<DriveCommand>,
+  speed: number,
+  { enabled, unsent }: { enabled: boolean; unsent: () => void },
+): Driving {
   const holds = useRef(new Holds()).current;
   const [held, setHeld] = useState(NOTHING);
-  const latest = useRef({ speed, enabled });
-  latest.current = { speed, enabled };
+  const latest = useRef({ speed, enabled, unsent });
+  latest.current = { speed, enabled, unsent };
 
   const apply = useCallback(() => {
     const directions = holds.directions;
@@ -44,7 +48,7 @@ export function useDriving(driver: Driver<DriveCommand>, speed: number, enabled:
   const stop = useCallback(() => {
     holds.clear();
     setHeld(NOTHING);
-    driver.stop();
+    if (!driver.stop()) latest.current.unsent();
   }, [driver, holds]);
 
   useEffect(() => {
