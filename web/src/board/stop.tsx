@@ -35,7 +35,7 @@ export function StopButton({ object, stop, place, list }: StopButtonProps) {
   const words = stop
     ? t("calls {0}; Esc, too", `${stop.call}(${stop.args.join(", ")})`)
     : t("lets the gateway make it safe: {0}; Esc, too", safe.join(", "));
-  return <Button send={send} words={words} />;
+  return <StopPress send={send} words={words} label={t("Stop")} byEscape />;
 }
 
 /**
@@ -66,9 +66,18 @@ export function useSafe({ device, service }: StopButtonProps["place"], list: Dev
 }
 
 /** `failed` hears of what fails later. */
-type Send = (failed: (error: unknown) => void) => Promise<void>;
+export type Send = (failed: (error: unknown) => void) => Promise<void>;
 
-function Button({ send: stop, words }: { send: Send; words: string }) {
+export interface StopPressProps {
+  send: Send;
+  label: string;
+  /** Before it is pressed. */
+  words: string;
+  byEscape?: boolean;
+}
+
+/** A button that sends at the press, and again with each, and says what became of it. */
+export function StopPress({ send: stop, label, words, byEscape = false }: StopPressProps) {
   const [state, setState] = useState<State>({ kind: "ready" });
   const send = (): void => {
     const at = performance.now();
@@ -79,13 +88,14 @@ function Button({ send: stop, words }: { send: Send; words: string }) {
   const sendNow = useRef(send);
   sendNow.current = send;
   useEffect(() => {
+    if (!byEscape) return;
     const heard = (event: KeyboardEvent): void => {
       if (event.code !== "Escape" || event.repeat) return;
       sendNow.current();
     };
     window.addEventListener("keydown", heard, { capture: true });
     return () => window.removeEventListener("keydown", heard, { capture: true });
-  }, []);
+  }, [byEscape]);
   return (
     <div class="stop">
       {/* At the press already; a click alone is the keyboard's, or a screen reader's. */}
@@ -95,7 +105,7 @@ function Button({ send: stop, words }: { send: Send; words: string }) {
         onPointerDown={(event) => event.button === 0 && send()}
         onClick={(event) => event.detail === 0 && send()}
       >
-        {t("Stop")}
+        {label}
       </button>
       <p class={`stop-words ${state.kind === "failed" ? "is-bad" : ""}`} role="status" data-stop={state.kind}>
         {wordsOf(state, words)}

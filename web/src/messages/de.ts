@@ -43,6 +43,7 @@ const german: Readonly<Record<string, string>> = {
   Mode: "Betriebsart",
   "Move or size {0}: arrow keys, with Shift to size":
     "{0} verschieben oder vergrößern: Pfeiltasten, mit Umschalt für die Größe",
+  "Not heard of since {0}: {1}": "Seit {0} nichts davon gehört: {1}",
   "NOT STOPPED: {0}": "NICHT GESTOPPT: {0}",
   "Name of {0}": "Name von {0}",
   "New items": "Neue Werte",
