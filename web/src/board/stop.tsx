@@ -6,7 +6,7 @@ import { t } from "../app/language";
 import type { DeviceList } from "../gateway/devices";
 import { devicesOf } from "../gateway/devices";
 import { makeSafe, safeOf } from "../gateway/safe";
-import { tellStop } from "../robot/control";
+import { isEscape, tellStop } from "../robot/control";
 import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
 import { stopDevice } from "../robot/stop";
@@ -90,7 +90,7 @@ export function StopPress({ send: stop, label, words, byEscape = false }: StopPr
   useEffect(() => {
     if (!byEscape) return;
     const heard = (event: KeyboardEvent): void => {
-      if (event.code !== "Escape" || event.repeat) return;
+      if (!isEscape(event) || event.repeat) return;
       sendNow.current();
     };
     window.addEventListener("keydown", heard, { capture: true });

@@ -108,6 +108,7 @@ export function RobotPage({ link, list, device, service, shown }: RobotPageProps
           driver={driver}
           control={control}
           enabled={live && shown && isOpen}
+          shown={shown}
           unsent={stopUnconnected}
           lost={state.kind === "lost"}
           failure={driveFailure}

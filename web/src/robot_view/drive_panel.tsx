@@ -17,6 +17,8 @@ export interface DrivePanelProps {
   driver: Driver<DriveCommand>;
   control: Control | null;
   enabled: boolean;
+  /** False while another view of the robot is. */
+  shown: boolean;
   /** Somebody asked for a stop, and there is no connection for it. */
   unsent: () => void;
   lost: boolean;
@@ -24,9 +26,9 @@ export interface DrivePanelProps {
   device: string;
 }
 
-export function DrivePanel({ driver, control, enabled, unsent, lost, failure, device }: DrivePanelProps) {
+export function DrivePanel({ driver, control, enabled, shown, unsent, lost, failure, device }: DrivePanelProps) {
   const [speed, setSpeed] = useState(200);
-  const driving = useDriving(driver, speed, { enabled, unsent });
+  const driving = useDriving(driver, speed, { enabled, shown, unsent });
   return (
     <section class="panel drive" aria-labelledby="drive-title">
       <h2 id="drive-title" class="unseen">
