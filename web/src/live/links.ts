@@ -1,17 +1,17 @@
 // Connections to services other than the page's own: one for each, however many panels show it.
 // Layer: web/live.
 
-import { useEffect, useState } from "preact/hooks";
+import { useEffect, useMemo, useState } from "preact/hooks";
 import { Store, useStore } from "../app/store";
 import type { DeviceList } from "../gateway/devices";
 import { linkTo } from "../gateway/link_to";
 import type { Link } from "../robot/link";
 import { openIn } from "../robot/link";
 import type { LinkState } from "../robot/link";
-import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
 import { parseStep, splitSteps } from "../app/router";
-import { walk } from "../robot/walk";
+import type { PathStep } from "../app/router";
+import { keepFound } from "../robot/walk";
 
 const links = new Map<string, { link: Link; dispose: () => void; users: number }>();
 const nowhere = new Store<LinkState>({ kind: "connecting" });
@@ -49,26 +49,32 @@ export function useObject(own: Link, from: string, path: string, list: DeviceLis
     return close;
   }, [from, list]);
   const state = useStore(from === "" ? own.state : (other?.state ?? nowhere));
+  const steps = useMemo(() => (path === "" ? [] : splitSteps(path).map(parseStep)), [path]);
+  const found = useWalk(state, steps);
+  return { ...found, failure: found.failure ?? (from !== "" && state.kind === "lost" ? state.reason : null) };
+}
+
+/** The object at the end of `path`, found anew on every connection. */
+export function useWalk(state: LinkState, path: readonly PathStep[]): ObjectState {
   const root = openIn(state);
-  const [found, setFound] = useState<{ object: Remote; root: Remote; path: string } | null>(null);
+  const key = JSON.stringify(path);
+  const [found, setFound] = useState<{ object: Remote; root: Remote | null; key: string } | null>(null);
   const [failure, setFailure] = useState<string | null>(null);
   useEffect(() => {
     if (!root) return;
-    let isCurrent = true;
     setFailure(null);
-    const steps = path === "" ? [] : splitSteps(path).map(parseStep);
-    walk(root, steps).then(
-      (object) => isCurrent && setFound({ object, root, path }),
-      (error: unknown) => isCurrent && setFailure(explain(error)),
-    );
-    return () => void (isCurrent = false);
-  }, [root, path]);
-  const isThere = found !== null && found.root === root && found.path === path;
-  const reach = path === "" ? root : isThere ? found.object : null; // the root needs no way to it: a stop is ready at once
+    return keepFound(root, path, (object, why) => {
+      setFound((old) => (object ? { object, root, key } : old && { ...old, root: null }));
+      setFailure(why === "" ? null : why);
+    });
+  }, [root, key]);
+  const isOfPath = found?.key === key;
+  // The root needs no way to it: a stop is ready at once.
+  const reach = path.length === 0 ? root : isOfPath && found.root === root ? found.object : null;
   return {
     object: state.kind === "online" ? reach : null,
     reach,
-    last: reach ?? (found?.path === path ? found.object : null),
-    failure: failure ?? (from !== "" && state.kind === "lost" ? state.reason : null),
+    last: reach ?? (isOfPath ? found.object : null),
+    failure,
   };
 }
