@@ -198,6 +198,30 @@ test("the stop reaches a device that the gateway takes for offline, and one with
   await expect(page.getByRole("region", { name: "Drive" })).toContainText("NOT STOPPED: offline");
 });
 
+test("a panel that fails says so, can be tried again, and leaves the rest of the board as it is", async ({
+  page,
+  lab,
+}) => {
+  const body = 'export default () => { if (!globalThis.isMended) throw new Error("an odd panel"); return "mended"; }';
+  await page.route("**/notes_panel-*.js", (route) => route.fulfill({ contentType: "text/javascript", body }));
+  await openBoard(page, lab.url);
+  await addPanel(page, "notes");
+  const notes = page.locator('[data-panel="notes"]');
+  await expect(notes.getByRole("alert").filter({ hasText: "an odd panel" })).toBeVisible();
+  await expect(page.locator('[data-panel="plot"] .freshness').first()).toContainText("a second");
+  await page.evaluate(() => ((globalThis as { isMended?: boolean }).isMended = true));
+  await notes.getByRole("button", { name: "Try again" }).click();
+  await expect(notes).toContainText("mended");
+  await page.goto(
+    `${lab.url}#/devices/create/Create?view=board&board=${btoa(
+      '{"board":1,"panels":[{"kind":"notes","from":"100%","x":0,"y":0,"w":4,"h":4}]}',
+    )}`,
+  );
+  await expect(page.getByRole("alert").filter({ hasText: '/panels/0/from is "100%"' })).toBeVisible();
+  await page.getByRole("button", { name: "Stop", exact: true }).click();
+  await expect(page.locator('[data-stop="arrived"]')).toBeVisible();
+});
+
 test("a camera of another device stands beside the robot, with an object of its own", async ({ page, lab }) => {
   await openBoard(page, lab.url);
   await addPanel(page, "image");

@@ -28,6 +28,7 @@ import {
   writeBoard,
 } from "./board";
 import type { Board, Panel, PanelKind } from "./board";
+import { Guard } from "./guard";
 import { Keeper } from "./keeper";
 import { findRoom, inOrder, nudge, put, settle } from "./layout";
 import { PanelFrame } from "./panel_frame";
@@ -88,19 +89,20 @@ export default function BoardPage({ link, route, list }: { link: Link; route: Se
       <Failure text={trouble ?? failure} />
       <div class="board">
         {inOrder(board.panels).map((panel) => (
-          <PanelFrame
-            key={panel.id}
-            panel={panel}
-            link={link}
-            place={{ device: route.device, service: route.service, object: path }}
-            services={services}
-            list={list}
-            arranging={arranging}
-            move={(place) => setPanels(put(board.panels, panel.id, place))}
-            step={(dx, dy) => setPanels(nudge(board.panels, panel.id, dx, dy))}
-            update={(change) => update(panel.id, change)}
-            remove={() => setPanels(settle(board.panels.filter(({ id }) => id !== panel.id)))}
-          />
+          <Guard key={panel.id}>
+            <PanelFrame
+              panel={panel}
+              link={link}
+              place={{ device: route.device, service: route.service, object: path }}
+              services={services}
+              list={list}
+              arranging={arranging}
+              move={(place) => setPanels(put(board.panels, panel.id, place))}
+              step={(dx, dy) => setPanels(nudge(board.panels, panel.id, dx, dy))}
+              update={(change) => update(panel.id, change)}
+              remove={() => setPanels(settle(board.panels.filter(({ id }) => id !== panel.id)))}
+            />
+          </Guard>
         ))}
       </div>
       {board.panels.length === 0 && <p class="empty">{t("This board is empty. Add a panel above.")}</p>}

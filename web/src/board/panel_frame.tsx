@@ -1,8 +1,7 @@
 // The frame of a panel: its name, its handles while the board is arranged, and what it shows.
 // Layer: web/board.
 
-import { Component } from "preact";
-import type { ComponentChildren, ComponentType } from "preact";
+import type { ComponentType } from "preact";
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { t } from "../app/language";
 import type { DeviceList } from "../gateway/devices";
@@ -13,6 +12,7 @@ import type { Link } from "../robot/link";
 import { Failure } from "../ui/failure";
 import { Definitions, scopeOf } from "../values/definitions";
 import type { Panel, PanelKind } from "./board";
+import { Guard } from "./guard";
 import { handleKey, useDrag } from "./handles";
 import type { Change } from "./handles";
 
@@ -162,17 +162,4 @@ function useLoaded(kind: PanelKind): ComponentType<PanelProps> | null {
     return () => void (isCurrent = false);
   }, [kind]);
   return loaded?.kind === kind ? loaded.shown : null;
-}
-
-/** What fails in one panel leaves the others as they are. */
-class Guard extends Component<{ children: ComponentChildren }, { failure: string | null }> {
-  override state = { failure: null };
-
-  static override getDerivedStateFromError(error: unknown): { failure: string } {
-    return { failure: (error as Error).message };
-  }
-
-  override render() {
-    return this.state.failure === null ? this.props.children : <Failure text={this.state.failure} />;
-  }
 }

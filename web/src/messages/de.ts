@@ -186,6 +186,7 @@ const german: Readonly<Record<string, string>> = {
   "Connecting to {0}, service {1}": "Verbindung zu {0}, Dienst {1}, wird aufgebaut",
   "Connected to {0} since {1}": "Verbunden mit {0} seit {1}",
   "No connection to {0} since {1}": "Keine Verbindung zu {0} seit {1}",
+  "Try again": "Noch einmal versuchen",
   "Try now": "Jetzt versuchen",
   connected: "verbunden",
   connecting: "verbindet",
