@@ -2,15 +2,16 @@
 // Layer: web/board.
 
 import type { ComponentType } from "preact";
-import { useEffect, useMemo, useState } from "preact/hooks";
+import { useEffect, useState } from "preact/hooks";
 import { t } from "../app/language";
 import type { DeviceList } from "../gateway/devices";
+import { useDefinitions } from "../live/definitions";
 import { useObject } from "../live/links";
 import { KINDS, textIn } from "../panels/panel";
 import type { PanelProps } from "../panels/panel";
 import type { Link } from "../robot/link";
 import { Failure } from "../ui/failure";
-import { Definitions, scopeOf } from "../values/definitions";
+import { scopeOf } from "../values/definitions";
 import type { Panel, PanelKind } from "./board";
 import { Guard } from "./guard";
 import { handleKey, useDrag } from "./handles";
@@ -43,8 +44,7 @@ export function PanelFrame({
 }: PanelFrameProps) {
   const path = [place.object, panel.object].filter((each) => each !== "" && panel.from === "").join(".");
   const { object, reach, last, failure } = useObject(link, panel.from, panel.from === "" ? path : panel.object, list);
-  const count = last?.definitions.length ?? 0;
-  const definitions = useMemo(() => new Definitions(last?.definitions ?? []), [last, count]);
+  const definitions = useDefinitions(last);
   const Shown = useLoaded(panel.kind);
   const name = nameOf(panel);
   const [device = place.device, service = place.service] =

@@ -10,11 +10,11 @@ import { isUsb, usbUrl } from "./usb_devices";
 export function linkTo(
   device: string,
   service: string,
-  list: Pick<DeviceList, "state">,
+  list: Pick<DeviceList, "answers">,
 ): { link: Link; dispose: () => void } {
   const url = relayUrl(device, service);
   const link = new Link(isUsb(device) ? usbUrl(device, service) : () => session.withTicket(url));
-  const unwatch = list.state.watch(follow(link, device));
+  const unwatch = list.answers.watch(follow(link, device));
   const dispose = (): void => {
     unwatch();
     link.dispose();
