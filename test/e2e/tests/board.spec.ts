@@ -162,7 +162,7 @@ test("the stop reaches a device that the gateway takes for offline, and one with
     ((await (await page.request.get(`${robot}state`)).json()) as { velocity: number }).velocity;
   const drive = async () => {
     expect((await page.request.post(`${robot}Drive`, { data: { velocity: 100, radius: 32767 } })).ok()).toBe(true);
-    await expect.poll(velocity).toBe(100);
+    await expect.poll(velocity).toBeGreaterThan(0);
   };
   await openBoard(page, lab.url);
   await page.route("**/api/v1/devices", async (route) => {

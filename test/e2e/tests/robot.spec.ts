@@ -106,17 +106,17 @@ test("Esc by its meaning stops, too; Space and arrows are the page's where they 
         { key, code },
       );
   const drive = page.getByRole("region", { name: "Drive" });
+  await page.keyboard.down("ArrowUp");
+  await waitUntilDriving(page);
+  await takes("Escape", "CapsLock");
+  await waitUntilStopped(page);
+  await page.keyboard.up("ArrowUp");
   expect([await takes(" ", "Space"), await takes("ArrowDown", "ArrowDown")]).toEqual([true, true]);
   await page.evaluate(() => window.dispatchEvent(new Event("blur")));
   await page.evaluate(() =>
     document.body.insertAdjacentHTML("beforeend", "<summary id=s></summary><ol id=o tabindex=0></ol>"),
   );
   expect([await takes(" ", "Space", "#s"), await takes(" ", "Space", "#o")]).toEqual([false, false]);
-  await page.keyboard.down("ArrowUp");
-  await waitUntilDriving(page);
-  await takes("Escape", "CapsLock");
-  await waitUntilStopped(page);
-  await page.keyboard.up("ArrowUp");
 
   await page.getByRole("link", { name: "All members" }).click();
   await expect(drive).toBeHidden();

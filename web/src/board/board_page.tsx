@@ -55,7 +55,16 @@ export default function BoardPage({ link, route, list }: { link: Link; route: Se
   const [arranging, setArranging] = useState(false);
   const silent = usePulse(object, useShared(list, route.device));
   const services = useServices(list);
-  if (!board) return failure === null ? <Waiting /> : <Failure text={failure} />;
+  if (!board) {
+    return (
+      <div class="board-page">
+        <div class="board-bar">
+          <StopButton object={reach} stop={null} place={route} list={list} />
+        </div>
+        {failure === null ? <Waiting /> : <Failure text={failure} />}
+      </div>
+    );
+  }
   const stop = preset?.stop ?? board.stop; // a file may say how to stop what is not known, and nothing else
   const setPanels = (panels: readonly Panel[]): void => setBoard({ ...board, panels });
   const add = (kind: PanelKind): void => {
