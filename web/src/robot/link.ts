@@ -2,7 +2,7 @@
 // Layer: web/robot.
 
 import { subscribe } from "rrgate-client";
-import type { UrlSource } from "rrgate-client";
+import type { RemoteObject, UrlSource } from "rrgate-client";
 import { Store } from "../app/store";
 import { explain, remoteOf } from "./remote";
 import type { Remote } from "./remote";
@@ -26,11 +26,15 @@ const LIMITS = { timeout: 10_000, longestRetry: 10_000 };
 export class Link {
   readonly state = new Store<LinkState>({ kind: "connecting" });
   readonly #subscription;
+  #client: RemoteObject | null = null;
 
   /** Starts connecting at once. `follow`: for tests. */
   constructor(url: string | UrlSource, follow: typeof subscribe = subscribe) {
     this.#subscription = follow(url, LIMITS);
-    this.#subscription.onConnected((client) => this.#connect(remoteOf(client)));
+    this.#subscription.onConnected((client) => {
+      this.#client = client;
+      this.#connect(client);
+    });
     this.#subscription.onLost((reason) => this.#lose(explain(reason), null));
     this.#subscription.onFailed((error) => this.#lose(explain(error), null));
     this.#subscription.onWaiting((ms) => this.#putOff(Date.now() + ms));
@@ -43,7 +47,7 @@ export class Link {
   setAway(reason: string | null): void {
     const { value } = this.state;
     if (reason !== null && value.kind === "online") this.#lose(reason, value.remote);
-    else if (reason === null && value.kind === "lost" && value.remote) this.#connect(value.remote);
+    else if (reason === null && value.kind === "lost" && value.remote && this.#client) this.#connect(this.#client);
   }
 
   /** Connects now instead of at the end of the wait; nothing happens while online or connecting. */
@@ -56,8 +60,9 @@ export class Link {
     void this.#subscription.close();
   }
 
-  #connect(remote: Remote): void {
-    this.state.value = { kind: "online", since: Date.now(), remote };
+  /** Anew for those who look: what they had asked the device for is gone, and so is the right to command it. */
+  #connect(client: RemoteObject): void {
+    this.state.value = { kind: "online", since: Date.now(), remote: remoteOf(client) };
   }
 
   #lose(reason: string, remote: Remote | null): void {
