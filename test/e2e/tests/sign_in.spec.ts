@@ -1,6 +1,6 @@
 // Signing in at the dashboard of a gateway that asks who one is.
 import { expect, test } from "@playwright/test";
-import type { Page } from "@playwright/test";
+import type { Locator, Page } from "@playwright/test";
 import { GuardedLab, password } from "../guarded_lab";
 import { webRoot } from "../processes";
 
@@ -165,6 +165,7 @@ test("what agents ask for is shown to who decides, with who, what and why, and i
 test("what agents ask for moves nothing, covers no Stop, and is not allowed by a press that was meant for something else", async ({
   page,
 }) => {
+  test.slow(); // three pages in three sizes, each of which waits for the gateway to be asked
   const ask = (id: string) => ({
     id,
     device: "create",
@@ -184,11 +185,13 @@ test("what agents ask for moves nothing, covers no Stop, and is not allowed by a
   await page.goto(lab.url);
   await signIn(page, "root", password);
   const stop = page.getByRole("button", { name: "Stop", exact: true });
-  const seen = () =>
-    stop.evaluate((button) => {
-      const { x, y, width, height } = button.getBoundingClientRect();
-      return { x, y, isSeen: button.contains(document.elementFromPoint(x + width / 2, y + height / 2)) };
+  const stopAgents = page.getByRole("button", { name: "Stop all agents" });
+  const placeOf = (button: Locator) =>
+    button.evaluate((element) => {
+      const { x, y, width, height } = element.getBoundingClientRect();
+      return { x, y, isSeen: element.contains(document.elementFromPoint(x + width / 2, y + height / 2)) };
     });
+  const seen = async () => ({ ...(await placeOf(stop)), agents: await placeOf(stopAgents) });
   for (const [width, height] of [
     [1280, 800],
     [412, 839],
@@ -200,6 +203,7 @@ test("what agents ask for moves nothing, covers no Stop, and is not allowed by a
       await page.goto(`${lab.url}#/devices/create/Create?view=${view}`);
       await expect(page.locator('[data-approvals="0"]')).toBeVisible();
       await expect(page.locator('[data-link="online"]')).toBeVisible();
+      if (view === "drive") await expect(page.locator('[data-reading="packets"]')).toContainText("a second");
       await stop.scrollIntoViewIfNeeded();
       const before = await seen();
       expect(before.isSeen).toBe(true);
