@@ -85,6 +85,7 @@ const languages = {
   ".robdef": "txt",
   ".hpp": "cpp",
   ".cpp": "cpp",
+  ".m": "matlab",
   ".mjs": "js",
   ".conf": "nginx",
   ".cfg": "ini",

@@ -65,6 +65,9 @@ class ResponseWriter {
   rr::awaitable<rr::error_code> write(std::span<const std::string_view> parts);
   rr::awaitable<rr::error_code> end();
 
+  /// See ResponseOptions.
+  void set_patience(std::chrono::milliseconds patience) { patience_ = patience; }
+
   /// Calls `on_gone` once when the client ends the connection before unwatch() is done. For streams that may have
   /// nothing to write for long. Between begin() and end().
   void watch(std::function<void()> on_gone);

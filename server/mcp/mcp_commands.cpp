@@ -20,6 +20,8 @@ constexpr std::size_t largest_results = 1024u * 1024;  // bytes of values; as JS
 
 /// What a device may take to answer; it is the lease that bounds it.
 constexpr std::chrono::seconds longest_call{50};
+/// What a sign of life may take: while one is written, nobody looks whether the lease has to end.
+constexpr milliseconds longest_sign{500};
 /// The gateway holds the lease for the agent as long as its request is there; both parts of it take less.
 constexpr milliseconds agent_deadman{60'000};
 
@@ -247,6 +249,7 @@ McpTools::Answer McpTools::give(const Command& command, const AgentTerms& terms)
   auto client = target.client;
   std::optional<AgentLease> lease;
   if (terms.needs_lease) {
+    reply_.writer().set_patience(longest_sign);
     auto asker = target.client;
     auto identity = standing_.identity();
     auto path = target.path();

@@ -5,6 +5,7 @@
 #include <optional>
 #include <set>
 
+#include "core/support/utf8.hpp"
 #include "server/http/endpoints/member_values.hpp"
 #include "server/json/schema.hpp"
 
@@ -142,10 +143,17 @@ std::vector<Verb> uses_of(const rr::MemberDefinition& member) {
 }
 
 std::string bounded_text(std::string_view text) {
-  if (text.size() <= longest_text) return std::string(text);
-  auto end = longest_text;
-  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0u) == 0x80u) --end;  // not within a character
-  return std::string(text.substr(0, end)) + " ... (" + std::to_string(text.size() - end) + " bytes more)";
+  constexpr std::string_view replacement = "\xEF\xBF\xBD";  // U+FFFD, for each byte that is no character's
+  std::string out;
+  while (!text.empty()) {
+    const auto size = rr::utf8_character_size(text);
+    const auto character = size == 0 ? replacement : text.substr(0, size);
+    if (out.size() + character.size() > longest_text)
+      return out + " ... (" + std::to_string(text.size()) + " bytes more)";
+    out += character;
+    text.remove_prefix(std::max<std::size_t>(1, size));
+  }
+  return out;
 }
 
 McpPage page_of(std::size_t count, const std::string& cursor) {

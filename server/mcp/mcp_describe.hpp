@@ -13,7 +13,7 @@ namespace rrgate {
 
 inline constexpr std::string_view from_device = "from_device";
 
-/// Text of a device, cut where it is longer than anybody needs.
+/// Text of a device as UTF-8, cut where it is longer than anybody needs.
 std::string bounded_text(std::string_view text);
 
 /// Whether a function is a generator that is sent values, one for each step.

@@ -27,9 +27,13 @@ constexpr int parse_error = -32700;
 constexpr int invalid_request = -32600;
 constexpr int method_not_found = -32601;
 constexpr int invalid_params = -32602;
+constexpr int internal_error = -32603;
 constexpr int resource_not_found = -32002;
 constexpr int header_mismatch = -32020;
 constexpr int unsupported_version = -32022;
+
+/// Of a progressToken, which is sent back each second.
+constexpr std::size_t longest_token = 256;
 
 constexpr const char* session_header = "Mcp-Session-Id";
 
@@ -149,12 +153,14 @@ void cancel(AgentRequests& requests, const McpMessage& message, const std::strin
   requests.cancel(session, id->dump());
 }
 
-/// What the client calls a request of which it wants to know how far it is; null where it does not.
+/// What the client calls a request of which it wants to know how far it is; null where it does not. Throws McpRefusal.
 rr::OrderedJson progress_token(const McpMessage& message) {
   const auto meta = message.params.find("_meta");
   if (meta == message.params.end() || !meta->is_object()) return nullptr;
   const auto token = meta->find("progressToken");
   if (token == meta->end() || !(token->is_string() || token->is_number_integer())) return nullptr;
+  if (token->is_string() && token->get_ref<const std::string&>().size() > longest_token)
+    throw McpRefusal{invalid_params, "\"progressToken\" has more than " + std::to_string(longest_token) + " bytes"};
   return *token;
 }
 
@@ -199,8 +205,9 @@ rr::OrderedJson resource_templates() {
              {"mimeType", "application/json"}},
             {{"uriTemplate", std::string(recording_scheme) + "{recording}/{+path}"},
              {"name", "recorded member"},
-             {"description", "What a recording holds of a member: first and last value, and for each number the "
-                             "minimum, the maximum and the mean."},
+             {"description",
+              "What a recording holds of a member: first and last value, and for each number the "
+              "minimum, the maximum and the mean."},
              {"mimeType", "application/json"}}}}};
 }
 
@@ -333,6 +340,9 @@ rr::awaitable<void> answer_message(GatewayState& gateway, ResponseWriter& writer
     refusal = thrown;
   } catch (const rr::Exception& exception) {
     refusal = refusal_of(exception.error());
+  } catch (const std::exception& exception) {
+    // A mistake of the gateway's: the reply has to end all the same, since it may be read from.
+    refusal = McpRefusal{internal_error, "the gateway can't answer this: " + bounded_text(exception.what())};
   }
   if (refusal) {
     rr::add_key(out, "id") = message.id;
@@ -367,8 +377,8 @@ rr::awaitable<void> answer_stream(GatewayState& gateway, ResponseWriter& writer)
   co_await reply.begin_resumable(request.header("MCP-Protocol-Version") == handshake_revisions.back());
   try {
     co_await tools.tell_session(**stream);
-  } catch (const rr::Exception&) {
-    // The client has gone, or may not hear of something any more; it may come again.
+  } catch (const std::exception&) {
+    // The client has gone, may not hear of something any more, or something has ended; it may come again.
   }
   co_await reply.end();
 }

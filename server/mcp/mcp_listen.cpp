@@ -7,6 +7,7 @@
 #include "server/http/endpoints/member_values.hpp"
 #include "server/mcp/mcp_describe.hpp"
 #include "server/mcp/mcp_tools.hpp"
+#include "server/mcp/value_hash.hpp"
 
 namespace rrgate {
 
@@ -80,7 +81,11 @@ struct McpTools::Followed {
   bool has_seen = false;
   bool has_changed = false;
   bool is_asking = false;
+  bool has_ended = false;  ///< the device has closed it, or has replaced its object
   steady_clock::time_point next_look = {};
+
+  /// Nothing comes of it any more: it has to be followed anew.
+  bool is_over() const { return has_ended || (target && target->client->upstream()->is_closed()); }
 
   Verb verb() const { return listener ? Verb::subscribe : Verb::read; }
   void note(std::size_t now) {
@@ -94,7 +99,7 @@ struct McpTools::Followed {
     std::size_t now = 0;  // it can't be read
     try {
       const auto value = co_await self->target->ask(rr::CallKind::property_get);
-      now = hash_of(to_json(*self->target, value, {}));
+      now = hash_of(value);
     } catch (const rr::Exception&) {
     }
     self->note(now);
@@ -115,6 +120,8 @@ struct McpTools::Listening {
   steady_clock::time_point next_telling = steady_clock::now();
   bool are_missing = false;                   ///< resources that can't be followed now
   steady_clock::time_point next_search = {};  ///< for those
+  std::set<std::string> refused = {};         ///< resources that the client may not follow
+  AccessStatePtr refused_by = nullptr;        ///< as long as these are the rights
 };
 
 rr::awaitable<McpTools::FollowedPtr> McpTools::follow(std::string uri) {
@@ -127,7 +134,6 @@ rr::awaitable<McpTools::FollowedPtr> McpTools::follow(std::string uri) {
     co_return out;
   }
   out->target = co_await find(request_of(named));
-  pass_.reset();  // what goes on from now on is no request to the device
   const auto& member = expect_member(*out->target, "a subscription", {rr::MemberKind::property, rr::MemberKind::wire});
   expect_direction(member, rr::MemberDirection::writeonly);
   const auto entry = admit(*out->target, member.kind == rr::MemberKind::wire ? Verb::subscribe : Verb::read);
@@ -136,8 +142,11 @@ rr::awaitable<McpTools::FollowedPtr> McpTools::follow(std::string uri) {
   } else {
     auto place = out->target->place();
     // Also where it is lost, or back: what a reader is told changes with that.
-    SampleHandler handler = [weak = std::weak_ptr(out)](const SamplePtr&, const rr::Error*) {
-      if (const auto self = weak.lock()) self->has_changed = true;
+    SampleHandler handler = [weak = std::weak_ptr(out)](const SamplePtr&, const rr::Error* error) {
+      const auto self = weak.lock();
+      if (!self) return;
+      self->has_changed = true;
+      if (error && error->code != rr::ErrorCode::connection_error) self->has_ended = true;
     };
     out->listener = value_or_throw(co_await out->target->client->listen(std::move(place), 0, std::move(handler)));
   }
@@ -178,6 +187,12 @@ bool McpTools::look_at_list(Listening& listening) {
 
 bool McpTools::look(Listening& listening) {
   if (listening.wants_list && look_at_list(listening)) listening.has_list_changed = true;
+  if (std::erase_if(listening.followed, [](const auto& each) { return each->is_over(); }) > 0) {
+    // Who subscribed by a request repeats it, and hears then what there is to follow.
+    if (!listening.id.is_null()) refuse(rr::ErrorCode::invalid_state, "the device has closed what was followed");
+    listening.are_missing = true;
+    listening.next_search = steady_clock::now();
+  }
   bool has_news = listening.has_list_changed;
   for (const auto& each : listening.followed) {
     look_at(each);
@@ -209,12 +224,10 @@ rr::awaitable<void> McpTools::listen(const rr::Json& wanted, rr::OrderedJson id)
   listening.wants_list = filter.wants_list;
   auto uris = rr::OrderedJson::array();
   for (const auto& uri : filter.uris) {
-    try {
-      listening.followed.push_back(co_await follow(uri));
-      uris.push_back(uri);
-    } catch (const rr::Exception&) {
-      // The client hears which ones it is told of.
-    }
+    const auto followed = co_await try_to_follow(uri);
+    if (!followed) continue;  // the client hears which ones it is told of
+    listening.followed.push_back(*followed);
+    uris.push_back(uri);
   }
   auto honored = rr::OrderedJson::object();
   if (filter.wants_list) rr::add_key(honored, "resourcesListChanged") = true;
@@ -230,21 +243,43 @@ rr::awaitable<void> McpTools::listen(const rr::Json& wanted, rr::OrderedJson id)
   }
 }
 
+rr::awaitable<rr::Result<McpTools::FollowedPtr>> McpTools::try_to_follow(std::string uri) {
+  reply_.expect_client();
+  std::optional<rr::Error> failed;
+  FollowedPtr followed;
+  try {
+    const auto* device = gateway_.devices().find(parse_resource(uri).device);
+    // To try would take long, and others wait meanwhile.
+    if (device && device->state() == DeviceState::offline && !parse_resource(uri).path.empty())
+      refuse(rr::ErrorCode::connection_error, "the device is offline");
+    followed = co_await follow(std::move(uri));
+  } catch (const rr::Exception& exception) {
+    failed = exception.error();
+  }
+  pass_.reset();  // what goes on from now on is no request to the device
+  if (failed) co_return *failed;
+  co_return followed;
+}
+
 rr::awaitable<void> McpTools::follow_again(Listening& listening, std::set<std::string> uris) {
   auto& followed = listening.followed;
   std::erase_if(followed, [&](const auto& each) { return !uris.contains(each->uri); });
   for (const auto& each : followed) uris.erase(each->uri);
-  for (auto it = uris.begin(); it != uris.end();) {
-    try {
-      followed.push_back(co_await follow(*it));
-      // Since the client subscribed, or since a cut: nobody knows.
-      followed.back()->has_changed = true;
-      it = uris.erase(it);
-    } catch (const rr::Exception&) {
-      ++it;  // it was there when the client subscribed, and may be again
+  const auto rights = gateway_.access().state_ptr();
+  if (std::exchange(listening.refused_by, rights) != rights) listening.refused.clear();
+  for (const auto& uri : listening.refused) uris.erase(uri);  // each attempt would be recorded
+  listening.are_missing = false;
+  for (const auto& uri : uris) {
+    const auto found = co_await try_to_follow(uri);
+    if (found) {
+      followed.push_back(*found);
+      followed.back()->has_changed = true;  // since the client subscribed, or since a cut: nobody knows
+    } else if (found.error().code == rr::ErrorCode::permission_denied) {
+      listening.refused.insert(uri);
+    } else {
+      listening.are_missing = true;  // it was there when the client subscribed, and may be again
     }
   }
-  listening.are_missing = !uris.empty();
   listening.next_search = steady_clock::now() + search_period;
 }
 
@@ -254,7 +289,8 @@ rr::awaitable<void> McpTools::tell_session(const AgentSubscriptions::Stream& ses
   auto seen = session.changes();
   co_await follow_again(listening, session.uris());
   const auto must_follow = [&] {
-    return session.changes() != seen || (listening.are_missing && steady_clock::now() >= listening.next_search);
+    return session.changes() != seen || (listening.are_missing && steady_clock::now() >= listening.next_search) ||
+           (!listening.refused.empty() && listening.refused_by != gateway_.access().state_ptr());
   };
   const std::function<bool()> has_news = [&] { return must_follow() || look(listening); };
   for (;;) {

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "core/types/value_size.hpp"
 #include "server/http/endpoints/large_json.hpp"
 #include "server/http/endpoints/member_values.hpp"
 #include "server/mcp/mcp_describe.hpp"
@@ -20,6 +21,8 @@ constexpr std::chrono::milliseconds wire_wait{500};
 /// Of events and packets that are told together: what comes then is for the next request.
 constexpr std::size_t most_heard = 100;
 constexpr std::size_t most_heard_bytes = 1024u * 1024;
+/// In memory; as JSON it is about as long or longer, and no answer has room for it.
+constexpr std::size_t largest_value = 1024u * 1024;
 
 milliseconds wait_of(const JsonRequest& arguments, milliseconds longest) {
   const auto* wanted = arguments.find("seconds");
@@ -153,6 +156,9 @@ McpTools::Answer McpTools::read_target(JsonRequestPtr arguments, TargetPtr targe
 rr::awaitable<void> McpTools::add_value(rr::OrderedJson& answer, const Target& target, const rr::Value& value) {
   const auto& type = target.member->type;
   if (!is_image_type(type, target.types())) {
+    if (rr::held_bytes(value) > largest_value)
+      refuse(rr::ErrorCode::buffer_limit_violation,
+             "the value has " + std::to_string(rr::held_bytes(value)) + " bytes, more than an answer has room for");
     rr::add_key(answer, from_device) = to_json(target, value, {});
     co_return;
   }

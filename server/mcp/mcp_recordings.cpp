@@ -20,6 +20,8 @@ namespace {
 /// Of files: a thread reads them in a second or two.
 constexpr std::uint64_t most_read_bytes = 32u * 1024 * 1024;
 constexpr std::size_t most_members = 1000;
+/// Of a value's JSON: an answer has no room for more.
+constexpr std::size_t largest_value = 64u * 1024;
 /// One agent reads at a time: the others get their turn, or give up.
 constexpr std::chrono::seconds longest_turn_wait{10};
 
@@ -39,7 +41,8 @@ rr::OrderedJson about(const RecordingInfo& recording) {
   rr::add_key(out, "service") = recording.service;
   rr::add_key(out, "state") = std::string(to_string(recording.state));
   rr::add_key(out, "begin") = seconds_since_epoch(recording.begin);
-  rr::add_key(out, "seconds") = std::max(0.0, seconds_since_epoch(recording.end) - seconds_since_epoch(recording.begin));
+  rr::add_key(out, "seconds") =
+      std::max(0.0, seconds_since_epoch(recording.end) - seconds_since_epoch(recording.begin));
   rr::add_key(out, "bytes") = recording.bytes();
   return out;
 }
@@ -48,11 +51,13 @@ rr::OrderedJson about(const RecordingInfo& recording) {
 std::vector<RecordingFile> newest_files(const RecordingInfo& recording) {
   auto first = recording.files.size();
   std::uint64_t bytes = 0;
-  while (first > 0 && bytes + recording.files[first - 1].bytes <= most_read_bytes) bytes += recording.files[--first].bytes;
+  while (first > 0 && bytes + recording.files[first - 1].bytes <= most_read_bytes)
+    bytes += recording.files[--first].bytes;
   if (first == recording.files.size() && first > 0)
-    refuse(rr::ErrorCode::out_of_system_resource,
-           "the newest file of the recording has " + std::to_string(recording.files.back().bytes) +
-               " bytes, and at most " + std::to_string(most_read_bytes) + " are read for an agent; a person can download it");
+    refuse(rr::ErrorCode::out_of_system_resource, "the newest file of the recording has " +
+                                                      std::to_string(recording.files.back().bytes) +
+                                                      " bytes, and at most " + std::to_string(most_read_bytes) +
+                                                      " are read for an agent; a person can download it");
   return {recording.files.begin() + static_cast<std::ptrdiff_t>(first), recording.files.end()};
 }
 
@@ -63,6 +68,7 @@ rr::Error in_words_for_agent(const rr::Error& error, const std::string& path) {
 /// What the files say of a member, from the first of them to the last.
 struct RecordedValues {
   std::uint64_t count = 0;
+  std::uint64_t too_large = 0;  ///< not counted in the others
   McapTime first_time = 0;
   McapTime last_time = 0;
   rr::OrderedJson first = nullptr;
@@ -82,6 +88,7 @@ struct RecordedValues {
   rr::OrderedJson to_json() const {
     auto out = rr::OrderedJson::object();
     rr::add_key(out, "count") = count;
+    if (too_large > 0) rr::add_key(out, "too_large") = too_large;
     if (count == 0) return out;
     constexpr double nanosecond = 1e-9;
     const auto between = last_time > first_time ? static_cast<double>(last_time - first_time) * nanosecond : 0.0;
@@ -103,6 +110,10 @@ rr::Result<> add_values(Recording& recording, const RecordedMember& member, Reco
     if (!read) return read.error();
     for (const auto& message : read->messages) {
       if (message.channel != member.channel) continue;
+      if (message.data.size() > largest_value) {
+        ++values.too_large;
+        continue;
+      }
       const auto document = recording.read_document(message);
       if (!document) return document.error();
       values.add(message.publish_time, member.kind == rr::MemberKind::event ? *document : document->at("value"));
@@ -135,8 +146,9 @@ rr::OrderedJson members_json(const std::map<std::string, RecordedCount>& members
 
 std::vector<std::string> recordings_for_agent(GatewayState& gateway, const Identity& who) {
   std::vector<std::string> out;
+  const auto& rules = gateway.access().state().rules;
   for (const auto& each : gateway.recordings().list())
-    if (gateway.access().check(who, wanted_of(each))) out.push_back(each.name);
+    if (rules.check(who, wanted_of(each))) out.push_back(each.name);
   return out;
 }
 
@@ -190,15 +202,15 @@ rr::awaitable<rr::OrderedJson> McpTools::read_recording(const std::string& uri) 
   if (!co_await reply_.wait(longest_turn_wait, is_its_turn))
     refuse(rr::ErrorCode::out_of_system_resource, "other agents read recordings; try again in a minute");
   auto begun = gateway_.access().check_and_begin(who(), wanted, trace_id_of(reply_.request().header("traceparent")),
-                                                       "recording_read");
+                                                 "recording_read");
   const auto entry = value_or_throw(std::move(begun));
   const auto work = [&reading] { return reading.read(); };
-  const auto read = co_await gateway_.workers().run(work);
+  auto read = co_await gateway_.workers().run(work);
   if (entry)
     entry->finish(read ? Outcome::ok : Outcome::error, read ? std::string_view(recording->name) : read.error().message);
   auto out = about(*recording);
   rr::add_key(out, "files_left_out") = recording->files.size() - files.size();
-  out.update(value_or_throw(read));
+  out.update(value_or_throw(std::move(read)));
   co_return out;
 }
 

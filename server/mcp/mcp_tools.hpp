@@ -91,6 +91,8 @@ class McpTools {
   using FollowedPtr = std::shared_ptr<Followed>;
   struct Listening;
   rr::awaitable<FollowedPtr> follow(std::string uri);
+  /// The same where many are to be followed. Throws   rr::Exception: the client has gone. Errors   why it can't be.
+  rr::awaitable<rr::Result<FollowedPtr>> try_to_follow(std::string uri);
   /// These instead of those so far.
   rr::awaitable<void> follow_again(Listening& listening, std::set<std::string> uris);
   /// Whether there is news, and it is time to tell it.

@@ -115,7 +115,7 @@ asio::awaitable<void> DeviceRecorder::record(std::shared_ptr<ValueClient> client
     const auto* type = client->upstream()->object_type(property.path);
     return read_property(client, property.path, type ? type->qualified_name : std::string(), property.member);
   });
-  while (!record_->is_closed() && upstream->types() == types) co_await wait(watch_period);
+  while (!record_->is_closed() && !upstream->is_closed() && upstream->types() == types) co_await wait(watch_period);
 }
 
 asio::awaitable<void> DeviceRecorder::follow(std::shared_ptr<ValueClient> client, RecordedMemberPlace member,

@@ -51,11 +51,14 @@ void SharedDevice::refresh() {
                        [&](const DeviceService& service) { return service.name == name; });
   };
   for (auto it = services_.begin(); it != services_.end();) {
-    if (has(it->first)) {
+    auto& service = *it->second;
+    service.set_listed(has(it->first));
+    // One that is not listed yet, since the device has just begun, is the same to those who wait for it.
+    if (has(it->first) ? !service.upstream()->is_closed() : service.upstream()->has_clients()) {
       ++it;
       continue;
     }
-    it->second->stop();
+    service.stop();
     it = services_.erase(it);
   }
   for (const auto& service : identity->services) {

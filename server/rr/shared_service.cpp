@@ -77,6 +77,16 @@ void SharedService::stop() {
   upstream_->close();
 }
 
+void SharedService::set_listed(bool is_listed) {
+  upstream_->close_unused(!is_listed);
+  if (!is_listed)
+    withdraw();
+  else if (!hosted_ && upstream_->is_open())
+    (void)publish();  // what can't be offered is told when the session is opened anew
+  else if (!hosted_)
+    upstream_->retry_now();
+}
+
 /// Offers the service as it is now. Where it is as it was, clients notice nothing.
 rr::Result<> SharedService::publish() {
   if (!upstream_->is_open()) return upstream_->lost_error();  // again, at once

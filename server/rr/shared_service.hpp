@@ -39,6 +39,9 @@ class SharedService : public std::enable_shared_from_this<SharedService> {
   /// Connects, again and again, until stop(). `rests_after`  see Upstream::rest_unused().
   void start(std::chrono::milliseconds rests_after);
   void stop();
+  /// Whether the device says that it has the service. Where not, it is offered to nobody until it can be opened again,
+  /// and given up with the last one who waits for it.
+  void set_listed(bool is_listed);
   /// Has logins judged by whoever the boards name now.
   void renew_judge();
 

@@ -37,7 +37,10 @@ class AgentSubscriptions {
   class Stream {
    public:
     explicit Stream(std::shared_ptr<Session> session) : session_(std::move(session)) { ++session_->streams; }
-    ~Stream() { --session_->streams; }
+    ~Stream() {
+      --session_->streams;
+      session_->used = std::chrono::steady_clock::now();
+    }
     Stream(const Stream&) = delete;
     Stream& operator=(const Stream&) = delete;
     const std::set<std::string>& uris() const { return session_->uris; }

@@ -251,18 +251,20 @@ void Upstream::make_safe(const SafeRequest& request, Completion done) {
                          if (!self || !found) return done(found);
                          self->make_safe(request, done);
                        });
-  ++unanswered_->count;
-  done = [unanswered = unanswered_, done = std::move(done)](const rr::Result<rr::Value>& result) {
-    done(result);
-    if (--unanswered->count == 0 && unanswered->on_none) std::exchange(unanswered->on_none, nullptr)();
+  const auto count_answer = [this](Completion answered) {
+    ++unanswered_->count;
+    return [unanswered = unanswered_, answered = std::move(answered)](const rr::Result<rr::Value>& result) {
+      answered(result);
+      if (--unanswered->count == 0 && unanswered->on_none) std::exchange(unanswered->on_none, nullptr)();
+    };
   };
   const auto connection = connection_;  // it may be lost
   const bool has_waiting = connection->session().queued_bytes() > 0;
   connection->set_urgent(true);
-  send_safe(request, std::move(done));
+  send_safe(request, count_answer(std::move(done)));
   connection->set_urgent(false);
   // What waits may be an older command, which must not be the last one.
-  if (has_waiting && connection_) send_safe(request, ignore_result);
+  if (has_waiting && connection_) send_safe(request, count_answer(ignore_result));
   const auto wire = wires_.find({request.path, request.member});
   if (request.kind != SafeAction::Kind::wire || wire == wires_.end()) return;
   wire->second->out_value = request.values.front();

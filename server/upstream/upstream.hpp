@@ -117,13 +117,16 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   bool has_tried() const { return attempts_ > 0 && !is_waking_; }
   /// For one that is kept open: waits for an attempt that is under way, or begins one now. Errors   those of open().
   rr::awaitable<rr::Result<>> opened();
-  /// As soon as the last client has left, close() follows.
-  void close_unused() { closes_unused_ = true; }
+  /// As soon as the last client has left, close() follows; or not any more.
+  void close_unused(bool closes) { closes_unused_ = closes; }
+  bool has_clients() const { return !clients_.empty(); }
   /// `closed`  is called once the device knows, or after half a second.
   void close(std::function<void()> closed = nullptr);
   /// Ends the session with the device as if it were lost.
   void break_off();
   bool is_open() const { return connection_ != nullptr; }
+  /// For good: whoever wants more of the service begins anew.
+  bool is_closed() const { return is_closed_; }
   Device& device() const { return *device_; }
   const std::string& service() const { return service_; }
   /// What the service is made of, and what its objects have brought since: the same as long as the device says the

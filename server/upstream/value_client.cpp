@@ -374,7 +374,7 @@ rr::Result<std::shared_ptr<ValueClient>> ValueClients::let_in(Entry& entry, cons
   auto made = make_another(entry.upstream, key.subject());
   if (!made) return made.error();
   entry.client = std::move(*made);
-  if (entry.is_ours) entry.upstream->close_unused();
+  if (entry.is_ours) entry.upstream->close_unused(true);
   return entry.client;
 }
 
@@ -385,6 +385,7 @@ bool ValueClients::has(const Device& device, const SessionKey& key) const {
 
 rr::awaitable<rr::Result<std::shared_ptr<ValueClient>>> ValueClients::open(std::shared_ptr<Device> device,
                                                                            SessionKey key) {
+  if (is_stopped_) co_return rr::make_error(rr::ErrorCode::operation_cancelled, "the gateway stops");
   const auto made = find_or_make(device, key);
   if (!made) co_return made.error();
   const auto upstream = *made;  // NOLINT(performance-unnecessary-copy-initialization): kept while this waits
@@ -415,6 +416,7 @@ void ValueClients::sweep() {
 }
 
 void ValueClients::stop() {
+  is_stopped_ = true;
   sweep_.disarm();
   for (const auto& [place, entry] : std::exchange(entries_, {}))
     if (entry.is_ours && !entry.client) entry.upstream->close();

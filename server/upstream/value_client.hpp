@@ -222,6 +222,7 @@ class ValueClients {
   MemoryBudget::Charge memory_;  ///< of nothing: those of the clients are its siblings
   Entries entries_;
   rr::Deadline sweep_;
+  bool is_stopped_ = false;
 };
 
 }  // namespace rrgate

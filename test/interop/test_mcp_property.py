@@ -48,6 +48,7 @@ ARGUMENTS = [{"order": order} for order in ORDERS] + [{"angle": number} for numb
     [{}, {"angle": 0.5, "more": 1}, {"order": {"speed": 0.1, "how": "", "more": 9}}, {"speed": 1}, [], None]
 RIGHT = {"speed": ("set", NUMBERS), "power": ("set", NUMBERS), "turn": ("call", [{"angle": number} for number in NUMBERS]),
          "go": ("call", [{"order": order} for order in ORDERS]), "reset": ("call", [{}])}
+EVERYTHING = {"speed", "turn", "go"}  # that a rule gives
 MEMBERS = ["speed", "power", "go", "turn", "reset", "target", "path", "", "nothing", "speed/0", "go/go"]
 
 
@@ -236,10 +237,13 @@ def test_no_course_of_requests_moves_a_device_but_on_the_terms_of_its_rules(node
         try:
             with concurrent.futures.ThreadPoolExecutor(4) as pool:
                 course = Course(seed, port, robot, agent, admin, pool)
-                course.run(1500)
+                course.run(1000)
+                for _ in range(4):  # chance may have left one out
+                    if course.seen_members != EVERYTHING:
+                        course.run(500)
             wait_for(lambda: robot.speed == 0)  # whoever has moved it, and by whatever its lease has ended
             course.check()
         finally:
             gateway.stop()
     # It is no test of an agent that gets nowhere.
-    assert course.seen_members == {"speed", "turn", "go"}
+    assert course.seen_members == EVERYTHING

@@ -2,7 +2,7 @@
 import json
 
 import pytest
-from mcp import McpError
+from mcp import MCPError
 
 from agents import with_agent, with_tokens
 from http_api import ask
@@ -42,7 +42,7 @@ def read(gateway, agent, *uris, modern=False):
 
 def refusal(gateway, agent, uri):
     async def work(session):
-        with pytest.raises(McpError) as refused:
+        with pytest.raises(MCPError) as refused:
             await session.read_resource(uri)
         return str(refused.value)
 
@@ -93,7 +93,7 @@ def test_what_can_not_be_read_is_said(begin_for_agents):
     gateway, agent, admin = begin_for_agents(RECORDS)
     ended = record(gateway, admin, 10)
     uri = SCHEME + ended["name"]
-    assert "nothing is recorded of \"Create/Drive\"" in refusal(gateway, agent, uri + "/Create/Drive")
+    assert "nothing is recorded of 'Create/Drive'" in refusal(gateway, agent, uri + "/Create/Drive")
     assert "no recording" in refusal(gateway, agent, SCHEME + "create.Create.20200101T000000000Z")
     file = gateway.file.parent / "recordings" / ended["files"][0]["name"]
     file.write_bytes(b"not a recording")

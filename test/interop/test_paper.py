@@ -2,41 +2,23 @@
 import itertools
 import re
 import signal
-import socket
 import subprocess
 import sys
 
 import pytest
 
 from clients import JS, run_program
-from processes import BUILD, ROOT, Background, free_port, start_gateway
+from paper_service import PAPER, running_service
+from processes import BUILD, Background, start_gateway
 
-PAPER = ROOT / "test" / "examples" / "paper"
-QUIET = [f"--robotraconteur-{name}=false" for name in ("local-enable", "discovery-announce-enable", "discovery-listening-enable")]
 SONG = [69, 16, 60, 16, 69, 16]
 
 
 @pytest.fixture
 def service(tmp_path):
     """The paper's service, on a robot that is not there: (port, what the robot was sent, line by line)."""
-    port, serial = free_port(), tmp_path / "serial"
-    command = [sys.executable, PAPER / "create_service.py", "--serialport", serial, "--tcp-port", port, *QUIET]
-    service = Background(command, tmp_path / "service.log", {"PYTHONPATH": PAPER / "fake"})
-
-    def accepts():
-        with socket.socket() as probe:
-            return probe.connect_ex(("127.0.0.1", port)) == 0
-
-    try:
-        service.wait_until(accepts)
-
-        def sent():
-            service.wait_until(lambda: "141 0\n" in serial.read_text())  # the song has arrived
-            return serial.read_text().splitlines()
-
-        yield port, sent
-    finally:
-        service.stop()
+    with running_service(tmp_path) as (port, sent):
+        yield port, lambda: sent(lambda lines: "141 0" in lines)  # the song has arrived
 
 
 @pytest.mark.parametrize("client", ["ours", "node"])

@@ -1,6 +1,7 @@
 // The Model Context Protocol, with requests as any client may send them.
 #include <catch2/catch.hpp>
 #include <limits>
+#include <set>
 
 #include "server/access/api_tokens.hpp"
 #include "server/http/shrink_image.hpp"
@@ -8,6 +9,7 @@
 #include "server/mcp/mcp_describe.hpp"
 #include "server/mcp/mcp_summary.hpp"
 #include "server/mcp/mcp_tools.hpp"
+#include "server/mcp/value_hash.hpp"
 #include "test/server/support/test_gateway.hpp"
 #include "test/support/folder.hpp"
 
@@ -60,6 +62,11 @@ TEST_CASE("agents: a message that is none is refused with what was expected, and
   CHECK(code(tell(gateway, "[]")) == -32600);
   CHECK(code(tell(gateway, R"({"jsonrpc": "2.0", "id": {}, "method": "ping"})")) == -32600);
   CHECK(code(tell(gateway, request("nothing"))) == -32601);
+  const auto with_token = [](std::size_t size) {
+    return request("ping", R"({"_meta": {"progressToken": ")" + std::string(size, 'x') + R"("}})");
+  };
+  CHECK(tell(gateway, with_token(256)).json.contains("result"));
+  CHECK(code(tell(gateway, with_token(257))) == -32602);
   CHECK(code(tell(gateway, request("tools/call", R"({"name": "nothing"})"))) == -32602);
   CHECK(code(tell(gateway, request("tools/call", R"({"name": "devices", "arguments": []})"))) == -32602);
   CHECK(code(tell(gateway, request("resources/read", R"({"uri": "file:///etc/passwd"})"))) == -32002);
@@ -113,6 +120,56 @@ TEST_CASE("agents: lists come in pages, and long texts of devices are cut betwee
   CHECK(cut.size() < 1050);
   CHECK(cut.substr(0, 999) == long_text.substr(0, 999));
   CHECK(cut.find("bytes more") != std::string::npos);
+  CHECK(bounded_text("a\xFF\xC3") == "a\xEF\xBF\xBD\xEF\xBF\xBD");
+}
+
+TEST_CASE("agents: a device whose name is no UTF-8 is listed all the same") {
+  boost::asio::io_context io;
+  const auto work = boost::asio::make_work_guard(io);
+  std::thread thread([&io] { io.run(); });
+  {
+    const FakeDevice evil(io, "ev\xFFil");
+    TestGateway gateway(0, [&](Config& config) {
+      enable(config);
+      config.devices.push_back({"evil", rr::parse_url(evil.url()).value(), 0});
+    });
+    const auto name = [&] {
+      const auto told = tell(gateway, request("tools/call", R"({"name": "devices"})"));
+      return told.json["result"]["structuredContent"]["devices"][0]["from_device"].value("node_name", "");
+    };
+    gateway.wait_for("/api/v1/devices", [](const auto& seen) { return seen["devices"][0]["state"] == "online"; });
+    CHECK(name() == "ev\xEF\xBF\xBDil");
+  }
+  io.stop();
+  thread.join();
+}
+
+TEST_CASE("agents: values that differ have other hashes, and equal ones the same") {
+  const auto text = [](const char* name, const char* value) {
+    return rr::Value(rr::MapString{{{name, rr::Value(value)}}});
+  };
+  const std::vector<rr::Value> values{
+      {},
+      rr::Value(1),
+      rr::Value(1.0),
+      rr::Value("a"),
+      rr::Value(std::vector<double>{1, 2}),
+      rr::Value(std::vector<double>{2, 1}),
+      rr::Value(rr::List{{rr::Value(1), rr::Value(2)}}),
+      rr::Value(rr::List{{rr::Value(2), rr::Value(1)}}),
+      text("a", "b"),
+      text("b", "a"),
+      rr::Value(rr::Structure{"s", {{"x", rr::Value(1)}, {"y", rr::Value(2)}}}),
+      rr::Value(rr::Structure{"s", {{"x", rr::Value(2)}, {"y", rr::Value(1)}}}),
+      rr::Value(rr::MultiDimArray{{1, 2}, rr::Array::take(std::vector<double>{1, 2})}),
+      rr::Value(rr::MultiDimArray{{2, 1}, rr::Array::take(std::vector<double>{1, 2})}),
+  };
+  std::set<std::size_t> hashes;
+  for (const auto& value : values) {
+    hashes.insert(hash_of(value));
+    CHECK(hash_of(value) == hash_of(rr::Value(value)));
+  }
+  CHECK(hashes.size() == values.size());
 }
 
 TEST_CASE("agents: the age of a wire's value is told of any time that a device says") {

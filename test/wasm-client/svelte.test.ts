@@ -59,6 +59,29 @@ it("follows wires, properties, events and calls", async () => {
   stops.forEach((stop) => stop());
 });
 
+it("reads a property again when the read before is answered, and says that a frozen device gives none", async () => {
+  vi.useFakeTimers();
+  try {
+    const answers: { give: (value: number) => void; fail: (error: Error) => void }[] = [];
+    const read = () => new Promise<number>((give, fail) => answers.push({ give, fail }));
+    const device = { onConnected: () => () => undefined, defaultClient: { $: { member: () => ({ get: read }) } } };
+    const speed = propertyStore(device as never, "speed", { every: 100 });
+    const stop = speed.subscribe(() => undefined);
+    await vi.advanceTimersByTimeAsync(250);
+    answers[0]?.give(1);
+    await vi.advanceTimersByTimeAsync(1);
+    expect(get(speed)).toEqual({ value: 1, error: undefined, isBusy: false });
+    await vi.advanceTimersByTimeAsync(1_000);
+    expect(answers).toHaveLength(2);
+    answers[1]?.fail(new Error("no answer"));
+    await vi.advanceTimersByTimeAsync(1);
+    expect(get(speed)).toEqual({ value: 1, error: new Error("no answer"), isBusy: false });
+    stop();
+  } finally {
+    vi.useRealTimers();
+  }
+});
+
 it("keeps what a wire gave when the connection is lost, and says how old it is and that nothing comes", async () => {
   const { service, options } = await startDevice();
   const device = subscribe(url, options);

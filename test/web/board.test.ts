@@ -9,13 +9,15 @@ import { Pace } from "../../web/src/live/pace";
 import { splitSteps } from "../../web/src/app/router";
 import { asCode } from "../../web/src/panels/code";
 import { hexLines, greyPicture } from "../../web/src/panels/bytes";
-import { Trace, toCsv } from "../../web/src/panels/trace";
+import { fitDrafts } from "../../web/src/panels/form_drafts";
+import { lonely, Trace, toCsv } from "../../web/src/panels/trace";
+import type { Frame } from "../../web/src/camera/frame";
 import { readPicture } from "../../web/src/camera/pixels";
 import type { Member } from "../../web/src/robot/remote";
 import { ROBOT_STOP } from "../../web/src/robot/stop";
 import { Definitions, flagNames, scopeOf } from "../../web/src/values/definitions";
-import { draftOf, formatUuid, makeDraft, readUuid, valueOf } from "../../web/src/values/draft";
-import { numberAt, numberPaths } from "../../web/src/values/paths";
+import { draftOf, formatUuid, jsonOf, makeDraft, readUuid, valueOf } from "../../web/src/values/draft";
+import { numberPaths, numberReader } from "../../web/src/values/paths";
 import { rowsOf } from "../../web/src/values/rows";
 import { unitOf } from "../../web/src/values/units";
 
@@ -108,6 +110,26 @@ describe("drafts", () => {
     expect(({} as Record<string, unknown>)["7"]).toBeUndefined();
   });
 
+  test("stay in a form over an outage, unless their type is another one", () => {
+    const inputs = [
+      { name: "arm", type: "Arm" },
+      { name: "speed", type: "double" },
+      { name: "mode", type: "Mode" },
+    ];
+    const typed = (draft: string) => ({ kind: "text", text: draft }) as const;
+    const form = fitDrafts(null, inputs, definitions, scope);
+    const [arm = typed("")] = form.drafts;
+    const drafts = [arm, typed("30"), typed("jog")];
+    const kept = fitDrafts({ ...form, drafts }, inputs, new Definitions([uuid, text, "service new"]), scope);
+    expect(kept).toEqual({ ...form, drafts });
+    const other = new Definitions([text.replace("jog = 0x10", "walk"), uuid]);
+    const fitted = fitDrafts(kept, inputs, other, scope);
+    expect(fitted.drafts).toEqual([makeDraft("Arm", other, scope), typed("30"), typed("off")]);
+    expect(fitted.emptied).toEqual(["mode"]); // in the others nothing was typed, or nothing is lost
+    const renamed = [{ name: "speed", type: "single" }];
+    expect(fitDrafts(kept, renamed, definitions, scope)).toMatchObject({ drafts: [typed("0")], emptied: ["speed"] });
+  });
+
   test("say which field is wrong", () => {
     const draft = makeDraft("Pose", definitions, scope);
     if (draft.kind !== "struct") throw new Error("no struct");
@@ -140,6 +162,7 @@ describe("tables and plots", () => {
 
   test("find numbers by path, and own fields only", () => {
     expect(numberPaths(value)).toEqual(expect.arrayContaining(["pose.x", "pose.q[2]", 'limits["a"]']));
+    const numberAt = (of: unknown, path: string) => numberReader(path)(of);
     expect(numberAt(value, "pose.q[2]")).toBe(3);
     expect(numberAt(value, 'limits["a"]')).toBe(1);
     expect(numberAt(value, "pose.constructor.length")).toBeUndefined();
@@ -148,10 +171,28 @@ describe("tables and plots", () => {
 
   test("keep what a window shows, and write a file that no spreadsheet runs", () => {
     const trace = new Trace(2);
-    for (let i = 0; i <= 10; i++) trace.push(i * 1000, [i, null]);
+    for (let i = 0; i <= 10; i++) trace.push(i * 1000, [i]);
     expect(trace.window(3)[0]).toEqual([-3, -2, -1, 0]);
     expect(toCsv(["time_s", '=A1,"x"'], new Trace(1))).toBe(`time_s,"'=A1,""x"""\n`);
     expect(toCsv(["t", "a", "b"], trace).split("\n")[2]).toBe("1,1,");
+  });
+
+  test("draw no line over an outage, and leave out what is no finite number", () => {
+    const trace = new Trace(2);
+    trace.breakOff(); // nothing came before
+    trace.push(0, [1, NaN]);
+    trace.push(1000, [2, Infinity]);
+    const before = trace.pushed;
+    trace.breakOff();
+    trace.push(9000, [3, 4]);
+    expect(trace.pushed).toBe(before + 2);
+    expect(trace.window(30)).toEqual([
+      [-9, -8, -8, 0],
+      [1, 2, null, 3],
+      [null, null, null, 4],
+    ]);
+    expect(lonely(trace.window(30)[1] ?? [])).toEqual([3]);
+    expect(lonely([1, 2, null])).toBeNull();
   });
 });
 
@@ -331,6 +372,33 @@ test("code quotes what comes from the device", () => {
   );
 });
 
+test("code, tables and forms round no 64-bit integer, and keep numbers that JSON has not", () => {
+  const wide = 9007199254740993n;
+  const member: Member = {
+    name: "count",
+    kind: "property",
+    type: "uint64",
+    parameters: [],
+    modifiers: [],
+    documentation: "",
+  };
+  const place = { device: "d", service: "s", object: "" };
+  const types = { definitions, scope };
+  const value = { ["__proto__"]: [NaN], at: BigInt64Array.of(wide), of: new Map([[-1, -Infinity]]) };
+  expect(JSON.stringify(jsonOf(value))).toBe('{"__proto__":["NaN"],"at":["9007199254740993"],"of":{"-1":"-Infinity"}}');
+  expect(asCode("curl", "http://h/", place, member, [wide], types)).toContain(`-d '"9007199254740993"'`);
+  const script = asCode("JavaScript", "http://h/", place, member, [value], types);
+  expect(script).toContain(
+    '.set({ ["__proto__"]: [NaN], "at": [9007199254740993n], "of": new Map([[-1, -Infinity]]) })',
+  );
+  for (const [type, given] of [
+    ["int64", wide],
+    ["double", NaN],
+    ["bool", true],
+  ] as const)
+    expect(valueOf(draftOf(given, type, definitions, scope), type, definitions, scope), type).toBe(given);
+});
+
 test("memories are shown as bytes and as grey values", () => {
   expect(hexLines(Uint8Array.from([0x41, 0, 255]), 16)).toMatch(/^ {6}16 {2}41 00 ff +A\.\.$/);
   expect(hexLines("x", 0)).toBeNull();
@@ -340,12 +408,15 @@ test("memories are shown as bytes and as grey values", () => {
 
 test("pictures of the standard types are read by their encoding", () => {
   const info = { width: 1, height: 1, step: 3, encoding: 0x1000 };
-  expect([...(readPicture({ image_info: info, data: Uint8Array.of(1, 2, 3) }).rgba ?? [])]).toEqual([1, 2, 3, 255]);
+  expect(rgbaOf(readPicture({ image_info: info, data: Uint8Array.of(1, 2, 3) }))).toEqual([1, 2, 3, 255]);
   const bgr = readPicture({ image_info: { ...info, encoding: 0x1002 }, data: Uint8Array.of(1, 2, 3) });
-  expect([...(bgr.rgba ?? [])]).toEqual([3, 2, 1, 255]);
+  expect(rgbaOf(bgr)).toEqual([3, 2, 1, 255]);
   const depth = { image_info: { width: 2, height: 1, step: 4, encoding: 0x4000 }, data: Uint8Array.of(0, 0, 16, 39) };
-  expect([...(readPicture(depth).rgba ?? [])]).toEqual([0, 0, 0, 255, 255, 255, 255, 255]);
-  expect(readPicture({ image_info: info, data: Uint8Array.of(255, 216, 255) }).encoded).not.toBeNull();
+  expect(rgbaOf(readPicture(depth))).toEqual([0, 0, 0, 255, 255, 255, 255, 255]);
+  const jpeg = Uint8Array.of(255, 216, 255);
+  expect(readPicture({ image_info: info, data: jpeg }).encoded).toBe(jpeg); // not copied
+  const grey = { image_info: { width: 2, height: 1, step: 2, encoding: "mono8" }, data: Uint8Array.of(7, 255) };
+  expect(rgbaOf(readPicture(grey))).toEqual([7, 7, 7, 255, 255, 255, 255, 255]);
   expect(() => readPicture({ image_info: { ...info, width: 9 }, data: Uint8Array.of(1, 2, 3) })).toThrow(
     "the picture has 3 bytes",
   );
@@ -373,3 +444,9 @@ test("a board is written at once and then not too often, and the address only wh
   ) as [Board, Board];
   expect([sameBoard(one, { ...one, panels: [...one.panels] }), sameBoard(one, other)]).toEqual([true, false]);
 });
+
+function rgbaOf({ width, height, paint }: Frame): number[] {
+  const pixels = new Uint32Array(width * height);
+  paint?.(pixels);
+  return [...new Uint8Array(pixels.buffer)];
+}

@@ -1,21 +1,22 @@
 // Runs of generators: stopped is what the device has said to be stopped.
+import { ErrorCode, RobotRaconteurError } from "../../wasm-client/dist/index.js";
 import { GeneratorRun } from "../../web/src/panels/generator_run";
 
-/** A generator in the hands of the test; as the client's, it answers one thing after another. */
+const aborted = { code: ErrorCode.OperationAborted, name: "RobotRaconteur.OperationAborted", message: "closed" };
+
+/** A generator in the hands of the test; as the client's, its end waits for no step, and rejects the one under way. */
 function makeGenerator() {
-  const answers: ((answer: IteratorResult<unknown, void> | Error) => void)[] = [];
-  let last: Promise<unknown> = Promise.resolve();
-  const step = (): Promise<IteratorResult<unknown, void>> => {
-    const result = last.then(
-      () =>
-        new Promise<IteratorResult<unknown, void>>((resolve, reject) =>
-          answers.push((answer) => (answer instanceof Error ? reject(answer) : resolve(answer))),
-        ),
+  type Answer = IteratorResult<unknown, void> | Error;
+  const answers: ((answer: Answer) => void)[] = [];
+  const ask = (): Promise<IteratorResult<unknown, void>> =>
+    new Promise((resolve, reject) =>
+      answers.push((answer) => (answer instanceof Error ? reject(answer) : resolve(answer))),
     );
-    last = result.catch(() => undefined);
-    return result;
+  const end = (): Promise<IteratorResult<unknown, void>> => {
+    for (const step of answers.splice(0)) step(new RobotRaconteurError(aborted));
+    return ask();
   };
-  const generator = { next: vi.fn(step), return: vi.fn(step) };
+  const generator = { next: vi.fn(ask), return: vi.fn(end) };
   const answer = (value: unknown) =>
     vi.waitFor(() => {
       const next = answers.shift();
@@ -40,23 +41,19 @@ async function running() {
 }
 
 describe("a run", () => {
-  it("is stopping while the step before hangs, and stopped when the device has said so", async () => {
-    const { run, answer, heard } = await running();
+  it("is stopping until the device has said so, and the step under way is no failure", async () => {
+    const { run, going, answer, heard } = await running();
     void run.stop();
-    await Promise.resolve();
-    expect(run.state.value).toBe("stopping");
-    await answer(2);
-    await vi.waitFor(() => expect(heard).toEqual([1, 2]));
-    expect(run.state.value).toBe("stopping");
+    await going;
+    expect([run.state.value, run.failure.value]).toEqual(["stopping", null]);
     await answer(undefined);
     await vi.waitFor(() => expect(run.state.value).toBe("stopped"));
-    expect([run.isFresh, run.failure.value]).toEqual([true, null]);
+    expect([run.isFresh, run.failure.value, heard]).toEqual([true, null, [1]]);
   });
 
   it("says why it was not stopped", async () => {
     const { run, answer } = await running();
     void run.stop();
-    await answer(2);
     await answer(new Error("no right to close it"));
     await vi.waitFor(() => expect(run.state.value).toBe("not stopped"));
     expect(run.failure.value).toBe("no right to close it");
@@ -68,8 +65,9 @@ describe("a run", () => {
     await one.going;
     expect([one.run.state.value, one.run.failure.value]).toEqual(["ended", "out of reach"]);
     const two = await running();
+    const failing = two.answer(new Error("out of reach"));
     void two.run.stop();
-    await two.answer(new Error("out of reach"));
+    await failing;
     await two.answer(undefined);
     await vi.waitFor(() => expect(two.run.state.value).toBe("ended"));
     expect(two.run.failure.value).toBe("out of reach");

@@ -75,6 +75,21 @@ describe("a feed", () => {
     feed.stop();
   });
 
+  it("says of a value whether it came right after the one before", async () => {
+    const feed = feedOf(async function* () {
+      for (const pause of [100, 100, 100, 100, 2_000, 100]) {
+        await new Promise((resolve) => setTimeout(resolve, pause));
+        yield pause;
+      }
+    });
+    const gaps: boolean[] = [];
+    feed.heard.add((_value, _now, isAfterGap) => void gaps.push(isAfterGap));
+    feed.start();
+    await vi.advanceTimersByTimeAsync(2_600);
+    feed.stop();
+    expect(gaps).toEqual([true, false, false, false, true, false]);
+  });
+
   it("that nobody looks at is tried no more", async () => {
     const wire = vi.fn(async function* () {
       yield* [];

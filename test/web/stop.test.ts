@@ -78,6 +78,7 @@ describe("a remote object", () => {
   const halt = vi.fn(() => Promise.resolve());
   const declare = (name: string, kind: string, type = "void") => ({ name, kind, type, parameters: [], modifiers: [] });
   const never = () => new Promise(() => undefined);
+  const found: { $?: unknown } = {};
   const info = {
     type: "a.b.Robot",
     members: [
@@ -86,8 +87,9 @@ describe("a remote object", () => {
       declare("abort", "property"),
     ],
     urgent: { halt, stop: halt },
-    member: () => Object.assign(never, { get: () => Promise.resolve({ $: info }), set: never, poke: never }),
+    member: () => Object.assign(never, { get: () => Promise.resolve(found), set: never, poke: never }),
   };
+  found.$ = info;
   const remote = () => remoteOf({ $: info } as never);
 
   it("calls at once what is a function, and says so of what is none", async () => {
@@ -101,8 +103,10 @@ describe("a remote object", () => {
   it("knows its commands that are under way, and those of its children", async () => {
     const root = remote();
     expect(root.underWay.settled()).toBeNull();
-    void (await root.child("abort")).set("abort", 1);
+    const child = await root.child("abort");
+    void child.set("abort", 1);
     expect(root.underWay.settled()).not.toBeNull();
+    expect(await root.child("abort")).toBe(child); // with what panels know of it: leases, locks
     await expect(root.call("unknown", [])).rejects.toThrow('no member "unknown"');
   });
 });

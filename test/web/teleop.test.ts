@@ -1,9 +1,12 @@
 import {
   AT_REST,
   commandOf,
+  Commands,
   deflectionOfGamepad,
   deflectionOfKeys,
+  findGamepad,
   readAxes,
+  tell,
   together,
   worthOf,
 } from "../../web/src/panels/teleop";
@@ -74,6 +77,45 @@ describe("teleop", () => {
   });
 });
 
+describe("at rest", () => {
+  const inputs = [{ name: "velocity", type: "double" }];
+  const mapping = (path: string, text: string) => ({
+    axes: [{ ...up, path }],
+    neutral: [{ kind: "text", text } as const],
+  });
+  const given = (commands: Commands, path: string, text: string, deflection = AT_REST) =>
+    commands.of(mapping(path, text), inputs, deflection, nothing, "");
+
+  it("what is typed while it moves does not keep it from stopping", () => {
+    const commands = new Commands();
+    expect(given(commands, "velocity", "0", full)).toEqual([200]);
+    expect(() => given(commands, "velo", "0", full)).toThrow('"velo" is no number');
+    expect(given(commands, "velo", "0")).toEqual([0]);
+    given(commands, "velocity", "1", full);
+    given(commands, "velocity", "12", full);
+    expect(given(commands, "velocity", "12")).toEqual([1]); // of when it began to move
+    expect(given(commands, "velocity", "")).toEqual([1]);
+    expect(given(commands, "velocity", "3")).toEqual([3]);
+    expect(given(new Commands(), "velo", "0")).toEqual([0]);
+    expect(() => given(new Commands(), "velocity", "")).toThrow("is not a number");
+  });
+
+  it.each([
+    ["function", "urgent", "call"],
+    ["wire", "setNow", "poke"],
+    ["property", "setNow", "set"],
+  ] as const)("a %s is told past what waits, and always with a deadline", async (kind, rest, move) => {
+    const ways = ["call", "urgent", "set", "setNow", "poke"] as const;
+    const object = Object.fromEntries(ways.map((way) => [way, vi.fn(() => Promise.resolve())]));
+    const member = { name: "velocity", kind, type: "double", parameters: [], modifiers: [], documentation: "" };
+    await tell(object as never, member, [0], true);
+    await tell(object as never, member, [5], false);
+    const wrapped = (value: number) => ["velocity", kind === "function" ? [value] : value, { timeout: 2_000 }];
+    for (const way of ways)
+      expect(object[way]?.mock.calls, way).toEqual(way === rest ? [wrapped(0)] : way === move ? [wrapped(5)] : []);
+  });
+});
+
 describe("sticks that were let go of", () => {
   it("wait for a new press: of a key, and of a finger that is still down", () => {
     const held = new HeldSticks();
@@ -95,6 +137,7 @@ describe("sticks that were let go of", () => {
   });
   it("wait, of a gamepad, until each axis was in the middle", () => {
     const held = new HeldSticks();
+    held.poll([0, 0, 0, 0], true);
     expect(held.poll([0, -1, 0.5, 0], true)).toBe(true);
     held.letGo();
     held.poll([0, -1, 0.5, 0], true);
@@ -106,6 +149,23 @@ describe("sticks that were let go of", () => {
     held.poll([0, 0.01, 0.4, 0], true);
     held.poll([0, -0.8, 0.4, 0], true);
     expect(held.deflection).toEqual({ ...AT_REST, "left-y": 0.8, "right-x": 0.4 });
+  });
+  it("wait, too, when a gamepad is first seen, and when it was away", () => {
+    const held = new HeldSticks();
+    expect(held.poll([0, -1, 0, 0], true)).toBe(false);
+    held.poll([0, 0, 0, 0], true);
+    held.poll([0, -1, 0, 0], true);
+    expect(held.deflection["left-y"]).toBe(1);
+    held.poll(null, true);
+    held.poll([0, -1, 0, 0], true);
+    expect(held.deflection).toEqual(AT_REST);
+  });
+  it("are those of a gamepad whose axes are known", () => {
+    const pad = (id: string, mapping: string, axes: number[]) => ({ id, mapping, axes, connected: true }) as never;
+    const wheel = pad("Wheel", "", [0, 0, -1, -1]);
+    expect(findGamepad([null, wheel])).toEqual({ axes: null, ignored: "Wheel" });
+    expect(findGamepad([wheel, pad("Pad", "standard", [1, 0])])).toEqual({ axes: [1, 0], ignored: "" });
+    expect(findGamepad([null])).toEqual({ axes: null, ignored: "" });
   });
   it("are free again past the middle, and where they may not drive", () => {
     const held = new HeldSticks();

@@ -285,9 +285,11 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
       co_return;
     }
     entry = std::move(*begun);
-    if (wanted.verb == Verb::subscribe)
-      writer.go_on_while([standing = std::make_shared<Standing>(gateway.access(), who), target] {
-        return standing->check(access_request(*target, Verb::subscribe), Recorded::never).has_value();
+    const bool is_generator = target->member && target->member->is_generator();
+    if (wanted.verb == Verb::subscribe || is_generator)
+      writer.go_on_while([standing = std::make_shared<Standing>(gateway.access(), who), target, verb = wanted.verb] {
+        return !target->client->upstream()->is_closed() &&
+               standing->check(access_request(*target, verb), Recorded::never).has_value();
       });
   }
   if (entry)

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "core/session/service/service_index.hpp"
+#include "server/access/standing.hpp"
 #include "server/http/endpoints/gateway_request.hpp"
 #include "server/http/response_writer.hpp"
 #include "server/recordings/recordings.hpp"
@@ -198,7 +199,12 @@ Response download(GatewayState& gateway, const Request& request, std::string_vie
   const auto it = std::find_if(files.begin(), files.end(), [&](const auto& each) { return each.name == file; });
   if (it == files.end()) return problem_response(404, "the recording has no file " + rr::quote(file));
   Response response;
-  response.answer_later = [path = gateway.recordings().path_of(*it), name = it->name](ResponseWriter& writer) {
+  const auto standing = std::make_shared<Standing>(gateway.access(), request.identity);
+  const auto recording = std::make_shared<const RecordingInfo>(*found.recording);
+  response.answer_later = [path = gateway.recordings().path_of(*it), name = it->name, standing,
+                           recording](ResponseWriter& writer) {
+    writer.go_on_while(
+        [standing, recording] { return standing->check(wanted_of(*recording), Recorded::never).has_value(); });
     return send_file(writer, path, name);
   };
   return answer_recorded(found, {}, std::move(response));

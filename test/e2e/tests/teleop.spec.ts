@@ -15,6 +15,12 @@ async function speedOf(lab: Lab): Promise<number> {
 const expectSpeed = (lab: Lab, speed: number) =>
   expect.poll(() => speedOf(lab), { intervals: [20], timeout: 5_000 }).toBeCloseTo(speed, 3);
 
+const pushGamepad = (page: Page, up: number, mapping = "standard") =>
+  page.evaluate(
+    ([y, mapping]) => Object.assign(window, { pads: [{ id: "Pad", connected: true, mapping, axes: [0, -y, 0, 0] }] }),
+    [up, mapping] as const,
+  );
+
 test.beforeEach(async ({ page, lab }) => {
   await page.addInitScript(() => {
     Object.assign(window, { pads: [] });
@@ -108,8 +114,7 @@ test("a stick on the screen that is still held drives no more after Escape, unti
 });
 
 test("a gamepad that is still pushed drives no more after Stop, until it was in the middle", async ({ page, lab }) => {
-  const push = (up: number) =>
-    page.evaluate((y) => Object.assign(window, { pads: [{ connected: true, axes: [0, -y, 0, 0] }] }), up);
+  const push = (up: number) => pushGamepad(page, up);
   await push(0);
   await expect(page.locator('[data-gamepad="true"]')).toBeVisible();
   await page.locator('[data-panel="teleop"]').getByRole("button", { name: "Take control" }).click();
@@ -132,13 +137,15 @@ test("a gamepad that is still pushed drives no more after Stop, until it was in 
 });
 
 test("a gamepad drives once one is in control, past its dead zone", async ({ page, lab }) => {
-  const push = (up: number) =>
-    page.evaluate((y) => Object.assign(window, { pads: [{ connected: true, axes: [0, -y, 0, 0] }] }), up);
+  const push = (up: number) => pushGamepad(page, up);
   await push(1);
   await expect(page.locator('[data-gamepad="true"]')).toBeVisible();
-  await page.waitForTimeout(200);
-  expect(await speedOf(lab)).toBe(0);
   await page.locator('[data-panel="teleop"]').getByRole("button", { name: "Take control" }).click();
+  await page.waitForTimeout(200); // pushed since before it was seen
+  expect(await speedOf(lab)).toBe(0);
+  await push(0);
+  await page.waitForTimeout(100); // a few frames: the page has seen it in the middle
+  await push(1);
   await expectSpeed(lab, 0.05);
   await push(0.54);
   await expectSpeed(lab, 0.024);
@@ -148,4 +155,14 @@ test("a gamepad drives once one is in control, past its dead zone", async ({ pag
   await expectSpeed(lab, 0.05);
   await page.evaluate(() => Object.assign(window, { pads: [] })); // it is unplugged
   await expectSpeed(lab, 0);
+});
+
+test("a gamepad whose axes the browser does not know is ignored, and the panel says so", async ({ page, lab }) => {
+  await page.locator('[data-panel="teleop"]').getByRole("button", { name: "Take control" }).click();
+  await pushGamepad(page, 0, "");
+  await expect(page.locator('[data-panel="teleop"]')).toContainText("Pad is ignored");
+  await page.waitForTimeout(100); // a few frames: the page has seen it in the middle
+  await pushGamepad(page, 1, "");
+  await page.waitForTimeout(300); // three repetitions of what is held
+  expect(await speedOf(lab)).toBe(0);
 });

@@ -5,22 +5,17 @@ systems_test.py BUILD_DIR
 import base64
 import json
 import os
-import pty
-import select
-import struct
 import subprocess
 import sys
 import tempfile
-import threading
-import time
-import tty
 import unittest
 from pathlib import Path
+
+from serial_robot import DEADLINE, Robot, wait_for
 
 BUILD = sys.argv.pop(1)
 RRGATE = os.path.join(BUILD, "server", "rrgate")
 CREATE = os.path.join(BUILD, "examples", "demo", "rrgate-create-serial")
-DEADLINE = 30  # seconds
 
 
 def ran(*arguments):
@@ -35,13 +30,6 @@ def rrgate(*arguments):
 
 def get(*arguments):
     return json.loads(rrgate("get", *arguments, "--json"))
-
-
-def wait_for(is_so):
-    until = time.monotonic() + DEADLINE
-    while not is_so():
-        assert time.monotonic() < until, "not within the deadline"
-        time.sleep(0.05)
 
 
 def colour(value):
@@ -200,56 +188,6 @@ class Microassembly(unittest.TestCase):
             wait_for(lambda: ran("call", self.cell, "illuminate", "0", "0.5").returncode == 0)
             wait_for(lambda: ran("call", self.cell, "focus", "0", "1.5").returncode == 0)
             wait_for(lambda: ran("get", self.cameras, "microscopes/3/picture").returncode == 0)
-
-
-class Robot:
-    """The bytes of an iRobot Create, on a terminal in the place of a serial line."""
-
-    LENGTHS = {128: 1, 132: 1, 137: 5, 141: 2, 150: 2}
-
-    def __init__(self):
-        self.line, its_end = pty.openpty()
-        tty.setraw(its_end)
-        self.device, self._its_end = os.ttyname(its_end), its_end
-        self.commands = []
-        self._is_plugged = True
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
-
-    def _read(self):
-        seen = b""
-        while self._is_plugged:
-            if not select.select([self.line], [], [], 0.05)[0]:
-                continue
-            seen += os.read(self.line, 256)
-            while seen and len(seen) >= (length := self._length(seen)):
-                self.commands.append(list(seen[:length]))
-                seen = seen[length:]
-
-    def _length(self, seen):
-        if seen[0] in (140, 148):
-            at = 2 if seen[0] == 140 else 1
-            return 1 + at + (seen[at] * (2 if at == 2 else 1)) if len(seen) > at else at + 1
-        return self.LENGTHS[seen[0]]
-
-    def say(self, data):
-        os.write(self.line, data)
-
-    def packet(self, bumps=0, distance=0, angle=0, buttons=0):
-        data = bytes([7, bumps, 19, *struct.pack(">h", distance), 20, *struct.pack(">h", angle), 18, buttons])
-        packet = bytes([19, len(data)]) + data
-        return packet + bytes([-sum(packet) % 256])
-
-    def heard(self, command):
-        wait_for(lambda: command in self.commands)
-
-    def unplug(self):
-        if not self._is_plugged:
-            return
-        self._is_plugged = False
-        self._reader.join()
-        for end in (self._its_end, self.line):
-            os.close(end)
 
 
 class CreateMinimal(unittest.TestCase):

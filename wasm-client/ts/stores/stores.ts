@@ -74,7 +74,7 @@ export type ParametersOf<T, K> = string extends keyof T
     : never;
 
 export interface PropertyOptions {
-  /** Milliseconds between two reads; without it, it is read once for each connection, and after refresh(). */
+  /** Milliseconds between two reads, more where an answer takes longer; without it, it is read once for each connection, and after refresh(). */
   every?: number | undefined;
 }
 
@@ -198,7 +198,9 @@ export function propertyStore<T = RemoteObject, K extends MembersLike<T, Propert
   type V = ValueOf<T, K>;
   const store: LiveStore<MemberState<V>> = new LiveStore<MemberState<V>>(idle, () => {
     const stop = device?.onConnected(() => void refresh());
-    const timer = every === undefined ? undefined : setInterval(() => device?.defaultClient && void refresh(), every);
+    // One read at a time: only the newest tells anything, so that the answer to a slower one would never be heard.
+    const tick = () => device?.defaultClient && !store.getSnapshot().isBusy && void refresh();
+    const timer = every === undefined ? undefined : setInterval(tick, every);
     return () => {
       stop?.();
       clearInterval(timer);

@@ -1,11 +1,14 @@
-// Turns a camera's frame into pixels of a canvas.
+// Turns a camera's frame into pixels of a canvas, without a copy of its own.
 // Layer: web/camera, pure. Source: experimental.createwebcam2: blue, green, red; rows from top to bottom, `step` bytes apart.
+
+/** Writes all pixels: one number each, whose bytes are red, green, blue, opaque (in the order of all machines that run browsers). */
+export type Paint = (to: Uint32Array) => void;
 
 export interface Frame {
   width: number;
   height: number;
-  /** Four bytes a pixel: red, green, blue, opaque. Null where `encoded` is set. */
-  rgba: Uint8ClampedArray<ArrayBuffer> | null;
+  /** Null where `encoded` is set. */
+  paint: Paint | null;
   /** A whole JPEG or PNG file, where the camera sends that instead of pixels. */
   encoded: Uint8Array<ArrayBuffer> | null;
 }
@@ -16,7 +19,7 @@ const MAX_PIXELS = 4096 * 4096;
 export function readFrame(value: unknown): Frame {
   const { width, height, step, data } = (value ?? {}) as Record<string, unknown>;
   if (!(data instanceof Uint8Array)) throw new Error("the camera's frame has no bytes in field 'data'");
-  if (isImageFile(data)) return { width: 0, height: 0, rgba: null, encoded: new Uint8Array(data) };
+  if (isImageFile(data)) return { width: 0, height: 0, paint: null, encoded: data as Uint8Array<ArrayBuffer> };
   if (
     typeof width !== "number" ||
     typeof height !== "number" ||
@@ -33,31 +36,48 @@ export function readFrame(value: unknown): Frame {
       `the camera's frame has ${data.length} bytes in rows of ${row}; expected ${width * height * 3} for ${width} by ${height} pixels`,
     );
   }
-  return { width, height, rgba: toRgba(data, width, height, row, channels), encoded: null };
+  const [red, green] = channels === 3 ? [2, 1] : [0, 0];
+  return { width, height, paint: colours(data, width, height, row, channels, [red, green, 0]), encoded: null };
 }
 
-function toRgba(
+export const OPAQUE = 0xff000000 | 0;
+
+/** Rows `step` bytes apart, of pixels of `bytes`; where in a pixel red, green and blue are. Sizes were checked. */
+export function colours(
   data: Uint8Array,
   width: number,
   height: number,
-  row: number,
-  channels: 1 | 3,
-): Uint8ClampedArray<ArrayBuffer> {
-  const rgba = new Uint8ClampedArray(width * height * 4);
-  const [red, green] = channels === 3 ? [2, 1] : [0, 0];
-  let to = 0;
+  step: number,
+  bytes: number,
+  [red, green, blue]: readonly [number, number, number],
+): Paint {
+  return (to) => fill(to, data, width, height, step, bytes, red, green, blue);
+}
+
+/** Of its own arguments only: what a closure holds is read anew for each pixel. */
+function fill(
+  to: Uint32Array,
+  data: Uint8Array,
+  width: number,
+  height: number,
+  step: number,
+  bytes: number,
+  red: number,
+  green: number,
+  blue: number,
+): void {
+  let at = 0;
   for (let y = 0; y < height; y++) {
-    let from = y * row;
+    let from = y * step;
     for (let x = 0; x < width; x++) {
-      rgba[to] = data[from + red] ?? 0;
-      rgba[to + 1] = data[from + green] ?? 0;
-      rgba[to + 2] = data[from] ?? 0;
-      rgba[to + 3] = 255;
-      to += 4;
-      from += channels;
+      to[at++] =
+        OPAQUE |
+        ((data[from + blue] as number) << 16) |
+        ((data[from + green] as number) << 8) |
+        (data[from + red] as number);
+      from += bytes;
     }
   }
-  return rgba;
 }
 
 function isImageFile(data: Uint8Array): boolean {

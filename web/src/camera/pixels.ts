@@ -1,8 +1,8 @@
 // The pixels of any struct that is shaped like an image: sizes, an encoding, and bytes.
 // Layer: web/camera, pure. Source: com.robotraconteur.image (ImageEncoding); experimental.createwebcam2 for those that say none.
 
-import type { Frame } from "./frame";
-import { readFrame } from "./frame";
+import type { Frame, Paint } from "./frame";
+import { colours, OPAQUE, readFrame } from "./frame";
 
 const MAX_PIXELS = 4096 * 4096;
 
@@ -49,10 +49,10 @@ export function readPicture(value: unknown): Frame {
     throw new Error(
       `the picture has ${data.length} bytes in rows of ${step}; expected ${needed} for ${width} by ${height}`,
     );
-  const rgba = layout.channels
+  const paint = layout.channels
     ? colours(data, width, height, step, layout.bytes, layout.channels)
     : greys(data, width, height, step, layout);
-  return { width, height, rgba, encoded: null };
+  return { width, height, paint, encoded: null };
 }
 
 function layoutOf(encoding: unknown): Layout | undefined {
@@ -63,38 +63,11 @@ function isFile(data: Uint8Array): boolean {
   return (data[0] === 0xff && data[1] === 0xd8) || (data[0] === 0x89 && data[1] === 0x50);
 }
 
-function colours(
-  data: Uint8Array,
-  width: number,
-  height: number,
-  step: number,
-  bytes: number,
-  [red, green, blue]: readonly [number, number, number],
-): Uint8ClampedArray<ArrayBuffer> {
-  const rgba = new Uint8ClampedArray(width * height * 4);
-  let to = 0;
-  for (let y = 0; y < height; y++) {
-    for (let from = y * step, x = 0; x < width; x++, from += bytes, to += 4) {
-      rgba[to] = data[from + red] ?? 0;
-      rgba[to + 1] = data[from + green] ?? 0;
-      rgba[to + 2] = data[from + blue] ?? 0;
-      rgba[to + 3] = 255;
-    }
-  }
-  return rgba;
-}
-
 /** Bytes as they are; wider numbers from the least (black) to the greatest (white), since no range is known. */
-function greys(
-  data: Uint8Array,
-  width: number,
-  height: number,
-  step: number,
-  { bytes, number = "u8" }: Layout,
-): Uint8ClampedArray<ArrayBuffer> {
+function greys(data: Uint8Array, width: number, height: number, step: number, { bytes, number = "u8" }: Layout): Paint {
+  if (number === "u8") return colours(data, width, height, step, 1, [0, 0, 0]);
   const view = new DataView(data.buffer, data.byteOffset, data.byteLength);
   const read = {
-    u8: (at: number) => view.getUint8(at),
     u16: (at: number) => view.getUint16(at, true),
     i16: (at: number) => view.getInt16(at, true),
     u32: (at: number) => view.getUint32(at, true),
@@ -102,25 +75,21 @@ function greys(
     f32: (at: number) => view.getFloat32(at, true),
     f64: (at: number) => view.getFloat64(at, true),
   }[number];
-  const values = new Float64Array(width * height);
-  let [low, high] = [Infinity, -Infinity];
-  for (let y = 0, to = 0; y < height; y++) {
-    for (let x = 0; x < width; x++, to++) {
-      const value = read(y * step + x * bytes);
-      values[to] = value;
-      if (value < low) low = value;
-      if (value > high) high = value;
+  return (to) => {
+    let [low, high] = [Infinity, -Infinity];
+    for (let y = 0; y < height; y++) {
+      for (let x = 0; x < width; x++) {
+        const value = read(y * step + x * bytes);
+        if (value < low) low = value;
+        if (value > high) high = value;
+      }
     }
-  }
-  if (number === "u8") [low, high] = [0, 255];
-  const scale = high > low ? 255 / (high - low) : 0;
-  const rgba = new Uint8ClampedArray(width * height * 4);
-  values.forEach((value, i) => {
-    const grey = (value - low) * scale;
-    rgba[4 * i] = grey;
-    rgba[4 * i + 1] = grey;
-    rgba[4 * i + 2] = grey;
-    rgba[4 * i + 3] = 255;
-  });
-  return rgba;
+    const scale = high > low ? 255 / (high - low) : 0;
+    for (let y = 0, at = 0; y < height; y++) {
+      for (let x = 0; x < width; x++) {
+        const grey = Math.round((read(y * step + x * bytes) - low) * scale) & 255; // NaN is black
+        to[at++] = OPAQUE | (grey * 0x10101);
+      }
+    }
+  };
 }

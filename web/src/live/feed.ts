@@ -11,9 +11,12 @@ const PROPERTY_MS = 500;
 const FIRST_RETRY_MS = 1_000;
 const LONGEST_RETRY_MS = 30_000;
 
+/** `isAfterGap`: it is the first, or those before it had become stale. */
+export type Heard = (value: unknown, now: number, isAfterGap: boolean) => void;
+
 export class Feed {
   readonly pace = new Pace();
-  readonly heard = new Set<(value: unknown, now: number) => void>();
+  readonly heard = new Set<Heard>();
   newest: unknown = undefined;
   failure: string | null = null;
   #stop: AbortController | null = null;
@@ -82,8 +85,9 @@ export class Feed {
     const now = performance.now();
     this.newest = value;
     this.failure = null;
+    const isAfterGap = this.pace.count === 0 || this.pace.isStale(now);
     this.pace.hear(now);
-    for (const heard of this.heard) heard(value, now);
+    for (const heard of this.heard) heard(value, now, isAfterGap);
   }
 }
 

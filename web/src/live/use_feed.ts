@@ -4,7 +4,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import type { Remote } from "../robot/remote";
 import { openFeed } from "./feed";
-import type { Feed, FeedKind } from "./feed";
+import type { Feed, FeedKind, Heard } from "./feed";
 import { span } from "../ui/words";
 import { t } from "../app/language";
 
@@ -52,19 +52,17 @@ export function useFeed(object: Remote | null, kind: FeedKind | null, member: st
 }
 
 /** Calls `heard` with each value. */
-export function useEach(
-  object: Remote | null,
-  kind: FeedKind | null,
-  member: string,
-  heard: (value: unknown, now: number) => void,
-): Feed | null {
-  const latest = useRef(heard);
-  latest.current = heard;
+export function useEach(object: Remote | null, kind: FeedKind | null, member: string, heard: Heard): Feed | null {
+  const latest = useRef({ object, member, heard });
+  latest.current = { object, member, heard };
   const [feed, setFeed] = useState<Feed | null>(null);
   useEffect(() => {
     if (!object || kind === null) return;
     const opened = openFeed(object, kind, member);
-    const hear = (value: unknown, now: number): void => latest.current(value, now);
+    const hear: Heard = (...given) => {
+      const { current } = latest;
+      if (current.object === object && current.member === member) current.heard(...given); // else it is about to end
+    };
     opened.feed.heard.add(hear);
     setFeed(opened.feed);
     return () => {

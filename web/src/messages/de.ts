@@ -18,6 +18,7 @@ const german: Readonly<Record<string, string>> = {
   "Copy as code": "Als Code kopieren",
   Done: "Fertig",
   Drive: "Fahren",
+  "Emptied, since its type has changed: {0}": "Geleert, weil der Typ ein anderer ist: {0}",
   Events: "Ereignisse",
   "Fill in": "Ausfüllen",
   Form: "Formular",
@@ -127,6 +128,8 @@ const german: Readonly<Record<string, string>> = {
   Rest: "Ruhe",
   "Sticks: W, A, S, D and the arrow keys": "Hebel: W, A, S, D und die Pfeiltasten",
   "A gamepad drives while you are in control.": "Ein Gamepad steuert, solange Sie die Steuerung haben.",
+  "{0} is ignored: the browser does not know which of its axes are the sticks of a gamepad.":
+    "{0} zählt nicht: Der Browser weiß nicht, welche seiner Achsen die Sticks eines Gamepads sind.",
   "Click here for the keys. Press a button of a gamepad to use it.":
     "Für die Tasten hier klicken. Ein Gamepad meldet sich mit einem seiner Knöpfe.",
   Unlock: "Entsperren",

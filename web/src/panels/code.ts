@@ -38,7 +38,7 @@ export function asCode(
 }
 
 function javaScript(url: string, { object }: CodePlace, member: Member, values: readonly unknown[]): string {
-  const args = values.map((value) => JSON.stringify(jsonOf(value))).join(", ");
+  const args = values.map(literal).join(", ");
   const verb = { function: "", property: ".set", wire: ".poke" }[member.kind as "function" | "property" | "wire"];
   const found = object === "" ? "" : `const object = await robot.$.find(${JSON.stringify(`*.${object}`)});\n`;
   return [
@@ -46,6 +46,20 @@ function javaScript(url: string, { object }: CodePlace, member: Member, values: 
     `const robot = await connect(${JSON.stringify(url)});`,
     `${found}console.log(await ${object === "" ? "robot" : "object"}.$.member(${JSON.stringify(member.name)})${verb}(${args}));`,
   ].join("\n");
+}
+
+/** Nothing is rounded: `123n`, `NaN`. Keys are quoted and computed: `__proto__` is a name like others. */
+function literal(value: unknown): string {
+  if (typeof value === "bigint") return `${value}n`;
+  if (typeof value === "number") return String(value);
+  if (ArrayBuffer.isView(value)) return literal(Array.from(value as unknown as ArrayLike<unknown>));
+  if (Array.isArray(value)) return `[${value.map(literal).join(", ")}]`;
+  if (value instanceof Map)
+    return `new Map([${[...value].map(([key, item]) => `[${literal(key)}, ${literal(item)}]`).join(", ")}])`;
+  if (value === null || typeof value !== "object") return JSON.stringify(value) ?? "null";
+  return `{ ${Object.entries(value)
+    .map(([key, item]) => `${key === "__proto__" ? `["__proto__"]` : JSON.stringify(key)}: ${literal(item)}`)
+    .join(", ")} }`;
 }
 
 function curl(base: string, place: CodePlace, member: Member, values: readonly unknown[]): string {

@@ -8,11 +8,12 @@ import type { Member } from "../robot/remote";
 import { Failure } from "../ui/failure";
 import { clockTime, flowing } from "../ui/words";
 import { draftOf, jsonOf, makeDraft, valueOf } from "../values/draft";
-import type { Draft } from "../values/draft";
 import { rowsOf } from "../values/rows";
 import { asCode } from "./code";
 import type { CodeLanguage, Types } from "./code";
 import { DraftInput } from "./draft_input";
+import { fitDrafts } from "./form_drafts";
+import type { FormDrafts } from "./form_drafts";
 import { inputsOf, membersFor, textIn, textsIn } from "./panel";
 import type { PanelProps } from "./panel";
 import { MemberSelect } from "./parts";
@@ -48,7 +49,7 @@ export default function FormPanel(props: PanelProps) {
 
 interface Done {
   time: number;
-  drafts: readonly Draft[];
+  form: FormDrafts;
   words: string;
   rows: { name: string; text: string }[];
   tookMs: number;
@@ -64,11 +65,13 @@ interface MemberFormProps extends PanelProps {
 
 function MemberForm({ object, member, definitions, scope, place, withMore = false }: MemberFormProps) {
   const inputs = inputsOf(member);
-  const fresh = (): Draft[] => inputs.map(({ type }) => makeDraft(type, definitions, scope));
-  const [drafts, setDrafts] = useState<readonly Draft[]>(fresh);
+  const fit = (old: FormDrafts | null): FormDrafts => fitDrafts(old, inputs, definitions, scope);
+  const [form, setForm] = useState(() => fit(null));
+  const { drafts, emptied } = form;
+  const setDrafts = (next: FormDrafts["drafts"]): void => setForm((old) => ({ ...old, drafts: next, emptied: [] }));
   const [done, setDone] = useState<readonly Done[]>([]);
   const doing = useAction();
-  useEffect(() => setDrafts(fresh()), [definitions]); // types may be known only now
+  useEffect(() => setForm(fit), [member, definitions]); // types may be known only now
   const values = (): unknown[] =>
     inputs.map(({ name, type }, i) => {
       try {
@@ -92,7 +95,7 @@ function MemberForm({ object, member, definitions, scope, place, withMore = fals
       const hasResult = member.kind === "function" && member.type !== "void";
       const entry: Done = {
         time: Date.now(),
-        drafts,
+        form,
         words: JSON.stringify(jsonOf(given)).slice(1, -1),
         rows: hasResult ? rowsOf(result, member.type, definitions, scope) : [],
         tookMs: performance.now() - begun,
@@ -117,7 +120,7 @@ function MemberForm({ object, member, definitions, scope, place, withMore = fals
           definitions={definitions}
           scope={scope}
           draft={drafts[i] ?? makeDraft(type, definitions, scope)}
-          change={(next) => setDrafts(inputs.map((_, at) => (at === i ? next : (drafts[at] as Draft))))}
+          change={(next) => setDrafts(drafts.map((old, at) => (at === i ? next : old)))}
         />
       ))}
       <div class="row-line">
@@ -150,22 +153,27 @@ function MemberForm({ object, member, definitions, scope, place, withMore = fals
           </tbody>
         </table>
       )}
-      <Failure text={doing.failure} />
-      {withMore && done.length > 0 && <History done={done} take={setDrafts} />}
+      <Failure
+        text={
+          doing.failure ??
+          (emptied.length > 0 ? t("Emptied, since its type has changed: {0}", emptied.join(", ")) : null)
+        }
+      />
+      {withMore && done.length > 0 && <History done={done} take={(before) => setForm(fit(before))} />}
       {withMore && <Code member={member} values={values} place={place} types={{ definitions, scope }} />}
     </form>
   );
 }
 
-function History({ done, take }: { done: readonly Done[]; take: (drafts: readonly Draft[]) => void }) {
+function History({ done, take }: { done: readonly Done[]; take: (form: FormDrafts) => void }) {
   return (
     <details>
       <summary>{t("History: {0}", done.length)}</summary>
       <ol class="history">
-        {done.map(({ time, words, drafts }, i) => (
+        {done.map(({ time, words, form }, i) => (
           <li key={i}>
             <time>{clockTime(time)}</time>{" "}
-            <button class="button button-quiet" type="button" onClick={() => take(drafts)}>
+            <button class="button button-quiet" type="button" onClick={() => take(form)}>
               {words || t("without arguments")}
             </button>
           </li>

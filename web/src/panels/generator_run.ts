@@ -1,6 +1,7 @@
 // A run of a generator function, and how far it has come: stopped is what the device has said to be stopped.
-// Layer: web/panels, pure. The client sends one step after another: a stop goes out when the step under way is answered.
+// Layer: web/panels, pure. A stop goes out at once; the client rejects the step under way with OperationAborted.
 
+import { ErrorCode, RobotRaconteurError } from "rrgate-client";
 import { Store } from "../app/store";
 import { explain } from "../robot/remote";
 
@@ -38,7 +39,7 @@ export class GeneratorRun {
       } while (this.#goesOn);
       if (!this.#isStopping) this.state.value = "held";
     } catch (error) {
-      if (this.#values !== mine) return;
+      if (this.#values !== mine || (this.#isStopping && isAborted(error))) return;
       this.failure.value = explain(error);
       if (this.#isStopping) return;
       this.#end("ended");
@@ -80,4 +81,8 @@ export class GeneratorRun {
     this.#goesOn = false;
     this.state.value = state;
   }
+}
+
+function isAborted(error: unknown): boolean {
+  return error instanceof RobotRaconteurError && error.code === ErrorCode.OperationAborted;
 }

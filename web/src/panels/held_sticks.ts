@@ -11,8 +11,12 @@ export class HeldSticks {
   readonly #fingers = new Set<Side>();
   #pointers = AT_REST;
   #gamepad = AT_REST;
-  /** Axes that were let go of while they may be pushed, with the side they were seen on first. */
+  /** Axes that may be pushed already, when they are first seen or let go of; with the side they were seen on first. */
   readonly #latched = new Map<Stick, number>();
+
+  constructor() {
+    this.#latch();
+  }
 
   get deflection(): Deflection {
     return together(deflectionOfKeys(this.#keys), this.#pointers, this.#gamepad);
@@ -46,10 +50,11 @@ export class HeldSticks {
   /** `axes`: of the gamepad, null where there is none. `counts`: whether it may drive now. @returns whether it has changed. */
   poll(axes: readonly number[] | null, counts: boolean): boolean {
     const before = this.#gamepad;
+    if (axes === null) this.#latch();
     const read = axes === null ? AT_REST : withoutDrift(deflectionOfGamepad(axes));
     const now = { ...AT_REST };
     for (const stick of STICKS) {
-      this.#unlatch(stick, Math.sign(read[stick]));
+      if (axes !== null) this.#unlatch(stick, Math.sign(read[stick]));
       if (counts && !this.#latched.has(stick)) now[stick] = read[stick];
     }
     this.#gamepad = now;
@@ -60,6 +65,10 @@ export class HeldSticks {
     this.#keys.clear();
     this.#fingers.clear();
     this.#pointers = this.#gamepad = AT_REST;
+    this.#latch();
+  }
+
+  #latch(): void {
     for (const stick of STICKS) this.#latched.set(stick, 0);
   }
 

@@ -1,35 +1,49 @@
 // Keeps others from changing an object while one works on it.
 // Layer: web/panels. Source: sessions spec, object locks.
 
-import { useEffect, useState } from "preact/hooks";
 import { t } from "../app/language";
+import { Store, useStore } from "../app/store";
 import { useAction } from "../members/row";
+import type { Remote } from "../robot/remote";
 import { Failure } from "../ui/failure";
 import { clockTime } from "../ui/words";
 import type { PanelProps } from "./panel";
 
+/** When this page has locked the object; null: it has not. */
+type Held = Store<number | null>;
+
+const ofObjects = new WeakMap<Remote, Held>();
+const none: Held = new Store<number | null>(null);
+
+/** The lock belongs to the session, whatever panel shows it, and ends with it. */
+function heldOf(object: Remote): Held {
+  const found = ofObjects.get(object) ?? new Store<number | null>(null);
+  ofObjects.set(object, found);
+  return found;
+}
+
 export default function LocksPanel({ object }: PanelProps) {
-  const [held, setHeld] = useState<{ kind: string; since: number } | null>(null);
+  const lock = object ? heldOf(object) : none;
+  const since = useStore(lock);
   const asking = useAction();
-  useEffect(() => setHeld(null), [object]); // a lock ends with its session
   const take = (kind: "user" | "client"): void =>
     asking.run(async () => {
       await object?.lock(kind);
-      setHeld({ kind, since: Date.now() });
+      lock.value = Date.now();
     });
   const giveBack = (): void =>
     asking.run(async () => {
       await object?.unlock();
-      setHeld(null);
+      lock.value = null;
     });
   const off = !object || asking.busy;
   return (
     <div class="locks-panel">
       <p role="status">
-        {held ? t("Locked by this page since {0}.", clockTime(held.since)) : t("Not locked by this page.")}
+        {since === null ? t("Not locked by this page.") : t("Locked by this page since {0}.", clockTime(since))}
       </p>
       <div class="row-line">
-        {held ? (
+        {since !== null ? (
           <button class="button" type="button" disabled={off} onClick={giveBack}>
             {t("Unlock")}
           </button>

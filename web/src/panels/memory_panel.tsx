@@ -25,10 +25,10 @@ export default function MemoryPanel({ object, members, settings, change }: Panel
   const [position, setPosition] = useState("0");
   const [count, setCount] = useState(String(AT_FIRST));
   const [text, setText] = useState("");
-  const [value, setValue] = useState<unknown>(undefined);
+  const [shown, setShown] = useState<{ value: unknown; from: number } | null>(null);
   const acting = useAction();
   useEffect(() => {
-    setValue(undefined);
+    setShown(null);
     if (!object || !member) return;
     acting.run(async () => {
       const found = await object.dimensions(name);
@@ -38,13 +38,16 @@ export default function MemoryPanel({ object, members, settings, change }: Panel
     });
   }, [object, name]);
   const numbers = (given: string): number[] => Array.from(parseInput(given, "uint32[]") as ArrayLike<number>);
-  const read = (): void =>
-    acting.run(async () => setValue(await object?.read(name, numbers(position), numbers(count))));
+  const readItems = async (): Promise<void> => {
+    const at = numbers(position);
+    const value = await object?.read(name, at, numbers(count));
+    setShown({ value, from: at[0] ?? 0 });
+  };
   const write = (event: Event): void => {
     event.preventDefault();
     acting.run(async () => {
       await object?.write(name, numbers(position), parseInput(text, member?.type ?? ""));
-      setValue(await object?.read(name, numbers(position), numbers(count)));
+      await readItems();
     });
   };
   const off = !object || !member || acting.busy;
@@ -67,7 +70,7 @@ export default function MemoryPanel({ object, members, settings, change }: Panel
           </select>
         </label>
       </div>
-      <form class="row-line row-form" onSubmit={(event) => (event.preventDefault(), read())}>
+      <form class="row-line row-form" onSubmit={(event) => (event.preventDefault(), acting.run(readItems))}>
         <TextField label={t("Position")} text={position} change={setPosition} />
         <TextField label={t("Items")} text={count} change={setCount} />
         <button class="button" type="submit" disabled={off}>
@@ -76,7 +79,7 @@ export default function MemoryPanel({ object, members, settings, change }: Panel
         <p class="note">{size.length === 0 ? "" : t("{0} items", size.join(" × "))}</p>
       </form>
       <Failure text={acting.failure} />
-      {value !== undefined && <Shown value={value} view={view} from={numbers(position)[0] ?? 0} />}
+      {shown && <Shown {...shown} view={view} />}
       {member && !member.modifiers.includes("readonly") && (
         <form class="row-line row-form" onSubmit={write}>
           <TextField label={t("New items")} text={text} change={setText} />

@@ -1,16 +1,16 @@
 // A pipe: its packets, newest first, and a form to send one.
 // Layer: web/panels.
 
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
 import { useEach, useFeed } from "../live/use_feed";
 import { useAction } from "../members/row";
-import type { Sender } from "../robot/remote";
 import { Failure } from "../ui/failure";
 import { clockTimeMs } from "../ui/words";
 import { makeDraft, valueOf } from "../values/draft";
 import { formatValue } from "../values/format";
 import { DraftInput } from "./draft_input";
+import { Outlet } from "./outlet";
 import { membersFor, textIn } from "./panel";
 import type { PanelProps } from "./panel";
 import { Freshness, MemberSelect } from "./parts";
@@ -77,24 +77,14 @@ function Packets({ object, name }: { object: PanelProps["object"]; name: string 
 function SendForm({ object, definitions, scope, name, type }: PanelProps & { name: string; type: string }) {
   const [draft, setDraft] = useState(() => makeDraft(type, definitions, scope));
   const [sent, setSent] = useState(0);
-  const sender = useRef<Promise<Sender> | null>(null);
+  const outlet = useMemo(() => (object ? new Outlet(() => object.openPipe(name)) : null), [object, name]);
   const sending = useAction();
-  useEffect(
-    () => () => {
-      void sender.current?.then((open) => open.close()).catch(() => undefined); // closing what never opened
-      sender.current = null;
-    },
-    [object, name],
-  );
+  useEffect(() => () => outlet?.close(), [outlet]);
   const send = (event: Event): void => {
     event.preventDefault();
     sending.run(async () => {
-      if (!object) throw new Error(t("not connected"));
-      const value = valueOf(draft, type, definitions, scope);
-      sender.current ??= object.openPipe(name);
-      await (
-        await sender.current.catch((error: unknown) => ((sender.current = null), Promise.reject(error)))
-      ).send(value);
+      if (!outlet) throw new Error(t("not connected"));
+      await outlet.send(valueOf(draft, type, definitions, scope));
       setSent((count) => count + 1);
     });
   };

@@ -1,20 +1,22 @@
 // Numbers over time: any of wires, properties and pipes, by their path; pause, zoom, cursor, and a file of what is shown.
 // Layer: web/panels. Drawn by uPlot.
 
-import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import { useCallback, useEffect, useMemo, useRef, useState } from "preact/hooks";
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import { t } from "../app/language";
 import { onColoursChanged } from "../app/theme";
 import { readPalette } from "../chart/palette";
+import type { FeedKind } from "../live/feed";
 import { useEach, useFeed } from "../live/use_feed";
+import type { Remote } from "../robot/remote";
 import { unitOf } from "../values/units";
-import { numberAt, numberPaths } from "../values/paths";
+import { numberPaths, numberReader } from "../values/paths";
 import { saveFile } from "../ui/save_file";
 import { membersFor, numberIn, textIn, textsIn } from "./panel";
 import type { PanelProps } from "./panel";
 import { feedKindOf, Freshness, MemberSelect } from "./parts";
-import { Trace, toCsv } from "./trace";
+import { lonely, Trace, toCsv } from "./trace";
 
 const DRAW_MS = 100;
 const AT_FIRST = 4;
@@ -27,25 +29,32 @@ export default function PlotPanel(props: PanelProps) {
   const member = choices.find((each) => each.name === name);
   const seconds = numberIn(settings, "seconds", 30, 1, 3600);
   const kind = feedKindOf(member);
-  const look = useFeed(object, kind, name);
-  const available = useMemo(() => numberPaths(look.value), [look.feed, look.value === undefined]);
+  const [first, setFirst] = useState<{ of: string; object: Remote | null; paths: readonly string[] }>(NOTHING);
+  const available = first.of === name ? first.paths : NOTHING.paths;
   const chosen = textsIn(settings, "paths");
   const paths = chosen.length > 0 ? chosen : preferred(available).slice(0, AT_FIRST);
   const key = JSON.stringify([name, paths]);
   const trace = useMemo(() => new Trace(paths.length), [key]);
+  const readers = useMemo(() => paths.map(numberReader), [key]);
   const [paused, setPaused] = useState(false);
-  useEach(object, kind, name, (value, now) =>
+  useEach(object, kind, name, (value, now, isAfterGap) => {
+    if (first.of !== name || first.object !== object) setFirst({ of: name, object, paths: numberPaths(value) });
+    if (isAfterGap) trace.breakOff();
     trace.push(
       now,
-      paths.map((path) => numberAt(value, path) ?? null),
-    ),
-  );
+      readers.map((read) => read(value)),
+    );
+  });
   const type = member?.type ?? "";
-  const label = (path: string): string => {
-    const unit = unitOf(type, path, definitions, scope);
-    const shown = path === "" ? name : path;
-    return unit === "" ? shown : `${shown} [${unit}]`;
-  };
+  const label = useCallback(
+    (path: string): string => {
+      const unit = unitOf(type, path, definitions, scope);
+      const shown = path === "" ? name : path;
+      return unit === "" ? shown : `${shown} [${unit}]`;
+    },
+    [name, type, definitions, scope],
+  );
+  const labels = useMemo(() => paths.map(label), [key, label]);
   const save = (): void =>
     saveFile(`${name}.csv`, "text/csv", toCsv(["time_s", ...paths.map((path) => path || name)], trace));
   const pick = (path: string, on: boolean): void =>
@@ -75,28 +84,50 @@ export default function PlotPanel(props: PanelProps) {
           CSV
         </button>
       </div>
-      <Canvas key={key} trace={trace} labels={paths.map(label)} seconds={seconds} paused={paused || object === null} />
+      <Canvas key={key} trace={trace} labels={labels} seconds={seconds} paused={paused || object === null} />
       <div class="panel-foot">
-        <Freshness look={look} isLive={object !== null} />
-        <details class="series-choice">
-          <summary>{t("Series: {0}", paths.length)}</summary>
-          <ul>
-            {[...new Set([...available, ...paths])].map((path) => (
-              <li key={path}>
-                <label>
-                  <input
-                    type="checkbox"
-                    checked={paths.includes(path)}
-                    onChange={(event) => pick(path, event.currentTarget.checked)}
-                  />{" "}
-                  {label(path)}
-                </label>
-              </li>
-            ))}
-          </ul>
-        </details>
+        <FreshnessOf object={object} kind={kind} name={name} />
+        <SeriesChoice available={available} chosen={paths} label={label} pick={pick} />
       </div>
     </div>
+  );
+}
+
+const NOTHING = { of: "", object: null, paths: [] };
+
+/** Apart, since it alone changes ten times a second. */
+function FreshnessOf({ object, kind, name }: { object: Remote | null; kind: FeedKind | null; name: string }) {
+  return <Freshness look={useFeed(object, kind, name)} isLive={object !== null} />;
+}
+
+interface SeriesChoiceProps {
+  available: readonly string[];
+  chosen: readonly string[];
+  label: (path: string) => string;
+  pick: (path: string, on: boolean) => void;
+}
+
+function SeriesChoice({ available, chosen, label, pick }: SeriesChoiceProps) {
+  const [isOpen, setOpen] = useState(false);
+  return (
+    <details class="series-choice" onToggle={(event) => setOpen(event.currentTarget.open)}>
+      <summary>{t("Series: {0}", chosen.length)}</summary>
+      <ul>
+        {isOpen &&
+          [...new Set([...available, ...chosen])].map((path) => (
+            <li key={path}>
+              <label>
+                <input
+                  type="checkbox"
+                  checked={chosen.includes(path)}
+                  onChange={(event) => pick(path, event.currentTarget.checked)}
+                />{" "}
+                {label(path)}
+              </label>
+            </li>
+          ))}
+      </ul>
+    </details>
   );
 }
 
@@ -121,18 +152,25 @@ function Canvas({ trace, labels, seconds, paused }: CanvasProps) {
     const box = place.current;
     if (!box) return;
     let plot = makePlot(box, labels);
+    let [drawn, isInView] = ["", true];
     const draw = (): void => {
-      if (latest.current.paused || document.hidden) return;
+      if (latest.current.paused || document.hidden || !isInView) return;
+      const isPointedAt = (plot.cursor.left ?? -1) >= 0;
+      const next = `${trace.pushed} ${latest.current.seconds} ${isPointedAt}`;
+      if (next === drawn) return;
+      drawn = next;
       const data = trace.window(latest.current.seconds) as uPlot.AlignedData;
       plot.setData(data);
-      const isPointedAt = (plot.cursor.left ?? -1) >= 0;
       if (!isPointedAt && data[0].length > 0) plot.setLegend({ idx: data[0].length - 1 }); // the newest values
     };
     const fit = new ResizeObserver(() => plot.setSize(sizeOf(box, plot)));
     fit.observe(box);
+    const look = new IntersectionObserver((seen) => (isInView = seen.at(-1)?.isIntersecting ?? true));
+    look.observe(box);
     const unwatch = onColoursChanged(() => {
       plot.destroy();
       plot = makePlot(box, labels);
+      drawn = "";
       plot.setData(trace.window(latest.current.seconds) as uPlot.AlignedData);
     });
     const timer = setInterval(draw, DRAW_MS);
@@ -141,6 +179,7 @@ function Canvas({ trace, labels, seconds, paused }: CanvasProps) {
       clearInterval(timer);
       unwatch();
       fit.disconnect();
+      look.disconnect();
       plot.destroy();
     };
   }, [trace]);
@@ -170,8 +209,11 @@ function makePlot(box: HTMLElement, labels: readonly string[]): uPlot {
           label,
           stroke: palette.series[i % palette.series.length] ?? palette.accent,
           width: 1.75,
-          spanGaps: true,
-          points: { show: (plot: uPlot) => plot.data[0].length < 3 }, // where there is no line yet
+          spanGaps: false, // what was not measured is not drawn
+          points: {
+            show: (plot: uPlot) => plot.data[0].length < 3, // where there is no line yet
+            filter: (plot: uPlot, at: number) => lonely(plot.data[at] ?? []),
+          },
           value: (_: uPlot, value: number | null) => (value === null ? "–" : String(Number(value.toPrecision(6)))),
         })),
       ],

@@ -2,6 +2,8 @@
 // Layer: web/panels, pure. Gamepads: the standard mapping of the Gamepad API, where up is negative.
 
 import type { Settings } from "../board/board";
+import { DRIVE_TIMEOUT_MS } from "../robot/driver";
+import type { Member, Remote } from "../robot/remote";
 import { makeDraft, valueOf } from "../values/draft";
 import type { Draft } from "../values/draft";
 import type { Definitions } from "../values/definitions";
@@ -37,6 +39,16 @@ export function deflectionOfKeys(held: ReadonlySet<string>): Deflection {
     if (key) sum[key[0]] += key[1];
   }
   return sum;
+}
+
+/**
+ * The axes of the first gamepad that is known to have the standard mapping: of another, an axis may be a trigger that rests at -1.
+ * `ignored`: the name of such a one, where there is no better.
+ */
+export function findGamepad(pads: readonly (Gamepad | null)[]): { axes: readonly number[] | null; ignored: string } {
+  const connected = pads.filter((pad): pad is Gamepad => pad?.connected === true);
+  const axes = connected.find(({ mapping }) => mapping === "standard")?.axes ?? null;
+  return { axes, ignored: axes === null ? (connected[0]?.id ?? "") : "" };
 }
 
 export function deflectionOfGamepad(axes: readonly number[]): Deflection {
@@ -132,6 +144,54 @@ export function commandOf(
   for (const axis of axes) add(values, inputs, axis.path, worthOf(axis, deflection));
   return values;
 }
+
+/**
+ * What one member is told. At rest no axis counts, and the neutral value is that of when moving began: what is typed meanwhile
+ * never keeps it from stopping.
+ */
+export class Commands {
+  #rest: unknown[] | null = null;
+  #isMoving = false;
+
+  /** @throws Error as commandOf(); at rest only where no neutral value was valid yet. */
+  of(
+    mapping: Mapping,
+    inputs: readonly Input[],
+    deflection: Deflection,
+    definitions: Definitions,
+    scope: string,
+  ): unknown[] {
+    const rest = (): unknown[] => commandOf({ ...mapping, axes: [] }, inputs, AT_REST, definitions, scope);
+    if (deflection !== AT_REST) {
+      const command = commandOf(mapping, inputs, deflection, definitions, scope);
+      if (!this.#isMoving) this.#rest = rest();
+      this.#isMoving = true;
+      return command;
+    }
+    try {
+      if (!this.#isMoving) this.#rest = rest();
+    } catch (error) {
+      if (this.#rest === null) throw error;
+    }
+    this.#isMoving = false;
+    return (this.#rest ??= rest());
+  }
+}
+
+/** At rest past whatever waits to be sent. Settles when the device has answered, or after DRIVE_TIMEOUT_MS. */
+export function tell(
+  object: Target,
+  { kind, name }: Member,
+  given: readonly unknown[],
+  isRest: boolean,
+): Promise<unknown> {
+  const options = { timeout: DRIVE_TIMEOUT_MS };
+  if (kind === "function") return object[isRest ? "urgent" : "call"](name, given, options);
+  if (isRest) return object.setNow(name, given[0], options);
+  return object[kind === "wire" ? "poke" : "set"](name, given[0], options);
+}
+
+type Target = Pick<Remote, "call" | "urgent" | "set" | "setNow" | "poke">;
 
 /** By the path's first step the parameter; a wire's value has no name, so its own name may be left out. */
 function add(values: unknown[], inputs: readonly Input[], path: string, worth: number): void {

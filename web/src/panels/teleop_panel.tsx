@@ -4,7 +4,7 @@
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { t } from "../app/language";
 import { onStop, stopNow } from "../robot/control";
-import { Driver, DRIVE_TIMEOUT_MS } from "../robot/driver";
+import { Driver } from "../robot/driver";
 import { explain } from "../robot/remote";
 import { ControlLine, useControl } from "../ui/control_line";
 import { Failure } from "../ui/failure";
@@ -17,7 +17,7 @@ import type { PanelProps } from "./panel";
 import { MemberSelect } from "./parts";
 import { StickPad } from "./stick";
 import type { StickMoves } from "./stick";
-import { AT_REST, commandOf, isStickKey, readAxes, readNeutral, STICKS } from "./teleop";
+import { AT_REST, commandOf, Commands, findGamepad, isStickKey, readAxes, readNeutral, STICKS, tell } from "./teleop";
 import type { Axis, Deflection } from "./teleop";
 
 const REPEAT_MS = 100;
@@ -46,6 +46,7 @@ export default function TeleopPanel(props: PanelProps) {
       }),
     [],
   );
+  const commands = useMemo(() => new Commands(), [name]); // also over a connection that is made anew
   const latest = useRef({ member, mapping, definitions, scope });
   latest.current = { member, mapping, definitions, scope };
   useEffect(() => {
@@ -53,23 +54,22 @@ export default function TeleopPanel(props: PanelProps) {
     let by = latest.current;
     const send = async (deflection: Deflection, insists: boolean): Promise<void> => {
       if (latest.current.member === member) by = latest.current; // else it is the old one that is told to rest
-      const given = commandOf(by.mapping, inputsOf(member), deflection, by.definitions, by.scope);
+      const given = commands.of(by.mapping, inputsOf(member), deflection, by.definitions, by.scope);
       const isRest = deflection === AT_REST;
-      const way = async (): Promise<unknown> => {
-        if (member.kind === "function")
-          return object[isRest ? "urgent" : "call"](member.name, given, { timeout: DRIVE_TIMEOUT_MS });
-        if (member.kind === "wire") return object.poke(member.name, given[0]);
-        return object.set(member.name, given[0], { timeout: DRIVE_TIMEOUT_MS });
-      };
+      const way = (): Promise<unknown> => tell(object, member, given, isRest);
       await (isRest ? stopNow(object, insists, way) : way());
       setFailure(null);
     };
     driver.setConnection({ send, right: control });
     return () => driver.dispose();
-  }, [object, control, member, driver]);
+  }, [object, control, member, commands, driver]);
 
   const enabled = object !== null && isOpen && mapping.axes.length > 0;
-  const { shown, pad, sticks, stop, hasGamepad } = useSticks(driver, enabled, () => control?.mayCommand === true);
+  const { shown, pad, sticks, stop, hasGamepad, ignored } = useSticks(
+    driver,
+    enabled,
+    () => control?.mayCommand === true,
+  );
   const setAxes = (axes: readonly Axis[]): void => change({ ...settings, axes });
   return (
     <div class="teleop panel-scroll">
@@ -94,7 +94,9 @@ export default function TeleopPanel(props: PanelProps) {
       <p class="note" data-gamepad={hasGamepad}>
         {hasGamepad
           ? t("A gamepad drives while you are in control.")
-          : t("Click here for the keys. Press a button of a gamepad to use it.")}
+          : ignored !== ""
+            ? t("{0} is ignored: the browser does not know which of its axes are the sticks of a gamepad.", ignored)
+            : t("Click here for the keys. Press a button of a gamepad to use it.")}
       </p>
       <Sent {...{ mapping, inputs, definitions, scope, shown }} />
       <Failure text={failure} />
@@ -154,6 +156,7 @@ function Sent({ mapping, inputs, definitions, scope, shown }: Shown) {
 function useSticks(driver: Driver<Deflection>, enabled: boolean, mayPoll: () => boolean) {
   const [shown, setShown] = useState<Deflection>(AT_REST);
   const [hasGamepad, setHasGamepad] = useState(false);
+  const [ignored, setIgnored] = useState("");
   const latest = useRef({ enabled, mayPoll });
   latest.current = { enabled, mayPoll };
   const actions = useMemo(() => {
@@ -189,9 +192,10 @@ function useSticks(driver: Driver<Deflection>, enabled: boolean, mayPoll: () => 
       if (held.releaseKey(event.code)) apply();
     };
     const poll = (): void => {
-      const found = (navigator.getGamepads?.() ?? []).find((each) => each?.connected) ?? null;
-      setHasGamepad(found !== null);
-      if (held.poll(found?.axes ?? null, latest.current.mayPoll() && document.hasFocus())) apply();
+      const { axes, ignored: other } = findGamepad(navigator.getGamepads?.() ?? []);
+      setHasGamepad(axes !== null);
+      setIgnored(other);
+      if (held.poll(axes, latest.current.mayPoll() && document.hasFocus())) apply();
     };
     return {
       letGo,
@@ -230,6 +234,7 @@ function useSticks(driver: Driver<Deflection>, enabled: boolean, mayPoll: () => 
   return {
     shown,
     hasGamepad,
+    ignored,
     pad: actions.pad,
     stop: actions.stop,
     sticks: { left: actions.left, right: actions.right },

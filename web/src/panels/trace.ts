@@ -11,18 +11,28 @@ export class Trace {
     this.#columns = Array.from({ length: columns }, () => []);
   }
 
-  /** `now`: milliseconds of a clock that only grows. */
-  push(now: number, values: readonly (number | null)[]): void {
+  #pushed = 0;
+
+  /** `now`: milliseconds of a clock that only grows. What is no finite number is null. */
+  push(now: number, values: readonly (number | undefined)[]): void {
+    this.#pushed++;
     this.#times.push(now);
-    this.#columns.forEach((column, i) => column.push(values[i] ?? null));
+    this.#columns.forEach((column, i) => column.push(finite(values[i])));
     if (this.#times.length < MOST * 1.25) return;
     const over = this.#times.length - MOST;
     this.#times.splice(0, over);
     for (const column of this.#columns) column.splice(0, over);
   }
 
-  get length(): number {
-    return this.#times.length;
+  /** What comes next was not measured right after what came last: a row of nulls at its time. */
+  breakOff(): void {
+    const end = this.#times.at(-1);
+    if (end !== undefined) this.push(end, []);
+  }
+
+  /** How often something was pushed: the same number, the same window. */
+  get pushed(): number {
+    return this.#pushed;
   }
 
   /** The newest `seconds`: times in seconds before the last (0), then the values. */
@@ -41,6 +51,18 @@ export class Trace {
     for (let i = 0; i < this.#times.length; i++)
       yield [((this.#times[i] ?? 0) - begin) / 1000, ...this.#columns.map((column) => column[i] ?? null)];
   }
+}
+
+function finite(value: number | undefined): number | null {
+  return value !== undefined && Number.isFinite(value) ? value : null;
+}
+
+/** Where a number stands between two that are none: a line has no length there. null: nowhere. */
+export function lonely(column: ArrayLike<number | null | undefined>): number[] | null {
+  const found: number[] = [];
+  const isThere = (i: number): boolean => column[i] !== null && column[i] !== undefined;
+  for (let i = 0; i < column.length; i++) if (isThere(i) && !isThere(i - 1) && !isThere(i + 1)) found.push(i);
+  return found.length > 0 ? found : null;
 }
 
 export function toCsv(head: readonly string[], trace: Trace): string {

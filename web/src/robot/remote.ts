@@ -35,18 +35,18 @@ export interface Remote {
   lease(options: LeaseOptions): Promise<Lease>;
   get(name: string): Promise<unknown>;
   set(name: string, value: unknown, options?: CallOptions): Promise<void>;
-  /** Writes a property past whatever waits to be sent. */
+  /** Writes a property, or pokes a wire, past whatever waits to be sent. */
   setNow(name: string, value: unknown, options?: CallOptions): Promise<void>;
   /** Values of a wire from now on, the newest only; ends with the connection or with `signal`. */
   wire(name: string, signal: AbortSignal): AsyncGenerator<unknown, void>;
-  poke(name: string, value: unknown): Promise<void>;
+  poke(name: string, value: unknown, options?: CallOptions): Promise<void>;
   /** All packets of a new pipe endpoint; ends when the device closes it, with the connection or with `signal`. */
   pipe(name: string, signal: AbortSignal): AsyncGenerator<unknown, void>;
   /** Items of a memory in each dimension. */
   dimensions(memory: string): Promise<number[]>;
   read(memory: string, position: readonly number[], count: readonly number[]): Promise<unknown>;
   write(memory: string, position: readonly number[], value: unknown): Promise<void>;
-  /** An endpoint to send with; what it receives is not read. */
+  /** An endpoint to send with; what it receives is dropped. */
   openPipe(name: string): Promise<Sender>;
   /** A run of a generator function. */
   generate(name: string, args: readonly unknown[]): AsyncGenerator<unknown, void, unknown>;
@@ -64,6 +64,7 @@ export interface Remote {
 }
 
 export interface Sender {
+  readonly isClosed: boolean;
   send(value: unknown): Promise<void>;
   close(): Promise<void>;
 }
@@ -89,6 +90,7 @@ export function remoteOf(object: RemoteObject, underWay = new UnderWay()): Remot
     if (!info.members.some((m) => m.name === name)) throw new Error(`${info.type} has no member "${name}"`);
     return info.member(name);
   };
+  const children = new WeakMap<RemoteObject, Remote>(); // who asks for one again gets the same: what is known of it is kept by it
   return {
     type: info.type,
     members: info.members,
@@ -110,7 +112,7 @@ export function remoteOf(object: RemoteObject, underWay = new UnderWay()): Remot
     set: (name, value, options) => underWay.follow((async () => member(name).set(value, options))()),
     setNow: async (name, value, options) => {
       const write = info.urgent[name];
-      if (!write) throw new Error(`${info.type} has no property "${name}" that can be written at once`);
+      if (!write) throw new Error(`${info.type} has no property or wire "${name}" that can be written at once`);
       await write(value, ...(options ? [options] : []));
     },
     wire: (name, signal) => valuesOf(() => member(name).connect({ signal }), signal),
@@ -118,7 +120,11 @@ export function remoteOf(object: RemoteObject, underWay = new UnderWay()): Remot
     dimensions: async (name) => member(name).dimensions(),
     read: async (name, position, count) => member(name).read(position, count),
     write: async (name, position, value) => member(name).write(position, value),
-    openPipe: async (name) => member(name).connect(-1, {}),
+    openPipe: async (name) => {
+      const endpoint = await member(name).connect(-1, {});
+      void drop(endpoint).catch(() => undefined); // who sends hears that it is closed
+      return endpoint;
+    },
     generate: (name, args) => member(name)(...args),
     lock: async (kind) => info.lock(kind),
     unlock: async () => info.unlock(),
@@ -133,11 +139,15 @@ export function remoteOf(object: RemoteObject, underWay = new UnderWay()): Remot
       callback.handler = handler;
       return () => void (callback.handler = null);
     },
-    poke: (name, value) => underWay.follow((async () => member(name).poke(value))()),
+    poke: (name, value, options) => underWay.follow((async () => member(name).poke(value, options))()),
     on: (name, heard) => member(name).on(heard),
     onReleased: (released) => info.onClose(() => info.state === "released" && released()),
-    child: async (name, index) =>
-      remoteOf(await (index === undefined ? member(name).get<RemoteObject>() : member(name).get(index)), underWay),
+    child: async (name, index) => {
+      const found = await (index === undefined ? member(name).get<RemoteObject>() : member(name).get(index));
+      const child = children.get(found) ?? remoteOf(found, underWay);
+      children.set(found, child);
+      return child;
+    },
   };
 }
 
@@ -150,6 +160,11 @@ function smallest(members: readonly Member[]): Member | undefined {
     words.find(({ kind }) => kind === "wire") ??
     readable.find(({ kind }) => kind === "wire")
   );
+}
+
+/** An endpoint that nobody reads would keep all packets, and be closed when they are too many. */
+async function drop(packets: AsyncIterable<unknown>): Promise<void> {
+  for await (const _ of packets);
 }
 
 /** Leaving the loop, or `signal`, closes the wire's connection or the pipe's endpoint. */

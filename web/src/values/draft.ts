@@ -47,6 +47,17 @@ export function shapeOf(type: string, definitions: Definitions, scope: string): 
   return { kind: "text", type };
 }
 
+/** All that the shape of a type's drafts depends on: where it is the same, a draft still fits. */
+export function shapeText(type: string, definitions: Definitions, scope: string, seen = new Set<string>()): string {
+  const shape = shapeOf(type, definitions, scope);
+  const inner = (of: string, within: string): string => shapeText(of, definitions, within, seen);
+  if (shape.kind === "list" || shape.kind === "map") return `${type} of ${inner(shape.item, scope)}`;
+  if (shape.kind === "enum") return `${type} ${shape.names.join(" ")}`;
+  if (shape.kind !== "struct" || seen.has(shape.name)) return `${shape.kind} ${type}`;
+  seen.add(shape.name); // it may contain itself
+  return `${shape.name} {${shape.fields.map((field) => `${field.name} ${inner(field.type, shape.scope)}`).join(", ")}}`;
+}
+
 /** An empty value. */
 export function makeDraft(type: string, definitions: Definitions, scope: string, depth = 0): Draft {
   const shape = shapeOf(type, definitions, scope);
@@ -138,9 +149,9 @@ export function draftOf(value: unknown, type: string, definitions: Definitions, 
   return { kind: "text", text: textOf(value) };
 }
 
-/** As JSON of the gateway's HTTP API, for examples of code. */
+/** As JSON of the gateway's HTTP API, for examples of code. 64-bit integers, and numbers that JSON has not, are texts there. */
 export function jsonOf(value: unknown): unknown {
-  if (typeof value === "bigint") return Number(value);
+  if (typeof value === "bigint" || (typeof value === "number" && !Number.isFinite(value))) return String(value);
   if (ArrayBuffer.isView(value)) return Array.from(value as unknown as ArrayLike<number | bigint>, jsonOf);
   if (Array.isArray(value)) return value.map(jsonOf);
   if (value instanceof Map) return objectOf([...value].map(([key, item]) => [String(key), jsonOf(item)]));
@@ -235,5 +246,6 @@ function emptyText(type: string): string {
 function textOf(value: unknown): string {
   if (value === null || value === undefined) return "";
   if (ArrayBuffer.isView(value)) return Array.from(value as unknown as ArrayLike<number>).join(", ");
-  return typeof value === "string" ? value : JSON.stringify(jsonOf(value));
+  const json = jsonOf(value);
+  return typeof json === "string" ? json : JSON.stringify(json);
 }

@@ -12,12 +12,15 @@ export function numberPaths(value: unknown): string[] {
   return found;
 }
 
-/** The number at `path`; undefined where there is none. Booleans count as 0 and 1. */
-export function numberAt(value: unknown, path: string): number | undefined {
-  let at: unknown = value;
-  for (const step of stepsOf(path)) at = child(at, step);
-  if (typeof at === "number") return at;
-  return typeof at === "bigint" || typeof at === "boolean" ? Number(at) : undefined;
+/** Reads the number at `path`; undefined where there is none. Booleans count as 0 and 1. */
+export function numberReader(path: string): (value: unknown) => number | undefined {
+  const steps = stepsOf(path);
+  return (value) => {
+    let at = value;
+    for (const step of steps) at = child(at, step);
+    if (typeof at === "number") return at;
+    return typeof at === "bigint" || typeof at === "boolean" ? Number(at) : undefined;
+  };
 }
 
 function collect(value: unknown, path: string, found: string[], depth: number): void {
