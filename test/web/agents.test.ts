@@ -25,11 +25,11 @@ describe("agents", () => {
 
   it("are those that wait, as far as the gateway tells of them", () => {
     const given = { ...approval, values: { speed: 1 }, why: "to see", expires_in: 20 };
-    expect(readAgents({ approvals: [given, null, { user: "x" }], stopped_for: 5 })).toEqual({
-      stoppedForS: 5,
-      approvals: [{ ...approval, values: '{"speed":1}', why: "to see", expiresInS: 20 }],
+    expect(readAgents({ approvals: [given, null, { user: "x" }], stopped_for: 5 }, 1_000)).toEqual({
+      stoppedUntil: 6_000,
+      approvals: [{ ...approval, values: '{"speed":1}', why: "to see", expiresAt: 21_000 }],
     });
-    expect(readAgents(null)).toEqual({ approvals: [], stoppedForS: 0 });
+    expect(readAgents(null, 1_000)).toEqual({ approvals: [], stoppedUntil: 1_000 });
   });
 
   it("are none where the gateway has no such address, and are forgotten with the right to decide", async () => {
@@ -87,6 +87,56 @@ describe("agents", () => {
     vi.unstubAllGlobals();
   });
 
+  it("are known to be as they were last where the gateway does not answer, and it is asked no longer than 5 s", async () => {
+    const limits = vi.spyOn(AbortSignal, "timeout");
+    const session = setup();
+    const desk = new AgentsDesk(session);
+    session.fetch.mockResolvedValueOnce(answer(200, { approvals: [approval], stopped_for: 540 }));
+    await desk.look();
+    const known = desk.state.value;
+    const hung = new AbortController();
+    limits.mockReturnValueOnce(hung.signal);
+    session.fetch.mockImplementationOnce(
+      (_, init) =>
+        new Promise((_resolve, reject) =>
+          init?.signal?.addEventListener("abort", () => reject(new DOMException("signal timed out", "TimeoutError"))),
+        ),
+    );
+    const looks = desk.look();
+    hung.abort();
+    expect(await looks).toBe(true);
+    expect(limits).toHaveBeenLastCalledWith(5_000);
+    expect(desk.silence.value).toEqual({ since: expect.any(Number), reason: "the gateway did not answer in time" });
+    session.fetch.mockResolvedValueOnce(answer(503, { detail: "starting" }));
+    await desk.look();
+    expect(desk.silence.value?.reason).toBe("starting");
+    expect(desk.state.value).toBe(known);
+    session.fetch.mockResolvedValueOnce(answer(200, {}));
+    await desk.look();
+    expect([desk.silence.value, desk.state.value?.approvals]).toEqual([null, []]);
+    limits.mockRestore();
+  });
+
+  it("are stopped at once, whatever was asked before, or it is told why not within 2 s", async () => {
+    const limits = vi.spyOn(AbortSignal, "timeout");
+    const session = setup();
+    const desk = new AgentsDesk(session);
+    session.fetch.mockResolvedValueOnce(answer(200, {}));
+    await desk.look();
+    let tellOld: (old: Response) => void = () => undefined;
+    session.fetch.mockReturnValueOnce(new Promise((resolve) => (tellOld = resolve)));
+    const old = desk.look();
+    session.fetch.mockResolvedValueOnce(answer(200, {})).mockReturnValueOnce(new Promise(() => undefined));
+    await desk.stop(10);
+    expect(limits).toHaveBeenCalledWith(2_000);
+    tellOld(answer(200, { stopped_for: 0 }));
+    await old;
+    expect(desk.state.value?.stoppedUntil).toBeGreaterThan(Date.now() + 590_000);
+    session.fetch.mockRejectedValueOnce(new TypeError("Failed to fetch"));
+    await expect(desk.stop(10)).rejects.toThrow("the gateway cannot be reached");
+    limits.mockRestore();
+  });
+
   it("are answered and stopped, and a refusal is told", async () => {
     const session = setup();
     const desk = new AgentsDesk(session);
@@ -103,12 +153,16 @@ describe("agents", () => {
       '{"answer":"minutes","minutes":10}',
     ]);
     expect(desk.trouble.value).toBe("too late");
+    await expect(desk.stop(10)).rejects.toThrow("too late");
+    await desk.letGoOn();
+    expect(desk.trouble.value).toBe("too late");
     session.fetch.mockImplementation(() => Promise.resolve(answer(200, {})));
     await desk.stop(10);
-    expect(session.fetch.mock.calls.map(([at, given]) => [at, given?.body])).toContainEqual([
-      "api/v1/agents/stop",
-      '{"minutes":10}',
-    ]);
+    await desk.letGoOn();
+    const stops = session.fetch.mock.calls
+      .filter(([at]) => at === "api/v1/agents/stop")
+      .map(([, given]) => given?.body);
+    expect(stops.slice(-2)).toEqual(['{"minutes":10}', '{"minutes":0}']);
     expect(desk.trouble.value).toBeNull();
   });
 });

@@ -273,6 +273,14 @@ describe("a board", () => {
         '{"board":1,"panels":[{"kind":"notes","x":-1,"y":0,"w":1,"h":1}]}',
         "/panels/0/x is -1, expected a whole number from 0",
       ],
+      [
+        '{"board":1,"panels":[{"kind":"notes","from":"100%","x":0,"y":0,"w":1,"h":1}]}',
+        '/panels/0/from is "100%", expected "device/service", each percent-encoded',
+      ],
+      [
+        '{"board":1,"panels":[{"kind":"notes","from":"arm","x":0,"y":0,"w":1,"h":1}]}',
+        '/panels/0/from is "arm", expected "device/service"',
+      ],
       ['{"board":1,"panels":[],"stop":{"call":1}}', "/stop/call is 1, expected the name of a function"],
       ["{", "the file is no JSON"],
     ] as const)

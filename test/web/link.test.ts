@@ -1,4 +1,6 @@
-import { Link } from "../../web/src/robot/link";
+import { keepFound } from "../../web/src/robot/walk";
+import { remoteOf } from "../../web/src/robot/remote";
+import { Link, openIn } from "../../web/src/robot/link";
 
 /** A subscription in the hands of the test. */
 function setup() {
@@ -16,6 +18,68 @@ function setup() {
   const tell = (name: string, news: unknown): void => heard[name]?.(news as never);
   return { link, subscription, tell };
 }
+
+describe("an object on the way", () => {
+  beforeEach(() => void vi.useFakeTimers());
+  afterEach(() => void vi.useRealTimers());
+
+  function walkTo(answers: (() => Promise<unknown>)[]) {
+    const child = vi.fn(() => answers.shift()?.() ?? Promise.reject(new Error("none left")));
+    const root = { type: "a.B", members: [{ name: "arm", kind: "objref", type: "Arm" }], child };
+    const found = vi.fn();
+    const end = keepFound(root as never, [{ member: "arm", index: null }], found);
+    return { child, found, end };
+  }
+  const arm = () => {
+    const info = {
+      type: "a.Arm",
+      members: [],
+      state: "connected",
+      onClose: vi.fn((_closed: () => void) => () => undefined),
+    };
+    const replace = (state: string) => {
+      info.state = state;
+      for (const [closed] of info.onClose.mock.calls) closed();
+    };
+    return { remote: remoteOf({ $: info } as never), replace };
+  };
+
+  it("is looked up again when the device has put another in its place, and not when the connection ends", async () => {
+    const [old, next] = [arm(), arm()];
+    const { child, found } = walkTo([() => Promise.resolve(old.remote), () => Promise.resolve(next.remote)]);
+    await vi.advanceTimersByTimeAsync(0);
+    old.replace("released");
+    await vi.advanceTimersByTimeAsync(0);
+    expect(found.mock.calls).toEqual([
+      [old.remote, ""],
+      [null, ""],
+      [next.remote, ""],
+    ]);
+    next.replace("closed");
+    await vi.advanceTimersByTimeAsync(60_000);
+    expect(child).toHaveBeenCalledTimes(2);
+  });
+  it("that was not found is looked for again, more and more rarely, while somebody looks", async () => {
+    const { remote } = arm();
+    const none = () => Promise.reject(new Error("no arm yet"));
+    const { child, found, end } = walkTo([none, none, () => Promise.resolve(remote)]);
+    await vi.advanceTimersByTimeAsync(1_000);
+    expect(found.mock.calls).toEqual([
+      [null, "no arm yet"],
+      [null, "no arm yet"],
+    ]);
+    await vi.advanceTimersByTimeAsync(1_900);
+    expect(child).toHaveBeenCalledTimes(2);
+    await vi.advanceTimersByTimeAsync(100);
+    expect(found).toHaveBeenLastCalledWith(remote, "");
+    end();
+    const never = walkTo([none]);
+    await vi.advanceTimersByTimeAsync(0);
+    never.end();
+    await vi.advanceTimersByTimeAsync(60_000);
+    expect(never.child).toHaveBeenCalledOnce();
+  });
+});
 
 const client = { $: { type: "a.B", members: [] } };
 
@@ -39,11 +103,12 @@ describe("link", () => {
       since: 1_000_000,
       reason: "device create is down",
       retryAt: 1_000_500,
+      remote: null,
     });
     vi.advanceTimersByTime(700);
     tell("failed", new Error("refused"));
     tell("waiting", 1000);
-    expect(link.state.value).toEqual({ kind: "lost", since: 1_000_000, reason: "refused", retryAt: 1_001_700 });
+    expect(link.state.value).toMatchObject({ since: 1_000_000, reason: "refused", retryAt: 1_001_700 });
     tell("connected", client);
     expect(link.state.value).toMatchObject({ kind: "online", since: 1_000_700 });
   });
@@ -55,18 +120,23 @@ describe("link", () => {
     expect(subscription.retryNow).toHaveBeenCalledOnce();
     expect(link.state.value).toMatchObject({ kind: "lost", retryAt: 1_000_000 });
   });
-  it("is lost while the gateway says that the device is away, and anew when it is back", () => {
+  it("is lost while the gateway says that the device is away, but for a stop, until it is back", () => {
     const { link, tell } = setup();
     link.setAway("refused");
     expect(link.state.value.kind).toBe("connecting");
     tell("connected", client);
-    const before = link.state.value;
+    const remote = openIn(link.state.value);
+    expect(remote).not.toBeNull();
     link.setAway("refused");
     expect(link.state.value).toMatchObject({ kind: "lost", reason: "refused" });
+    tell("waiting", 500);
+    expect(openIn(link.state.value)).toBe(remote);
     link.setAway(null);
     expect(link.state.value.kind).toBe("online");
-    expect(link.state.value).not.toBe(before);
+    expect(openIn(link.state.value)).not.toBe(remote); // what it had asked for, and its control, are gone
+    link.setAway("refused");
     tell("lost", new Error("closed"));
+    expect(openIn(link.state.value)).toBeNull();
     link.setAway(null);
     expect(link.state.value).toMatchObject({ kind: "lost", reason: "closed" });
   });

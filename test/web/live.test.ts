@@ -1,6 +1,8 @@
 // What comes from a device, and whether it still answers.
 import { ErrorCode, RobotRaconteurError } from "../../wasm-client/dist/index.js";
 import { follow } from "../../web/src/gateway/link_to";
+import { DeviceList } from "../../web/src/gateway/devices";
+import { definitionsOf } from "../../web/src/live/definitions";
 import { Feed } from "../../web/src/live/feed";
 import { Pulse } from "../../web/src/live/pulse";
 
@@ -101,15 +103,62 @@ describe("a feed", () => {
   });
 });
 
-it("a connection hears that its device is away, and that it is back", () => {
+it("a connection hears that its device is away where it is shared, and that it is back", () => {
   const link = { setAway: vi.fn(), retryNow: vi.fn() };
   const hear = follow(link, "arm");
-  const said = (state: string) => hear({ kind: "known", devices: [{ name: "arm", state, lastError: null }] } as never);
+  const said = (state: string, mode = "shared") =>
+    hear({ kind: "known", devices: [{ name: "arm", state, mode, lastError: null }] } as never);
+  said("offline", "relay"); // it may have no ear for the gateway while this page has its only connection
+  expect(link.setAway).not.toHaveBeenCalled();
   said("online");
-  expect(link.retryNow).not.toHaveBeenCalled();
+  link.retryNow.mockClear();
   said("offline");
   expect(link.setAway).toHaveBeenLastCalledWith("offline");
   said("online");
   expect(link.setAway).toHaveBeenLastCalledWith(null);
   expect(link.retryNow).toHaveBeenCalledOnce();
+});
+
+it("a list of devices that is as before is told to connections, and not to pages", async () => {
+  vi.stubGlobal("document", { baseURI: "https://host/", addEventListener: vi.fn(), removeEventListener: vi.fn() });
+  let state = "online";
+  let isAway = false;
+  vi.stubGlobal("fetch", () =>
+    isAway
+      ? Promise.reject(new TypeError("failed"))
+      : Promise.resolve(Response.json({ devices: [{ name: "arm", state }] })),
+  );
+  const list = new DeviceList();
+  const [pages, connections] = [vi.fn(), vi.fn()];
+  list.state.watch(pages);
+  list.answers.watch(connections);
+  list.start();
+  const told = async () => {
+    await vi.advanceTimersByTimeAsync(3_900);
+    return [pages, connections].map((each) => each.mock.calls.length);
+  };
+  expect(await told()).toEqual([1, 2]);
+  state = "offline";
+  expect(await told()).toEqual([2, 4]);
+  isAway = true;
+  expect(await told()).toEqual([3, 6]);
+  isAway = false;
+  expect(await told()).toEqual([4, 8]);
+  list.stop();
+  expect(list.state.value.kind).toBe("loading");
+  vi.unstubAllGlobals();
+});
+
+it("definitions are read every two seconds, however many look, and anew where there are more", () => {
+  const texts = ["service a\n", "service b\n"];
+  const read = vi.fn(() => [...texts]);
+  const object = Object.defineProperty({}, "definitions", { get: read }) as never;
+  const first = definitionsOf(object, 0);
+  expect([definitionsOf(object, 10), definitionsOf(object, 1_999)]).toEqual([first, first]);
+  expect(read).toHaveBeenCalledOnce();
+  expect(definitionsOf(object, 2_000)).toBe(first);
+  texts.push("service c\n");
+  expect(definitionsOf(object, 2_010)).toBe(first);
+  expect(definitionsOf(object, 4_000)).not.toBe(first);
+  expect(read).toHaveBeenCalledTimes(3);
 });

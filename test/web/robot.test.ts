@@ -191,6 +191,15 @@ describe("driver", () => {
     vi.advanceTimersByTime(5000);
     expect(calls).toHaveLength(2);
   });
+  it("says that a stop could not be sent without a connection", () => {
+    const { calls, send } = connection();
+    const driver = makeDriver();
+    expect(driver.stop()).toBe(false);
+    driver.setConnection({ send });
+    expect([calls.length, driver.stop()]).toEqual([0, true]);
+    driver.dispose();
+    expect(driver.stop()).toBe(false);
+  });
   it("repeats a held command, and not a stop", async () => {
     const { calls, send } = connection();
     const driver = makeDriver();

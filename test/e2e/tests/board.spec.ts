@@ -1,6 +1,6 @@
 // The board of an object: panels that are added, arranged by pointer and keyboard, and found again.
 import { readFileSync } from "node:fs";
-import type { Page } from "@playwright/test";
+import type { Page, WebSocketRoute } from "@playwright/test";
 import { expect, test } from "../lab_test";
 import { addPanel } from "../board";
 
@@ -144,6 +144,82 @@ test("the stop is sent at once and its arrival is said, also while another call 
     await page.keyboard.press("Escape");
     await expect(page.locator('[data-stop="arrived"]')).toBeVisible({ timeout: 1_000 });
   }).toPass();
+});
+
+test("the stop reaches a device that the gateway takes for offline, and one without connection by the gateway", async ({
+  page,
+  lab,
+}) => {
+  const sockets: WebSocketRoute[] = [];
+  let isRefused = false;
+  await page.routeWebSocket(/devices\/create/, (socket) => {
+    if (isRefused) return void socket.close();
+    socket.connectToServer();
+    sockets.push(socket);
+  });
+  const robot = `${lab.url}api/v1/devices/create/Create/`;
+  const velocity = async () =>
+    ((await (await page.request.get(`${robot}state`)).json()) as { velocity: number }).velocity;
+  const drive = async () => {
+    expect((await page.request.post(`${robot}Drive`, { data: { velocity: 100, radius: 32767 } })).ok()).toBe(true);
+    await expect.poll(velocity).toBeGreaterThan(0);
+  };
+  await openBoard(page, lab.url);
+  await page.route("**/api/v1/devices", async (route) => {
+    const response = await route.fetch();
+    const json = (await response.json()) as { devices: { name: string; state: string }[] };
+    for (const device of json.devices) if (device.name === "create") device.state = "offline";
+    await route.fulfill({ response, json });
+  });
+  await expect(page.locator('[data-link="lost"]')).toBeVisible();
+  await expect(panel(page, "Calls").getByRole("button", { name: /^Call / })).toBeDisabled();
+  await drive();
+  await page.keyboard.press("Escape");
+  await expect(page.locator('[data-stop="arrived"]')).toBeVisible();
+  await expect.poll(velocity).toBe(0);
+
+  await page.getByRole("link", { name: "Drive" }).click();
+  await drive();
+  await page.getByRole("button", { name: "Stop", exact: true }).click();
+  await expect.poll(velocity).toBe(0);
+
+  isRefused = true;
+  for (const socket of sockets) await socket.close();
+  await drive();
+  await page.keyboard.press("Escape");
+  await expect.poll(velocity).toBe(0);
+  await page.getByRole("link", { name: "Board" }).click();
+  await drive();
+  await page.getByRole("button", { name: "Stop", exact: true }).click();
+  await expect.poll(velocity).toBe(0);
+  await page.route("**/Create?lease=take*", (route) => route.fulfill({ status: 503, json: { detail: "offline" } }));
+  await page.getByRole("link", { name: "Drive" }).click();
+  await page.keyboard.press("Escape");
+  await expect(page.getByRole("region", { name: "Drive" })).toContainText("NOT STOPPED: offline");
+});
+
+test("a panel that fails says so, can be tried again, and leaves the rest of the board as it is", async ({
+  page,
+  lab,
+}) => {
+  const body = 'export default () => { if (!globalThis.isMended) throw new Error("an odd panel"); return "mended"; }';
+  await page.route("**/notes_panel-*.js", (route) => route.fulfill({ contentType: "text/javascript", body }));
+  await openBoard(page, lab.url);
+  await addPanel(page, "notes");
+  const notes = page.locator('[data-panel="notes"]');
+  await expect(notes.getByRole("alert").filter({ hasText: "an odd panel" })).toBeVisible();
+  await expect(page.locator('[data-panel="plot"] .freshness').first()).toContainText("a second");
+  await page.evaluate(() => ((globalThis as { isMended?: boolean }).isMended = true));
+  await notes.getByRole("button", { name: "Try again" }).click();
+  await expect(notes).toContainText("mended");
+  await page.goto(
+    `${lab.url}#/devices/create/Create?view=board&board=${btoa(
+      '{"board":1,"panels":[{"kind":"notes","from":"100%","x":0,"y":0,"w":4,"h":4}]}',
+    )}`,
+  );
+  await expect(page.getByRole("alert").filter({ hasText: '/panels/0/from is "100%"' })).toBeVisible();
+  await page.getByRole("button", { name: "Stop", exact: true }).click();
+  await expect(page.locator('[data-stop="arrived"]')).toBeVisible();
 });
 
 test("a camera of another device stands beside the robot, with an object of its own", async ({ page, lab }) => {

@@ -93,6 +93,38 @@ for (const key of ["Escape", "Space"]) {
   });
 }
 
+test("Esc by its meaning stops, too; Space and arrows are the page's where they scroll, and where the controls are not shown", async ({
+  page,
+}) => {
+  /** Whether the page has a use for it; `at`: what has the keyboard. */
+  const takes = (key: string, code: string, at = "body") =>
+    page
+      .locator(at)
+      .evaluate(
+        (target, init) =>
+          !target.dispatchEvent(new KeyboardEvent("keydown", { ...init, bubbles: true, cancelable: true })),
+        { key, code },
+      );
+  const drive = page.getByRole("region", { name: "Drive" });
+  await page.keyboard.down("ArrowUp");
+  await waitUntilDriving(page);
+  await takes("Escape", "CapsLock");
+  await waitUntilStopped(page);
+  await page.keyboard.up("ArrowUp");
+  expect([await takes(" ", "Space"), await takes("ArrowDown", "ArrowDown")]).toEqual([true, true]);
+  await page.evaluate(() => window.dispatchEvent(new Event("blur")));
+  await page.evaluate(() =>
+    document.body.insertAdjacentHTML("beforeend", "<summary id=s></summary><ol id=o tabindex=0></ol>"),
+  );
+  expect([await takes(" ", "Space", "#s"), await takes(" ", "Space", "#o")]).toEqual([false, false]);
+
+  await page.getByRole("link", { name: "All members" }).click();
+  await expect(drive).toBeHidden();
+  expect([await takes(" ", "Space"), await takes("ArrowDown", "ArrowDown")]).toEqual([false, false]);
+  await takes("Escape", "CapsLock");
+  await expect(page.locator('[data-stop="arrived"]')).toBeVisible();
+});
+
 const endsOfAHeldButton: Readonly<Record<string, (page: Page) => Promise<unknown>>> = {
   "the key is let go": (page) => page.keyboard.up("Enter"),
   "another button takes the keyboard": (page) => page.getByRole("button", { name: "Clear trail" }).focus(),

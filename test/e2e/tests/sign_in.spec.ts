@@ -1,6 +1,6 @@
 // Signing in at the dashboard of a gateway that asks who one is.
 import { expect, test } from "@playwright/test";
-import type { Page } from "@playwright/test";
+import type { Locator, Page } from "@playwright/test";
 import { GuardedLab, password } from "../guarded_lab";
 import { webRoot } from "../processes";
 
@@ -153,11 +153,116 @@ test("what agents ask for is shown to who decides, with who, what and why, and i
       return (await worker.getNotifications()).map(({ title, body }) => `${title} ${body}`);
     });
   await expect.poll(notices).toEqual(["The agent of bot asks to do this: create · Create.Drive"]);
-  await approval.getByRole("button", { name: "Allow once" }).click();
-  await expect(approval).toBeHidden();
+  await expect(async () => {
+    await approval.getByRole("button", { name: "Allow once" }).click(); // not before it has been seen
+    await expect(approval).toBeHidden({ timeout: 200 });
+  }).toPass();
   await expect.poll(notices).toEqual([]);
   expect(answers).toEqual(['{"answer":"once"}']);
   await expect(page.getByRole("button", { name: "Stop all agents" })).toBeVisible();
+});
+
+test("what agents ask for moves nothing, covers no Stop, and is not allowed by a press that was meant for something else", async ({
+  page,
+}) => {
+  test.slow(); // three pages in three sizes, each of which waits for the gateway to be asked
+  const ask = (id: string) => ({
+    id,
+    device: "create",
+    path: "Create",
+    member: "Drive",
+    verb: "call",
+    ["expires_in"]: 20,
+  });
+  let approvals: object[] = [];
+  const allowed: string[] = [];
+  await page.route("**/api/v1/agents/approvals", (route) => route.fulfill({ json: { approvals, ["stopped_for"]: 0 } }));
+  await page.route("**/api/v1/agents/approvals/*", async (route) => {
+    allowed.push(route.request().url().slice(-2));
+    approvals = approvals.slice(1);
+    await route.fulfill({ json: { state: "allowed" } });
+  });
+  await page.goto(lab.url);
+  await signIn(page, "root", password);
+  const stop = page.getByRole("button", { name: "Stop", exact: true });
+  const stopAgents = page.getByRole("button", { name: "Stop all agents" });
+  const placeOf = (button: Locator) =>
+    button.evaluate((element) => {
+      const { x, y, width, height } = element.getBoundingClientRect();
+      return { x, y, isSeen: element.contains(document.elementFromPoint(x + width / 2, y + height / 2)) };
+    });
+  const seen = async () => ({ ...(await placeOf(stop)), agents: await placeOf(stopAgents) });
+  for (const [width, height] of [
+    [1280, 800],
+    [412, 839],
+    [839, 412],
+  ] as const) {
+    await page.setViewportSize({ width, height });
+    for (const view of ["drive", "board", "members"]) {
+      approvals = [];
+      await page.goto(`${lab.url}#/devices/create/Create?view=${view}`);
+      await expect(page.locator('[data-approvals="0"]')).toBeVisible();
+      await expect(page.locator('[data-link="online"]')).toBeVisible();
+      if (view === "drive") await expect(page.locator('[data-reading="packets"]')).toContainText("a second");
+      await stop.scrollIntoViewIfNeeded();
+      const before = await seen();
+      expect(before.isSeen).toBe(true);
+      approvals = [ask("a1"), ask("a2"), ask("a3")];
+      await expect(page.locator('[data-approval="a3"]')).toBeVisible();
+      expect(await seen(), `${view}, ${width} wide`).toEqual(before);
+    }
+  }
+
+  const pressWhenChanged = (id: string) =>
+    page.evaluate(
+      (wanted) =>
+        new Promise<void>((resolve) => {
+          const look = (): void => {
+            const first = document.querySelector<HTMLElement>("[data-approval]");
+            if (first?.dataset["approval"] !== wanted) return;
+            observer.disconnect();
+            first.querySelector("button")?.click();
+            resolve();
+          };
+          const observer = new MutationObserver(look);
+          observer.observe(document.body, { childList: true, subtree: true });
+          look();
+        }),
+      id,
+    );
+  approvals = [];
+  await expect(page.locator('[data-approvals="0"]')).toBeVisible();
+  const pressed = pressWhenChanged("a1");
+  approvals = [ask("a1"), ask("a2")];
+  await pressed;
+  const moved = pressWhenChanged("a2");
+  await expect(async () => {
+    await page.locator('[data-approval="a1"]').getByRole("button", { name: "Allow once" }).click({ timeout: 1_000 });
+    await expect(page.locator('[data-approval="a1"]')).toBeHidden({ timeout: 200 });
+  }).toPass();
+  await moved;
+  await expect(page.locator('[data-approval="a2"]')).toBeVisible();
+  expect(allowed).toEqual(["a1"]);
+});
+
+test("Stop all agents says what became of it, and the page how old its news of agents are", async ({ page }) => {
+  let isAway = false;
+  await page.route("**/api/v1/agents/approvals", (route) =>
+    isAway ? route.abort() : route.fulfill({ json: { approvals: [], ["stopped_for"]: 0 } }),
+  );
+  await page.route("**/api/v1/agents/stop", (route) => (isAway ? undefined : route.fulfill({ json: {} })));
+  await page.goto(lab.url);
+  await signIn(page, "root", password);
+  const agents = page.getByRole("region", { name: "Agents" });
+  const before = (await agents.boundingBox())?.height;
+  await agents.getByRole("button", { name: "Stop all agents" }).click();
+  await expect(agents.locator('[data-stop="arrived"]')).toBeVisible();
+  isAway = true;
+  await expect(agents.locator("[data-silence]")).toContainText("the gateway cannot be reached");
+  await agents.getByRole("button", { name: "Stop all agents" }).click();
+  await expect(agents.locator('[data-stop="sent"]')).toBeVisible();
+  await expect(agents.locator('[data-stop="failed"]')).toHaveText("NOT STOPPED: the gateway did not answer in time");
+  expect((await agents.boundingBox())?.height).toBe(before);
 });
 
 test("the form fits a phone and is used with the keyboard", async ({ page }) => {

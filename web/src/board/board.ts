@@ -148,11 +148,13 @@ function readPanel(json: unknown, index: number): Panel {
     if (typeof value !== "string") throw new Error(`${where}/${name} is ${say(value)}, expected a text`);
     return value;
   };
+  const from = text("from");
+  if (!isPlace(from)) throw new Error(`${where}/from is ${say(from)}, expected "device/service", each percent-encoded`);
   return {
     id: makeId(),
     kind: kind as PanelKind,
     title: text("title"),
-    from: text("from"),
+    from,
     object: text("object"),
     x: number("x"),
     y: number("y"),
@@ -160,6 +162,15 @@ function readPanel(json: unknown, index: number): Panel {
     h: number("h"),
     settings: record(settings, `${where}/settings`),
   };
+}
+
+/** Whether it names a service, or none. */
+function isPlace(from: string): boolean {
+  try {
+    return from === "" || from.split("/").map(decodeURIComponent).filter(Boolean).length === 2;
+  } catch {
+    return false;
+  }
 }
 
 function readStop(json: unknown): StopCall {

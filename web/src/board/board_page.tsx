@@ -28,6 +28,7 @@ import {
   writeBoard,
 } from "./board";
 import type { Board, Panel, PanelKind } from "./board";
+import { Guard } from "./guard";
 import { Keeper } from "./keeper";
 import { findRoom, inOrder, nudge, put, settle } from "./layout";
 import { PanelFrame } from "./panel_frame";
@@ -40,7 +41,7 @@ type ServiceRoute = Route & { page: "service" };
 export default function BoardPage({ link, route, list }: { link: Link; route: ServiceRoute; list: DeviceList }) {
   const path = route.path.map(formatStep).join(".");
   const key = boardKey(route);
-  const { object, last, failure } = useObject(link, "", path, list);
+  const { object, reach, last, failure } = useObject(link, "", path, list);
   const preset = useMemo(() => {
     if (!last) return null;
     return presetFor({
@@ -54,7 +55,16 @@ export default function BoardPage({ link, route, list }: { link: Link; route: Se
   const [arranging, setArranging] = useState(false);
   const silent = usePulse(object, useShared(list, route.device));
   const services = useServices(list);
-  if (!board) return failure === null ? <Waiting /> : <Failure text={failure} />;
+  if (!board) {
+    return (
+      <div class="board-page">
+        <div class="board-bar">
+          <StopButton object={reach} stop={null} place={route} list={list} />
+        </div>
+        {failure === null ? <Waiting /> : <Failure text={failure} />}
+      </div>
+    );
+  }
   const stop = preset?.stop ?? board.stop; // a file may say how to stop what is not known, and nothing else
   const setPanels = (panels: readonly Panel[]): void => setBoard({ ...board, panels });
   const add = (kind: PanelKind): void => {
@@ -68,7 +78,7 @@ export default function BoardPage({ link, route, list }: { link: Link; route: Se
   return (
     <div class="board-page" data-kept={isKept}>
       <div class="board-bar">
-        <StopButton object={object} stop={stop} place={route} list={list} />
+        <StopButton object={reach} stop={stop} place={route} list={list} />
         {silent !== null && (
           <p class="failure board-silent" role="alert">
             {t("The device has not answered for {0}.", oldness(silent))}
@@ -88,19 +98,20 @@ export default function BoardPage({ link, route, list }: { link: Link; route: Se
       <Failure text={trouble ?? failure} />
       <div class="board">
         {inOrder(board.panels).map((panel) => (
-          <PanelFrame
-            key={panel.id}
-            panel={panel}
-            link={link}
-            place={{ device: route.device, service: route.service, object: path }}
-            services={services}
-            list={list}
-            arranging={arranging}
-            move={(place) => setPanels(put(board.panels, panel.id, place))}
-            step={(dx, dy) => setPanels(nudge(board.panels, panel.id, dx, dy))}
-            update={(change) => update(panel.id, change)}
-            remove={() => setPanels(settle(board.panels.filter(({ id }) => id !== panel.id)))}
-          />
+          <Guard key={panel.id}>
+            <PanelFrame
+              panel={panel}
+              link={link}
+              place={{ device: route.device, service: route.service, object: path }}
+              services={services}
+              list={list}
+              arranging={arranging}
+              move={(place) => setPanels(put(board.panels, panel.id, place))}
+              step={(dx, dy) => setPanels(nudge(board.panels, panel.id, dx, dy))}
+              update={(change) => update(panel.id, change)}
+              remove={() => setPanels(settle(board.panels.filter(({ id }) => id !== panel.id)))}
+            />
+          </Guard>
         ))}
       </div>
       {board.panels.length === 0 && <p class="empty">{t("This board is empty. Add a panel above.")}</p>}

@@ -1,18 +1,19 @@
 // The frame of a panel: its name, its handles while the board is arranged, and what it shows.
 // Layer: web/board.
 
-import { Component } from "preact";
-import type { ComponentChildren, ComponentType } from "preact";
-import { useEffect, useMemo, useState } from "preact/hooks";
+import type { ComponentType } from "preact";
+import { useEffect, useState } from "preact/hooks";
 import { t } from "../app/language";
 import type { DeviceList } from "../gateway/devices";
+import { useDefinitions } from "../live/definitions";
 import { useObject } from "../live/links";
 import { KINDS, textIn } from "../panels/panel";
 import type { PanelProps } from "../panels/panel";
 import type { Link } from "../robot/link";
 import { Failure } from "../ui/failure";
-import { Definitions, scopeOf } from "../values/definitions";
+import { scopeOf } from "../values/definitions";
 import type { Panel, PanelKind } from "./board";
+import { Guard } from "./guard";
 import { handleKey, useDrag } from "./handles";
 import type { Change } from "./handles";
 
@@ -42,9 +43,8 @@ export function PanelFrame({
   remove,
 }: PanelFrameProps) {
   const path = [place.object, panel.object].filter((each) => each !== "" && panel.from === "").join(".");
-  const { object, last, failure } = useObject(link, panel.from, panel.from === "" ? path : panel.object, list);
-  const count = last?.definitions.length ?? 0;
-  const definitions = useMemo(() => new Definitions(last?.definitions ?? []), [last, count]);
+  const { object, reach, last, failure } = useObject(link, panel.from, panel.from === "" ? path : panel.object, list);
+  const definitions = useDefinitions(last);
   const Shown = useLoaded(panel.kind);
   const name = nameOf(panel);
   const [device = place.device, service = place.service] =
@@ -127,6 +127,7 @@ export function PanelFrame({
           <Guard key={panel.kind}>
             <Shown
               object={object}
+              reach={reach}
               members={last.members}
               definitions={definitions}
               scope={scopeOf(last.type)}
@@ -161,17 +162,4 @@ function useLoaded(kind: PanelKind): ComponentType<PanelProps> | null {
     return () => void (isCurrent = false);
   }, [kind]);
   return loaded?.kind === kind ? loaded.shown : null;
-}
-
-/** What fails in one panel leaves the others as they are. */
-class Guard extends Component<{ children: ComponentChildren }, { failure: string | null }> {
-  override state = { failure: null };
-
-  static override getDerivedStateFromError(error: unknown): { failure: string } {
-    return { failure: (error as Error).message };
-  }
-
-  override render() {
-    return this.state.failure === null ? this.props.children : <Failure text={this.state.failure} />;
-  }
 }

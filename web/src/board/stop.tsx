@@ -6,7 +6,7 @@ import { t } from "../app/language";
 import type { DeviceList } from "../gateway/devices";
 import { devicesOf } from "../gateway/devices";
 import { makeSafe, safeOf } from "../gateway/safe";
-import { tellStop } from "../robot/control";
+import { isEscape, tellStop } from "../robot/control";
 import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
 import { stopDevice } from "../robot/stop";
@@ -20,47 +20,67 @@ type State =
   | { kind: "arrived"; tookMs: number; time: number }
   | { kind: "failed"; why: string };
 
-/** By a call where it is known how, else by what the gateway does when a lease ends; nothing where neither is known. */
+/**
+ * By a call where it is known how and there is a connection, else by what the gateway does when a lease ends; nothing where neither
+ * is known.
+ */
 export function StopButton({ object, stop, place, list }: StopButtonProps) {
   const safe = useSafe(place, list);
-  if (stop) {
-    const send = object && ((failed: (error: unknown) => void) => stopDevice(object, stop, failed));
-    return <Button send={send} words={t("calls {0}; Esc, too", `${stop.call}(${stop.args.join(", ")})`)} />;
-  }
-  if (safe.length === 0) return null;
-  const send = (): Promise<void> => {
+  if (!stop && safe.length === 0) return null;
+  const send: Send = (failed) => {
+    if (stop && object) return stopDevice(object, stop, failed);
     tellStop();
-    return makeSafe(place.device, place.service);
+    return stopWithout(place, safe);
   };
-  return <Button send={send} words={t("lets the gateway make it safe: {0}; Esc, too", safe.join(", "))} />;
+  const words = stop
+    ? t("calls {0}; Esc, too", `${stop.call}(${stop.args.join(", ")})`)
+    : t("lets the gateway make it safe: {0}; Esc, too", safe.join(", "));
+  return <StopPress send={send} words={words} label={t("Stop")} byEscape />;
+}
+
+/**
+ * Without a connection to the device: by HTTP.
+ * `safe`  what the gateway does to make it safe.
+ * @throws (rejects) why it may not have been stopped.
+ */
+export async function stopWithout(
+  { device, service }: StopButtonProps["place"],
+  safe: readonly string[],
+): Promise<void> {
+  if (safe.length === 0) throw new Error(t("not connected: nothing was sent"));
+  await makeSafe(device, service);
 }
 
 export interface StopButtonProps {
+  /** null: there is no connection. */
   object: Remote | null;
   stop: StopCall | null;
   place: { device: string; service: string };
   list: DeviceList;
 }
 
-function useSafe({ device, service }: StopButtonProps["place"], list: DeviceList): string[] {
+/** What the gateway does to make a service safe; empty where it has no leases of it. */
+export function useSafe({ device, service }: StopButtonProps["place"], list: DeviceList): string[] {
   const known = devicesOf(useStore(list.state))?.find(({ name }) => name === device);
   return safeOf(known?.safe ?? [], service);
 }
 
 /** `failed` hears of what fails later. */
-type Send = (failed: (error: unknown) => void) => Promise<void>;
+export type Send = (failed: (error: unknown) => void) => Promise<void>;
 
-function Button({ send: sendStop, words }: { send: Send | null; words: string }) {
+export interface StopPressProps {
+  send: Send;
+  label: string;
+  /** Before it is pressed. */
+  words: string;
+  byEscape?: boolean;
+}
+
+/** A button that sends at the press, and again with each, and says what became of it. */
+export function StopPress({ send: stop, label, words, byEscape = false }: StopPressProps) {
   const [state, setState] = useState<State>({ kind: "ready" });
-  const latest = useRef(sendStop);
-  latest.current = sendStop;
   const send = (): void => {
     const at = performance.now();
-    const stop = latest.current;
-    if (!stop) {
-      tellStop();
-      return setState({ kind: "failed", why: t("not connected: nothing was sent") });
-    }
     setState({ kind: "sent", at }); // each press sends again
     const fail = (error: unknown): void => setState({ kind: "failed", why: explain(error) });
     stop(fail).then(() => setState({ kind: "arrived", tookMs: performance.now() - at, time: Date.now() }), fail);
@@ -68,13 +88,14 @@ function Button({ send: sendStop, words }: { send: Send | null; words: string })
   const sendNow = useRef(send);
   sendNow.current = send;
   useEffect(() => {
+    if (!byEscape) return;
     const heard = (event: KeyboardEvent): void => {
-      if (event.code !== "Escape" || event.repeat) return;
+      if (!isEscape(event) || event.repeat) return;
       sendNow.current();
     };
     window.addEventListener("keydown", heard, { capture: true });
     return () => window.removeEventListener("keydown", heard, { capture: true });
-  }, []);
+  }, [byEscape]);
   return (
     <div class="stop">
       {/* At the press already; a click alone is the keyboard's, or a screen reader's. */}
@@ -84,7 +105,7 @@ function Button({ send: sendStop, words }: { send: Send | null; words: string })
         onPointerDown={(event) => event.button === 0 && send()}
         onClick={(event) => event.detail === 0 && send()}
       >
-        {t("Stop")}
+        {label}
       </button>
       <p class={`stop-words ${state.kind === "failed" ? "is-bad" : ""}`} role="status" data-stop={state.kind}>
         {wordsOf(state, words)}

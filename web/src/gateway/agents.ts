@@ -4,6 +4,7 @@
 import { Store } from "../app/store";
 import { ApprovalNotices } from "./approval_notices";
 import { isRecord, text } from "./fields";
+import { reasonOf } from "./poller";
 import { problemOf } from "./session";
 import type { Session } from "./session";
 
@@ -18,13 +19,20 @@ export interface Approval {
   /** As JSON. */
   values: string;
   why: string;
-  expiresInS: number;
+  /** Milliseconds, as Date.now() counts them. */
+  expiresAt: number;
 }
 
 export interface Agents {
   approvals: readonly Approval[];
-  /** Seconds; 0: they are not stopped. */
-  stoppedForS: number;
+  /** Milliseconds, as Date.now() counts them; what is past: they are not stopped. */
+  stoppedUntil: number;
+}
+
+/** The gateway has not said how things are since then, and why. */
+export interface Silence {
+  since: number;
+  reason: string;
 }
 
 export type Answer = { answer: "once" | "deny" } | { answer: "minutes"; minutes: number };
@@ -32,13 +40,19 @@ export type Answer = { answer: "once" | "deny" } | { answer: "minutes"; minutes:
 const PATH = "api/v1/agents";
 const POLL_MS = 2_000;
 const RARE_POLL_MS = 60_000;
+const TIMEOUT_MS = 5_000;
+const STOP_TIMEOUT_MS = 2_000;
 
 export class AgentsDesk {
   /** null: the gateway has none, or this user does not decide. */
   readonly state = new Store<Agents | null>(null);
+  /** What is known is as old as this says; null: it is of now. */
+  readonly silence = new Store<Silence | null>(null);
   readonly trouble = new Store<string | null>(null);
   readonly notices = new ApprovalNotices();
   readonly #session: Pick<Session, "fetch" | "who">;
+  #asked = 0;
+  #heardAt = Date.now();
 
   constructor(session: Pick<Session, "fetch" | "who">) {
     this.#session = session;
@@ -55,14 +69,21 @@ export class AgentsDesk {
   /** @returns whether the gateway knows of agents. */
   async look(): Promise<boolean> {
     if (!this.#session.who.value?.admin) return true;
+    const asked = ++this.#asked;
     try {
-      const response = await this.#session.fetch(`${PATH}/approvals`);
+      const signal = AbortSignal.timeout(TIMEOUT_MS);
+      const response = await this.#session.fetch(`${PATH}/approvals`, { signal });
+      if (response.status >= 500) throw new Error(await problemOf(response));
       const answer: unknown = response.ok ? await response.json() : null;
+      if (asked !== this.#asked) return true; // asked again meanwhile, or stopped
+      this.#heardAt = Date.now();
+      this.silence.value = null;
       this.state.value = response.ok && this.#session.who.value?.admin ? readAgents(answer) : null;
       this.notices.show(this.state.value?.approvals ?? []);
       return response.status !== 404;
-    } catch {
-      return true; // the list of devices tells that the gateway is away
+    } catch (error) {
+      if (asked === this.#asked) this.silence.value = { since: this.#heardAt, reason: reasonOf(error) };
+      return true;
     }
   }
 
@@ -70,23 +91,40 @@ export class AgentsDesk {
     return this.#send(`approvals/${encodeURIComponent(approval.id)}`, answer);
   }
 
-  /** Ends what they do, and lets them do nothing for so long; 0: lets them again. */
-  stop(minutes: number): Promise<void> {
-    return this.#send("stop", { minutes });
+  /** Ends what they do, and lets them do nothing for so long. @throws (rejects) why they may go on. */
+  async stop(minutes: number): Promise<void> {
+    await this.#post("stop", { minutes }, STOP_TIMEOUT_MS);
+    if (this.state.value) this.state.value = { ...this.state.value, stoppedUntil: Date.now() + minutes * 60_000 };
+    void this.look();
   }
 
+  letGoOn(): Promise<void> {
+    return this.#send("stop", { minutes: 0 });
+  }
+
+  /** What fails is told as trouble. */
   async #send(path: string, body: object): Promise<void> {
     try {
-      const response = await this.#session.fetch(`${PATH}/${path}`, {
-        method: "POST",
-        headers: { ["Content-Type"]: "application/json" },
-        body: JSON.stringify(body),
-      });
-      this.trouble.value = response.ok ? null : await problemOf(response);
+      await this.#post(path, body, TIMEOUT_MS);
+      this.trouble.value = null;
     } catch (error) {
       this.trouble.value = (error as Error).message;
     }
     await this.look();
+  }
+
+  /** @throws Error (rejects), for people. */
+  async #post(path: string, body: object, timeoutMs: number): Promise<void> {
+    const init = {
+      method: "POST",
+      headers: { ["Content-Type"]: "application/json" },
+      body: JSON.stringify(body),
+      signal: AbortSignal.timeout(timeoutMs),
+    };
+    const response = await this.#session.fetch(`${PATH}/${path}`, init).catch((error: unknown) => {
+      throw new Error(reasonOf(error), { cause: error });
+    });
+    if (!response.ok) throw new Error(await problemOf(response));
   }
 
   async #lookAgain(): Promise<void> {
@@ -96,12 +134,12 @@ export class AgentsDesk {
   }
 }
 
-export function readAgents(answer: unknown): Agents {
+export function readAgents(answer: unknown, now = Date.now()): Agents {
   const { approvals, stopped_for: stoppedFor } = isRecord(answer) ? answer : {};
-  const seconds = (value: unknown): number => (typeof value === "number" ? value : 0);
+  const after = (seconds: unknown): number => (typeof seconds === "number" ? now + seconds * 1000 : now);
   const list: unknown[] = Array.isArray(approvals) ? approvals : [];
   return {
-    stoppedForS: seconds(stoppedFor),
+    stoppedUntil: after(stoppedFor),
     approvals: list
       .filter(isRecord)
       .filter((each) => text(each["id"]) !== "")
@@ -115,7 +153,7 @@ export function readAgents(answer: unknown): Agents {
         verb: text(each["verb"]),
         values: JSON.stringify(each["values"]) ?? "",
         why: text(each["why"]),
-        expiresInS: seconds(each["expires_in"]),
+        expiresAt: after(each["expires_in"]),
       })),
   };
 }

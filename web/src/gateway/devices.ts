@@ -44,17 +44,20 @@ const POLL_MS = 2_000;
 
 export class DeviceList {
   readonly state = new Store<GatewayState>({ kind: "loading" });
+  /** The same, and told also where an answer is as the one before. */
+  readonly answers = new Store<GatewayState>({ kind: "loading" });
+  #said = "";
   readonly #poller = new Poller<Device[]>({
     ask: fetchDevices,
-    answered: (devices) => (this.state.value = { kind: "known", devices }),
+    answered: (devices) => this.#tell({ kind: "known", devices }),
     failed: (error) => {
       const before = this.state.value;
-      this.state.value = {
+      this.#tell({
         kind: "away",
         since: before.kind === "away" ? before.since : Date.now(),
         reason: reasonOf(error),
         devices: devicesOf(before),
-      };
+      });
     },
     period: POLL_MS,
     hiddenPeriod: POLL_MS * 5, // enough to be right when it is shown
@@ -66,13 +69,22 @@ export class DeviceList {
 
   /** Forgets what it knows: it is not for everybody. */
   stop(): void {
-    this.state.value = { kind: "loading" };
+    this.#tell({ kind: "loading" });
     this.#poller.stop();
   }
 
   /** Asks now. */
   refresh(): void {
     this.#poller.refresh();
+  }
+
+  /** Whole pages follow the state: what is as before is not told to them. */
+  #tell(next: GatewayState): void {
+    this.answers.value = next;
+    const said = JSON.stringify(next);
+    if (said === this.#said) return;
+    this.#said = said;
+    this.state.value = next;
   }
 }
 

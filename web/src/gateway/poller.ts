@@ -70,5 +70,6 @@ export class Poller<T> {
 
 /** Why it does not answer, for people. */
 export function reasonOf(error: unknown): string {
+  if ((error as Error).name === "TimeoutError") return "the gateway did not answer in time";
   return error instanceof TypeError ? "the gateway cannot be reached" : (error as Error).message;
 }

@@ -1,16 +1,17 @@
 // Connections to services other than the page's own: one for each, however many panels show it.
 // Layer: web/live.
 
-import { useEffect, useState } from "preact/hooks";
+import { useEffect, useMemo, useState } from "preact/hooks";
 import { Store, useStore } from "../app/store";
 import type { DeviceList } from "../gateway/devices";
 import { linkTo } from "../gateway/link_to";
 import type { Link } from "../robot/link";
+import { openIn } from "../robot/link";
 import type { LinkState } from "../robot/link";
-import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
 import { parseStep, splitSteps } from "../app/router";
-import { walk } from "../robot/walk";
+import type { PathStep } from "../app/router";
+import { keepFound } from "../robot/walk";
 
 const links = new Map<string, { link: Link; dispose: () => void; users: number }>();
 const nowhere = new Store<LinkState>({ kind: "connecting" });
@@ -28,13 +29,18 @@ function openLink(place: string, list: DeviceList): { link: Link; close: () => v
   return { link: entry.link, close };
 }
 
+export interface ObjectState {
+  /** For commands and values; null while there is no connection, or the device is away. */
+  object: Remote | null;
+  /** For a stop: also while the device is only said to be away. */
+  reach: Remote | null;
+  /** For what was known of it. */
+  last: Remote | null;
+  failure: string | null;
+}
+
 /** The object at `path` ("Webcams[0].lens") of the page's service, or of another one ("device/service"). */
-export function useObject(
-  own: Link,
-  from: string,
-  path: string,
-  list: DeviceList,
-): { object: Remote | null; last: Remote | null; failure: string | null } {
+export function useObject(own: Link, from: string, path: string, list: DeviceList): ObjectState {
   const [other, setOther] = useState<Link | null>(null);
   useEffect(() => {
     if (from === "") return setOther(null);
@@ -43,25 +49,32 @@ export function useObject(
     return close;
   }, [from, list]);
   const state = useStore(from === "" ? own.state : (other?.state ?? nowhere));
-  const root = state.kind === "online" ? state.remote : null;
-  const [found, setFound] = useState<{ object: Remote; root: Remote; path: string } | null>(null);
+  const steps = useMemo(() => (path === "" ? [] : splitSteps(path).map(parseStep)), [path]);
+  const found = useWalk(state, steps);
+  return { ...found, failure: found.failure ?? (from !== "" && state.kind === "lost" ? state.reason : null) };
+}
+
+/** The object at the end of `path`, found anew on every connection. */
+export function useWalk(state: LinkState, path: readonly PathStep[]): ObjectState {
+  const root = openIn(state);
+  const key = JSON.stringify(path);
+  const [found, setFound] = useState<{ object: Remote; root: Remote | null; key: string } | null>(null);
   const [failure, setFailure] = useState<string | null>(null);
   useEffect(() => {
     if (!root) return;
-    let isCurrent = true;
     setFailure(null);
-    const steps = path === "" ? [] : splitSteps(path).map(parseStep);
-    walk(root, steps).then(
-      (object) => isCurrent && setFound({ object, root, path }),
-      (error: unknown) => isCurrent && setFailure(explain(error)),
-    );
-    return () => void (isCurrent = false);
-  }, [root, path]);
-  const isThere = found !== null && found.root === root && found.path === path;
-  const object = path === "" ? root : isThere ? found.object : null; // the root needs no way to it: a stop is ready at once
+    return keepFound(root, path, (object, why) => {
+      setFound((old) => (object ? { object, root, key } : old && { ...old, root: null }));
+      setFailure(why === "" ? null : why);
+    });
+  }, [root, key]);
+  const isOfPath = found?.key === key;
+  // The root needs no way to it: a stop is ready at once.
+  const reach = path.length === 0 ? root : isOfPath && found.root === root ? found.object : null;
   return {
-    object,
-    last: object ?? (found?.path === path ? found.object : null),
-    failure: failure ?? (from !== "" && state.kind === "lost" ? state.reason : null),
+    object: state.kind === "online" ? reach : null,
+    reach,
+    last: reach ?? (isOfPath ? found.object : null),
+    failure,
   };
 }

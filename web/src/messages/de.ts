@@ -44,6 +44,7 @@ const german: Readonly<Record<string, string>> = {
   Mode: "Betriebsart",
   "Move or size {0}: arrow keys, with Shift to size":
     "{0} verschieben oder vergrößern: Pfeiltasten, mit Umschalt für die Größe",
+  "Not heard of since {0}: {1}": "Seit {0} nichts davon gehört: {1}",
   "NOT STOPPED: {0}": "NICHT GESTOPPT: {0}",
   "Name of {0}": "Name von {0}",
   "New items": "Neue Werte",
@@ -188,6 +189,7 @@ const german: Readonly<Record<string, string>> = {
   "Connecting to {0}, service {1}": "Verbindung zu {0}, Dienst {1}, wird aufgebaut",
   "Connected to {0} since {1}": "Verbunden mit {0} seit {1}",
   "No connection to {0} since {1}": "Keine Verbindung zu {0} seit {1}",
+  "Try again": "Noch einmal versuchen",
   "Try now": "Jetzt versuchen",
   connected: "verbunden",
   connecting: "verbindet",

@@ -4,11 +4,13 @@
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { t } from "../app/language";
 import { useStore } from "../app/store";
+import { stopWithout, useSafe } from "../board/stop";
 import { CameraView } from "../camera/camera_view";
 import { RobotChart } from "../chart/robot_chart";
 import type { DeviceList } from "../gateway/devices";
 import { stopNow } from "../robot/control";
 import { Driver, DRIVE_TIMEOUT_MS } from "../robot/driver";
+import { openIn } from "../robot/link";
 import type { Link } from "../robot/link";
 import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
@@ -27,38 +29,52 @@ export interface RobotPageProps {
   link: Link;
   list: DeviceList;
   device: string;
+  service: string;
   /** False while another view of the same robot is shown: the model follows on, driving does not. */
   shown: boolean;
 }
 
-export function RobotPage({ link, list, device, shown }: RobotPageProps) {
+export function RobotPage({ link, list, device, service, shown }: RobotPageProps) {
   const state = useStore(link.state);
   const remote = state.kind === "online" ? state.remote : null;
+  const reach = openIn(state); // a stop also goes to a robot that is only said to be away
+  const safe = useSafe({ device, service }, list);
   const model = useMemo(() => new RobotModel(), []);
   const [driveFailure, setDriveFailure] = useState<string | null>(null);
-  const { control, isOpen } = useControl(remote);
+  const { control, isOpen } = useControl(reach);
   const driver = useMemo(() => {
     const onError = (error: unknown): void => setDriveFailure(`Drive: ${explain(error)}`);
     return new Driver({ rest: STOP, same: sameCommand, onError });
   }, []);
 
   useEffect(() => {
-    if (!remote || !control) return;
+    if (!remote) return;
     const stop = new AbortController();
     model.attach(remote, stop.signal);
+    return () => stop.abort();
+  }, [remote, model]);
+
+  useEffect(() => {
+    if (!reach || !control) return;
     setDriveFailure(null);
     const send = async (command: DriveCommand, insists: boolean): Promise<void> => {
       const given = [command.velocity, command.radius];
-      if (!sameCommand(command, STOP)) await remote.call("Drive", given, { timeout: DRIVE_TIMEOUT_MS });
-      else await stopNow(remote, insists, () => remote.urgent("Drive", given, { timeout: DRIVE_TIMEOUT_MS }));
+      if (!sameCommand(command, STOP)) await reach.call("Drive", given, { timeout: DRIVE_TIMEOUT_MS });
+      else await stopNow(reach, insists, () => reach.urgent("Drive", given, { timeout: DRIVE_TIMEOUT_MS }));
       setDriveFailure(null);
     };
     driver.setConnection({ send, right: control });
-    return () => {
-      driver.dispose();
-      stop.abort();
-    };
-  }, [remote, control, model, driver]);
+    return () => driver.dispose();
+  }, [reach, control, driver]);
+
+  const stopUnconnected = (): void => {
+    if (!shown) return; // the view that is shown has a stop of its own
+    setDriveFailure(t("sent, no answer yet"));
+    stopWithout({ device, service }, safe).then(
+      () => setDriveFailure(null),
+      (error: unknown) => setDriveFailure(t("NOT STOPPED: {0}", explain(error))),
+    );
+  };
 
   const live = remote !== null;
   const poseAge = useAge(() => model.heardAt("pose"));
@@ -92,7 +108,8 @@ export function RobotPage({ link, list, device, shown }: RobotPageProps) {
           driver={driver}
           control={control}
           enabled={live && shown && isOpen}
-          linked={live}
+          shown={shown}
+          unsent={stopUnconnected}
           lost={state.kind === "lost"}
           failure={driveFailure}
           device={device}

@@ -14,13 +14,11 @@ import { devicesOf } from "../gateway/devices";
 import type { DeviceList } from "../gateway/devices";
 import { linkTo } from "../gateway/link_to";
 import { isUsb } from "../gateway/usb_devices";
-import { useObject } from "../live/links";
+import { useObject, useWalk } from "../live/links";
 import type { Link } from "../robot/link";
-import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
 import type { StopCall } from "../robot/stop";
 import { isCreate } from "../robot/robot_model";
-import { walk } from "../robot/walk";
 import { Definitions, scopeOf } from "../values/definitions";
 import { LinkStrip } from "../ui/link_strip";
 import { ObjectView } from "./object_view";
@@ -46,7 +44,7 @@ export function ServicePage({ route, list }: { route: ServiceRoute; list: Device
       {link && shown === "members" && <HeadStop link={link} route={route} list={list} />}
       {drives && link && (
         <div hidden={shown !== "drive"}>
-          <RobotPage link={link} list={list} device={device} shown={shown === "drive"} />
+          <RobotPage link={link} list={list} device={device} service={service} shown={shown === "drive"} />
         </div>
       )}
       {link && shown === "board" && <LoadedBoard link={link} route={route} list={list} />}
@@ -87,8 +85,8 @@ function HeadStop({ link, route, list }: { link: Link; route: ServiceRoute; list
   const shown = useObject(link, "", route.path.map(formatStep).join("."), list);
   const root = useObject(link, "", "", list);
   const [own, service] = [useStop(shown.last), useStop(root.last)];
-  if (own) return <StopButton object={shown.object} stop={own} place={route} list={list} />;
-  return <StopButton object={root.object} stop={service} place={route} list={list} />;
+  if (own) return <StopButton object={shown.reach} stop={own} place={route} list={list} />;
+  return <StopButton object={root.reach} stop={service} place={route} list={list} />;
 }
 
 function useStop(object: Remote | null): StopCall | null {
@@ -166,31 +164,17 @@ function useRobot(link: Link | null, device: string, service: string, list: Devi
   return /^experimental\.(create\d*\.Create|simulatedcreate\.SimulatedCreate)$/.test(known?.type ?? "");
 }
 
-/** The object that the path leads to, found anew on every connection. */
 function MembersPage({ link, route, path }: { link: Link; route: ServiceRoute; path: readonly PathStep[] }) {
   const state = useStore(link.state);
-  const remote = state.kind === "online" ? state.remote : null;
-  const [found, setFound] = useState<{ object: Remote; of: Remote } | null>(null);
-  const [failure, setFailure] = useState<string | null>(null);
-  const key = JSON.stringify(path);
-  useEffect(() => {
-    if (!remote) return;
-    let current = true;
-    setFailure(null);
-    walk(remote, path).then(
-      (object) => current && setFound({ object, of: remote }),
-      (error: unknown) => current && setFailure(explain(error)),
-    );
-    return () => void (current = false);
-  }, [remote, key]);
-  if (failure !== null && remote) {
+  const { object, last, failure } = useWalk(state, path);
+  if (failure !== null && state.kind === "online") {
     return (
       <p class="failure" role="alert">
         {failure}
       </p>
     );
   }
-  if (!found) {
+  if (!last) {
     if (state.kind === "lost") return null; // the strip above says why
     return (
       <div class="members-loading" aria-hidden="true">
@@ -200,7 +184,6 @@ function MembersPage({ link, route, path }: { link: Link; route: ServiceRoute; p
       </div>
     );
   }
-  return (
-    <ObjectView key={`${key}:${found.object.type}`} object={found.object} live={found.of === remote} route={route} />
-  );
+  const key = `${JSON.stringify(path)}:${last.type}`;
+  return <ObjectView key={key} object={last} live={object !== null} route={route} />;
 }

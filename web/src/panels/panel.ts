@@ -10,6 +10,8 @@ import type { Definitions } from "../values/definitions";
 export interface PanelProps {
   /** The panel's object; null while there is no connection. */
   object: Remote | null;
+  /** The same for a stop: also while the device is only said to be away. */
+  reach: Remote | null;
   /** What was last known of it, also without connection. */
   members: readonly Member[];
   definitions: Definitions;

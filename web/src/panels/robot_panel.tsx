@@ -20,7 +20,7 @@ import { Freshness } from "./parts";
 
 const WIRE = "robot_state";
 
-export default function RobotPanel({ object, members, definitions, scope, settings, change }: PanelProps) {
+export default function RobotPanel({ object, reach, members, definitions, scope, settings, change }: PanelProps) {
   const isRobot = members.some(({ name }) => name === WIRE) && members.some(({ name }) => name === "jog_joint");
   const look = useFeed(object, isRobot ? "wire" : null, WIRE);
   const state = readState(look.value);
@@ -52,21 +52,22 @@ export default function RobotPanel({ object, members, definitions, scope, settin
   const haltAll = (): void => {
     const fail = (error: unknown): void => setFailure(explain(error));
     setFailure(null);
-    if (object) stopDevice(object, ROBOT_STOP, fail).catch(fail);
-    else tellStop();
+    if (reach) return void stopDevice(reach, ROBOT_STOP, fail).catch(fail);
+    tellStop();
+    setFailure(t("NOT STOPPED: {0}", t("not connected: nothing was sent")));
   };
   const positions = state?.positions ?? new Float64Array();
   const jogBy = (way: "call" | "urgent", index: number, direction: number): Promise<unknown> => {
     const velocity = new Float64Array(positions.length);
     velocity[index] = direction * (percent / 100) * (joints[index]?.fastest || 1);
-    return object?.[way]("jog_joint", [velocity, JOG_SECONDS, false], { timeout: 2000 }) ?? Promise.resolve();
+    return reach?.[way]("jog_joint", [velocity, JOG_SECONDS, false], { timeout: 2000 }) ?? Promise.resolve();
   };
   const jog = async (index: number, direction: number, isHeld: () => boolean): Promise<void> => {
     await control?.begin();
     if (isHeld()) await jogBy("call", index, direction);
   };
   const halt = (index: number): Promise<unknown> =>
-    object ? stopNow(object, false, () => jogBy("urgent", index, 0)) : Promise.resolve();
+    reach ? stopNow(reach, false, () => jogBy("urgent", index, 0)) : Promise.resolve();
   const canJog = object !== null && isOpen && mode === "jog" && look.stale === null;
   return (
     <div class="robot-panel panel-scroll">
@@ -82,7 +83,6 @@ export default function RobotPanel({ object, members, definitions, scope, settin
           class="button"
           type="button"
           aria-pressed={mode === "halt"}
-          disabled={!object}
           onPointerDown={(event) => event.button === 0 && haltAll()}
           onClick={(event) => event.detail === 0 && haltAll()}
         >

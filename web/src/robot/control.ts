@@ -131,6 +131,11 @@ export async function stopNow(
   }
 }
 
+/** By what it means, and by its place: either may be another on a keyboard whose keys were given other meanings. */
+export function isEscape({ key, code }: Pick<KeyboardEvent, "key" | "code">): boolean {
+  return key === "Escape" || code === "Escape";
+}
+
 const stopping = new EventTarget();
 let stops = 0;
 

@@ -58,12 +58,16 @@ export class Driver<Command> {
     else if (this.#mayMove) this.#transmit(command);
   }
 
-  /** Somebody asked for a stop: sent whoever moves the robot, and again until it is answered. */
-  stop(): void {
-    if (!this.#means) return;
+  /**
+   * Somebody asked for a stop: sent whoever moves the robot, and again until it is answered.
+   * @returns false where there is no connection: nothing was sent.
+   */
+  stop(): boolean {
+    if (!this.#means) return false;
     this.#wanted = this.#options.rest;
     this.#insists = this.#mayMove = true;
     this.#transmit(this.#options.rest);
+    return true;
   }
 
   /** Whether the robot may move by a command of this page's. */

@@ -10,8 +10,16 @@ import type { Remote } from "./remote";
 export type LinkState =
   | { kind: "connecting" }
   | { kind: "online"; since: number; remote: Remote }
-  /** Not connected. `since`: when it was lost (or first failed); `retryAt`: when the attempt begins that comes or runs. */
-  | { kind: "lost"; since: number; reason: string; retryAt: number };
+  /**
+   * Not connected. `since`: when it was lost (or first failed); `retryAt`: when the attempt begins that comes or runs.
+   * `remote`: of the connection where that is still open, and only the device is said to be away: a stop still goes by it.
+   */
+  | { kind: "lost"; since: number; reason: string; retryAt: number; remote: Remote | null };
+
+/** What an open connection leads to, also to a device that is said to be away. */
+export function openIn(state: LinkState): Remote | null {
+  return state.kind === "connecting" ? null : state.remote;
+}
 
 const LIMITS = { timeout: 10_000, longestRetry: 10_000 };
 
@@ -19,21 +27,16 @@ export class Link {
   readonly state = new Store<LinkState>({ kind: "connecting" });
   readonly #subscription;
   #client: RemoteObject | null = null;
-  #isAway = false;
 
   /** Starts connecting at once. `follow`: for tests. */
   constructor(url: string | UrlSource, follow: typeof subscribe = subscribe) {
     this.#subscription = follow(url, LIMITS);
     this.#subscription.onConnected((client) => {
       this.#client = client;
-      this.#isAway = false;
       this.#connect(client);
     });
-    this.#subscription.onLost((reason) => {
-      this.#client = null;
-      this.#lose(explain(reason));
-    });
-    this.#subscription.onFailed((error) => this.#lose(explain(error)));
+    this.#subscription.onLost((reason) => this.#lose(explain(reason), null));
+    this.#subscription.onFailed((error) => this.#lose(explain(error), null));
     this.#subscription.onWaiting((ms) => this.#putOff(Date.now() + ms));
   }
 
@@ -42,13 +45,9 @@ export class Link {
    * there.
    */
   setAway(reason: string | null): void {
-    if (reason !== null && this.state.value.kind === "online") {
-      this.#isAway = true;
-      this.#lose(reason);
-    } else if (reason === null && this.#isAway && this.#client) {
-      this.#isAway = false;
-      this.#connect(this.#client);
-    }
+    const { value } = this.state;
+    if (reason !== null && value.kind === "online") this.#lose(reason, value.remote);
+    else if (reason === null && value.kind === "lost" && value.remote && this.#client) this.#connect(this.#client);
   }
 
   /** Connects now instead of at the end of the wait; nothing happens while online or connecting. */
@@ -61,15 +60,15 @@ export class Link {
     void this.#subscription.close();
   }
 
-  /** Anew for those who look: what they had asked the device for is gone. */
+  /** Anew for those who look: what they had asked the device for is gone, and so is the right to command it. */
   #connect(client: RemoteObject): void {
     this.state.value = { kind: "online", since: Date.now(), remote: remoteOf(client) };
   }
 
-  #lose(reason: string): void {
+  #lose(reason: string, remote: Remote | null): void {
     const before = this.state.value;
     const since = before.kind === "lost" ? before.since : Date.now();
-    this.state.value = { kind: "lost", since, reason, retryAt: Date.now() };
+    this.state.value = { kind: "lost", since, reason, retryAt: Date.now(), remote };
   }
 
   #putOff(retryAt: number): void {

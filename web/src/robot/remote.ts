@@ -59,6 +59,8 @@ export interface Remote {
   /** @returns a function that unsubscribes. */
   on(name: string, heard: (...args: unknown[]) => void): () => void;
   child(name: string, index?: string | number): Promise<Remote>;
+  /** Calls once when the device has put another object in the place of this one: it must be looked up again. @returns a function that hears no more. */
+  onReleased(released: () => void): () => void;
 }
 
 export interface Sender {
@@ -139,6 +141,7 @@ export function remoteOf(object: RemoteObject, underWay = new UnderWay()): Remot
     },
     poke: (name, value, options) => underWay.follow((async () => member(name).poke(value, options))()),
     on: (name, heard) => member(name).on(heard),
+    onReleased: (released) => info.onClose(() => info.state === "released" && released()),
     child: async (name, index) => {
       const found = await (index === undefined ? member(name).get<RemoteObject>() : member(name).get(index));
       const child = children.get(found) ?? remoteOf(found, underWay);

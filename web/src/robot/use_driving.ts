@@ -2,7 +2,7 @@
 // Layer: web/robot.
 
 import { useCallback, useEffect, useRef, useState } from "preact/hooks";
-import { onStop } from "./control";
+import { isEscape, onStop } from "./control";
 import { Holds } from "./holds";
 import { commandFor, directionOfKey } from "./steering";
 import type { Direction, DriveCommand } from "./steering";
@@ -12,18 +12,25 @@ export interface Driving {
   held: ReadonlySet<Direction>;
   press: (source: string, direction: Direction) => void;
   release: (source: string) => void;
-  /** Lets go of everything and stops the robot, whoever moves it. */
+  /** Lets go of everything and stops the robot, whoever moves it; `unsent` hears where that cannot be sent. */
   stop: () => void;
 }
 
 const NOTHING: ReadonlySet<Direction> = new Set();
 
-/** While `enabled`, follows the keyboard of the whole page; `press` and `release` are for buttons. */
-export function useDriving(driver: Driver<DriveCommand>, speed: number, enabled: boolean): Driving {
+/**
+ * While `enabled`, follows the keyboard of the whole page; `press` and `release` are for buttons. Esc always stops, Space while the
+ * controls are `shown`.
+ */
+export function useDriving(
+  driver: Driver<DriveCommand>,
+  speed: number,
+  { enabled, shown, unsent }: { enabled: boolean; shown: boolean; unsent: () => void },
+): Driving {
   const holds = useRef(new Holds()).current;
   const [held, setHeld] = useState(NOTHING);
-  const latest = useRef({ speed, enabled });
-  latest.current = { speed, enabled };
+  const latest = useRef({ speed, enabled, unsent });
+  latest.current = { speed, enabled, unsent };
 
   const apply = useCallback(() => {
     const directions = holds.directions;
@@ -44,7 +51,7 @@ export function useDriving(driver: Driver<DriveCommand>, speed: number, enabled:
   const stop = useCallback(() => {
     holds.clear();
     setHeld(NOTHING);
-    driver.stop();
+    if (!driver.stop()) latest.current.unsent();
   }, [driver, holds]);
 
   useEffect(() => {
@@ -53,15 +60,30 @@ export function useDriving(driver: Driver<DriveCommand>, speed: number, enabled:
   }, [enabled, speed, apply, letGo]);
 
   useEffect(() => {
+    const escape = (event: KeyboardEvent): void => {
+      if (!isEscape(event)) return;
+      event.preventDefault();
+      stop();
+    };
+    window.addEventListener("keydown", escape);
+    const forget = onStop(letGo);
+    return () => {
+      window.removeEventListener("keydown", escape);
+      forget();
+    };
+  }, [letGo, stop]);
+
+  useEffect(() => {
+    if (!shown) return;
     const keyDown = (event: KeyboardEvent): void => {
-      if (isStop(event)) {
+      if (event.code === "Space" && !hasMeaning(event.target)) {
         event.preventDefault();
         return stop();
       }
       if (event.ctrlKey || event.metaKey || event.altKey) return letGo(); // a shortcut; its key-up may never come
       if (takesKeys(event.target)) return;
       const direction = directionOfKey(event.code);
-      if (!direction) return;
+      if (!direction || !latest.current.enabled) return;
       event.preventDefault(); // arrows would scroll the page
       if (!event.repeat) press(event.code, direction);
     };
@@ -82,13 +104,11 @@ export function useDriving(driver: Driver<DriveCommand>, speed: number, enabled:
       [document, "focusin", (event: FocusEvent) => takesKeys(event.target) && letGo()],
     ] as const;
     for (const [target, name, heard] of listeners) target.addEventListener(name, heard as EventListener);
-    const forget = onStop(letGo);
     return () => {
-      forget();
       for (const [target, name, heard] of listeners) target.removeEventListener(name, heard as EventListener);
       letGo();
     };
-  }, [press, release, letGo, stop]);
+  }, [shown, press, release, letGo, stop]);
 
   return { held, press, release, stop };
 }
@@ -97,9 +117,15 @@ function takesKeys(target: EventTarget | null): boolean {
   return target instanceof Element && target.closest("input, textarea, select, [contenteditable]") !== null;
 }
 
-/** Esc anywhere; Space where it has no other meaning. */
-function isStop({ code, target }: KeyboardEvent): boolean {
-  if (code === "Escape") return true;
-  const hasMeaning = 'button, a, input:not([type="range"]), textarea, select, [contenteditable]';
-  return code === "Space" && !(target instanceof Element && target.closest(hasMeaning) !== null);
+/** Whether Space there presses, opens, writes or scrolls something. */
+function hasMeaning(target: EventTarget | null): boolean {
+  const own = 'button, a, summary, input:not([type="range"]), textarea, select, [contenteditable], [tabindex="0"]';
+  return target instanceof Element && (target.closest(own) !== null || isScrollArea(target));
+}
+
+/** Browsers give the keyboard to scroll areas that have no tabindex, too. */
+function isScrollArea(target: Element): boolean {
+  const { scrollHeight, clientHeight } = target;
+  const scrolls = scrollHeight > clientHeight && /auto|scroll/.test(getComputedStyle(target).overflowY);
+  return scrolls && !target.contains(document.body); // which scrolls where nothing has the keyboard
 }

@@ -17,16 +17,18 @@ export interface DrivePanelProps {
   driver: Driver<DriveCommand>;
   control: Control | null;
   enabled: boolean;
-  /** Whether there is a connection: Stop needs nothing else. */
-  linked: boolean;
+  /** False while another view of the robot is. */
+  shown: boolean;
+  /** Somebody asked for a stop, and there is no connection for it. */
+  unsent: () => void;
   lost: boolean;
   failure: string | null;
   device: string;
 }
 
-export function DrivePanel({ driver, control, enabled, linked, lost, failure, device }: DrivePanelProps) {
+export function DrivePanel({ driver, control, enabled, shown, unsent, lost, failure, device }: DrivePanelProps) {
   const [speed, setSpeed] = useState(200);
-  const driving = useDriving(driver, speed, enabled);
+  const driving = useDriving(driver, speed, { enabled, shown, unsent });
   return (
     <section class="panel drive" aria-labelledby="drive-title">
       <h2 id="drive-title" class="unseen">
@@ -36,7 +38,12 @@ export function DrivePanel({ driver, control, enabled, linked, lost, failure, de
         <HoldButton direction="forward" label={t("Forward")} driving={driving} enabled={enabled} />
         <HoldButton direction="left" label={t("Left")} driving={driving} enabled={enabled} />
         {/* At the press already; a click alone is the keyboard's, or a screen reader's. */}
-        <button class="pad-stop" type="button" disabled={!linked} onPointerDown={driving.stop} onClick={driving.stop}>
+        <button
+          class="pad-stop"
+          type="button"
+          onPointerDown={(event) => event.button === 0 && driving.stop()}
+          onClick={(event) => event.detail === 0 && driving.stop()}
+        >
           {t("Stop")}
         </button>
         <HoldButton direction="right" label={t("Right")} driving={driving} enabled={enabled} />

@@ -4,7 +4,7 @@
 import { t } from "../app/language";
 import { useNow, useStore } from "../app/store";
 import { devicesOf } from "../gateway/devices";
-import type { DeviceList, GatewayState } from "../gateway/devices";
+import type { Device, DeviceList, GatewayState } from "../gateway/devices";
 import { isUsb } from "../gateway/usb_devices";
 import type { Link, LinkState } from "../robot/link";
 import { StateBadge } from "./state_badge";
@@ -33,7 +33,11 @@ export function LinkStrip({ link, list, device, service }: LinkStripProps) {
           {headline(state, device, service)}
         </p>
         <p class="link-detail">
-          {lost ? <LostDetail state={state} list={list} device={device} /> : detail(state, device)}
+          {lost ? (
+            <LostDetail state={state} list={list} device={device} />
+          ) : (
+            <FoundDetail state={state} list={list} device={device} />
+          )}
         </p>
       </div>
       <button class="button" type="button" hidden={!lost} onClick={() => link.retryNow()}>
@@ -49,23 +53,21 @@ function headline(state: LinkState, device: string, service: string): string {
   return t("No connection to {0} since {1}", device, clockTime(state.since));
 }
 
-function detail(state: LinkState, device: string): string {
-  return state.kind === "online"
-    ? state.remote.type
-    : isUsb(device)
-      ? t("Asking this browser for the device")
-      : t("Asking the gateway for the device");
-}
-
-function LostDetail({
-  state,
-  list,
-  device,
-}: {
-  state: LinkState & { kind: "lost" };
+interface DetailProps<State> {
+  state: State;
   list: DeviceList;
   device: string;
-}) {
+}
+
+function FoundDetail({ state, list, device }: DetailProps<Exclude<LinkState, { kind: "lost" }>>) {
+  const gateway = useStore(list.state);
+  if (state.kind === "connecting")
+    return isUsb(device) ? t("Asking this browser for the device") : t("Asking the gateway for the device");
+  const known = devicesOf(gateway)?.find((d) => d.name === device);
+  return known?.state === "offline" ? saidOf(known) : state.remote.type; // a connection of one's own may tell it later
+}
+
+function LostDetail({ state, list, device }: DetailProps<LinkState & { kind: "lost" }>) {
   const now = useNow(500);
   const gateway = useStore(list.state);
   const next = state.retryAt <= now ? t("trying now") : t("next try in {0}", span(state.retryAt - now + 999));
@@ -87,6 +89,9 @@ function reasonOf(state: LinkState & { kind: "lost" }, gateway: GatewayState, de
   const known = devices?.find((d) => d.name === device);
   if (devices && !known) return t('The gateway has no device "{0}" any more.', device);
   if (!known || known.state === "online") return sentence(state.reason);
-  const said = [t(known.state), ...(known.lastError ? [known.lastError] : [])].join(", ");
-  return t("The gateway says: device {0}.", said);
+  return saidOf(known);
+}
+
+function saidOf({ state, lastError }: Device): string {
+  return t("The gateway says: device {0}.", [t(state), ...(lastError ? [lastError] : [])].join(", "));
 }
