@@ -7,6 +7,7 @@ import "uplot/dist/uPlot.min.css";
 import { t } from "../app/language";
 import { onColoursChanged } from "../app/theme";
 import { readPalette } from "../chart/palette";
+import { drawInTurn, leaveTurn } from "../chart/turns";
 import type { FeedKind } from "../live/feed";
 import { useEach, useFeed } from "../live/use_feed";
 import type { Remote } from "../robot/remote";
@@ -173,10 +174,11 @@ function Canvas({ trace, labels, seconds, paused }: CanvasProps) {
       drawn = "";
       plot.setData(trace.window(latest.current.seconds) as uPlot.AlignedData);
     });
-    const timer = setInterval(draw, DRAW_MS);
+    const timer = setInterval(() => drawInTurn(draw), DRAW_MS);
     draw();
     return () => {
       clearInterval(timer);
+      leaveTurn(draw);
       unwatch();
       fit.disconnect();
       look.disconnect();
