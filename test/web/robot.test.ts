@@ -131,6 +131,22 @@ describe("driver", () => {
     await calls[0]?.answer();
     expect(calls.map((c) => c.command)).toEqual([GO, TURN]);
   });
+  it("asks for the right to move again where a stop that has just been answered took it away", async () => {
+    const { calls, send } = connection();
+    const driver = makeDriver();
+    const right = { mayCommand: true, begin: vi.fn(() => Promise.resolve(void (right.mayCommand = true))) };
+    driver.setConnection({ send, right });
+    driver.want(GO);
+    await calls[0]?.answer();
+    driver.stop();
+    right.mayCommand = false;
+    driver.want(TURN);
+    expect(right.begin).not.toHaveBeenCalled(); // the stop is not answered yet
+    await calls[1]?.answer();
+    expect(right.begin).toHaveBeenCalledTimes(1);
+    await Promise.resolve();
+    expect(calls.map((c) => c.command)).toEqual([GO, STOP, TURN]);
+  });
   it("sends a stop at once, past a command that is never answered", () => {
     const { calls, send } = connection();
     const driver = makeDriver();

@@ -135,6 +135,8 @@ export class Driver<Command> {
     }
     if (!this.#isAnswered) return;
     if (this.#isStop(this.#wanted) && !this.#mayMove) this.#rest();
-    else if (!this.#options.same(this.#sent, this.#wanted)) this.#transmit(this.#wanted);
+    else if (!this.#options.same(this.#sent, this.#wanted))
+      if (this.#isStop(this.#wanted)) this.#transmit(this.#wanted);
+      else this.#move();
   }
 }
