@@ -202,6 +202,16 @@ def reynard(tmp_path_factory):
     device.stop()
 
 
+@pytest.fixture(scope="module")
+def standard_robot(tmp_path_factory):
+    port = free_port()
+    robot = Background([sys.executable, PEERS / "standard_robot.py", port],
+                       tmp_path_factory.mktemp("robot") / "log")
+    robot.next_line()
+    yield f"rr+tcp://127.0.0.1:{port}/?service=robot"
+    robot.stop()
+
+
 @pytest.fixture
 def own_service(tmp_path):
     """A service that no other test uses, so that it can be paused: (process, URL)"""

@@ -9,7 +9,6 @@ import re
 import shutil
 import socket
 import subprocess
-import sys
 import tempfile
 import time
 
@@ -19,7 +18,7 @@ import RobotRaconteur as RR
 from command_line import DEVICE_ERROR, DONE, FAILED, NOT_UNDERSTOOD, REFUSED, UNREACHABLE, Ran, run, shown_on_terminal
 from found_nodes import THEIRS, TYPE
 from gateways import RRGATE, Gateway
-from processes import BUILD, ROOT, Background, free_port
+from processes import BUILD, Background, free_port
 from shared_sites import Site, start_service
 from tap import Tap
 from users import PASSWORDS, make_users
@@ -70,16 +69,6 @@ def test_values_are_read_written_and_called(url):
     run("call", url, "setf_arm_position", "q2=-0.5", "q1=0.25", "0.125")
     assert json.loads(run("call", url, "getf_arm_position")) == pytest.approx([0.25, -0.5, 0.125])
     assert set(json.loads(run("get", url, "state", "--json"))) >= {"time", "robot_position", "arm_position"}
-
-
-@pytest.fixture(scope="module")
-def standard_robot(tmp_path_factory):
-    port = free_port()
-    robot = Background([sys.executable, ROOT / "test" / "interop" / "peers" / "standard_robot.py", port],
-                       tmp_path_factory.mktemp("robot") / "log")
-    robot.next_line()
-    yield f"rr+tcp://127.0.0.1:{port}/?service=robot"
-    robot.stop()
 
 
 @pytest.mark.parametrize("way", ["directly", "gateway"])
