@@ -15,7 +15,7 @@ from processes import BUILD, ROOT
 DEADLINE = 30.0  # seconds for one command
 
 # What goes on until it is ended, and the port by which others reach it.
-SERVERS = {r"(build/release/server/)?rrgate (demo|serve|proxy)\b": 8080, r"\S+/python examples/thermostat/device\.py": 52230,
+SERVERS = {r"rrgate demo --port 8081\b": 8081, r"(build/release/server/)?rrgate (demo|serve|proxy)\b": 8080, r"\S+/python examples/thermostat/device\.py": 52230,
            r"build-examples/thermostat_device": 52230, r"\S+/python -m reynard_the_robot": 29200}
 
 
