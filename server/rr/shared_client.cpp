@@ -70,6 +70,8 @@ bool SharedClient::handle_event(rr::Now) {
 
 void SharedClient::ended() {
   handle(rr::ClientGone{});
+  // One that came when the client had left already, or was not let in.
+  if (const auto unused = std::exchange(login_, nullptr)) unused->close();
   owner_->client_ended(*this);
 }
 
@@ -366,8 +368,11 @@ void SharedClient::move_to(std::shared_ptr<Upstream> upstream) {
   home_->remove(*this);
   home_ = std::move(upstream);
   home_->add(*this);
-  for (const auto& [path, member] : std::set(wires_)) home_->join_wire(*this, path, *member);
-  for (const auto& [id, pipe] : std::unordered_map(pipes_)) home_->join_pipe(*this, id, pipe.path, *pipe.member);
+  // What is sent meanwhile may end the client.
+  for (const auto& [path, member] : std::set(wires_))
+    if (service_) home_->join_wire(*this, path, *member);
+  for (const auto& [id, pipe] : std::unordered_map(pipes_))
+    if (service_) home_->join_pipe(*this, id, pipe.path, *pipe.member);
 }
 
 void SharedClient::leave_login() {

@@ -145,18 +145,19 @@ void Upstream::watch_object(const std::string& path, const rr::EntityDefinition&
   objects_.insert(path);
   for (const auto& member : type.members) {
     if (member.kind == rr::MemberKind::event) {
-      connection_->on_event(path, member.name,
-                            [weak = weak_from_this(), path, &member](std::span<const rr::Value> arguments) {
-                              const auto self = weak.lock();
-                              if (!self) return;
-                              rr::EventPacket packet(path, member, arguments);
-                              self->for_each_client([&](UpstreamClient& client) { client.receive_event(packet); });
-                            });
+      connection_->on_event(
+          path, member.name,
+          [weak = weak_from_this(), path, &member, types = types_](std::span<const rr::Value> arguments) {
+            const auto self = weak.lock();
+            if (!self) return;
+            rr::EventPacket packet(path, member, arguments);
+            self->for_each_client([&](UpstreamClient& client) { client.receive_event(packet); });
+          });
     } else if (member.kind == rr::MemberKind::callback) {
       connection_->on_callback_later(
           path, member.name,
-          [weak = weak_from_this(), path, &member](std::span<const rr::Value> arguments,
-                                                   const rr::ClientConnection::CallbackReply& answer) {
+          [weak = weak_from_this(), path, &member, types = types_](std::span<const rr::Value> arguments,
+                                                                   const rr::ClientConnection::CallbackReply& answer) {
             if (const auto self = weak.lock()) self->route_callback(path, member, arguments, answer);
           });
     }

@@ -123,6 +123,11 @@ void Upstream::close(std::function<void()> closed) {
   wake_.cancel();
   attempted_.cancel();
   const auto connection = std::exchange(connection_, nullptr);
+  const auto reason = lost_error();
+  std::vector<MemberKey> unanswered;  // wires whose clients wait for an answer, which does not come any more
+  for (const auto& [key, wire] : wires_)
+    if (!wire->is_attached) unanswered.push_back(key);
+  for (const auto& key : unanswered) drop_wire(key, &reason);
   if (!connection) {
     if (closed) closed();
     return;

@@ -24,6 +24,7 @@ constexpr std::size_t clients_a_turn = 64;
 // --- wires ---
 
 void Upstream::join_wire(UpstreamClient& client, const std::string& path, const rr::MemberDefinition& member) {
+  if (!has(client)) return;  // it has left, and nobody would take it off again
   if (!connection_) return client.answer_wire(path, member, lost_error());
   if (const auto allowed = locks_->check(client, path, member, MemberUse::connect); !allowed) {
     client.answer_wire(path, member, allowed.error());
@@ -171,6 +172,7 @@ rr::Result<> Upstream::send_wire(UpstreamClient& client, const std::string& path
 
 void Upstream::join_pipe(UpstreamClient& client, rr::PipeId id, const std::string& path,
                          const rr::MemberDefinition& member) {
+  if (!has(client)) return;
   if (!connection_) return client.refuse_pipe(id, lost_error());
   if (const auto allowed = locks_->check(client, path, member, MemberUse::connect); !allowed) {
     client.refuse_pipe(id, allowed.error());

@@ -103,19 +103,24 @@ Result<> ServiceSession::park(const Message& message, const MessageEntry& entry)
   if (path->front().name != service_->name())
     return make_error(ErrorCode::object_not_found,
                       "path " + quote(entry.service_path) + " does not begin with this service");
+  // A message is kept whole for each of its requests that waits.
+  if (message.entries.size() > options_.max_parked_requests)
+    return make_error(ErrorCode::out_of_system_resource,
+                      "a message of " + std::to_string(message.entries.size()) +
+                          " requests can't wait for its objects to be found, expected at most " +
+                          std::to_string(options_.max_parked_requests));
   if (parked_.size() >= options_.max_parked_requests)
     return make_error(
         ErrorCode::out_of_system_resource,
         std::to_string(parked_.size()) + " requests of this client wait for their objects to be found already");
-  EncodedMessage encoded;
   const auto limit = options_.connection.max_message_size;
-  if (auto done = encode(message, {.max_message_size = limit}, encoded); !done) return done;
-  std::size_t bytes = encoded.size();
-  for (const auto& other : parked_) bytes += other.message.size();
-  if (bytes > limit)
-    return make_error(ErrorCode::out_of_system_resource, "requests of this client that wait for their objects hold " +
-                                                             std::to_string(bytes) + " bytes, expected at most " +
-                                                             std::to_string(limit));
+  std::size_t held = 0;
+  for (const auto& other : parked_) held += other.message.size();
+  EncodedMessage encoded;
+  if (const auto done = encode(message, {.max_message_size = limit - std::min(limit, held)}, encoded); !done)
+    return make_error(ErrorCode::out_of_system_resource,
+                      "requests of this client that wait for their objects hold " + std::to_string(held) +
+                          " bytes already, expected at most " + std::to_string(limit) + ": " + done.error().message);
   const auto is_same = [&](const ParkedRequest& other) { return other.path == entry.service_path; };
   const bool is_asked = std::any_of(parked_.begin(), parked_.end(), is_same);
   const auto index = static_cast<std::size_t>(&entry - message.entries.data());

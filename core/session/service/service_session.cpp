@@ -258,6 +258,7 @@ void ServiceSession::handle_message(const Message& message, Now now) {
   if (is_ours) last_session_message_ = now.steady;
   for (const auto& entry : message.entries) {
     if (connection_.is_held_back()) return;
+    if (leaving_ && is_ours) return;  // behind a disconnect
     if (!is_ours) {
       if (is_request(entry.type) && !is_packet(entry.type))
         send_error(entry, {ErrorCode::invalid_endpoint, "Invalid destination endpoint"}, now);

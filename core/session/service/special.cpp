@@ -349,6 +349,7 @@ Result<> ServiceSession::disconnect(const Message& message, const MessageEntry& 
     leaving_->path = entry.service_path;
     leaving_->member = entry.member_name;
     leaving_->request_id = entry.request_id;
+    parked_.clear();
     events_.push(LeaveWanted{});
   }
   return {};

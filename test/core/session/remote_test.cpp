@@ -94,6 +94,16 @@ TEST_CASE("what waits for objects is bounded in bytes, too") {
   CHECK(pair.completion(ids.back()).error().code == ErrorCode::out_of_system_resource);
 }
 
+TEST_CASE("a message of more requests than may wait for objects is not kept for each of them") {
+  Remote pair;
+  pair.forge(*pair.client, [](Message& message) {
+    for (std::uint32_t i = 0; i < 65; ++i)
+      message.begin_entry(EntryType::property_get_req, "arm.slots[" + std::to_string(i) + "]", "name", i + 1);
+  });
+  pair.pump();
+  CHECK_FALSE(pair.service->poll_event());
+}
+
 TEST_CASE("paths of other services are refused at once") {
   Remote pair;
   const auto error =
@@ -267,6 +277,23 @@ TEST_CASE("whoever leaves a remote service is told so when everything is given u
   pair.pump();
   pair.next_client<SessionClosed>();
   CHECK(pair.client->state() == ClientState::closed);
+}
+
+TEST_CASE("what a client of a remote service sends behind its disconnect is left out") {
+  Remote pair;
+  pair.client->find_object("arm.tool", pair.now);
+  pair.pump();
+  pair.next_service<ObjectWanted>();
+  pair.client->disconnect(pair.now);
+  pair.forge(*pair.client, [](Message& message) {
+    message.begin_entry(EntryType::wire_connect_req, "arm", "torque", 77);
+    message.begin_entry(EntryType::pipe_connect_req, "arm", "samples", 78);
+  });
+  pair.pump();
+  pair.next_service<LeaveWanted>();
+  CHECK_FALSE(pair.service->poll_event());
+  pair.find("arm.tool");  // nor does what has waited go on
+  CHECK_FALSE(pair.service->poll_event());
 }
 
 TEST_CASE("a remote service hears that its client is another user") {
