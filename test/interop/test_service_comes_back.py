@@ -1,12 +1,14 @@
 """A device that has just begun lists its service late: who has waited for the service through the gateway goes on when it is there.
 The device is of the real package."""
 import contextlib
+import http.client
 import threading
 import time
 
 import pytest
 import RobotRaconteur as RR
 
+from gateways import Gateway
 from http_api import Stream, ask
 from json_sockets import Socket
 from processes import free_port, start_gateway
@@ -122,3 +124,25 @@ def test_nothing_is_kept_of_a_service_that_nobody_waits_for(site):
     assert ask(port, "GET", "/gauge/level", base=DEVICE).status == 404
     node.begin()
     wait_for(lambda: ask(port, "GET", "/gauge/level", base=DEVICE).status == 200)
+
+
+def test_who_waits_for_a_device_is_answered_when_the_configuration_loses_it(own_service, tmp_path):
+    device, url = own_service
+    config = {"devices": [{"name": "interop", "url": url, "mode": "shared"}], "retry": {"min_ms": 100, "max_ms": 300, "online_ms": 500}}
+    gateway = Gateway(tmp_path, config)
+    try:
+        gateway.wait_for("device online", device="interop")
+        # The session is there, and the object is known.
+        assert ask(gateway.port, "GET", "/api/v1/devices/interop/interop/p_double").status == 200
+        device.pause()
+        waiting = http.client.HTTPConnection("127.0.0.1", gateway.port, timeout=10)
+        waiting.request("GET", "/api/v1/devices/interop/interop/both", headers={"Accept": "text/event-stream"})
+        time.sleep(0.5)
+        gateway.write({**gateway.config, "devices": []})
+        gateway.hang_up()
+        answer = waiting.getresponse()
+        assert answer.status >= 400, answer.read()
+        waiting.close()
+    finally:
+        device.resume()
+        gateway.process.stop()
