@@ -308,9 +308,9 @@ rr::Result<> Upstream::send_pipe(UpstreamClient& client, rr::PipeId id, const rr
   if (known == endpoints_.end()) return rr::make_error(rr::ErrorCode::invalid_operation, "the pipe is not connected");
   auto& pipe = pipes_.at(known->second);
   const auto allowed = locks_->check_packet(client, pipe.path, *pipe.member);
-  const auto sent = !allowed                                           ? allowed
-                    : pipe.state == PipeState::attached && connection_ ? pass_on(pipe, known->first, packet, wants_ack)
-                                                                       : rr::Result<>(lost_error());
+  auto sent = !allowed                                           ? allowed
+              : pipe.state == PipeState::attached && connection_ ? pass_on(pipe, known->first, packet, wants_ack)
+                                                                 : rr::Result<>(lost_error());
   if (sent) return {};
   log(LogLevel::info, "pipe endpoint closed: its packet was not taken",
       {{"device", device_->config().name},

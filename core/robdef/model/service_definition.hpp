@@ -20,7 +20,7 @@ struct Version {
   std::uint32_t tweak = 0;
 
   bool is_unspecified() const { return *this == Version{}; }
-  auto operator<=>(const Version&) const = default;
+  auto operator<=>(const Version&) const = default;  // NOLINT(modernize-use-nullptr): of what it makes
 };
 
 Result<Version> parse_version(std::string_view text);
