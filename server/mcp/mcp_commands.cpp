@@ -306,7 +306,7 @@ rr::awaitable<rr::Result<rr::Value>> McpTools::ask(ValueClient& client, rr::Call
     std::optional<rr::Result<rr::Value>> result;
   };
   const auto answered = std::make_shared<Answered>();
-  client.upstream()->request(client, std::move(called),
+  client.upstream()->request(client, called,
                              [answered, on_answer = std::move(on_answer), life = client.shared_from_this(),
                               wake = reply_.waker()](const rr::Result<rr::Value>& result) {
                                if (on_answer) on_answer(result);
