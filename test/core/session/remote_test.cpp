@@ -78,6 +78,7 @@ TEST_CASE("what a remote object is refused with reaches the client as it is") {
 TEST_CASE("requests that wait for objects are bounded") {
   Remote pair;
   std::vector<RequestId> ids;
+  ids.reserve(65);
   for (int i = 0; i < 65; ++i)
     ids.push_back(pair.client->find_object("arm.slots[" + std::to_string(i) + "]", pair.now));
   CHECK(pair.completion(ids.back()).error().code == ErrorCode::out_of_system_resource);
@@ -90,6 +91,7 @@ TEST_CASE("what waits for objects is bounded in bytes, too") {
   CHECK(pair.hosted().forget_path("arm.tool"));
   const Value name(std::string(5'000'000, 'x'));
   std::vector<RequestId> ids;
+  ids.reserve(3);
   for (int i = 0; i < 3; ++i) ids.push_back(pair.client->set_property("arm.tool", "name", name, pair.now));
   CHECK(pair.completion(ids.back()).error().code == ErrorCode::out_of_system_resource);
 }
