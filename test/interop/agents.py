@@ -69,6 +69,10 @@ def with_lines(arguments, work, environment={}, modern=False):
         return result, shown.read()
 
 
+async def next_event(subscription, within=15):
+    return await asyncio.wait_for(anext(subscription), within)
+
+
 def call(port, tool, headers={}, modern=False, **arguments):
     result = with_agent(port, lambda session: session.call_tool(tool, arguments), headers, modern)
     assert json.loads(result.content[0].text) == result.structured_content

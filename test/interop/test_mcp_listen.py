@@ -10,7 +10,7 @@ import pytest
 from mcp import MCPError, types
 from mcp.client.subscriptions import ResourcesListChanged, ResourceUpdated, SubscriptionLost, listen
 
-from agents import lose_role, records, serving, with_agent, with_lines, with_tokens
+from agents import lose_role, next_event, records, serving, with_agent, with_lines, with_tokens
 from http_api import ask
 from processes import start_gateway
 from shared_sites import port_of
@@ -46,10 +46,6 @@ def site(tmp_path):
         gateway, port = start_gateway(tmp_path, url, device={"mode": "shared"}, mcp={})
         yield port, lamp
         gateway.stop()
-
-
-async def next_event(subscription, within=15):
-    return await asyncio.wait_for(anext(subscription), within)
 
 
 async def silence(subscription, seconds):

@@ -6,7 +6,7 @@ from mcp import MCPError
 
 from agents import with_agent, with_tokens
 from http_api import ask
-from test_recordings import API, begin, begin_gateway, create, listed, look, stop, wait_for  # noqa: F401 (fixtures)
+from recordings import API, begin, begin_gateway, create, wait_for  # noqa: F401 (fixtures)
 
 RECORDS = {"roles": ["agent"], "devices": ["create"], "may": ["record"], "agent": {}}
 SCHEME = "rrgate-recording://"

@@ -5,8 +5,7 @@ import json
 import pytest
 from mcp.client.subscriptions import ResourceUpdated, listen
 
-from agents import records, with_agent, with_tokens
-from test_mcp_listen import next_event
+from agents import next_event, records, with_agent, with_tokens
 from processes import start_gateway
 
 FREELY = {"approval": "none", "lease": False}
