@@ -230,7 +230,8 @@ def judge(text):
     if PYTHON.exists():
         add_guest_cases(suite, text, "other junit")
         said = between(text, "reference").strip()
-        is_right = said.splitlines()[-1:] == [json.dumps(REFERENCE_ANSWER)]
+        # Behind its answer it may say that it has crashed: its USB transport does at times, when it ends.
+        is_right = json.dumps(REFERENCE_ANSWER) in said.splitlines()
         add_case(suite, "the reference uses the device", None if is_right else said or text[-2000:])
     return suite
 
