@@ -59,18 +59,12 @@ class CsvExport {
       if (columns_.size() <= max_columns && known_.insert(column).second) columns_.push_back(column);
   }
   rr::Result<> for_each(const std::function<void(const McapMessage&, const rr::Json& cells)>& take) {
-    for (const auto& chunk : recording_.chunks()) {
-      if (!chunk.message_counts.contains(member_.channel)) continue;
-      const auto read = recording_.read(chunk);
-      if (!read) return read.error();
-      for (const auto& message : read->messages) {
-        if (message.channel != member_.channel) continue;
-        const auto document = recording_.read_document(message);
-        if (!document) return document.error();
-        take(message, cells_of(member_, *document));
-      }
-    }
-    return {};
+    return recording_.for_each(member_, [&](const McapMessage& message) -> rr::Result<> {
+      const auto document = recording_.read_document(message);
+      if (!document) return document.error();
+      take(message, cells_of(member_, *document));
+      return {};
+    });
   }
 
   Recording& recording_;

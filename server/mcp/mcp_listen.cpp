@@ -248,9 +248,10 @@ rr::awaitable<rr::Result<McpTools::FollowedPtr>> McpTools::try_to_follow(std::st
   std::optional<rr::Error> failed;
   FollowedPtr followed;
   try {
-    const auto* device = gateway_.devices().find(parse_resource(uri).device);
+    const auto named = parse_resource(uri);
+    const auto* device = gateway_.devices().find(named.device);
     // To try would take long, and others wait meanwhile.
-    if (device && device->state() == DeviceState::offline && !parse_resource(uri).path.empty())
+    if (device && device->state() == DeviceState::offline && !named.path.empty())
       refuse(rr::ErrorCode::connection_error, "the device is offline");
     followed = co_await follow(std::move(uri));
   } catch (const rr::Exception& exception) {

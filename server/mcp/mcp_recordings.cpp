@@ -25,10 +25,6 @@ constexpr std::size_t largest_value = 64u * 1024;
 /// One agent reads at a time: the others get their turn, or give up.
 constexpr std::chrono::seconds longest_turn_wait{10};
 
-AccessRequest wanted_of(const RecordingInfo& recording) {
-  return {.device = recording.device, .service = recording.service, .verb = Verb::record};
-}
-
 double seconds_since_epoch(std::chrono::system_clock::time_point time) {
   return std::chrono::duration<double>(time.time_since_epoch()).count();
 }
@@ -104,22 +100,16 @@ struct RecordedValues {  // NOLINT(bugprone-exception-escape): the JSON of its v
 };
 
 rr::Result<> add_values(Recording& recording, const RecordedMember& member, RecordedValues& values) {
-  for (const auto& chunk : recording.chunks()) {
-    if (!chunk.message_counts.contains(member.channel)) continue;
-    const auto read = recording.read(chunk);
-    if (!read) return read.error();
-    for (const auto& message : read->messages) {
-      if (message.channel != member.channel) continue;
-      if (message.data.size() > largest_value) {
-        ++values.too_large;
-        continue;
-      }
-      const auto document = recording.read_document(message);
-      if (!document) return document.error();
-      values.add(message.publish_time, member.kind == rr::MemberKind::event ? *document : document->at("value"));
+  return recording.for_each(member, [&](const McapMessage& message) -> rr::Result<> {
+    if (message.data.size() > largest_value) {
+      ++values.too_large;
+      return {};
     }
-  }
-  return {};
+    const auto document = recording.read_document(message);
+    if (!document) return document.error();
+    values.add(message.publish_time, member.kind == rr::MemberKind::event ? *document : document->at("value"));
+    return {};
+  });
 }
 
 struct RecordedCount {

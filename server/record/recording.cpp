@@ -187,6 +187,19 @@ rr::Result<Recording::Messages> Recording::read(const RecordedChunk& chunk) {
   return out;
 }
 
+rr::Result<> Recording::for_each(const RecordedMember& member,
+                                 const std::function<rr::Result<>(const McapMessage&)>& take) {
+  for (const auto& chunk : chunks_) {
+    if (!chunk.message_counts.contains(member.channel)) continue;
+    const auto found = read(chunk);
+    if (!found) return found.error();
+    for (const auto& message : found->messages)
+      if (message.channel == member.channel)
+        if (auto taken = take(message); !taken) return taken;
+  }
+  return {};
+}
+
 rr::Result<rr::Json> Recording::read_document(const McapMessage& message) const {
   auto document = rr::read_json(rr::as_text(message.data));
   const auto& member = members_.at(message.channel);

@@ -1,6 +1,7 @@
 // A recording that is read: what it holds, and its messages. Layer: server/record.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -53,6 +54,9 @@ class Recording {
   };
   /// In the order of the file. Errors   as open(), where the file has changed since.
   rr::Result<Messages> read(const RecordedChunk& chunk);
+  /// Calls `take` with each message of a member, in the order of the file; borrowed for the call. Errors   as read();
+  /// the first that `take` returns, which ends it.
+  rr::Result<> for_each(const RecordedMember& member, const std::function<rr::Result<>(const McapMessage&)>& take);
   /// The document of a message. Errors   data_serialization_error: what it is, and why.
   rr::Result<rr::Json> read_document(const McapMessage& message) const;
 

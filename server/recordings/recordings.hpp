@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "server/access/access_rules.hpp"
 #include "server/config/config.hpp"
 #include "server/recordings/device_recorder.hpp"
 
@@ -45,6 +46,11 @@ struct RecordingInfo {
 
   std::uint64_t bytes() const;
 };
+
+/// What is asked for by who wants to make it or to have it; borrows from it.
+inline AccessRequest wanted_of(const RecordingInfo& recording) {
+  return {.device = recording.device, .service = recording.service, .verb = Verb::record};
+}
 
 /// What the name of a recording says; nullopt: it is none.
 std::optional<RecordingInfo> parse_recording_name(std::string_view name);

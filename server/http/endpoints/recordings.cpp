@@ -21,10 +21,6 @@ constexpr std::size_t most_members = 64;
 constexpr std::size_t longest_pattern = 256;
 constexpr std::string_view stop_suffix = "/stop";
 
-AccessRequest wanted_of(const RecordingInfo& recording) {
-  return {.device = recording.device, .service = recording.service, .verb = Verb::record};
-}
-
 Json described(const RecordingInfo& recording) {
   const auto seconds = [](auto duration) {
     return static_cast<double>(std::chrono::duration_cast<std::chrono::milliseconds>(duration).count()) / 1000;
