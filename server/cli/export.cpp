@@ -34,7 +34,7 @@ class CsvExport {
   CsvExport(Recording& recording, const RecordedMember& member) : recording_(recording), member_(member) {}
 
   rr::Result<> write(std::ostream& out) {
-    const auto looked = for_each([this](const McapMessage&, const rr::Json& cells) { add_columns(cells); });
+    auto looked = for_each([this](const McapMessage&, const rr::Json& cells) { add_columns(cells); });
     if (!looked) return looked;
     if (columns_.size() > max_columns)
       return rr::make_error(rr::ErrorCode::out_of_range,

@@ -11,9 +11,10 @@ import pytest
 import RobotRaconteur as RR
 
 from clients import JS, run_program
+from directions import PEERS
 from load import Clients, running
 from news import News
-from processes import BUILD, Background, read_json, start_gateway
+from processes import BUILD, Background, free_port, read_json, start_gateway
 from scenarios import POSE
 from shared_sites import RETRY, is_refused, port_of, start_arm, start_service
 from tap import Tap
@@ -374,3 +375,26 @@ def test_who_answers_callbacks(node, tmp_path, answer):
     finally:
         gateway.stop()
         service.stop()
+
+
+def test_an_endpoint_hears_nothing_that_the_device_still_sends_to_one_that_was_closed(node, tmp_path):
+    """A device of the package sends it to the next endpoint of the same index."""
+    port = free_port()
+    device = Background([sys.executable, PEERS / "chaos_device.py", tmp_path / "journal", f"--robotraconteur-tcp-port={port}"],
+                        tmp_path / "device.log")
+    gateway, port = start_gateway(tmp_path, json.loads(device.next_line())["url"], device={"mode": "shared"})
+    root = node.ConnectService(f"rr+tcp://127.0.0.1:{port}/?nodename=interop&service=chaos")
+    mine = [1.0, 2.0, 3.0, 4.0, 5.0]
+    for _ in range(40):
+        left = root.echo.Connect(-1)
+        for number in range(100):
+            left.AsyncSendPacket(1000.0 + number, lambda number, error: None)
+        left.AsyncClose(lambda error: None, 5)
+        endpoint = root.echo.Connect(-1)
+        for number in mine:
+            endpoint.SendPacket(number)
+        assert [endpoint.ReceivePacketWait(5000) for _ in mine] == mine
+        endpoint.Close()
+    node.DisconnectService(root)
+    assert gateway.stop() == 0
+    device.stop()

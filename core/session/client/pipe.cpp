@@ -23,9 +23,11 @@ ClientSession::ClientPipe* ClientSession::find_pipe(std::string_view path, std::
 }
 
 RequestId ClientSession::connect_pipe(std::string_view path, std::string_view member, std::int32_t index, Now now) {
+  // No index twice: a reference service gives the next endpoint of an index what it still sends to the one before.
+  if (index == any_pipe_index && last_pipe_index_ > 0 && last_pipe_index_ < INT32_MAX) index = last_pipe_index_ + 1;
+  last_pipe_index_ = std::max({last_pipe_index_, index, 1});
   const auto id = request_pipe(EntryType::pipe_connect_req, path, member, index, now);
   if (const auto found = pending_.find(id); found != pending_.end()) {
-    found->second.pipe_index = index;
     auto& pipe = pipes_[{std::string(path), std::string(member)}];
     pipe.member = found->second.member;
     ++pipe.connects;
@@ -112,6 +114,7 @@ Result<std::int32_t> ClientSession::open_pipe(const Message& message, const Mess
                                               const Pending& pending, Now now) {
   const auto index = read_pipe_index_element(message, entry, *pending.member);
   if (!index) return index;
+  last_pipe_index_ = std::max(last_pipe_index_, *index);
   auto* pipe = find_pipe(pending.path, pending.member->name);
   if (!pipe || pending.is_abandoned) {
     // What it sends meanwhile must not reach the next endpoint of this index.

@@ -15,7 +15,7 @@ constexpr std::size_t max_closed_indices = 1000;
 
 /// Which index an endpoint gets beside those in use, as the reference assigns it: the one asked for where it is above
 /// all others, else the next above them; never one below, so that an index is not used again while others live. Nor is
-/// one up to `closed` that this side has closed: packets for that endpoint may still be on their way.
+/// one up to `closed`: packets of that endpoint may still be on their way.
 template <class Indices>
 std::optional<std::int32_t> assign_index(std::int32_t asked, const Indices& in_use, std::int32_t closed) {
   const auto last = in_use.empty() ? closed : std::max(closed, in_use.rbegin()->first);
@@ -45,11 +45,12 @@ void ServiceSession::forget_pipe(PipeId id) {
   pipes_.erase(pipe);
 }
 
-/// This side ends an endpoint that the client may still be sending to.
-void ServiceSession::leave_pipe(PipeId id) {
+/// An endpoint ends that the other side may still be sending to, or be read from.
+void ServiceSession::leave_pipe(PipeId id, PipeEnd by) {
   if (const auto* pipe = find_pipe(id); pipe && pipe->index < INT32_MAX) {
-    auto& closed = closed_indices_.try_emplace(*pipe->key, any_pipe_index).first->second;
-    closed = std::max(closed, pipe->index);
+    auto& closed = closed_indices_[*pipe->key];
+    auto& highest = by == PipeEnd::service ? closed.by_service : closed.by_client;
+    highest = std::max(highest, pipe->index);
     if (closed_indices_.size() > max_closed_indices) closed_indices_.erase(closed_indices_.begin());
   }
   forget_pipe(id);
@@ -142,7 +143,7 @@ void ServiceSession::close_pipe(PipeId id, Now now) {
   if (!pipe) return;
   const auto index = pipe->index;
   const auto key = *pipe->key;
-  leave_pipe(id);
+  leave_pipe(id, PipeEnd::service);
   connection_.begin_message(outgoing_);
   outgoing_.begin_entry(EntryType::pipe_closed, key.path, key.member);
   write_pipe_index(outgoing_, index);
@@ -154,7 +155,7 @@ void ServiceSession::release_pipes(std::string_view path) {
   for (const auto& [id, pipe] : pipes_)
     if (is_within(pipe.key->path, path)) released.push_back(id);
   for (const auto id : released) {
-    leave_pipe(id);
+    leave_pipe(id, PipeEnd::service);
     events_.push(PipeClosed{id});
   }
 }
@@ -171,9 +172,12 @@ Result<> ServiceSession::connect_pipe(const Message& message, const MessageEntry
         "this client has " + std::to_string(options_.max_pipe_endpoints) + " pipe endpoints connected already");
   PathMember key{std::string(entry.service_path), std::string(entry.member_name)};
   const auto indices = pipe_indices_.try_emplace(std::move(key)).first;
-  const auto closed = closed_indices_.find(indices->first);
+  const auto found_closed = closed_indices_.find(indices->first);
+  const auto closed = found_closed == closed_indices_.end() ? ClosedIndices{} : found_closed->second;
+  // Who closes an endpoint and names its index again wants that one.
   const auto index =
-      assign_index(*asked, indices->second, closed == closed_indices_.end() ? any_pipe_index : closed->second);
+      assign_index(*asked, indices->second,
+                   *asked == any_pipe_index ? std::max(closed.by_service, closed.by_client) : closed.by_service);
   if (!index)
     return make_error(ErrorCode::out_of_range, "pipe '" + member.name + "': there is no index above those in use");
   const auto id = ++last_pipe_id_;
@@ -203,7 +207,7 @@ Result<> ServiceSession::disconnect_pipe(const Message& message, const MessageEn
   const auto* pipe = find_pipe(entry, *index);
   if (!pipe) return make_error(ErrorCode::invalid_argument, "Invalid pipe");
   const auto id = pipe->id;
-  forget_pipe(id);
+  leave_pipe(id, PipeEnd::client);
   events_.push(PipeClosed{id});
   begin_reply(entry);
   send_outgoing(now);

@@ -261,6 +261,12 @@ class ServiceSession {
     Ledger ledger;
   };
   using PipeIndices = std::map<std::int32_t, ServicePipe*>;
+  enum class PipeEnd : std::uint8_t { service, client };
+  /// Of a pipe the highest that each side has closed.
+  struct ClosedIndices {
+    std::int32_t by_service = any_pipe_index;
+    std::int32_t by_client = any_pipe_index;
+  };
 
   bool takes_requests() const { return calls_.size() < options_.max_open_calls && !connection_.is_held_back(); }
   void handle_message(const Message& message, Now now);
@@ -365,7 +371,7 @@ class ServiceSession {
   ServicePipe* find_pipe(PipeId id);
   ServicePipe* find_pipe(const MessageEntry& entry, std::int32_t index);
   void forget_pipe(PipeId id);
-  void leave_pipe(PipeId id);
+  void leave_pipe(PipeId id, PipeEnd by);
   /// `send(pipe, number)` of the next packet's number, which it takes where that succeeds.
   template <class Send>
   Result<std::uint32_t> send_numbered(PipeId id, Now now, Send&& send);
@@ -436,8 +442,7 @@ class ServiceSession {
   PipeId last_pipe_id_ = 0;
   std::map<PipeId, ServicePipe> pipes_;                             ///< mostly none or one
   std::map<PathMember, PipeIndices, PathMemberLess> pipe_indices_;  ///< the same pipes
-  /// Of each member the highest that this side has closed.
-  std::map<PathMember, std::int32_t, PathMemberLess> closed_indices_;
+  std::map<PathMember, ClosedIndices, PathMemberLess> closed_indices_;
   std::vector<std::pair<std::int32_t, std::uint32_t>> pipe_acks_;  ///< index and number, to be sent; reused
   Fifo<ServiceEvent> events_;
 };

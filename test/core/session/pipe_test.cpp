@@ -62,25 +62,23 @@ class ByHand {
   }
   /// What the client sends, one line a message: type, and the elements' names.
   std::vector<std::string> heard() {
-    Bytes bytes;
-    for (const auto slice : pair.client->poll_transmit()) bytes.insert(bytes.end(), slice.begin(), slice.end());
-    pair.client->handle_transmitted(bytes.size(), pair.now);
     std::vector<std::string> lines;
-    FrameScanner scanner(1u << 20);
-    for (ByteSpan left = bytes; !left.empty();) {
-      left = left.subspan(scanner.feed(left).value());
-      if (!scanner.message()) continue;
-      Message message;
-      decode(*scanner.message(), {}, message).value();
-      for (const auto& entry : message.entries) {
-        std::string line(entry_type_name(entry.type));
-        for (const auto& element : message.elements_of(entry))
-          line +=
-              " " + (element.key_kind == KeyKind::name ? std::string(element.name) : std::to_string(element.number));
-        lines.push_back(line);
-      }
-    }
+    for_each_heard([&](const Message& message, const MessageEntry& entry) {
+      std::string line(entry_type_name(entry.type));
+      for (const auto& element : message.elements_of(entry))
+        line += " " + (element.key_kind == KeyKind::name ? std::string(element.name) : std::to_string(element.number));
+      lines.push_back(line);
+    });
     return lines;
+  }
+  /// Of the one request that the client sends.
+  std::int32_t asked_index() {
+    std::vector<std::int32_t> asked;
+    for_each_heard([&](const Message& message, const MessageEntry& entry) {
+      asked.push_back(read_pipe_index_element(message, entry, {MemberKind::pipe, "samples", {}}).value());
+    });
+    REQUIRE(asked.size() == 1);
+    return asked.front();
   }
   void expect_packet(std::int32_t index, double value) {
     const auto packet = pair.next_client<PipePacketReceived>();
@@ -98,6 +96,20 @@ class ByHand {
     const auto id = pair.client->connect_pipe("arm", "samples", index, pair.now);
     CHECK(heard() == Lines{"PipeConnectReq index"});
     return id;
+  }
+
+  void for_each_heard(const std::function<void(const Message&, const MessageEntry&)>& take) {
+    Bytes bytes;
+    for (const auto slice : pair.client->poll_transmit()) bytes.insert(bytes.end(), slice.begin(), slice.end());
+    pair.client->handle_transmitted(bytes.size(), pair.now);
+    FrameScanner scanner(1u << 20);
+    for (ByteSpan left = bytes; !left.empty();) {
+      left = left.subspan(scanner.feed(left).value());
+      if (!scanner.message()) continue;
+      Message message;
+      decode(*scanner.message(), {}, message).value();
+      for (const auto& entry : message.entries) take(message, entry);
+    }
   }
 
   using Lines = std::vector<std::string>;
@@ -246,7 +258,7 @@ TEST_CASE("the application may refuse an endpoint; its first packet lets the cli
   id = pair.next_service<PipeConnected>().id;
   REQUIRE(pair.service->send_pipe_packet(id, Value(1.0), pair.now));
   pair.service->refuse_pipe(id, {ErrorCode::operation_failed, "too late"}, pair.now);
-  CHECK(pair.completion(request).value() == Value(1));
+  CHECK(pair.completion(request).value() == Value(2));
   CHECK(pair.next_client<PipePacketReceived>().value == Value(1.0));
 }
 
@@ -299,9 +311,56 @@ TEST_CASE("packets of an endpoint that was given up before it was connected reac
   CHECK(pair.next_service<PipeClosed>().id == given_up);
   const auto id = pair.next_service<PipeConnected>().id;
   REQUIRE(pair.service->send_pipe_packet(id, Value(2.0), pair.now));
-  CHECK(pair.completion(request).value() == Value(1));
+  CHECK(pair.completion(request).value() == Value(2));
   CHECK(pair.next_client<PipePacketReceived>().value == Value(2.0));
   CHECK_FALSE(pair.client->poll_event());
+}
+
+TEST_CASE("any index is one that the session has not had, since a service may still send to the endpoint before") {
+  ByHand by_hand;
+  auto& client = *by_hand.pair.client;
+  const auto ask = [&](std::int32_t index = any_pipe_index) {
+    const auto request = client.connect_pipe("arm", "samples", index, by_hand.pair.now);
+    return std::pair(request, by_hand.asked_index());
+  };
+  const auto [first, any] = ask();
+  CHECK(any == any_pipe_index);
+  by_hand.say_connected(first, 1);
+  by_hand.expect_connected(first, 1);
+  by_hand.say_closed(1);
+  by_hand.pair.next_client<PipeClosedByService>();
+  CHECK(ask().second == 2);
+  const auto [third, next] = ask();
+  CHECK(next == 3);  // also while the second is not there yet
+  by_hand.say_connected(third, 7);
+  by_hand.expect_connected(third, 7);
+  CHECK(ask().second == 8);
+  CHECK(ask(4).second == 4);
+  CHECK(ask(INT32_MAX).second == INT32_MAX);
+  CHECK(ask().second == any_pipe_index);  // there is none above
+}
+
+TEST_CASE("a client that closes an endpoint gets the next one by another index, unless it names the same") {
+  Loopback pair;
+  pair.connect();
+  const auto index_for = [&](std::int32_t asked) {
+    const auto request = pair.client->connect_pipe("arm", "samples", asked, pair.now);
+    pair.pump();
+    pair.service->accept_pipe(pair.next_service<PipeConnected>().id, pair.now);
+    return pair.completion(request).value().to<std::int32_t>().value();
+  };
+  const auto close = [&](std::int32_t index) {
+    const auto request = pair.client->disconnect_pipe("arm", "samples", index, pair.now);
+    CHECK(pair.completion(request).value().is_null());
+    pair.next_service<PipeClosed>();
+  };
+  CHECK(index_for(any_pipe_index) == 1);
+  close(1);
+  CHECK(index_for(any_pipe_index) == 2);
+  close(2);
+  CHECK(index_for(2) == 2);
+  close(2);
+  CHECK(index_for(1) == 1);
 }
 
 TEST_CASE("a connect that was given up is undone also where it is answered after its time") {
