@@ -85,6 +85,7 @@ void DetectedNodes::confirm(const NodeId& node_id) {
 template <class F>
 DetectedNodes::Nodes::iterator DetectedNodes::drop_urls(Nodes::iterator node, F&& is_gone) {
   auto& info = node->second;
+  if (std::none_of(info.urls.begin(), info.urls.end(), is_gone)) return std::next(node);
   const auto last = info;  // what a lost node was
   info.urls.erase(std::remove_if(info.urls.begin(), info.urls.end(), is_gone), info.urls.end());
   if (info.urls.empty()) {
@@ -92,11 +93,9 @@ DetectedNodes::Nodes::iterator DetectedNodes::drop_urls(Nodes::iterator node, F&
     end_claim(node->first);
     return nodes_.erase(node);
   }
-  if (info.urls.size() != last.urls.size()) {
-    NodeEvent event{NodeEvent::Kind::changed, info};
-    event.urls_changed = true;
-    events_.push_back(std::move(event));
-  }
+  NodeEvent event{NodeEvent::Kind::changed, info};
+  event.urls_changed = true;
+  events_.push_back(std::move(event));
   return std::next(node);
 }
 

@@ -10,6 +10,7 @@ namespace rr {
 namespace {
 
 constexpr std::uint64_t largest = std::numeric_limits<std::uint64_t>::max();
+constexpr unsigned most_pods = 256;
 
 std::string memory_subject(const MemberDefinition& memory) {
   return "memory '" + memory.name + "'";
@@ -74,8 +75,11 @@ std::uint64_t capped(std::uint64_t left, std::uint64_t right) {
   return right != 0 && left > largest / right ? largest : left * right;
 }
 
-/// About what one pod takes in a message. Pods are not recursive: verification sees to that.
-std::uint64_t packed_size(const EntityDefinition& pod, const TypeRegistry& types) {
+/// About what one pod takes in a message. Pods are not recursive: verification sees to that. But they may hold one
+/// another so often that nobody can count: `left`  how many are looked at.
+std::uint64_t packed_size(const EntityDefinition& pod, const TypeRegistry& types, unsigned& left) {
+  if (left == 0) return largest;
+  --left;
   constexpr std::uint64_t element_overhead = 32;
   std::uint64_t size = element_overhead;
   for (const auto& field : pod.members) {
@@ -83,7 +87,7 @@ std::uint64_t packed_size(const EntityDefinition& pod, const TypeRegistry& types
     std::uint64_t each = item_size(field.type.type);
     if (const auto* named = types.find_entity(field.type.qualified_name)) {
       each = named->kind == EntityKind::pod
-                 ? packed_size(*named, types)
+                 ? packed_size(*named, types, left)
                  : std::uint64_t{named->namedarray_count} * item_size(named->namedarray_type);
     }
     const auto data = capped(items, each);
@@ -201,7 +205,8 @@ std::uint64_t memory_item_size(const MemberDefinition& memory, const TypeRegistr
   if (memory.type.name.empty()) return std::max<std::uint64_t>(1, item_size(memory.type.type));
   const auto* entity = types.find_entity(memory.type.qualified_name);
   if (!entity) return 1;
-  if (entity->kind == EntityKind::pod) return packed_size(*entity, types);
+  unsigned left = most_pods;
+  if (entity->kind == EntityKind::pod) return packed_size(*entity, types, left);
   return std::max<std::uint64_t>(1, std::uint64_t{entity->namedarray_count} * item_size(entity->namedarray_type));
 }
 

@@ -369,6 +369,7 @@ void ClientConnection::handle(WireValueReceived&& received) {
 
 void ClientConnection::handle(WireClosedByService&& closed) {
   const MemberKey key{std::move(closed.path), std::move(closed.member)};
+  if (session_.has_wire(key.first, key.second)) return;  // a handler has connected it again meanwhile
   wire_handlers_.erase(key);
   const auto found = wire_closed_handlers_.extract(key);
   if (found && found.mapped()) run_handler("wire", key.second, found.mapped());

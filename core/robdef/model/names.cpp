@@ -71,6 +71,7 @@ bool is_name(std::string_view text) {
 }
 
 bool is_qualified_name(std::string_view text) {
+  if (text.size() > longest_qualified_name) return false;
   while (true) {
     const auto dot = text.find('.');
     if (!is_name(text.substr(0, dot))) return false;

@@ -8,6 +8,13 @@
 
 namespace rr {
 
+/// No definition in use comes near these; without them a small text becomes gigabytes, or takes minutes.
+inline constexpr std::size_t longest_qualified_name = 255;
+inline constexpr std::size_t max_dimensions = 64;
+inline constexpr std::size_t max_parameters = 1024;  ///< of a member
+inline constexpr std::size_t max_members = 8192;     ///< of a type
+inline constexpr std::size_t max_imports = 1024;     ///< and as many usings
+
 constexpr bool is_blank(char c) {
   return c == ' ' || c == '\t';
 }

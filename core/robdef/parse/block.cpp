@@ -168,6 +168,11 @@ void DefinitionParser::parse_body_line(LogicalLine line, EntityDefinition& entit
                                   : ", expected field, constant, option or end"));
     return;
   }
+  if (entity.members.size() >= max_members) {
+    documentation_.drop();
+    reader.fail("at most 8192 members");
+    return;
+  }
   MemberDefinition member;
   member.kind = *kind;
   member.documentation = documentation_.take();

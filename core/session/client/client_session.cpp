@@ -248,7 +248,11 @@ void ClientSession::cancel(RequestId id) {
       found != pending_.end() && abandon_request(id, found->second.deadline + late_reply_period))
     return;
   pending_.erase(id);
-  fetches_.erase(id);
+  const auto fetch =
+      std::find_if(fetches_.begin(), fetches_.end(), [id](const auto& each) { return each.second.lookup == id; });
+  if (fetch == fetches_.end()) return;
+  pending_.erase(fetch->first);
+  fetches_.erase(fetch);
 }
 
 void ClientSession::disconnect(Now now) {
@@ -388,6 +392,8 @@ void ClientSession::handle_path_released(std::string_view path) {
   if (path == options_.service) return;  // the root cannot be released
   std::erase_if(objects_, [path](const auto& object) { return is_within(object.first, path); });
   std::erase_if(memory_limits_, [path](const auto& memory) { return is_within(memory.first.path, path); });
+  for (auto& [id, fetch] : fetches_)
+    if (is_within(fetch.path, path)) fetch.object_type.clear();  // what is there now may be of another type
   release_wires(path);
   release_pipes(path);
   emit(PathReleased{std::string(path)});

@@ -176,6 +176,9 @@ class ClientSession {
   RequestId poke_out_value(std::string_view path, std::string_view member, const Value& value, Now now);  ///< null
   /// Sends OutValue on a connected wire. A value that still waits for a slow stream is replaced by a newer one.
   Result<> send_wire(std::string_view path, std::string_view member, const Value& value, Now now);
+  bool has_wire(std::string_view path, std::string_view member) const {
+    return wires_.contains(PathMemberView{path, member});
+  }
   /// Completes with the index in use, which may differ from the one asked for; any_pipe_index asks for one that the
   /// session has not had. Packets follow as PipePacketReceived, maybe at once.
   RequestId connect_pipe(std::string_view path, std::string_view member, std::int32_t index, Now now);
@@ -279,6 +282,7 @@ class ClientSession {
   /// Definitions that are fetched, with all their imports, before the connect sequence or a lookup can go on.
   struct Fetch {
     std::vector<std::string> texts = {};
+    std::size_t bytes = 0;              ///< of `texts`
     std::set<std::string> names = {};   ///< of `texts`
     std::set<std::string> wanted = {};  ///< imported or asked for
     std::set<std::string> asked = {};
@@ -422,7 +426,8 @@ class ClientSession {
   std::map<PathMember, std::uint32_t, PathMemberLess> memory_limits_;  ///< MaxTransferSize of memories that were used
   PipeStore pipe_store_;                                               ///< outlives pipes_
   std::map<PathMember, ClientPipe, PathMemberLess> pipes_;
-  std::int32_t last_pipe_index_ = 0;                               ///< the highest asked for or given
+  std::int32_t last_pipe_index_ = 0;  ///< the highest asked for or given
+  bool has_closed_pipe_ = false;
   std::vector<std::pair<std::int32_t, std::uint32_t>> pipe_acks_;  ///< index and number, to be sent; reused
   CallbackId last_callback_id_ = 0;
   std::map<CallbackId, OpenCallback> callbacks_;

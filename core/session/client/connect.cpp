@@ -12,6 +12,7 @@ namespace rr {
 namespace {
 
 constexpr std::size_t max_fetched_definitions = 1024;
+constexpr std::size_t max_fetched_bytes = 64u * 1024 * 1024;
 
 std::string read_text(const Message& message, const MessageEntry& entry, std::string_view name) {
   const auto* element = message.elements_of(entry).find(name);
@@ -32,6 +33,7 @@ void ClientSession::Fetch::add(std::string text) {
   const auto parsed = parse_service_definition(text, RobdefMode::compat);
   names.insert(parsed.definition.name);
   for (const auto& import : parsed.definition.imports) wanted.insert(import.name);
+  bytes += text.size();
   texts.push_back(std::move(text));
 }
 
@@ -178,10 +180,10 @@ void ClientSession::advance_fetch(Fetch fetch, Now now) {
   if (!fetch.asked.insert(*missing).second)
     return fail_fetch(fetch, make_error(ErrorCode::service_definition_error,
                                         "the node answered with another definition than " + quote(*missing)));
-  if (fetch.asked.size() > max_fetched_definitions)
-    return fail_fetch(
-        fetch, make_error(ErrorCode::service_definition_error,
-                          "the definitions import more than " + std::to_string(max_fetched_definitions) + " others"));
+  if (fetch.asked.size() > max_fetched_definitions || fetch.bytes > max_fetched_bytes)
+    return fail_fetch(fetch, make_error(ErrorCode::service_definition_error,
+                                        "the definitions import more than " + std::to_string(max_fetched_definitions) +
+                                            " others, or 64 MiB"));
   const auto id = begin_request(EntryType::get_service_desc, options_.service, {});
   outgoing_.add_text("ServiceType", *missing);
   outgoing_.add_text("clientversion", protocol_level);

@@ -24,7 +24,7 @@ ClientSession::ClientPipe* ClientSession::find_pipe(std::string_view path, std::
 
 RequestId ClientSession::connect_pipe(std::string_view path, std::string_view member, std::int32_t index, Now now) {
   // No index twice: a reference service gives the next endpoint of an index what it still sends to the one before.
-  if (index == any_pipe_index && last_pipe_index_ > 0 && last_pipe_index_ < INT32_MAX) index = last_pipe_index_ + 1;
+  if (index == any_pipe_index && has_closed_pipe_ && last_pipe_index_ < INT32_MAX) index = last_pipe_index_ + 1;
   last_pipe_index_ = std::max({last_pipe_index_, index, 1});
   const auto id = request_pipe(EntryType::pipe_connect_req, path, member, index, now);
   if (const auto found = pending_.find(id); found != pending_.end()) {
@@ -47,6 +47,7 @@ RequestId ClientSession::disconnect_pipe(std::string_view path, std::string_view
   const auto id = request_pipe(EntryType::pipe_disconnect_req, path, member, index, now);
   if (const auto found = pending_.find(id); found != pending_.end()) {
     found->second.pipe_index = index;
+    has_closed_pipe_ = true;
     endpoint->second.start_closing();
   }
   return id;
@@ -139,6 +140,7 @@ Result<std::int32_t> ClientSession::open_pipe(const Message& message, const Mess
       emit(PipePacketReceived{pending.path, pending.member->name, *index, std::move(packet.value)});
   });
   if (pipe->closed_early.erase(*index) > 0) {
+    has_closed_pipe_ = true;
     pipe->endpoints.erase(*index);
     emit(PipeClosedByService{pending.path, pending.member->name, *index});
   }
@@ -182,6 +184,7 @@ bool ClientSession::abandon_request(RequestId id, TimePoint deadline) {
 
 void ClientSession::request_silent_disconnect(const std::string& path, const MemberDefinition& member,
                                               std::int32_t index, Now now) {
+  has_closed_pipe_ = true;
   const auto id = begin_request(EntryType::pipe_disconnect_req, path, member.name);
   write_pipe_index(outgoing_, index);
   if (!send_outgoing(now)) return;  // the connection's end is heard of elsewhere
@@ -202,7 +205,9 @@ void ClientSession::handle_pipe_packets(const Message& message, const MessageEnt
     if (!index) continue;
     auto endpoint = pipe->endpoints.find(*index);
     if (endpoint == pipe->endpoints.end()) {
-      if (pipe->connects == 0 || pipe->endpoints.size() >= pipe->connects + max_unknown_endpoints) continue;
+      const auto unknown = std::count_if(pipe->endpoints.begin(), pipe->endpoints.end(),
+                                         [](const auto& each) { return each.second.state() == PipeState::connecting; });
+      if (pipe->connects == 0 || static_cast<std::size_t>(unknown) >= pipe->connects + max_unknown_endpoints) continue;
       endpoint = pipe->endpoints.try_emplace(*index, *pipe->member, pipe_store_, PipeState::connecting).first;
     }
     if (endpoint->second.is_unreliable()) is_unreliable = true;
@@ -210,6 +215,7 @@ void ClientSession::handle_pipe_packets(const Message& message, const MessageEnt
     if (state_ == ClientState::closed) return;
   }
   if (!pipe_acks_.empty()) send_pipe_acks(entry.service_path, entry.member_name, is_unreliable, now);
+  if (state_ == ClientState::closed) return;
   // A packet that is lost, or cannot be read, cannot be made up for: the endpoint ends, and both sides know.
   for (const auto index : broken) {
     const auto endpoint = pipe->endpoints.find(index);
@@ -280,6 +286,7 @@ void ClientSession::handle_pipe_closed(const Message& message, const MessageEntr
     return;
   }
   if (endpoint->second.state() != PipeState::open) return;  // the answer to our own disconnect is on its way
+  has_closed_pipe_ = true;
   pipe.endpoints.erase(endpoint);
   emit(PipeClosedByService{found->first.path, found->first.member, *index});
   if (pipe.endpoints.empty() && pipe.connects == 0) pipes_.erase(found);
@@ -293,6 +300,7 @@ void ClientSession::release_pipes(std::string_view path) {
     }
     for (const auto& [index, endpoint] : pipe->second.endpoints)
       if (endpoint.state() == PipeState::open) emit(PipeClosedByService{pipe->first.path, pipe->first.member, index});
+    has_closed_pipe_ = true;
     pipe->second.endpoints.clear();
     pipe = pipe->second.connects == 0 ? pipes_.erase(pipe) : std::next(pipe);
   }

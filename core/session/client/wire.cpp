@@ -66,8 +66,10 @@ void ClientSession::flush_wires(Now now) {
   for (auto& [key, wire] : wires_) {
     if (!wire.waiting || state_ == ClientState::closed) continue;
     const Value value = std::move(wire.waiting->value);
-    // The value was checked when it came in; what can fail here is the connection, and that ends the session elsewhere.
-    if (!send_wire_packet(key, wire, value, now) || connection_.queued_bytes() >= wire_high_mark) return;
+    // What can fail is a value that does not fit, which others don't wait for, or the connection, which is heard
+    // elsewhere.
+    (void)send_wire_packet(key, wire, value, now);
+    if (connection_.queued_bytes() >= wire_high_mark) return;
   }
 }
 

@@ -167,3 +167,22 @@ TEST_CASE("ranges and data that a message does not bring in order are refused") 
           add(message, "count", 1);
         }) == ErrorCode::data_type_mismatch);
 }
+
+TEST_CASE("pods that hold one another beyond counting are items of a size all the same") {
+  const auto chain = [](std::size_t length, std::size_t fields) {
+    std::string text = "service test.pods\nstdver 0.10\nobject Store\n  memory p0[] samples\nend\n";
+    for (std::size_t i = 0; i < length; ++i) {
+      text += "pod p" + std::to_string(i) + "\n";
+      for (std::size_t field = 0; field < fields; ++field)
+        text += "  field p" + std::to_string(i + 1) + " a" + std::to_string(field) + "\n";
+      text += "end\n";
+    }
+    return text + "pod p" + std::to_string(length) + "\n  field int32 id\nend\n";
+  };
+  for (const auto& text : {chain(60, 2), chain(20'000, 1)}) {
+    TypeRegistry types;
+    types.add({text}, RobdefMode::strict).value();
+    const auto* store = types.find_entity("test.pods.Store");
+    CHECK(memory_item_size(*store->find_member("samples"), types) == largest);
+  }
+}

@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 #include <ctime>
 
+#include "core/robdef/model/names.hpp"
 #include "test/core/robdef/checked.hpp"
 
 namespace rr::test {
@@ -72,6 +73,41 @@ TEST_CASE("lines of a megabyte", "[robdef][hostile]") {
   check_quickly(head + "object O\n    wire int32 f [a(" + repeated("1 ,", size / 3) + "1)]\nend\n");
   check_quickly(head + "enum E\n a=1" + repeated(",b", size / 2) + "\nend\n");
   check_quickly(head + "enum E\n a=1" + repeated(",", size) + "\nend\n");
+}
+
+TEST_CASE("what no definition needs is refused before it takes gigabytes", "[robdef][hostile]") {
+  const auto refused = [](const std::string& body, const std::string& expected) {
+    auto checked = check(head + body, RobdefMode::compat);
+    REQUIRE_FALSE(checked.ok());
+    CHECK_THAT(checked.errors().front().message, Catch::Contains(expected));
+  };
+  const auto accepted = [](const std::string& body) {
+    auto checked = check(head + body, RobdefMode::compat);
+    INFO(checked.report());
+    CHECK(checked.ok());
+  };
+  const auto sizes = [](std::size_t count) {
+    return "struct S\n    field double[" + repeated("1,", count - 1) + "1] x\nend\n";
+  };
+  accepted(sizes(max_dimensions));
+  refused(sizes(max_dimensions + 1), "at most 64 sizes");
+  const auto parameters = [](std::size_t count) {
+    const auto list = numbered(count, [](const std::string& number) { return "int32 a" + number + ","; });
+    return "object O\n    event e(" + list.substr(0, list.size() - 1) + ")\nend\n";
+  };
+  accepted(parameters(max_parameters));
+  refused(parameters(max_parameters + 1), "at most 1024 parameters");
+  const auto members = [](std::size_t count) {
+    return "struct S\n" + numbered(count, [](const std::string& number) { return "field int32 a" + number + "\n"; }) +
+           "end\n";
+  };
+  accepted(members(max_members));
+  refused(members(max_members + 1), "at most 8192 members");
+  refused(repeated("import demo.b\n", max_imports + 1), "at most 1024 imports");
+  refused(repeated("using demo.b.C\n", max_imports + 1), "at most 1024 usings");
+  const auto named = [](std::size_t size) { return "service demo." + std::string(size - 5, 'a') + "\nstdver 0.9\n"; };
+  CHECK(check(named(longest_qualified_name), RobdefMode::compat).ok());
+  CHECK_FALSE(check(named(longest_qualified_name + 1), RobdefMode::compat).ok());
 }
 
 TEST_CASE("parameters that wrap without end", "[robdef][hostile]") {

@@ -244,6 +244,31 @@ TEST_CASE("definitions that were fetched for an object are known in the next ses
   }
 }
 
+TEST_CASE("a lookup whose definition is being fetched can be given up, and finds nothing that was released meanwhile") {
+  Sessions sessions;
+  REQUIRE(sessions.open(none_yet));
+  const auto id = sessions.client->find_object("hand.finger", sessions.now);
+  sessions.carry(*sessions.client, *sessions.service, 1u << 20);
+  sessions.carry(*sessions.service, *sessions.client, 1u << 20);  // the type, whose definition is asked for
+  CHECK(sessions.client->pending_requests() == 1);
+  SECTION("released") {
+    sessions.service->release_path("hand.finger", sessions.now);
+    sessions.pump();
+    CHECK(sessions.next_client<PathReleased>().path == "hand.finger");
+    const auto done = sessions.next_client<Completed>();
+    CHECK(done.id == id);
+    CHECK(done.result.error().code == ErrorCode::service_error);
+  }
+  SECTION("given up") {
+    sessions.client->cancel(id);
+    CHECK(sessions.client->pending_requests() == 0);
+    sessions.pump();
+    CHECK_FALSE(sessions.client->poll_event());
+  }
+  CHECK(sessions.client->object_type("hand.finger") == nullptr);
+  CHECK(sessions.completion(sessions.client->find_object("hand.finger", sessions.now)));
+}
+
 TEST_CASE("a client remembers a bounded number of definitions") {
   Sessions sessions;
   auto many = none_yet;

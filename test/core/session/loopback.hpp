@@ -50,6 +50,7 @@ object Arm
   objref Tool{string} tools
   objref Tool[] slots
   objref varobject anything
+  wire double aim
   wire double torque
   wire Pose state [readonly]
   pipe double samples

@@ -258,7 +258,7 @@ TEST_CASE("the application may refuse an endpoint; its first packet lets the cli
   id = pair.next_service<PipeConnected>().id;
   REQUIRE(pair.service->send_pipe_packet(id, Value(1.0), pair.now));
   pair.service->refuse_pipe(id, {ErrorCode::operation_failed, "too late"}, pair.now);
-  CHECK(pair.completion(request).value() == Value(2));
+  CHECK(pair.completion(request).value() == Value(1));
   CHECK(pair.next_client<PipePacketReceived>().value == Value(1.0));
 }
 
@@ -314,6 +314,17 @@ TEST_CASE("packets of an endpoint that was given up before it was connected reac
   CHECK(pair.completion(request).value() == Value(2));
   CHECK(pair.next_client<PipePacketReceived>().value == Value(2.0));
   CHECK_FALSE(pair.client->poll_event());
+}
+
+TEST_CASE("however many endpoints are open, the next one keeps the packets that come before its reply") {
+  ByHand by_hand;
+  for (std::int32_t index = 1; index <= 70; ++index) {
+    const auto request = by_hand.connect();
+    by_hand.say_packet(index, 1, index);
+    by_hand.say_connected(request, index);
+    by_hand.expect_connected(request, index);
+    by_hand.expect_packet(index, index);
+  }
 }
 
 TEST_CASE("any index is one that the session has not had, since a service may still send to the endpoint before") {

@@ -179,3 +179,21 @@ TEST_CASE("one client connects a bounded number of wires") {
         ErrorCode::out_of_system_resource);
   CHECK(pair.completion(pair.client->connect_wire("arm", "torque", pair.now)).has_value());
 }
+
+TEST_CASE("a value that does not fit holds up no other wire while the stream is slow") {
+  Loopback pair;
+  pair.connect();
+  for (const auto* wire : {"aim", "torque"}) pair.completion(pair.client->connect_wire("arm", wire, pair.now)).value();
+  while (pair.service->poll_event()) {
+  }
+  const Value large(
+      Structure{"experimental.loopback.Pose", {{"x", Value(1.0)}, {"joints", Value(std::vector<double>(50'000))}}});
+  pair.client->set_property("arm", "pose", large, pair.now);
+  REQUIRE(pair.client->send_wire("arm", "aim", Value("text"), pair.now));  // waits, and does not fit
+  REQUIRE(pair.client->send_wire("arm", "torque", Value(2.0), pair.now));
+  pair.pump();
+  double last = 0;
+  while (const auto event = pair.service->poll_event())
+    if (const auto* received = std::get_if<WireReceived>(&*event)) last = received->value.to<double>().value();
+  CHECK(last == 2.0);
+}
