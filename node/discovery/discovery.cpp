@@ -171,7 +171,12 @@ class Discovery::Implementation : public std::enable_shared_from_this<Implementa
                                                               std::vector<std::string> schemes, milliseconds timeout) {
     asio::steady_timer pause(self->io_);
     const auto deadline = std::chrono::steady_clock::now() + timeout;
-    const auto watch_id = self->watch([&pause](const NodeEvent&) { pause.cancel(); });
+    struct Unwatch {  // also where the search is cancelled
+      Implementation& all;
+      WatchId id;
+      ~Unwatch() { all.unwatch(id); }
+    };
+    const Unwatch watching{*self, self->watch([&pause](const NodeEvent&) { pause.cancel(); })};
     std::vector<NodeDiscoveryInfo> found;
     bool has_asked = false;
     while (!self->is_closed_) {
@@ -182,7 +187,6 @@ class Discovery::Implementation : public std::enable_shared_from_this<Implementa
       pause.expires_at(deadline);
       co_await self->wait_for(pause);
     }
-    self->unwatch(watch_id);
     co_return found;
   }
 

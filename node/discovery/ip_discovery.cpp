@@ -51,7 +51,11 @@ class IpDiscovery::Implementation : public std::enable_shared_from_this<Implemen
   void close() {
     is_closed_ = true;
     rescan_.cancel();
-    for (auto* receiver : {&v6_, &v4_}) receiver->reset();
+    for (auto* receiver : {&v6_, &v4_}) {
+      error_code ignored;
+      if (*receiver) (*receiver)->socket.close(ignored);  // what it waits for keeps it
+      receiver->reset();
+    }
   }
 
   const std::vector<LocalAddress>& addresses() const { return addresses_; }

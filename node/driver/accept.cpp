@@ -94,7 +94,7 @@ awaitable<Result<Accepted>> accept_stream(std::unique_ptr<ByteStream> stream, Ac
   tls.is_required = options.requires_tls;
   tls.timeout = prologue_time;
   auto accepted = co_await accept_plain(std::move(stream), std::move(options));
-  if (!accepted || !tls.context) co_return accepted;
+  if (!accepted || (!tls.context && !tls.is_required)) co_return accepted;
   auto secured = co_await accept_tls(std::move(accepted->stream), std::move(tls));
   if (!secured) co_return secured.error();
   accepted->stream = std::move(secured->stream);

@@ -100,7 +100,11 @@ awaitable<Result<T>> race(std::vector<Runner<T>> runners, std::chrono::milliseco
       ++started;
       auto& signal = state->attempts.emplace_back();
       // A coroutine uses its slot until its completion handler is called, even one that never waits: that keeps it.
-      const auto keep = [state](std::exception_ptr) {};
+      const auto keep = [state](const std::exception_ptr& thrown) {
+        if (!thrown) return;
+        state->failures.emplace_back("", make_error(ErrorCode::internal_error, "it can't be tried"));
+        state->changed.cancel();
+      };
       asio::co_spawn(executor, std::move(attempt), asio::bind_cancellation_slot(signal.slot(), keep));
       if (state->winner || state->failures.size() != failed) continue;  // it had nothing to wait for
     }

@@ -1,8 +1,10 @@
 #include "node/transport/usb_host.hpp"
 
+#include <boost/asio/co_spawn.hpp>
 #include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <fstream>
+#include <utility>
 
 #include "node/transport/await_tuple.hpp"
 #include "node/transport/usb_claim.hpp"
@@ -133,21 +135,32 @@ awaitable<void> UsbHost::probe(std::shared_ptr<Known> known) {
     known->probed = pipes.error();
 }
 
+awaitable<void> UsbHost::ask_new() {
+  const auto asked = std::make_shared<asio::steady_timer>(*executor_, TimePoint::max());
+  const auto left = std::make_shared<std::size_t>(0);
+  const auto known_now = known_;
+  for (const auto& [place, known] : known_now) {
+    if (known->probed || !known->claim.expired()) continue;
+    ++*left;
+    asio::co_spawn(*executor_, probe(known), [asked, left](const std::exception_ptr&) {
+      --*left;
+      asked->cancel();
+    });
+  }
+  while (*left > 0) co_await asked->async_wait(await_tuple);
+}
+
 awaitable<UsbHost::Found> UsbHost::scan() {
-  if (is_scanning_) {
-    // One that runs already will do: what is plugged in during it shows in the next.
-    while (is_scanning_) co_await scanned_->async_wait(await_tuple);
-  } else {
-    is_scanning_ = true;
+  // One that runs already will do: what is plugged in during it shows in the next.
+  if (!std::exchange(is_scanning_, true)) {
     const auto looked = look();
     problem_ = looked ? "" : looked.error().message;
-    std::vector<std::shared_ptr<Known>> to_ask;
-    for (const auto& [place, known] : known_)
-      if (!known->probed && known->claim.expired()) to_ask.push_back(known);
-    for (const auto& known : to_ask) co_await probe(known);
-    is_scanning_ = false;
-    scanned_->cancel();
+    asio::co_spawn(*executor_, ask_new(), [this](const std::exception_ptr&) {
+      is_scanning_ = false;
+      if (scanned_) scanned_->cancel();
+    });
   }
+  while (is_scanning_) co_await scanned_->async_wait(await_tuple);
   Found found;
   if (!problem_.empty()) found.problems.push_back(problem_);
   for (const auto& [place, known] : known_) {
@@ -158,18 +171,24 @@ awaitable<UsbHost::Found> UsbHost::scan() {
   co_return found;
 }
 
+std::shared_ptr<UsbHost::Known> UsbHost::find(const std::function<bool(const Node&)>& matches) const {
+  for (const auto& [place, known] : known_)
+    if (known->probed && *known->probed &&
+        matches({(*known->probed)->id, (*known->probed)->name, known->device.description()}))
+      return known;
+  return nullptr;
+}
+
 awaitable<Result<std::unique_ptr<ByteStream>>> UsbHost::dial(std::function<bool(const Node&)> matches,
                                                              DialOptions options) {
   const auto deadline = std::chrono::steady_clock::now() + options.timeout;
-  const auto found = co_await scan();
-  std::shared_ptr<Known> chosen;
-  for (const auto& [place, known] : known_) {
-    if (!known->probed || !*known->probed) continue;
-    const Node node{(*known->probed)->id, (*known->probed)->name, known->device.description()};
-    if (matches(node)) {
-      chosen = known;
-      break;
-    }
+  // A device that is known is not kept waiting by others that don't answer.
+  (void)look();  // a failure is the scan's to tell
+  auto chosen = find(matches);
+  Found found;
+  if (!chosen) {
+    found = co_await scan();
+    chosen = find(matches);
   }
   if (!chosen) {
     std::string seen;

@@ -4,6 +4,7 @@
 #include <boost/system/errc.hpp>
 
 #include "node/transport/await_tuple.hpp"
+#include "node/transport/count_guard.hpp"
 
 namespace rr {
 
@@ -47,7 +48,7 @@ awaitable<ReadResult> WebSocketStream::read_some(std::span<std::uint8_t> into) {
 
 std::size_t WebSocketStream::try_write(std::span<const ByteSpan> slices, error_code& error) {
   error = is_broken_ ? error_code(asio::error::broken_pipe) : error_code();
-  if (error || is_writing_) return 0;
+  if (error || !may_write()) return 0;
   // One frame at a time: a client masks what it tries to write, and does so again with what the stream did not take.
   const auto frames = splitter_.split(slices, max_frame_payload);
   if (frames.empty()) return 0;
@@ -58,7 +59,7 @@ std::size_t WebSocketStream::try_write(std::span<const ByteSpan> slices, error_c
 }
 
 awaitable<error_code> WebSocketStream::write(std::span<const ByteSpan> slices) {
-  while (is_writing_) co_await written_.async_wait(await_tuple);
+  while (!is_broken_ && !may_write()) co_await written_.async_wait(await_tuple);
   if (is_broken_) co_return asio::error::broken_pipe;
   const auto frames = splitter_.split(slices);
   if (frames.empty()) co_return error_code();  // an empty frame would end a native peer's connection
@@ -67,7 +68,13 @@ awaitable<error_code> WebSocketStream::write(std::span<const ByteSpan> slices) {
   co_return error;
 }
 
+/// Data does not keep a control frame waiting, for as long as it takes a peer to read all that there is.
+bool WebSocketStream::may_write() const {
+  return !is_writing_ && (controls_ == 0 || splitter_.is_in_frame());
+}
+
 awaitable<error_code> WebSocketStream::write_control(Bytes frame) {
+  const CountGuard waiting(controls_);
   while (!is_broken_ && (is_writing_ || splitter_.is_in_frame())) co_await written_.async_wait(await_tuple);
   if (is_broken_) co_return asio::error::broken_pipe;
   const ByteSpan slice(frame);

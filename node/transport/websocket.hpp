@@ -31,6 +31,7 @@ class WebSocketStream final : public ByteStream {
 
  private:
   /// Waits until no other frame is in the middle of being written.
+  bool may_write() const;
   awaitable<error_code> write_control(Bytes frame);
   awaitable<error_code> write_raw(std::span<const ByteSpan> slices);
 
@@ -42,7 +43,8 @@ class WebSocketStream final : public ByteStream {
   bool takes_close_;
   std::optional<EndReason> violation_;  ///< what the peer did against RFC 6455
   bool is_writing_ = false;
-  bool is_broken_ = false;             ///< closed, or a write ended within a frame: nothing more can be sent
+  std::size_t controls_ = 0;  ///< control frames that wait, or are written: they come before the next frame of data
+  bool is_broken_ = false;    ///< closed, or a write ended within a frame: nothing more can be sent
   boost::asio::steady_timer written_;  ///< cancelled when a write ends, and when the stream is closed
 };
 

@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "core/support/utf8.hpp"
+#include "node/transport/count_guard.hpp"
 
 namespace rr {
 
@@ -183,6 +184,8 @@ awaitable<error_code> WebSocketMessages::write(std::span<const std::string> mess
     slices.emplace_back(headers.back());
     slices.push_back(as_bytes(message));
   }
+  while (!is_broken_ && (is_writing_ || controls_ > 0))
+    co_await written_.async_wait(asio::as_tuple(asio::use_awaitable));
   co_return co_await write_raw(slices);
 }
 
@@ -194,6 +197,7 @@ awaitable<error_code> WebSocketMessages::write_control(WebSocketOpcode opcode, B
   const auto frame = make_control_frame(WebSocketRole::server, opcode, payload);
   const ByteSpan slice(frame);
   const std::span<const ByteSpan> slices(&slice, 1);
+  const CountGuard waiting(controls_);
   co_return co_await write_raw(slices);
 }
 

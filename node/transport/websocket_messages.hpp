@@ -86,6 +86,7 @@ class WebSocketMessages {
   Deadline close_limit_;
   std::optional<EndReason> violation_;
   bool is_writing_ = false;
+  std::size_t controls_ = 0;           ///< control frames that wait, or are written: they come before the next messages
   bool is_broken_ = false;             ///< a write ended in the middle of a frame: nothing more can be sent
   boost::asio::steady_timer written_;  ///< cancelled when a write ends
 };

@@ -1,11 +1,14 @@
 // Discovery without packets: announcements are handed in, nodes are real ones on the loopback.
 #include "node/discovery/discovery.hpp"
 
+#include <boost/asio/bind_cancellation_slot.hpp>
+#include <boost/asio/cancellation_signal.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <catch2/catch.hpp>
 
+#include "node/discovery/ip_discovery.hpp"
 #include "test/node/node/node_fixture.hpp"
 #include "test/node/transport/certificate_lab.hpp"
 
@@ -242,4 +245,31 @@ TEST_CASE("found nodes are asked by TLS where their CA is trusted") {
     while (!found) io.run_one_for(milliseconds(50));
     CHECK(found->size() == (is_trusted ? 1 : 0));
   }
+}
+
+TEST_CASE("discovery that ends leaves no socket that waits for packets") {
+  boost::asio::io_context io(1);
+  IpDiscoveryScopes scopes;
+  scopes.link_local = scopes.site_local = scopes.ipv4_broadcast = false;
+  scopes.node_local = true;
+  {
+    const IpDiscovery ended(io.get_executor(), scopes, true, {[](auto&&...) {}, [] {}, [](auto&&...) {}});
+  }
+  io.run_for(std::chrono::seconds(10));
+  CHECK(io.stopped());
+}
+
+TEST_CASE("a search that is cancelled is not told of nodes any more") {
+  Listener listener;
+  boost::asio::cancellation_signal cancelled;
+  bool is_over = false;
+  boost::asio::co_spawn(listener.io, listener.discovery.find_node_by_name("nobody", {}, std::chrono::seconds(60)),
+                        boost::asio::bind_cancellation_slot(cancelled.slot(), [&](auto&&...) { is_over = true; }));
+  listener.io.poll();
+  cancelled.emit(boost::asio::cancellation_type::terminal);
+  listener.io.restart();
+  listener.io.poll();
+  REQUIRE(is_over);
+  listener.hear(random_node_id(), 1);
+  CHECK(listener.discovery.detected_nodes().size() == 1);
 }

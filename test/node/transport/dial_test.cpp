@@ -10,6 +10,7 @@
 #include <boost/asio/steady_timer.hpp>
 #include <catch2/catch.hpp>
 
+#include "node/transport/race.hpp"
 #include "test/node/node/node_fixture.hpp"
 #include "test/node/transport/sandbox.hpp"
 
@@ -184,4 +185,21 @@ TEST_CASE("heartbeats come as often as client or service want them") {
   options.heartbeat = Heartbeat{milliseconds(50), seconds(15)};
   RunningNode asking(prepare, options);
   CHECK(idle_messages(asking.url("x"), {}) >= 3);
+}
+
+TEST_CASE("a way that throws is one that does not work, and nobody waits for it") {
+  asio::io_context io(1);
+  std::string told;
+  const auto work = [&]() -> awaitable<void> {
+    std::vector<Runner<int>> runners;
+    runners.push_back({"odd", []() -> awaitable<Result<int>> {
+                         throw std::bad_alloc();
+                         co_return 1;
+                       }});
+    const auto winner = co_await race<int>(std::move(runners), milliseconds(1), make_error(ErrorCode::none, ""));
+    told = winner ? "it has won" : winner.error().message;
+  };
+  asio::co_spawn(io, work, asio::detached);
+  io.run_for(seconds(10));
+  CHECK(told == "it can't be tried");
 }

@@ -163,3 +163,33 @@ TEST_CASE("closing lets go of a pong that waits for the end of a frame") {
   CHECK(pair.near.try_write({&slice, 1}, error) == 0);
   CHECK(error);
 }
+
+TEST_CASE("a pong comes before the next frame of who writes without a pause") {
+  Pair pair(WebSocketRole::server);
+  pair.streams.to_server->limit = 10;  // each write waits for the far side
+  bool is_over = false;
+  auto write_on = [](WebSocketStream& stream, bool& is_done) -> awaitable<void> {
+    const std::string text = "payload of a frame";
+    const ByteSpan slice = as_bytes(text);
+    const std::span<const ByteSpan> slices(&slice, 1);
+    for (int i = 0; i < 1000 && !co_await stream.write(slices); ++i) {
+    }
+    is_done = true;
+  };
+  asio::co_spawn(pair.io, write_on(pair.near, is_over), asio::detached);
+  pair.run();
+  const auto ping = make_control_frame(WebSocketRole::client, WebSocketOpcode::ping, as_bytes("hello"));
+  auto& to_client = *pair.streams.to_client;
+  to_client.bytes.assign(ping.begin(), ping.end());
+  const auto data = make_control_frame(WebSocketRole::client, WebSocketOpcode::binary, as_bytes("order"));
+  to_client.bytes.insert(to_client.bytes.end(), data.begin(), data.end());
+  pair.read_near();
+  for (int i = 0; i < 10 && !pair.near_read_is_over; ++i) {
+    to_client.changed.cancel();
+    pair.read_far();
+  }
+  CHECK(pair.near_read_is_over);
+  CHECK_FALSE(is_over);
+  pair.near.close();
+  pair.run();
+}
