@@ -269,7 +269,7 @@ void Access::reload(bool is_forced) {
 }
 
 bool Access::sign_out(const Identity& who) {
-  if (!sign_ins_.end(who.sign_in, std::chrono::system_clock::now())) return false;
+  if (!sign_ins_.end(who, std::chrono::system_clock::now())) return false;
   state_ = std::make_shared<const AccessState>(*state_);  // so that everybody is judged anew
   record({.event = "signed_out", .who = &who});
   return true;

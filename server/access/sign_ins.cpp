@@ -43,11 +43,8 @@ std::optional<std::string> SignIns::extend(std::string_view cookie, Time now) co
   return seal(key_, sign_in_purpose, *found);
 }
 
-bool SignIns::end(const std::string& id, Time now) {
-  if (ended_.size() >= max_ended) std::erase_if(ended_, [now](const auto& item) { return item.second <= now; });
-  if (ended_.size() >= max_ended) return false;
-  ended_.emplace(id, now + lifetime);
-  return true;
+bool SignIns::end(const Identity& who, Time now) {
+  return has_ended(who.sign_in) || ended_.add(who.sign_in, who.subject(), now + lifetime, now);
 }
 
 }  // namespace rrgate

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <chrono>
-#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -10,6 +9,7 @@
 
 #include "core/support/bytes.hpp"
 #include "server/access/identity.hpp"
+#include "server/access/spent_seals.hpp"
 
 namespace rrgate {
 
@@ -31,17 +31,15 @@ class SignIns {
   std::optional<Identity> find(std::string_view cookie, Time now) const;
   /// Another cookie of the same sign-in, where half the time of this one is over. nullopt: not yet, or never.
   std::optional<std::string> extend(std::string_view cookie, Time now) const;
-  /// No cookie of the sign-in is taken any more. False: too many have ended lately.
-  bool end(const std::string& id, Time now);
-  bool has_ended(const std::string& id) const { return ended_.contains(id); }
+  /// No cookie of this sign-in is taken any more. False: too many of the same user have ended lately, or of all.
+  bool end(const Identity& who, Time now);
+  bool has_ended(const std::string& id) const { return ended_.has(id); }
 
  private:
-  static constexpr std::size_t max_ended = 65'536;
-
   std::optional<SealedIdentity> open(std::string_view cookie, Time now) const;
 
   rr::Bytes key_;
-  std::map<std::string, Time, std::less<>> ended_;  ///< until their last cookie would be too late
+  SpentSeals ended_;  ///< until their last cookie would be too late
 };
 
 }  // namespace rrgate

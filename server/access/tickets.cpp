@@ -18,8 +18,7 @@ std::optional<std::string> Tickets::issue(const Identity& who, Time now) const {
 std::optional<Identity> Tickets::redeem(std::string_view ticket, Time now) {
   auto found = unseal(key_, ticket_purpose, ticket, now);
   if (!found) return std::nullopt;
-  if (used_.size() >= max_used) std::erase_if(used_, [now](const auto& item) { return item.second <= now; });
-  if (used_.size() >= max_used || !used_.emplace(std::move(found->id), found->ends).second) return std::nullopt;
+  if (!used_.add(std::move(found->id), found->who.subject(), found->ends, now)) return std::nullopt;
   return std::move(found->who);
 }
 

@@ -3,13 +3,13 @@
 #pragma once
 
 #include <chrono>
-#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
 
 #include "core/support/bytes.hpp"
 #include "server/access/identity.hpp"
+#include "server/access/spent_seals.hpp"
 
 namespace rrgate {
 
@@ -24,14 +24,12 @@ class Tickets {
   /// nullopt: its roles don't fit into a URL.
   std::optional<std::string> issue(const Identity& who, Time now) const;
   /// Who it is for, by what had been shown then; for Access::renew(). Works once. nullopt: of another key, used, too
-  /// late, or too many were used just now.
+  /// late, or too many were used just now, of the same user or of all.
   std::optional<Identity> redeem(std::string_view ticket, Time now);
 
  private:
-  static constexpr std::size_t max_used = 65'536;
-
   rr::Bytes key_;
-  std::map<std::string, Time> used_;  ///< until they would be too late
+  SpentSeals used_;
 };
 
 }  // namespace rrgate

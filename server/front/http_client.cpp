@@ -161,6 +161,7 @@ rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& 
     co_await refuse(response);
     co_return Continuation();
   }
+  const auto kept = destination->device ? destination->device->shared_from_this() : nullptr;
   std::string way(request.header(way_header));
   const bool is_circle = destination->device && destination->device->is_on_way(way);
   if (is_circle) destination->device->note_circle();
@@ -184,6 +185,14 @@ rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& 
     co_return Continuation();
   }
   if (hears_in_session || destination->node) {
+    rr::NodeIdentity self;
+    if (hears_in_session) {  // before the wait: the device may have gone behind it
+      const bool is_stranger = !gateway.access().state().rules.sees_any(request.identity);
+      const auto found = asked_node(request);
+      const auto asked = found ? *found : rr::NodeIdentity();
+      self = is_stranger || !destination->device ? unknown_identity(gateway, asked.id, asked.name)
+                                                 : relayed_identity(gateway, *destination->device);
+    }
     const auto accepted = format_upgrade_response(request);
     if (co_await write_acceptance(gateway, tcp, accepted)) co_return Continuation();
     tcp.put_back(unread);
@@ -191,11 +200,6 @@ rr::awaitable<Continuation> accept_websocket(GatewayState& gateway, Connection& 
     if (hears_in_session) {
       gateway.log_refusal(LogLevel::info, "client refused", connection.client,
                           {{"peer", connection.client}, {"error", allowed.error().message}});
-      const bool is_stranger = !gateway.access().state().rules.sees_any(request.identity);
-      const auto found = asked_node(request);
-      const auto asked = found ? *found : rr::NodeIdentity();
-      auto self = is_stranger ? unknown_identity(gateway, asked.id, asked.name)
-                              : relayed_identity(gateway, *destination->device);
       auto refusal = allowed.error();
       co_return refuse_in_session(gateway, connection, std::move(self), std::move(socket), std::move(refusal));
     }

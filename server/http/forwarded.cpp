@@ -22,8 +22,9 @@ bool share_first_bits(const Bytes& left, const Bytes& right, unsigned bits) {
   return true;
 }
 
-/// Splits at `separator` where it is not inside a quoted string.
-std::vector<std::string_view> split(std::string_view text, char separator) {
+/// Splits at `separator` where it is not inside a quoted string. nullopt: a quote never ends. Who has opened it hides
+/// what the proxies behind him have added.
+std::optional<std::vector<std::string_view>> split_quoted(std::string_view text, char separator) {
   std::vector<std::string_view> out;
   std::size_t begin = 0;
   bool is_quoted = false;
@@ -37,7 +38,18 @@ std::vector<std::string_view> split(std::string_view text, char separator) {
       begin = i + 1;
     }
   }
-  if (begin < text.size()) out.push_back(rr::trim(text.substr(begin)));  // a quote that never ends
+  if (is_quoted) return std::nullopt;
+  return out;
+}
+
+/// Lists of X-Forwarded-For know no quotes.
+std::vector<std::string_view> split(std::string_view text, char separator) {
+  std::vector<std::string_view> out;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const auto end = std::min(text.find(separator, begin), text.size());
+    out.push_back(rr::trim(text.substr(begin, end - begin)));
+    begin = end + 1;
+  }
   return out;
 }
 
@@ -53,14 +65,24 @@ std::string joined(const HttpRequest& request, Name name) {
   return out;
 }
 
+/// "", ":80", and what RFC 7239 calls an obfuscated port: ":_x".
+bool is_port(std::string_view text) {
+  return text.empty() ||
+         (text.size() > 1 && text.front() == ':' && std::all_of(text.begin() + 1, text.end(), [](char c) {
+            return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || c == '-' ||
+                   c == '.';
+          }));
+}
+
 /// "192.0.2.1", "192.0.2.1:80", "[2001:db8::1]:80", "2001:db8::1".
 std::optional<address> parse_node(std::string_view text) {
   if (text.size() >= 2 && text.front() == '"' && text.back() == '"') text = text.substr(1, text.size() - 2);
   if (!text.empty() && text.front() == '[') {
     const auto close = text.find(']');
-    if (close == std::string_view::npos) return std::nullopt;
+    if (close == std::string_view::npos || !is_port(text.substr(close + 1))) return std::nullopt;
     text = text.substr(1, close - 1);
   } else if (const auto colon = text.find(':'); colon != std::string_view::npos && text.rfind(':') == colon) {
+    if (!is_port(text.substr(colon))) return std::nullopt;
     text = text.substr(0, colon);
   }
   boost::system::error_code error;
@@ -76,21 +98,33 @@ struct Hop {
   std::string host;
 };
 
+Hop hop_of_forwarded(std::string_view element) {
+  Hop hop;
+  const auto pairs = split_quoted(element, ';');
+  if (!pairs) return hop;
+  for (const auto pair : *pairs) {
+    const auto equals = pair.find('=');
+    if (equals == std::string_view::npos) continue;
+    const auto name = rr::trim(pair.substr(0, equals));
+    auto value = rr::trim(pair.substr(equals + 1));
+    if (equals_ignoring_case(name, "for")) hop.from = parse_node(value);
+    if (value.size() >= 2 && value.front() == '"' && value.back() == '"') value = value.substr(1, value.size() - 2);
+    if (equals_ignoring_case(name, "proto")) hop.proto = value;
+    if (equals_ignoring_case(name, "host")) hop.host = value;
+  }
+  return hop;
+}
+
+/// Line by line: what a client has sent does not reach into what a proxy has added in a line of its own. A line that is
+/// no list says nothing, and nothing before it is believed.
 std::vector<Hop> hops_of_forwarded(const HttpRequest& request) {
   std::vector<Hop> out;
-  const auto text = joined(request, "Forwarded");
-  for (const auto element : split(text, ',')) {
-    auto& hop = out.emplace_back();
-    for (const auto pair : split(element, ';')) {
-      const auto equals = pair.find('=');
-      if (equals == std::string_view::npos) continue;
-      const auto name = rr::trim(pair.substr(0, equals));
-      auto value = rr::trim(pair.substr(equals + 1));
-      if (equals_ignoring_case(name, "for")) hop.from = parse_node(value);
-      if (value.size() >= 2 && value.front() == '"' && value.back() == '"') value = value.substr(1, value.size() - 2);
-      if (equals_ignoring_case(name, "proto")) hop.proto = value;
-      if (equals_ignoring_case(name, "host")) hop.host = value;
-    }
+  const auto lines = request.message.equal_range("Forwarded");
+  for (auto it = lines.first; it != lines.second; ++it) {
+    const auto elements = split_quoted({it->value().data(), it->value().size()}, ',');
+    if (!elements) out.emplace_back();
+    if (elements)
+      for (const auto element : *elements) out.push_back(hop_of_forwarded(element));
   }
   return out;
 }

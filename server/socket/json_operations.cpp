@@ -16,7 +16,7 @@ namespace asio = boost::asio;
 namespace {
 
 /// Requests that are not answered yet.
-constexpr std::size_t max_running = 64;
+constexpr std::size_t max_running = 64;  ///< and as many that are urgent
 
 /// What has ended a request: also what is nobody's intention, as a lack of memory, whose text is not for the client.
 rr::Error error_of(const std::exception_ptr& thrown) {
@@ -108,7 +108,7 @@ rr::awaitable<void> JsonOperations::take(const std::string& message) {
   const auto* name = request->find("op");
   const auto* operation = name && name->is_string() ? find_operation(name->get_ref<const std::string&>()) : nullptr;
   const bool passes = operation && is_urgent(*request, *operation);
-  if (running_ >= max_running && !passes)
+  if (running_ >= (passes ? 2 * max_running : max_running))
     co_return tell_error(request->id(),
                          rr::make_error(rr::ErrorCode::out_of_system_resource,
                                         "more than " + std::to_string(max_running) + " requests are not answered yet"));

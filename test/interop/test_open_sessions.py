@@ -1,5 +1,6 @@
 """What is open for somebody whose rights change, or whose proof is no longer good."""
 import concurrent.futures
+import http.client
 import json
 import re
 import time
@@ -71,6 +72,24 @@ def test_roles_that_change_hold_in_open_sessions(device, tmp_path):
             (tmp_path / "users.new").rename(tmp_path / "users")
             gateway.wait_for("users and rights read anew")
             assert not may_write()
+
+
+def test_a_command_whose_body_takes_long_needs_the_right_when_it_is_carried_out(device, tmp_path):
+    make_users(tmp_path)
+    with running(tmp_path, device, {"users_file": "users", "rules": RULES}) as gateway:
+        assert ask(gateway.port, "PUT", BASE + "/p_double", 1.5, basic("alice")).status == 204
+        link = http.client.HTTPConnection("127.0.0.1", gateway.port, timeout=20)
+        link.putrequest("PUT", BASE + "/p_double")
+        for name, value in {**basic("alice"), "Content-Type": "application/json", "Content-Length": "4"}.items():
+            link.putheader(name, value)
+        link.endheaders(b" ")
+        time.sleep(0.3)  # its head is judged meanwhile
+        change_roles(tmp_path, "alice", "viewer")
+        gateway.wait_for("users and rights read anew")
+        link.send(b"2.5")
+        assert link.getresponse().status == 403
+        link.close()
+        assert ask(gateway.port, "GET", BASE + "/p_double", headers=basic("root")).json == 1.5
 
 
 def change_roles(folder, name, role):

@@ -87,6 +87,15 @@ TEST_CASE("X-Forwarded headers of a trusted proxy") {
     CHECK(seen({{"X-Forwarded-For", "192.0.2.7, unknown"}}).peer == "10.0.0.1:40000");
     CHECK(seen({{"X-Forwarded-For", ""}}).peer == "10.0.0.1:40000");
   }
+  SECTION("a client hides nothing that proxies add behind what it has sent") {
+    for (const auto* sent : {"[6.6.6.6]\"", "6.6.6.6:\"", "\"6.6.6.6", "6.6.6.6\\", "\"6.6.6.6\\"}) {
+      INFO(sent);
+      CHECK(seen({{"X-Forwarded-For", sent + std::string(", 192.0.2.7")}}).peer == "192.0.2.7");
+      CHECK(seen({{"X-Forwarded-For", sent}, {"X-Forwarded-For", "192.0.2.7"}}).peer == "192.0.2.7");
+    }
+    for (const auto* wrong : {"[2001:db8::1]x", "6.6.6.6:80x!", "[2001:db8::1"})
+      CHECK(seen({{"X-Forwarded-For", wrong}}).peer == "10.0.0.1:40000");
+  }
   SECTION("the other kind is not read") {
     CHECK(seen({{"Forwarded", "for=6.6.6.6"}, {"X-Forwarded-For", "192.0.2.7"}}).peer == "192.0.2.7");
     CHECK(seen({{"Forwarded", "for=192.0.2.7"}, {"X-Forwarded-For", "6.6.6.6"}}, "10.0.0.1", ForwardedBy::forwarded)
@@ -109,6 +118,16 @@ TEST_CASE("Forwarded of a trusted proxy") {
   CHECK(arrival.host == "lab.example:444");
   CHECK(seen({{"Forwarded", "for=_hidden, for=\"never ends"}}, "10.0.0.1", ForwardedBy::forwarded).peer ==
         "10.0.0.1:40000");
+  const std::string hiding = R"(for=6.6.6.6;proto=https;x=")";
+  for (const auto* added : {"for=192.0.2.7", R"(for="[2001:db8::7]")", R"(for="[2001:db8::7]";host="a:1")"}) {
+    const auto one_line = seen({{"Forwarded", hiding + ", " + added}}, "10.0.0.1", ForwardedBy::forwarded);
+    CHECK(one_line.peer == "10.0.0.1:40000");
+    CHECK_FALSE(one_line.is_encrypted);
+    const auto two_lines = seen({{"Forwarded", hiding}, {"Forwarded", added}}, "10.0.0.1", ForwardedBy::forwarded);
+    CHECK(two_lines.peer != "6.6.6.6");
+    CHECK(two_lines.peer != "10.0.0.1:40000");
+    CHECK_FALSE(two_lines.is_encrypted);
+  }
 }
 
 TEST_CASE("the base path is taken from the front of paths") {

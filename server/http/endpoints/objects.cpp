@@ -297,11 +297,19 @@ rr::awaitable<void> serve(GatewayState& gateway, ResponseWriter& writer, std::ve
       if (status < 400) return entry->finish({});
       entry->finish(Outcome::error, error ? error->message : "answered with status " + std::to_string(status));
     });
-  if (target)
+  if (target && !writer.is_at_work()) {
+    Standing standing(gateway.access(), writer.request().identity);
     if (const auto failed = co_await writer.read_body()) {
       co_await writer.send(*failed);
       co_return;
     }
+    // A body may take minutes, in which a right may be taken away.
+    const auto still = standing.check(access_request(*target, verb_of(request, *target)), Recorded::never);
+    if (!still) {
+      co_await refuse(gateway, writer, still.error());
+      co_return;
+    }
+  }
   try {
     if (target) co_await serve_target(request, *target);
   } catch (const rr::Exception& exception) {

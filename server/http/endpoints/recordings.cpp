@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <fstream>
-#include <numeric>
 
 #include "core/session/service/service_index.hpp"
 #include "server/access/standing.hpp"
@@ -212,15 +211,21 @@ Handler recordings_endpoint(GatewayState& gateway) {
   return [&gateway](const Request& request, std::string_view) {
     const auto& limits = gateway.config().recordings;
     const auto& rules = gateway.access().state().rules;
+    if (!rules.sees_any(request.identity))
+      return gateway.http_access().refusal(
+          request, rr::make_error(rr::ErrorCode::permission_denied, "you may use nothing here"));
     Json out;
-    const auto all = gateway.recordings().list();
     out["enabled"] = !limits.folder.empty();
-    out["bytes"] = std::accumulate(all.begin(), all.end(), std::uint64_t{0},
-                                   [](std::uint64_t sum, const auto& each) { return sum + each.bytes(); });
+    std::uint64_t bytes = 0;
+    auto list = Json::array();
+    for (const auto& each : gateway.recordings().list()) {
+      if (!rules.check(request.identity, wanted_of(each))) continue;
+      bytes += each.bytes();
+      list.push_back(described(each));
+    }
+    out["bytes"] = bytes;
     out["max_bytes"] = limits.max_bytes;
-    auto& list = out["recordings"] = Json::array();
-    for (const auto& each : all)
-      if (rules.check(request.identity, wanted_of(each))) list.push_back(described(each));
+    out["recordings"] = std::move(list);
     auto response = json_answer(200, out);
     response.set("Cache-Control", "no-store");
     return response;

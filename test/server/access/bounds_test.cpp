@@ -150,13 +150,45 @@ TEST_CASE("tickets: once, soon, and by gateways of one key") {
 
 TEST_CASE("tickets: those that were used are kept until they would be too late, and no more than fit") {
   Tickets tickets(rr::Bytes(32, 1));
-  const auto use = [&](seconds at) {
-    return tickets.redeem(tickets.issue({}, day + at).value(), day + at).has_value();
+  const auto use = [&](const std::string& name, seconds at) {
+    Identity who;
+    who.name = name;
+    who.proof = Proof::password;
+    return tickets.redeem(tickets.issue(who, day + at).value(), day + at).has_value();
   };
-  int used = 0;
-  while (used < 70'000 && use(seconds(0))) ++used;
-  CHECK(used == 65'536);
-  CHECK(use(seconds(31)));
+  std::size_t used = 0;
+  while (used < 70'000 && use("alice", seconds(0))) ++used;
+  CHECK(used == SpentSeals::most_of_subject);
+  CHECK(use("bob", seconds(0)));  // whatever alice does
+  ++used;
+  for (int user = 0; used < SpentSeals::most && user < 20; ++user)
+    while (use("user" + std::to_string(user), seconds(0))) ++used;
+  CHECK(used == SpentSeals::most);
+  CHECK_FALSE(use("carol", seconds(0)));
+  CHECK(use("alice", seconds(31)));
+}
+
+TEST_CASE("sign-ins: what has ended is kept until it would be too late; who signs out without end stops nobody else") {
+  SignIns sign_ins(rr::Bytes(32, 7));
+  const auto sign_out = [&](const std::string& name, std::size_t number, SignIns::Time at = day) {
+    Identity who;
+    who.name = name;
+    who.proof = Proof::password;
+    who.sign_in = name + std::to_string(number);
+    return sign_ins.end(who, at);
+  };
+  std::size_t ended = 0;
+  while (ended < 70'000 && sign_out("alice", ended)) ++ended;
+  CHECK(ended == SpentSeals::most_of_subject);
+  CHECK(sign_out("alice", 0));  // it has ended
+  CHECK(sign_out("bob", 0));
+  CHECK(sign_ins.has_ended("bob0"));
+  for (int user = 0; user < 20; ++user)
+    for (std::size_t i = 0; sign_out("user" + std::to_string(user) + "-", i); ++i) ++ended;
+  CHECK(ended + 1 == SpentSeals::most);
+  CHECK_FALSE(sign_out("carol", 0));
+  CHECK(sign_out("carol", 0, day + std::chrono::hours(9)));
+  CHECK_FALSE(sign_ins.has_ended("alice0"));
 }
 
 TEST_CASE("sign-ins: for hours, by gateways of one key, and for nothing else") {
@@ -216,20 +248,11 @@ TEST_CASE("sign-ins: with use they go on for a week, and end with all their cook
 
   const auto other = sign_ins.begin(alice, day).value();
   const auto second = sign_ins.extend(first, day + hours(5)).value();
-  CHECK(sign_ins.end(sign_ins.find(first, day)->sign_in, day));
+  CHECK(sign_ins.end(*sign_ins.find(first, day), day));
   CHECK_FALSE(sign_ins.find(first, day));
   CHECK_FALSE(sign_ins.find(second, day));
   CHECK_FALSE(sign_ins.extend(first, day + hours(5)));
   CHECK(sign_ins.find(other, day));
-}
-
-TEST_CASE("sign-ins: what has ended is kept until it would be too late, and no more than fit") {
-  SignIns sign_ins(rr::Bytes(32, 7));
-  int ended = 0;
-  while (ended < 70'000 && sign_ins.end(std::to_string(ended), day)) ++ended;
-  CHECK(ended == 65'536);
-  CHECK(sign_ins.end("another", day + std::chrono::hours(9)));
-  CHECK_FALSE(sign_ins.has_ended("0"));
 }
 
 TEST_CASE("requests of access: asked, decided, fetched once") {
