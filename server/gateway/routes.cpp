@@ -67,6 +67,7 @@ std::vector<Route> list_routes(GatewayState& gateway) {
       {post, "/api/v1/access/requests/*", with_body(request_endpoint(gateway))},
       {get, "/api/v1/agents/approvals", approvals_endpoint(gateway)},
       {post, "/api/v1/agents/approvals/*", with_body(approval_endpoint(gateway))},
+      {get, "/api/v1/agents/sessions", agent_sessions_endpoint(gateway)},
       {post, "/api/v1/agents/stop", with_body(stop_agents_endpoint(gateway))},
       {post, std::string(mcp_path), mcp_endpoint(gateway)},
       {delete_, std::string(mcp_path), end_mcp_endpoint(gateway)},

@@ -13,7 +13,6 @@ namespace rrgate {
 
 namespace {
 
-constexpr std::size_t longest_text = 1000;
 constexpr std::size_t page_items = 50;
 
 void add_text(rr::OrderedJson& out, const std::string& documentation) {
@@ -142,14 +141,13 @@ std::vector<Verb> uses_of(const rr::MemberDefinition& member) {
   return out;
 }
 
-std::string bounded_text(std::string_view text) {
+std::string bounded_text(std::string_view text, std::size_t most) {
   constexpr std::string_view replacement = "\xEF\xBF\xBD";  // U+FFFD, for each byte that is no character's
   std::string out;
   while (!text.empty()) {
     const auto size = rr::utf8_character_size(text);
     const auto character = size == 0 ? replacement : text.substr(0, size);
-    if (out.size() + character.size() > longest_text)
-      return out + " ... (" + std::to_string(text.size()) + " bytes more)";
+    if (out.size() + character.size() > most) return out + " ... (" + std::to_string(text.size()) + " bytes more)";
     out += character;
     text.remove_prefix(std::max<std::size_t>(1, size));
   }

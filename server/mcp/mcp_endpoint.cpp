@@ -32,6 +32,9 @@ constexpr int resource_not_found = -32002;
 constexpr int header_mismatch = -32020;
 constexpr int unsupported_version = -32022;
 
+/// Of what an agent says, for people who look at a list of it.
+constexpr std::size_t longest_shown = 200;
+
 /// Of a progressToken, which is sent back each second.
 constexpr std::size_t longest_token = 256;
 
@@ -140,11 +143,76 @@ rr::OrderedJson capabilities() {
 }
 
 /// What the requests of a client are known by, from which it may cancel others: nobody else knows the id, and with
-/// another login it is another session. Empty: it has none. The gateway keeps nothing of it.
-std::string session_of(const Request& request) {
-  const auto id = request.header(session_header);
+/// another login it is another session. Empty: it has none.
+std::string session_of(std::string_view id, const Request& request) {
   return id.empty() ? std::string() : std::string(id) + "\n" + request.identity.name;
 }
+
+std::string session_of(const Request& request) {
+  return session_of(request.header(session_header), request);
+}
+
+/// What an agent calls itself: at the handshake, or in each message. Empty: it does not say.
+std::string program_of(const McpMessage& message) {
+  const auto part = [](const rr::Json& of, const char* key) {
+    const auto found = of.is_object() ? of.find(key) : of.end();
+    return found == of.end() ? rr::Json() : *found;
+  };
+  const auto said = message.is_modern ? part(part(message.params, "_meta"), "io.modelcontextprotocol/clientInfo")
+                                      : part(message.params, "clientInfo");
+  std::string out;
+  for (const auto* key : {"name", "version"})
+    if (const auto text = part(said, key); text.is_string())
+      out += (out.empty() ? "" : " ") + bounded_text(text.get<std::string>(), longest_shown);
+  return out;
+}
+
+/// Who asks, for the list of those who have been here. `session`  empty: an agent without is known by its address.
+AgentSessionPtr visit(GatewayState& gateway, const Request& request, const McpMessage& message,
+                      const std::string& session) {
+  const auto& user = request.identity.name;
+  const auto client = request.origin().network;
+  auto agent = gateway.agent_sessions().visit(session.empty() ? client + "\n" + user : session, user, client);
+  if (auto program = program_of(message); !program.empty()) agent->program = std::move(program);
+  return agent;
+}
+
+std::string shown(const rr::Json& arguments, const char* key) {
+  const auto found = arguments.find(key);
+  if (found == arguments.end()) return {};
+  return bounded_text(found->is_string() ? found->get<std::string>() : rr::write_json(*found), longest_shown);
+}
+
+/// A command in that list, from when it is asked for until this ends.
+class ShownCommand {
+ public:
+  ShownCommand(AgentSession& agent, const std::string& tool, const rr::Json& arguments)
+      : command_(agent.begin_command({.tool = tool,
+                                      .device = shown(arguments, "device"),
+                                      .path = shown(arguments, "path"),
+                                      .values = shown(arguments, tool == "set" ? "value" : "args")})) {}
+  ShownCommand(const ShownCommand&) = delete;
+  ShownCommand& operator=(const ShownCommand&) = delete;
+  ~ShownCommand() {
+    if (command_->state == AgentCommand::State::running) end(AgentCommand::State::failed, "it broke off");
+  }
+
+  void finish(const rr::OrderedJson& result) {
+    const auto& said = result["structuredContent"];
+    if (!result["isError"].get<bool>())
+      return end(AgentCommand::State::done, said.contains("would_send") ? "dry run: nothing was sent" : "");
+    const auto& error = said["error"];
+    end(AgentCommand::State::failed, error[error.contains("message") ? "message" : from_device].get<std::string>());
+  }
+
+ private:
+  void end(AgentCommand::State state, std::string_view detail) {
+    command_->state = state;
+    command_->detail = bounded_text(detail, longest_shown);
+  }
+
+  std::shared_ptr<AgentCommand> command_;
+};
 
 /// A request that the client cancels ends as if the client had gone.
 void cancel(AgentRequests& requests, const McpMessage& message, const std::string& session) {
@@ -261,7 +329,8 @@ rr::awaitable<rr::OrderedJson> subscribe(GatewayState& gateway, McpTools& tools,
 }
 
 /// Throws   McpRefusal, rr::Exception.
-rr::awaitable<rr::OrderedJson> result_of(GatewayState& gateway, McpReply& reply, const McpMessage& message) {
+rr::awaitable<rr::OrderedJson> result_of(GatewayState& gateway, McpReply& reply, const McpMessage& message,
+                                         AgentSession& agent) {
   const auto& who = reply.request().identity;
   const auto& method = message.method;
   if (method == "initialize") co_return initialize(message);
@@ -275,6 +344,7 @@ rr::awaitable<rr::OrderedJson> result_of(GatewayState& gateway, McpReply& reply,
   if (method == "resources/templates/list") co_return resource_templates();
   McpTools tools(gateway, reply);
   if (method == "resources/read") {
+    ++agent.reads;
     const auto uri = message.text("uri");
     std::optional<McpRefusal> refusal;
     rr::OrderedJson read;
@@ -291,7 +361,13 @@ rr::awaitable<rr::OrderedJson> result_of(GatewayState& gateway, McpReply& reply,
     const auto found = message.params.find("arguments");
     const auto arguments = found == message.params.end() ? rr::Json::object() : *found;
     if (!arguments.is_object()) throw McpRefusal{invalid_params, "\"arguments\" is no object"};
+    std::optional<ShownCommand> command;
+    if (McpTools::is_command(name))
+      command.emplace(agent, name, arguments);
+    else
+      ++agent.reads;
     auto result = co_await tools.call(name, arguments);
+    if (result && command) command->finish(*result);
     if (!result) throw McpRefusal{invalid_params, "there is no tool " + rr::quote(name) + "; tools/list names them"};
     co_return std::move(*result);
   }
@@ -315,7 +391,7 @@ rr::awaitable<void> answer_message(GatewayState& gateway, ResponseWriter& writer
   try {
     message = read_message(writer.request());
     take_revision(message, writer.request());
-    const auto session = session_of(writer.request());
+    auto session = session_of(writer.request());
     auto& requests = gateway.agent_requests();
     if (message.id.is_null()) {
       if (message.method == "notifications/cancelled") cancel(requests, message, session);
@@ -327,8 +403,13 @@ rr::awaitable<void> answer_message(GatewayState& gateway, ResponseWriter& writer
     reply.set_progress(progress_token(message));
     AgentRequests::Handle under_way;
     if (!session.empty()) under_way = requests.add(session, message.id.dump(), reply.canceller());
-    if (message.method == "initialize") writer.add_header(session_header, rr::encode_base64(rr::random_bytes(18)));
-    auto result = co_await result_of(gateway, reply, message);
+    if (message.method == "initialize") {
+      const auto begun = rr::encode_base64(rr::random_bytes(18));
+      writer.add_header(session_header, begun);
+      session = session_of(begun, writer.request());
+    }
+    const auto agent = visit(gateway, writer.request(), message, session);
+    auto result = co_await result_of(gateway, reply, message, *agent);
     if (message.is_modern) {
       rr::add_key(result, "resultType") = "complete";
       rr::add_key(result, "ttlMs") = 0;  // what there is, and what the asker may do, can change at any time
@@ -400,6 +481,7 @@ rr::awaitable<void> end_session(GatewayState& gateway, ResponseWriter& writer) {
   if (const auto session = session_of(writer.request()); !session.empty()) {
     gateway.agent_requests().cancel_all(session);
     gateway.agent_subscriptions().end(session);
+    gateway.agent_sessions().end(session);
   }
   Response response;
   response.status = 204;

@@ -21,7 +21,7 @@ namespace {
 constexpr std::uint64_t most_read_bytes = 32u * 1024 * 1024;
 constexpr std::size_t most_members = 1000;
 /// Of a value's JSON: an answer has no room for more.
-constexpr std::size_t largest_value = 64u * 1024;
+constexpr std::size_t largest_recorded = 64u * 1024;
 /// One agent reads at a time: the others get their turn, or give up.
 constexpr std::chrono::seconds longest_turn_wait{10};
 
@@ -101,7 +101,7 @@ struct RecordedValues {  // NOLINT(bugprone-exception-escape): the JSON of its v
 
 rr::Result<> add_values(Recording& recording, const RecordedMember& member, RecordedValues& values) {
   return recording.for_each(member, [&](const McapMessage& message) -> rr::Result<> {
-    if (message.data.size() > largest_value) {
+    if (message.data.size() > largest_recorded) {
       ++values.too_large;
       return {};
     }

@@ -82,7 +82,7 @@ const McpTools::Tool McpTools::tools[] = {
            "dry_run": {"type": "boolean", "description": "true: nothing is done; the answer says what would be sent"}},
            "required": ["device", "path", "why"], "additionalProperties": false},
          "annotations": {"readOnlyHint": false, "destructiveHint": true, "idempotentHint": false, "openWorldHint": false}})",
-     &McpTools::call_function},
+     &McpTools::call_function, true},
     {"set",
      R"({"title": "Set a property",
          "description": "Sets a property, which may move a robot. On the same terms as \"call\".",
@@ -94,7 +94,7 @@ const McpTools::Tool McpTools::tools[] = {
            "dry_run": {"type": "boolean", "description": "true: nothing is done; the answer says what would be sent"}},
            "required": ["device", "path", "value", "why"], "additionalProperties": false},
          "annotations": {"readOnlyHint": false, "destructiveHint": true, "idempotentHint": true, "openWorldHint": false}})",
-     &McpTools::set_property},
+     &McpTools::set_property, true},
     {"stop",
      R"({"title": "Stop",
          "description": "Makes an object safe at once, and all below it, whoever commands it now: the values that the operator has declared safe are sent. Always allowed.",
@@ -103,7 +103,7 @@ const McpTools::Tool McpTools::tools[] = {
            "path": {"type": "string", "description": "SERVICE or SERVICE/OBJECT"}},
            "required": ["device", "path"], "additionalProperties": false},
          "annotations": {"readOnlyHint": false, "destructiveHint": false, "idempotentHint": true, "openWorldHint": false}})",
-     &McpTools::stop},
+     &McpTools::stop, true},
 };
 
 rr::OrderedJson McpTools::list() {
@@ -116,6 +116,11 @@ rr::OrderedJson McpTools::list() {
   auto out = rr::OrderedJson::object();
   rr::add_key(out, "tools") = std::move(list);
   return out;
+}
+
+bool McpTools::is_command(std::string_view name) {
+  return std::any_of(std::begin(tools), std::end(tools),
+                     [&](const Tool& each) { return each.name == name && each.is_command; });
 }
 
 rr::awaitable<std::optional<rr::OrderedJson>> McpTools::call(const std::string& name, const rr::Json& arguments) {

@@ -21,6 +21,8 @@ class McpTools {
 
   /// The result of tools/list. The same for all devices: nothing of theirs is in it.
   static rr::OrderedJson list();
+  /// Whether there is such a tool, and it does more than read.
+  static bool is_command(std::string_view name);
   /// The result of tools/call: what a tool can't do is one too. nullopt: there is no such tool.
   /// `arguments`  borrowed for the wait.
   rr::awaitable<std::optional<rr::OrderedJson>> call(const std::string& name, const rr::Json& arguments);
@@ -52,6 +54,7 @@ class McpTools {
     std::string_view name;
     const char* definition;  ///< JSON, but for the name
     Perform perform;
+    bool is_command = false;
   };
   static const Tool tools[];
 

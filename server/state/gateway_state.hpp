@@ -19,6 +19,7 @@
 #include "server/rr/shared_devices.hpp"
 #include "server/state/admission.hpp"
 #include "server/state/agent_requests.hpp"
+#include "server/state/agent_sessions.hpp"
 #include "server/state/agent_subscriptions.hpp"
 #include "server/state/connection.hpp"
 #include "server/state/handshake_turns.hpp"
@@ -77,6 +78,8 @@ class GatewayState {
   Approvals& approvals() { return approvals_; }
   /// What agents wait for.
   AgentRequests& agent_requests() { return agent_requests_; }
+  /// Which agents have been here, and what they have commanded.
+  AgentSessions& agent_sessions() { return agent_sessions_; }
   /// What agents want to be told of.
   AgentSubscriptions& agent_subscriptions() { return agent_subscriptions_; }
   /// Agents that read recordings now.
@@ -107,6 +110,7 @@ class GatewayState {
   Access access_;
   Approvals approvals_;
   AgentRequests agent_requests_;
+  AgentSessions agent_sessions_;
   AgentSubscriptions agent_subscriptions_;
   RateGate recording_readers_;
   Logins logins_;

@@ -36,6 +36,8 @@ def test_everybody_sees_what_he_may(guarded):
         assert refused.headers["Content-Type"] == "application/problem+json"
     for path in ("/healthz", "/readyz"):
         assert ask(port, "GET", path).status == 200, path
+    assert ask(port, "GET", "/api/v1/recordings").status == 401
+    assert ask(port, "GET", "/api/v1/recordings", headers=basic("vera")).json["recordings"] == []
     devices = ask(port, "GET", "/api/v1/devices", headers=basic("vera")).json["devices"]
     assert [each["name"] for each in devices] == ["interop"]
     who = ask(port, "GET", "/api/v1/access", headers=basic("alice")).json
@@ -221,6 +223,20 @@ def test_a_token_gets_nothing_by_the_name_that_its_client_has_chosen(device, tmp
         assert ask(gateway.port, "PUT", BASE + "/p_double", 1, basic("vera")).status == 204
         (approved,) = (line for line in audit_of(gateway, lambda lines: lines[-1]["event"] == "write") if line["event"] == "approved")
         assert approved["user"] == "root" and "roles viewer, until 2" in approved["detail"]
+
+
+def test_a_body_that_is_too_large_is_refused_as_the_document_says(device, tmp_path):
+    make_users(tmp_path)
+    (tmp_path / "tokens").touch(0o600)
+    with running(tmp_path, device, {"users_file": "users", "tokens_file": "tokens", "rules": RULES}) as gateway:
+        paths = ask(gateway.port, "GET", "/api/v1/openapi.json").json["paths"]
+        posted = {path.replace("{", "").replace("}", ""): each["post"] for path, each in paths.items() if "post" in each}
+        assert len(posted) >= 10
+        del posted["/api/v1/tickets"]  # takes none
+        for path, operation in posted.items():
+            refused = ask(gateway.port, "POST", path, "x" * 70_000, basic("root"))
+            assert str(refused.status) in operation["responses"], (path, refused)
+            assert refused.status in (404, 413), (path, refused)
 
 
 def test_the_gateways_document_is_kept_with_users_and_rights(device, tmp_path):

@@ -16,6 +16,7 @@ from shared_sites import Site
 
 SPEED = {"roles": ["agent"], "paths": ["plain"], "members": ["speed"], "may": ["write"]}
 APPROVALS = "/api/v1/agents/approvals"
+SESSIONS = "/api/v1/agents/sessions"
 
 
 def rule(**terms):
@@ -87,8 +88,8 @@ def test_the_token_of_an_agent_commands_nothing_by_any_other_face(lab):
     with Socket(made.port, PLAIN, additional_headers=made.agent) as socket:
         assert socket.refusal("set", "speed", value=1)[0] == "PermissionDenied"
         assert socket.refusal("lease", deadman=1000)[0] == "PermissionDenied"
-    for path in (APPROVALS, "/api/v1/agents/stop"):
-        assert ask(made.port, "GET" if path == APPROVALS else "POST", path, headers=made.agent).status == 403
+    for method, path in (("GET", APPROVALS), ("GET", SESSIONS), ("POST", "/api/v1/agents/stop")):
+        assert ask(made.port, method, path, headers=made.agent).status == 403
     assert made.has_never_moved()
 
 
@@ -275,6 +276,22 @@ def test_an_agent_is_told_what_it_may_and_on_which_terms(lab):
     (speed,) = described.structured_content["members"]
     assert speed["may"] == ["read", "write"]
     assert speed["terms"] == {"limits": {"speed": [0, 1]}, "approval": "ask", "lease": False}
+
+
+def test_a_person_sees_which_agents_have_been_here_and_what_they_have_commanded(lab):
+    made = lab(rule(approval="none", hold_seconds=0))
+    call(made.port, "read", made.agent, device="interop", path="plain/speed")
+    assert not made.set(1).is_error
+    assert made.set(3).is_error
+    assert not made.set(2, dry_run=True).is_error
+    sessions = ask(made.port, "GET", SESSIONS, headers=made.admin).json["sessions"]
+    assert all(each["user"] == "agent" and each["client"] == "127.0.0.1" and each["program"] for each in sessions)
+    assert [sum(each[count] for each in sessions) for count in ("reads", "commands")] == [1, 3]
+    dry, refused, done = (each["last_commands"][0] for each in sessions if each["commands"])
+    assert done == {"ago": done["ago"], "tool": "set", "device": "interop", "path": "plain/speed", "values": "1",
+                    "state": "done", "detail": ""} and done["ago"] < 30
+    assert (refused["values"], refused["state"]) == ("3", "failed") and "0.0 to 2.0" in refused["detail"]
+    assert (dry["state"], dry["detail"]) == ("done", "dry run: nothing was sent")
 
 
 def test_agents_write_to_nothing_but_properties_and_call_no_generators(lab):

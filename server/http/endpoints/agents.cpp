@@ -19,6 +19,10 @@ std::int64_t seconds_until(Clock::time_point end) {
   return std::max<std::int64_t>(0, std::chrono::ceil<std::chrono::seconds>(end - Clock::now()).count());
 }
 
+double seconds_from(std::chrono::steady_clock::time_point begin, std::chrono::steady_clock::time_point now) {
+  return static_cast<double>(std::chrono::floor<std::chrono::milliseconds>(now - begin).count()) / 1e3;
+}
+
 rr::OrderedJson described(const Approval& approval) {
   const auto& command = approval.command;
   return {{"id", approval.id},
@@ -31,6 +35,31 @@ rr::OrderedJson described(const Approval& approval) {
           {"values", rr::OrderedJson::parse(command.values)},
           {"why", command.why},
           {"expires_in", seconds_until(approval.ends)}};
+}
+
+rr::OrderedJson described(const AgentCommand& command, std::chrono::steady_clock::time_point now) {
+  constexpr std::string_view states[] = {"running", "done", "failed"};
+  return {{"ago", seconds_from(command.at, now)},
+          {"tool", command.tool},
+          {"device", command.device},
+          {"path", command.path},
+          {"values", command.values},
+          {"state", std::string(states[static_cast<std::size_t>(command.state)])},
+          {"detail", command.detail}};
+}
+
+rr::OrderedJson described(const AgentSession& session, std::chrono::steady_clock::time_point now) {
+  auto commands = rr::OrderedJson::array();
+  for (const auto& each : session.last_commands) commands.push_back(described(*each, now));
+  return {{"user", session.user},
+          {"client", session.client},
+          {"program", session.program},
+          {"begun_ago", seconds_from(session.begun, now)},
+          {"used_ago", seconds_from(session.used, now)},
+          {"ended", session.has_ended},
+          {"reads", session.reads},
+          {"commands", session.commands},
+          {"last_commands", std::move(commands)}};
 }
 
 /// Of a body. Errors   invalid_argument.
@@ -85,6 +114,20 @@ Handler approvals_endpoint(GatewayState& gateway) {
     auto out = rr::OrderedJson::object();
     rr::add_key(out, "approvals") = std::move(list);
     rr::add_key(out, "stopped_for") = seconds_until(gateway.approvals().stopped_until());
+    auto response = json_answer(200, out);
+    response.set("Cache-Control", "no-store");
+    return response;
+  };
+}
+
+Handler agent_sessions_endpoint(GatewayState& gateway) {
+  return [&gateway](const Request& request, std::string_view) {
+    if (auto refusal = refuse_who_may_not_admin(gateway, request)) return std::move(*refusal);
+    auto list = rr::OrderedJson::array();
+    const auto now = std::chrono::steady_clock::now();
+    for (const auto& each : gateway.agent_sessions().list()) list.push_back(described(*each, now));
+    auto out = rr::OrderedJson::object();
+    rr::add_key(out, "sessions") = std::move(list);
     auto response = json_answer(200, out);
     response.set("Cache-Control", "no-store");
     return response;

@@ -12,6 +12,9 @@ class GatewayState;
 Handler approvals_endpoint(GatewayState& gateway);
 /// POST /api/v1/agents/approvals/ID {"answer": "once", "minutes" or "deny", "minutes": N}, for admins: {"state"}.
 Handler approval_endpoint(GatewayState& gateway);
+/// GET /api/v1/agents/sessions, for admins: {"sessions": [{"user", "client", "program", "begun_ago", "used_ago",
+/// "ended", "reads", "commands", "last_commands": [{"ago", "tool", "device", "path", "values", "state", "detail"}]}]}.
+Handler agent_sessions_endpoint(GatewayState& gateway);
 /// POST /api/v1/agents/stop {"minutes": N}, for admins: {"ended": commands, "stopped_for": seconds}. 0 minutes: what
 /// goes on ends, and agents may go on.
 Handler stop_agents_endpoint(GatewayState& gateway);

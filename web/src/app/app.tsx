@@ -66,18 +66,20 @@ export function App({ route, list, usb, access, agents, recordings, session }: A
       <main id="main" ref={main} tabIndex={-1}>
         {isForm && <SignInPage session={session} done={() => setAsked(false)} />}
         {!isForm && <AgentsPart agents={agents} />}
-        {!isForm && <Page route={where} list={list} usb={usb} access={access} recordings={recordings} />}
+        {!isForm && (
+          <Page route={where} list={list} usb={usb} access={access} agents={agents} recordings={recordings} />
+        )}
       </main>
     </>
   );
 }
 
-type PageParts = Omit<AppParts, "route" | "session" | "agents"> & { route: Route };
+type PageParts = Omit<AppParts, "route" | "session"> & { route: Route };
 
-function Page({ route: where, list, usb, access, recordings }: PageParts) {
+function Page({ route: where, list, usb, access, agents, recordings }: PageParts) {
   return (
     <>
-      {where.page === "devices" && <DevicesPage list={list} usb={usb} access={access} />}
+      {where.page === "devices" && <DevicesPage list={list} usb={usb} access={access} agents={agents} />}
       {where.page === "recordings" && <RecordingsPage desk={recordings} list={list} />}
       {where.page === "service" && <ServicePage key={`${where.device}/${where.service}`} route={where} list={list} />}
       {where.page === "unknown" && <UnknownPage address={where.address} />}

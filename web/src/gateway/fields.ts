@@ -7,3 +7,7 @@ export function isRecord(value: unknown): value is Record<string, unknown> {
 export function text(value: unknown): string {
   return typeof value === "string" ? value : "";
 }
+
+export function count(value: unknown): number {
+  return typeof value === "number" ? value : 0;
+}

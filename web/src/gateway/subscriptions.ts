@@ -2,7 +2,7 @@
 // Layer: web/gateway. Source: GET /api/v1/devices/NAME/subscriptions.
 
 import { Store } from "../app/store";
-import { isRecord, text } from "./fields";
+import { count, isRecord, text } from "./fields";
 import { Poller, reasonOf } from "./poller";
 import { problemOf, session } from "./session";
 
@@ -100,8 +100,4 @@ export function readSubscriptions(answer: unknown): Subscription[] {
 
 function compare(a: string, b: string): number {
   return a < b ? -1 : a > b ? 1 : 0;
-}
-
-function count(value: unknown): number {
-  return typeof value === "number" ? value : 0;
 }

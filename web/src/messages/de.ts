@@ -425,6 +425,14 @@ const german: Readonly<Record<string, string>> = {
   "still {0} to answer": "noch {0} für eine Antwort",
   "Allow once": "Einmal erlauben",
   "Allow for {0} minutes": "Für {0} Minuten erlauben",
+  "What agents do": "Was Agenten tun",
+  "The gateway knows of no agent now.": "Das Gateway weiß jetzt von keinem Agenten.",
+  "The agents that were here last, and the last commands of each.":
+    "Die Agenten, die zuletzt hier waren, und die letzten Befehle von jedem.",
+  "since {0}, last heard {1} ago; reads: {2}, commands: {3}":
+    "seit {0}, zuletzt gehört vor {1}; gelesen: {2}, Befehle: {3}",
+  "Last commands of {0}": "Letzte Befehle von {0}",
+  failed: "gescheitert",
 };
 
 export default german;

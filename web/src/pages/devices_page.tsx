@@ -7,13 +7,22 @@ import { devicesOf } from "../gateway/devices";
 import type { DeviceList, GatewayState } from "../gateway/devices";
 import type { UsbDeviceList } from "../gateway/usb_devices";
 import type { AccessDesk } from "../gateway/access";
+import type { AgentsDesk } from "../gateway/agents";
 import { AccessPart } from "./access_part";
+import { AgentSessionsPart } from "./agent_sessions_part";
 import { DeviceCard } from "./device_card";
 import { DeviceParts } from "./device_parts";
 import { StateBadge } from "../ui/state_badge";
 import { clockTime, sentence, span } from "../ui/words";
 
-export function DevicesPage({ list, usb, access }: { list: DeviceList; usb: UsbDeviceList; access: AccessDesk }) {
+interface DevicesPageParts {
+  list: DeviceList;
+  usb: UsbDeviceList;
+  access: AccessDesk;
+  agents: AgentsDesk;
+}
+
+export function DevicesPage({ list, usb, access, agents }: DevicesPageParts) {
   const state = useStore(list.state);
   const devices = devicesOf(state);
   return (
@@ -28,6 +37,7 @@ export function DevicesPage({ list, usb, access }: { list: DeviceList; usb: UsbD
         <a href="#/recordings">{t("Recordings")}</a>
       </p>
       <AccessPart access={access} />
+      <AgentSessionsPart agents={agents} />
     </div>
   );
 }

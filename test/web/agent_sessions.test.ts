@@ -1,0 +1,172 @@
+// What agents do: read from whatever the gateway answers, kept while it is away, asked for only while shown.
+import { AgentSessionList, awayAfter, readAgentSessions } from "../../web/src/gateway/agent_sessions";
+import type { AgentSession, AgentSessionsState } from "../../web/src/gateway/agent_sessions";
+
+/** As the gateway writes it. */
+const written = {
+  user: "vera",
+  client: "10.0.0.5",
+  program: "claude-ai 0.1.0",
+  begun_ago: 60,
+  used_ago: 2.5,
+  ended: false,
+  reads: 12,
+  commands: 2,
+  last_commands: [
+    { ago: 9, tool: "set", device: "arm", path: "robot/speed", values: "1", state: "failed", detail: "too fast" },
+    { ago: 3, tool: "call", device: "arm", path: "robot/move", values: '{"speed":1}', state: "running", detail: "" },
+  ],
+};
+
+const read: AgentSession = {
+  user: "vera",
+  client: "10.0.0.5",
+  program: "claude-ai 0.1.0",
+  begunAt: 40_000,
+  usedAt: 97_500,
+  ended: false,
+  reads: 12,
+  commands: 2,
+  lastCommands: [
+    {
+      at: 97_000,
+      tool: "call",
+      device: "arm",
+      path: "robot/move",
+      values: '{"speed":1}',
+      state: "running",
+      detail: "",
+    },
+    { at: 91_000, tool: "set", device: "arm", path: "robot/speed", values: "1", state: "failed", detail: "too fast" },
+  ],
+};
+
+describe("sessions of agents", () => {
+  it("are read in the order of the gateway, their commands the newest first", () => {
+    const other = { ...written, user: "", ended: true, last_commands: [] };
+    expect(readAgentSessions({ sessions: [written, other] }, 100_000)).toEqual([
+      read,
+      { ...read, user: "", ended: true, lastCommands: [] },
+    ]);
+    expect(readAgentSessions({ sessions: [] })).toEqual([]);
+  });
+
+  it("are read as far as they can be", () => {
+    const wrong = {
+      user: 7,
+      client: null,
+      program: ["x"],
+      begun_ago: "1",
+      used_ago: {},
+      ended: "yes",
+      reads: "many",
+      commands: null,
+      last_commands: [null, "call", 3, { ago: "now", tool: 1, values: { speed: 1 }, state: true }],
+    };
+    const nothing = { user: "", client: "", program: "", begunAt: 5, usedAt: 5, ended: false, reads: 0, commands: 0 };
+    const noCommand = { at: 5, tool: "", device: "", path: "", values: "", state: "", detail: "" };
+    const answer = { sessions: [null, 1, "vera", wrong, {}, { last_commands: { 0: {} } }] };
+    expect(readAgentSessions(answer, 5)).toEqual([
+      { ...nothing, lastCommands: [noCommand] },
+      { ...nothing, lastCommands: [] },
+      { ...nothing, lastCommands: [] },
+    ]);
+    for (const none of [null, undefined, 1, "sessions", [], {}, { sessions: null }, { sessions: { length: 1 } }])
+      expect(() => readAgentSessions(none)).toThrow('no list "sessions"');
+  });
+
+  it("stay as they were while the gateway is away, since when it went", () => {
+    const known: AgentSessionsState = { kind: "known", sessions: [read] };
+    const away = awayAfter(known, new TypeError("fetch failed"), 1000);
+    expect(away).toEqual({ kind: "away", since: 1000, reason: "the gateway cannot be reached", sessions: [read] });
+    expect(awayAfter(away, new Error("late"), 2000)).toMatchObject({ since: 1000, reason: "late", sessions: [read] });
+    expect(awayAfter({ kind: "loading" }, new Error("late"), 2000)).toMatchObject({ since: 2000, sessions: null });
+    expect(awayAfter({ kind: "denied", reason: "no" }, new Error("late"), 3)).toMatchObject({ sessions: null });
+  });
+});
+
+describe("a list of sessions of agents", () => {
+  const answers: (Response | Error)[] = [];
+  const asked: string[] = [];
+  let page: { hidden: boolean; look: () => void };
+
+  beforeEach(() => {
+    vi.useFakeTimers();
+    answers.length = asked.length = 0;
+    page = { hidden: false, look: () => undefined };
+    vi.stubGlobal("document", {
+      baseURI: "https://host/robots/",
+      get hidden() {
+        return page.hidden;
+      },
+      addEventListener: (_: string, listener: () => void) => (page.look = listener),
+      removeEventListener: () => (page.look = () => undefined),
+    });
+    vi.stubGlobal("fetch", async (url: URL) => {
+      if (!url.pathname.endsWith("/sessions")) throw new TypeError("fetch failed"); // who is signed in, after a 401
+      asked.push(url.href);
+      const answer = answers.shift() ?? new TypeError("fetch failed");
+      if (answer instanceof Error) throw answer;
+      return answer;
+    });
+  });
+  afterEach(() => {
+    vi.useRealTimers();
+    vi.unstubAllGlobals();
+  });
+
+  it("is asked again every 2 s, and no more once it is closed", async () => {
+    vi.setSystemTime(100_000);
+    answers.push(Response.json({ sessions: [written] }), Response.json({ sessions: [] }));
+    const list = new AgentSessionList();
+    expect(list.state.value).toEqual({ kind: "loading" });
+    list.start();
+    await vi.advanceTimersByTimeAsync(0);
+    expect(list.state.value).toEqual({ kind: "known", sessions: [read] });
+    await vi.advanceTimersByTimeAsync(2000);
+    expect(list.state.value).toEqual({ kind: "known", sessions: [] });
+    expect(asked).toEqual(Array(2).fill("https://host/robots/api/v1/agents/sessions"));
+    list.stop();
+    await vi.advanceTimersByTimeAsync(60_000);
+    page.look();
+    expect(asked.length).toBe(2);
+  });
+
+  it("says who may not see it, and why; without agents, or a list, it is away", async () => {
+    answers.push(
+      Response.json({ detail: "vera may not" }, { status: 403 }),
+      new Response("", { status: 401 }),
+      Response.json({ detail: "no agents" }, { status: 404 }),
+      Response.json({ sessions: [written] }),
+      Response.json([]),
+    );
+    const list = new AgentSessionList();
+    list.start();
+    await vi.advanceTimersByTimeAsync(0);
+    expect(list.state.value).toEqual({ kind: "denied", reason: "vera may not" });
+    await vi.advanceTimersByTimeAsync(2000);
+    expect(list.state.value).toEqual({ kind: "denied", reason: "the gateway answered 401" });
+    await vi.advanceTimersByTimeAsync(2000);
+    expect(list.state.value).toMatchObject({ kind: "away", reason: "no agents", sessions: null });
+    await vi.advanceTimersByTimeAsync(2000);
+    expect(list.state.value).toMatchObject({ kind: "known", sessions: [{ user: "vera" }] });
+    await vi.advanceTimersByTimeAsync(2000);
+    expect(list.state.value).toMatchObject({ kind: "away", sessions: [{ user: "vera" }] });
+    await vi.advanceTimersByTimeAsync(2000);
+    expect(list.state.value).toMatchObject({ reason: "the gateway cannot be reached", sessions: [{ user: "vera" }] });
+    list.stop();
+  });
+
+  it("is not asked for while the page is hidden, and at once when it is shown", async () => {
+    const list = new AgentSessionList();
+    page.hidden = true;
+    list.start();
+    await vi.advanceTimersByTimeAsync(60_000);
+    expect(asked.length).toBe(1);
+    page.hidden = false;
+    page.look();
+    await vi.advanceTimersByTimeAsync(0);
+    expect(asked.length).toBe(2);
+    list.stop();
+  });
+});
