@@ -168,16 +168,12 @@ void DefinitionParser::parse_body_line(LogicalLine line, EntityDefinition& entit
                                   : ", expected field, constant, option or end"));
     return;
   }
-  if (entity.members.size() >= max_members) {
-    documentation_.drop();
-    reader.fail("at most 8192 members");
-    return;
-  }
   MemberDefinition member;
   member.kind = *kind;
   member.documentation = documentation_.take();
   member.line = line.line();
-  if (parse_member(reader, member)) entity.members.push_back(std::move(member));
+  if (reader.has_room(entity.members.size(), max_members) && parse_member(reader, member))
+    entity.members.push_back(std::move(member));
 }
 
 /// Parameter lists that run on without '\', as in the 2016 paper: joins the lines; strict reports them.

@@ -224,11 +224,8 @@ void DefinitionParser::parse_option_version(StatementReader& reader, std::string
 
 void DefinitionParser::parse_import(StatementReader& reader) {
   check_order(reader, "import", Group::imports);
-  if (definition_.imports.size() >= max_imports) {
-    reader.fail("at most 1024 imports");
+  if (!reader.has_room(definition_.imports.size(), max_imports) || !reader.expect_blank("the name of a service"))
     return;
-  }
-  if (!reader.expect_blank("the name of a service")) return;
   const auto start = reader.position();
   const auto name = reader.token();
   if (!is_qualified_name(name)) {
@@ -240,11 +237,8 @@ void DefinitionParser::parse_import(StatementReader& reader) {
 
 void DefinitionParser::parse_using(StatementReader& reader) {
   check_order(reader, "using", Group::usings);
-  if (definition_.usings.size() >= max_imports) {
-    reader.fail("at most 1024 usings");
+  if (!reader.has_room(definition_.usings.size(), max_imports) || !reader.expect_blank("the qualified name of a type"))
     return;
-  }
-  if (!reader.expect_blank("the qualified name of a type")) return;
   const auto start = reader.position();
   const auto name = reader.token();
   if (!is_qualified_name(name) || split_qualified(name).service.empty()) {

@@ -35,8 +35,7 @@ bool parse_parameters(StatementReader& reader, std::vector<ParameterDefinition>&
   out.reserve(std::min(commas, ahead.size() / 4) + 1);
   while (true) {
     reader.skip_blanks();
-    if (out.size() >= max_parameters) return reader.fail("at most 1024 parameters");
-    if (!parse_parameter(reader, out.emplace_back())) return false;
+    if (!reader.has_room(out.size(), max_parameters) || !parse_parameter(reader, out.emplace_back())) return false;
     reader.skip_blanks();
     if (reader.accept(')')) return true;
     if (!reader.accept(',')) return reader.fail("',' or ')'");

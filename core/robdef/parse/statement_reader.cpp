@@ -67,6 +67,10 @@ bool StatementReader::expect_end(std::string_view expected) {
   return fail(std::string(expected) + (peek() == '#' ? " (comments take lines of their own)" : ""));
 }
 
+bool StatementReader::has_room(std::size_t count, std::size_t most) {
+  return count < most || fail("at most " + std::to_string(most) + " of these");
+}
+
 bool StatementReader::fail(std::string_view expected) {
   auto end = position_;
   if (!is_end()) {

@@ -44,6 +44,8 @@ class StatementReader {
   bool expect_word(std::string_view expected, std::string& out);
   /// Nothing but blanks may follow.
   bool expect_end(std::string_view expected = "the end of the statement");
+  /// Reports what stands here where there are as many already as there may be.
+  bool has_room(std::size_t count, std::size_t most);
   /// Reports what stands here as a syntax error; always false.
   bool fail(std::string_view expected);
   bool fail_at(std::size_t from, std::size_t to, std::string_view code, std::string message);

@@ -36,8 +36,8 @@ bool parse_dimensions(StatementReader& reader, TypeDefinition& out) {
   out.array = ArrayKind::fixed_multidim;
   if (reader.accept(']')) return true;
   while (true) {
-    if (out.sizes.size() >= max_dimensions) return reader.fail("at most 64 sizes");
-    if (!parse_size(reader, out.sizes.emplace_back())) return false;
+    if (!reader.has_room(out.sizes.size(), max_dimensions) || !parse_size(reader, out.sizes.emplace_back()))
+      return false;
     if (reader.accept(']')) return true;
     if (!reader.accept(',')) return reader.fail("',' or ']'");
   }

@@ -111,9 +111,10 @@ void ClientSession::scan_deadlines(Now now) {
       pending_.erase(found);
       continue;
     }
+    const auto fetch = std::move(found->second.fetch);
     if (!abandon_request(id, now.steady + late_reply_period)) pending_.erase(found);
-    if (const auto fetch = fetches_.extract(id)) {
-      fail_fetch(fetch.mapped(), std::move(error));
+    if (fetch) {
+      fail_fetch(*fetch, std::move(error));
     } else if (state_ == ClientState::connecting) {
       return fail(connection_error("connect to " + quote(options_.service) + ": " + error.message));
     } else {
@@ -247,12 +248,8 @@ void ClientSession::cancel(RequestId id) {
   if (const auto found = pending_.find(id);
       found != pending_.end() && abandon_request(id, found->second.deadline + late_reply_period))
     return;
-  pending_.erase(id);
-  const auto fetch =
-      std::find_if(fetches_.begin(), fetches_.end(), [id](const auto& each) { return each.second.lookup == id; });
-  if (fetch == fetches_.end()) return;
-  pending_.erase(fetch->first);
-  fetches_.erase(fetch);
+  if (pending_.erase(id) > 0) return;
+  std::erase_if(pending_, [id](const auto& each) { return each.second.fetch && each.second.fetch->lookup == id; });
 }
 
 void ClientSession::disconnect(Now now) {
@@ -329,7 +326,7 @@ void ClientSession::handle_reply(const Message& message, const MessageEntry& ent
   if (!node) return;
   const auto id = node.key();
   auto pending = spare_pending_.take(std::move(node));
-  if (auto fetch = fetches_.extract(id)) return handle_fetch_reply(entry, std::move(fetch.mapped()), now);
+  if (pending.fetch) return handle_fetch_reply(entry, std::move(*pending.fetch), now);
   if (state_ == ClientState::connecting) return handle_connect_reply(entry, pending.type, now);
   if (pending.type == EntryType::disconnect_client) return fail(connection_error("closed by this side"));
   if (pending.type == EntryType::pipe_connect_req || pending.type == EntryType::pipe_disconnect_req)
@@ -392,8 +389,9 @@ void ClientSession::handle_path_released(std::string_view path) {
   if (path == options_.service) return;  // the root cannot be released
   std::erase_if(objects_, [path](const auto& object) { return is_within(object.first, path); });
   std::erase_if(memory_limits_, [path](const auto& memory) { return is_within(memory.first.path, path); });
-  for (auto& [id, fetch] : fetches_)
-    if (is_within(fetch.path, path)) fetch.object_type.clear();  // what is there now may be of another type
+  for (auto& [id, pending] : pending_)
+    if (pending.fetch && is_within(pending.fetch->path, path))
+      pending.fetch->object_type.clear();  // what is there now may be of another type
   release_wires(path);
   release_pipes(path);
   emit(PathReleased{std::string(path)});
@@ -412,13 +410,12 @@ void ClientSession::fail(Error reason) {
   connection_.close(reason);
   std::vector<RequestId> waiting;
   for (const auto& [id, pending] : pending_)
-    if (const auto fetch = fetches_.find(id); fetch != fetches_.end())
-      waiting.push_back(fetch->second.lookup);
+    if (pending.fetch)
+      waiting.push_back(pending.fetch->lookup);
     else if (!is_connecting && !pending.is_abandoned && pending.type != EntryType::disconnect_client)
       waiting.push_back(id);
   std::sort(waiting.begin(), waiting.end());
   pending_.clear();
-  fetches_.clear();
   callbacks_.clear();
   // Wires and pipes stay, unused: what emits an event may be in the middle of one.
   const Error lost{ErrorCode::connection_error, reason.message};

@@ -252,6 +252,20 @@ class ClientSession {
   std::size_t queued_bytes() const { return connection_.queued_bytes(); }
 
  private:
+  /// Definitions that are fetched, with all their imports, before the connect sequence or a lookup can go on.
+  struct Fetch {
+    std::vector<std::string> texts = {};
+    std::size_t bytes = 0;              ///< of `texts`
+    std::set<std::string> names = {};   ///< of `texts`
+    std::set<std::string> wanted = {};  ///< imported or asked for
+    std::set<std::string> asked = {};
+    std::string last_asked = {};
+    RequestId lookup = 0;  ///< the find_object() that waits; 0: the connect sequence
+    std::string path = {};
+    std::string object_type = {};
+
+    void add(std::string text);
+  };
   struct Pending {
     EntryType type = EntryType::null;
     const MemberDefinition* member = nullptr;
@@ -261,6 +275,7 @@ class ClientSession {
     bool is_abandoned = false;    ///< pipes and wires: nobody waits any more, but the reply must be acted on
     GeneratorStep step = GeneratorStep::next;     ///< generator steps only
     std::unique_ptr<MemoryTransfer> memory = {};  ///< memories only
+    std::unique_ptr<Fetch> fetch = {};            ///< requests of definitions only
   };
   struct OpenCallback {
     std::uint32_t request_id = 0;  ///< the service's
@@ -276,22 +291,8 @@ class ClientSession {
   struct ClientPipe {
     const MemberDefinition* member = nullptr;
     std::map<std::int32_t, ClientEndpoint> endpoints = {};
-    std::size_t connects = 0;                  ///< pending
-    std::set<std::int32_t> closed_early = {};  ///< closed by the service before its connect reply came
-  };
-  /// Definitions that are fetched, with all their imports, before the connect sequence or a lookup can go on.
-  struct Fetch {
-    std::vector<std::string> texts = {};
-    std::size_t bytes = 0;              ///< of `texts`
-    std::set<std::string> names = {};   ///< of `texts`
-    std::set<std::string> wanted = {};  ///< imported or asked for
-    std::set<std::string> asked = {};
-    std::string last_asked = {};
-    RequestId lookup = 0;  ///< the find_object() that waits; 0: the connect sequence
-    std::string path = {};
-    std::string object_type = {};
-
-    void add(std::string text);
+    std::size_t connects = 0;                     ///< pending
+    std::vector<std::int32_t> closed_early = {};  ///< closed by the service before its connect reply came
   };
 
   // connecting (connect.cpp)
@@ -381,6 +382,8 @@ class ClientSession {
   void acknowledge_packet(ClientEndpoint& endpoint, std::int32_t index, std::uint32_t number);
   void send_pipe_acks(std::string_view path, std::string_view member, bool is_unreliable, Now now);
   void handle_pipe_acks(const Message& message, const MessageEntry& entry);
+  void deliver_pipe_packet(std::string_view path, std::string_view member, std::int32_t index, Value&& packet);
+  void tell_pipe_closed(std::string_view path, std::string_view member, std::int32_t index);
   void handle_pipe_closed(const Message& message, const MessageEntry& entry);
   void release_pipes(std::string_view path);
   void request_silent_disconnect(const std::string& path, const MemberDefinition& member, std::int32_t index, Now now);
@@ -415,7 +418,6 @@ class ClientSession {
   using PendingRequests = std::unordered_map<RequestId, Pending>;
   PendingRequests pending_;
   SpareNode<PendingRequests> spare_pending_;
-  std::unordered_map<RequestId, Fetch> fetches_;
   bool is_urgent_ = false;
   RequestId last_request_id_ = 0;
   TimePoint earliest_deadline_ = TimePoint::max();  ///< no pending request is due before

@@ -191,7 +191,7 @@ void ClientSession::advance_fetch(Fetch fetch, Now now) {
   fetch.last_asked = *missing;
   if (auto sent = send_outgoing(now); !sent) return fail(sent.error());
   add_pending(id, EntryType::get_service_desc, nullptr, {}, now);
-  fetches_.emplace(id, std::move(fetch));
+  pending_.find(id)->second.fetch = std::make_unique<Fetch>(std::move(fetch));
 }
 
 void ClientSession::handle_fetch_reply(const MessageEntry& entry, Fetch fetch, Now now) {

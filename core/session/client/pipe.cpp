@@ -136,13 +136,11 @@ Result<std::int32_t> ClientSession::open_pipe(const Message& message, const Mess
                           ", which is in use");
   emit(Completed{id, Value(*index)});
   endpoint.open(reads_unreliable(message, entry), [&](PipePacket&& packet) {
-    if (state_ != ClientState::closed)
-      emit(PipePacketReceived{pending.path, pending.member->name, *index, std::move(packet.value)});
+    deliver_pipe_packet(pending.path, pending.member->name, *index, std::move(packet.value));
   });
-  if (pipe->closed_early.erase(*index) > 0) {
-    has_closed_pipe_ = true;
+  if (std::erase(pipe->closed_early, *index) > 0) {
     pipe->endpoints.erase(*index);
-    emit(PipeClosedByService{pending.path, pending.member->name, *index});
+    tell_pipe_closed(pending.path, pending.member->name, *index);
   }
   return index;
 }
@@ -221,7 +219,7 @@ void ClientSession::handle_pipe_packets(const Message& message, const MessageEnt
     const auto endpoint = pipe->endpoints.find(index);
     if (endpoint == pipe->endpoints.end() || endpoint->second.state() != PipeState::open) continue;
     endpoint->second.start_closing();
-    emit(PipeClosedByService{std::string(entry.service_path), std::string(entry.member_name), index});
+    tell_pipe_closed(entry.service_path, entry.member_name, index);
     request_silent_disconnect(std::string(entry.service_path), *pipe->member, index, now);
   }
 }
@@ -234,10 +232,19 @@ Result<> ClientSession::handle_pipe_packet(const Message& message, const Message
   if (endpoint.member().direction() == MemberDirection::writeonly) return {};
   if (auto read = read_pipe_packet_value(message, element, endpoint.member(), types_, *packet); !read) return read;
   return endpoint.receive(std::move(*packet), [&](PipePacket&& due) {
-    if (state_ != ClientState::closed)
-      emit(PipePacketReceived{std::string(entry.service_path), std::string(entry.member_name), index,
-                              std::move(due.value)});
+    deliver_pipe_packet(entry.service_path, entry.member_name, index, std::move(due.value));
   });
+}
+
+void ClientSession::deliver_pipe_packet(std::string_view path, std::string_view member, std::int32_t index,
+                                        Value&& packet) {
+  if (state_ == ClientState::closed) return;
+  emit(PipePacketReceived{std::string(path), std::string(member), index, std::move(packet)});
+}
+
+void ClientSession::tell_pipe_closed(std::string_view path, std::string_view member, std::int32_t index) {
+  has_closed_pipe_ = true;
+  emit(PipeClosedByService{std::string(path), std::string(member), index});
 }
 
 /// A service that does not mind how many are on the way is acknowledged its oldest packet for each that comes.
@@ -282,13 +289,12 @@ void ClientSession::handle_pipe_closed(const Message& message, const MessageEntr
   const auto endpoint = pipe.endpoints.find(*index);
   const bool is_known = endpoint != pipe.endpoints.end() && endpoint->second.state() != PipeState::connecting;
   if (!is_known) {
-    if (pipe.connects > 0 && pipe.closed_early.size() < max_unknown_endpoints) pipe.closed_early.insert(*index);
+    if (pipe.connects > 0 && pipe.closed_early.size() < max_unknown_endpoints) pipe.closed_early.push_back(*index);
     return;
   }
   if (endpoint->second.state() != PipeState::open) return;  // the answer to our own disconnect is on its way
-  has_closed_pipe_ = true;
   pipe.endpoints.erase(endpoint);
-  emit(PipeClosedByService{found->first.path, found->first.member, *index});
+  tell_pipe_closed(found->first.path, found->first.member, *index);
   if (pipe.endpoints.empty() && pipe.connects == 0) pipes_.erase(found);
 }
 
@@ -299,8 +305,7 @@ void ClientSession::release_pipes(std::string_view path) {
       continue;
     }
     for (const auto& [index, endpoint] : pipe->second.endpoints)
-      if (endpoint.state() == PipeState::open) emit(PipeClosedByService{pipe->first.path, pipe->first.member, index});
-    has_closed_pipe_ = true;
+      if (endpoint.state() == PipeState::open) tell_pipe_closed(pipe->first.path, pipe->first.member, index);
     pipe->second.endpoints.clear();
     pipe = pipe->second.connects == 0 ? pipes_.erase(pipe) : std::next(pipe);
   }

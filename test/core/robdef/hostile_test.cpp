@@ -90,21 +90,21 @@ TEST_CASE("what no definition needs is refused before it takes gigabytes", "[rob
     return "struct S\n    field double[" + repeated("1,", count - 1) + "1] x\nend\n";
   };
   accepted(sizes(max_dimensions));
-  refused(sizes(max_dimensions + 1), "at most 64 sizes");
+  refused(sizes(max_dimensions + 1), "at most 64 of these");
   const auto parameters = [](std::size_t count) {
     const auto list = numbered(count, [](const std::string& number) { return "int32 a" + number + ","; });
     return "object O\n    event e(" + list.substr(0, list.size() - 1) + ")\nend\n";
   };
   accepted(parameters(max_parameters));
-  refused(parameters(max_parameters + 1), "at most 1024 parameters");
+  refused(parameters(max_parameters + 1), "at most 1024 of these");
   const auto members = [](std::size_t count) {
     return "struct S\n" + numbered(count, [](const std::string& number) { return "field int32 a" + number + "\n"; }) +
            "end\n";
   };
   accepted(members(max_members));
-  refused(members(max_members + 1), "at most 8192 members");
-  refused(repeated("import demo.b\n", max_imports + 1), "at most 1024 imports");
-  refused(repeated("using demo.b.C\n", max_imports + 1), "at most 1024 usings");
+  refused(members(max_members + 1), "at most 8192 of these");
+  refused(repeated("import demo.b\n", max_imports + 1), "at most 1024 of these");
+  refused(repeated("using demo.b.C\n", max_imports + 1), "at most 1024 of these");
   const auto named = [](std::size_t size) { return "service demo." + std::string(size - 5, 'a') + "\nstdver 0.9\n"; };
   CHECK(check(named(longest_qualified_name), RobdefMode::compat).ok());
   CHECK_FALSE(check(named(longest_qualified_name + 1), RobdefMode::compat).ok());
