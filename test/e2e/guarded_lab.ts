@@ -14,7 +14,7 @@ export class GuardedLab {
   readonly url: string;
   readonly token: string;
 
-  private constructor(createPort: number, port: number, webcamsPort: number | null, site: string) {
+  private constructor(createPort: number, port: number, webcamsPort: number | null, site: string, more: object) {
     const folder = mkdtempSync(path.join(tmpdir(), "rrgate-e2e-"));
     const file = (name: string): string => path.join(folder, name);
     for (const [name, roles] of [
@@ -44,15 +44,16 @@ export class GuardedLab {
     }
     writeFileSync(
       file("gateway.json"),
-      JSON.stringify({ listen: [`127.0.0.1:${port}`], ["web_root"]: site, devices, access }),
+      JSON.stringify({ listen: [`127.0.0.1:${port}`], ["web_root"]: site, devices, access, ...more }),
     );
     this.url = `http://127.0.0.1:${port}/`;
     this.create = new Program(deviceProgram("rrgate-demo-create"), ["--port", String(createPort)]);
     this.gateway = new Program(rrgate, ["serve", "--config", file("gateway.json")]);
   }
 
-  static async start(site: string, { hasCamera = false } = {}): Promise<GuardedLab> {
-    const lab = new GuardedLab(await freePort(), await freePort(), hasCamera ? await freePort() : null, site);
+  /** `more` is for the configuration. */
+  static async start(site: string, { hasCamera = false, more = {} } = {}): Promise<GuardedLab> {
+    const lab = new GuardedLab(await freePort(), await freePort(), hasCamera ? await freePort() : null, site, more);
     lab.create.start();
     lab.webcams?.start();
     lab.gateway.start();

@@ -282,3 +282,38 @@ test("the form fits a phone and is used with the keyboard", async ({ page }) => 
   const box = await signOut(page).boundingBox();
   expect((box?.x ?? 999) + (box?.width ?? 999)).toBeLessThanOrEqual(320);
 });
+
+test("what agents have done is listed for who decides about them, as it happens", async ({ page }) => {
+  const open = await GuardedLab.start(webRoot, { more: { mcp: {} } });
+  const tell = async (method: string, params: object) => {
+    const headers = { Authorization: `Bearer ${open.token}`, ["Content-Type"]: "application/json", ...session };
+    const body = JSON.stringify({ jsonrpc: "2.0", id: 1, method, params });
+    return fetch(`${open.url}mcp`, { method: "POST", headers, body });
+  };
+  let session = {};
+  try {
+    await page.goto(open.url);
+    await signIn(page, "root", password);
+    const list = page.locator("details", { hasText: "What agents do" });
+    await list.getByText("What agents do").click();
+    await expect(list).toContainText("knows of no agent");
+    const begun = await tell("initialize", { clientInfo: { name: "<b>mind</b>", version: "1.2" } });
+    session = { ["Mcp-Session-Id"]: begun.headers.get("Mcp-Session-Id") };
+    const call = (name: string, given: object) =>
+      tell("tools/call", { name, arguments: { device: "create", why: "to see", ...given } });
+    await call("read", { path: "Create/DistanceTraveled" });
+    await call("call", { path: "Create/Drive", args: { velocity: 100, radius: 5000 } });
+    await call("stop", { path: "Create" });
+    await expect(list).toContainText("<b>mind</b> 1.2");
+    const rows = list.getByRole("row");
+    await expect(rows).toHaveCount(3);
+    await expect(rows.nth(2)).toContainText("create · Create/Drive");
+    await expect(rows.nth(2)).toContainText('"velocity":100');
+    await expect(rows.nth(2)).toContainText('no rule with "agent"');
+    await expect(rows.nth(1)).toContainText("create · Create");
+    await page.setViewportSize({ width: 360, height: 700 });
+    expect(await page.evaluate(() => document.documentElement.scrollWidth)).toBeLessThanOrEqual(360);
+  } finally {
+    await open.stop();
+  }
+});
