@@ -21,7 +21,7 @@ AgentSessionPtr AgentSessions::visit(const std::string& key, const std::string& 
   session = std::make_shared<AgentSession>();
   session->user = user;
   session->client = client;
-  const auto made = session;
+  auto made = session;
   if (sessions_.size() > most_sessions) {
     const auto rank = [&](const auto& each) {
       return std::tuple(each.second == made, each.second->commands > 0, each.second->used);
