@@ -1,10 +1,8 @@
 #include "node/transport/usb_host.hpp"
 
-#include <boost/asio/co_spawn.hpp>
 #include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <fstream>
-#include <utility>
 
 #include "node/transport/await_tuple.hpp"
 #include "node/transport/usb_claim.hpp"
@@ -119,6 +117,7 @@ awaitable<void> UsbHost::probe(std::shared_ptr<Known> known) {
       arrived->cancel();
     });
     if (!answer->is_there) co_await arrived->async_wait(await_tuple);
+    if (!answer->is_there) co_return;  // cancelled: it is asked again
     // A refusal says what the device is; anything else is worth another try.
     if (answer->status != UsbStatus::ok && answer->status != UsbStatus::stall) {
       known->problem = open_problem(known->device, answer->status);
@@ -135,32 +134,27 @@ awaitable<void> UsbHost::probe(std::shared_ptr<Known> known) {
     known->probed = pipes.error();
 }
 
-awaitable<void> UsbHost::ask_new() {
-  const auto asked = std::make_shared<asio::steady_timer>(*executor_, TimePoint::max());
-  const auto left = std::make_shared<std::size_t>(0);
-  const auto known_now = known_;
-  for (const auto& [place, known] : known_now) {
-    if (known->probed || !known->claim.expired()) continue;
-    ++*left;
-    asio::co_spawn(*executor_, probe(known), [asked, left](const std::exception_ptr&) {
-      --*left;
-      asked->cancel();
-    });
-  }
-  while (*left > 0) co_await asked->async_wait(await_tuple);
-}
-
 awaitable<UsbHost::Found> UsbHost::scan() {
-  // One that runs already will do: what is plugged in during it shows in the next.
-  if (!std::exchange(is_scanning_, true)) {
+  if (is_scanning_) {
+    // One that runs already will do: what is plugged in during it shows in the next.
+    while (is_scanning_) co_await scanned_->async_wait(await_tuple);
+  } else {
+    struct Scanning {  // others wait for its end, also where it is cancelled
+      UsbHost& host;
+      ~Scanning() {
+        host.is_scanning_ = false;
+        if (host.scanned_) host.scanned_->cancel();
+      }
+    };
+    is_scanning_ = true;
+    const Scanning scanning{*this};
     const auto looked = look();
     problem_ = looked ? "" : looked.error().message;
-    asio::co_spawn(*executor_, ask_new(), [this](const std::exception_ptr&) {
-      is_scanning_ = false;
-      if (scanned_) scanned_->cancel();
-    });
+    std::vector<std::shared_ptr<Known>> to_ask;
+    for (const auto& [place, known] : known_)
+      if (!known->probed && known->claim.expired()) to_ask.push_back(known);
+    for (const auto& known : to_ask) co_await probe(known);
   }
-  while (is_scanning_) co_await scanned_->async_wait(await_tuple);
   Found found;
   if (!problem_.empty()) found.problems.push_back(problem_);
   for (const auto& [place, known] : known_) {

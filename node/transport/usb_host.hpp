@@ -35,7 +35,6 @@ class UsbHost final : public boost::asio::execution_context::service {
     std::vector<std::string> problems;
   };
   /// Looks at what is plugged in; devices are asked who they are when they are new, or could not be asked before.
-  /// Goes on where who waits is cancelled: others may wait for the same.
   awaitable<Found> scan();
 
   /// Opens a stream to the device that `matches`, and to the first of several.
@@ -55,8 +54,6 @@ class UsbHost final : public boost::asio::execution_context::service {
   void shutdown() override;
   Result<> look();
   static awaitable<void> probe(std::shared_ptr<Known> known);
-  /// Asks all that were not asked, side by side.
-  awaitable<void> ask_new();
   /// A known device that was asked; null: there is none.
   std::shared_ptr<Known> find(const std::function<bool(const Node&)>& matches) const;
 

@@ -310,7 +310,7 @@ class ClientSession {
   void keep_attributes(const MessageEntry& entry);
   void advance_fetch(Fetch fetch, Now now);
   void handle_fetch_reply(const MessageEntry& entry, Fetch fetch, Now now);
-  void finish_fetch(const Fetch& fetch, Now now);
+  void finish_fetch(Fetch fetch, Now now);
   void fail_fetch(const Fetch& fetch, Error error);
   void become_connected(Now now);
   Result<std::string> choose_root_type() const;

@@ -176,7 +176,7 @@ void ClientSession::advance_fetch(Fetch fetch, Now now) {
   const auto missing = std::find_if(fetch.wanted.begin(), fetch.wanted.end(), [&](const std::string& name) {
     return !fetch.names.contains(name) && !types_.find_service(name);
   });
-  if (missing == fetch.wanted.end()) return finish_fetch(fetch, now);
+  if (missing == fetch.wanted.end()) return finish_fetch(std::move(fetch), now);
   if (!fetch.asked.insert(*missing).second)
     return fail_fetch(fetch, make_error(ErrorCode::service_definition_error,
                                         "the node answered with another definition than " + quote(*missing)));
@@ -205,7 +205,7 @@ void ClientSession::handle_fetch_reply(const MessageEntry& entry, Fetch fetch, N
   advance_fetch(std::move(fetch), now);
 }
 
-void ClientSession::finish_fetch(const Fetch& fetch, Now now) {
+void ClientSession::finish_fetch(Fetch fetch, Now now) {
   if (auto added = types_.add(fetch.texts, RobdefMode::compat); !added) return fail_fetch(fetch, added.error());
   if (fetch.lookup == 0) {
     // The older sequence has asked for definitions only; the combined one is at its end.
@@ -243,7 +243,7 @@ Result<std::string> ClientSession::choose_root_type() const {
   // The list that the service sent names local objects without their definition.
   const std::string home(split_qualified(root_type_).service);
   for (const auto& base : root_implements_)
-    if (base == wanted || (wanted.starts_with(home + ".") && wanted.substr(home.size() + 1) == base)) return wanted;
+    if (base == wanted || home + "." + base == wanted) return wanted;
   std::vector<const EntityDefinition*> open{types_.find_entity(root_type_)};
   std::set<const EntityDefinition*> seen;
   while (!open.empty()) {

@@ -113,7 +113,7 @@ void ClientSession::handle_pipe_reply(const Message& message, const MessageEntry
 /// Opens the endpoint that a connect reply names: first its completion, then the packets that came before.
 Result<std::int32_t> ClientSession::open_pipe(const Message& message, const MessageEntry& entry, RequestId id,
                                               const Pending& pending, Now now) {
-  auto index = read_pipe_index_element(message, entry, *pending.member);
+  const auto index = read_pipe_index_element(message, entry, *pending.member);
   if (!index) return index;
   last_pipe_index_ = std::max(last_pipe_index_, *index);
   auto* pipe = find_pipe(pending.path, pending.member->name);
