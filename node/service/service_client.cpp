@@ -189,8 +189,12 @@ void ServiceClient::abandon_generator(const Generator& generator) {
   if (generator.abort) notify("a generator's", "abort", generator.abort);
 }
 
-void ServiceClient::handle(const GeneratorEnded& ended, Now) {
-  if (const auto left = generators_.extract(ended.id)) abandon_generator(left.mapped().generator);
+void ServiceClient::handle(const GeneratorEnded& ended, Now now) {
+  const auto left = generators_.extract(ended.id);
+  if (!left) return;
+  for (const auto& called : left.mapped().waiting)
+    session_.reply(called.id, make_error(ErrorCode::operation_aborted, "the generator has ended"), now);
+  abandon_generator(left.mapped().generator);
 }
 
 void ServiceClient::handle(const ClientConnected& connected, Now) {

@@ -44,8 +44,13 @@ std::size_t MemberFollower::connected_count() const {
 Result<std::size_t> MemberFollower::send(const Value& value) {
   std::optional<Error> failure;
   std::size_t count = 0;
-  for (const auto& [id, place] : places_) {
+  const auto self = shared_from_this();
+  PlaceId last = 0;  // who is found gone by what is sent is taken out, and others may be
+  for (auto next = places_.begin(); next != places_.end(); next = places_.upper_bound(last)) {
+    last = next->first;
+    const auto& place = next->second;
     if (!place.is_connected) continue;
+    const auto connection = place.root.connection();
     if (const auto sent = send_to(place, value))
       ++count;
     else

@@ -322,7 +322,7 @@ void ServiceSession::finish_combined(const OpenLogin& login, Result<Authenticate
 /// `service` may be null.
 Result<> ServiceSession::connect(std::shared_ptr<HostedService> service, const NodeId& client,
                                  std::uint32_t client_endpoint, std::optional<AuthenticatedUser> user, Now now) {
-  if (!service) return service_not_found();
+  if (!service || is_gone_) return service_not_found();
   if (service_) return has_session_already();
   service_ = std::move(service);
   endpoint_ = directory_.endpoints().take(now.steady);

@@ -290,3 +290,19 @@ TEST_CASE("who is not wanted hears why, whichever way he connects, and the sessi
   pair.service->handle_timeout(pair.now);
   CHECK(pair.service->wants_close());
 }
+
+TEST_CASE("a session that has ended does not begin again in what its client sends behind the end") {
+  Loopback pair;
+  pair.connect();
+  while (pair.service->poll_event()) {
+  }
+  pair.forge(*pair.client, [](Message& message) {
+    message.begin_entry(EntryType::disconnect_client, {}, {}, 100);
+    message.add_text("servicename", "arm");
+    message.begin_entry(EntryType::connect_client, "arm", {}, 101);
+    message.add_text("servicename", "arm");
+  });
+  pair.carry(*pair.client, *pair.service, 1u << 20);
+  pair.next_service<ClientGone>();
+  CHECK_FALSE(pair.service->poll_event());
+}
