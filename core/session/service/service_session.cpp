@@ -316,8 +316,10 @@ Result<> ServiceSession::answer_session_request(const Message& message, const Me
       return {};
     case EntryType::object_type_name: {
       if (auto admitted = admit(entry.type, entry.service_path, nullptr); !admitted) return admitted;
-      const auto found = service_->find_object(entry.service_path);
+      const auto service = service_;
+      const auto found = service->find_object(entry.service_path);
       if (!found) return found.error();
+      begin_reply(entry);  // anew: the application, which was asked, may have had this session send something
       outgoing_.add_text("objecttype", found->type->qualified_name);
       return {};
     }
@@ -328,8 +330,10 @@ Result<> ServiceSession::answer_session_request(const Message& message, const Me
 }
 
 Result<> ServiceSession::dispatch_member(const Message& message, const MessageEntry& entry, Now now) {
-  auto found = service_->find_object(entry.service_path);
+  const auto service = service_;
+  auto found = service->find_object(entry.service_path);
   if (!found) return found.error();
+  if (!service_) return {};  // the application, which was asked, has ended the session
   const auto* member = found->type->find_member(entry.member_name);
   if (!member || member->kind != find_member_request(entry.type)->kind)
     return make_error(ErrorCode::member_not_found,

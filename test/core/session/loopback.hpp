@@ -1,6 +1,7 @@
 // A client and a service session joined in memory: every byte, no socket, time by hand.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <utility>
 #include <variant>
@@ -75,11 +76,13 @@ class PlainObject : public ServiceObject {
   Result<std::shared_ptr<ServiceObject>> find_child(const MemberDefinition& objref,
                                                     const std::optional<std::string>& index) override {
     asked.push_back(objref.name + (index ? "[" + *index + "]" : ""));
+    if (while_finding) while_finding();
     if (index == "none") return std::shared_ptr<ServiceObject>();
     return std::shared_ptr<ServiceObject>(std::make_shared<PlainObject>("experimental.loopback.Tool"));
   }
   bool is_monitor_lockable() const override { return has_monitor; }
   std::vector<std::string> asked;
+  std::function<void()> while_finding;
   bool has_monitor = true;
 
  private:

@@ -306,3 +306,23 @@ TEST_CASE("a session that has ended does not begin again in what its client send
   pair.next_service<ClientGone>();
   CHECK_FALSE(pair.service->poll_event());
 }
+
+TEST_CASE("an application may use the session, or end it, while it is asked for an object") {
+  Loopback pair;
+  pair.connect();
+  SECTION("it sends something") {
+    pair.root->while_finding = [&] { pair.service->release_path("arm.slots[1]", pair.now); };
+    pair.client->find_object("arm.tools[a]", pair.now);
+    pair.pump();
+    CHECK(pair.next_client<PathReleased>().path == "arm.slots[1]");
+    CHECK(pair.next_client<Completed>().result.value() == Value("experimental.loopback.Tool"));
+  }
+  SECTION("it ends the session") {
+    pair.completion(pair.client->find_object("arm.tools[a]", pair.now)).value();
+    pair.service->service()->forget_path("arm.tools[a]");
+    pair.root->while_finding = [&] { pair.service->close_service(pair.now); };
+    pair.client->get_property("arm.tools[a]", "name", pair.now);
+    pair.pump();
+    CHECK(pair.client->state() == ClientState::closed);
+  }
+}
