@@ -17,9 +17,11 @@ struct PathSegment {
   bool operator==(const PathSegment&) const = default;
 };
 
-/// Splits and decodes a path. Paths are opaque for identity: two spellings of one index are two paths.
-/// Accepts the percent forms of all known peers, "%ffffffc3" included.
-/// Errors   service_error "Invalid service path specified".
+inline constexpr std::size_t max_path_size = 2048;
+
+/// Splits and decodes a path. Paths are opaque for identity: two spellings of one index are two paths. They are few:
+/// an index is spelled as one of the known peers does it, "%ffffffc3" included.
+/// Errors   service_error "Invalid service path specified", also above max_path_size.
 Result<std::vector<PathSegment>> parse_service_path(std::string_view path);
 
 /// Every byte that is not an ASCII letter or digit becomes %xx.
@@ -28,6 +30,12 @@ std::string encode_path_index(std::string_view index);
 /// `parent.member` or `parent.member[index]`.
 std::string child_path(std::string_view parent, std::string_view member,
                        std::optional<std::string_view> index = std::nullopt);
+
+/// The one spelling of a valid path by which locks know its object; of others, themselves.
+std::string canonical_path(std::string_view path);
+
+/// As much of `path` as has `count` segments, or all of it.
+std::string_view first_segments(std::string_view path, std::size_t count);
 
 /// Whether `path` is `ancestor` or lies below it.
 bool is_within(std::string_view path, std::string_view ancestor);

@@ -269,8 +269,9 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
     // Meanwhile some may leave, others come, who are sent the newest by that, and a handler may set another value.
     const auto followers = found->second;
     const auto value = newest;
+    const std::weak_ptr alive = alive_;
     for (const auto id : followers)
-      if (newest == value) send_wire_to(id, packet);
+      if (!alive.expired() && newest == value) send_wire_to(id, packet);
   }
   void send_wire_to(ClientId id, WirePacket& packet) override {
     const auto found = clients_.find(id);
@@ -309,7 +310,7 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   }
   const std::shared_ptr<NodeThread>& thread() override { return thread_; }
   BlockingPool& blocking_pool() override { return blocking_pool_; }
-  void set_current_client(ClientId id) override { current_client_ = id; }
+  ClientId set_current_client(ClientId id) override { return std::exchange(current_client_, id); }
   void report(const std::string& problem) override {
     if (options_.report)
       options_.report(problem);
@@ -352,9 +353,11 @@ class Node::Implementation final : public ServiceClientOwner, public ServiceHost
   /// Clients that are lost while they are sent to, or by what handlers do then, leave clients_ meanwhile.
   template <class F>
   void for_clients_of(const Service& service, F&& what) {
+    const std::weak_ptr alive = alive_;  // a handler may end the node
     for (auto next = clients_.begin(); next != clients_.end();) {
       const auto client = next->second;
       if (client->service() == &service) what(*client);
+      if (alive.expired()) return;
       next = clients_.upper_bound(client->id());
     }
   }

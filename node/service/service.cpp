@@ -25,10 +25,6 @@ TypeDefinition step_type(TypeDefinition type) {
   return type;
 }
 
-bool is_indexed(const MemberDefinition& objref) {
-  return objref.type.container != ContainerKind::none || objref.type.array != ArrayKind::none;
-}
-
 bool is_kind_of(const TypeRegistry& types, const std::string& type, const std::string& wanted) {
   if (type == wanted) return true;
   const EntityDefinition* entity = types.find_entity(type);
@@ -141,8 +137,8 @@ void Object::check_arguments(const MemberDefinition& member, const char* verb, s
 void Object::fire_values(std::string_view event, std::span<const Value> arguments) {
   const MemberDefinition& member = require_member(event, MemberKind::event);
   check_arguments(member, "fired", arguments);
-  if (!service_.host_) return;
   for (const std::string& path : paths()) {
+    if (!service_.host_) return;  // nor after a handler has ended the node
     EventPacket packet(path, member, arguments);
     service_.host_->send_event(service_, packet);
   }
@@ -186,7 +182,8 @@ void Object::set_in_value(std::string_view wire, Value value, std::optional<Time
   mine.in_value = newest;
   if (!service_.host_) return;
   for (const std::string& path : paths()) {
-    if (mine.in_value != newest) return;  // a handler has set another meanwhile
+    // Meanwhile a handler may have set another, or ended the node.
+    if (mine.in_value != newest || !service_.host_) return;
     packet.set_path(path);
     service_.host_->send_wire(packet, mine.in_value);
   }
@@ -198,6 +195,7 @@ void Object::set_wire_for(ClientId client, std::string_view wire, Value value) {
   members_[&packet.member()].own_in_values.insert_or_assign(client, value);
   service_.objects_of_clients_[client].insert(weak_from_this());
   for (const std::string& path : paths()) {
+    if (!service_.host_) return;
     packet.set_path(path);
     service_.host_->send_wire_to(client, packet);
   }
@@ -210,7 +208,7 @@ void Object::forget_client(ClientId client) {
 void Object::objref(std::string_view name, std::shared_ptr<Object> child) {
   const MemberDefinition& member = require_member(name, MemberKind::objref);
   const std::string where = type_name() + "." + member.name;
-  if (is_indexed(member)) refuse(where + " is indexed: it takes a function that finds the object");
+  if (member.is_indexed()) refuse(where + " is indexed: it takes a function that finds the object");
   if (child && !may_stand_behind(*service_.types_, child->type_name(), member))
     refuse(where + ": is " + format_type(member.type) + ", the object is " + child->type_name());
   members_[&member].find = [child = std::move(child)](std::string_view) { return child; };
@@ -219,13 +217,13 @@ void Object::objref(std::string_view name, std::shared_ptr<Object> child) {
 
 void Object::objref(std::string_view name, std::function<std::shared_ptr<Object>()> find) {
   const MemberDefinition& member = require_member(name, MemberKind::objref);
-  if (is_indexed(member)) refuse(type_name() + "." + member.name + " is indexed: it takes a function of the index");
+  if (member.is_indexed()) refuse(type_name() + "." + member.name + " is indexed: it takes a function of the index");
   members_[&member].find = [find = std::move(find)](std::string_view) { return find(); };
 }
 
 void Object::objref(std::string_view name, std::function<std::shared_ptr<Object>(std::string_view index)> find) {
   const MemberDefinition& member = require_member(name, MemberKind::objref);
-  if (!is_indexed(member)) refuse(type_name() + "." + member.name + " has no index: it takes an object");
+  if (!member.is_indexed()) refuse(type_name() + "." + member.name + " has no index: it takes an object");
   members_[&member].find = std::move(find);
 }
 
@@ -241,7 +239,8 @@ std::vector<std::string> Object::paths() const {
 }
 
 void Object::release_path(const std::string& path) {
-  if (service_.hosted_->forget_path(path) && service_.host_) service_.host_->release_path(service_, path);
+  for (const auto& spelling : service_.hosted_->forget_path(path))
+    if (service_.host_) service_.host_->release_path(service_, spelling);
 }
 
 std::vector<std::string> Object::missing_handlers() const {
@@ -270,9 +269,10 @@ Result<std::shared_ptr<ServiceObject>> Object::find_child(const MemberDefinition
                                                           const std::optional<std::string>& index) {
   const auto found = members_.find(&objref);
   if (found == members_.end() || !found->second.find) return no_handler("objref", objref);
+  const auto find = found->second.find;  // it may give the objref another one
   std::shared_ptr<Object> child;
   try {
-    child = found->second.find(index ? std::string_view(*index) : std::string_view{});
+    child = find(index ? std::string_view(*index) : std::string_view{});
   } catch (...) {
     auto error = handler_error(std::current_exception());
     if (!is_unhandled(error)) return error;
@@ -360,8 +360,8 @@ Error Object::no_handler(std::string_view what, const MemberDefinition& member) 
 // --- Service ---
 
 std::shared_ptr<Service> Service::from_text(const std::vector<std::string>& definitions, std::string name,
-                                            std::string root_type, RobdefMode mode) {
-  const std::shared_ptr<Service> service(new Service);
+                                            const std::string& root_type, RobdefMode mode) {
+  std::shared_ptr<Service> service(new Service);
   service->name_ = std::move(name);
   service->types_ = std::make_shared<TypeRegistry>();
   if (auto added = service->types_->add(definitions, mode); !added)
@@ -373,10 +373,11 @@ std::shared_ptr<Service> Service::from_text(const std::vector<std::string>& defi
 }
 
 std::shared_ptr<Service> Service::from_files(const std::vector<std::string>& paths, std::string name,
-                                             std::string root_type) {
+                                             const std::string& root_type) {
   std::vector<std::string> texts;
+  texts.reserve(paths.size());
   for (const std::string& path : paths) texts.push_back(read_file(path));
-  return from_text(texts, std::move(name), std::move(root_type));
+  return from_text(texts, std::move(name), root_type);
 }
 
 std::shared_ptr<Object> Service::make_object(std::string_view type) {

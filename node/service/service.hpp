@@ -112,7 +112,7 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
       return object_->broadcast(name_, value, max_backlog);
     }
     /// Those that are open now.
-    const std::vector<PipeEndpoint>& endpoints() const { return object_->endpoints(name_); }
+    std::vector<PipeEndpoint> endpoints() const { return object_->endpoints(name_); }
 
    private:
     friend class Object;
@@ -220,7 +220,7 @@ class Object : public ServiceObject, public std::enable_shared_from_this<Object>
                         std::function<void(PipeEndpoint)> handler);
   void set_packet_handler(std::string_view name, HandlerType packet, PacketHandler handler);
   std::size_t broadcast(std::string_view pipe, const Value& value, std::int32_t max_backlog);
-  const std::vector<PipeEndpoint>& endpoints(std::string_view pipe);
+  std::vector<PipeEndpoint> endpoints(std::string_view pipe);
   void set_generator(std::string_view name, GeneratorHandler handler);
   void check_arguments(const MemberDefinition& member, const char* verb, std::span<const Value> arguments) const;
   detail::MemoryForm memory_form(std::string_view name, DataType items) const;
@@ -283,13 +283,13 @@ class Service {
   /// Throws   std::invalid_argument with the first finding where a definition is not valid, an import is missing, or
   ///          there is no such object.
   static std::shared_ptr<Service> from_text(const std::vector<std::string>& definitions, std::string name,
-                                            std::string root_type, RobdefMode mode = RobdefMode::strict);
+                                            const std::string& root_type, RobdefMode mode = RobdefMode::strict);
   /// As from_text; the files may import one another. The last file holds the root type.
   /// Throws   std::invalid_argument: also for a file that cannot be read.
   static std::shared_ptr<Service> from_files(const std::vector<std::string>& paths, std::string name,
-                                             std::string root_type);
-  static std::shared_ptr<Service> from_file(const std::string& path, std::string name, std::string root_type) {
-    return from_files({path}, std::move(name), std::move(root_type));
+                                             const std::string& root_type);
+  static std::shared_ptr<Service> from_file(const std::string& path, std::string name, const std::string& root_type) {
+    return from_files({path}, std::move(name), root_type);
   }
 
   Object& root() { return *root_; }

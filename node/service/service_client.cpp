@@ -109,14 +109,14 @@ void ServiceClient::cancel_late_calls() {
 template <class F>
 std::optional<Error> ServiceClient::run_handler(std::string_view kind, std::string_view name, F&& handler) {
   std::optional<Error> failure;
-  owner_->set_current_client(id_);
+  const auto outer = owner_->set_current_client(id_);  // its handler may have lost this client
   try {
     handler();
   } catch (...) {
     failure = handler_error(std::current_exception());
   }
   if (!owner_) return failure;
-  owner_->set_current_client(0);
+  owner_->set_current_client(outer);
   if (failure && is_unhandled(*failure)) owner_->report(describe_failure(kind, name, *failure));
   return failure;
 }

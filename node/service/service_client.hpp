@@ -24,7 +24,7 @@ class ServiceClientOwner {
   /// For handlers that answer later.
   virtual const std::shared_ptr<NodeThread>& thread() = 0;
   virtual BlockingPool& blocking_pool() = 0;
-  virtual void set_current_client(ClientId id) = 0;  ///< 0: no handler runs
+  virtual ClientId set_current_client(ClientId id) = 0;  ///< 0: no handler runs; returns whose handler ran till now
   /// A handler failed by mistake, or no client waits for its answer.
   virtual void report(const std::string& problem) = 0;
   /// Has the login judged, away from the node's thread, and answers it with client.answer_login() unless that is gone.

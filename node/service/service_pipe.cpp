@@ -35,7 +35,7 @@ std::size_t Object::broadcast(std::string_view pipe, const Value& value, std::in
   }));
 }
 
-const std::vector<PipeEndpoint>& Object::endpoints(std::string_view pipe) {
+std::vector<PipeEndpoint> Object::endpoints(std::string_view pipe) {
   return members_[&require_member(pipe, MemberKind::pipe)].endpoints;
 }
 

@@ -165,11 +165,9 @@ RemoteMember find_member(const rr::RemoteObject& root, std::string_view path) {
       out.member = member;
       break;
     }
-    const bool is_indexed =
-        member->type.array != rr::ArrayKind::none || member->type.container != rr::ContainerKind::none;
-    if (is_indexed && ++i == segments->size())
+    if (member->is_indexed() && ++i == segments->size())
       throw NotUnderstood("objref " + rr::quote(name) + " needs an index: " + name + "/INDEX");
-    look_at(is_indexed ? out.object.object(name, (*segments)[i]) : out.object.object(name));
+    look_at(member->is_indexed() ? out.object.object(name, (*segments)[i]) : out.object.object(name));
   }
   return out;
 }

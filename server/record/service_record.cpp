@@ -28,10 +28,6 @@ bool is_recordable(const rr::MemberDefinition& member) {
   return is_kind && member.direction() != rr::MemberDirection::writeonly;
 }
 
-bool is_indexed_objref(const rr::MemberDefinition& member) {
-  return member.type.array != rr::ArrayKind::none || member.type.container != rr::ContainerKind::none;
-}
-
 [[noreturn]] void give_up(std::string why) {
   throw rr::ClientException(rr::make_error(rr::ErrorCode::invalid_argument, std::move(why)));
 }
@@ -111,7 +107,7 @@ asio::awaitable<void> ServiceRecord::choose_by(std::string pattern, const rr::Cl
       give_up("no objref " + rr::quote(name) + " in " + type->qualified_name);
     std::optional<std::string> index;
     place += (place.empty() ? "" : "/") + name;
-    if (is_indexed_objref(*member)) {
+    if (member->is_indexed()) {
       if (++i + 1 >= segments->size()) give_up("objref " + rr::quote(name) + " needs an index: " + name + "/INDEX/*");
       index = (*segments)[i];
       place += "/" + *index;

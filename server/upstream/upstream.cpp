@@ -123,8 +123,32 @@ const rr::EntityDefinition* Upstream::object_type(const std::string& path) const
   return type ? types_->find_entity(type->qualified_name) : nullptr;
 }
 
+/// The objref of an index is known by its parent, which is found first.
 void Upstream::find_object(const std::string& path, Completion done) {
   if (!connection_) return done(lost_error());
+  auto parent = path.substr(0, path.rfind('.'));
+  if (!path.ends_with(']') || object_type(parent)) return look_up(path, std::move(done));
+  find_object(parent, [weak = weak_from_this(), path, done = std::move(done)](const rr::Result<rr::Value>& found) {
+    const auto self = weak.lock();
+    if (!found) return done(found);
+    if (!self) return done(rr::make_error(rr::ErrorCode::connection_error, "the session with the device has ended"));
+    self->look_up(path, done);
+  });
+}
+
+/// A device may ignore the index of a plain objref (1.2.8 does): locks and leases would not know the object.
+rr::Result<> Upstream::check_index(std::string_view path) const {
+  if (!path.ends_with(']')) return {};
+  const auto dot = path.rfind('.');
+  const auto* parent = object_type(std::string(path.substr(0, dot)));
+  const auto* objref = parent ? parent->find_member(path.substr(dot + 1, path.rfind('[') - dot - 1)) : nullptr;
+  if (!objref || objref->is_indexed()) return {};
+  return rr::make_error(rr::ErrorCode::invalid_argument, "objref '" + objref->name + "' has no index");
+}
+
+void Upstream::look_up(const std::string& path, Completion done) {
+  if (!connection_) return done(lost_error());
+  if (auto valid = check_index(path); !valid) return done(valid.error());
   if (objects_.size() >= max_objects && !objects_.contains(path))
     return done(
         rr::make_error(rr::ErrorCode::out_of_system_resource,

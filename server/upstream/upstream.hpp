@@ -152,7 +152,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   /// The client goes on as another user: what it has locked is given back.
   void change_user(UpstreamClient& client);
 
-  /// Completes with the object's type.
+  /// Completes with the object's type. Errors   those of the device; invalid_argument: an index of a plain objref.
   void find_object(const std::string& path, Completion done);
   /// Asks the device; the object of the call is a SharedObject that find_object() has found here.
   void request(UpstreamClient& client, const rr::Called& called, Completion done);
@@ -274,6 +274,8 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   rr::awaitable<void> rest();
   void lost(const rr::Error& reason);
   void tell_lost(const rr::Error& reason);
+  rr::Result<> check_index(std::string_view path) const;
+  void look_up(const std::string& path, Completion done);
   void watch_object(const std::string& path, const rr::EntityDefinition& type);
   void look_up_again();
   void handle_released(const std::string& path);

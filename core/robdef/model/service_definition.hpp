@@ -86,6 +86,8 @@ struct MemberDefinition {
   MemberDirection direction() const;  ///< readonly wins where both are given
   /// A function whose return type or last parameter is a generator.
   bool is_generator() const;
+  /// An objref to many objects: a list, or a map by int32 or string.
+  bool is_indexed() const;
 };
 
 struct ConstantDefinition {

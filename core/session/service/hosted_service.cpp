@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <set>
+#include <string>
 #include <utility>
 
 #include "core/robdef/model/names.hpp"
@@ -13,27 +14,25 @@ namespace rr {
 
 namespace {
 
+/// Without leading zeros: two texts of one number would be two paths.
 bool is_decimal_int32(std::string_view text) {
   std::int32_t number = 0;
   const auto* end = text.data() + text.size();
   const auto parsed = std::from_chars(text.data(), end, number);
-  return parsed.ec == std::errc{} && parsed.ptr == end;
-}
-
-bool is_indexed(const MemberDefinition& objref) {
-  return objref.type.container != ContainerKind::none || objref.type.array != ArrayKind::none;
+  return parsed.ec == std::errc{} && text == std::to_string(number);
 }
 
 /// What the objref's type says about the index: required or not, number or text.
 Result<> check_index(const MemberDefinition& objref, const std::optional<std::string>& index) {
   const auto& type = objref.type;
-  const bool by_text = type.container == ContainerKind::map_string;
-  const bool by_number = type.container == ContainerKind::map_int32 || type.array == ArrayKind::variable;
-  if (!by_text && !by_number) return {};  // an index on a plain objref is ignored
+  if (!objref.is_indexed()) {
+    if (!index) return {};
+    return make_error(ErrorCode::invalid_argument, "objref '" + objref.name + "' has no index");
+  }
   if (!index) return make_error(ErrorCode::invalid_argument, "objref '" + objref.name + "' needs an index");
-  if (by_number && !is_decimal_int32(*index))
+  if (type.container != ContainerKind::map_string && !is_decimal_int32(*index))
     return make_error(ErrorCode::invalid_argument,
-                      "objref '" + objref.name + "': index " + quote(*index) + " is not an int32");
+                      "objref '" + objref.name + "': index " + quote(*index) + ": expected a decimal int32");
   return {};
 }
 
@@ -135,42 +134,22 @@ Result<> HostedService::add_object(const std::string& path, std::shared_ptr<Serv
   return {};
 }
 
-Result<std::string> HostedService::canonical_path(std::string_view path) {
-  if (path == name_) return name_;
-  const auto segments = parse_service_path(path);
-  if (!segments) return segments.error();
-  std::string canonical = name_;
-  for (std::size_t i = 1; i < segments->size(); ++i) {
-    const auto& [name, index] = (*segments)[i];
-    const auto parent = find_object(canonical);
-    if (!parent) return parent.error();
-    const auto* objref = parent->type->find_member(name);
-    if (!objref || objref->kind != MemberKind::objref)
-      return make_error(ErrorCode::member_not_found, parent->type->name + " has no objref " + quote(name));
-    if (auto valid = check_index(*objref, index); !valid) return valid.error();
-    if (!is_indexed(*objref)) {
-      canonical = child_path(canonical, name);
-    } else if (objref->type.container == ContainerKind::map_string) {
-      canonical = child_path(canonical, name, *index);
-    } else {
-      std::int32_t number = 0;
-      std::from_chars(index->data(), index->data() + index->size(), number);
-      canonical = child_path(canonical, name, std::to_string(number));
+std::vector<std::string> HostedService::forget_path(std::string_view path) {
+  if (path == name_) return {};
+  const auto wanted = canonical_path(path);
+  const auto segments = static_cast<std::size_t>(std::count(path.begin(), path.end(), '.'));
+  const auto stem = path.substr(0, path.find('['));
+  std::vector<std::string> spellings;
+  for (auto object = objects_.lower_bound(stem); object != objects_.end() && object->first.starts_with(stem);) {
+    const auto known_as = first_segments(object->first, segments + 1);
+    if (canonical_path(known_as) != wanted) {
+      ++object;
+      continue;
     }
+    if (spellings.empty() || spellings.back() != known_as) spellings.emplace_back(known_as);
+    object = forget(object);
   }
-  if (auto found = find_object(canonical); !found) return found.error();
-  return canonical;
-}
-
-bool HostedService::forget_path(std::string_view path) {
-  if (path == name_) return false;
-  bool was_there = false;
-  for (auto object = objects_.lower_bound(path); object != objects_.end() && object->first.starts_with(path);) {
-    const bool is_gone = is_within(object->first, path);
-    object = is_gone ? forget(object) : std::next(object);
-    was_there |= is_gone;
-  }
-  return was_there;
+  return spellings;
 }
 
 std::vector<std::string> HostedService::paths_of(const ServiceObject& object) const {

@@ -86,10 +86,8 @@ class HostedService {
   /// An object of a remote service that was found. Another one may be forgotten for it.
   /// Errors   service_definition_error: its type is not known.
   Result<> add_object(const std::string& path, std::shared_ptr<ServiceObject> object);
-  /// The one spelling of `path` by which locks know its object. Errors as find_object().
-  Result<std::string> canonical_path(std::string_view path);
-  /// Forgets `path` and everything below it. Returns whether anything was there.
-  bool forget_path(std::string_view path);
+  /// Forgets `path`, its other spellings and everything below. Returns the spellings that clients have used.
+  std::vector<std::string> forget_path(std::string_view path);
   /// All paths under which `object` is known.
   std::vector<std::string> paths_of(const ServiceObject& object) const;
 

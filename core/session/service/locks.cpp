@@ -5,6 +5,7 @@
 
 #include "core/member/error_entry.hpp"
 #include "core/session/service/service_session.hpp"
+#include "core/session/service_path.hpp"
 
 namespace rr {
 
@@ -36,29 +37,33 @@ Result<> ServiceSession::check_locks(const MessageEntry& entry, const HostedServ
   if (is_packet(entry.type) || is_disconnect(entry.type)) return {};
   auto& locks = service_->object_locks();
   if (!locks.empty() && !is_exempt(entry.type, member)) {
-    const auto path = service_->canonical_path(entry.service_path);
-    if (!path) return path.error();
-    if (auto allowed = locks.check(*path, user(), session_id_); !allowed) return allowed;
+    const auto path = canonical_path(entry.service_path);
+    if (auto allowed = locks.check(path, user(), session_id_); !allowed) return allowed;
   }
   auto& monitors = service_->monitor_locks();
   return monitors.empty() ? Result<>{} : monitors.check(*found.object, session_id_, now);
 }
 
-/// RequestObjectLock, RequestClientObjectLock, ReleaseObjectLock; the reply is begun.
-Result<> ServiceSession::answer_object_lock(const MessageEntry& entry) {
+/// RequestObjectLock, RequestClientObjectLock, ReleaseObjectLock.
+Result<> ServiceSession::answer_object_lock(const MessageEntry& entry, Now now) {
   if (!user_) return make_error(ErrorCode::authentication_error, "User is not authenticated");
   if (!user_->has_privilege("objectlock") && !user_->has_privilege("objectlockoverride"))
     return make_error(ErrorCode::object_locked_error, "User does not have object locking privileges");
   if (!service_->policy().allow_object_lock)
     return make_error(ErrorCode::permission_denied, "This service does not allow object locks");
-  const auto path = service_->canonical_path(entry.service_path);
-  if (!path) return path.error();
-  auto& locks = service_->object_locks();
-  const auto done = entry.member_name == "ReleaseObjectLock"   ? locks.unlock(*path, *user_)
-                    : entry.member_name == "RequestObjectLock" ? locks.lock(*path, *user_, 0)
-                                                               : locks.lock(*path, *user_, session_id_);
-  if (done) outgoing_.add_text("return", "OK");
-  return done;
+  const auto service = service_;
+  if (const auto found = service->find_object(entry.service_path); !found) return found.error();
+  if (!user_) return {};  // the application, which was asked, has ended the session
+  const auto path = canonical_path(entry.service_path);
+  auto& locks = service->object_locks();
+  auto done = entry.member_name == "ReleaseObjectLock"   ? locks.unlock(path, *user_)
+              : entry.member_name == "RequestObjectLock" ? locks.lock(path, *user_, 0)
+                                                         : locks.lock(path, *user_, session_id_);
+  if (!done) return done;
+  begin_reply(entry);
+  outgoing_.add_text("return", "OK");
+  send_outgoing(now);
+  return {};
 }
 
 /// MonitorEnter, MonitorContinueEnter, MonitorExit. Where the lock is not free the answer follows later.
@@ -66,8 +71,10 @@ Result<> ServiceSession::answer_monitor(const Message& message, const MessageEnt
   const auto command = entry.member_name;
   if (command != "MonitorEnter" && command != "MonitorContinueEnter" && command != "MonitorExit")
     return protocol_error("Invalid ClientSessionOp command");
-  auto found = service_->find_object(entry.service_path);
+  const auto service = service_;
+  auto found = service->find_object(entry.service_path);
   if (!found) return found.error();
+  if (!service_) return {};  // the application, which was asked, has ended the session
   auto& monitors = service_->monitor_locks();
   if (command == "MonitorExit") {
     const auto was_locked = monitors.exit(*found->object, session_id_, now);

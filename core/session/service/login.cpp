@@ -122,10 +122,7 @@ Result<> ServiceSession::answer_session_op(const Message& message, const Message
   }
   if (command == "RequestObjectLock" || command == "RequestClientObjectLock" || command == "ReleaseObjectLock") {
     if (auto admitted = admit(entry.type, entry.service_path, nullptr); !admitted) return admitted;
-    begin_reply(entry);
-    if (auto done = answer_object_lock(entry); !done) return done;
-    send_outgoing(now);
-    return {};
+    return answer_object_lock(entry, now);
   }
   if (command == "ReleaseClientObjectLock") return make_error(ErrorCode::invalid_operation, "Invalid command");
   return protocol_error("Invalid ClientSessionOp command");

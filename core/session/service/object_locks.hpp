@@ -14,7 +14,7 @@ namespace rr {
 using SessionId = std::uint64_t;
 
 /// Who has locked what. A lock holds for its object and everything below it; no two locks overlap. Paths are canonical
-/// (HostedService::canonical_path()): other spellings of an index open nothing.
+/// (canonical_path()): other spellings of an index open nothing.
 class ObjectLocks {
  public:
   /// `session`  0: a user lock, for all sessions of the user; otherwise a lock for this one alone.

@@ -225,7 +225,7 @@ void ServiceSession::close_service(Now now) {
 void ServiceSession::send_outgoing(Now now, bool is_urgent) {
   if (!passes_.empty())
     for (const auto& entry : outgoing_.entries)
-      if (!is_request(entry.type)) answer_pass(entry);
+      if (!is_request(entry.type) && entry.type != EntryType::pipe_packet_ret) answer_pass(entry);
   if (auto sent = connection_.send(outgoing_, now, is_urgent); sent)
     return;
   else if (connection_.state() == ConnectionState::closed)
@@ -251,6 +251,8 @@ void ServiceSession::handle_message(const Message& message, Now now) {
   const bool is_session_lookup =
       first.type == EntryType::object_type_name && message.entries.size() == 1 && message.header.receiver_endpoint != 0;
   if (is_special && !is_session_lookup) {
+    for (const auto& entry : message.entries)
+      if (refuse_reused_id(entry, now)) return;
     if (is_request(first.type)) handle_special(message, now);
     return;
   }
@@ -259,6 +261,7 @@ void ServiceSession::handle_message(const Message& message, Now now) {
   for (const auto& entry : message.entries) {
     if (connection_.is_held_back()) return;
     if (leaving_ && is_ours) return;  // behind a disconnect
+    if (refuse_reused_id(entry, now)) return;
     if (!is_ours) {
       if (is_request(entry.type) && !is_packet(entry.type))
         send_error(entry, {ErrorCode::invalid_endpoint, "Invalid destination endpoint"}, now);
@@ -270,6 +273,16 @@ void ServiceSession::handle_message(const Message& message, Now now) {
       handle_entry(message, entry, now);
     }
   }
+}
+
+/// What is kept for a request is found by the client's number: a second request of that number would end the first.
+bool ServiceSession::refuse_reused_id(const MessageEntry& entry, Now now) {
+  if (passes_.empty() || !is_request(entry.type) || is_packet(entry.type) || !passes_.contains(entry.request_id))
+    return false;
+  connection_.close(protocol_error("request " + std::to_string(entry.request_id) +
+                                   " of the client is not answered yet, and it sent another one of that number"));
+  leave(connection_.close_reason(), now);
+  return true;
 }
 
 /// The endpoints must be this connection's, and the sender the node that connected: knowing the number of somebody

@@ -307,7 +307,7 @@ class ServiceSession {
   // locks (locks.cpp)
   Result<> check_locks(const MessageEntry& entry, const HostedService::Found& found, const MemberDefinition& member,
                        Now now);
-  Result<> answer_object_lock(const MessageEntry& entry);
+  Result<> answer_object_lock(const MessageEntry& entry, Now now);
   Result<> answer_monitor(const Message& message, const MessageEntry& entry, Now now);
   static Result<std::chrono::milliseconds> read_monitor_timeout(const Message& message, const MessageEntry& entry);
   /// Of OpenEnter or OpenLock. `answer`  the text that the client gets.
@@ -351,6 +351,7 @@ class ServiceSession {
   Result<> admit_special(const Message& message, const MessageEntry& entry) const;
   const ServiceDefinition* find_definition(std::string_view service, std::string_view name) const;
   Result<> enter(const MessageEntry& entry, const MemberDefinition& member);
+  bool refuse_reused_id(const MessageEntry& entry, Now now);
   void answer_pass(const MessageEntry& answer);
   std::shared_ptr<RequestPass> release_pass(std::uint32_t request_id);
 
@@ -419,8 +420,7 @@ class ServiceSession {
 
   CallId last_call_id_ = 0;
   std::vector<OpenCall> calls_;
-  std::unordered_multimap<std::uint32_t, std::shared_ptr<RequestPass>>
-      passes_;  ///< of requests, until they are answered
+  std::unordered_map<std::uint32_t, std::shared_ptr<RequestPass>> passes_;  ///< of requests, until they are answered
   GeneratorTable generators_;
   Wires wires_;
   std::unique_ptr<Ledgers> ended_;  ///< of wires and pipes that are no more; null: there were none

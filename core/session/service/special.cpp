@@ -237,7 +237,9 @@ Result<> ServiceSession::write_root_type(const Message& message, const MessageEn
   const auto service = directory_.find(service_name_of(entry));
   if (!service) return object_not_found();
   if (service->policy().require_valid_user && entry.service_path != service->name()) return object_not_found();
+  auto begun = std::exchange(outgoing_, {});  // the application, which is asked, may have this session send something
   const auto found = service->find_object(entry.service_path);
+  outgoing_ = std::move(begun);
   if (!found) return object_not_found();
   const bool is_root = found->type == &service->root_type();
   const auto name = is_root ? type_for_client(*service, *version) : found->type->qualified_name;

@@ -120,7 +120,7 @@ Result<> ServiceSession::answer_wire(const MessageEntry& entry, const HostedServ
   }
   begin_reply(entry);
   send_outgoing(now);
-  if (is_new) events_.push(WireConnected{key.path, found.object, &member});
+  if (is_new && service_) events_.push(WireConnected{key.path, found.object, &member});
   return {};
 }
 
@@ -128,11 +128,13 @@ void ServiceSession::handle_wire_packet(const Message& message, const MessageEnt
   const auto wire = wires_.find(PathMemberView{entry.service_path, entry.member_name});
   if (wire == wires_.end() || !check_direction(entry.type, *wire->second.member)) return;
   if (!admit(entry.type, entry.service_path, wire->second.member)) return;
-  auto packet = read_wire_value(message, entry, *wire->second.member, service_->types());
+  const auto* member = wire->second.member;
+  auto packet = read_wire_value(message, entry, *member, service_->types());
   if (!packet || !wire->second.accept(packet->time)) return;
-  auto found = service_->find_object(entry.service_path);
-  if (!found) return;
-  events_.push(WireReceived{std::move(found->object), wire->second.member, packet->time, std::move(packet->value)});
+  const auto service = service_;
+  auto found = service->find_object(entry.service_path);
+  if (!found || !has_wire(entry.service_path, member->name)) return;  // the application, which was asked, may close it
+  events_.push(WireReceived{std::move(found->object), member, packet->time, std::move(packet->value)});
 }
 
 // --- ended ---

@@ -46,7 +46,7 @@ TEST_CASE("a remote service is asked for objects, and requests wait for them") {
     CHECK(pair.completion(got).value() == Value("gripper"));
   }
   SECTION("a client that has found it before the service forgot it just goes on") {
-    CHECK(pair.hosted().forget_path("arm.tool"));
+    CHECK(pair.hosted().forget_path("arm.tool").size() == 1);
     const auto first = pair.client->get_property("arm.tool", "name", pair.now);
     const auto second = pair.client->set_property("arm.tool", "name", Value("hammer"), pair.now);
     pair.pump();
@@ -88,7 +88,7 @@ TEST_CASE("what waits for objects is bounded in bytes, too") {
   Remote pair;
   pair.find("arm.tool");
   CHECK(pair.completion(pair.client->find_object("arm.tool", pair.now)));
-  CHECK(pair.hosted().forget_path("arm.tool"));
+  CHECK(pair.hosted().forget_path("arm.tool").size() == 1);
   const Value name(std::string(5'000'000, 'x'));
   std::vector<RequestId> ids;
   ids.reserve(3);
@@ -454,6 +454,17 @@ TEST_CASE("requests are bounded until they are answered; what is too much is ref
     pair.service->reply(pair.next_service<Called>().id, Value{}, pair.now);
     CHECK(pair.completion(closing));
     CHECK(open == 2);
+  }
+  SECTION("another request of the same number ends the client, not the first one's entry") {
+    const auto type = GENERATE(EntryType::client_keep_alive_req, EntryType::get_node_info, EntryType::property_get_req);
+    pair.forge(*pair.client, [&](Message& message) {
+      message.begin_entry(type, "arm", "nothing", static_cast<std::uint32_t>(reading));
+    });
+    pair.carry(*pair.client, *pair.service, 1u << 20);
+    CHECK(pair.service->wants_close());
+    CHECK_THAT(pair.service->connection().close_reason().message, Catch::Contains("is not answered yet"));
+    CHECK(open == 0);
+    CHECK(answers == std::vector{ErrorCode::none});
   }
   SECTION("what is asked of an object that is replaced is over") {
     pair.service->release_path("arm", pair.now);

@@ -317,6 +317,18 @@ TEST_CASE("an application may use the session, or end it, while it is asked for 
     CHECK(pair.next_client<PathReleased>().path == "arm.slots[1]");
     CHECK(pair.next_client<Completed>().result.value() == Value("experimental.loopback.Tool"));
   }
+  SECTION("it sends something while another node's question of the same connection is answered") {
+    pair.root->while_finding = [&] { pair.service->release_path("arm.slots[1]", pair.now); };
+    pair.forge(*pair.client, [](Message& message) {
+      message.begin_entry(EntryType::get_node_info, {}, {}, 100);
+      message.begin_entry(EntryType::object_type_name, "arm.tools[a]", {}, 101);
+    });
+    pair.carry(*pair.client, *pair.service, 1u << 20);
+    const auto sent = pair.service->poll_transmit();
+    std::string bytes;
+    for (const auto& part : sent) bytes.append(part.begin(), part.end());
+    CHECK_THAT(bytes, Catch::Contains("experimental.loopback.Tool"));
+  }
   SECTION("it ends the session") {
     pair.completion(pair.client->find_object("arm.tools[a]", pair.now)).value();
     pair.service->service()->forget_path("arm.tools[a]");
@@ -325,4 +337,32 @@ TEST_CASE("an application may use the session, or end it, while it is asked for 
     pair.pump();
     CHECK(pair.client->state() == ClientState::closed);
   }
+}
+
+TEST_CASE("few paths lead to one object, and all of them are released with it") {
+  Loopback pair;
+  pair.connect();
+  auto& service = *pair.service->service();
+  const auto find = [&](std::string_view path) { return pair.completion(pair.client->find_object(path, pair.now)); };
+  REQUIRE(find("arm.tools[a%2db%2ec]"));
+  REQUIRE(find("arm.tools[a%2Db%2Ec]"));
+  REQUIRE(find("arm.tools[a-b%2ec]"));
+  REQUIRE(find("arm.tools[%ffffffc3%ffffffa4]"));
+  REQUIRE(find("arm.slots[-1]"));
+  REQUIRE(find("arm.tool"));
+  const auto asked = pair.root->asked.size();
+  for (const auto* path : {"arm.tools[a%2Db%2ec]", "arm.tools[a-b%2dc]", "arm.tools[%61]", "arm.tools[%ffffffc3%a4]"})
+    CHECK(find(path).error().code == ErrorCode::service_error);
+  for (const auto* path : {"arm.slots[01]", "arm.slots[-0]", "arm.slots[1a]", "arm.slots", "arm.tool[0]"})
+    CHECK(find(path).error().code == ErrorCode::invalid_argument);
+  const auto longest = "arm.tools[" + std::string(max_path_size - 11, 'a') + "]";
+  CHECK(find(longest));
+  CHECK(find("arm.tools[a" + longest.substr(10)).error().code == ErrorCode::service_error);
+  CHECK(pair.root->asked.size() == asked + 1);
+
+  CHECK(service.forget_path("arm.tools[a%2db%2ec]") ==
+        std::vector<std::string>{"arm.tools[a%2Db%2Ec]", "arm.tools[a%2db%2ec]", "arm.tools[a-b%2ec]"});
+  CHECK_FALSE(service.has_object("arm.tools[a-b%2ec]"));
+  CHECK(service.has_object(longest));
+  CHECK(service.forget_path("arm.tools[a%2db%2ec]").empty());
 }

@@ -118,7 +118,7 @@ TEST_CASE("a broadcast leaves out endpoints that lag behind, counts it, and goes
   };
   const auto state = [&] {
     return belt.node.ask([&](Node&) {
-      const auto& one = belt.service->pipe("scans").endpoints().front();
+      const auto one = belt.service->pipe("scans").endpoints().front();
       return std::pair(one.backlog(), one.missed());
     });
   };

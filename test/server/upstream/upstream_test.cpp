@@ -18,6 +18,8 @@ object Bench
     wire double level [readonly]
     function int32{generator} count()
     function void wait()
+    objref Bench spare
+    objref Bench{int32} others
 end
 )";
 
@@ -29,6 +31,8 @@ struct Counting {
   Counting() {
     service->generator(
         "count", [this] { return [next = 0, token = life]() mutable { return std::optional<std::int32_t>(++next); }; });
+    service->root().objref("spare", std::shared_ptr<rr::Object>());
+    service->root().objref("others", [](std::string_view) { return std::shared_ptr<rr::Object>(); });
     service->function("wait", [this](rr::Reply<void> reply) { waiting = std::move(reply); });
   }
   /// Generators that clients have opened and not closed.
@@ -212,4 +216,32 @@ TEST_CASE("a device that does not answer what makes it safe holds the end of a s
   bench.upstream->close();
   REQUIRE(bench.run_until([&] { return is_gone && !bench.device->is_closing(); }));
   CHECK(std::chrono::steady_clock::now() - begin >= 1s);
+}
+
+TEST_CASE("an index of a plain objref is refused before the device is asked, which may ignore it") {
+  Counting device;
+  int asked = 0;
+  device.service->root().objref("others", [&](std::string_view) {
+    ++asked;
+    return device.service->make_object("Bench");
+  });
+  UpstreamBench bench(device.service);
+  bench.open();
+  std::optional<rr::Result<rr::Value>> answer;
+  const auto keep = [&](const rr::Result<rr::Value>& found) { answer = found; };
+  const auto is_refused = [&] {
+    return answer && !*answer && answer->error().message == "objref 'spare' has no index";
+  };
+  bench.upstream->find_object("bench.spare[7]", keep);
+  CHECK(is_refused());
+  answer.reset();
+  bench.upstream->find_object("bench.others[1].spare[7]", keep);
+  CHECK(bench.run_until([&] { return answer.has_value(); }));
+  CHECK(is_refused());
+  CHECK(asked == 1);
+  answer.reset();
+  bench.upstream->find_object("bench.others[1].others[2]", keep);
+  CHECK(bench.run_until([&] { return answer.has_value(); }));
+  CHECK(asked == 1);
+  CHECK((answer && answer->has_error()));
 }
