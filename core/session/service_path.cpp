@@ -7,12 +7,8 @@ namespace rr {
 
 namespace {
 
-bool is_digit(char c) {
-  return c >= '0' && c <= '9';
-}
-
 bool is_alnum(char c) {
-  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || is_digit(c);
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
 }
 
 /// How one peer spells indexes; what it does once it always does.
@@ -56,7 +52,7 @@ std::optional<std::string> decode_index(std::string_view text) {
     if (is_alnum(decoded) || (is_mark(decoded) && !spelling.leaves_marks(false))) return std::nullopt;
     if (byte >= 0x80 && !spelling.extends_sign(is_sign_extended)) return std::nullopt;
     for (const char digit : digits)
-      if (!is_digit(digit) && !spelling.has_capitals(digit < 'a')) return std::nullopt;
+      if (digit > '9' && !spelling.has_capitals(digit < 'a')) return std::nullopt;
     out += decoded;
     i += is_sign_extended ? 8 : 2;
   }

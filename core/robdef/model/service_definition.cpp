@@ -57,10 +57,6 @@ bool MemberDefinition::is_generator() const {
           (!parameters.empty() && parameters.back().type.container == ContainerKind::generator));
 }
 
-bool MemberDefinition::is_indexed() const {
-  return kind == MemberKind::objref && (type.container != ContainerKind::none || type.array != ArrayKind::none);
-}
-
 const MemberDefinition* EntityDefinition::find_member(std::string_view member) const {
   return find_named(members, member);
 }

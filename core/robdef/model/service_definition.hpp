@@ -87,7 +87,9 @@ struct MemberDefinition {
   /// A function whose return type or last parameter is a generator.
   bool is_generator() const;
   /// An objref to many objects: a list, or a map by int32 or string.
-  bool is_indexed() const;
+  bool is_indexed() const {
+    return kind == MemberKind::objref && (type.container != ContainerKind::none || type.array != ArrayKind::none);
+  }
 };
 
 struct ConstantDefinition {
