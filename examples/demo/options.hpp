@@ -5,13 +5,19 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace rrgate::demo {
+
+inline constexpr std::string_view all_devices = "auto", no_device = "none";
 
 struct Options {
   std::string host = "127.0.0.1";
   std::uint16_t port = 0;
-  std::string robot;  ///< webcams: URL of the Create service
+  std::string robot;                 ///< webcams: URL of the Create service
+  bool is_on_robot = false;          ///< webcams: --robot was given
+  std::vector<std::string> devices;  ///< webcams: paths, or one of the words above; empty: none was given
+  std::string pictures;              ///< webcams: a file or folder; empty: none
 };
 
 /// What a program takes, with its defaults.
@@ -27,6 +33,9 @@ std::optional<Options> parse_options(const Program& program, int argc, char** ar
 
 /// "rr+tcp://127.0.0.1:52222/?service=Create": where a client on this machine finds the service.
 std::string service_url(const std::string& host, std::uint16_t port, std::string_view service);
+
+/// Whether none but this machine can connect to `host`, as far as its text tells.
+bool is_loopback(std::string_view host);
 
 /// "rr+tcp://127.0.0.1:52222", for Node::listen().
 std::string listen_url(const Options& options);

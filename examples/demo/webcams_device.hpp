@@ -1,12 +1,14 @@
-// The service of the demo cameras: the webcams of the Robot Raconteur paper's Example 2, on the demo robot. Layer:
-// demo. Definition: robdef/modern/experimental.createwebcam2.robdef.
+// The service of the webcams of the Robot Raconteur paper's Example 2: simulated on the demo robot, or those of this
+// machine. Layer: demo. Definition: robdef/modern/experimental.createwebcam2.robdef.
 #pragma once
 
 #include <functional>
 #include <memory>
+#include <string>
 #include <vector>
 
-#include "examples/demo/camera.hpp"
+#include "examples/demo/frame_source.hpp"
+#include "examples/demo/robot.hpp"
 #include "rrgate/device.hpp"
 
 namespace rrgate::demo {
@@ -15,28 +17,27 @@ class WebcamsDevice {
  public:
   static constexpr std::string_view service_name = "Webcam";
 
-  /// Adds the service to `node`, which must not run any more once the device is gone. `robot_pose` is asked for each
-  /// frame.
-  WebcamsDevice(rr::Node& node, std::function<Pose()> robot_pose);
+  /// Adds the service to `node`, which must not run any more once the device is gone. Webcam 0 is the first source.
+  WebcamsDevice(rr::Node& node, std::vector<std::unique_ptr<FrameSource>> sources);
+  /// With two simulated cameras. `robot_pose` is asked for each frame.
+  WebcamsDevice(rr::Node& node, const std::function<Pose()>& robot_pose);
   WebcamsDevice(const WebcamsDevice&) = delete;
   WebcamsDevice& operator=(const WebcamsDevice&) = delete;
 
  private:
   struct Webcam {
-    std::string name;
-    Camera camera;
+    std::unique_ptr<FrameSource> source;
     std::shared_ptr<rr::Object> object = {};
     bool is_streaming = false;
+    bool has_request = false;  ///< of the stream, to the source
   };
 
   std::shared_ptr<rr::Object> make_object(Webcam& webcam);
-  rr::Value capture(const Camera& camera) const;
   void stream_frames();
+  void end_stream(Webcam& webcam);
 
-  World world_;
-  std::function<Pose()> robot_pose_;
   std::shared_ptr<rr::Service> service_;
-  std::vector<Webcam> webcams_;  ///< by index of the objref Webcams
+  std::vector<Webcam> webcams_;  ///< by index of the objref Webcams; stays as it was made
 };
 
 }  // namespace rrgate::demo

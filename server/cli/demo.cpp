@@ -42,6 +42,7 @@ struct DemoDevice {
   std::uint16_t port = 0;
   std::vector<std::string> arguments = {};
   bool follows_first = false;  ///< is told where the first device is
+  bool has_cameras = false;    ///< is told which cameras or pictures to show
   bool has_group = false;      ///< is told by what name the nodes of this demo find one another
   pid_t process = -1;
 
@@ -83,10 +84,11 @@ std::vector<DemoSystem> list_systems() {
     part.has_group = true;
     return part;
   };
-  auto riding_webcams = webcams;
+  auto riding_webcams = webcams, standing_webcams = webcams;
   riding_webcams.follows_first = true;
+  standing_webcams.has_cameras = true;
   return {{"create", "a mobile robot in a room, and two cameras that ride on it", {create, riding_webcams}},
-          {"webcams", "two cameras that stand in a room", {webcams}},
+          {"webcams", "the cameras of this machine, or two that stand in a room", {standing_webcams}},
           {"conference-room",
            "lights and colour sensors of a room, and a controller that holds the light at a target",
            {{"controller", "rrgate-demo-conference-room", "Controller"},
@@ -333,7 +335,20 @@ struct DemoOptions {
   std::optional<std::uint16_t> port;
   bool is_lan = false;
   bool is_without_browser = false;
+  std::vector<std::string> cameras;
+  std::string pictures;
 };
+
+/// Which cameras are shown; none of this machine's to other machines, unless that is asked for. Returns what is wrong.
+std::string choose_cameras(const DemoOptions& options, std::vector<DemoDevice>& devices) {
+  const bool is_chosen = !options.cameras.empty() || !options.pictures.empty();
+  const auto shown = std::find_if(devices.begin(), devices.end(), [](const auto& each) { return each.has_cameras; });
+  if (shown == devices.end()) return is_chosen ? "--device and --pictures are options of 'demo webcams'" : "";
+  for (const auto& camera : options.cameras) shown->arguments.insert(shown->arguments.end(), {"--device", camera});
+  if (!options.pictures.empty()) shown->arguments.insert(shown->arguments.end(), {"--pictures", options.pictures});
+  if (!is_chosen && options.is_lan) shown->arguments.insert(shown->arguments.end(), {"--device", "none"});
+  return {};
+}
 
 int demo(const DemoOptions& options) {
   if (options.is_list) return print_systems();
@@ -346,6 +361,7 @@ int demo(const DemoOptions& options) {
   const auto systems = list_systems();
   const auto is_wanted = [&options](const DemoSystem& system) { return system.name == options.system; };
   auto devices = std::find_if(systems.begin(), systems.end(), is_wanted)->devices;
+  if (const auto mistake = choose_cameras(options, devices); !mistake.empty()) return usage_error("demo", mistake);
   if (const auto missing = prepare_programs(devices); !missing.empty())
     return report_failure("demo", missing + " not found beside rrgate");
   for (auto& device : devices)
@@ -388,6 +404,16 @@ void add_demo(Commands& commands) {
       ->option_text("N");
   app.add_flag("--lan", options.is_lan, "Allow other machines, with a password that is printed")
       ->envname("RRGATE_DEMO_LAN");
+  auto* const cameras =
+      app.add_option("--device", options.cameras,
+                     "webcams: a camera to show, as /dev/video0; may be repeated. auto: all of this machine, or else "
+                     "simulated ones; none: simulated ones; default: auto, with --lan none")
+          ->allow_extra_args(false)
+          ->option_text("PATH");
+  app.add_option("--pictures", options.pictures,
+                 "webcams: pictures to show, a folder of .jpg files, or a .jpg or .mjpeg file")
+      ->excludes(cameras)
+      ->option_text("PATH");
   app.add_flag("--no-browser", options.is_without_browser, "Do not open the page in a browser");
 }
 

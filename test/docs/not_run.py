@@ -17,6 +17,7 @@ COMMANDS = {
     ("docs/start.md", "./dev demo"): "builds everything; the test starts what came of it",
     ("docs/systems.md", "rrgate demo conference-room"): "goes on until it is ended: test/examples/systems/systems_test.py does it",
     ("docs/systems.md", "rrgate demo microassembly"): "the same",
+    ("docs/systems.md", "rrgate demo webcams"): "takes cameras: test/examples/demo has simulated drivers, test/server/process_test.py pictures",
     ("docs/systems.md", "/usr/libexec/rrgate"): "takes a robot: test/examples/systems/systems_test.py has one of bytes",
     ("docs/tutorials/cpp-device.md", "./dev build"): "test/examples/examples_test.py builds and runs it",
     ("docs/tutorials/cpp-device.md", "build-examples/thermostat_client"): "test/examples/examples_test.py builds and runs it",

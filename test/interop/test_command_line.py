@@ -268,7 +268,7 @@ def test_each_value_of_a_generator_is_a_line_of_the_file(tmp_path):
 
 def test_images_go_to_files(tmp_path):
     port = free_port()
-    cameras = Background([BUILD / "examples" / "demo" / "rrgate-demo-webcams", "--port", port], tmp_path / "log")
+    cameras = Background([BUILD / "examples" / "demo" / "rrgate-demo-webcams", "--port", port, "--device", "none"], tmp_path / "log")
     url = f"rr+tcp://127.0.0.1:{port}/?service=Webcam"
     try:
         cameras.wait_until(lambda: Ran(["info", url]).code == DONE)

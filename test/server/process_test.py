@@ -160,12 +160,36 @@ class Demo(Files):
         listed = run("demo", "--list")
         self.assertEqual((listed.returncode, listed.stderr), (0, ""))
         self.assertEqual([line.split()[0] for line in listed.stdout.splitlines()], ["create", "webcams", "conference-room", "microassembly", "baxter"])
-        with urllib.request.urlopen(self.start("webcams") + "api/v1/devices", timeout=10) as answer:
+        with urllib.request.urlopen(self.start("webcams", "--device", "none") + "api/v1/devices", timeout=10) as answer:
             self.assertEqual([each["name"] for each in json.load(answer)["devices"]], ["webcams"])
         unknown = run("demo", "fox")
         self.assertEqual((unknown.returncode, unknown.stdout), (2, ""))
         self.assertIn("fox", unknown.stderr)
         self.assertIn("webcams", unknown.stderr)
+
+    def test_webcams_show_pictures_of_files(self):
+        picture = os.path.join(self.folder.name, "picture.jpg")
+        webcams = self.start("webcams", "--device=none") + "devices/webcams?service=Webcam"
+        self.assertEqual(run("call", webcams, "Webcams/0/CaptureFrame", "-o", picture).returncode, 0)
+        webcams = self.start("webcams", "--pictures", self.folder.name) + "devices/webcams?service=Webcam"
+        shown = json.loads(run("call", webcams, "Webcams/0/CaptureFrame", "--json").stdout)
+        self.assertEqual((shown["width"], shown["height"], shown["step"]), (320, 240, 960))
+        self.assertNotEqual(run("get", webcams, "Webcams/1/Name").returncode, 0)
+        self.assertIn("webcam 0: " + os.path.basename(self.folder.name), self.said)
+
+    def test_a_camera_that_is_not_there_is_told_to_who_asks_for_its_frames(self):
+        webcams = self.start("webcams", "--device", "/dev/no-camera") + "devices/webcams?service=Webcam"
+        refused = run("call", webcams, "Webcams/0/CaptureFrame")
+        self.assertEqual(refused.returncode, 1)
+        self.assertIn("/dev/no-camera can't be opened: No such file or directory", refused.stderr)
+
+    def test_cameras_are_chosen_for_webcams_alone(self):
+        for arguments in (["create", "--device", "none"], ["microassembly", "--pictures", "x"], ["--device", "/dev/video0"],
+                          ["webcams", "--device", "none", "--pictures", "x"], ["webcams", "--device"]):
+            with self.subTest(arguments):
+                refused = run("demo", *arguments)
+                self.assertEqual((refused.returncode, refused.stdout), (2, ""))
+                self.assertIn("--device", refused.stderr)
 
     def test_other_machines_come_with_a_password(self):
         url = self.start("--lan")

@@ -15,6 +15,19 @@ rr::Value field_of(const rr::Value& structure, std::string_view name) {
   return *structure.get_if<rr::Structure>()->find(name);
 }
 
+/// A camera that a test unplugs, and that can let its client wait.
+struct TestCamera : FrameSource {
+  std::string name() const override { return "Test"; }
+  void take(Taken taken) override {
+    if (is_slow) return waiting.push_back(std::move(taken));
+    taken(problem.empty() ? FrameResult{{2, 1, 6, {1, 2, 3, 4, 5, 6}}, {}} : FrameResult{{}, problem});
+  }
+
+  std::string problem;
+  bool is_slow = false;
+  std::vector<Taken> waiting;
+};
+
 }  // namespace
 
 TEST_CASE("two cameras look out from the pose that they are given") {
@@ -106,6 +119,77 @@ TEST_CASE("frames flow to every endpoint of a camera's pipe while it streams") {
   host.object("Webcams", "1").call("StartStreaming");
   REQUIRE(host.connection().run_until([&] { return of_right >= 2; }, 20s));
   CHECK(second == stopped_at);
+}
+
+TEST_CASE("a camera that fails is an error to its clients, and its stream goes on when it is started again") {
+  std::unique_ptr<WebcamsDevice> webcams;
+  auto owned = std::make_unique<TestCamera>();
+  TestCamera& camera = *owned;
+  rr::RunningNode node([&](rr::Node& made) {
+    std::vector<std::unique_ptr<FrameSource>> sources;
+    sources.push_back(std::move(owned));
+    webcams = std::make_unique<WebcamsDevice>(made, std::move(sources));
+  });
+  const auto host = rr::connect(node.url("Webcam"));
+  CHECK(host.get("WebcamNames") == rr::Value(rr::MapInt32{{{0, "Test"}}}));
+  const auto webcam = host.object("Webcams", "0");
+  CHECK(field_of(webcam.call("CaptureFrame"), "data") == rr::Value(std::vector<std::uint8_t>{1, 2, 3, 4, 5, 6}));
+  webcam.call("CaptureFrameToBuffer");
+  CHECK(webcam.memory("multidimbuffer").read() ==
+        rr::Value(rr::MultiDimArray{{1, 2, 3}, rr::Array::take(std::vector<std::uint8_t>{3, 6, 2, 5, 1, 4})}));
+
+  int frames = 0;
+  const auto take_frame = [&](const rr::Value&) { ++frames; };
+  const auto stream = webcam.connect_pipe("FrameStream", take_frame);
+  webcam.call("StartStreaming");
+  REQUIRE(host.connection().run_until([&] { return frames >= 2; }, 20s));
+  node.ask([&](rr::Node&) { return camera.problem = "camera 'Test' is lost: /dev/video0 was unplugged"; });
+  REQUIRE(host.connection().run_until([&] { return !stream.is_open(); }, 20s));
+  for (const char* function : {"CaptureFrame", "CaptureFrameToBuffer", "StartStreaming"})
+    CHECK(rr::error_of([&] { webcam.call(function); }).message == "camera 'Test' is lost: /dev/video0 was unplugged");
+
+  node.ask([&](rr::Node&) {
+    camera.problem.clear();
+    return 0;
+  });
+  webcam.connect_pipe("FrameStream", take_frame);
+  webcam.call("StartStreaming");
+  const int after = frames + 2;
+  CHECK(host.connection().run_until([&] { return frames >= after; }, 20s));
+}
+
+TEST_CASE("a stream asks a slow camera for one frame at a time, and for none after it was stopped") {
+  std::unique_ptr<WebcamsDevice> webcams;
+  auto owned = std::make_unique<TestCamera>();
+  TestCamera& camera = *owned;
+  rr::RunningNode node([&](rr::Node& made) {
+    std::vector<std::unique_ptr<FrameSource>> sources;
+    sources.push_back(std::move(owned));
+    webcams = std::make_unique<WebcamsDevice>(made, std::move(sources));
+  });
+  const auto host = rr::connect(node.url("Webcam"));
+  const auto webcam = host.object("Webcams", "0");
+  int frames = 0;
+  webcam.connect_pipe("FrameStream", [&](const rr::Value&) { ++frames; });
+  webcam.call("StartStreaming");
+  REQUIRE(host.connection().run_until([&] { return frames >= 1; }, 20s));
+  node.ask([&](rr::Node&) { return camera.is_slow = true; });
+  const auto waiting = [&] { return node.ask([&](rr::Node&) { return camera.waiting.size(); }); };
+  while (waiting() == 0) webcam.get("Name");
+  // The stream's period passes twice.
+  const auto later = std::chrono::steady_clock::now() + 200ms;
+  while (std::chrono::steady_clock::now() < later) webcam.get("Name");
+  CHECK(waiting() == 1);
+  webcam.call("StopStreaming");
+  const int stopped_at = frames;
+  node.ask([&](rr::Node&) {
+    camera.waiting.front()({{2, 1, 6, std::vector<std::uint8_t>(6)}, {}});
+    camera.waiting.clear();
+    return 0;
+  });
+  for (int i = 0; i < 20; ++i) webcam.get("Name");
+  CHECK(frames == stopped_at);
+  CHECK(waiting() == 0);
 }
 
 TEST_CASE("the cameras follow the robot, and turn by themselves while there is none") {
