@@ -180,7 +180,7 @@ class Demo(Files):
     def test_a_camera_that_is_not_there_is_told_to_who_asks_for_its_frames(self):
         webcams = self.start("webcams", "--device", "/dev/no-camera") + "devices/webcams?service=Webcam"
         refused = run("call", webcams, "Webcams/0/CaptureFrame")
-        self.assertEqual(refused.returncode, 1)
+        self.assertEqual(refused.returncode, 5)
         self.assertIn("/dev/no-camera can't be opened: No such file or directory", refused.stderr)
 
     def test_cameras_are_chosen_for_webcams_alone(self):
