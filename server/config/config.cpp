@@ -190,7 +190,7 @@ std::optional<nlohmann::json> parse_json(std::string_view text, std::vector<Find
   };
   try {
     return nlohmann::json::parse(text, watch, true, true);
-  } catch (const nlohmann::json::parse_error& error) {
+  } catch (const nlohmann::json::exception& error) {  // a number that no double holds is no parse_error
     std::string what = error.what();  // "[json.exception.parse_error.101] parse error at line 1, column 2: ..."
     const auto begin = what.find("] ");
     findings.push_back({{}, "not JSON: " + (begin == std::string::npos ? what : what.substr(begin + 2))});

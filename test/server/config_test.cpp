@@ -354,6 +354,7 @@ TEST_CASE("what only shared devices have") {
 TEST_CASE("mistakes are named by path, with what was found and expected") {
   finds("", "gateway.json: not JSON");
   finds("{", "gateway.json: not JSON", "line 1");
+  finds(R"({"listen": 1e400})", "gateway.json: not JSON", "1e400");
   finds("[]", "gateway.json: ", "found array, expected an object");
   finds(R"({"devices": []})", "gateway.json: /listen: missing; expected an array");
   finds(R"({"listen": ["127.0.0.1:0"]})", "gateway.json: /devices: missing");
