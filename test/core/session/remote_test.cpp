@@ -98,9 +98,11 @@ TEST_CASE("what waits for objects is bounded in bytes, too") {
 
 TEST_CASE("a message of more requests than may wait for objects is not kept for each of them") {
   Remote pair;
-  pair.forge(*pair.client, [](Message& message) {
-    for (std::uint32_t i = 0; i < 65; ++i)
-      message.begin_entry(EntryType::property_get_req, "arm.slots[" + std::to_string(i) + "]", "name", i + 1);
+  std::vector<std::string> paths;  // a message borrows them
+  for (int i = 0; i < 65; ++i) paths.push_back("arm.slots[" + std::to_string(i) + "]");
+  pair.forge(*pair.client, [&paths](Message& message) {
+    std::uint32_t id = 0;
+    for (const auto& path : paths) message.begin_entry(EntryType::property_get_req, path, "name", ++id);
   });
   pair.pump();
   CHECK_FALSE(pair.service->poll_event());
