@@ -157,6 +157,26 @@ rr::awaitable<std::unique_ptr<rr::ByteStream>> accept_https(GatewayState& gatewa
   co_return tls;
 }
 
+/// Who the client is by its certificate; without one, nobody.
+void identify(GatewayState& gateway, Connection& connection) {
+  auto& identity = connection.identity;
+  identity.client = connection.client;
+  identity.face = Face::native;
+  const auto certified = identity.is_proven() ? gateway.access().renew(identity) : std::nullopt;
+  identity = certified ? *certified : gateway.access().anonymous(connection.client, Face::native);
+}
+
+rr::awaitable<void> refuse_unknown_protocol(GatewayState& gateway, rr::ByteStream& stream) {
+  gateway.reject(Rejection::unknown_protocol);
+  // Native nodes answer with 404 too.
+  const auto response = problem_response(404, "neither HTTP nor Robot Raconteur: nothing here speaks that");
+  const auto text = format_response_head(response, false, 1) + *response.body;
+  const auto slice = rr::as_bytes(text);
+  const std::span<const rr::ByteSpan> slices(&slice, 1);
+  co_await stream.write(slices);
+  co_await stream.end(rr::no_reason);
+}
+
 }  // namespace
 
 rr::awaitable<void> serve_connection(GatewayState& gateway, std::unique_ptr<rr::ByteStream> stream,
@@ -180,11 +200,7 @@ rr::awaitable<void> serve_connection(GatewayState& gateway, std::unique_ptr<rr::
   }
 
   connection.network = network_name(connection.peer.endpoint.address());
-  auto& identity = connection.identity;
-  identity.client = connection.client;
-  identity.face = Face::native;
-  const auto certified = identity.is_proven() ? gateway.access().renew(identity) : std::nullopt;
-  identity = certified ? *certified : gateway.access().anonymous(connection.client, Face::native);
+  identify(gateway, connection);
   rr::awaitable<void> continuation;
   switch (protocol) {
     case Protocol::robot_raconteur:
@@ -194,17 +210,9 @@ rr::awaitable<void> serve_connection(GatewayState& gateway, std::unique_ptr<rr::
     case Protocol::http:
       continuation = co_await serve_http_client(gateway, connection, std::move(stream));
       break;
-    case Protocol::unknown: {
-      gateway.reject(Rejection::unknown_protocol);
-      // Native nodes answer with 404 too.
-      const auto response = problem_response(404, "neither HTTP nor Robot Raconteur: nothing here speaks that");
-      const auto text = format_response_head(response, false, 1) + *response.body;
-      const auto slice = rr::as_bytes(text);
-      const std::span<const rr::ByteSpan> slices(&slice, 1);
-      co_await current->write(slices);
-      co_await current->end(rr::no_reason);
+    case Protocol::unknown:
+      co_await refuse_unknown_protocol(gateway, *current);
       break;
-    }
     default:
       break;
   }

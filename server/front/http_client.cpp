@@ -331,82 +331,94 @@ Response to_base_path(const Config& config) {
   return response;
 }
 
+/// Answers a request. What that takes is given back before the next one is waited for.
+/// Returns  how the connection goes on; nullopt: with the next request.
+rr::awaitable<std::optional<Continuation>> serve_request(GatewayState& gateway, Connection& connection,
+                                                         std::unique_ptr<rr::ByteStream>& stream, RequestReader& reader,
+                                                         HttpRequest&& message) {
+  const auto& config = gateway.config();
+  Request request{std::move(message)};
+  ++gateway.metrics().requests;
+  request.arrival = see_through_proxies(request, connection.peer, config.proxy.trust);
+  take_base_path(request, config.base_path);
+  const bool is_refused = gateway.is_stopping() && !is_answered_while_stopping(request);
+  request.identity.face = face_of(request);
+  HttpAccess::Admitted admitted;
+  admitted.refusal = refuse_page(gateway, request);
+  if (!admitted.refusal) admitted.refusal = require_tls(gateway, request);
+  if (!admitted.refusal && !is_refused && is_guarded(request) && !is_awaited_page(gateway, request)) {
+    const auto urgent = find_urgent(gateway, request);
+    const AccessRequest wanted{.device = urgent.device, .service = urgent.service};
+    admitted =
+        co_await gateway.http_access().admit(request, connection, config, urgent.device.empty() ? nullptr : &wanted);
+    if (admitted.refusal) gateway.reject(rejection_of(admitted.refusal->status));
+  }
+  auto memory = gateway.memory().charge(network_name(request.arrival.address));
+  if (!admitted.refusal && !is_refused && makes_work(request) && !memory.has_room(least_room))
+    admitted.refusal = no_memory_response();
+  if (admitted.refusal && asks_for_websocket(request)) {
+    co_await write_refusal(gateway, *stream, *admitted.refusal);
+    co_await stream->end(rr::no_reason);
+    co_return Continuation();
+  }
+  if (!is_refused && asks_for_websocket(request)) {
+    admitted = {};  // connections have bounds of their own
+    const rr::Bytes unread(reader.unread().begin(), reader.unread().end());
+    co_return co_await accept_websocket(gateway, connection, std::move(stream), request, unread);
+  }
+  std::vector<std::pair<std::string, std::string>> headers;
+  if (request.arrival.is_encrypted && config.tls.hsts_seconds > 0)
+    headers.emplace_back("Strict-Transport-Security", "max-age=" + std::to_string(config.tls.hsts_seconds));
+  if (!admitted.cookie.empty()) headers.emplace_back("Set-Cookie", std::move(admitted.cookie));
+  ResponseOptions options{gateway.is_stopping(), std::move(headers), config.timeouts.send_stall, !makes_work(request),
+                          &gateway.metrics()};
+  ResponseWriter writer(*stream, reader, request, std::move(memory), std::move(options));
+  const auto response = admitted.refusal                ? *admitted.refusal
+                        : is_refused                    ? stopping_response()
+                        : is_base_path(request, config) ? to_base_path(config)
+                                                        : gateway.router().answer(request);
+  if (response.answer_later) {
+    const auto standing = std::make_shared<Standing>(gateway.access(), request.identity);
+    // Streams, and requests that are not whole yet, end with what the client has shown; what is at work is answered.
+    connection.is_good = [standing, &writer] {
+      return writer.is_at_work() || (standing->is_good() && writer.may_go_on());
+    };
+    const Unjudged after{connection};
+    co_await response.answer_later(writer);
+    if (writer.body_failure()) note_unreadable(gateway, connection, *writer.body_failure());
+  } else if (co_await writer.send(response)) {
+    co_return Continuation();
+  }
+  if (writer.goes_on()) co_return std::nullopt;
+  co_await stream->end(rr::no_reason);
+  co_return Continuation();
+}
+
+/// Refuses what could not be read.
+rr::awaitable<void> refuse_unreadable(GatewayState& gateway, Connection& connection, rr::ByteStream& stream,
+                                      const ReadFailure& failure) {
+  note_unreadable(gateway, connection, failure);
+  const auto response = problem_response(failure.status, failure.detail);
+  co_await write_refusal(gateway, stream, response);
+  co_await stream.end(rr::no_reason);
+}
+
 }  // namespace
 
 rr::awaitable<Continuation> serve_http_client(GatewayState& gateway, Connection& connection,
                                               std::unique_ptr<rr::ByteStream> stream) {
-  const auto& config = gateway.config();
-  const RequestLimits limits{config.limits.header_bytes, config.limits.header_timeout, config.timeouts.idle,
-                             config.limits.body_bytes};
-  RequestReader reader(*stream, limits);
+  const auto& limits = gateway.config().limits;
+  RequestReader reader(*stream,
+                       {limits.header_bytes, limits.header_timeout, gateway.config().timeouts.idle, limits.body_bytes});
   for (;;) {
     auto read = co_await reader.next();
-    if (!read.request && read.failure.status == 0) break;
     if (!read.request) {
-      note_unreadable(gateway, connection, read.failure);
-      const auto response = problem_response(read.failure.status, read.failure.detail);
-      co_await write_refusal(gateway, *stream, response);
-      co_await stream->end(rr::no_reason);
-      break;
+      if (read.failure.status != 0) co_await refuse_unreadable(gateway, connection, *stream, read.failure);
+      co_return Continuation();
     }
-    Request request{std::move(*read.request)};
-    ++gateway.metrics().requests;
-    request.arrival = see_through_proxies(request, connection.peer, config.proxy.trust);
-    take_base_path(request, config.base_path);
-    const bool is_refused = gateway.is_stopping() && !is_answered_while_stopping(request);
-    request.identity.face = face_of(request);
-    HttpAccess::Admitted admitted;
-    admitted.refusal = refuse_page(gateway, request);
-    if (!admitted.refusal) admitted.refusal = require_tls(gateway, request);
-    if (!admitted.refusal && !is_refused && is_guarded(request) && !is_awaited_page(gateway, request)) {
-      const auto urgent = find_urgent(gateway, request);
-      const AccessRequest wanted{.device = urgent.device, .service = urgent.service};
-      admitted =
-          co_await gateway.http_access().admit(request, connection, config, urgent.device.empty() ? nullptr : &wanted);
-      if (admitted.refusal) gateway.reject(rejection_of(admitted.refusal->status));
-    }
-    auto memory = gateway.memory().charge(network_name(request.arrival.address));
-    if (!admitted.refusal && !is_refused && makes_work(request) && !memory.has_room(least_room))
-      admitted.refusal = no_memory_response();
-    if (admitted.refusal && asks_for_websocket(request)) {
-      co_await write_refusal(gateway, *stream, *admitted.refusal);
-      co_await stream->end(rr::no_reason);
-      break;
-    }
-    if (!is_refused && asks_for_websocket(request)) {
-      admitted = {};  // connections have bounds of their own
-      const rr::Bytes unread(reader.unread().begin(), reader.unread().end());
-      co_return co_await accept_websocket(gateway, connection, std::move(stream), request, unread);
-    }
-    std::vector<std::pair<std::string, std::string>> headers;
-    if (request.arrival.is_encrypted && config.tls.hsts_seconds > 0)
-      headers.emplace_back("Strict-Transport-Security", "max-age=" + std::to_string(config.tls.hsts_seconds));
-    if (!admitted.cookie.empty()) headers.emplace_back("Set-Cookie", std::move(admitted.cookie));
-    ResponseOptions options{gateway.is_stopping(), std::move(headers), config.timeouts.send_stall, !makes_work(request),
-                            &gateway.metrics()};
-    ResponseWriter writer(*stream, reader, request, std::move(memory), std::move(options));
-    const auto response = admitted.refusal                ? *admitted.refusal
-                          : is_refused                    ? stopping_response()
-                          : is_base_path(request, config) ? to_base_path(config)
-                                                          : gateway.router().answer(request);
-    if (response.answer_later) {
-      const auto standing = std::make_shared<Standing>(gateway.access(), request.identity);
-      // Streams, and requests that are not whole yet, end with what the client has shown; what is at work is answered.
-      connection.is_good = [standing, &writer] {
-        return writer.is_at_work() || (standing->is_good() && writer.may_go_on());
-      };
-      const Unjudged after{connection};
-      co_await response.answer_later(writer);
-      if (writer.body_failure()) note_unreadable(gateway, connection, *writer.body_failure());
-    } else if (co_await writer.send(response)) {
-      break;
-    }
-    if (!writer.goes_on()) {
-      co_await stream->end(rr::no_reason);
-      break;
-    }
+    auto next = co_await serve_request(gateway, connection, stream, reader, std::move(*read.request));
+    if (next) co_return std::move(*next);
   }
-  co_return Continuation();
 }
 
 }  // namespace rrgate
