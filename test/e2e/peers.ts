@@ -9,7 +9,10 @@ export interface Peer {
   stop(): Promise<void>;
 }
 
-/** `script`: in the repository; it takes its port and writes what `ready` finds. The device is called "peer". */
+/**
+ * `script`: in the repository; it takes its port and writes what `ready` finds. The device is called "peer".
+ * `more`: of its configuration in the gateway.
+ */
 export async function startPeer(script: string, service: string, ready: RegExp, more: object = {}): Promise<Peer> {
   const python = process.env["RRGATE_PYTHON"] ?? path.join(repositoryRoot, "build/deps/venv/bin/python");
   if (!existsSync(python)) throw new Error(`${python} is missing: ./dev setup makes it, or name one in RRGATE_PYTHON`);
@@ -17,7 +20,8 @@ export async function startPeer(script: string, service: string, ready: RegExp, 
   const device = new Program(python, [path.join(repositoryRoot, script), String(port)]);
   device.start();
   await device.waitForOutput(ready);
-  const gateway = await startGateway("peer", `rr+tcp://127.0.0.1:${port}/?service=${service}`, webRoot, more);
+  const url = `rr+tcp://127.0.0.1:${port}/?service=${service}`;
+  const gateway = await startGateway("peer", url, webRoot, { devices: [{ name: "peer", url, ...more }] });
   const stop = async () => {
     await gateway.program.kill("SIGTERM");
     await device.kill();

@@ -44,7 +44,7 @@ test("the base drives while a key is held, its arms jog, its cameras see, and St
   await forward.focus();
   await page.keyboard.down("Space");
   await expect
-    .poll(async () => Number.parseFloat(await arm.locator('[data-position="6"]').innerText()))
+    .poll(async () => Number.parseFloat(await arm.locator('[data-joint="6"] .joint-value').innerText()))
     .toBeGreaterThan(0.05);
   await page.keyboard.up("Space");
 });

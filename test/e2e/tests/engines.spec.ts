@@ -68,9 +68,9 @@ for (const [name, { start, needs }] of Object.entries(engines)) {
       await visitor.see({ css: ".robot-words" }, /ready/);
       await visitor.press(button("Jog"));
       const letGo = await visitor.hold(button("joint_1 forward"));
-      await visitor.see({ css: '[data-position="1"]' }, /^0\.0*[1-9]/);
+      await visitor.see({ css: '[data-joint="1"] .joint-value' }, /^0\.0*[1-9]/);
       await letGo();
-      await visitor.see({ css: '[data-position="0"]' }, /^0 rad$/);
+      await visitor.see({ css: '[data-joint="0"] .joint-value' }, /^0 rad$/);
       await visitor.press(button("Stop"));
       await visitor.see({ css: '[data-stop="arrived"]' });
       expect(await visitor.complaints()).toEqual([]);

@@ -49,6 +49,21 @@ test("a robot's joints stand as a chain where the driver says, and the picture m
   expect((await canvas.screenshot()).equals(before)).toBe(false);
 });
 
+test("a laser scanner of the standard types: its scan as points, without those that hit nothing", async ({ page }) => {
+  const scanner = await startPeer("test/interop/peers/laser_scanner.py", "scanner", /ready/);
+  try {
+    await page.goto(`${scanner.url}#/devices/peer/scanner`);
+    await expect(panel(page)).toContainText("350 points");
+    const canvas = panel(page).locator("canvas");
+    await panel(page).getByRole("button", { name: "From above" }).click();
+    const before = await canvas.screenshot();
+    await panel(page).getByRole("button", { name: "From the side" }).click();
+    await expect(async () => expect((await canvas.screenshot()).equals(before)).toBe(false)).toPass();
+  } finally {
+    await scanner.stop();
+  }
+});
+
 test("it is looked at from other sides, by buttons and by dragging", async ({ page }) => {
   await page.goto(`${robot.url}#/devices/peer/robot`);
   await expect(panel(page).getByText("2 frames")).toBeVisible();

@@ -1,4 +1,5 @@
 // Boards of the standard types, at the drivers' base class for robots.
+import type { WebSocketRoute } from "@playwright/test";
 import { expect, test } from "../lab_test";
 import { addPanel } from "../board";
 import { startPeer } from "../peers";
@@ -7,7 +8,10 @@ import type { Peer } from "../peers";
 let robot: Peer;
 
 test.beforeAll(async () => {
-  robot = await startPeer("test/interop/peers/standard_robot.py", "robot", /ready/);
+  robot = await startPeer("test/interop/peers/standard_robot.py", "robot", /ready/, {
+    mode: "shared",
+    leases: { safe: [{ property: "robot.command_mode", value: "halt" }], takeover: ["*"] },
+  });
 });
 test.afterAll(async () => robot.stop());
 
@@ -22,7 +26,7 @@ test("a standard robot: its state in words, a joint jogged while a button is hel
   await expect(page.getByRole("meter", { name: "joint_1" })).toHaveAttribute("max", "3");
   await page.getByRole("button", { name: "Jog", exact: true }).click();
   await expect(state).toContainText("jog");
-  const position = async () => Number.parseFloat(await page.locator('[data-position="1"]').innerText());
+  const position = async () => Number.parseFloat(await page.locator('[data-joint="1"] .joint-value').innerText());
   expect(await position()).toBe(0);
   await forward.focus();
   await page.keyboard.down("Space");
@@ -35,10 +39,34 @@ test("a standard robot: its state in words, a joint jogged while a button is hel
     last = now;
     expect(isStill).toBe(true);
   }).toPass({ intervals: [300] });
-  await expect(page.locator('[data-position="0"]')).toHaveText("0 rad");
+  await expect(page.locator('[data-joint="0"] .joint-value')).toHaveText("0 rad");
   await page.getByRole("button", { name: "Stop", exact: true }).click();
   await expect(page.locator('[data-stop="arrived"]')).toBeVisible();
   await expect(state).toContainText("halt");
+  await expect(forward).toBeDisabled();
+});
+
+test("its tool is jogged along an axis of the robot's frame while a button is held, and stopped", async ({ page }) => {
+  await page.goto(`${robot.url}#/devices/peer/robot`);
+  await page.getByRole("button", { name: "Jog", exact: true }).click();
+  const forward = page.getByRole("button", { name: "Y forward", exact: true });
+  await expect(forward).toBeEnabled();
+  const along = async (axis: string) =>
+    Number.parseFloat(await page.locator(`[data-tool="planar"] [data-axis="${axis}"] .joint-value`).innerText());
+  const before = await along("Y");
+  await forward.focus();
+  await page.keyboard.down("Space");
+  await expect(async () => expect(await along("Y")).toBeGreaterThan(before + 0.02)).toPass();
+  expect(await along("Z")).toBe(0.1);
+  await page.keyboard.up("Space");
+  let last = NaN;
+  await expect(async () => {
+    const now = await along("Y");
+    const isStill = now === last;
+    last = now;
+    expect(isStill).toBe(true);
+  }).toPass({ intervals: [300] });
+  await page.getByRole("button", { name: "Halt", exact: true }).click();
   await expect(forward).toBeDisabled();
 });
 
@@ -59,6 +87,33 @@ test("Halt stops as Stop does, and no jogging begins behind it", async ({ page }
   await expect(page.getByRole("button", { name: "Jog", exact: true })).toBeEnabled(); // its sequence is over
   await expect(state).toContainText("halt");
   await expect(page.getByRole("button", { name: "joint_0 forward" })).toBeDisabled();
+});
+
+test("Halt without a connection lets the gateway halt the robot, and says so where it can't", async ({ page }) => {
+  const sockets: WebSocketRoute[] = [];
+  let isRefused = false;
+  await page.routeWebSocket(/devices\/peer/, (socket) => {
+    if (isRefused) return void socket.close();
+    socket.connectToServer();
+    sockets.push(socket);
+  });
+  await page.goto(`${robot.url}#/devices/peer/robot`);
+  const halt = page.getByRole("button", { name: "Halt", exact: true });
+  await expect(page.getByRole("list", { name: "State" })).toContainText("halt");
+  isRefused = true;
+  for (const socket of sockets) await socket.close();
+  await expect(page.locator('[data-panel="robot"] [data-stale="true"]')).toBeVisible();
+  const mode = `${robot.url}api/v1/devices/peer/robot/command_mode`;
+  const read = async () => (await page.request.get(mode)).json();
+  const jog = async () => expect((await page.request.put(mode, { data: 1 })).status()).toBe(204);
+  await jog();
+  await halt.click();
+  await expect.poll(read).toBe("halt");
+  await jog();
+  await page.route("**/robot?lease=take*", (route) => route.fulfill({ status: 503, json: { detail: "offline" } }));
+  await halt.click();
+  await expect(page.locator('[data-panel="robot"]')).toContainText("NOT STOPPED: offline");
+  expect(await read()).toBe("jog");
 });
 
 test("a robot that freezes is no longer jogged, and its state is marked old", async ({ page }) => {

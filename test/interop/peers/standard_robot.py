@@ -62,6 +62,13 @@ class PlanarRobot(AbstractRobot):
         self._endpoint_pose = [self._geometry_util.xyz_rpy_to_pose(tip, [0, 0, second])]
         super()._run_timestep(now)
 
+    def async_jog_cartesian(self, velocity, timeout, wait, handler):
+        first, second = self._joint_position[0], np.sum(self._joint_position)
+        arm = np.array([[-0.5 * np.sin(first), 0], [0.5 * np.cos(first), 0]])
+        jacobian = arm + 0.4 * np.array([[-np.sin(second)] * 2, [np.cos(second)] * 2])
+        wanted = velocity[0][0]["linear"]
+        self.async_jog_joint(np.linalg.pinv(jacobian, 0.1) @ [wanted["x"], wanted["y"]], timeout, wait, handler)
+
     def _send_robot_command(self, now, joint_pos_cmd, joint_vel_cmd):
         if joint_pos_cmd is not None:
             self._joint_position = np.array(joint_pos_cmd)

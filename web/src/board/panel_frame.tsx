@@ -16,6 +16,7 @@ import type { Panel, PanelKind } from "./board";
 import { Guard } from "./guard";
 import { handleKey, useDrag } from "./handles";
 import type { Change } from "./handles";
+import { stopWithout, useSafe } from "./stop";
 
 export interface PanelFrameProps {
   panel: Panel;
@@ -49,6 +50,7 @@ export function PanelFrame({
   const name = nameOf(panel);
   const [device = place.device, service = place.service] =
     panel.from === "" ? [] : panel.from.split("/").map(decodeURIComponent);
+  const safe = useSafe({ device, service }, list);
   const kind = t(KINDS[panel.kind].title);
   const remarks = [panel.from === "" ? "" : device, panel.object, kind].filter((each) => each !== "" && each !== name);
   const drag = useDrag(panel, move);
@@ -128,6 +130,7 @@ export function PanelFrame({
             <Shown
               object={object}
               reach={reach}
+              stopWithout={() => stopWithout({ device, service }, safe)}
               members={last.members}
               definitions={definitions}
               scope={scopeOf(last.type)}

@@ -30,8 +30,29 @@ type Spec = [
   place?: string,
 ];
 
+interface Preset {
+  stop: StopCall | null;
+  panels: readonly Spec[];
+}
+
+const SCANNER: Preset = {
+  stop: null,
+  panels: [
+    ["scene", 0, 0, 8, 13, { member: "laser_scan_sensor_data" }],
+    ["table", 8, 0, 4, 7, { member: "scanner_info" }],
+    ["streams", 8, 7, 4, 6],
+  ],
+};
+const POINTS: Preset = {
+  stop: null,
+  panels: [
+    ["scene", 0, 0, 8, 13, { member: "point_cloud_sensor_data" }],
+    ["table", 8, 0, 4, 7, { member: "point_sensor_info" }],
+    ["streams", 8, 7, 4, 6],
+  ],
+};
 const ROBOT = "com.robotraconteur.robotics.robot.Robot";
-const STANDARD: Readonly<Record<string, { stop: StopCall | null; panels: readonly Spec[] }>> = {
+const STANDARD: Readonly<Record<string, Preset>> = {
   [ROBOT]: {
     stop: ROBOT_STOP,
     panels: [
@@ -72,6 +93,40 @@ const STANDARD: Readonly<Record<string, { stop: StopCall | null; panels: readonl
       ["form", 0, 10, 4, 8, { member: "mode" }],
       ["form", 4, 10, 4, 8, { member: "position_command" }],
       ["form", 8, 10, 4, 8, { member: "trapezoidal_move" }],
+    ],
+  },
+  ["com.robotraconteur.actuator.Actuator"]: {
+    stop: null,
+    panels: [
+      ["plot", 0, 0, 8, 10, { member: "actuator_state" }],
+      ["table", 8, 0, 4, 10, { member: "actuator_state" }],
+      ["form", 0, 10, 4, 8, { member: "actuator_mode" }],
+      ["form", 4, 10, 4, 8, { member: "actuator_command" }],
+      ["table", 8, 10, 4, 8, { member: "actuator_info" }],
+    ],
+  },
+  ["com.robotraconteur.laserscanner.LaserScanner"]: SCANNER,
+  ["com.robotraconteur.laserscanner.LaserScanPartScanner"]: SCANNER,
+  ["com.robotraconteur.pointcloud.sensor.PointCloudSensor"]: POINTS,
+  ["com.robotraconteur.pointcloud.sensor.PointCloudPartSensor"]: POINTS,
+  ["com.robotraconteur.hid.joystick.Joystick"]: {
+    stop: null,
+    panels: [
+      ["plot", 0, 0, 8, 10, { member: "gamepad_state", paths: ["left_x", "left_y", "right_x", "right_y"] }],
+      ["table", 8, 0, 4, 10, { member: "gamepad_state" }],
+      ["table", 0, 10, 4, 8, { member: "joystick_state" }],
+      ["form", 4, 10, 4, 8, { members: ["rumble", "force_feedback"] }],
+      ["table", 8, 10, 4, 8, { member: "joystick_info" }],
+    ],
+  },
+  // One input or output of a device of the type SignalDevice.
+  ["com.robotraconteur.signal.Signal"]: {
+    stop: null,
+    panels: [
+      ["plot", 0, 0, 8, 8, { member: "signal_value_vec" }],
+      ["table", 8, 0, 4, 8, { member: "signal_value" }],
+      ["form", 0, 8, 6, 7, { members: ["signal_command", "signal_command_vec"] }],
+      ["table", 6, 8, 6, 7, { member: "signal_info" }],
     ],
   },
   // Of `rrgate demo microassembly`, whose cameras are another device.

@@ -3,6 +3,8 @@
 
 import { enumName, flagNames } from "../values/definitions";
 import type { Definitions } from "../values/definitions";
+import { readPose } from "../values/frames";
+import type { Pose } from "../values/frames";
 
 export interface RobotState {
   commandMode: number;
@@ -10,19 +12,22 @@ export interface RobotState {
   controllerState: number;
   flags: bigint | number;
   positions: Float64Array;
+  /** Of the tool of each chain, in the robot's frame; undefined where that is no pose. */
+  tools: readonly (Pose | undefined)[];
 }
 
 /** undefined: nothing came yet. */
 export function readState(value: unknown): RobotState | undefined {
   if (value === null || typeof value !== "object") return undefined;
   const state = value as Fields;
-  const { robot_state_flags: flags, joint_position: positions } = state;
+  const { robot_state_flags: flags, joint_position: positions, kin_chain_tcp: tools } = state;
   return {
     commandMode: Number(state["command_mode"]),
     operationalMode: Number(state["operational_mode"]),
     controllerState: Number(state["controller_state"]),
     flags: typeof flags === "bigint" ? flags : Number(flags),
     positions: positions instanceof Float64Array ? positions : new Float64Array(),
+    tools: Array.isArray(tools) ? tools.map(readPose) : [],
   };
 }
 

@@ -1,4 +1,4 @@
-// A standard robot: what its flags say, where its joints are within their limits, and jogging them while a button is held.
+// A standard robot: what its flags say, where its joints and tools are, and jogging them while a button is held.
 // Layer: web/panels. Source: com.robotraconteur.robotics.robot.
 
 import { useEffect, useState } from "preact/hooks";
@@ -13,18 +13,22 @@ import { Failure } from "../ui/failure";
 import { formatNumber } from "../values/format";
 import { jointsOf, modeName, readState, stateWords } from "./joints";
 import type { Joint } from "./joints";
-import { JogButton } from "./jog_button";
+import { JogRow } from "./jog_row";
 import { numberIn } from "./panel";
 import type { PanelProps } from "./panel";
 import { Freshness } from "./parts";
+import { coordinateOf, isTurn, TOOL_AXES, toolsOf, velocityAlong } from "./tools";
+import type { Tool, ToolAxis } from "./tools";
 
 const WIRE = "robot_state";
 
-export default function RobotPanel({ object, reach, members, definitions, scope, settings, change }: PanelProps) {
+export default function RobotPanel(props: PanelProps) {
+  const { object, reach, stopWithout, members, definitions, scope, settings, change } = props;
   const isRobot = members.some(({ name }) => name === WIRE) && members.some(({ name }) => name === "jog_joint");
   const look = useFeed(object, isRobot ? "wire" : null, WIRE);
   const state = readState(look.value);
   const [joints, setJoints] = useState<readonly Joint[]>([]);
+  const [tools, setTools] = useState<readonly Tool[]>([]);
   const [failure, setFailure] = useState<string | null>(null);
   const acting = useAction();
   const { control, isOpen } = useControl(object);
@@ -33,7 +37,11 @@ export default function RobotPanel({ object, reach, members, definitions, scope,
     if (!object || !isRobot) return;
     let isCurrent = true;
     object.get("robot_info").then(
-      (info) => isCurrent && setJoints(jointsOf(info)),
+      (info) => {
+        if (!isCurrent) return;
+        setJoints(jointsOf(info));
+        setTools(toolsOf(info));
+      },
       (error: unknown) => isCurrent && setFailure(explain(error)),
     );
     return () => void (isCurrent = false);
@@ -50,24 +58,33 @@ export default function RobotPanel({ object, reach, members, definitions, scope,
       if (!isStopped()) await object?.set("command_mode", 1);
     });
   const haltAll = (): void => {
-    const fail = (error: unknown): void => setFailure(explain(error));
     setFailure(null);
-    if (reach) return void stopDevice(reach, ROBOT_STOP, fail).catch(fail);
+    if (reach) {
+      const fail = (error: unknown): void => setFailure(explain(error));
+      return void stopDevice(reach, ROBOT_STOP, fail).catch(fail);
+    }
     tellStop();
-    setFailure(t("NOT STOPPED: {0}", t("not connected: nothing was sent")));
+    stopWithout().catch((error: unknown) => setFailure(t("NOT STOPPED: {0}", explain(error))));
   };
   const positions = state?.positions ?? new Float64Array();
-  const jogBy = (way: "call" | "urgent", index: number, direction: number): Promise<unknown> => {
+  /** `speed`: of what may be, 0 to 1, with a sign. */
+  const jogJoint = (way: "call" | "urgent", index: number, speed: number): Promise<unknown> => {
     const velocity = new Float64Array(positions.length);
-    velocity[index] = direction * (percent / 100) * (joints[index]?.fastest || 1);
+    velocity[index] = speed * (joints[index]?.fastest || 1);
     return reach?.[way]("jog_joint", [velocity, JOG_SECONDS, false], { timeout: 2000 }) ?? Promise.resolve();
   };
-  const jog = async (index: number, direction: number, isHeld: () => boolean): Promise<void> => {
-    await control?.begin();
-    if (isHeld()) await jogBy("call", index, direction);
+  const jogTool = (way: "call" | "urgent", chain: number, axis: ToolAxis, speed: number): Promise<unknown> => {
+    const velocity = velocityAlong(axis, speed * (tools[chain]?.fastest[axis] ?? 0));
+    const velocities = new Map([[chain, velocity]]);
+    return reach?.[way]("jog_cartesian", [velocities, JOG_SECONDS, false], { timeout: 2000 }) ?? Promise.resolve();
   };
-  const halt = (index: number): Promise<unknown> =>
-    reach ? stopNow(reach, false, () => jogBy("urgent", index, 0)) : Promise.resolve();
+  type Jog = (way: "call" | "urgent", speed: number) => Promise<unknown>;
+  const jogBy = async (jog: Jog, direction: number, isHeld: () => boolean): Promise<void> => {
+    await control?.begin();
+    if (isHeld()) await jog("call", (direction * percent) / 100);
+  };
+  const halt = (jog: Jog): Promise<unknown> =>
+    reach ? stopNow(reach, false, () => jog("urgent", 0)) : Promise.resolve();
   const canJog = object !== null && isOpen && mode === "jog" && look.stale === null;
   return (
     <div class="robot-panel panel-scroll">
@@ -114,36 +131,58 @@ export default function RobotPanel({ object, reach, members, definitions, scope,
       <ol class={`joints ${look.stale === null ? "" : "is-stale"}`}>
         {Array.from(positions, (position, i) => {
           const joint = joints[i] ?? { name: t("Joint {0}", i + 1), unit: "", low: NaN, high: NaN, fastest: 1 };
+          const jog: Jog = (way, speed) => jogJoint(way, i, speed);
           return (
             <li key={i} data-joint={i}>
-              <span class="joint-name">{joint.name}</span>
-              <JogButton
-                label={t("{0} back", joint.name)}
-                sign="−"
+              <JogRow
+                name={joint.name}
+                value={position}
+                unit={joint.unit}
+                digits={4}
                 enabled={canJog}
-                jog={(isHeld) => jog(i, -1, isHeld)}
-                stop={() => halt(i)}
+                jog={(direction, isHeld) => jogBy(jog, direction, isHeld)}
+                stop={() => halt(jog)}
                 fail={setFailure}
-              />
-              <JointBar joint={joint} position={position} />
-              <JogButton
-                label={t("{0} forward", joint.name)}
-                sign="+"
-                enabled={canJog}
-                jog={(isHeld) => jog(i, 1, isHeld)}
-                stop={() => halt(i)}
-                fail={setFailure}
-              />
-              <span class="joint-value" data-position={i}>
-                {formatNumber(Number(position.toFixed(4)))} {joint.unit}
-              </span>
+              >
+                <JointBar joint={joint} position={position} />
+              </JogRow>
             </li>
           );
         })}
       </ol>
+      {members.some(({ name }) => name === "jog_cartesian") &&
+        tools.map((tool, chain) => {
+          const pose = state?.tools[chain];
+          return (
+            pose && (
+              <section key={chain} class={`tool-axes ${look.stale === null ? "" : "is-stale"}`} data-tool={tool.name}>
+                <h3>{t("Tool of {0}", tool.name)}</h3>
+                <ul>
+                  {TOOL_AXES.map((axis) => {
+                    const jog: Jog = (way, speed) => jogTool(way, chain, axis, speed);
+                    return (
+                      <li key={axis} data-axis={axis}>
+                        <JogRow
+                          name={axis}
+                          value={coordinateOf(pose, axis)}
+                          unit={isTurn(axis) ? "°" : "m"}
+                          digits={isTurn(axis) ? 1 : 4}
+                          enabled={canJog}
+                          jog={(direction, isHeld) => jogBy(jog, direction, isHeld)}
+                          stop={() => halt(jog)}
+                          fail={setFailure}
+                        />
+                      </li>
+                    );
+                  })}
+                </ul>
+              </section>
+            )
+          );
+        })}
       {!canJog && object && (
         <p class="note">
-          {look.stale === null ? t("Choose Jog to move joints by hand.") : t("No jogging on old values.")}
+          {look.stale === null ? t("Choose Jog to move the robot by hand.") : t("No jogging on old values.")}
         </p>
       )}
       <Freshness look={look} isLive={object !== null} />

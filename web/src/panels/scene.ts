@@ -3,6 +3,8 @@
 
 import {
   AxesHelper,
+  BufferAttribute,
+  BufferGeometry,
   Color,
   CylinderGeometry,
   DirectionalLight,
@@ -12,6 +14,8 @@ import {
   Mesh,
   MeshLambertMaterial,
   PerspectiveCamera,
+  Points as PointCloud,
+  PointsMaterial,
   Quaternion,
   Scene,
   SphereGeometry,
@@ -21,6 +25,7 @@ import {
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { Palette } from "../chart/palette";
 import type { Frame, Pose } from "../values/frames";
+import type { Points } from "../values/points";
 
 export type View = "corner" | "above" | "front" | "side";
 
@@ -31,6 +36,7 @@ const VIEWS: Readonly<Record<View, readonly [x: number, y: number, z: number]>> 
   side: [0, -1, 0],
 };
 const SMALLEST_M = 0.3;
+const POINT_PX = 2;
 const FLOOR_SQUARES = 20;
 const UP = new Vector3(0, 1, 0); // along which cylinders lie
 
@@ -43,6 +49,10 @@ export class Picture {
   readonly #frames = new Group();
   readonly #linkMaterial = new MeshLambertMaterial();
   readonly #jointMaterial = new MeshLambertMaterial();
+  readonly #cloud = new PointCloud(
+    new BufferGeometry(),
+    new PointsMaterial({ size: POINT_PX, sizeAttenuation: false }),
+  );
   readonly #round = new SphereGeometry(1, 20, 12);
   readonly #tube = new CylinderGeometry(1, 1, 1, 20);
   readonly #resized: ResizeObserver;
@@ -59,7 +69,7 @@ export class Picture {
     this.#renderer.setPixelRatio(Math.min(devicePixelRatio || 1, 2));
     const sun = new DirectionalLight(0xffffff, 1.6);
     sun.position.set(1, -2, 4);
-    this.#scene.add(new HemisphereLight(0xffffff, 0x8899aa, 1.8), sun, this.#chains, this.#frames);
+    this.#scene.add(new HemisphereLight(0xffffff, 0x8899aa, 1.8), sun, this.#chains, this.#frames, this.#cloud);
     this.#camera.up.set(0, 0, 1); // as robots have it
     this.#controls = new OrbitControls(this.#camera, canvas);
     this.#controls.addEventListener("change", this.#redraw);
@@ -70,6 +80,7 @@ export class Picture {
   colour(palette: Palette): void {
     this.#linkMaterial.color = new Color(palette.series[1] ?? palette.ink);
     this.#jointMaterial.color = new Color(palette.accent);
+    this.#cloud.material.color = new Color(palette.series[0] ?? palette.accent);
     this.#line = palette.line;
     this.#layFloor();
     this.#redraw();
@@ -81,18 +92,22 @@ export class Picture {
     if (shown === this.#shown) return; // a robot that stands still costs nothing
     this.#shown = shown;
     const poses = [...chains.flat(), ...frames.map(({ pose }) => pose)];
-    const radius = Math.max(SMALLEST_M, ...poses.map(({ at }) => Math.hypot(...at)));
-    if (radius > this.#radius * 1.2) {
-      this.#radius = radius;
-      this.#layFloor();
-    }
+    this.#makeRoom(Math.max(0, ...poses.map(({ at }) => Math.hypot(...at))));
     this.#chains.clear();
     for (const chain of chains) this.#addChain(chain);
     this.#showFrames([...chains.flatMap((chain) => chain.at(-1) ?? []), ...frames.map(({ pose }) => pose)]);
-    if (!this.#isLookedAt && poses.length > 0) {
-      this.#isLookedAt = true;
-      this.look("corner");
-    }
+    if (poses.length > 0) this.#lookAtFirst();
+    this.#redraw();
+  }
+
+  /** Instead of those before. */
+  showPoints(points: Points): void {
+    this.#cloud.geometry.dispose(); // the next ones may be more
+    this.#cloud.geometry = new BufferGeometry().setAttribute("position", new BufferAttribute(points, 3));
+    this.#cloud.geometry.computeBoundingSphere();
+    const { center, radius } = this.#cloud.geometry.boundingSphere ?? { center: new Vector3(), radius: 0 };
+    this.#makeRoom(center.length() + radius);
+    if (points.length > 0) this.#lookAtFirst();
     this.#redraw();
   }
 
@@ -116,8 +131,22 @@ export class Picture {
     this.#controls.dispose();
     this.#floor?.dispose();
     for (const axes of this.#frames.children) (axes as AxesHelper).dispose();
-    for (const each of [this.#round, this.#tube, this.#linkMaterial, this.#jointMaterial]) each.dispose();
+    const { geometry, material } = this.#cloud;
+    for (const each of [this.#round, this.#tube, this.#linkMaterial, this.#jointMaterial, geometry, material])
+      each.dispose();
     this.#renderer.dispose();
+  }
+
+  #makeRoom(radius: number): void {
+    if (radius <= this.#radius * 1.2 && this.#radius > 0) return;
+    this.#radius = Math.max(SMALLEST_M, radius);
+    this.#layFloor();
+  }
+
+  #lookAtFirst(): void {
+    if (this.#isLookedAt) return;
+    this.#isLookedAt = true;
+    this.look("corner");
   }
 
   #addChain(poses: readonly Pose[]): void {

@@ -1,4 +1,5 @@
-// Poses and frames of a value in space, and the joints of a standard robot as a chain; the same as numbers below.
+// Poses, frames, point clouds and scans of a value in space, and the joints of a standard robot as a chain; frames as
+// numbers, too.
 // Layer: web/panels.
 
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
@@ -8,8 +9,10 @@ import { readPalette } from "../chart/palette";
 import { useFeed } from "../live/use_feed";
 import { explain } from "../robot/remote";
 import { Failure } from "../ui/failure";
+import { formatNumber } from "../values/format";
 import { chainsOf, framesIn, posesOf } from "../values/frames";
 import type { Chain } from "../values/frames";
+import { pointsIn } from "../values/points";
 import { readState } from "./joints";
 import { membersFor, textIn } from "./panel";
 import type { PanelProps } from "./panel";
@@ -54,11 +57,13 @@ export default function ScenePanel({ object, members, settings, change }: PanelP
     };
   }, []);
 
-  const { carried, frames } = useMemo(() => {
+  const { carried, frames, points } = useMemo(() => {
+    const points = pointsIn(look.value);
     const positions = readState(look.value)?.positions;
     return {
       carried: positions?.length ? chains.map((chain) => ({ name: chain.name, poses: posesOf(chain, positions) })) : [],
-      frames: framesIn(look.value),
+      frames: points ? [] : framesIn(look.value), // a header's pose is the sensor's, and a cloud may have as many as points
+      points,
     };
   }, [look.value, chains]);
   useEffect(
@@ -69,6 +74,7 @@ export default function ScenePanel({ object, members, settings, change }: PanelP
       ),
     [carried, frames],
   );
+  useEffect(() => points && picture.current?.showPoints(points), [points]);
   const told = [...carried.flatMap(({ name, poses }) => poses.slice(-1).map((pose) => ({ name, pose }))), ...frames];
 
   return (
@@ -95,6 +101,7 @@ export default function ScenePanel({ object, members, settings, change }: PanelP
         role="img"
         aria-label={t("{0} in space", name)}
       />
+      {points && <p class="note">{t("{0} points", formatNumber(points.length / 3))}</p>}
       <details class="frames">
         <summary>{told.length === 1 ? t("1 frame") : t("{0} frames", told.length)}</summary>
         <ul>
