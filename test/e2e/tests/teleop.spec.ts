@@ -35,7 +35,11 @@ test.beforeEach(async ({ page, lab }) => {
   await panel.getByLabel("Number of axis 1").blur();
   await expect(panel.getByRole("alert")).toContainText('"speed" is no number of int16 velocity, int16 radius');
   await panel.getByLabel("Number of axis 1").fill("velocity");
-  await panel.getByLabel("Scale of axis 1").fill("50");
+  const scale = panel.getByLabel("Scale of axis 1");
+  await scale.fill("");
+  await scale.pressSequentially("-0.5"); // no number yet after the first, and the third
+  await expect(scale).toHaveValue("-0.5");
+  await scale.fill("50");
   await panel.getByLabel("radius at rest").fill("32767");
   await panel.getByLabel("radius at rest").blur();
   await expect(command(page)).toHaveText("0,32767");

@@ -41,23 +41,23 @@ export interface ObjectState {
 
 /** The object at `path` ("Webcams[0].lens") of the page's service, or of another one ("device/service"). */
 export function useObject(own: Link, from: string, path: string, list: DeviceList): ObjectState {
-  const [other, setOther] = useState<Link | null>(null);
+  const [other, setOther] = useState<{ from: string; link: Link } | null>(null);
   useEffect(() => {
     if (from === "") return setOther(null);
     const { link, close } = openLink(from, list);
-    setOther(link);
+    setOther({ from, link });
     return close;
   }, [from, list]);
-  const state = useStore(from === "" ? own.state : (other?.state ?? nowhere));
+  const state = useStore(from === "" ? own.state : other?.from === from ? other.link.state : nowhere);
   const steps = useMemo(() => (path === "" ? [] : splitSteps(path).map(parseStep)), [path]);
-  const found = useWalk(state, steps);
+  const found = useWalk(state, steps, from);
   return { ...found, failure: found.failure ?? (from !== "" && state.kind === "lost" ? state.reason : null) };
 }
 
-/** The object at the end of `path`, found anew on every connection. */
-export function useWalk(state: LinkState, path: readonly PathStep[]): ObjectState {
+/** The object at the end of `path`, found anew on every connection. `from`: which service it is of, where that may change. */
+export function useWalk(state: LinkState, path: readonly PathStep[], from = ""): ObjectState {
   const root = openIn(state);
-  const key = JSON.stringify(path);
+  const key = JSON.stringify([from, path]);
   const [found, setFound] = useState<{ object: Remote; root: Remote | null; key: string } | null>(null);
   const [failure, setFailure] = useState<string | null>(null);
   useEffect(() => {

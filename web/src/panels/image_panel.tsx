@@ -12,7 +12,9 @@ import { membersFor, textIn } from "./panel";
 import type { PanelProps } from "./panel";
 import { feedKindOf, Freshness, MemberSelect } from "./parts";
 
-export default function ImagePanel({ object, members, settings, change }: PanelProps) {
+const EMPTY = [4, 3] as const;
+
+export default function ImagePanel({ object, members, place, settings, change }: PanelProps) {
   const choices = useMemo(() => membersFor("image", members), [members]);
   const name = textIn(settings, "member") || choices[0]?.name || "";
   const member = choices.find((each) => each.name === name);
@@ -32,6 +34,11 @@ export default function ImagePanel({ object, members, settings, change }: PanelP
       setShown((old) => ({ ...old, failure: explain(error) }));
     }
   };
+  const source = [place.device, place.service, place.object, name].join("/");
+  useEffect(() => {
+    if (canvas.current) [canvas.current.width, canvas.current.height] = EMPTY; // no picture of another one
+    setShown({ size: "", failure: null });
+  }, [source]);
   const feed = look.feed;
   useEffect(() => {
     if (!feed || feed.kind !== kind || feed.member !== name) return;
@@ -78,7 +85,7 @@ export default function ImagePanel({ object, members, settings, change }: PanelP
         </button>
       </div>
       <div class={`image-box ${look.stale === null ? "" : "is-stale"}`}>
-        <canvas ref={canvas} width={4} height={3} role="img" aria-label={t("Picture of {0}", name)} />
+        <canvas ref={canvas} width={EMPTY[0]} height={EMPTY[1]} role="img" aria-label={t("Picture of {0}", name)} />
       </div>
       <Failure text={shown.failure ?? acting.failure} />
       <div class="panel-foot">

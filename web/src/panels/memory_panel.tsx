@@ -27,12 +27,16 @@ export default function MemoryPanel({ object, members, settings, change }: Panel
   const [text, setText] = useState("");
   const [shown, setShown] = useState<{ value: unknown; from: number } | null>(null);
   const acting = useAction();
+  const placed = useRef(""); // of what Position and Items are: they stay over an outage, as the new items do
   useEffect(() => {
     setShown(null);
     if (!object || !member) return;
     acting.run(async () => {
       const found = await object.dimensions(name);
       setSize(found);
+      const of = `${name} ${found.join()}`;
+      if (placed.current === of) return;
+      placed.current = of;
       setPosition(found.map(() => 0).join(", "));
       setCount(found.map((items) => Math.min(items, found.length === 1 ? AT_FIRST : 32)).join(", "));
     });

@@ -152,7 +152,10 @@ function Canvas({ trace, labels, seconds, paused }: CanvasProps) {
   useEffect(() => {
     const box = place.current;
     if (!box) return;
-    let plot = makePlot(box, labels);
+    let isZoomed = false;
+    const zoomed = (): void => void (isZoomed = true);
+    const zoomOut = (): void => void (isZoomed = false);
+    let plot = makePlot(box, labels, zoomed);
     let [drawn, isInView] = ["", true];
     const draw = (): void => {
       if (latest.current.paused || document.hidden || !isInView) return;
@@ -161,16 +164,19 @@ function Canvas({ trace, labels, seconds, paused }: CanvasProps) {
       if (next === drawn) return;
       drawn = next;
       const data = trace.window(latest.current.seconds) as uPlot.AlignedData;
-      plot.setData(data);
+      plot.setData(data, !isZoomed);
+      if (isZoomed) plot.redraw();
       if (!isPointedAt && data[0].length > 0) plot.setLegend({ idx: data[0].length - 1 }); // the newest values
     };
     const fit = new ResizeObserver(() => plot.setSize(sizeOf(box, plot)));
     fit.observe(box);
+    box.addEventListener("dblclick", zoomOut);
     const look = new IntersectionObserver((seen) => (isInView = seen.at(-1)?.isIntersecting ?? true));
     look.observe(box);
     const unwatch = onColoursChanged(() => {
       plot.destroy();
-      plot = makePlot(box, labels);
+      plot = makePlot(box, labels, zoomed);
+      isZoomed = false;
       drawn = "";
       plot.setData(trace.window(latest.current.seconds) as uPlot.AlignedData);
     });
@@ -180,6 +186,7 @@ function Canvas({ trace, labels, seconds, paused }: CanvasProps) {
       clearInterval(timer);
       leaveTurn(draw);
       unwatch();
+      box.removeEventListener("dblclick", zoomOut);
       fit.disconnect();
       look.disconnect();
       plot.destroy();
@@ -188,7 +195,7 @@ function Canvas({ trace, labels, seconds, paused }: CanvasProps) {
   return <div ref={place} class="plot-canvas" role="img" aria-label={t("Plot of {0}", labels.join(", "))} />;
 }
 
-function makePlot(box: HTMLElement, labels: readonly string[]): uPlot {
+function makePlot(box: HTMLElement, labels: readonly string[], zoomed: () => void): uPlot {
   const palette = readPalette(box);
   const axis = { stroke: palette.inkSoft, grid: { stroke: palette.line, width: 1 }, ticks: { stroke: palette.line } };
   const plot = new uPlot(
@@ -199,6 +206,7 @@ function makePlot(box: HTMLElement, labels: readonly string[]): uPlot {
         x: { time: false },
         y: { range: (_, low, high) => (low === high ? [low - 1, high + 1] : uPlot.rangeNum(low, high, 0.1, true)) },
       },
+      hooks: { setSelect: [({ select }) => void ((select.width > 0 || select.height > 0) && zoomed())] },
       cursor: { drag: { x: true, y: true, uni: 20 } },
       legend: { live: true },
       axes: [

@@ -19,6 +19,8 @@ import type { PanelProps } from "./panel";
 import { feedKindOf, Freshness, MemberSelect } from "./parts";
 import { Picture } from "./scene";
 
+const NO_POINTS = new Float32Array();
+
 export default function ScenePanel({ object, members, settings, change }: PanelProps) {
   const choices = membersFor("scene", members);
   const usual = choices.find(({ name }) => name === "robot_state") ?? choices[0];
@@ -74,7 +76,7 @@ export default function ScenePanel({ object, members, settings, change }: PanelP
       ),
     [carried, frames],
   );
-  useEffect(() => points && picture.current?.showPoints(points), [points]);
+  useEffect(() => picture.current?.showPoints(points ?? NO_POINTS), [points]);
   const told = [...carried.flatMap(({ name, poses }) => poses.slice(-1).map((pose) => ({ name, pose }))), ...frames];
 
   return (

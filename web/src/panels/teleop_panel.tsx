@@ -12,6 +12,7 @@ import { jsonOf } from "../values/draft";
 import { DraftInput } from "./draft_input";
 import { HeldSticks } from "./held_sticks";
 import type { Side } from "./held_sticks";
+import { NumberField } from "./number_field";
 import { inputsOf, membersFor, textIn } from "./panel";
 import type { PanelProps } from "./panel";
 import { MemberSelect } from "./parts";
@@ -281,23 +282,13 @@ function AxesForm({ axes, inputs, change }: AxesFormProps) {
             value={axis.path}
             onInput={(event) => set(i, { path: event.currentTarget.value.trim() })}
           />
-          <input
-            class="field"
-            type="number"
-            step="any"
-            aria-label={t("Scale of axis {0}", i + 1)}
-            value={axis.scale}
-            onInput={(event) => set(i, { scale: event.currentTarget.valueAsNumber || 0 })}
-          />
-          <input
-            class="field"
-            type="number"
-            min={0}
-            max={0.9}
-            step={0.05}
-            aria-label={t("Dead zone of axis {0}", i + 1)}
+          <NumberField label={t("Scale of axis {0}", i + 1)} value={axis.scale} change={(scale) => set(i, { scale })} />
+          <NumberField
+            label={t("Dead zone of axis {0}", i + 1)}
             value={axis.deadZone}
-            onInput={(event) => set(i, { deadZone: event.currentTarget.valueAsNumber || 0 })}
+            least={0}
+            most={0.9}
+            change={(deadZone) => set(i, { deadZone })}
           />
           <button class="button button-quiet" type="button" onClick={() => change(axes.filter((_, at) => at !== i))}>
             {t("Remove")}

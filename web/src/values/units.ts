@@ -4,19 +4,28 @@
 import type { Definitions } from "./definitions";
 import { parseType } from "./type_text";
 
-const ENDINGS: Readonly<Record<string, string>> = {
-  _rad: "rad",
-  _deg: "°",
-  _m: "m",
-  _mm: "mm",
-  _s: "s",
-  _ms: "ms",
-  _hz: "Hz",
-  _v: "V",
-  _a: "A",
-  _n: "N",
-  _nm: "Nm",
-};
+/** The first that fits. Of one letter alone only where the rest of the name says so, too. */
+const ENDINGS: readonly (readonly [ending: RegExp, unit: string])[] = [
+  [/_rad_s$/, "rad/s"],
+  [/_deg_s$/, "°/s"],
+  [/_mm_s$/, "mm/s"],
+  [/_m_s$/, "m/s"],
+  [/_m_s2$/, "m/s²"],
+  [/_rad$/, "rad"],
+  [/_deg$/, "°"],
+  [/_mm$/, "mm"],
+  [/_m$/, "m"],
+  [/_ms$/, "ms"],
+  [/_s$/, "s"],
+  [/_hz$/, "Hz"],
+  [/volt.*_v$/, "V"],
+  [/current.*_a$/, "A"],
+  [/force.*_n$/, "N"],
+  [/(torque|effort|moment).*_nm$/, "Nm"],
+];
+
+const UNIT =
+  /^(?:%|°C?|rad(?:ians?)?|deg(?:rees?)?|rpm|min|h|K|px|bar|l|[µnmckMG]?(?:m|s|g|V|A|N|Nm|Hz|W|Wh|Ah|Pa|J|T|lx))(?:\/(?:s[²2]?|s\^2|min|h|m[²2³3]?|l))?[²³]?$/;
 
 /** "" where nothing tells. `path`: as in paths.ts. */
 export function unitOf(type: string, path: string, definitions: Definitions, scope: string): string {
@@ -28,12 +37,10 @@ export function unitOf(type: string, path: string, definitions: Definitions, sco
     if (!struct || !field) return "";
     [base, within, documentation] = [field.type, struct.scope, field.documentation];
   }
-  const said =
-    /\[([^\]\s]{1,12})\]|\(([a-zA-Zµ°%/²³]{1,6})\)|\bin (mm|cm|m|rad|radians|degrees|deg|s|ms|V|A|N|Nm|Hz|mm\/s|m\/s)\b/.exec(
-      documentation,
-    );
-  if (said) return said[1] ?? said[2] ?? said[3] ?? "";
-  const last = names[names.length - 1] ?? "";
-  const ending = Object.keys(ENDINGS).find((each) => last.toLowerCase().endsWith(each));
-  return ending === undefined ? "" : (ENDINGS[ending] ?? "");
+  for (const [, bracketed, named] of documentation.matchAll(/[[(]([^\])\s]{1,12})[\])]|\bin ([^\s.,;]{1,12})/g)) {
+    const said = bracketed ?? named ?? "";
+    if (UNIT.test(said)) return said;
+  }
+  const last = (names[names.length - 1] ?? "").toLowerCase();
+  return ENDINGS.find(([ending]) => ending.test(last))?.[1] ?? "";
 }
