@@ -3,7 +3,7 @@ import { makeError } from "./errors.js";
 import { ObjectTree } from "./object.js";
 import { checkTimeout, Session } from "./session.js";
 import type { Proof } from "./platform.js";
-import type { OpenTransport, Transport } from "./transport.js";
+import type { CoreTransport, OpenCoreTransport, OpenTransport, Transport } from "./transport.js";
 import type { ObjectInfo, RemoteObject } from "./types.js";
 import { parseServiceUrl } from "./url.js";
 import { openUsb } from "./usb_devices.js";
@@ -84,7 +84,8 @@ export async function connectWith<T>(
     throw makeError("InvalidArgument", "found a password or credentials without username");
   }
 
-  void preload().catch(() => undefined); // while the socket opens; Core.create() says what is wrong
+  const own: OpenCoreTransport | undefined = options.transport;
+  if (!own?.hasCore) void preload().catch(() => undefined); // while the socket opens; Core.create() says what is wrong
   const attempt = new Attempt();
   const abort = () => attempt.fail(signal?.reason);
   signal?.addEventListener("abort", abort, { once: true });
@@ -98,9 +99,10 @@ export async function connectWith<T>(
     const { address, service, nodeId, nodeName } = parseServiceUrl(given);
     where = address.host || address.href;
     const openSocket: OpenTransport = (to, listener) => openWebsocket(to, listener, options);
-    await attempt.open(address, options.transport ?? (address.protocol === "rr+usb:" ? openUsb : openSocket));
+    const open = options.transport ?? (address.protocol === "rr+usb:" ? openUsb : openSocket);
+    const { createCore = Core.create } = await attempt.open(address, open);
     const core = await attempt.unlessFailed(
-      Core.create({
+      createCore({
         service,
         nodeId,
         nodeName,
@@ -144,7 +146,7 @@ class Attempt {
     this.#failure.catch(() => undefined);
   }
 
-  async open(url: URL, open: OpenTransport): Promise<void> {
+  async open(url: URL, open: OpenTransport): Promise<Transport & Partial<CoreTransport>> {
     let opened!: () => void;
     const isOpen = new Promise<void>((resolve) => (opened = resolve));
     const opening = Promise.resolve(
@@ -167,8 +169,9 @@ class Attempt {
       },
       () => undefined,
     );
-    await this.unlessFailed(opening);
+    const transport = await this.unlessFailed(opening);
     await this.unlessFailed(isOpen);
+    return transport;
   }
 
   begin(core: Core, timeout: number): Session {

@@ -28,7 +28,8 @@ export interface MemberListener {
   onWireClosed?(): void;
   onPipePacket?(index: number, value: RrValue): void;
   onPipeAcks?(index: number, numbers: number[]): void;
-  onPipeClosed?(index: number): void;
+  /** `reason`: where it was not the service that closed it. */
+  onPipeClosed?(index: number, reason?: RobotRaconteurError): void;
 }
 
 export type CallbackHandler = (...args: RrValue[]) => unknown;
@@ -308,7 +309,9 @@ export class Session {
         this.#tell(event.path, event.member, (listener) => listener.onPipeAcks?.(event.index, event.numbers));
         break;
       case "pipe_closed":
-        this.#tell(event.path, event.member, (listener) => listener.onPipeClosed?.(event.index));
+        this.#tell(event.path, event.member, (listener) =>
+          listener.onPipeClosed?.(event.index, event.error && this.#error(event.error)),
+        );
         break;
       case "callback":
         void this.#answer(event);

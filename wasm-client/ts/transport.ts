@@ -1,4 +1,5 @@
 // A byte stream in both directions, whatever carries it. Layer: wasm-client/ts.
+import type { Core, CoreOptions } from "./wasm_module.js";
 
 export interface Transport {
   /** Copies `bytes` before it returns: they lie in memory that changes afterwards. */
@@ -6,6 +7,12 @@ export interface Transport {
   /** Bytes taken by send() that are not on their way yet. */
   readonly buffered: number;
   close(): void;
+}
+
+/** One that leads to where the protocol is spoken, too: this side needs no core of its own. */
+export interface CoreTransport extends Transport {
+  /** As Core.create(), for what goes over this transport. */
+  createCore(options: CoreOptions): Promise<Core>;
 }
 
 /** What a transport tells; nothing before its open function has returned, nothing after closed(). */
@@ -18,3 +25,6 @@ export interface TransportListener {
 }
 
 export type OpenTransport = (url: URL, listener: TransportListener) => Transport | Promise<Transport>;
+
+/** `hasCore`: of what it opens, each is a CoreTransport. */
+export type OpenCoreTransport = OpenTransport & { readonly hasCore?: true };

@@ -5,7 +5,7 @@ import type { ErrorFields } from "./errors.js";
 import { JsValues } from "./js_values.js";
 import type { CoreExports, Handle } from "./js_values.js";
 import { platform } from "./platform.js";
-import type { MemberInfo, RrValue, SessionStats, TypeInfo } from "./types.js";
+import type { MemberInfo, PipeConnectOptions, RrValue, SessionStats, TypeInfo } from "./types.js";
 
 export interface CoreOptions {
   service: string;
@@ -61,7 +61,8 @@ export type CoreEvent =
   | { kind: "wire_closed"; path: string; member: string }
   | { kind: "pipe"; path: string; member: string; index: number; value: RrValue }
   | { kind: "pipe_acks"; path: string; member: string; index: number; numbers: number[] }
-  | { kind: "pipe_closed"; path: string; member: string; index: number }
+  /** `error`: of this side, where it closed the endpoint. */
+  | { kind: "pipe_closed"; path: string; member: string; index: number; error?: ErrorFields }
   | { kind: "callback"; id: number; path: string; member: string; arguments: RrValue[] }
   | { kind: "path_released"; path: string }
   | { kind: "closed"; error: ErrorFields };
@@ -257,10 +258,20 @@ export class Core {
     return this.#ask("open_generator", path, member, args);
   }
 
-  stepGenerator(step: GeneratorStep, path: string, member: string, index: number, parameter: unknown): number {
+  /** `sent`: the parameter fits, so that the service hears of the step. */
+  stepGenerator(
+    step: GeneratorStep,
+    path: string,
+    member: string,
+    index: number,
+    parameter: unknown,
+    sent: () => void,
+  ): number {
     const number = generatorSteps.indexOf(step);
     const handle = this.#give(parameter);
-    return this.#checked(this.#atNow().step_generator(number, this.#give(path), this.#give(member), index, handle));
+    const id = this.#checked(this.#atNow().step_generator(number, this.#give(path), this.#give(member), index, handle));
+    sent();
+    return id;
   }
 
   getMemoryDimensions(path: string, member: string): number {
@@ -299,12 +310,13 @@ export class Core {
     return this.#ask("poke_out_value", path, member, value);
   }
 
-  sendWire(path: string, member: string, value: unknown): void {
+  /** Where the core is in another thread, that takes time, here and for packets. */
+  sendWire(path: string, member: string, value: unknown): void | Promise<void> {
     this.#ask("send_wire", path, member, value);
   }
 
-  /** `index` -1: any. */
-  connectPipe(path: string, member: string, index: number): number {
+  /** `index` -1: any. `_limits`: of what may wait for the page, where the core is in another thread. */
+  connectPipe(path: string, member: string, index: number, _limits?: PipeConnectOptions): number {
     return this.#checked(this.#atNow().connect_pipe(this.#give(path), this.#give(member), index));
   }
 
@@ -312,8 +324,15 @@ export class Core {
     return this.#checked(this.#atNow().disconnect_pipe(this.#give(path), this.#give(member), index));
   }
 
-  /** @returns the packet's number. */
-  sendPipePacket(path: string, member: string, index: number, value: unknown, wantsAck: boolean): number {
+  /** `sent`: told the packet's number. */
+  sendPipePacket(
+    path: string,
+    member: string,
+    index: number,
+    value: unknown,
+    wantsAck: boolean,
+    sent: (number: number) => void,
+  ): void | Promise<void> {
     const number = this.#atNow().send_pipe_packet(
       this.#give(path),
       this.#give(member),
@@ -322,7 +341,7 @@ export class Core {
       wantsAck,
     );
     if (number < 0) this.#checked(0);
-    return number;
+    sent(number);
   }
 
   authenticate(username: string, credentials: unknown): number {
@@ -428,7 +447,7 @@ export class Core {
     return this.#values.take(this.#session.known_definitions()) as KnownDefinitions;
   }
 
-  definition(name: string): RawDefinition | undefined {
+  definition(name: string): RawDefinition | undefined | Promise<RawDefinition | undefined> {
     return this.#values.take(this.#session.definition(this.#give(name))) as RawDefinition | undefined;
   }
 

@@ -9,17 +9,21 @@ import type { RawConstant, RawDefinition } from "../wasm_module.js";
 type Constants = DefinitionInfo["constants"];
 
 /** See ObjectInfo.definition(). */
-export function definition(session: Session, type: string, name = type.replace(/\.[^.]*$/, "")): DefinitionInfo {
-  const raw = session.look((core) => core.definition(name) ?? null);
+export async function definition(
+  session: Session,
+  type: string,
+  name = type.replace(/\.[^.]*$/, ""),
+): Promise<DefinitionInfo> {
+  const asked = session.look((core) => [core.definition(name)]);
+  if (!asked) throw makeError("InvalidOperation", "definition: the session is closed");
+  const raw = await asked[0];
   if (raw) return makeDefinition(raw);
-  throw raw === null
-    ? makeError("InvalidArgument", `definition: "${name}" is not known`)
-    : makeError("InvalidOperation", "definition: the session is closed");
+  throw makeError("InvalidArgument", `definition: "${name}" is not known`);
 }
 
 /** See ObjectInfo.constants. */
-export function constants(session: Session, type: string): Constants {
-  const { constants: shared, types } = definition(session, type);
+export async function constants(session: Session, type: string): Promise<Constants> {
+  const { constants: shared, types } = await definition(session, type);
   const own = types[type.slice(type.lastIndexOf(".") + 1)]?.constants ?? {};
   return record([...Object.entries(shared), ...Object.entries(own)]);
 }

@@ -111,12 +111,9 @@ class Generator implements AsyncGenerator<RrValue | undefined, undefined, unknow
   #step(step: GeneratorStep, index: number, options?: CallOptions, parameter?: unknown): Promise<RrValue> {
     const { session, path, info } = this.context;
     this.#isSent = false;
+    const sent = () => void (this.#isSent = true);
     const ask = () =>
-      session.request((core) => {
-        const id = core.stepGenerator(step, path, info.name, index, parameter);
-        this.#isSent = true;
-        return id;
-      }, options);
+      session.request((core) => core.stepGenerator(step, path, info.name, index, parameter, sent), options);
     return step === "next" ? ask() : session.urgently(ask);
   }
 

@@ -50,7 +50,7 @@ class PipeEnds {
     const stopListening = session.listen(path, info.name, {
       onPipePacket: (index, value) => this.#endpoints.get(index)?.receive(value),
       onPipeAcks: (index, numbers) => this.#endpoints.get(index)?.acknowledge(numbers),
-      onPipeClosed: (index) => this.#endpoints.get(index)?.end(),
+      onPipeClosed: (index, reason) => this.#endpoints.get(index)?.end(reason),
     });
     const stopClosing = session.onClose((reason) => {
       for (const endpoint of [...this.#endpoints.values()]) endpoint.end(reason);
@@ -64,7 +64,7 @@ class PipeEnds {
     ++this.#connects;
     try {
       await session.request(
-        (core) => core.connectPipe(path, info.name, wanted),
+        (core) => core.connectPipe(path, info.name, wanted, options),
         options,
         (value) => {
           // At once: packets may follow the reply in the same message.
@@ -132,11 +132,13 @@ class Endpoint implements PipeEndpoint {
       throw makeError("OutOfSystemResource", `${maxAcks} packets of pipe ${info.name} wait for their acknowledgement`);
     }
     let acknowledged: Promise<void> | undefined;
-    const number = session.tell((core) => {
-      const sent = core.sendPipePacket(path, info.name, this.index, packet, ack);
-      if (ack) acknowledged = new Promise((resolve) => this.#acks.set(sent, resolve));
-      return sent;
-    });
+    let number = 0;
+    await session.tell((core) =>
+      core.sendPipePacket(path, info.name, this.index, packet, ack, (sent) => {
+        number = sent;
+        if (ack) acknowledged = new Promise((resolve) => this.#acks.set(sent, resolve));
+      }),
+    );
     const taken = acknowledged ?? session.room();
     if (!taken) return;
     const unlessOver = within(taken, { signal: this.#ending.signal }, "");

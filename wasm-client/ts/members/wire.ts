@@ -83,7 +83,7 @@ class SharedWire {
     await this.ready;
     const { session, path, info } = this.context;
     if (this.isOver) throw closedWire(info.name);
-    session.tell((core) => core.sendWire(path, info.name, value));
+    await session.tell((core) => core.sendWire(path, info.name, value));
   }
 
   #over(): void {
