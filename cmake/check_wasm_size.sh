@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Adds up what a page has to load of a built client package (.wasm and .js, after brotli) and holds it to the budgets:
 # one for what every page loads, and one each for what it loads when it wants it: usb/ for a USB device, lease/ for a lease,
-# serve/ to be a device, losses/ to ask what was lost, definition/ for a definition, services/ to look for services, and
-# what it has of a framework.
+# serve/ to be a device, losses/ to ask what was lost, definition/ for a definition, services/ to look for services, worker/ to
+# have it all in a worker, and what it has of a framework.
 # Usage: check_wasm_size.sh DIRECTORY [LIMIT_KB [USB_LIMIT_KB]]
 set -euo pipefail
 
@@ -26,10 +26,11 @@ find_files() {
   find "$directory" -type f \( -name '*.wasm' -o -name '*.js' -o -name '*.mjs' \) "$@" | sort
 }
 
-# Nobody loads inline.js and rrgate.wasm, and internal.js is not published.
+# Nobody loads inline.js and rrgate.wasm, and internal.js is not published; nor is worker/host.js, which only that loads.
 mapfile -t files < <(find_files -not -path "$directory/usb/*" -not -path "$directory/lease/*" -not -path "$directory/definition/*" \
   -not -path "$directory/services/*" -not -path "$directory/serve/*" -not -path "$directory/losses/*" -not -path "$directory/stores/*" \
-  -not -path "$directory/react/*" -not -path "$directory/svelte/*" -not -path "$directory/vue/*" -not -name inline.js -not -name internal.js)
+  -not -path "$directory/worker/*" -not -path "$directory/react/*" -not -path "$directory/svelte/*" -not -path "$directory/vue/*" -not -name inline.js -not -name internal.js \
+  -not -name worker.js -not -name worker_thread.js)
 mapfile -t usb_files < <(find_files -path "$directory/usb/*")
 mapfile -t definition_files < <(find_files -path "$directory/definition/*")
 mapfile -t serve_files < <(find_files -path "$directory/serve/*")
@@ -37,6 +38,7 @@ mapfile -t service_files < <(find_files -path "$directory/services/*")
 mapfile -t framework_files < <(for name in stores react svelte vue; do find_files -path "$directory/$name/*"; done)
 mapfile -t losses_files < <(find_files -path "$directory/losses/*")
 mapfile -t lease_files < <(find_files -path "$directory/lease/*")
+mapfile -t worker_files < <(find_files \( -path "$directory/worker/*" -o -name worker.js -o -name worker_thread.js \) -not -name host.js)
 check client "${2:-122}" "${files[@]}"
 check "USB part" "${3:-20}" "${usb_files[@]}"
 check "part for leases" 2 "${lease_files[@]}"
@@ -44,4 +46,5 @@ check "part for services" 144 "${serve_files[@]}"
 check "part for losses" 1 "${losses_files[@]}"
 check "part for definitions" 2 "${definition_files[@]}"
 check "part that finds services" 1 "${service_files[@]}"
+check "part for workers" 10 "${worker_files[@]}"
 check "parts for frameworks" 3 "${framework_files[@]}"

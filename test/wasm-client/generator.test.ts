@@ -115,6 +115,7 @@ it("is aborted when a step is given up", async () => {
 
   vi.useFakeTimers();
   const late = failure(robot["hang_on"]!({ timeout: 100 }).next());
+  await settle();
   await vi.advanceTimersByTimeAsync(100);
   expect((await late).code).toBe(ErrorCode.RequestTimeout);
 });

@@ -3,7 +3,7 @@ import { readdirSync, readFileSync } from "node:fs";
 import { Info } from "../../wasm-client/dist/internal.js";
 import { ErrorCode, lease, RobotRaconteurError } from "../../wasm-client/dist/node.js";
 import type { RemoteObject } from "../../wasm-client/dist/node.js";
-import { failure, TestService } from "./service.js";
+import { failure, settle, TestService } from "./service.js";
 
 const definition = `service test.lease
 stdver 0.10
@@ -178,12 +178,14 @@ it("sends urgent calls and writes past all but what the WebSocket has", async ()
   const slow = await service.connect({ transport: open });
   const sizeBefore = (buffered = 0);
   const old = [...Array(10)].map(() => slow["drive_by"]!("x".repeat(50_000)));
+  await settle();
   expect(buffered).toBeGreaterThan(sizeBefore);
   expect(buffered).toBeLessThan(128 * 1024);
   const order: string[] = [];
   void slow.$.urgent["drive"]!(0).then(() => order.push("urgent"));
   void slow.$.urgent["speed"]!(0).then(() => order.push("written"));
   for (const call of old) void call.then(() => order.push("older"));
+  await settle();
   buffered = 0;
   const drained = setInterval(() => (buffered = 0), 1);
   await vi.waitUntil(() => order.length === 12);

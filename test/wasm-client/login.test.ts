@@ -1,7 +1,7 @@
 // Users and locks.
 import { ErrorCode } from "../../wasm-client/dist/node.js";
 import type { ConnectOptions, RemoteObject } from "../../wasm-client/dist/node.js";
-import { failure, TestService } from "./service.js";
+import { failure, settle, TestService } from "./service.js";
 
 const definition = `service test.login
 stdver 0.10
@@ -79,5 +79,6 @@ it("does not keep a monitor that it gave up", async () => {
   const entering = failure(robot.$.monitor(() => 1, { signal: abort.signal }));
   abort.abort(new Error("enough"));
   expect((await entering).message).toBe("enough");
+  await settle();
   expect(await robot.$.monitor(() => 2, { timeout: 1_000 })).toBe(2);
 });

@@ -1,7 +1,7 @@
 // Members of objects as an application uses them.
-import { connect, ErrorCode, RobotRaconteurError } from "../../wasm-client/dist/node.js";
+import { ErrorCode, RobotRaconteurError } from "../../wasm-client/dist/node.js";
 import type { RemoteObject, RrValue, WireConnection } from "../../wasm-client/dist/node.js";
-import { failure, settle, TestService } from "./service.js";
+import { connect, failure, settle, TestService } from "./service.js";
 
 const definition = `service test.members
 stdver 0.10

@@ -1,8 +1,8 @@
 // Slips of those who call: each is told at once, and disturbs nothing else.
-import { connect, ErrorCode, subscribe } from "../../wasm-client/dist/node.js";
+import { ErrorCode } from "../../wasm-client/dist/node.js";
 import { platform } from "../../wasm-client/dist/internal.js";
 import type { RemoteObject } from "../../wasm-client/dist/node.js";
-import { failure, TestService } from "./service.js";
+import { connect, failure, subscribe, TestService } from "./service.js";
 
 const definition = `service test.misuse
 stdver 0.10

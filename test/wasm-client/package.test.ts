@@ -53,8 +53,26 @@ it("loads what pages that are devices need where it is imported alone", () => {
 
 it("loads two scripts in a page", () => {
   const scripts = readdirSync(dist).filter((name) => name.endsWith(".js"));
-  expect(scripts.sort()).toEqual(["client.js", "index.js", "inline.js", "internal.js", "node.js"]);
+  expect(scripts.sort()).toEqual([
+    "client.js",
+    "index.js",
+    "inline.js",
+    "internal.js",
+    "node.js",
+    "worker.js",
+    "worker_thread.js",
+  ]);
   expect(read("index.js").match(/"\.[^"]*"/g)).toEqual(['"./client.js"']);
+});
+
+it("has what runs in a worker in one file, which bundlers find", () => {
+  expect(manifest.exports["./worker"]).toMatchObject({ default: "./dist/worker.js" });
+  expect(read("worker.js")).toContain('new Worker(new URL("./worker_thread.js",import.meta.url),{type:"module"})');
+  expect(read("worker_thread.js")).toContain('new URL("./rrgate.wasm",import.meta.url)');
+  expect(read("worker_thread.js")).not.toMatch(/\bimport\b(?!\.meta)|\bfrom"/);
+  expect(read("client.js")).not.toContain("/worker");
+  for (const file of ["worker.js", "worker/remote_core.js", "worker/passage.js"])
+    expect(read(file), file).not.toContain("/host.js");
 });
 
 it("loads what there is for a framework with that framework alone", () => {

@@ -115,10 +115,12 @@ it("waits for acknowledgements where they are wanted", async () => {
   expect((await aborted).message).toBe("enough");
   vi.useFakeTimers();
   const late = failure(endpoint.send(5, { ack: true, timeout: 100 }));
+  await settle();
   await vi.advanceTimersByTimeAsync(100);
   expect((await late).code).toBe(ErrorCode.RequestTimeout);
   vi.useRealTimers();
   const openOnes = failure(endpoint.send(6, { ack: true }));
+  await settle();
   service.isMute = false;
   void endpoint.close();
   expect((await openOnes).code).toBe(ErrorCode.InvalidOperation);

@@ -20,7 +20,7 @@
 //   objrefs                  of every index but "missing" and 99; a property `name` tells which
 // Service "test", node "test.service", attribute site = "dock".
 import { readFileSync } from "node:fs";
-import { connect } from "../../wasm-client/dist/node.js";
+import * as page from "../../wasm-client/dist/node.js";
 import { JsValues } from "../../wasm-client/dist/internal.js";
 import type { CoreExports, Handle } from "../../wasm-client/dist/internal.js";
 import type { ConnectOptions, OpenTransport, RemoteObject, TransportListener } from "../../wasm-client/dist/node.js";
@@ -44,6 +44,9 @@ interface WasmService extends CoreExports {
   handle_transmitted(size: number): void;
 }
 /* eslint-enable @typescript-eslint/naming-convention */
+
+/** The client's, in a page or by a worker: vitest.config.ts runs the tests that use them with both. */
+export const { connect, subscribe } = process.env["IN_WORKER"] ? await import("./thread_in_place.js") : page;
 
 const built = new URL("../../build/wasm/test/wasm-client/service/", import.meta.url);
 let compiled: Promise<WebAssembly.Module> | undefined;
@@ -210,7 +213,14 @@ export async function failure(promise: Promise<unknown>): Promise<any> {
   throw new Error("it did not reject");
 }
 
-/** Lets everything run that is ready to run, and the services that it talks to. */
+/** Before a test has put a clock of its own in its place. */
+const { setImmediate } = globalThis;
+
+/** Lets everything run that is ready to run, and the services that it talks to; with a worker, what they say to one another. */
 export async function settle(): Promise<void> {
-  for (let i = 0; i < 50; ++i) await Promise.resolve();
+  const turns = process.env["IN_WORKER"] ? 20 : 1;
+  for (let turn = 0; turn < turns; ++turn) {
+    for (let i = 0; i < 50; ++i) await Promise.resolve();
+    if (turns > 1) await new Promise((resolve) => setImmediate(resolve));
+  }
 }

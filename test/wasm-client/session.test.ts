@@ -1,7 +1,7 @@
 // The life of a session: how it begins, what ends it, and what becomes of what waits. Time is simulated.
-import { connect, ErrorCode, RobotRaconteurError } from "../../wasm-client/dist/node.js";
+import { ErrorCode, RobotRaconteurError } from "../../wasm-client/dist/node.js";
 import type { OpenTransport, TransportListener } from "../../wasm-client/dist/node.js";
-import { failure, settle, TestService } from "./service.js";
+import { connect, failure, settle, TestService } from "./service.js";
 
 const definition = `service test.session
 stdver 0.10
@@ -118,6 +118,7 @@ describe("connecting", () => {
     await settle();
     abort.abort();
     expect((await connecting).name).toBe("AbortError");
+    await settle();
     expect(transport.closed).toBe(1);
     transport.listener.opened();
     transport.listener.closed("late news changes nothing");
@@ -225,6 +226,7 @@ describe("the end of a session", () => {
     const hanging = failure(robot["hang"]!());
     const told: unknown[] = [];
     robot.$.onClose((...reason) => told.push(reason));
+    await settle();
     const before = service.sent.length;
     const closing = robot.$.close();
     expect(robot.$.close()).toBe(closing);
@@ -296,6 +298,7 @@ describe("the end of a session", () => {
     let reason: RobotRaconteurError | undefined;
     robot.$.onClose((why) => (reason = why));
     service.garbage(new TextEncoder().encode("garbage that is long enough to be looked at"));
+    await settle();
     expect(reason?.code).toBe(ErrorCode.ProtocolError);
     expect(service.isClosed).toBe(true);
   });

@@ -1,7 +1,6 @@
 // Subscriptions as pages hold them: their state, values and events over connections, and the end of all that is held.
-import { subscribe } from "../../wasm-client/dist/node.js";
 import type { Client, OpenTransport, RemoteObject, RrValue, SubscriptionState } from "../../wasm-client/dist/node.js";
-import { settle, TestService } from "./service.js";
+import { settle, subscribe, TestService } from "./service.js";
 
 const definition = `service test.store
 stdver 0.10
@@ -31,9 +30,7 @@ const follow = (transport: OpenTransport) =>
   subscribe<RemoteObject>("ws://one/?service=test", { transport, firstRetry: 20, random: () => 1 });
 
 async function until(is: () => boolean): Promise<void> {
-  await vi.waitFor(() => {
-    if (!is()) throw new Error("not yet");
-  });
+  await vi.waitUntil(is, { interval: 1 });
 }
 
 it("tells what it is doing, to who looks and to who listens", async () => {

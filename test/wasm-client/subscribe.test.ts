@@ -1,7 +1,7 @@
 // Subscriptions: connections come and go, the waits between are in the hands of the test.
-import { ErrorCode, findServices, RobotRaconteurError, subscribe } from "../../wasm-client/dist/node.js";
+import { ErrorCode, findServices, RobotRaconteurError } from "../../wasm-client/dist/node.js";
 import type { Clock, OpenTransport, RemoteObject, SubscribeOptions } from "../../wasm-client/dist/node.js";
-import { failure, settle, TestService } from "./service.js";
+import { failure, settle, subscribe, TestService } from "./service.js";
 
 const definition = `service test.subscribe
 stdver 0.10

@@ -1,9 +1,9 @@
 // Sessions recorded between a client and a service of the reference (1.2.8), replayed with this client: what it sends
 // must be what the reference sent, byte for byte, and it must understand the answers.
-import { connect, ErrorCode } from "../../wasm-client/dist/node.js";
+import { ErrorCode } from "../../wasm-client/dist/node.js";
 import type { ConnectOptions, RemoteObject } from "../../wasm-client/dist/node.js";
 import { Replay } from "./replay.js";
-import { failure, settle } from "./service.js";
+import { connect, failure, settle } from "./service.js";
 
 const withoutTable: ConnectOptions = { stringTable: false };
 const version2: ConnectOptions = { version: 2 };

@@ -20,12 +20,17 @@ const entries = [
   "svelte/svelte",
   "usb/nodes",
   "vue/vue",
+  "worker",
 ];
 /** What a page that is a device loads, whether it is one or Node in its place. */
 const served = /\/wasm-client\/ts\/serve\/(?!node\.ts$)/;
+/** What a worker does is in a script of its own (below); here, only the tests look at it. */
+const host = /\/wasm-client\/ts\/worker\/(?:host|outbox|serve_thread)\.ts$/;
+const remote = /\/wasm-client\/ts\/worker\/remote_core\.ts$/;
+const passage = /\/wasm-client\/ts\/worker\/passage\.ts$/;
 /** What all entries have in common: one file of it, whoever loads it. */
 const shared =
-  /\/wasm-client\/ts\/(?!usb\/|lease\/|losses\/|definition\/|react\/|serve\/|services\/|stores\/|svelte\/|vue\/|(?:index|internal|node)\.ts$)/;
+  /\/wasm-client\/ts\/(?!usb\/|lease\/|losses\/|definition\/|react\/|serve\/|services\/|stores\/|svelte\/|vue\/|worker\/|(?:index|internal|node|worker)\.ts$)/;
 
 // Bundlers look for files by `new URL("...", import.meta.url)`; not all take the quotes that the minifier prefers. A plugin
 // after it, so that source maps stay right: each quote is one character, too.
@@ -33,13 +38,15 @@ const quotes = {
   name: "quotes",
   generateBundle(_, bundle) {
     for (const file of Object.values(bundle)) {
-      if (file.type === "chunk") file.code = file.code.replace(/\b(new URL|import)\(`([^`$]*)`/g, '$1("$2"');
+      if (file.type === "chunk")
+        file.code = file.code.replace(/\b(new URL|import)\(`([^`$]*)`|\{type:`module`\}/g, (all) =>
+          all.replace(/`/g, '"'),
+        );
     }
   },
 };
 
-const bundle = await rolldown({
-  input: Object.fromEntries(entries.map((name) => [name, source(name)])),
+const settings = {
   platform: "neutral",
   external: [/^node:/, "react", "vue", "ws"],
   tsconfig: false,
@@ -50,19 +57,29 @@ const bundle = await rolldown({
     typescript: { removeClassFieldsWithoutInitializer: true },
   },
   plugins: [quotes],
+};
+
+async function build(input, codeSplitting) {
+  const bundle = await rolldown({ input: Object.fromEntries(input.map((name) => [name, source(name)])), ...settings });
+  await bundle.write({
+    dir: directory,
+    format: "es",
+    minify: true,
+    comments: false, // not even hints for bundlers: what they could leave out is none of them
+    codeSplitting,
+    chunkFileNames: "[name].js",
+    sourcemap: option === "--sourcemap",
+  });
+  await bundle.close();
+}
+
+await build(entries, {
+  groups: [
+    { name: "client", test: shared },
+    { name: "serve/device", test: served },
+    { name: "worker/passage", test: passage },
+    { name: "worker/remote_core", test: remote },
+    { name: "worker/host", test: host },
+  ],
 });
-await bundle.write({
-  dir: directory,
-  format: "es",
-  minify: true,
-  comments: false, // not even hints for bundlers: what they could leave out is none of them
-  codeSplitting: {
-    groups: [
-      { name: "client", test: shared },
-      { name: "serve/device", test: served },
-    ],
-  },
-  chunkFileNames: "[name].js",
-  sourcemap: option === "--sourcemap",
-});
-await bundle.close();
+await build(["worker_thread"], false);
