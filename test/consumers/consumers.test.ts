@@ -39,6 +39,10 @@ beforeAll(async () => {
   await run("npm", ["install", ...options, join(folder, stdout.trim())]);
   await writeFile(join(folder, "page.js"), page("rrgate-client"));
   await writeFile(join(folder, "index.html"), '<body><script type="module" src="./page.js"></script>');
+  // The same with the core in a worker, whose script bundlers have to find as well.
+  await mkdir(join(folder, "threaded"));
+  await writeFile(join(folder, "threaded/page.js"), page("rrgate-client/worker") + tell);
+  await cp(join(folder, "index.html"), join(folder, "threaded/index.html"));
   [demo, robot] = await startDemo();
 }, 60_000);
 afterAll(async () => {
@@ -62,14 +66,19 @@ const page = (name: string) => `import { preload, version } from "${name}";
 const show = (text) => { document.body.innerHTML = '<p id="shown">' + text + "</p>"; };
 preload().then(() => show(version), (error) => show(String(error)));
 `;
+/** A page that tells what it shows in its title as well: see told(). */
+const tell = `new MutationObserver(() => {
+  document.title = document.getElementById("shown").textContent;
+}).observe(document.body, { childList: true });
+`;
 const program = (url: string) => `import { connect, version } from "rrgate-client";
 const robot = await connect("${url}");
 console.log(version, typeof await robot.DistanceTraveled.get());
 await robot.$.close();
 `;
 
-/** What Chromium shows of a page in `out`. A page without one of its own loads `script`. */
-async function show(out: string, script?: string): Promise<string> {
+/** What Chromium shows of a page in `out`, as `look` finds it. A page without one of its own loads `script`. */
+async function show(out: string, script?: string, look = dumped): Promise<string> {
   if (script) await writeFile(join(folder, out, "index.html"), `<body><script type="module" src="${script}"></script>`);
   const types: Record<string, string> = { ".html": "text/html", ".js": "text/javascript", ".wasm": "application/wasm" };
   const server = createServer((request, response) => {
@@ -83,9 +92,34 @@ async function show(out: string, script?: string): Promise<string> {
   await once(server.listen(0, "127.0.0.1"), "listening");
   const { port } = server.address() as AddressInfo;
   try {
-    return await dumped(`http://127.0.0.1:${port}/`);
+    return await look(`http://127.0.0.1:${port}/`);
   } finally {
     server.close();
+  }
+}
+
+/** What a page with a worker shows. Virtual time, which dumped() has, does not wait for workers: Chromium runs until it is told. */
+async function told(url: string): Promise<string> {
+  const flags = ["--headless", "--no-sandbox", "--disable-gpu", "--remote-debugging-port=0"];
+  const browser = spawn("chromium", [...flags, `--user-data-dir=${join(folder, "profile")}`, url], {
+    stdio: ["ignore", "ignore", "pipe"],
+  });
+  try {
+    const lines = createInterface({ input: browser.stderr });
+    for await (const line of lines) {
+      const debugged = /ws:\/\/([^/]*)/.exec(line)?.[1];
+      if (!debugged) continue;
+      for (;;) {
+        const pages = (await (await fetch(`http://${debugged}/json/list`)).json()) as { url: string; title: string }[];
+        const title = pages.find((each) => each.url.startsWith(url))?.title ?? "";
+        if (title !== "" && !url.includes(title)) return title;
+        await new Promise((resolve) => setTimeout(resolve, 50));
+      }
+    }
+    throw new Error("Chromium ended");
+  } finally {
+    browser.kill();
+    await once(browser, "exit");
   }
 }
 
@@ -108,6 +142,7 @@ it("packs what a page needs, and installs without anything else", async () => {
   const names = await readdir(dist(""));
   expect(names).toEqual(expect.arrayContaining(["index.js", "client.js", "rrgate.wasm", "inline.js", "react", "vue"]));
   expect(names).not.toContain("internal.js");
+  expect(await readdir(dist("worker"))).not.toContain("host.js");
 });
 
 it("is bundled by esbuild, with the core copied beside it", async () => {
@@ -133,6 +168,12 @@ it("is bundled by esbuild, with the core copied beside it", async () => {
   expect(await show("esbuild", "inline.js")).toBe(version);
 }, 30_000);
 
+it("is bundled by esbuild, with worker and core copied beside it", async () => {
+  await tool("esbuild", "threaded/page.js", "--bundle", "--splitting", "--format=esm", "--outdir=esbuild-threaded");
+  for (const file of ["rrgate.wasm", "worker_thread.js"]) await cp(dist(file), join(folder, "esbuild-threaded", file));
+  expect(await show("esbuild-threaded", "page.js", told)).toBe(version);
+}, 30_000);
+
 it("is bundled by Rollup, with the core copied beside it", async () => {
   const { stderr } = await tool(
     "rollup",
@@ -152,32 +193,58 @@ it("is bundled by Vite, which ships the core by itself", async () => {
   expect(await show("vite")).toBe(version);
 }, 30_000);
 
-it("runs in the development server of Vite", async () => {
-  const server = spawn(join(here, "node_modules/.bin/vite"), ["--port", "0", "--host", "127.0.0.1"], {
-    cwd: folder,
-    stdio: ["ignore", "pipe", "inherit"],
-  });
-  try {
-    for await (const line of createInterface({ input: server.stdout })) {
-      const url = /http:\S+/.exec(line.replace(/\x1b\[\d+m/g, ""))?.[0];
-      if (!url) continue;
-      expect(await dumped(url)).toBe(version);
-      break;
-    }
-  } finally {
-    server.kill();
-    await once(server, "exit");
-  }
+it("is bundled by Vite with its worker", async () => {
+  await tool("vite", "build", "threaded", "--base", "./", "--outDir", "../vite-threaded");
+  expect(await show("vite-threaded", undefined, told)).toBe(version);
 }, 30_000);
+
+it.each([
+  ["", dumped],
+  ["threaded", told],
+])(
+  "runs in the development server of Vite %s",
+  async (root, look) => {
+    const server = spawn(join(here, "node_modules/.bin/vite"), ["--port", "0", "--host", "127.0.0.1"], {
+      cwd: join(folder, root),
+      stdio: ["ignore", "pipe", "inherit"],
+    });
+    try {
+      for await (const line of createInterface({ input: server.stdout })) {
+        const url = /http:\S+/.exec(line.replace(/\x1b\[\d+m/g, ""))?.[0];
+        if (!url) continue;
+        expect(await look(url)).toBe(version);
+        break;
+      }
+    } finally {
+      server.kill();
+      await once(server, "exit");
+    }
+  },
+  30_000,
+);
 
 it("is bundled by webpack, which ships the core by itself", async () => {
   await tool("webpack", "build", "--entry", "./page.js", "--mode", "production", "--output-path", "webpack");
   expect(await show("webpack", "main.js")).toBe(version);
 }, 30_000);
 
+it("is bundled by webpack with its worker", async () => {
+  const entry = ["--entry", "./threaded/page.js", "--output-path", "webpack-threaded"];
+  await tool("webpack", "build", "--mode", "production", ...entry);
+  expect(await show("webpack-threaded", "main.js", told)).toBe(version);
+}, 30_000);
+
 it("is bundled by Parcel, which ships the core by itself", async () => {
   await tool("parcel", "build", "index.html", "--dist-dir", "parcel", "--cache-dir", "parcel-cache");
   expect(await show("parcel")).toBe(version);
+}, 60_000);
+
+it("is bundled by Parcel with its worker", async () => {
+  // By its file: Parcel takes other entries of a package where the project says so, and the project is this repository.
+  await writeFile(join(folder, "threaded/page.js"), page("../node_modules/rrgate-client/dist/worker.js") + tell);
+  const folders = ["--dist-dir", "parcel-threaded", "--cache-dir", "parcel-cache"];
+  await tool("parcel", "build", "threaded/index.html", ...folders);
+  expect(await show("parcel-threaded", undefined, told)).toBe(version);
 }, 60_000);
 
 it("is bundled by Next.js, which ships the core by itself", async () => {

@@ -116,10 +116,15 @@ for (const [name, { start, needs }] of Object.entries(engines)) {
       expect(await visitor.complaints()).toEqual([]);
     });
 
-    for (const scheme of ["http", "https"]) {
-      test(`the client calls, reads, listens and sends by ${scheme === "http" ? "ws" : "wss"}`, async () => {
+    for (const [scheme, entry, how] of [
+      ["http", "index.js", "ws"],
+      ["https", "index.js", "wss"],
+      ["http", "worker.js", "ws in a worker"],
+      ["https", "worker.js", "wss in a worker"],
+    ] as const) {
+      test(`the client calls, reads, listens and sends by ${how}`, async () => {
         await visitor.open(service.url.replace("http", scheme));
-        expect(await visitor.run(useAllMembers)).toEqual({
+        expect(await visitor.run(useAllMembers, entry)).toEqual({
           called: 5,
           refused: "not today",
           set: "für alle",
@@ -142,9 +147,9 @@ function coloursOf(css: string): number {
   return new Set(Array.from(pixels).filter((_, index) => index % 4 === 0)).size;
 }
 
-/** Runs in the page. */
-async function useAllMembers(): Promise<object> {
-  const { connect } = await import(new URL("index.js", location.href).href);
+/** Runs in the page. `entry`: of the client. */
+async function useAllMembers(entry: string): Promise<object> {
+  const { connect } = await import(new URL(entry, location.href).href);
   const device = await connect(new URL("/devices/big?service=interop", location.href));
   const called: number = await device.add(2, 3);
   const refused: string = await device.fail("custom", "not today").catch((error: Error) => error.message);

@@ -54,18 +54,21 @@ async function follow(): Promise<void> {
 }
 
 /** Connects, takes the lease, drives; the page's `lab` has what was made of it. */
-async function drive(page: Page, time = deadman): Promise<void> {
+async function drive(page: Page, time = deadman, entry = "index.js"): Promise<void> {
   await page.goto(gateway.url);
-  await page.evaluate(async (milliseconds) => {
-    const { connect, lease } = await import(new URL("index.js", location.href).href);
-    const driven = await connect("/devices/create?service=Create");
-    await driven.reset();
-    const held = await lease(driven, { deadman: milliseconds });
-    const lab = { driven, held, lost: "" };
-    held.onLost((reason: Error) => (lab.lost = reason.message));
-    Object.assign(window, { lab });
-    await driven.Drive(50, 32767);
-  }, time);
+  await page.evaluate(
+    async ([milliseconds, script]) => {
+      const { connect, lease } = await import(new URL(script, location.href).href);
+      const driven = await connect("/devices/create?service=Create");
+      await driven.reset();
+      const held = await lease(driven, { deadman: milliseconds });
+      const lab = { driven, held, lost: "" };
+      held.onLost((reason: Error) => (lab.lost = reason.message));
+      Object.assign(window, { lab });
+      await driven.Drive(50, 32767);
+    },
+    [time, entry] as const,
+  );
   await expect.poll(() => speeds.at(-1)?.speed).toBeGreaterThan(0);
 }
 
@@ -87,22 +90,24 @@ test("the robot goes on for as long as the page is alive", async ({ page }) => {
   expect(await lost(page)).toBe("");
 });
 
-test("a main thread that hangs stops the robot", async ({ page }) => {
-  await drive(page);
-  const began = await page.evaluate(() => {
-    const now = Date.now();
-    while (Date.now() < now + 1000);
-    return now;
+for (const entry of ["index.js", "worker.js"])
+  test(`a main thread that hangs stops the robot, with ${entry}`, async ({ page }) => {
+    await drive(page, deadman, entry);
+    const began = await page.evaluate(() => {
+      const now = Date.now();
+      while (Date.now() < now + 1000);
+      return now;
+    });
+    expect(await stoppedAfter(began)).toBeLessThan(soon);
+    await expect.poll(() => lost(page)).toContain(`its holder has not renewed it for ${deadman} ms`);
+    const late = await page.evaluate(async () => {
+      const { driven } = (
+        window as unknown as { lab: { driven: Record<"Drive", (...way: number[]) => Promise<void>> } }
+      ).lab;
+      return driven.Drive(50, 32767).catch((error: Error) => error.message);
+    });
+    expect(late).toContain("has ended");
   });
-  expect(await stoppedAfter(began)).toBeLessThan(soon);
-  await expect.poll(() => lost(page)).toContain(`its holder has not renewed it for ${deadman} ms`);
-  const late = await page.evaluate(async () => {
-    const { driven } = (window as unknown as { lab: { driven: Record<"Drive", (...way: number[]) => Promise<void>> } })
-      .lab;
-    return driven.Drive(50, 32767).catch((error: Error) => error.message);
-  });
-  expect(late).toContain("has ended");
-});
 
 test("a page that is frozen, by a debugger, stops the robot", async ({ page }) => {
   await drive(page);
