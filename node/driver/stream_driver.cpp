@@ -52,13 +52,15 @@ void StreamDriver::spawn(awaitable<void> work) {
 awaitable<void> StreamDriver::read_all(std::shared_ptr<StreamDriver> self) {
   auto& driver = *self;
   while (!driver.is_closed_ && driver.unread_.empty()) {
-    const auto read = co_await driver.stream_->read_some(driver.buffer_);
+    const auto room = driver.buffer_.renew();
+    const auto read = co_await driver.stream_->read_some(room);
     if (driver.is_closed_) break;
     const Now now = read_clocks();
     if (read.error) co_return driver.finish(stream_error(read.error), now);
     if (read.is_end())
       co_return driver.finish(make_error(ErrorCode::connection_error, "the peer closed the connection"), now);
-    driver.unread_ = {driver.buffer_.data(), read.bytes};
+    driver.buffer_.note_read(read.bytes);
+    driver.unread_ = room.first(read.bytes);
     driver.settle(now);
   }
   driver.is_reading_ = false;

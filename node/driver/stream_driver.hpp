@@ -11,7 +11,7 @@
 #include "core/support/bytes.hpp"
 #include "core/support/error.hpp"
 #include "node/driver/clocks.hpp"
-#include "node/platform/page_buffer.hpp"
+#include "node/platform/read_buffer.hpp"
 #include "node/transport/byte_stream.hpp"
 
 namespace rr {
@@ -80,7 +80,7 @@ class StreamDriver : public std::enable_shared_from_this<StreamDriver> {
   std::unique_ptr<ByteStream> stream_;
   boost::asio::steady_timer timer_;
   TimePoint armed_for_ = TimePoint::max();
-  PageBuffer buffer_;
+  ReadBuffer buffer_;
   ByteSpan unread_;          ///< of buffer_: the session does not take it yet, and nothing more is read
   bool is_reading_ = false;  ///< read_all() runs
   bool is_settling_ = false;

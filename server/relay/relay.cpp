@@ -11,7 +11,7 @@
 #include <cstring>
 #include <memory>
 
-#include "node/platform/page_buffer.hpp"
+#include "node/platform/read_buffer.hpp"
 
 namespace rrgate {
 
@@ -78,17 +78,19 @@ rr::awaitable<void> Relay::pump_to_device() {
 }
 
 rr::awaitable<void> Relay::pump(Direction& direction) {
-  const rr::PageBuffer buffer(options_.outbox_bytes);
-  std::size_t held = 0;  // bytes of an incomplete message start, at the front
+  rr::ReadBuffer buffer(options_.outbox_bytes);
+  std::size_t held = 0;  // bytes of an incomplete message start, at the front; far fewer than there is room for
   while (!end_reason_) {
-    const auto read = co_await direction.from.read_some({buffer.data() + held, buffer.size() - held});
+    const auto room = held == 0 ? buffer.renew() : buffer.room();
+    const auto read = co_await direction.from.read_some(room.subspan(held));
     if (read.error || read.is_end()) {
       end_of(direction, read.error);
       break;
     }
     held += read.bytes;
+    buffer.note_read(held);
     const auto messages = direction.gate.messages();
-    const auto passed = direction.gate.pass({buffer.data(), held});
+    const auto passed = direction.gate.pass(room.first(held));
     direction.flow.messages += direction.gate.messages() - messages;
     if (!passed) {
       stop(broken_rule(direction, passed.error()));
@@ -99,7 +101,7 @@ rr::awaitable<void> Relay::pump(Direction& direction) {
       to_client_.gate.make_opaque();
       to_device_.gate.make_opaque();
     }
-    const rr::ByteSpan slice(buffer.data(), *passed);
+    const rr::ByteSpan slice = room.first(*passed);
     direction.flow.waiting += *passed;
     memory_.hold(memory_.bytes() + *passed);  // bounded for each client: it waits, and nobody is refused
     const auto error = co_await direction.to.write({&slice, 1});
@@ -112,7 +114,7 @@ rr::awaitable<void> Relay::pump(Direction& direction) {
     direction.bytes += *passed;
     direction.flow.bytes += *passed;
     held -= *passed;
-    if (held > 0) std::memmove(buffer.data(), buffer.data() + *passed, held);
+    if (held > 0) std::memmove(room.data(), room.data() + *passed, held);
     if (direction.gate.is_opaque()) co_await keep_pace(direction, *passed);
   }
 }

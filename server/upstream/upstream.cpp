@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/session/service/hosted_service.hpp"
 #include "core/session/service_path.hpp"
 #include "core/support/glob.hpp"
 
@@ -80,8 +81,13 @@ void Upstream::remove(UpstreamClient& client, std::function<void()> left) {
   }
   ++clients_left_;
   std::erase_if(calls_, [&](const OpenCall& call) { return call.client == &client; });
-  for (auto it = endpoints_.lower_bound({&client, 0}); it != endpoints_.end() && it->first.first == &client;)
-    leave_pipe(client, (it++)->first.second);
+  for (;;) {  // the device may be lost with it, and end those of others
+    const auto it = endpoints_.lower_bound({&client, 0});
+    if (it == endpoints_.end() || it->first.first != &client) break;
+    leave_pipe(client, it->first.second);
+  }
+  for (const auto& [key, wire] : wires_)
+    if (wire->out_value && wire->out_value->sender == &client) wire->out_value.reset();
   std::vector<std::pair<std::string, const rr::MemberDefinition*>> wires;
   for (const auto& [key, wire] : wires_)
     if (has_joined(client, key)) wires.emplace_back(key.first, &wire->member);
@@ -123,11 +129,14 @@ const rr::EntityDefinition* Upstream::object_type(const std::string& path) const
   return type ? types_->find_entity(type->qualified_name) : nullptr;
 }
 
-/// The objref of an index is known by its parent, which is found first.
+/// What an index is of is known by the object above it, which is found first.
 void Upstream::find_object(const std::string& path, Completion done) {
   if (!connection_) return done(lost_error());
-  auto parent = path.substr(0, path.rfind('.'));
-  if (!path.ends_with(']') || object_type(parent)) return look_up(path, std::move(done));
+  const auto index = path.rfind('[');
+  const auto dot = path.rfind('.', index);
+  auto parent = path.substr(0, dot);
+  if (index == std::string::npos || dot == std::string::npos || object_type(parent))
+    return look_up(path, std::move(done));
   find_object(parent, [weak = weak_from_this(), path, done = std::move(done)](const rr::Result<rr::Value>& found) {
     const auto self = weak.lock();
     if (!found) return done(found);
@@ -136,14 +145,18 @@ void Upstream::find_object(const std::string& path, Completion done) {
   });
 }
 
-/// A device may ignore the index of a plain objref (1.2.8 does): locks and leases would not know the object.
+/// A device may ignore the index of a plain objref (1.2.8 does), or take several spellings of one: locks, leases and
+/// rights would not know the object. What is above the last index was checked when it was found.
 rr::Result<> Upstream::check_index(std::string_view path) const {
-  if (!path.ends_with(']')) return {};
-  const auto dot = path.rfind('.');
+  const auto index = path.rfind('[');
+  const auto dot = path.rfind('.', index);
+  if (index == std::string_view::npos || dot == std::string_view::npos) return {};
+  const auto segments = rr::parse_service_path(path.substr(0, path.find(']', index) + 1));
+  if (!segments) return segments.error();
   const auto* parent = object_type(std::string(path.substr(0, dot)));
-  const auto* objref = parent ? parent->find_member(path.substr(dot + 1, path.rfind('[') - dot - 1)) : nullptr;
-  if (!objref || objref->is_indexed()) return {};
-  return rr::make_error(rr::ErrorCode::invalid_argument, "objref '" + objref->name + "' has no index");
+  const auto* objref = parent ? parent->find_member(segments->back().name) : nullptr;
+  if (!objref || objref->kind != rr::MemberKind::objref) return {};  // as the device says
+  return rr::check_index(*objref, segments->back().index);
 }
 
 void Upstream::look_up(const std::string& path, Completion done) {
@@ -194,7 +207,7 @@ void Upstream::look_up_again() {
   for (const auto& path : known) {
     find_object(path, [weak = weak_from_this(), path](const rr::Result<rr::Value>& found) {
       const auto self = weak.lock();
-      if (!self || !self->connection_) return;
+      if (!self || self->is_lost()) return;
       if (!found) return self->handle_released(path);
       std::vector<MemberKey> wires;
       for (const auto& [key, wire] : self->wires_)
@@ -234,8 +247,7 @@ void Upstream::request(UpstreamClient& client, const rr::Called& called, Complet
     const auto self = weak.lock();
     if (result || !self) return done(std::move(result));
     if (!self->connection_) return done(self->lost_error());
-    // The session has ended with this, and says so after it.
-    if (self->connection_->session().state() == rr::ClientState::closed) return done(self->lost_error(result.error()));
+    if (self->is_lost()) return done(self->lost_error(result.error()));
     done(std::move(result));
   };
   const auto& path = path_of(called);
@@ -292,9 +304,11 @@ void Upstream::make_safe(const SafeRequest& request, Completion done) {
   if (has_waiting && connection_) send_safe(request, count_answer(ignore_result));
   const auto wire = wires_.find({request.path, request.member});
   if (request.kind != SafeAction::Kind::wire || wire == wires_.end()) return;
-  wire->second->out_value = request.values.front();
+  wire->second->out_value.reset();
   if (connection_ && wire->second->is_attached)
-    (void)connection_->send_wire(request.path, request.member, *std::exchange(wire->second->out_value, std::nullopt));
+    (void)connection_->send_wire(request.path, request.member, request.values.front());
+  else
+    wire->second->out_value = OutValue{nullptr, request.values.front()};
 }
 
 void Upstream::send_safe(const SafeRequest& request, Completion done) {

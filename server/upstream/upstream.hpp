@@ -216,6 +216,10 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
     rr::WirePacket packet;
     const std::uint64_t count;  ///< Wire::count of it
   };
+  struct OutValue {
+    UpstreamClient* sender;  ///< null: it makes the device safe
+    rr::Value value;
+  };
   struct Wire {
     Wire(std::string its_path, const rr::MemberDefinition& its_member)
         : path(std::move(its_path)), member(its_member) {}
@@ -225,10 +229,10 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
     std::vector<Follower> followers;
     std::size_t next = 0;  ///< before the follower whose turn it is
     std::shared_ptr<const rr::WireValue> newest;
-    rr::TimePoint arrived;               ///< of the newest
-    std::optional<Outgoing> outgoing;    ///< while hand_out() is at it
-    std::uint64_t count = 0;             ///< values that have come
-    std::optional<rr::Value> out_value;  ///< the newest that could not be sent yet
+    rr::TimePoint arrived;              ///< of the newest
+    std::optional<Outgoing> outgoing;   ///< while hand_out() is at it
+    std::uint64_t count = 0;            ///< values that have come
+    std::optional<OutValue> out_value;  ///< the newest that could not be sent yet
     bool is_attached = false;
     bool is_due = false;  ///< hand_out() is due
   };
@@ -272,6 +276,8 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   /// Until it is lost or closed; returns whether it has had no clients for too long instead.
   rr::awaitable<bool> watch_use();
   rr::awaitable<void> rest();
+  /// Also while the session has ended, and says so next: what failed has failed by that.
+  bool is_lost() const;
   void lost(const rr::Error& reason);
   void tell_lost(const rr::Error& reason);
   rr::Result<> check_index(std::string_view path) const;
@@ -325,8 +331,9 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   std::chrono::milliseconds rests_after_{0};  ///< without clients; 0: never
   bool is_attempting_ = false;
   bool is_resting_ = false;
-  bool is_wanted_ = false;  ///< a client has come, or was about to
-  bool is_waking_ = false;  ///< has rested, and the attempt to open it again is not over
+  bool is_wanted_ = false;   ///< a client has come, or was about to
+  bool is_waking_ = false;   ///< has rested, and the attempt to open it again is not over
+  bool is_watched_ = false;  ///< watch_use() waits
   bool is_closed_ = false;
   bool closes_unused_ = false;
   bool requires_user_ = false;

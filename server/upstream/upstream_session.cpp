@@ -168,7 +168,9 @@ rr::awaitable<void> Upstream::run(std::shared_ptr<Upstream> self, Retry retry, s
     if (done) {
       log(LogLevel::info, "session open", {{"device", device}, {"service", self->service_}});
       const auto opened_at = std::chrono::steady_clock::now();
+      self->is_watched_ = true;
       const bool may_rest = co_await self->watch_use();
+      self->is_watched_ = false;
       // A device that accepts and drops at once is as good as away.
       if (std::chrono::steady_clock::now() - opened_at >= lasting * retry.min) backoff.reset();
       if (may_rest) {
@@ -248,11 +250,20 @@ rr::Error Upstream::lost_error(const std::optional<rr::Error>& reason) const {
                             (reason ? ": " + reason->message : std::string(" is not connected")));
 }
 
+bool Upstream::is_lost() const {
+  return !connection_ || connection_->session().state() == rr::ClientState::closed;
+}
+
 void Upstream::lost(const rr::Error& reason) {
   connection_.reset();
   loss_ = reason;
   generators_.clear();
-  for (const auto& [key, wire] : wires_) wire->is_attached = false;
+  for (const auto& [key, wire] : wires_) {
+    wire->is_attached = false;
+    wire->newest.reset();  // no value of before is one of now
+    wire->outgoing.reset();
+    for (auto& follower : wire->followers) follower.count = wire->count;
+  }
   for (auto& [number, pipe] : pipes_) {
     pipe.state = PipeState::detached;
     pipe.is_held = false;
@@ -261,7 +272,7 @@ void Upstream::lost(const rr::Error& reason) {
   locks_->handle_lost(*this);
   device_->note_trouble();
   tell_lost(lost_error());
-  wake_.cancel();
+  if (is_watched_) wake_.cancel();  // else an attempt is over that has failed, or the next one waits for its time
 }
 
 void Upstream::tell_lost(const rr::Error& reason) {

@@ -25,8 +25,9 @@ constexpr std::size_t clients_a_turn = 64;
 
 void Upstream::join_wire(UpstreamClient& client, const std::string& path, const rr::MemberDefinition& member) {
   if (!has(client)) return;  // it has left, and nobody would take it off again
-  if (!connection_) return client.answer_wire(path, member, lost_error());
-  if (const auto allowed = locks_->check(client, path, member, MemberUse::connect); !allowed) {
+  const auto allowed =
+      connection_ ? locks_->check(client, path, member, MemberUse::connect) : rr::Result<>(lost_error());
+  if (!allowed) {
     client.answer_wire(path, member, allowed.error());
     return client.close_wire(path, member);  // where it comes with the wire from another session
   }
@@ -52,7 +53,7 @@ void Upstream::attach_wire(const MemberKey& key) {
   if (!connection_->session().object_type(key.first))  // another session of this service has found it
     return find_object(key.first, [weak, key](const rr::Result<rr::Value>& found) {
       const auto self = weak.lock();
-      if (!self || !self->connection_) return;
+      if (!self || self->is_lost()) return;
       if (found) return self->attach_wire(key);
       const auto reason = found.error();
       self->drop_wire(key, &reason);
@@ -62,7 +63,7 @@ void Upstream::attach_wire(const MemberKey& key) {
   };
   auto connected = [weak, key](const rr::Result<rr::Value>& done) {
     const auto self = weak.lock();
-    if (!self || !self->connection_) return;
+    if (!self || self->is_lost()) return;
     const auto found = self->wires_.find(key);
     if (found == self->wires_.end()) return;
     if (!done) {
@@ -75,8 +76,10 @@ void Upstream::attach_wire(const MemberKey& key) {
     for (const auto& follower : followers)
       if (self->has_joined(*follower.client, key)) follower.client->answer_wire(key.first, wire->member, {});
     if (!self->connection_) return;
-    if (const auto value = std::exchange(wire->out_value, std::nullopt))
-      (void)self->connection_->send_wire(key.first, key.second, *value);
+    // Who has sent it may have lost the right, or the lease, meanwhile.
+    if (const auto waiting = std::exchange(wire->out_value, std::nullopt))
+      if (!waiting->sender || self->locks_->check_packet(*waiting->sender, key.first, wire->member))
+        (void)self->connection_->send_wire(key.first, key.second, waiting->value);
   };
   connection_->on_wire_closed(key.first, key.second, [weak, key] {
     const auto closed = rr::make_error(rr::ErrorCode::service_error, "the device closed the wire");
@@ -104,6 +107,10 @@ void Upstream::hand_out_later(const std::shared_ptr<Wire>& wire) {
 /// One after the other, each the newest that there is at its turn. Not all at once: one read may bring hundreds of
 /// values, of which the last one counts, and everybody else has to get a turn, too.
 void Upstream::hand_out(const std::shared_ptr<Wire>& wire) {
+  if (!wire->newest) {  // the device was lost meanwhile
+    wire->is_due = false;
+    return;
+  }
   if (!wire->outgoing || wire->outgoing->count != wire->count)
     wire->outgoing.emplace(wire->path, wire->member, wire->newest, wire->arrived, wire->count);
   std::size_t up_to_date = 0;  // in a row
@@ -132,7 +139,9 @@ void Upstream::hand_out(const std::shared_ptr<Wire>& wire) {
 void Upstream::leave_wire(UpstreamClient& client, const std::string& path, const rr::MemberDefinition& member) {
   const auto found = wires_.find({path, member.name});
   if (found == wires_.end()) return;
-  auto& followers = found->second->followers;
+  auto& wire = *found->second;
+  if (wire.out_value && wire.out_value->sender == &client) wire.out_value.reset();
+  auto& followers = wire.followers;
   std::erase_if(followers, [&](const Follower& each) { return each.client == &client; });
   if (!followers.empty()) return;
   wires_.erase(found);
@@ -164,7 +173,7 @@ rr::Result<> Upstream::send_wire(UpstreamClient& client, const std::string& path
   const auto found = wires_.find({path, member.name});
   if (found == wires_.end()) return {};
   if (connection_ && found->second->is_attached) return connection_->send_wire(path, member.name, value);
-  found->second->out_value = value;
+  found->second->out_value = OutValue{&client, value};
   return {};
 }
 
@@ -173,8 +182,9 @@ rr::Result<> Upstream::send_wire(UpstreamClient& client, const std::string& path
 void Upstream::join_pipe(UpstreamClient& client, rr::PipeId id, const std::string& path,
                          const rr::MemberDefinition& member) {
   if (!has(client)) return;
-  if (!connection_) return client.refuse_pipe(id, lost_error());
-  if (const auto allowed = locks_->check(client, path, member, MemberUse::connect); !allowed) {
+  const auto allowed =
+      connection_ ? locks_->check(client, path, member, MemberUse::connect) : rr::Result<>(lost_error());
+  if (!allowed) {
     client.refuse_pipe(id, allowed.error());
     return client.close_pipe(id);  // where it comes with the endpoint from another session
   }
@@ -208,7 +218,7 @@ void Upstream::attach_pipe(PipeNumber number) {
   if (!connection_->session().object_type(pipe.path))  // another session of this service has found it
     return find_object(pipe.path, [weak, number](const rr::Result<rr::Value>& object) {
       const auto self = weak.lock();
-      if (!self || !self->connection_) return;
+      if (!self || self->is_lost()) return;
       if (object) return self->attach_pipe(number);
       self->drop_pipe(number);
     });
@@ -252,7 +262,7 @@ void Upstream::pipe_attached(PipeNumber number, const std::string& path, const s
   }
   auto& pipe = found->second;
   if (!result) {
-    if (!is_first && !connection_) return;  // lost again: the next attempt will do
+    if (!is_first && is_lost()) return;  // again: the next attempt will do
     const auto endpoints = pipe.endpoints;
     if (!is_first) return drop_pipe(number);
     for (const auto& endpoint : endpoints) end_endpoint(endpoint);
@@ -260,6 +270,8 @@ void Upstream::pipe_attached(PipeNumber number, const std::string& path, const s
     pipes_.erase(found);
     for (const auto& endpoint : endpoints)
       if (has(*endpoint.first)) endpoint.first->refuse_pipe(endpoint.second, result.error());
+    for (const auto& endpoint : endpoints)  // of who came with it from another session
+      if (has(*endpoint.first)) endpoint.first->close_pipe(endpoint.second);
     return;
   }
   pipe.index = result->to<std::int32_t>().value();

@@ -173,6 +173,7 @@ void ValueClient::closed(const Key& key, const rr::Error& reason) {
   if (found->second.state == TopicState::joining) return joined(key, reason);  // it is not answered any more
   found->second.state = TopicState::idle;
   found->second.error = reason;
+  forget_value(found->second);
   tell(key, &reason);
 }
 
@@ -217,6 +218,12 @@ void ValueClient::keep(Topic& topic, const SamplePtr& sample) {
   if (is_wire) memory_.hold(memory_.bytes() + sample->bytes);
   topic.recent.push_back(sample);
   topic.recent_bytes += sample->bytes;
+}
+
+/// A wire's value of before is none of now; events did happen.
+void ValueClient::forget_value(Topic& topic) {
+  if (topic.place.member->kind != rr::MemberKind::wire) return;
+  while (!topic.recent.empty()) forget_oldest(topic);
 }
 
 void ValueClient::forget_oldest(Topic& topic) {
@@ -311,8 +318,10 @@ void ValueClient::release_path(const std::string& path) {
 
 void ValueClient::connection_lost(const rr::Error& reason) {
   std::vector<Key> lost;
-  for (auto& [key, topic] : topics_)
+  for (auto& [key, topic] : topics_) {
+    forget_value(topic);
     if (!std::exchange(topic.is_lost, true)) lost.push_back(key);
+  }
   for (const auto& key : lost) tell(key, &reason);
 }
 

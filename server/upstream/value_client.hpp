@@ -157,6 +157,7 @@ class ValueClient final : public UpstreamClient, public std::enable_shared_from_
   /// To handlers, which may leave meanwhile.
   static void hand_out(const SamplePtr& sample, rr::MemberKind kind, const Handlers& handlers);
   void keep(Topic& topic, const SamplePtr& sample);
+  void forget_value(Topic& topic);
   void forget_oldest(Topic& topic);
   void tell(const Key& key, const rr::Error* error);
   void leave(const Key& key, std::uint64_t id);

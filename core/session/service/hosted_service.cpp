@@ -22,7 +22,8 @@ bool is_decimal_int32(std::string_view text) {
   return parsed.ec == std::errc{} && text == std::to_string(number);
 }
 
-/// What the objref's type says about the index: required or not, number or text.
+}  // namespace
+
 Result<> check_index(const MemberDefinition& objref, const std::optional<std::string>& index) {
   const auto& type = objref.type;
   if (!objref.is_indexed()) {
@@ -35,8 +36,6 @@ Result<> check_index(const MemberDefinition& objref, const std::optional<std::st
                       "objref '" + objref.name + "': index " + quote(*index) + ": expected a decimal int32");
   return {};
 }
-
-}  // namespace
 
 std::string_view implements_name(const EntityDefinition& type, const ImplementsDefinition& base) {
   const auto [definition, name] = split_qualified(base.qualified_name);

@@ -41,6 +41,10 @@ class ServiceObject {
 /// (also where the definition names them by an alias).
 std::string_view implements_name(const EntityDefinition& type, const ImplementsDefinition& base);
 
+/// What the objref's type says about the index, which is decoded: required or not, number or text.
+/// Errors   invalid_argument.
+Result<> check_index(const MemberDefinition& objref, const std::optional<std::string>& index);
+
 /// One service of a node.
 class HostedService {
  public:

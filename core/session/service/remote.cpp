@@ -145,6 +145,7 @@ void ServiceSession::handle_object_found(std::string_view path, const Result<>& 
     const DecodeOptions options{.message_limit = options_.connection.max_message_size};
     if (!service_ || !decode(request.message, options, message)) return;
     const auto& entry = message.entries[request.entry];
+    if (refuse_reused_id(entry, now)) return;
     if (found)
       handle_entry(message, entry, now);
     else

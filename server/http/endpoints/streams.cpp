@@ -38,7 +38,8 @@ struct Outbox {
       waiting.push_back(std::move(text));
     }
     is_replaceable = replaces;
-    if (bytes > max_waiting_bytes || !memory.resize(in_flight + bytes)) {
+    const bool is_slow = waiting.size() > 1 && bytes > max_waiting_bytes;  // one alone may be larger
+    if (is_slow || !memory.resize(in_flight + bytes)) {
       waiting.clear();
       bytes = 0;
       waiting.push_back("event: error\ndata: {\"detail\":\"too slow: values were lost, so the stream ends\"}\n\n");
@@ -141,14 +142,17 @@ rr::awaitable<void> stream_images(const ObjectRequest& request, const Target& ta
     explicit Newest(const asio::any_io_executor& executor) : news(executor, asio::steady_timer::time_point::max()) {}
     SamplePtr sample;
     bool is_gone = false;
+    bool is_over = false;  ///< no more frames come
     asio::steady_timer news;
   };
   auto& writer = request.writer();
   auto& gateway = request.gateway();
   const auto& member = *target.member;
   const auto newest = std::make_shared<Newest>(writer.executor());
-  SampleHandler handler = [newest](const SamplePtr& sample, const rr::Error*) {
-    if (!sample) return;
+  SampleHandler handler = [newest](const SamplePtr& sample, const rr::Error* error) {
+    // Of a device that is lost more frames come when it is back.
+    if (error && error->code == rr::ErrorCode::invalid_state) newest->is_over = true;
+    if (!sample && !newest->is_over) return;
     newest->sample = sample;
     newest->news.cancel();
   };
@@ -165,7 +169,7 @@ rr::awaitable<void> stream_images(const ObjectRequest& request, const Target& ta
   });
   // Browsers show a part when the next one's boundary has come: each is followed by it at once.
   auto failed = co_await writer.write("--frame\r\n");
-  while (!failed && !newest->is_gone) {
+  while (!failed && !newest->is_gone && !newest->is_over) {
     if (!newest->sample) {
       co_await newest->news.async_wait(asio::as_tuple(asio::use_awaitable));
       continue;

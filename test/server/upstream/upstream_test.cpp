@@ -16,6 +16,7 @@ stdver 0.10
 object Bench
     event struck(int32 number)
     wire double level [readonly]
+    wire double wish [writeonly]
     function int32{generator} count()
     function void wait()
     objref Bench spare
@@ -119,6 +120,54 @@ TEST_CASE("a device that drops each session at once is tried ever more rarely, u
   bench.upstream->break_off();
   REQUIRE(bench.run_until([&] { return attempts.times.size() == lasting + 2; }));
   CHECK(attempts.times.back() - lost < 320ms);  // half of what would come next, had it not lasted
+}
+
+TEST_CASE("wires that were joined anew by a session that was lost at once are joined by the next one") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  const auto cut = rr::make_error(rr::ErrorCode::connection_error, "the line was cut");
+  int sessions = 0;
+  bench.upstream->keep_open({10ms, 20ms, 10s}, [&]() -> rr::Result<> {
+    if (++sessions == 2) bench.upstream->connection()->close(cut);
+    return {};
+  });
+  REQUIRE(bench.wait_for(bench.upstream->opened()).has_value());
+  REQUIRE(bench.find("bench").has_value());
+  HearingClient client(bench.upstream);
+  std::vector<double> received;
+  client.on_wire = [&](rr::WirePacket& packet) { received.push_back(packet.value().to<double>().value()); };
+  bench.upstream->join_wire(client, "bench", *bench.upstream->object_type("bench")->find_member("level"));
+  REQUIRE(bench.run_until([&] { return client.heard.size() == 1; }));
+  bench.upstream->connection()->close(cut);
+  REQUIRE(bench.run_until([&] { return sessions == 3 && client.heard.back() == "wire level joined"; }));
+  device.service->set_wire("level", 0.5);
+  CHECK(bench.run_until([&] { return !received.empty(); }));
+  for (const auto& heard : client.heard) CHECK(heard != "released bench");
+}
+
+TEST_CASE("what a client sends while the device is away is not sent when it has left, but what others send is") {
+  Counting device;
+  std::vector<double> wishes;
+  device.service->on_wire("wish", [&](double value) { wishes.push_back(value); });
+  UpstreamBench bench(device.service);
+  bench.open();
+  const auto& wire = *bench.upstream->object_type("bench")->find_member("wish");
+  std::optional<HearingClient> first(std::in_place, bench.upstream);
+  HearingClient second(bench.upstream);
+  const auto is_joined = [&] { return second.heard.size() == 1 && second.heard.back() == "wire wish joined"; };
+  bench.upstream->join_wire(*first, "bench", wire);
+  bench.upstream->join_wire(second, "bench", wire);
+  REQUIRE(bench.run_until(is_joined));
+  bench.upstream->connection()->close(rr::make_error(rr::ErrorCode::connection_error, "the line was cut"));
+  REQUIRE(bench.run_until([&] { return !bench.upstream->is_open(); }));
+  CHECK(bench.upstream->send_wire(*first, "bench", wire, rr::Value(1.0)).has_value());
+  first.reset();
+  second.heard.clear();
+  bench.open();
+  REQUIRE(bench.run_until(is_joined));
+  CHECK(bench.upstream->send_wire(second, "bench", wire, rr::Value(2.0)).has_value());
+  REQUIRE(bench.run_until([&] { return !wishes.empty(); }));
+  CHECK(wishes == std::vector<double>{2.0});
 }
 
 TEST_CASE("who waits for a session that is lost as soon as it is open hears that; the next one gets in") {
@@ -239,6 +288,16 @@ TEST_CASE("an index of a plain objref is refused before the device is asked, whi
   CHECK(bench.run_until([&] { return answer.has_value(); }));
   CHECK(is_refused());
   CHECK(asked == 1);
+  for (const std::string path : {"bench.spare[7].others[1]", "bench.others[1].spare[7].spare"}) {
+    answer.reset();
+    bench.upstream->find_object(path, keep);
+    CHECK(bench.run_until([&] { return answer.has_value(); }));
+    CHECK(is_refused());
+  }
+  CHECK(asked == 1);
+  answer.reset();
+  bench.upstream->find_object("bench.others[%201]", keep);  // " 1"
+  CHECK((answer && !*answer && answer->error().message.ends_with("expected a decimal int32")));
   answer.reset();
   bench.upstream->find_object("bench.others[1].others[2]", keep);
   CHECK(bench.run_until([&] { return answer.has_value(); }));
