@@ -52,7 +52,7 @@ class UpstreamBench {
   /// What `work` comes to, once it does: see run_until().
   template <class T>
   std::shared_ptr<std::optional<T>> begin(rr::awaitable<T> work) {
-    const auto out = std::make_shared<std::optional<T>>();
+    auto out = std::make_shared<std::optional<T>>();
     boost::asio::co_spawn(io, std::move(work), [out](const std::exception_ptr& failure, T result) {
       if (failure) std::rethrow_exception(failure);
       out->emplace(std::move(result));
@@ -61,7 +61,7 @@ class UpstreamBench {
   }
   template <class T>
   T wait_for(rr::awaitable<T> work) {
-    const auto out = begin(std::move(work));
+    auto out = begin(std::move(work));
     REQUIRE(run_until([&] { return out->has_value(); }));
     return std::move(**out);
   }
@@ -82,7 +82,7 @@ class UpstreamBench {
     called.object = std::make_shared<SharedObject>(path, type.qualified_name);
     called.member = type.find_member(member);
     called.generator = generator;
-    const auto out = std::make_shared<std::optional<rr::Result<rr::Value>>>();
+    auto out = std::make_shared<std::optional<rr::Result<rr::Value>>>();
     upstream->request(client, called, [out](rr::Result<rr::Value> result) { *out = std::move(result); });
     return out;
   }

@@ -130,7 +130,7 @@ TEST_CASE("a device that drops each session at once is tried ever more rarely, u
 TEST_CASE("wires that were joined anew by a session that was lost at once are joined by the next one") {
   const std::string path = "bench.parts[1]";  // which the device is asked for
   Counting device;
-  const auto part = device.service->make_object("Part");
+  auto part = device.service->make_object("Part");
   device.service->root().objref("parts", [&](std::string_view) { return part; });
   UpstreamBench bench(device.service);
   const auto cut = rr::make_error(rr::ErrorCode::connection_error, "the line was cut");
