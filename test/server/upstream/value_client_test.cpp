@@ -23,6 +23,7 @@ const std::string part = "rack.parts[1]";
 
 struct Rack {
   std::shared_ptr<rr::Service> service = rr::Service::from_text({definition}, "rack", "Rack");
+  std::shared_ptr<rr::Object> newest_part;
   UpstreamBench bench;
   std::shared_ptr<ValueClient> client;
   std::vector<std::string> heard;
@@ -34,11 +35,12 @@ struct Rack {
                                            MemoryBudget(1'000'000).charge(""));
   }
   std::shared_ptr<rr::Service> prepared() {
-    service->objref("parts", [this](std::string_view) { return service->make_object("Part"); });
+    service->objref("parts", [this](std::string_view) { return newest_part = service->make_object("Part"); });
     return service;
   }
   auto listen(const std::string& member) {
-    MemberPlace place{part, bench.upstream->object_type(part)->find_member(member), bench.upstream->types()};
+    const auto types = bench.upstream->types();
+    MemberPlace place{part, types->find_entity("test.rack.Part")->find_member(member), types};
     return bench.begin(client->listen(std::move(place), 0, [this](const SamplePtr& sample, const rr::Error* error) {
       heard.push_back(sample ? "value" : error ? error->message : "back");
     }));
@@ -77,4 +79,17 @@ TEST_CASE("a member that the device closes is told to its listeners, and joined 
   const auto second = rack.listen(member);
   REQUIRE(rack.bench.run_until([&] { return second->has_value(); }));
   CHECK((**second).has_value());
+}
+
+TEST_CASE("a wire's value of before an outage is given to nobody who comes in it") {
+  Rack rack;
+  const auto first = rack.listen("level");
+  REQUIRE(rack.bench.run_until([&] { return first->has_value(); }));
+  rack.newest_part->set_wire("level", 5);
+  REQUIRE(rack.bench.run_until([&] { return !rack.heard.empty(); }));
+  rack.bench.upstream->connection()->close(rr::make_error(rr::ErrorCode::connection_error, "the line was cut"));
+  REQUIRE(rack.bench.run_until([&] { return rack.heard.size() == 2; }));
+  const auto second = rack.listen("level");
+  REQUIRE(rack.bench.run_until([&] { return second->has_value(); }));
+  CHECK(rack.heard == std::vector<std::string>{"value", "connection_lost: device 'device': the line was cut"});
 }
