@@ -468,6 +468,19 @@ TEST_CASE("requests are bounded until they are answered; what is too much is ref
     CHECK(open == 0);
     CHECK(answers == std::vector{ErrorCode::none});
   }
+  SECTION("so do two that have waited for an object with one number") {
+    pair.service->reply(read.id, Value(1.5), pair.now);
+    REQUIRE(pair.completion(reading));
+    pair.forge(*pair.client, [](Message& message) {
+      message.begin_entry(EntryType::property_get_req, "arm.tool", "name", 4711);
+      message.begin_entry(EntryType::property_get_req, "arm.tool", "name", 4711);
+    });
+    pair.carry(*pair.client, *pair.service, 1u << 20);
+    pair.next_service<ObjectWanted>();
+    pair.find("arm.tool");
+    CHECK(pair.service->wants_close());
+    CHECK_THAT(pair.service->connection().close_reason().message, Catch::Contains("request 4711"));
+  }
   SECTION("what is asked of an object that is replaced is over") {
     pair.service->release_path("arm", pair.now);
     CHECK(open == 1);
