@@ -99,6 +99,7 @@ TEST_CASE("what waits for objects is bounded in bytes, too") {
 TEST_CASE("a message of more requests than may wait for objects is not kept for each of them") {
   Remote pair;
   std::vector<std::string> paths;  // a message borrows them
+  paths.reserve(65);
   for (int i = 0; i < 65; ++i) paths.push_back("arm.slots[" + std::to_string(i) + "]");
   pair.forge(*pair.client, [&paths](Message& message) {
     std::uint32_t id = 0;
