@@ -74,6 +74,32 @@ describe("control", () => {
     uses[1]?.();
     expect(held.release).toHaveBeenCalledOnce();
   });
+  it("that went with the device is given back, said to be lost, and begins by hand alone over the next connection", async () => {
+    const { control, held, object, tell } = setup();
+    await control.begin();
+    control.end("the device is away");
+    expect(control.state.value).toMatchObject({ kind: "lost", byOthers: false });
+    expect(held.release).toHaveBeenCalledOnce();
+    tell("held"); // an answer that comes late
+    expect(control.mayCommand).toBe(false);
+    const next = new Control(object, control.state.value);
+    await expect(next.begin()).rejects.toThrow("the device is away");
+    await next.take();
+    expect(next.mayCommand).toBe(true);
+    expect(new Control(object, next.state.value).state.value).toEqual({ kind: "idle" });
+  });
+  it("that is granted when nobody shows it any more, or the device has gone, is given back at once", async () => {
+    for (const leave of [(control: Control) => control.use()(), (control: Control) => control.end("away")]) {
+      let give: () => void = () => undefined;
+      const { control, held } = setup(() => new Promise<void>((resolve) => (give = resolve)));
+      const begun = control.begin();
+      leave(control);
+      give();
+      await expect(begun).rejects.toThrow("nothing was sent");
+      expect(held.release).toHaveBeenCalledOnce();
+      expect(control.state.value).toEqual({ kind: "idle" });
+    }
+  });
   it("is taken over by a stop that somebody asked for, and not by one that follows a key", async () => {
     const { object, lease, held } = setup();
     const refused = () => Promise.reject(failed("ObjectLockedError", "held by vera"));

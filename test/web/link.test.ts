@@ -1,5 +1,6 @@
 import { keepFound } from "../../web/src/robot/walk";
 import { remoteOf } from "../../web/src/robot/remote";
+import { controlOf } from "../../web/src/robot/control";
 import { Link, openIn } from "../../web/src/robot/link";
 
 /** A subscription in the hands of the test. */
@@ -139,6 +140,32 @@ describe("link", () => {
     expect(openIn(link.state.value)).toBeNull();
     link.setAway(null);
     expect(link.state.value).toMatchObject({ kind: "lost", reason: "closed" });
+  });
+  it("takes the right to command with it, before anybody hears that it is lost", async () => {
+    const lease = vi.fn(async () => ({
+      onState: () => undefined,
+      onLost: () => undefined,
+      release: async () => undefined,
+    }));
+    const { link, tell } = setup();
+    const robot = () => {
+      const remote = openIn(link.state.value);
+      return remote && controlOf({ ...remote, lease } as never);
+    };
+    for (const lose of [() => link.setAway("refused"), () => tell("lost", new Error("closed"))]) {
+      tell("connected", client);
+      const control = robot();
+      await control?.take();
+      expect(control?.mayCommand).toBe(true);
+      const seen: boolean[] = [];
+      const forget = link.state.watch(() => seen.push(control?.mayCommand === true));
+      lose();
+      link.setAway(null);
+      forget();
+      expect(seen).not.toContain(true);
+      tell("connected", client);
+      expect(robot()?.state.value.kind).toBe("lost");
+    }
   });
   it("ends with the page", () => {
     const { link, subscription } = setup();

@@ -1,5 +1,5 @@
 // The right to command, as the pages show it: taken with the first command, refused, taken over, lost, given back.
-import type { Page } from "@playwright/test";
+import type { Page, WebSocketRoute } from "@playwright/test";
 import { expect, openRobot, putAtStart, test, waitUntilDriving, waitUntilStopped } from "../lab_test";
 import { startGateway, webRoot } from "../processes";
 
@@ -100,6 +100,53 @@ test("a page that hangs while it drives is out of control and stays so until it 
   await page.getByRole("button", { name: "Take" }).click();
   await expect(control(page)).toHaveAttribute("data-control", "held");
   await expect(forward(page)).toBeEnabled();
+});
+
+test("control that went with the device is lost at once, and comes back by hand alone", async ({ page, lab }) => {
+  await page.keyboard.down("ArrowUp");
+  await waitUntilDriving(page);
+  await expect(control(page)).toHaveAttribute("data-control", "held");
+  await lab.create.kill();
+  await expect(control(page)).toHaveAttribute("data-control", "lost", { timeout: 1_000 });
+  await expect(page.locator('[data-link="lost"]')).toBeVisible();
+  await expect(control(page)).toHaveAttribute("data-control", "lost");
+  await expect(page.getByRole("button", { name: "Take control" })).toBeDisabled(); // there is nothing to command
+  await page.keyboard.up("ArrowUp");
+  lab.create.start();
+  await lab.waitUntilOnline();
+  await expect(page.locator('[data-link="online"]')).toBeVisible({ timeout: 30_000 });
+  await expect(page.getByRole("button", { name: "Take control" })).toBeEnabled();
+  await page.keyboard.press("ArrowUp");
+  await expect(control(page)).toHaveAttribute("data-control", "lost");
+  await expect(forward(page)).toBeDisabled();
+  await page.getByRole("button", { name: "Take control" }).click();
+  await expect(control(page)).toHaveAttribute("data-control", "held");
+  await page.keyboard.down("ArrowUp");
+  await waitUntilDriving(page);
+  await page.keyboard.up("ArrowUp");
+  await waitUntilStopped(page);
+});
+
+test("control that went with the connection comes back by hand alone", async ({ page }) => {
+  const sockets: WebSocketRoute[] = [];
+  await page.routeWebSocket(/devices\/create/, (socket) => {
+    socket.connectToServer();
+    sockets.push(socket);
+  });
+  await page.reload();
+  await expect(forward(page)).toBeEnabled();
+  await page.keyboard.down("ArrowUp");
+  await waitUntilDriving(page);
+  await page.keyboard.up("ArrowUp");
+  await expect(control(page)).toHaveAttribute("data-control", "held");
+  for (const socket of sockets.splice(0)) await socket.close();
+  await expect.poll(() => sockets.length).toBeGreaterThan(0); // it connects again
+  await expect(page.locator('[data-link="online"]')).toBeVisible();
+  await expect(control(page)).toHaveAttribute("data-control", "lost");
+  await page.keyboard.press("ArrowUp");
+  await expect(control(page)).toHaveAttribute("data-control", "lost");
+  await page.getByRole("button", { name: "Take control" }).click();
+  await expect(control(page)).toHaveAttribute("data-control", "held");
 });
 
 test("a robot without leases is driven without one, and the page says so", async ({ page, lab }) => {

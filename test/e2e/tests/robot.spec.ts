@@ -248,6 +248,7 @@ test("says when the device is lost, disables driving, and recovers without a rel
 
   lab.create.start();
   await expect(page.locator('[data-link="online"]')).toBeVisible({ timeout: 30_000 });
+  await page.getByRole("button", { name: "Take control" }).click(); // the robot's absence took it
   await expect(page.getByRole("button", { name: "Forward" })).toBeEnabled();
   expect(await page.evaluate(() => (window as { kept?: boolean }).kept)).toBe(true);
   const again = await waitUntilStill(page);

@@ -78,6 +78,40 @@ for (const [what, end] of Object.entries(ends)) {
   });
 }
 
+test("a robot that was away is driven again by who takes control by hand, and by nobody before", async ({
+  page,
+  lab,
+}) => {
+  const panel = page.locator('[data-panel="teleop"]');
+  const control = panel.locator("[data-control]");
+  await pad(page).focus();
+  await page.keyboard.down("KeyW");
+  await expectSpeed(lab, 0.05);
+  await lab.create.kill();
+  await expect(control).toHaveAttribute("data-control", "lost", { timeout: 1_000 });
+  await expect(page.locator('[data-link="lost"]')).toBeVisible();
+  await expect(control).toHaveAttribute("data-control", "lost");
+  await expect(panel.getByRole("button", { name: "Take control" })).toBeDisabled();
+  lab.create.start();
+  await lab.waitUntilOnline();
+  await expect(page.locator('[data-link="online"]')).toBeVisible({ timeout: 30_000 });
+  await expect(panel.getByRole("button", { name: "Take control" })).toBeEnabled();
+  await expect(control).toHaveAttribute("data-control", "lost");
+  await pad(page).focus();
+  await page.keyboard.up("KeyW");
+  await page.keyboard.down("KeyW");
+  await expectSpeed(lab, 0);
+  await expect(control).toHaveAttribute("data-control", "lost");
+  await page.keyboard.up("KeyW");
+  await panel.getByRole("button", { name: "Take control" }).click();
+  await expect(control).toHaveAttribute("data-control", "held");
+  await pad(page).focus();
+  await page.keyboard.down("KeyW");
+  await expectSpeed(lab, 0.05);
+  await page.keyboard.up("KeyW");
+  await expectSpeed(lab, 0);
+});
+
 test("a stick on the screen drives as far as it is pushed, and springs back", async ({ page, lab }) => {
   const box = (await page.getByLabel("Left stick").boundingBox())!;
   await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);

@@ -41,7 +41,7 @@ export function RobotPage({ link, list, device, service, shown }: RobotPageProps
   const safe = useSafe({ device, service }, list);
   const model = useMemo(() => new RobotModel(), []);
   const [driveFailure, setDriveFailure] = useState<string | null>(null);
-  const { control, isOpen } = useControl(reach);
+  const { control, last, isOpen } = useControl(reach);
   const driver = useMemo(() => {
     const onError = (error: unknown): void => setDriveFailure(`Drive: ${explain(error)}`);
     return new Driver({ rest: STOP, same: sameCommand, onError });
@@ -106,7 +106,7 @@ export function RobotPage({ link, list, device, service, shown }: RobotPageProps
       <div class="robot-side">
         <DrivePanel
           driver={driver}
-          control={control}
+          control={last}
           enabled={live && shown && isOpen}
           shown={shown}
           unsent={stopUnconnected}

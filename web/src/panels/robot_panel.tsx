@@ -31,7 +31,7 @@ export default function RobotPanel(props: PanelProps) {
   const [tools, setTools] = useState<readonly Tool[]>([]);
   const [failure, setFailure] = useState<string | null>(null);
   const acting = useAction();
-  const { control, isOpen } = useControl(object);
+  const { control, last, isOpen } = useControl(object);
   const percent = numberIn(settings, "percent", 10, 0, 100);
   useEffect(() => {
     if (!object || !isRobot) return;
@@ -126,7 +126,7 @@ export default function RobotPanel(props: PanelProps) {
           <output>{percent} %</output>
         </label>
       </div>
-      <ControlLine control={control} />
+      <ControlLine control={last} isThere={object !== null} />
       <Failure text={failure ?? acting.failure} />
       <ol class={`joints ${look.stale === null ? "" : "is-stale"}`}>
         {Array.from(positions, (position, i) => {

@@ -35,7 +35,7 @@ export default function TeleopPanel(props: PanelProps) {
   );
   const [isNew] = useState(mapping.axes.length === 0);
   const [failure, setFailure] = useState<string | null>(null);
-  const { control, isOpen } = useControl(object);
+  const { control, last, isOpen } = useControl(object);
 
   const driver = useMemo(
     () =>
@@ -77,7 +77,7 @@ export default function TeleopPanel(props: PanelProps) {
       <div class="panel-tools">
         <MemberSelect members={choices} chosen={name} choose={(next) => change({ member: next, axes: [] })} />
       </div>
-      <ControlLine control={control} />
+      <ControlLine control={last} isThere={object !== null} />
       <div
         class={`teleop-pad ${enabled ? "" : "is-off"}`}
         role="application"

@@ -1,7 +1,7 @@
 // The right of this page to command an object: taken with the first command, kept for as long as the page is alive and
 // looked at, and given back with a button. Layer: web/robot.
 // Where no gateway gives leases, commands need none. Who has lost it takes it again by hand: a key that is still held down
-// must not go on by itself.
+// must not go on by itself, and a device that comes back is commanded by nobody yet.
 
 import { ErrorCode, RobotRaconteurError } from "rrgate-client";
 import type { Lease } from "rrgate-client";
@@ -24,14 +24,18 @@ export type ControlState =
 export const DEADMAN_MS = 1000;
 
 export class Control {
-  readonly state = new Store<ControlState>({ kind: "idle" });
+  readonly state: Store<ControlState>;
   readonly #object: Pick<Remote, "lease">;
   #lease: Lease | null = null;
   #users = 0;
   #taking: Promise<void> | null = null;
+  /** What is granted from now on is wanted no more. */
+  #isLeft = false;
 
-  constructor(object: Pick<Remote, "lease">) {
+  /** `before`: of the same object over the connection before; what was lost there is lost here. */
+  constructor(object: Pick<Remote, "lease">, before?: ControlState) {
     this.#object = object;
+    this.state = new Store<ControlState>(before?.kind === "lost" ? before : { kind: "idle" });
   }
 
   get mayCommand(): boolean {
@@ -54,10 +58,21 @@ export class Control {
   /** Until all who use it have called the function that is returned: it is given back then. */
   use(): () => void {
     this.#users += 1;
+    this.#isLeft = false;
     return () => {
       this.#users -= 1;
-      if (this.#users === 0 && this.#lease) this.release().catch(() => undefined); // ends with its session, too
+      this.#isLeft = this.#users === 0;
+      if (this.#isLeft && this.#lease) this.release().catch(() => undefined); // ends with its session, too
     };
+  }
+
+  /** The connection or the device is gone, and with it what was held. */
+  end(reason: string): void {
+    const lease = this.#lease;
+    this.#isLeft = true;
+    if (!lease) return;
+    this.#lose(new Error(reason));
+    lease.release().catch(() => undefined); // ends with its session, too
   }
 
   async release(): Promise<void> {
@@ -69,24 +84,35 @@ export class Control {
 
   async #ask(takeover: boolean): Promise<void> {
     this.state.value = { kind: "taking" };
+    let lease: Lease;
     try {
-      const lease = await this.#object.lease({ deadman: DEADMAN_MS, takeover, timeout: 2_000 });
-      this.#lease = lease;
-      const since = Date.now();
-      this.state.value = { kind: "held", since };
-      lease.onState((state, reason) => {
-        if (lease !== this.#lease) return;
-        if (state === "held") this.state.value = { kind: "held", since };
-        if (state === "doubtful") this.state.value = { kind: "doubtful", reason: doubt(reason) };
-      });
-      lease.onLost((reason) => lease === this.#lease && this.#lose(reason));
+      lease = await this.#object.lease({ deadman: DEADMAN_MS, takeover, timeout: 2_000 });
     } catch (error) {
-      if (codeOf(error) === ErrorCode.NotImplementedError) this.state.value = { kind: "free" };
-      else {
+      if (codeOf(error) !== ErrorCode.NotImplementedError) {
         this.#lose(error);
         throw error;
       }
+      this.state.value = { kind: "free" };
+      return;
     }
+    if (this.#isLeft) {
+      this.state.value = { kind: "idle" }; // nobody would see that it is held
+      lease.release().catch(() => undefined);
+      throw new Error(t("not connected: nothing was sent"));
+    }
+    this.#hold(lease);
+  }
+
+  #hold(lease: Lease): void {
+    const since = Date.now();
+    this.#lease = lease;
+    this.state.value = { kind: "held", since };
+    lease.onState((state, reason) => {
+      if (lease !== this.#lease) return;
+      if (state === "held") this.state.value = { kind: "held", since };
+      if (state === "doubtful") this.state.value = { kind: "doubtful", reason: doubt(reason) };
+    });
+    lease.onLost((reason) => lease === this.#lease && this.#lose(reason));
   }
 
   #lose(reason: unknown): void {
@@ -104,11 +130,14 @@ function codeOf(error: unknown): number | undefined {
 
 const controls = new WeakMap<Remote, Control>();
 
-/** One for all panels that show the object. */
+/** One for all panels that show the object; one anew for each connection. */
 export function controlOf(object: Remote): Control {
-  const found = controls.get(object) ?? new Control(object);
-  controls.set(object, found);
-  return found;
+  const found = controls.get(object);
+  if (found) return found;
+  const control = new Control(object, object.controls.get(object.path)?.state.value);
+  controls.set(object, control);
+  object.controls.set(object.path, control);
+  return control;
 }
 
 /**

@@ -4,6 +4,7 @@
 import { subscribe } from "rrgate-client";
 import type { RemoteObject, UrlSource } from "rrgate-client";
 import { Store } from "../app/store";
+import type { Control } from "./control";
 import { explain, remoteOf } from "./remote";
 import type { Remote } from "./remote";
 
@@ -26,6 +27,7 @@ const LIMITS = { timeout: 10_000, longestRetry: 10_000 };
 export class Link {
   readonly state = new Store<LinkState>({ kind: "connecting" });
   readonly #subscription;
+  readonly #controls = new Map<string, Control>();
   #client: RemoteObject | null = null;
 
   /** Starts connecting at once. `follow`: for tests. */
@@ -60,12 +62,14 @@ export class Link {
     void this.#subscription.close();
   }
 
-  /** Anew for those who look: what they had asked the device for is gone, and so is the right to command it. */
+  /** Anew for those who look: what they had asked the device for is gone. */
   #connect(client: RemoteObject): void {
-    this.state.value = { kind: "online", since: Date.now(), remote: remoteOf(client) };
+    this.state.value = { kind: "online", since: Date.now(), remote: remoteOf(client, this.#controls) };
   }
 
+  /** Rights to command are lost before anybody hears of it: who had them takes them again by hand. */
   #lose(reason: string, remote: Remote | null): void {
+    for (const control of this.#controls.values()) control.end(reason);
     const before = this.state.value;
     const since = before.kind === "lost" ? before.since : Date.now();
     this.state.value = { kind: "lost", since, reason, retryAt: Date.now(), remote };

@@ -13,6 +13,7 @@ import type {
   RemoteObject,
 } from "rrgate-client";
 
+import type { Control } from "./control";
 import { UnderWay } from "./under_way";
 
 export type Member = MemberInfo;
@@ -22,11 +23,15 @@ export type { MemberKind };
 export interface Remote {
   /** Qualified object type, such as `experimental.create.Create`. */
   readonly type: string;
+  /** Such as `Create` or `Webcam.Webcams[0]`. */
+  readonly path: string;
   readonly members: readonly Member[];
   /** The texts of the definitions known so far. */
   readonly definitions: readonly string[];
   /** Commands of this connection that are not answered yet. */
   readonly underWay: UnderWay;
+  /** By path, the newest of each object of the service: they outlive the connection. */
+  readonly controls: Map<string, Control>;
   has(name: string, kind: MemberKind): boolean;
   call(name: string, args: readonly unknown[], options?: CallOptions): Promise<unknown>;
   /** Past whatever waits to be sent. @throws (rejects) where `name` is no function, or one that only begins a generator. */
@@ -83,7 +88,11 @@ export function isGenerator({ type, parameters }: Pick<Member, "type" | "paramet
   return [type, parameters.at(-1)?.type ?? ""].some((each) => each.endsWith("{generator}"));
 }
 
-export function remoteOf(object: RemoteObject, underWay = new UnderWay()): Remote {
+export function remoteOf(
+  object: RemoteObject,
+  controls = new Map<string, Control>(),
+  underWay = new UnderWay(),
+): Remote {
   const info = object.$;
   // By name through `$`: a definition may call a member "then" or "toString".
   const member = (name: string): DynamicMember => {
@@ -93,12 +102,14 @@ export function remoteOf(object: RemoteObject, underWay = new UnderWay()): Remot
   const children = new WeakMap<RemoteObject, Remote>(); // who asks for one again gets the same: what is known of it is kept by it
   return {
     type: info.type,
+    path: info.path,
     members: info.members,
     get definitions() {
       return info.types;
     },
     has: (name, kind) => info.members.some((m) => m.name === name && m.kind === kind),
     underWay,
+    controls,
     call: (name, args, options) =>
       underWay.follow((async () => member(name)(...args, ...(options ? [options] : [])))()),
     urgent: async (name, args, options) => {
@@ -144,7 +155,7 @@ export function remoteOf(object: RemoteObject, underWay = new UnderWay()): Remot
     onReleased: (released) => info.onClose(() => info.state === "released" && released()),
     child: async (name, index) => {
       const found = await (index === undefined ? member(name).get<RemoteObject>() : member(name).get(index));
-      const child = children.get(found) ?? remoteOf(found, underWay);
+      const child = children.get(found) ?? remoteOf(found, controls, underWay);
       children.set(found, child);
       return child;
     },

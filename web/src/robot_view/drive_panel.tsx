@@ -64,7 +64,7 @@ export function DrivePanel({ driver, control, enabled, shown, unsent, lost, fail
         />
         <output for="speed">{speed} mm/s</output>
       </div>
-      <ControlLine control={control} />
+      <ControlLine control={control} isThere={!lost} />
       <p class="note drive-note">
         {lost
           ? t("Driving is off: no connection to {0}. It comes back by itself.", device)

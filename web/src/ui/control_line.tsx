@@ -1,6 +1,6 @@
 // Who commands: taken, given back, lost. Layer: web/ui.
 
-import { useEffect, useMemo } from "preact/hooks";
+import { useEffect, useMemo, useRef } from "preact/hooks";
 import { t } from "../app/language";
 import { Store, useStore } from "../app/store";
 import { controlOf } from "../robot/control";
@@ -10,6 +10,8 @@ import { clockTime } from "./words";
 
 export interface InControl {
   control: Control | null;
+  /** The same; without a connection the last one, for what became of it. */
+  last: Control | null;
   /** False after it was lost, until it is taken by hand, and while the gateway does not confirm it. */
   isOpen: boolean;
 }
@@ -18,12 +20,20 @@ const NOBODY = new Store<ControlState>({ kind: "idle" });
 
 export function useControl(object: Remote | null): InControl {
   const control = useMemo(() => (object ? controlOf(object) : null), [object]);
+  const last = useRef(control);
+  last.current = control ?? last.current;
   useEffect(() => control?.use(), [control]);
-  const { kind } = useStore(control?.state ?? NOBODY);
-  return { control, isOpen: control !== null && kind !== "lost" && kind !== "doubtful" };
+  const { kind } = useStore(last.current?.state ?? NOBODY);
+  return { control, last: last.current, isOpen: control !== null && kind !== "lost" && kind !== "doubtful" };
 }
 
-export function ControlLine({ control }: { control: Control | null }) {
+export interface ControlLineProps {
+  control: Control | null;
+  /** Whether there is a device to command. */
+  isThere: boolean;
+}
+
+export function ControlLine({ control, isThere }: ControlLineProps) {
   const state = useStore(control?.state ?? NOBODY);
   if (state.kind === "free") return <p class="control-line note">{t("Nobody gives leases of it: all may command.")}</p>;
   const take = (takeover: boolean): void => void control?.take(takeover).catch(() => undefined); // the state says why not
@@ -37,7 +47,7 @@ export function ControlLine({ control }: { control: Control | null }) {
         <button
           class="button"
           type="button"
-          disabled={!control || state.kind === "taking"}
+          disabled={!control || !isThere || state.kind === "taking"}
           onClick={() => take(state.kind === "lost" && state.byOthers)}
         >
           {state.kind === "lost" && state.byOthers ? t("Take over") : t("Take control")}
