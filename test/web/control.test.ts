@@ -110,6 +110,19 @@ describe("control", () => {
     expect(held.release).toHaveBeenCalledOnce();
     await expect(stopNow(object, true, () => Promise.reject(new Error("away")))).rejects.toThrow("away");
   });
+  it("is taken by a stop where nobody has it and none may be taken over, and else left with whoever has it", async () => {
+    const answers = [failed("PermissionDenied", "no takeover"), null];
+    const { object, lease, held } = setup(() => {
+      const answer = answers.shift();
+      return answer ? Promise.reject(answer) : Promise.resolve();
+    });
+    const refused = () => Promise.reject(failed("ObjectLockedError", "it has ended"));
+    await stopNow(object, true, refused);
+    expect(lease.mock.calls).toEqual([[{ takeover: true, timeout: 2_000 }], [{ timeout: 2_000 }]]);
+    expect(held.release).toHaveBeenCalledOnce();
+    answers.splice(0, 1, failed("PermissionDenied", "no takeover"), failed("ObjectLockedError", "held by vera"));
+    await expect(stopNow(object, true, refused)).rejects.toThrow("it has ended");
+  });
   it("that comes after the key was let go moves nothing", async () => {
     let give: () => void = () => undefined;
     const { control } = setup(() => new Promise<void>((resolve) => (give = resolve)));

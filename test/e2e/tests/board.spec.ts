@@ -188,10 +188,12 @@ test("the stop reaches a device that the gateway takes for offline, and one with
   await drive();
   await page.keyboard.press("Escape");
   await expect.poll(velocity).toBe(0);
+  await expect(page.getByRole("region", { name: "Drive" })).toContainText("passed on by the gateway after");
   await page.getByRole("link", { name: "Board" }).click();
   await drive();
   await page.getByRole("button", { name: "Stop", exact: true }).click();
   await expect.poll(velocity).toBe(0);
+  await expect(page.locator('[data-stop="passed"]')).toBeVisible();
   await page.route("**/Create?lease=take*", (route) => route.fulfill({ status: 503, json: { detail: "offline" } }));
   await page.getByRole("link", { name: "Drive" }).click();
   await page.keyboard.press("Escape");

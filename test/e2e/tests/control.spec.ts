@@ -6,6 +6,13 @@ import { startGateway, webRoot } from "../processes";
 const control = (page: Page) => page.locator("[data-control]");
 const forward = (page: Page) => page.getByRole("button", { name: "Forward" });
 
+/** For longer than the gateway waits for a page that has control. */
+const hang = (page: Page) =>
+  page.evaluate(() => {
+    const until = Date.now() + 1500;
+    while (Date.now() < until);
+  });
+
 test.beforeEach(async ({ page, lab }) => {
   await openRobot(page, lab);
   await putAtStart(page);
@@ -89,10 +96,7 @@ test("the list of all members has a Stop, too", async ({ page, lab }) => {
 test("a page that hangs while it drives is out of control and stays so until it is taken by hand", async ({ page }) => {
   await page.keyboard.down("ArrowUp");
   await waitUntilDriving(page);
-  await page.evaluate(() => {
-    const until = Date.now() + 1500;
-    while (Date.now() < until);
-  });
+  await hang(page);
   await expect(control(page)).toContainText("has not renewed it");
   await waitUntilStopped(page);
   await expect(forward(page)).toBeDisabled();
@@ -147,6 +151,29 @@ test("control that went with the connection comes back by hand alone", async ({ 
   await expect(control(page)).toHaveAttribute("data-control", "lost");
   await page.getByRole("button", { name: "Take control" }).click();
   await expect(control(page)).toHaveAttribute("data-control", "held");
+});
+
+test("Stop stops the robot where control was lost and nobody may take it over", async ({ page, lab }) => {
+  const leases = { safe: [{ call: "Create.Drive", arguments: [0, 0] }] };
+  const devices = [{ name: "create", url: lab.createUrl, mode: "shared", leases }];
+  const { program, url } = await startGateway("create", lab.createUrl, webRoot, { devices });
+  try {
+    await openRobot(page, { url });
+    await page.keyboard.down("ArrowUp");
+    await waitUntilDriving(page);
+    await hang(page);
+    await page.keyboard.up("ArrowUp");
+    await expect(control(page)).toHaveAttribute("data-control", "lost");
+    await waitUntilStopped(page);
+    const robot = `${url}api/v1/devices/create/Create/`;
+    expect((await page.request.post(`${robot}Drive`, { data: { velocity: 100, radius: 32767 } })).ok()).toBe(true);
+    await waitUntilDriving(page);
+    await page.getByRole("button", { name: "Stop" }).click();
+    await waitUntilStopped(page);
+    await expect(page.getByRole("region", { name: "Drive" })).not.toContainText("Locked");
+  } finally {
+    await program.kill();
+  }
 });
 
 test("a robot without leases is driven without one, and the page says so", async ({ page, lab }) => {

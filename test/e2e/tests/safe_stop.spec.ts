@@ -25,18 +25,37 @@ for (const view of ["members", "board"]) {
       await put(page);
       await stop();
       await expect.poll(() => read(page)).toBe(0);
-      await expect(page.locator('[data-stop="arrived"]')).toBeVisible();
+      await expect(page.locator('[data-stop="passed"]')).toContainText("passed on by the gateway after"); // it hears no answer
     }
     await put(page); // nobody has the lease any more
   });
 }
 
+test("Stop makes a device safe whose lease nobody may take over, while nobody has it", async ({ page }) => {
+  const leases = { safe: [{ property: "interop.p_double", value: 0 }] };
+  const other = await startTestService(webRoot, (url) => ({
+    devices: [{ name: "big", url, mode: "shared", leases }],
+  }));
+  try {
+    const object = `${other.url}api/v1/devices/big/interop`;
+    await page.goto(`${other.url}#/devices/big/interop?view=members`);
+    await expect(page.locator('[data-stop="ready"]')).toBeVisible();
+    expect((await page.request.put(`${object}/p_double`, { data: 5 })).status()).toBe(204);
+    await page.locator("button.stop-button").click();
+    await expect(page.locator('[data-stop="passed"]')).toBeVisible();
+    await expect.poll(async () => (await page.request.get(`${object}/p_double`)).json()).toBe(0);
+    expect((await page.request.post(`${object}?lease=acquire&deadman=60000`)).ok()).toBe(true);
+    await page.locator("button.stop-button").click();
+    await expect(page.locator('[data-stop="failed"]')).toContainText(/NOT STOPPED: .* has the lease of/);
+  } finally {
+    await other.stop();
+  }
+});
+
 test("Stop says why the device may not be safe", async ({ page }) => {
   await page.goto(`${lab.url}#/devices/big/interop?view=members`);
   await expect(page.locator('[data-stop="ready"]')).toBeVisible();
-  await page.route("**/interop?lease=take*", (route) =>
-    route.fulfill({ status: 403, json: { detail: "not for you" } }),
-  );
+  await page.route("**/interop?lease=*", (route) => route.fulfill({ status: 403, json: { detail: "not for you" } }));
   await page.locator("button.stop-button").click();
   await expect(page.locator('[data-stop="failed"]')).toHaveText("NOT STOPPED: not for you");
 });

@@ -109,10 +109,12 @@ test("Halt without a connection lets the gateway halt the robot, and says so whe
   await jog();
   await halt.click();
   await expect.poll(read).toBe("halt");
+  await expect(page.locator('[data-panel="robot"]')).toContainText("passed on by the gateway after");
   await jog();
   await page.route("**/robot?lease=take*", (route) => route.fulfill({ status: 503, json: { detail: "offline" } }));
   await halt.click();
   await expect(page.locator('[data-panel="robot"]')).toContainText("NOT STOPPED: offline");
+  await expect(page.locator('[data-panel="robot"]')).not.toContainText("passed on");
   expect(await read()).toBe("jog");
 });
 

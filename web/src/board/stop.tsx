@@ -18,6 +18,8 @@ type State =
   | { kind: "ready" }
   | { kind: "sent"; at: number }
   | { kind: "arrived"; tookMs: number; time: number }
+  /** To a gateway that has sent it: it tells nothing of the device's answer. */
+  | { kind: "passed"; how: string }
   | { kind: "failed"; why: string };
 
 /**
@@ -41,14 +43,17 @@ export function StopButton({ object, stop, place, list }: StopButtonProps) {
 /**
  * Without a connection to the device: by HTTP.
  * `safe`  what the gateway does to make it safe.
- * @throws (rejects) why it may not have been stopped.
+ * @returns how it went, in words. @throws (rejects) why it may not have been stopped.
  */
 export async function stopWithout(
   { device, service }: StopButtonProps["place"],
   safe: readonly string[],
-): Promise<void> {
+): Promise<string> {
   if (safe.length === 0) throw new Error(t("not connected: nothing was sent"));
+  const at = performance.now();
   await makeSafe(device, service);
+  const took = (performance.now() - at).toFixed(0);
+  return t("passed on by the gateway after {0} ms, {1}; the device's answer is not known", took, clockTime(Date.now()));
 }
 
 export interface StopButtonProps {
@@ -65,8 +70,8 @@ export function useSafe({ device, service }: StopButtonProps["place"], list: Dev
   return safeOf(known?.safe ?? [], service);
 }
 
-/** `failed` hears of what fails later. */
-export type Send = (failed: (error: unknown) => void) => Promise<void>;
+/** `failed` hears of what fails later. With words where it was not the device that answered: how it went. */
+export type Send = (failed: (error: unknown) => void) => Promise<string | void>;
 
 export interface StopPressProps {
   send: Send;
@@ -83,7 +88,10 @@ export function StopPress({ send: stop, label, words, byEscape = false }: StopPr
     const at = performance.now();
     setState({ kind: "sent", at }); // each press sends again
     const fail = (error: unknown): void => setState({ kind: "failed", why: explain(error) });
-    stop(fail).then(() => setState({ kind: "arrived", tookMs: performance.now() - at, time: Date.now() }), fail);
+    stop(fail).then((how) => {
+      if (how !== undefined) setState({ kind: "passed", how });
+      else setState({ kind: "arrived", tookMs: performance.now() - at, time: Date.now() });
+    }, fail);
   };
   const sendNow = useRef(send);
   sendNow.current = send;
@@ -122,6 +130,8 @@ function wordsOf(state: State, ready: string): string {
       return t("sent, no answer yet");
     case "arrived":
       return t("arrived after {0} ms, {1}", state.tookMs.toFixed(0), clockTime(state.time));
+    case "passed":
+      return state.how;
     case "failed":
       return t("NOT STOPPED: {0}", state.why);
   }

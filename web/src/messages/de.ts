@@ -149,6 +149,8 @@ const german: Readonly<Record<string, string>> = {
   "not connected": "nicht verbunden",
   "not connected: nothing was sent": "nicht verbunden: nichts wurde gesendet",
   "object, such as Webcams[0]": "Objekt, etwa Webcams[0]",
+  "passed on by the gateway after {0} ms, {1}; the device's answer is not known":
+    "vom Gateway weitergegeben nach {0} ms, {1}; was das Gerät antwortet, ist nicht bekannt",
   "sent, no answer yet": "gesendet, noch keine Antwort",
   "this service": "dieser Dienst",
   "under way …": "läuft …",

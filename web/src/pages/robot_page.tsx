@@ -70,9 +70,8 @@ export function RobotPage({ link, list, device, service, shown }: RobotPageProps
   const stopUnconnected = (): void => {
     if (!shown) return; // the view that is shown has a stop of its own
     setDriveFailure(t("sent, no answer yet"));
-    stopWithout({ device, service }, safe).then(
-      () => setDriveFailure(null),
-      (error: unknown) => setDriveFailure(t("NOT STOPPED: {0}", explain(error))),
+    stopWithout({ device, service }, safe).then(setDriveFailure, (error: unknown) =>
+      setDriveFailure(t("NOT STOPPED: {0}", explain(error))),
     );
   };
 

@@ -12,8 +12,11 @@ export interface PanelProps {
   object: Remote | null;
   /** The same for a stop: also while the device is only said to be away. */
   reach: Remote | null;
-  /** A stop where `reach` is null, by what the gateway does to make the device safe. @throws (rejects) why it may not have arrived. */
-  stopWithout: () => Promise<void>;
+  /**
+   * A stop where `reach` is null, by what the gateway does to make the device safe.
+   * @returns how it went, in words. @throws (rejects) why it may not have arrived.
+   */
+  stopWithout: () => Promise<string>;
   /** What was last known of it, also without connection. */
   members: readonly Member[];
   definitions: Definitions;

@@ -30,6 +30,7 @@ export default function RobotPanel(props: PanelProps) {
   const [joints, setJoints] = useState<readonly Joint[]>([]);
   const [tools, setTools] = useState<readonly Tool[]>([]);
   const [failure, setFailure] = useState<string | null>(null);
+  const [halted, setHalted] = useState<string | null>(null);
   const acting = useAction();
   const { control, last, isOpen } = useControl(object);
   const percent = numberIn(settings, "percent", 10, 0, 100);
@@ -59,12 +60,17 @@ export default function RobotPanel(props: PanelProps) {
     });
   const haltAll = (): void => {
     setFailure(null);
+    setHalted(null);
     if (reach) {
       const fail = (error: unknown): void => setFailure(explain(error));
       return void stopDevice(reach, ROBOT_STOP, fail).catch(fail);
     }
     tellStop();
-    stopWithout().catch((error: unknown) => setFailure(t("NOT STOPPED: {0}", explain(error))));
+    setHalted(t("sent, no answer yet"));
+    stopWithout().then(setHalted, (error: unknown) => {
+      setHalted(null);
+      setFailure(t("NOT STOPPED: {0}", explain(error)));
+    });
   };
   const positions = state?.positions ?? new Float64Array();
   /** `speed`: of what may be, 0 to 1, with a sign. */
@@ -127,6 +133,9 @@ export default function RobotPanel(props: PanelProps) {
         </label>
       </div>
       <ControlLine control={last} isThere={object !== null} />
+      <p class="note" role="status" hidden={halted === null || reach !== null}>
+        {halted}
+      </p>
       <Failure text={failure ?? acting.failure} />
       <ol class={`joints ${look.stale === null ? "" : "is-stale"}`}>
         {Array.from(positions, (position, i) => {

@@ -142,8 +142,8 @@ export function controlOf(object: Remote): Control {
 
 /**
  * A stop that is refused because somebody else has the lease: what this page commanded has been made safe by the gateway when
- * the lease went. Who `insists` takes it over, where one may, so that the gateway makes the device safe once more, and leaves it
- * free. @throws (rejects) with what `stop` failed with.
+ * the lease went. Who `insists` takes it over, where one may, or takes it where nobody has it any more, so that the gateway makes
+ * the device safe once more, and leaves it free. @throws (rejects) with what `stop` failed with.
  */
 export async function stopNow(
   object: Pick<Remote, "lease">,
@@ -155,7 +155,13 @@ export async function stopNow(
   } catch (error) {
     if (codeOf(error) !== ErrorCode.ObjectLockedError) throw error;
     if (!insists) return;
-    const lease = await object.lease({ takeover: true, timeout: 2_000 }).catch(() => Promise.reject(error));
+    const timeout = 2_000;
+    const lease = await object
+      .lease({ takeover: true, timeout })
+      .catch((why: unknown) =>
+        codeOf(why) === ErrorCode.PermissionDenied ? object.lease({ timeout }) : Promise.reject(error),
+      )
+      .catch(() => Promise.reject(error));
     await lease.release();
   }
 }
