@@ -15,9 +15,22 @@ it("takes the reduced speed of an axis, else the greatest, else the reduced spee
       { tcp_max_velocity: { linear: { x: NaN } } },
     ],
   });
-  expect(slow).toEqual({ name: "arm", fastest: { X: 0.1, Y: 0.2, Z: expect.closeTo(0.3), RX: 0.2, RY: 0.2, RZ: 0.2 } });
+  expect(slow).toEqual({
+    name: "arm",
+    isJogged: false,
+    fastest: { X: 0.1, Y: 0.2, Z: expect.closeTo(0.3), RX: 0.2, RY: 0.2, RZ: 0.2 },
+  });
   expect(fast?.fastest).toEqual({ X: 1, Y: 2, Z: 3, RX: 2, RY: 2, RZ: 2 });
-  expect(silent).toEqual({ name: "3", fastest: { X: 0.25, Y: 0.25, Z: 0.25, RX: 0.5, RY: 0.5, RZ: 0.5 } });
+  expect(silent).toEqual({
+    name: "3",
+    isJogged: false,
+    fastest: { X: 0.25, Y: 0.25, Z: 0.25, RX: 0.5, RY: 0.5, RZ: 0.5 },
+  });
+});
+
+it("are jogged only where the robot says that it can be", () => {
+  const isJogged = (flags: unknown) => toolsOf({ chains: [{}], ["robot_capabilities"]: flags })[0]?.isJogged;
+  expect([1, 0x401, 0, 0x406, undefined].map(isJogged)).toEqual([true, true, false, false, false]);
 });
 
 it("finds no tools in what is no RobotInfo", () => {

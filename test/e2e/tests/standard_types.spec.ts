@@ -70,6 +70,14 @@ test("its tool is jogged along an axis of the robot's frame while a button is he
   await expect(forward).toBeDisabled();
 });
 
+test("the tool of a robot that says that it can't be jogged has its place, and no buttons", async ({ page }) => {
+  await page.goto(`${robot.url}#/devices/peer/not_jogged`);
+  const tool = page.locator('[data-tool="planar"]');
+  await expect(tool.locator('[data-axis="X"] .joint-value')).toHaveText("0.9 m");
+  await expect(page.getByRole("button", { name: "joint_0 forward" })).toBeVisible();
+  await expect(tool.getByRole("button")).toHaveCount(0);
+});
+
 test("Halt stops as Stop does, and no jogging begins behind it", async ({ page }) => {
   await page.goto(`${robot.url}#/devices/peer/robot`);
   const state = page.getByRole("list", { name: "State" });

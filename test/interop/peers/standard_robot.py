@@ -1,5 +1,6 @@
 """A robot of the standard types with two joints, that moves at once to where it is told: the drivers' base class of
-robotraconteur-abstract-robot, with the definitions of robotraconteurcompanion.
+robotraconteur-abstract-robot, with the definitions of robotraconteurcompanion. The service "not_jogged" has one that says that it
+can't be jogged.
 
     standard_robot.py PORT
 """
@@ -84,13 +85,18 @@ def main(port):
     with RR.ServerNodeSetup("test.standard_robot", port, argv=["--robotraconteur-log-level=WARNING"]):
         node = RR.RobotRaconteurNode.s
         RRC.RegisterStdRobDefServiceTypes(node)
-        robot = PlanarRobot(InfoParser(node).ParseInfoString(INFO, "com.robotraconteur.robotics.robot.RobotInfo"))
-        robot._start_robot()
+        robots = {"robot": INFO, "not_jogged": INFO.replace("jog_command, ", "")}
+        for name, info in robots.items():
+            parsed = InfoParser(node).ParseInfoString(info, "com.robotraconteur.robotics.robot.RobotInfo")
+            robots[name] = PlanarRobot(parsed)
+            robots[name]._start_robot()
         time.sleep(0.2)
-        node.RegisterService("robot", "com.robotraconteur.robotics.robot.Robot", robot)
+        for name, robot in robots.items():
+            node.RegisterService(name, "com.robotraconteur.robotics.robot.Robot", robot)
         print("ready", flush=True)
         sys.stdin.read()
-        robot._close()
+        for robot in robots.values():
+            robot._close()
 
 
 main(int(sys.argv[1]))

@@ -10,6 +10,8 @@ export interface JogRowProps {
   value: number;
   unit: string;
   digits: number;
+  /** False: it has no buttons, and only says where it is. */
+  isJogged?: boolean;
   enabled: boolean;
   /** `direction`: 1 or -1. */
   jog: (direction: number, isHeld: () => boolean) => Promise<unknown>;
@@ -19,27 +21,25 @@ export interface JogRowProps {
   children?: ComponentChildren;
 }
 
-export function JogRow({ name, value, unit, digits, enabled, jog, stop, fail, children }: JogRowProps) {
+export function JogRow(props: JogRowProps) {
+  const { name, value, unit, digits, isJogged = true, enabled, jog, stop, fail, children } = props;
+  const button = (label: string, sign: string, direction: number) =>
+    isJogged && (
+      <JogButton
+        label={label}
+        sign={sign}
+        enabled={enabled}
+        jog={(isHeld) => jog(direction, isHeld)}
+        stop={stop}
+        fail={fail}
+      />
+    );
   return (
     <>
       <span class="joint-name">{name}</span>
-      <JogButton
-        label={t("{0} back", name)}
-        sign="−"
-        enabled={enabled}
-        jog={(isHeld) => jog(-1, isHeld)}
-        stop={stop}
-        fail={fail}
-      />
+      {button(t("{0} back", name), "−", -1)}
       {children}
-      <JogButton
-        label={t("{0} forward", name)}
-        sign="+"
-        enabled={enabled}
-        jog={(isHeld) => jog(1, isHeld)}
-        stop={stop}
-        fail={fail}
-      />
+      {button(t("{0} forward", name), "+", 1)}
       <span class="joint-value">
         {formatNumber(Number(value.toFixed(digits)))} {unit}
       </span>

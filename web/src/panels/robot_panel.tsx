@@ -176,6 +176,7 @@ export default function RobotPanel(props: PanelProps) {
                           value={coordinateOf(pose, axis)}
                           unit={isTurn(axis) ? "°" : "m"}
                           digits={isTurn(axis) ? 1 : 4}
+                          isJogged={tool.isJogged}
                           enabled={canJog}
                           jog={(direction, isHeld) => jogBy(jog, direction, isHeld)}
                           stop={() => halt(jog)}

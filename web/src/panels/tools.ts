@@ -9,6 +9,8 @@ export type ToolAxis = (typeof TOOL_AXES)[number];
 
 export interface Tool {
   name: string;
+  /** Whether the robot says that it can be jogged. */
+  isJogged: boolean;
   /** By axis: m/s, rad/s. */
   fastest: Readonly<Record<ToolAxis, number>>;
 }
@@ -20,9 +22,11 @@ type Point = { x: number; y: number; z: number };
 const REDUCED_M_S = 0.25;
 const REDUCED_RAD_S = 0.5;
 
+const JOG_COMMAND = 0x1; // of RobotCapabilities, which has one flag for all kinds of jogging
+
 /** Of a RobotInfo. */
 export function toolsOf(info: unknown): Tool[] {
-  const { chains } = fieldsOf(info);
+  const { chains, robot_capabilities: capabilities } = fieldsOf(info);
   if (!Array.isArray(chains)) return [];
   return chains.map((each: unknown, i) => {
     const chain = fieldsOf(each);
@@ -33,6 +37,7 @@ export function toolsOf(info: unknown): Tool[] {
       (isTurn(axis) ? REDUCED_RAD_S : REDUCED_M_S);
     return {
       name: typeof name === "string" && name !== "" ? name : String(i + 1),
+      isJogged: (Number(capabilities) & JOG_COMMAND) !== 0,
       fastest: Object.fromEntries(TOOL_AXES.map((axis) => [axis, fastest(axis)])) as Tool["fastest"],
     };
   });
