@@ -10,16 +10,16 @@ export interface Peer {
 }
 
 /**
- * `script`: in the repository; it takes its port and writes what `ready` finds. The device is called "peer".
+ * `script`: in the repository; it takes its port and writes "ready" when it serves. The device is called "peer".
  * `more`: of its configuration in the gateway.
  */
-export async function startPeer(script: string, service: string, ready: RegExp, more: object = {}): Promise<Peer> {
+export async function startPeer(script: string, service: string, more: object = {}): Promise<Peer> {
   const python = process.env["RRGATE_PYTHON"] ?? path.join(repositoryRoot, "build/deps/venv/bin/python");
   if (!existsSync(python)) throw new Error(`${python} is missing: ./dev setup makes it, or name one in RRGATE_PYTHON`);
   const port = await freePort();
   const device = new Program(python, [path.join(repositoryRoot, script), String(port)]);
   device.start();
-  await device.waitForOutput(ready);
+  await device.waitForOutput(/^ready$/m);
   const url = `rr+tcp://127.0.0.1:${port}/?service=${service}`;
   const gateway = await startGateway("peer", url, webRoot, { devices: [{ name: "peer", url, ...more }] });
   const stop = async () => {

@@ -49,6 +49,14 @@ exec chroot /host /bin/sh /run/given/guest.sh
 """
 
 GUEST = r"""cd {root}
+is_plugged_in() {{
+  for vendor in /sys/bus/usb/devices/*/idVendor; do
+    [ "$(cat $vendor)" = 1209 ] && ls -d ${{vendor%/idVendor}}/*:1.* && return
+  done > /dev/null 2>&1
+  return 1
+}}
+tries=0
+until is_plugged_in || [ $tries -ge 150 ]; do /bin/busybox usleep 200000; tries=$((tries + 1)); done
 echo "MARK junit begin"
 {build}/test/usb/rr-usb-guest-test -w NoTests -r junit {pattern}
 status=$?

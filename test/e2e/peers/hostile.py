@@ -82,7 +82,7 @@ def make():
 
 
 def main():
-    with RR.ServerNodeSetup("test.hostile", int(sys.argv[1])):
+    with RR.ServerNodeSetup("test.hostile", int(sys.argv[1]), argv=["--robotraconteur-local-enable=false"]):
         node = RR.RobotRaconteurNode.s
         node.RegisterServiceType(DEFINITION)
         hostile = Hostile()
@@ -94,7 +94,7 @@ def main():
                 hostile.then.OutValue = make()
                 hostile.isPrototypeOf.fire(HTML)
         threading.Thread(target=tick, daemon=True).start()
-        print(f"rr+tcp://127.0.0.1:{sys.argv[1]}/?service=hostile", flush=True)
+        print("ready", flush=True)
         sys.stdin.read()
         stop.set()
 

@@ -7,7 +7,7 @@ import type { Peer } from "../peers";
 let hostile: Peer;
 
 test.beforeAll(async () => {
-  hostile = await startPeer("test/e2e/peers/hostile.py", "hostile", /rr\+tcp/);
+  hostile = await startPeer("test/e2e/peers/hostile.py", "hostile");
 });
 test.afterAll(async () => hostile.stop());
 

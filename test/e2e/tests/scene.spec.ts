@@ -16,7 +16,7 @@ test.use({
 let robot: Peer;
 
 test.beforeAll(async () => {
-  robot = await startPeer("test/interop/peers/standard_robot.py", "robot", /ready/);
+  robot = await startPeer("test/interop/peers/standard_robot.py", "robot");
 });
 test.afterAll(async () => robot.stop());
 
@@ -50,7 +50,7 @@ test("a robot's joints stand as a chain where the driver says, and the picture m
 });
 
 test("a laser scanner of the standard types: its scan as points, without those that hit nothing", async ({ page }) => {
-  const scanner = await startPeer("test/interop/peers/laser_scanner.py", "scanner", /ready/);
+  const scanner = await startPeer("test/interop/peers/laser_scanner.py", "scanner");
   try {
     await page.goto(`${scanner.url}#/devices/peer/scanner`);
     await expect(panel(page)).toContainText("350 points");

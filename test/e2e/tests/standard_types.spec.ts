@@ -8,7 +8,7 @@ import type { Peer } from "../peers";
 let robot: Peer;
 
 test.beforeAll(async () => {
-  robot = await startPeer("test/interop/peers/standard_robot.py", "robot", /ready/, {
+  robot = await startPeer("test/interop/peers/standard_robot.py", "robot", {
     mode: "shared",
     leases: { safe: [{ property: "robot.command_mode", value: "halt" }], takeover: ["*"] },
   });

@@ -5,6 +5,7 @@
 import sys
 import threading
 
+import quiet_node
 import RobotRaconteur as RR
 
 DEFINITION = """
@@ -27,7 +28,7 @@ class Thing:
 
 
 port = int(sys.argv[1])
-with RR.ServerNodeSetup("experimental.escaping", port):
+with RR.ServerNodeSetup("experimental.escaping", port, argv=quiet_node.arguments(server=True)):
     RR.RobotRaconteurNode.s.RegisterServiceType(DEFINITION)
     RR.RobotRaconteurNode.s.RegisterService("evil", "experimental.escaping.Thing", Thing())
     print("ready", flush=True)

@@ -6,6 +6,7 @@ import sys
 import threading
 
 import numpy as np
+import quiet_node
 import RobotRaconteur as RR
 import RobotRaconteurCompanion as RRC
 
@@ -33,7 +34,7 @@ class Scanner:
 
 
 def main(port):
-    with RR.ServerNodeSetup("test.laser_scanner", port, argv=["--robotraconteur-log-level=WARNING"]):
+    with RR.ServerNodeSetup("test.laser_scanner", port, argv=quiet_node.arguments(server=True)):
         node = RR.RobotRaconteurNode.s
         RRC.RegisterStdRobDefServiceTypes(node)
         scanner = Scanner()

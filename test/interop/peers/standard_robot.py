@@ -8,6 +8,7 @@ import sys
 import time
 
 import numpy as np
+import quiet_node
 import RobotRaconteur as RR
 import RobotRaconteurCompanion as RRC
 from RobotRaconteurCompanion.InfoParser import InfoParser
@@ -82,7 +83,7 @@ class PlanarRobot(AbstractRobot):
 
 
 def main(port):
-    with RR.ServerNodeSetup("test.standard_robot", port, argv=["--robotraconteur-log-level=WARNING"]):
+    with RR.ServerNodeSetup("test.standard_robot", port, argv=quiet_node.arguments(server=True)):
         node = RR.RobotRaconteurNode.s
         RRC.RegisterStdRobDefServiceTypes(node)
         robots = {"robot": INFO, "not_jogged": INFO.replace("jog_command, ", "")}
