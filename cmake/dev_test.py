@@ -61,7 +61,7 @@ class Dev(unittest.TestCase):
         self.check_refused('unknown command "biuld"', "biuld")
         self.check_refused('setup: unknown word "produkt"; expected product, or nothing', "setup", "produkt")
         for command in ("asan", "tsan", "debian13"):
-            self.check_refused(f'{command}: unknown part "web"; expected core, node, server or demo', command, "core", "web")
+            self.check_refused(f'{command}: unknown part "web"; expected core, node, server or examples', command, "core", "web")
 
     def test_packages_are_known_by_what_they_provide(self):
         self.put("dpkg-query", "printf '%s\\n' 'installed g++, c++-compiler, g++:amd64 (= 4)' 'not-installed cmake, '"

@@ -110,11 +110,12 @@ class Connection {
   const NodeIdentity& peer() const { return peer_; }
   std::uint32_t local_endpoint() const { return local_endpoint_; }
   std::uint32_t remote_endpoint() const { return remote_endpoint_; }
-  std::size_t queued_bytes() const { return queue_.size(); }
+  /// Of memory, which is more than the bytes of the messages.
+  std::size_t queued_bytes() const { return queue_.held(); }
   /// What waits for the stream, and what has come of a message that is not complete.
-  std::size_t held_bytes() const { return queue_.size() + scanner_.held_bytes(); }
+  std::size_t held_bytes() const { return queue_.held() + scanner_.held_bytes(); }
   /// Whether a peer that is not authorised leaves answers unread: it is to get no others before it has read those.
-  bool is_held_back() const { return !is_authorised_ && queue_.size() > options_.max_unauthorised_queued_bytes; }
+  bool is_held_back() const { return !is_authorised_ && queue_.held() > options_.max_unauthorised_queued_bytes; }
   const ConnectionStats& stats() const { return stats_; }
 
  private:

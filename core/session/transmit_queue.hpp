@@ -23,6 +23,8 @@ class TransmitQueue {
   bool empty() const { return size_ == 0; }
   /// Bytes not yet consumed.
   std::size_t size() const { return size_; }
+  /// Those, and what the messages themselves take: the larger part of many small ones.
+  std::size_t held() const { return size_ + (messages_.size() - first_) * message_bytes; }
 
   /// Up to `max_slices` slices to write next, in order. They stay valid until consume() or clear().
   std::span<const ByteSpan> slices(std::size_t max_slices = 32);
@@ -33,6 +35,8 @@ class TransmitQueue {
 
  private:
   using Encoded = std::unique_ptr<EncodedMessage>;
+  /// Of memory, beside its bytes: the object, and the allocations that an encoding makes (64-bit, glibc).
+  static constexpr std::size_t message_bytes = 320;
 
   Encoded take_spare();
   void insert(Encoded encoded, bool is_urgent);

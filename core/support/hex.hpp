@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -28,6 +29,13 @@ inline constexpr std::string_view upper_hex_digits = "0123456789ABCDEF";
 inline std::string hex_text(std::uint32_t value, int digits) {
   std::string text;
   for (int at = digits - 1; at >= 0; --at) text += lower_hex_digits[value >> (4 * at) & 15];
+  return text;
+}
+
+/// Two lower-case digits for each byte.
+inline std::string hex_text(std::span<const std::uint8_t> bytes) {
+  std::string text;
+  for (const auto byte : bytes) text += {lower_hex_digits[byte >> 4], lower_hex_digits[byte & 15]};
   return text;
 }
 

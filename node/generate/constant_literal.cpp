@@ -8,6 +8,7 @@
 
 #include "core/robdef/model/names.hpp"
 #include "core/robdef/parse/statement.hpp"
+#include "core/support/hex.hpp"
 #include "node/generate/source_writer.hpp"
 
 namespace rrgate {
@@ -91,7 +92,6 @@ std::string float_literal(float value) {
 }
 
 std::string string_literal(std::string_view text, bool for_cpp) {
-  constexpr std::string_view digits = "0123456789abcdef";
   std::string out = "\"";
   for (const char c : text) {
     const auto byte = static_cast<unsigned char>(c);
@@ -108,7 +108,7 @@ std::string string_literal(std::string_view text, bool for_cpp) {
       out += {'\\', static_cast<char>('0' + byte / 64), static_cast<char>('0' + byte / 8 % 8),
               static_cast<char>('0' + byte % 8)};
     } else {
-      out += {'\\', 'x', digits[byte / 16], digits[byte % 16]};
+      out += "\\x" + rr::hex_text(byte, 2);
     }
   }
   return out + '"';

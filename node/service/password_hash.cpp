@@ -9,6 +9,8 @@
 #include <optional>
 #include <vector>
 
+#include "core/support/bytes.hpp"
+#include "core/support/hex.hpp"
 #include "node/tls/base64.hpp"
 
 namespace rr {
@@ -84,22 +86,11 @@ std::optional<std::string> hash_md5(std::string_view password) {
 std::optional<std::string> parse_hex(std::string_view text) {
   std::string bytes;
   for (std::size_t i = 0; i + 1 < text.size(); i += 2) {
-    unsigned byte = 0;
-    const auto parsed = std::from_chars(text.data() + i, text.data() + i + 2, byte, 16);
-    if (parsed.ec != std::errc{} || parsed.ptr != text.data() + i + 2) return std::nullopt;
+    const int byte = hex_byte(text.substr(i));
+    if (byte < 0) return std::nullopt;
     bytes.push_back(static_cast<char>(byte));
   }
   return bytes;
-}
-
-std::string format_hex(std::string_view bytes) {
-  constexpr std::string_view digits = "0123456789abcdef";
-  std::string text;
-  for (const char byte : bytes) {
-    text.push_back(digits[static_cast<unsigned char>(byte) >> 4]);
-    text.push_back(digits[static_cast<unsigned char>(byte) & 15]);
-  }
-  return text;
 }
 
 }  // namespace
@@ -151,7 +142,7 @@ bool PasswordHash::matches(std::string_view password) const {
 }
 
 std::string PasswordHash::text() const {
-  if (scheme_ == PasswordScheme::md5) return format_hex(hash_);
+  if (scheme_ == PasswordScheme::md5) return hex_text(as_bytes(hash_));
   return std::string(scrypt_prefix) + "ln=" + std::to_string(cost_.ln) + ",r=" + std::to_string(cost_.r) +
          ",p=" + std::to_string(cost_.p) + "$" + encode_unpadded(salt_) + "$" + encode_unpadded(hash_);
 }

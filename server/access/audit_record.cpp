@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 
+#include "core/support/hex.hpp"
 #include "node/platform/utc_time.hpp"
 #include "node/tls/digest.hpp"
 #include "server/json/json.hpp"
@@ -21,13 +22,7 @@ constexpr std::string_view hash_begins = ",\"hash\":\"";
 std::string hash_of(std::string_view previous, std::string_view text) {
   std::string all(previous);
   all.append(text).append("}");
-  constexpr std::string_view digits = "0123456789abcdef";
-  std::string out;
-  for (const auto byte : rr::sha256(rr::as_bytes(all))) {
-    out += digits[byte >> 4];
-    out += digits[byte & 15];
-  }
-  return out;
+  return rr::hex_text(rr::sha256(rr::as_bytes(all)));
 }
 
 bool is_hash(std::string_view text) {

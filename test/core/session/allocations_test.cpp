@@ -43,6 +43,27 @@ TEST_CASE("what a large message took on both sides of a session is given back") 
   CHECK(live_bytes <= before + 64 * 1024);
 }
 
+TEST_CASE("small answers that nobody reads are counted with all that they take of the memory") {
+  Loopback pair;
+  constexpr std::size_t limit = 2'000'000;
+  ServiceSessionOptions options;
+  options.connection.max_queued_bytes = limit;
+  pair.service = std::make_unique<ServiceSession>(pair.directory, options, pair.now);
+  pair.connect();
+  const auto before = live_bytes;
+  std::size_t most = 0;
+  while (!pair.service->wants_close()) {
+    const auto waited = pair.service->queued_bytes();
+    pair.client->call_function("arm", "stop", {}, pair.now);
+    pair.carry(*pair.client, *pair.service, read_size);
+    pair.service->reply(pair.next_service<Called>().id, Value{}, pair.now);
+    most = std::max(most, live_bytes - before);
+    REQUIRE((pair.service->wants_close() || pair.service->queued_bytes() > waited));
+  }
+  // The client's open requests are among it, and buffers that grow by doubling.
+  CHECK(most < 2 * limit);
+}
+
 TEST_CASE("calls that follow one another allocate nothing on either side") {
   Loopback pair;
   pair.connect();
