@@ -226,10 +226,12 @@ test("a panel that fails says so, can be tried again, and leaves the rest of the
 
 test("a camera of another device stands beside the robot, with an object of its own", async ({ page, lab }) => {
   await openBoard(page, lab.url);
+  await panel(page, "Left camera").getByRole("button", { name: "Start stream" }).click();
+  await expect(panel(page, "Left camera").locator(".panel-foot")).toContainText("320 × 240");
   await addPanel(page, "image");
-  const image = page.locator('[data-panel="image"]');
+  const image = page.locator('[data-panel="image"]').last();
   await image.getByLabel("Service").selectOption("webcams/Webcam");
-  await image.getByRole("textbox", { name: /^Object of/ }).fill("Webcams[0]");
+  await image.getByRole("textbox", { name: /^Object of/ }).fill("Webcams[1]");
   await image.getByRole("textbox", { name: /^Object of/ }).press("Enter");
   await image.getByLabel("Member").selectOption("FrameStream");
   await image.getByRole("button", { name: "Start stream" }).click();

@@ -23,7 +23,9 @@ const pages = {
   },
   board: async (page: Page, url: string) => {
     await openRobot(page, { url });
+    await putAtStart(page);
     await page.getByRole("link", { name: "Board" }).click();
+    await expect(page.getByText("320 × 240")).toBeAttached();
     await expect(
       page
         .getByText(/\d+ a second/)

@@ -68,7 +68,7 @@ const STANDARD: Readonly<Record<string, Preset>> = {
   ["com.robotraconteur.imaging.Camera"]: {
     stop: null,
     panels: [
-      ["image", 0, 0, 8, 12, { member: "frame_stream_compressed", start: "start_streaming" }],
+      ["image", 0, 0, 8, 12, { member: "frame_stream_compressed" }],
       ["form", 8, 0, 4, 6, { members: ["start_streaming", "stop_streaming", "trigger"] }, "Streaming"],
       ["table", 8, 6, 4, 6, { member: "camera_state" }],
       ["form", 0, 12, 4, 7, { member: "trigger_mode" }],
@@ -127,6 +127,25 @@ const STANDARD: Readonly<Record<string, Preset>> = {
       ["table", 8, 0, 4, 8, { member: "signal_value" }],
       ["form", 0, 8, 6, 7, { members: ["signal_command", "signal_command_vec"] }],
       ["table", 6, 8, 6, 7, { member: "signal_info" }],
+    ],
+  },
+  // Of `rrgate demo`: the robot, whose cameras are another device, and those cameras.
+  ["experimental.simulatedcreate.SimulatedCreate"]: {
+    stop: null,
+    panels: [
+      ["plot", 0, 0, 5, 8, { member: "state", paths: ["x", "y", "heading"] }, "Pose"],
+      ["image", 5, 0, 4, 8, { member: "FrameStream" }, "Left camera", "webcams/Webcam Webcams[0]"],
+      ["form", 9, 0, 3, 8, { member: "Drive" }, "Calls"],
+      ["table", 0, 8, 5, 7, { member: "state" }],
+      ["log", 5, 8, 4, 7],
+      ["table", 9, 8, 3, 7, { member: "packets" }],
+    ],
+  },
+  ["experimental.createwebcam2.WebcamHost"]: {
+    stop: null,
+    panels: [
+      ["image", 0, 0, 6, 11, { member: "FrameStream" }, "Left", " Webcams[0]"],
+      ["image", 6, 0, 6, 11, { member: "FrameStream" }, "Right", " Webcams[1]"],
     ],
   },
   // Of `rrgate demo microassembly`, whose cameras are another device.

@@ -66,6 +66,16 @@ export default function ImagePanel({ object, members, place, settings, change }:
       link.click();
       setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
     });
+  const starter = kind === "pipe" && start && (
+    <button
+      class={shown.size === "" ? "button" : "button button-quiet"}
+      type="button"
+      disabled={!object || acting.busy}
+      onClick={begin}
+    >
+      {t("Start stream")}
+    </button>
+  );
   return (
     <div class="image-panel">
       <div class="panel-tools">
@@ -75,17 +85,14 @@ export default function ImagePanel({ object, members, place, settings, change }:
             {t("Take")}
           </button>
         )}
-        {kind === "pipe" && start && (
-          <button class="button button-quiet" type="button" disabled={!object || acting.busy} onClick={begin}>
-            {t("Start stream")}
-          </button>
-        )}
+        {shown.size !== "" && starter}
         <button class="button button-quiet" type="button" disabled={shown.size === ""} onClick={save}>
           PNG
         </button>
       </div>
       <div class={`image-box ${look.stale === null ? "" : "is-stale"}`}>
         <canvas ref={canvas} width={EMPTY[0]} height={EMPTY[1]} role="img" aria-label={t("Picture of {0}", name)} />
+        {shown.size === "" && starter}
       </div>
       <Failure text={shown.failure ?? acting.failure} />
       <div class="panel-foot">
