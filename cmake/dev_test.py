@@ -1,7 +1,10 @@
 #!/usr/bin/env python3
 """./dev before it does anything: help, words that it does not know, and what it takes for missing. Programs that would install or
 build something are replaced by ones that write down that they were called."""
+import os
 import pathlib
+import pty
+import shutil
 import subprocess
 import tempfile
 import unittest
@@ -79,6 +82,53 @@ class Dev(unittest.TestCase):
         self.assertEqual([call.split("update")[-1].strip() for call in calls if "install" in call],
                          [call for call in calls if call.endswith("install -y --no-install-recommends --no-remove mold")])
         self.assertEqual(len(calls), 2)
+
+    def test_a_product_takes_nothing_that_only_tests_need(self):
+        done = self.run_script("bash", "-c", "set -- help; source ./dev >/dev/null; echo ${product_packages[*]}; echo ${test_packages[*]}")
+        product, tests = (line.split() for line in done.stdout.splitlines())
+        for name in ("catch2", "python3-venv"):
+            self.assertNotIn(name, product)
+            self.assertIn(name, tests)
+
+    def test_a_build_without_catch2_has_no_tests(self):
+        self.put("cmake", f'echo "$@" >{self.called}')
+        shutil.copy(ROOT / "dev", self.folder)
+        (self.folder / "CMakePresets.json").touch()
+        for package, expected in (("catch2", "ON"), ("cmake", "OFF")):
+            self.put("dpkg-query", f"echo 'installed {package}, '")
+            self.run_script("bash", "-c", f"set -- help; source {self.folder}/dev >/dev/null; configure release")
+            self.assertIn(f"-DBUILD_TESTING={expected}", self.called.read_text().split())
+
+    def test_a_demo_says_first_what_it_installs_and_keeps_what_failed(self):
+        self.put("node", "echo v18.20.4")
+        self.put("apt-get", "echo Get:1 something; echo no such host >&2; exit 100")
+        self.put("sudo", "shift; exec \"$@\"")  # for users who are not root
+        shutil.copy(ROOT / "dev", self.folder)
+        done = self.run_script(str(self.folder / "dev"), "demo")
+        self.assertNotEqual(done.returncode, 0)
+        lines = done.stdout.splitlines()
+        self.assertRegex(lines[0], "^==> Debian packages to install, with what they need: ccache cmake .*emscripten.* python3-pip$")
+        self.assertEqual(lines[1], "==> Node is to be installed from PyPI into build/deps/node")
+        self.assertRegex(lines[2], "^==> then npm packages .*: about [0-9]+ minutes in all$")
+        self.assertRegex(lines[3], "^==> installing Debian packages: ccache cmake")
+        self.assertEqual(lines[-3:], ["Get:1 something", "no such host", "==> this failed; all of it is in build/demo.log"])
+        self.assertTrue((self.folder / "build/demo.log").read_text().endswith("Get:1 something\nno such host\n"))
+
+    def test_progress_is_one_line_at_a_terminal_and_none_elsewhere(self):
+        told = ("==> installing Debian packages: mold", "Get:1 something", "0 upgraded, 2 newly installed, 0 to remove.",
+                "Setting up mold (1)", "Setting up ninja (1)", "added 40 packages", "[1/2] Building", "[2/2] Linking", "warning: x")
+        told_by_script = " ".join(f"'{line}'" for line in told)
+        command = ("bash", "-c",
+                   f"set -- help; source ./dev >/dev/null; printf '%s\\n' {told_by_script} | show_progress")
+        self.assertEqual(self.run_script(*command).stdout, told[0] + "\n")
+        ours, theirs = pty.openpty()
+        subprocess.run(command, cwd=ROOT, stdout=theirs, timeout=20, check=True)
+        os.close(theirs)
+        shown = os.read(ours, 10000).decode().replace("\r\n", "\n")
+        os.close(ours)
+        self.assertEqual(shown.split("\r\x1b[K"),
+                         ["", told[0] + "\n", "downloading 2 packages", "installing: 1 of 2 packages", "installing: 2 of 2 packages",
+                          "building: 1 of 2", "building: 2 of 2", ""])
 
 
 if __name__ == "__main__":
