@@ -130,6 +130,19 @@ class Dev(unittest.TestCase):
                          ["", told[0] + "\n", "downloading 2 packages", "installing: 1 of 2 packages", "installing: 2 of 2 packages",
                           "building: 1 of 2", "building: 2 of 2", ""])
 
+    def test_the_npm_package_names_the_repository_and_no_login(self):
+        for url, expected in (("https://code.example.org/lab/rrgate.git", "git+https://code.example.org/lab/rrgate.git"),
+                              ("https://user:secret@code.example.org/lab/rrgate.git", "git+https://code.example.org/lab/rrgate.git"),
+                              ("git@code.example.org:lab/rrgate.git", "git+https://code.example.org/lab/rrgate.git"),
+                              ("ssh://git@code.example.org:2222/lab/rrgate.git", "git+https://code.example.org/lab/rrgate.git"),
+                              ("/srv/rrgate.git", ""), ("file:///srv/rrgate.git", "")):
+            self.put("git", f"echo '{url}'")
+            done = self.run_script("bash", "-c", "set -- help; source ./dev >/dev/null; public_repository")
+            self.assertEqual((done.returncode, done.stdout.strip()), (0, expected), url)
+        self.put("git", "exit 2")
+        done = self.run_script("bash", "-c", "set -- help; source ./dev >/dev/null; x=$(public_repository) || true; echo \"[$x]\"")
+        self.assertEqual(done.stdout, "[]\n")
+
 
 if __name__ == "__main__":
     unittest.main()
