@@ -1,12 +1,33 @@
 // rrgate check: whether service definitions are good. Layer: server/cli.
+#include <nlohmann/json.hpp>
+
 #include "server/cli/definition_options.hpp"
 
 namespace rrgate {
 
 namespace {
 
-int check(const DefinitionOptions& options) {
+struct CheckDefinitionsOptions : DefinitionOptions {
+  bool is_json = false;
+};
+
+void print_diagnostic(const rr::Diagnostic& diagnostic) {
+  auto json = nlohmann::ordered_json::object();
+  json["file"] = diagnostic.file;
+  json["line"] = diagnostic.column != 0 ? diagnostic.column_line : diagnostic.line;
+  if (diagnostic.column != 0) json["column"] = diagnostic.column;
+  json["severity"] = diagnostic.severity == rr::Severity::error ? "error" : "warning";
+  json["code"] = diagnostic.code;
+  json["message"] = diagnostic.message;
+  print_json_line(json);
+}
+
+int check(const CheckDefinitionsOptions& options) {
   const auto set = DefinitionSet::from_files(options.files, options.folders, options.mode());
+  if (options.is_json) {
+    for (const auto& diagnostic : set.diagnostics()) print_diagnostic(diagnostic);
+    return set.is_good() ? exit_ok : exit_failed;
+  }
   if (!report_diagnostics(set)) return exit_failed;
   for (const auto* definition : set.requested())
     std::cout << definition->file << ": good; " << definition->name << "\n";
@@ -20,6 +41,7 @@ void add_check(Commands& commands) {
   add_files(app, options);
   add_folders(app, options);
   add_compat(app, options);
+  add_json_flag(app, options.is_json, "Print each error and warning as one line of JSON");
 }
 
 }  // namespace rrgate

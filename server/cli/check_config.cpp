@@ -1,4 +1,6 @@
 // rrgate check-config: whether `rrgate serve` would take a file. Layer: server/cli.
+#include <nlohmann/json.hpp>
+
 #include "node/tls/client_certificates.hpp"
 #include "server/access/access.hpp"
 #include "server/cli/command.hpp"
@@ -13,32 +15,63 @@ namespace {
 struct CheckOptions {
   std::string file;
   std::optional<std::string> service_user;
+  bool is_json = false;
 };
 
-int check_config(const CheckOptions& options) {
-  const auto& file = options.file;
-  const auto config = load_config(file);
-  if (!report_findings(file, config)) return exit_usage;
-  if (const auto& certificates = config.config.tls.certificates; !certificates.empty())
-    if (const auto tls = rr::make_web_tls(certificates, config.config.access.clients); !tls) {
-      std::cerr << short_name(file) << ": /tls/certificates: " << tls.error().message << "\n";
-      return exit_usage;
-    }
-  if (const auto access = load_access(config.config.access); !access) {
-    std::cerr << short_name(file) << ": /access: " << access.error().message << "\n";
-    return exit_usage;
-  }
+/// What is said of a file. Without errors, `rrgate serve` takes it.
+struct Verdict {
+  std::vector<Finding> errors;
+  std::vector<Finding> warnings;
+  std::size_t devices = 0;
+};
+
+/// Errors   those of find_missing_rights().
+rr::Result<Verdict> judge(const CheckOptions& options) {
+  const auto parsed = load_config(options.file);
+  const auto& config = parsed.config;
+  if (!parsed.findings.empty()) return Verdict{parsed.findings};
+  if (const auto& certificates = config.tls.certificates; !certificates.empty())
+    if (const auto tls = rr::make_web_tls(certificates, config.access.clients); !tls)
+      return Verdict{{{"/tls/certificates", tls.error().message}}};
+  if (const auto access = load_access(config.access); !access) return Verdict{{{"/access", access.error().message}}};
+  Verdict out;
+  out.devices = config.devices.size();
   if (options.service_user) {
-    const auto missing = find_missing_rights(*options.service_user, file, config.config);
-    if (!missing) return report_failure("check-config", missing.error().message);
-    for (const auto& sentence : missing->needed) std::cerr << short_name(file) << ": " << sentence << "\n";
-    for (const auto& sentence : missing->optional) std::cerr << short_name(file) << ": warning: " << sentence << "\n";
-    if (!missing->needed.empty()) return exit_usage;
+    const auto missing = find_missing_rights(*options.service_user, options.file, config);
+    if (!missing) return missing.error();
+    for (const auto& sentence : missing->needed) out.errors.push_back({"", sentence});
+    for (const auto& sentence : missing->optional) out.warnings.push_back({"", sentence});
   }
-  for (const auto& caution : find_cautions(config.config))
-    std::cerr << format_finding(short_name(file), {caution.path, "warning: " + caution.text}) << "\n";
-  std::cout << short_name(file) << ": good; " << config.config.devices.size() << " devices\n";
-  return exit_ok;
+  if (out.errors.empty())
+    for (auto& caution : find_cautions(config)) out.warnings.push_back(std::move(caution));
+  return out;
+}
+
+nlohmann::ordered_json to_json(const std::vector<Finding>& findings) {
+  auto out = nlohmann::ordered_json::array();
+  for (const auto& [path, text] : findings) out.push_back({{"path", path}, {"text", text}});
+  return out;
+}
+
+int check_config(const CheckOptions& options) {
+  const auto name = short_name(options.file);
+  const auto verdict = judge(options);
+  if (!verdict) return report_failure("check-config", verdict.error().message);
+  const auto& [errors, warnings, devices] = *verdict;
+  const bool is_good = errors.empty();
+  if (options.is_json) {
+    print_json_line({{"file", options.file},
+                     {"good", is_good},
+                     {"devices", devices},
+                     {"errors", to_json(errors)},
+                     {"warnings", to_json(warnings)}});
+    return is_good ? exit_ok : exit_usage;
+  }
+  for (const auto& error : errors) std::cerr << format_finding(name, error) << "\n";
+  for (const auto& [path, text] : warnings)
+    std::cerr << name << ": " << (path.empty() ? "" : path + ": ") << "warning: " << text << "\n";
+  if (is_good) std::cout << name << ": good; " << devices << " devices\n";
+  return is_good ? exit_ok : exit_usage;
 }
 
 }  // namespace
@@ -48,6 +81,7 @@ void add_check_config(Commands& commands) {
   app.add_option("FILE", options.file, "Configuration")->required()->option_text(" ");
   app.add_option("--as-service", options.service_user, "Also report files that this user can't read or write")
       ->option_text("USER");
+  add_json_flag(app, options.is_json, "Print errors and warnings as one line of JSON");
 }
 
 }  // namespace rrgate

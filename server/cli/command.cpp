@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iostream>
+#include <nlohmann/json.hpp>
 
 #include "server/config/version.hpp"
 
@@ -57,6 +58,15 @@ int Commands::run(std::vector<std::string> words) {
     return exit_usage;
   }
   return chosen_();
+}
+
+CLI::Option* add_json_flag(CLI::App& app, bool& is_json, const std::string& summary) {
+  return app.add_flag("--json", is_json, summary);
+}
+
+void print_json_line(const nlohmann::ordered_json& json) {
+  // Names of files may be no UTF-8.
+  std::cout << json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << std::endl;
 }
 
 int report_failure(std::string_view command, std::string_view what) {

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <functional>
 #include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -55,6 +56,11 @@ class Commands {
 
 /// All commands of rrgate.
 int run_command_line(std::vector<std::string> words);
+
+/// Flag --json of a command that has an answer of its own.
+CLI::Option* add_json_flag(CLI::App& app, bool& is_json, const std::string& summary);
+/// One line on standard output, at once: whoever reads a pipe sees each as it comes.
+void print_json_line(const nlohmann::ordered_json& json);
 
 /// Prints "rrgate NAME: what" and how to get help to stderr; returns exit_usage.
 int usage_error(std::string_view command, std::string_view what);

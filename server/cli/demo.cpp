@@ -17,6 +17,7 @@
 #include <iomanip>
 #include <iostream>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "core/support/random.hpp"
 #include "server/cli/command.hpp"
@@ -104,9 +105,13 @@ std::vector<DemoSystem> list_systems() {
            {{"baxter", "rrgate-demo-baxter.py", "base", baxter}}}};
 }
 
-int print_systems() {
-  for (const auto& system : list_systems())
-    std::cout << std::left << std::setw(17) << system.name << system.summary << "\n";
+int print_systems(bool is_json) {
+  for (const auto& system : list_systems()) {
+    if (is_json)
+      print_json_line({{"name", system.name}, {"summary", system.summary}});
+    else
+      std::cout << std::left << std::setw(17) << system.name << system.summary << "\n";
+  }
   return exit_ok;
 }
 
@@ -258,8 +263,19 @@ void print_qr_code(const std::string& text) {
   }
 }
 
-void print_address(std::uint16_t port, const DemoLogin* login) {
+void print_address(std::uint16_t port, const DemoLogin* login, bool is_json) {
   const auto url = [port](const std::string& host) { return "http://" + host + ":" + std::to_string(port) + "/"; };
+  if (is_json) {
+    nlohmann::ordered_json json{{"url", url("127.0.0.1")}};
+    if (login) {
+      json["network"] = nlohmann::ordered_json::array();
+      for (const auto& address : addresses_of_machine()) json["network"].push_back(url(address));
+      json["user"] = DemoLogin::user;
+      json["password"] = login->password().value();
+    }
+    print_json_line(json);
+    return;
+  }
   if (login) {
     const auto addresses = addresses_of_machine();
     if (!addresses.empty() && ::isatty(STDOUT_FILENO)) print_qr_code(url(addresses.front()));
@@ -289,7 +305,8 @@ void open_browser(const std::string& url) {
 }
 
 /// Prints the address once all devices answer, and opens it in a browser. Says so if they don't answer.
-rr::awaitable<void> announce(Gateway& gateway, std::uint16_t port, const DemoLogin* login, bool opens_browser) {
+rr::awaitable<void> announce(Gateway& gateway, std::uint16_t port, const DemoLogin* login, bool is_json,
+                             bool opens_browser) {
   asio::steady_timer pause(co_await asio::this_coro::executor);
   const auto is_online = [](const auto& device) { return device->state() == DeviceState::online; };
   const auto& devices = gateway.devices().all();
@@ -303,7 +320,7 @@ rr::awaitable<void> announce(Gateway& gateway, std::uint16_t port, const DemoLog
     co_await pause.async_wait(asio::as_tuple(asio::use_awaitable));
   }
   if (gateway.is_stopping()) co_return;
-  print_address(port, login);
+  print_address(port, login, is_json);
   if (opens_browser) open_browser("http://127.0.0.1:" + std::to_string(port) + "/");
 }
 
@@ -335,6 +352,7 @@ struct DemoOptions {
   std::optional<std::uint16_t> port;
   bool is_lan = false;
   bool is_without_browser = false;
+  bool is_json = false;
   std::vector<std::string> cameras;
   std::string pictures;
 };
@@ -351,7 +369,7 @@ std::string choose_cameras(const DemoOptions& options, std::vector<DemoDevice>& 
 }
 
 int demo(const DemoOptions& options) {
-  if (options.is_list) return print_systems();
+  if (options.is_list) return print_systems(options.is_json);
   const auto port = options.port.value_or(is_port_free(preferred_port) ? preferred_port : 0);
   std::optional<DemoLogin> login;
   if (options.is_lan) login.emplace();
@@ -381,8 +399,8 @@ int demo(const DemoOptions& options) {
     deaths.emplace(io, SIGCHLD);
     gateway.on_stop([&] { deaths->cancel(); });
     wait_for_death();
-    asio::co_spawn(io, announce(gateway, addresses.front().port, user, !options.is_lan && !options.is_without_browser),
-                   asio::detached);
+    const bool opens_browser = !options.is_lan && !options.is_without_browser;
+    asio::co_spawn(io, announce(gateway, addresses.front().port, user, options.is_json, opens_browser), asio::detached);
   });
   stop_devices(devices);
   return code;
@@ -415,6 +433,7 @@ void add_demo(Commands& commands) {
       ->excludes(cameras)
       ->option_text("PATH");
   app.add_flag("--no-browser", options.is_without_browser, "Do not open the page in a browser");
+  add_json_flag(app, options.is_json, "Print the address, or with --list each system, as one line of JSON");
 }
 
 }  // namespace rrgate

@@ -6,6 +6,7 @@
 
 #include <iostream>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "core/support/error.hpp"
@@ -58,6 +59,7 @@ std::string ask(const Address& address, std::string_view path) {
 struct HealthOptions {
   std::string address = "127.0.0.1:8080";
   bool asks_ready = false;
+  bool is_json = false;
 };
 
 int ask_health(const HealthOptions& options) {
@@ -66,6 +68,10 @@ int ask_health(const HealthOptions& options) {
   const auto answer = ask(*address, options.asks_ready ? "/readyz" : "/healthz");
   const auto line = answer.substr(0, answer.find('\r'));
   const bool is_well = line.find(" 200 ") != std::string::npos;
+  if (options.is_json) {
+    print_json_line({{"address", address->host + ":" + address->port}, {"good", is_well}, {"answer", line}});
+    return is_well ? exit_ok : exit_failed;
+  }
   (is_well ? std::cout : std::cerr) << address->host << ":" << address->port << ": "
                                     << (line.empty() ? "no answer" : line) << '\n';
   return is_well ? exit_ok : exit_failed;
@@ -79,6 +85,7 @@ void add_health(Commands& commands) {
       ->capture_default_str()
       ->option_text("[127.0.0.1:8080]");
   app.add_flag("--ready", options.asks_ready, "Ask whether it accepts clients");
+  add_json_flag(app, options.is_json, "Print the answer as one line of JSON");
 }
 
 }  // namespace rrgate

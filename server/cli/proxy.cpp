@@ -14,6 +14,7 @@ struct ProxyOptions {
   std::optional<std::string> name;
   std::uint16_t port = 8080;
   bool is_relay = false;
+  bool is_json = false;
 };
 
 int run_proxy(const ProxyOptions& options) {
@@ -29,8 +30,11 @@ int run_proxy(const ProxyOptions& options) {
   auto read = parse_config(text.dump());
   if (!read.findings.empty()) return usage_error("proxy", format_finding("configuration", read.findings.front()));
   return run_gateway(std::move(read.config), [&](auto&, Gateway&, const auto& addresses) {
-    std::cout << "rrgate proxy: http://127.0.0.1:" << addresses.front().port << "/ stands for " << options.url
-              << std::endl;
+    const auto address = "http://127.0.0.1:" + std::to_string(addresses.front().port) + "/";
+    if (options.is_json)
+      print_json_line({{"url", address}, {"device", options.url}});
+    else
+      std::cout << "rrgate proxy: " << address << " stands for " << options.url << std::endl;
   });
 }
 
@@ -45,6 +49,7 @@ void add_proxy(Commands& commands) {
       ->capture_default_str()
       ->option_text("N [8080]");
   app.add_flag("--relay", options.is_relay, "Give each client its own session with the device");
+  add_json_flag(app, options.is_json, "Print the address as one line of JSON");
 }
 
 }  // namespace rrgate

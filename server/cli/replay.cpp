@@ -5,6 +5,7 @@
 #include <boost/asio/signal_set.hpp>
 #include <chrono>
 #include <iostream>
+#include <nlohmann/json.hpp>
 
 #include "server/cli/command.hpp"
 
@@ -20,6 +21,7 @@ struct ReplayCommandOptions {
   bool loops = false;
   bool is_paused = false;
   bool keeps_ids = false;
+  bool is_json = false;
 };
 
 void serve(Replay& replay, boost::asio::io_context& io, const ReplayCommandOptions& options) {
@@ -28,7 +30,12 @@ void serve(Replay& replay, boost::asio::io_context& io, const ReplayCommandOptio
   player.set_loops(options.loops);
   player.seek(options.start);
   if (!options.is_paused) player.play();
-  for (const auto& url : replay.urls()) std::cout << "rrgate replay: " << url << std::endl;
+  for (const auto& url : replay.urls()) {
+    if (options.is_json)
+      print_json_line({{"url", url}});
+    else
+      std::cout << "rrgate replay: " << url << std::endl;
+  }
   bool is_over = false;
   boost::asio::signal_set signals(io, SIGINT, SIGTERM);
   signals.async_wait([&is_over](const auto& error, int) {
@@ -76,6 +83,7 @@ void add_replay(Commands& commands) {
   app.add_option("--listen", options.listen, "Address of the first node; others use the next ports")
       ->option_text("URL [rr+tcp://127.0.0.1:0]");
   app.add_flag("--keep-ids", options.keeps_ids, "Use the recorded NodeIDs; the recorded nodes must not run");
+  add_json_flag(app, options.is_json, "Print each URL as one line of JSON");
 }
 
 }  // namespace rrgate

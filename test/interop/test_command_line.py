@@ -476,4 +476,11 @@ def test_a_gateway_for_one_device_needs_no_file(reynard, tmp_path):
         assert json.loads(run("ls", base, "--json"))["url"] == found
     finally:
         proxy.stop()
+    proxy = Background([RRGATE, "proxy", reynard, "--port", "0", "--json"], tmp_path / "log")
+    try:
+        told = json.loads(proxy.next_line())
+        assert told == {"url": told["url"], "device": reynard}
+        proxy.wait_until(lambda: Ran(["get", f"{told['url']}devices/reynard?service=reynard", "color"]).code == DONE)
+    finally:
+        proxy.stop()
     assert Ran(["proxy", reynard, "--name", "a/b"]).refused(NOT_UNDERSTOOD, "'a/b'")

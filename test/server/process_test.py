@@ -74,6 +74,50 @@ class CommandLine(Files):
         result = run("check-config", self.file({"listen": ["127.0.0.1:1"], "devices": []}))
         self.assertEqual((result.returncode, result.stderr), (0, ""))
 
+    def test_commands_that_have_an_answer_give_it_as_json(self):
+        """What others print is a file, a protocol, or one word on a line."""
+        commands = re.findall(r"^  ([a-z][a-z-]+)  +[A-Z]", run("--help").stdout, re.M)
+        self.assertGreater(len(commands), 20)
+        without = [name for name in commands if "--json " not in run(name, "--help").stdout]
+        self.assertEqual(without, ["serve", "init", "passwd", "token", "cert", "record", "export", "mcp", "fmt", "generate",
+                                   "completion"])
+
+    def test_a_configuration_is_judged_as_json(self):
+        good, bad = {"listen": ["127.0.0.1:1"], "devices": []}, {"listen": ["8080"], "devices": []}
+        for config, code in ((good, 0), (bad, 2)):
+            path = self.file(config)
+            result = run("check-config", path, "--json")
+            told = json.loads(result.stdout)
+            self.assertEqual((result.returncode, result.stderr, result.stdout.count("\n")), (code, "", 1))
+            self.assertEqual((told["file"], told["good"], told["warnings"]), (path, code == 0, []))
+            self.assertEqual([error["path"] for error in told["errors"]], ["/listen/0"] if code else [])
+        self.assertTrue(all(error["text"] for error in told["errors"]))
+
+    def test_health_is_told_as_json(self):
+        with socket.socket() as nobody:
+            nobody.bind(("127.0.0.1", 0))
+            address = f"127.0.0.1:{nobody.getsockname()[1]}"
+            result = run("health", address, "--json")
+        self.assertEqual((result.returncode, result.stderr), (1, ""))
+        self.assertEqual(json.loads(result.stdout), {"address": address, "good": False, "answer": ""})
+
+    def test_findings_of_definitions_are_json(self):
+        path = os.path.join(self.folder.name, "lamp.robdef")
+        for body, code in [("object Lamp\nend\n", 0), ("object\nend\n", 1)]:
+            with open(path, "w") as out:
+                out.write("service test.lamp\nstdver 0.10\n" + body)
+            result = run("check", path, "--json")
+            self.assertEqual((result.returncode, result.stderr), (code, ""))
+            told = [json.loads(line) for line in result.stdout.splitlines()]
+            self.assertEqual([(each["file"], each["line"], each["severity"]) for each in told][:1],
+                             [(path, 3, "error")] if code else [])
+            self.assertTrue(all(each["code"] and each["message"] for each in told))
+
+    def test_demos_are_listed_as_json(self):
+        told = [json.loads(line) for line in run("demo", "--list", "--json").stdout.splitlines()]
+        text = run("demo", "--list").stdout.splitlines()
+        self.assertEqual([f"{each['name']:<17}{each['summary']}" for each in told], text)
+
     def test_definitions_are_checked(self):
         path = os.path.join(self.folder.name, "lamp.robdef")
         for body, code in [("object Lamp\nend\n", 0), ("object\nend\n", 1)]:
