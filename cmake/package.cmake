@@ -1,12 +1,12 @@
 # Debian packages, by CPack: rrgate (the program as a service) and rrgate-dev (the C++ API). ./dev package calls it, since the
-# packages also hold files that it makes in RRGATE_PACKAGE_FILES: the man page and the changelogs.
+# packages also hold files that it makes in RRGATE_PACKAGE_FILES: the man pages and the changelogs.
 set(RRGATE_PACKAGE_FILES "${PROJECT_SOURCE_DIR}/build/package/files" CACHE PATH "What ./dev package makes for packages")
 
 # Two components, "system" and "dev_system", that `cmake --install` leaves out: they have places outside of a prefix.
 install_unit("/lib/systemd/system" system EXCLUDE_FROM_ALL)
 install(FILES cmake/deb/gateway.json DESTINATION /etc/rrgate COMPONENT system EXCLUDE_FROM_ALL)
 install(FILES cmake/deb/apparmor DESTINATION /etc/apparmor.d RENAME rrgate COMPONENT system EXCLUDE_FROM_ALL)
-install(FILES "${RRGATE_PACKAGE_FILES}/rrgate.1.gz" DESTINATION share/man/man1 COMPONENT system EXCLUDE_FROM_ALL)
+install(DIRECTORY "${RRGATE_PACKAGE_FILES}/man/" DESTINATION share/man/man1 COMPONENT system EXCLUDE_FROM_ALL)
 foreach(completion bash-completion/completions/rrgate zsh/vendor-completions/_rrgate fish/vendor_completions.d/rrgate.fish)
   get_filename_component(folder "${completion}" DIRECTORY)
   install(FILES "${RRGATE_PACKAGE_FILES}/${completion}" DESTINATION share/${folder} COMPONENT system EXCLUDE_FROM_ALL)

@@ -1,5 +1,6 @@
 """The Debian package of the gateway, in a fresh Debian 12: installed by dpkg, run by the user, program and arguments of its unit."""
 import base64
+import gzip
 import json
 import re
 import resource
@@ -101,6 +102,22 @@ def test_what_is_where(root):
                  "etc/apparmor.d/rrgate", "etc/apparmor.d/local/rrgate", "usr/lib/udev/rules.d/60-robotraconteur-usb.rules", "usr/share/doc/rrgate/copyright"):
         assert (root.folder / path).is_file(), path
     assert "good" in root.run("rrgate", "check-config", "--as-service", "rrgate", "/etc/rrgate/gateway.json").stdout
+
+
+def test_each_command_has_a_man_page(root):
+    def pages_of(*words):
+        help_text = root.run(*words, "--help").stdout
+        below = [page for name in re.findall(r"^  ([a-z][a-z-]+)  +[A-Z]", help_text, re.M) for page in pages_of(*words, name)]
+        return ["-".join(words), *below]
+
+    pages = pages_of("rrgate")
+    assert {"rrgate-ls", "rrgate-cert", "rrgate-cert-ca", "rrgate-generate-ts"} <= set(pages)
+    folder = root.folder / "usr/share/man/man1"
+    assert sorted(pages) == sorted(path.name.removesuffix(".1.gz") for path in folder.iterdir() if path.name.startswith("rrgate"))
+    for page in pages:
+        text = gzip.decompress((folder / f"{page}.1.gz").read_bytes()).decode()
+        assert re.search(rf'^\.TH {page.upper()} "1"', text, re.M) and re.search(rf"^{page} \\- \S", text, re.M), page
+        assert text.count('.SH "SEE ALSO"') == 1 and "\\-\\-help" in text, page
 
 
 def test_the_demo_drives_its_robot_at_once(root, tmp_path):
