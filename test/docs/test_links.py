@@ -37,3 +37,11 @@ def test_anchors_are_those_of_github():
     text = "# Nodes in C++\n## connect(url, options)\n## `a_b`, c\n## Twice\n## Twice\n```sh\n# none\n```\n"
     assert anchors(text) == {"nodes-in-c", "connecturl-options", "a_b-c", "twice", "twice-1"}
     assert links("[a](b.md#c) `[d](e)` [f](https://g) ![h](i.png)") == ["b.md#c", "i.png"]
+
+
+def test_screenshots_are_those_that_the_browser_tests_compare():
+    """Nothing else would notice that one shows a page of the past."""
+    shown = {picture for page in pages() for link in links(pages()[page]) if (picture := link.rpartition("/")[2]).endswith(".png")}
+    compared = {path.name for path in (ROOT / "docs/images/page").iterdir()}
+    assert shown and shown <= compared, shown - compared
+    assert [path.name for path in (ROOT / "docs/images").glob("*.png")] == []
