@@ -71,16 +71,17 @@ def test_values_are_read_written_and_called(url):
     assert set(json.loads(run("get", url, "state", "--json"))) >= {"time", "robot_position", "arm_position"}
 
 
-@pytest.mark.parametrize("way", ["directly", "gateway"])
+@pytest.mark.parametrize("way", ["directly", "gateway", "gateway with users"])
 def test_a_robot_of_the_standard_types_is_jogged(standard_robot, way, tmp_path):
-    url, login, gateway = standard_robot, {}, None
-    if way == "gateway":
+    url, login, gateway, access = standard_robot, {}, None, {}
+    if way == "gateway with users":
         make_users(tmp_path)
-        gateway = Gateway(tmp_path, {"devices": [{"name": "arm", "url": standard_robot, "mode": "shared"}], "access": {
-            "users_file": "users", "rules": [{"roles": ["operator"], "may": ["read", "subscribe", "write", "call"]}]}})
+        access = {"access": {"users_file": "users", "rules": [{"roles": ["operator"], "may": ["read", "subscribe", "write", "call"]}]}}
+        login = {"environment": {"RRGATE_PASSWORD": PASSWORDS["alice"]}}
+    if way != "directly":
+        gateway = Gateway(tmp_path, {"devices": [{"name": "arm", "url": standard_robot, "mode": "shared"}], **access})
         gateway.wait_for("device online")
         url = f"http://127.0.0.1:{gateway.port}/devices/arm?service=robot"
-        login = {"environment": {"RRGATE_PASSWORD": PASSWORDS["alice"]}}
 
     def rrgate(*arguments):
         return run(*arguments, *(["--user", "alice"] if login else []), **login)
@@ -91,6 +92,11 @@ def test_a_robot_of_the_standard_types_is_jogged(standard_robot, way, tmp_path):
             assert time.monotonic() < deadline, state
 
     try:
+        services = map(json.loads, rrgate("ls", url.split("/devices/" if gateway else "?")[0], "--json").splitlines())
+        listed = next(each for each in services if each["service"] == "robot")
+        assert listed["type"] == "com.robotraconteur.robotics.robot.Robot"
+        assert json.loads(rrgate("get", listed["url"], "robot_info", "--json"))["joint_info"][1]["joint_limits"]["upper"] > 0
+        assert rrgate("get", listed["url"], "command_mode") == "halt"  # as people read it
         assert "com.robotraconteur.robotics.robot.Robot" in rrgate("info", url)
         assert "function void halt() [urgent]" in rrgate("info", url, "halt")
         for mode in "halt", "jog":  # words of an enum
