@@ -36,16 +36,22 @@ complete -o default -F _rrgate rrgate
 constexpr std::string_view zsh_script = R"(#compdef rrgate
 _rrgate() {
     local -a candidates
-    candidates=("${(@f)$(rrgate completion words -- "${(@Q)words[2,CURRENT]}" 2>/dev/null)}")
-    if [[ -n $candidates[1] ]]; then compadd -Q -- "${(@q)candidates}"; else _files; fi
+    candidates=("${(@f)$(rrgate completion words -- "${(@Q)words[2,CURRENT-1]}" "${(Q)PREFIX}" 2>/dev/null)}")
+    if [[ -n $candidates[1] ]]; then compadd -- "${(@)candidates}"; else _files; fi
 }
 if [[ $funcstack[1] == _rrgate ]]; then _rrgate "$@"; else compdef _rrgate rrgate; fi
 )";
 constexpr std::string_view fish_script = R"(function __rrgate_words
     set -l words (commandline -opc) (commandline -ct)
-    rrgate completion words -- (string unescape -- $words[2..-1]) 2>/dev/null
+    set -l found (rrgate completion words -- (string unescape -- $words[2..-1]) 2>/dev/null)
+    # Of a URL, fish itself would offer files for what comes after ":".
+    if set -q found[1]
+        printf '%s\n' $found
+    else
+        __fish_complete_path $words[-1]
+    end
 end
-complete -c rrgate -a '(__rrgate_words)'
+complete -c rrgate -f -a '(__rrgate_words)'
 )";
 
 /// Kinds of member that a command is for; empty: all.

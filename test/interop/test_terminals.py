@@ -1,11 +1,15 @@
 """What people meet at a terminal: completion by the shell, texts of devices, a browser that opens."""
+import contextlib
+import fcntl
 import json
 import os
 import pty
 import re
 import select
+import struct
 import subprocess
 import sys
+import termios
 import time
 
 import pytest
@@ -46,21 +50,27 @@ _rrgate; echo "${COMPREPLY[@]}" """
     assert completed(f"rrgate call '{reynard}' teleport x") == ["x="]
 
 
-@pytest.mark.parametrize("typed", ["http://h", "'http://h", '"http://h', "http:", "ht", r"http://h:8080/devices/a\?nodeid=1\&"])
-def test_urls_that_bash_completes_reach_the_program_whole(typed, tmp_path):
-    """In a bash at a terminal: "&" would run the command beside it, without what follows."""
-    url = "http://h:8080/devices/a?nodeid=1&service=x"
-    program = tmp_path / "rrgate"
+SHELLS = {"bash": (["bash", "--norc", "--noprofile", "-i"], ""),
+          "zsh": (["zsh", "-f", "-i"], "autoload -U compinit; compinit -u -D; "),
+          "fish": (["fish", "--no-config", "-i", "-C", "function fish_prompt; echo -n 'ready '; end"], "")}
+
+
+@contextlib.contextmanager
+def at_a_shell(shell, folder, completes):
+    """Somebody who types into a shell at a terminal, and sees as "got <word>" what a command line of rrgate becomes. `completes`  a line
+    of bash: what the program answers to "completion words"."""
+    command, first = SHELLS[shell]
+    program = folder / "rrgate"
     program.write_text(f"""#!/bin/bash
-if [[ "$1 $2" == "completion words" ]]; then [[ "{url}" == "${{@: -1}}"* ]] && echo "{url}"
-elif [[ $1 == completion ]]; then {RRGATE} completion bash
-else printf 'got <%s>\\n' "$@"; fi
+if [[ "$1 $2" == "completion words" ]]; then {completes}
+elif [[ $1 == completion ]]; then {RRGATE} completion {shell}
+else printf 'got <%s>\\n' "$@"; echo al''l; fi
 """)
     program.chmod(0o755)
     terminal, theirs = pty.openpty()
-    environment = {**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}", "PS1": "ready ", "TERM": "dumb", "HOME": str(tmp_path)}
-    with subprocess.Popen(["bash", "--norc", "--noprofile", "-i"], stdin=theirs, stdout=theirs, stderr=theirs, env=environment,
-                          start_new_session=True) as bash:
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 50, 1000, 0, 0))
+    environment = {**os.environ, "PATH": f"{folder}:{os.environ['PATH']}", "PS1": "ready ", "TERM": "dumb", "HOME": str(folder)}
+    with subprocess.Popen(["setsid", "-c", *command], stdin=theirs, stdout=theirs, stderr=theirs, env=environment, cwd=folder) as process:
         os.close(theirs)
         shown = ""
 
@@ -72,17 +82,42 @@ else printf 'got <%s>\\n' "$@"; fi
                 if select.select([terminal], [], [], 0.2)[0]:
                     shown += os.read(terminal, 4096).decode(errors="replace")
 
+        def enter(line):
+            """Types it, with Tab for "\t"; returns the words that the program got."""
+            nonlocal shown
+            shown = ""
+            os.write(terminal, f"{line}\n".encode())
+            read_until("\nall")
+            return re.findall(r"got <(.*)>", shown.replace("\r", "\n"))
+
         try:
             read_until("ready ")
-            os.write(terminal, b"source <(rrgate completion bash); echo lo''aded\n")
+            load = "rrgate completion fish | source" if shell == "fish" else f"source <(rrgate completion {shell})"
+            os.write(terminal, f"{first}{load}; echo lo''aded\n".encode())
             read_until("loaded")
-            os.write(terminal, f"rrgate get {typed}\t\n".encode())
-            read_until("got <http")
-            read_until(">")
-            assert re.findall(r"got <(.*)>", shown.replace("\r", "")) == ["get", url]
+            yield enter
         finally:
-            bash.kill()
+            process.kill()
             os.close(terminal)
+
+
+@pytest.mark.parametrize("typed", ["http://h", "'http://h", '"http://h', "http:", "ht", r"http://h:8080/devices/a\?nodeid=1\&"])
+@pytest.mark.parametrize("shell", SHELLS)
+def test_urls_that_a_shell_completes_reach_the_program_whole(shell, typed, tmp_path):
+    """"&" would run the command beside the shell, without what follows."""
+    url = "http://h:8080/devices/a?nodeid=1&service=x"
+    with at_a_shell(shell, tmp_path, f"""[[ "{url}" == "${{@: -1}}"* ]] && echo "{url}" """) as enter:
+        assert enter(f"rrgate get {typed}\t") == ["get", url]
+
+
+@pytest.mark.parametrize("shell", SHELLS)
+def test_shells_complete_commands_members_and_files(shell, reynard, tmp_path):
+    (tmp_path / "lab.robdef").touch()
+    with at_a_shell(shell, tmp_path, f'exec {RRGATE} "$@"') as enter:
+        assert enter("rrgate check-c\t") == ["check-config"]
+        assert enter(f"rrgate get '{reynard}' robot_p\t") == ["get", reynard, "robot_position"]
+        assert enter(f"rrgate get --time\t 5 '{reynard}' col\t") == ["get", "--timeout", "5", reynard, "color"]
+        assert enter("rrgate check lab\t") == ["check", "lab.robdef"]
 
 
 @pytest.mark.parametrize("more, desktop, opens", [([], True, True), (["--no-browser"], True, False), (["--lan"], True, False),
