@@ -14,7 +14,14 @@ export class GuardedLab {
   readonly url: string;
   readonly token: string;
 
-  private constructor(createPort: number, port: number, webcamsPort: number | null, site: string, more: object) {
+  private constructor(
+    createPort: number,
+    port: number,
+    webcamsPort: number | null,
+    site: string,
+    device: object,
+    more: object,
+  ) {
     const folder = mkdtempSync(path.join(tmpdir(), "rrgate-e2e-"));
     const file = (name: string): string => path.join(folder, name);
     for (const [name, roles] of [
@@ -36,7 +43,7 @@ export class GuardedLab {
       ],
     };
     const createUrl = `rr+tcp://127.0.0.1:${createPort}/?service=Create`;
-    const devices = [{ name: "create", url: createUrl }];
+    const devices: object[] = [{ name: "create", url: createUrl, ...device }];
     if (webcamsPort !== null) {
       devices.push({ name: "webcams", url: `rr+tcp://127.0.0.1:${webcamsPort}/?service=Webcam` });
       const options = ["--port", String(webcamsPort), "--robot", createUrl];
@@ -51,9 +58,10 @@ export class GuardedLab {
     this.gateway = new Program(rrgate, ["serve", "--config", file("gateway.json")]);
   }
 
-  /** `more` is for the configuration. */
-  static async start(site: string, { hasCamera = false, more = {} } = {}): Promise<GuardedLab> {
-    const lab = new GuardedLab(await freePort(), await freePort(), hasCamera ? await freePort() : null, site, more);
+  /** `more` is for the configuration, `device` for that of the robot. */
+  static async start(site: string, { hasCamera = false, device = {}, more = {} } = {}): Promise<GuardedLab> {
+    const webcamsPort = hasCamera ? await freePort() : null;
+    const lab = new GuardedLab(await freePort(), await freePort(), webcamsPort, site, device, more);
     lab.create.start();
     lab.webcams?.start();
     lab.gateway.start();

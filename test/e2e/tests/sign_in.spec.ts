@@ -317,3 +317,92 @@ test("what agents have done is listed for who decides about them, as it happens"
     await open.stop();
   }
 });
+
+for (const [view, content] of [
+  ["drive", ".pad"],
+  ["board", ".board"],
+  ["members", "[data-member]"],
+] as const) {
+  test(`Stop stays in reach when the sign-in has expired, and stops the robot: ${view}`, async ({ page, context }) => {
+    const headers = { Authorization: `Bearer ${lab.token}`, ["Content-Type"]: "application/json" };
+    const robot = `${lab.url}api/v1/devices/create/Create`;
+    const distance = async () => (await fetch(`${robot}/DistanceTraveled`, { headers })).text();
+    const drive = (velocity: number) =>
+      fetch(`${robot}/Drive`, { method: "POST", headers, body: JSON.stringify({ velocity, radius: 2000 }) });
+    const stop = page.getByRole("button", { name: "Stop", exact: true });
+    await page.setViewportSize({ width: 412, height: 700 });
+    await page.goto(`${lab.url}#/devices/create/Create?view=${view}`);
+    await signIn(page, "root", password);
+    await expect(page.locator('[data-link="online"]')).toBeVisible();
+    await expect(stop).toBeVisible();
+    await context.clearCookies();
+    await expect(form(page)).toBeVisible();
+    await expect(page.getByRole("alert")).toHaveText("The gateway no longer accepts this sign-in.");
+    await expect(page.getByLabel("Password or token")).toBeInViewport();
+    await expect(page.locator(content).filter({ visible: true })).toHaveCount(0);
+    for (const press of [() => stop.click(), () => page.keyboard.press("Escape")]) {
+      expect((await drive(30)).ok).toBe(true);
+      await expect(stop).toBeInViewport({ ratio: 1 });
+      await press();
+      await expect(page.locator('[data-stop="arrived"]')).toBeVisible();
+      let before = "";
+      await expect(async () => {
+        const now = await distance();
+        const last = before;
+        before = now;
+        expect(now).toBe(last);
+      }).toPass({ intervals: [300] });
+    }
+    await signIn(page, "root", password);
+    await expect(form(page)).toBeHidden();
+    await expect(page.locator(content).first()).toBeVisible();
+  });
+}
+
+test("Stop says that it needs a sign-in once the gateway has ended the connection, and works after it", async ({
+  page,
+  context,
+}) => {
+  await page.goto(`${lab.url}#/devices/create/Create`);
+  await signIn(page, "root", password);
+  await expect(page.locator('[data-link="online"]')).toBeVisible();
+  const other = await context.newPage();
+  await other.goto(lab.url);
+  await signOut(other).click();
+  await expect(form(page)).toBeVisible();
+  const stop = page.getByRole("button", { name: "Stop", exact: true });
+  await expect(page.locator('[data-link="lost"]')).toBeVisible();
+  await stop.click();
+  await expect(page.locator('[data-stop="failed"]')).toHaveText(
+    "NOT STOPPED: not connected: nothing was sent. Sign in, then press Stop again.",
+  );
+  await signIn(page, "root", password);
+  await expect(page.locator('[data-link="online"]')).toBeVisible();
+  await expect(page.getByRole("button", { name: "Forward" })).toBeEnabled();
+});
+
+test("Stop asks the gateway to make the device safe also after the sign-in, and says why it may not be", async ({
+  page,
+  context,
+}) => {
+  const leases = { safe: [{ call: "Create.Drive", arguments: [0, 0] }] };
+  const shared = await GuardedLab.start(webRoot, { device: { mode: "shared", leases } });
+  try {
+    await page.goto(`${shared.url}#/devices/create/Create?view=members`);
+    await signIn(page, "root", password);
+    await expect(page.locator('[data-link="online"]')).toBeVisible();
+    const other = await context.newPage();
+    await other.goto(shared.url);
+    await signOut(other).click();
+    await expect(form(page)).toBeVisible();
+    await expect(page.locator('[data-link="lost"]')).toBeVisible();
+    const asked = page.waitForRequest(/Create\?lease=take/);
+    await page.getByRole("button", { name: "Stop", exact: true }).click();
+    await asked;
+    await expect(page.locator('[data-stop="failed"]')).toHaveText(
+      /^NOT STOPPED: .*[^.]\. Sign in, then press Stop again\.$/,
+    );
+  } finally {
+    await shared.stop();
+  }
+});

@@ -15,8 +15,8 @@ import type { UsbDeviceList } from "../gateway/usb_devices";
 import type { AccessDesk } from "../gateway/access";
 import type { AgentsDesk } from "../gateway/agents";
 import type { RecordingDesk } from "../gateway/recordings";
-import { mustSignIn } from "../gateway/session";
-import type { Session } from "../gateway/session";
+import { isSignedOut, mustSignIn } from "../gateway/session";
+import type { Session, Who } from "../gateway/session";
 import { DevicesPage } from "../pages/devices_page";
 import { ServicePage } from "../pages/service_page";
 import { RecordingsPage } from "../pages/recordings_page";
@@ -39,7 +39,11 @@ export function App({ route, list, usb, access, agents, recordings, session }: A
   const main = useRef<HTMLElement>(null);
   const who = useStore(session.who);
   const [asked, setAsked] = useState(false);
+  const expired = useStore(session.trouble);
   const isForm = mustSignIn(who) || (asked && who?.user === null);
+  // A device that a page is open for may be moving: who is to sign in again can still stop it.
+  const onlyStop = isForm && where.page === "service" && (expired !== null || !mustSignIn(who));
+  const turn = useTurn(who);
   const title = isForm ? t("Sign in") : titleOf(where);
   const first = useRef(true);
   useEffect(() => {
@@ -64,24 +68,46 @@ export function App({ route, list, usb, access, agents, recordings, session }: A
         <ThemeButton />
       </header>
       <main id="main" ref={main} tabIndex={-1}>
-        {isForm && <SignInPage session={session} done={() => setAsked(false)} />}
         {!isForm && <AgentsPart agents={agents} />}
-        {!isForm && (
-          <Page route={where} list={list} usb={usb} access={access} agents={agents} recordings={recordings} />
+        {(!isForm || onlyStop) && (
+          <Page
+            key={turn}
+            route={where}
+            list={list}
+            usb={usb}
+            access={access}
+            agents={agents}
+            recordings={recordings}
+            onlyStop={onlyStop}
+          />
         )}
+        {isForm && <SignInPage session={session} done={() => setAsked(false)} />}
       </main>
     </>
   );
 }
 
-type PageParts = Omit<AppParts, "route" | "session"> & { route: Route };
+/** Another number for another user: a page begins anew, since its connections are those of the one before. */
+function useTurn(who: Who | null): number {
+  const last = useRef<string | null>(null);
+  const turn = useRef(0);
+  if (who !== null && !isSignedOut(who)) {
+    if (last.current !== null && last.current !== who.user) turn.current += 1;
+    last.current = who.user;
+  }
+  return turn.current;
+}
 
-function Page({ route: where, list, usb, access, agents, recordings }: PageParts) {
+type PageParts = Omit<AppParts, "route" | "session"> & { route: Route; onlyStop: boolean };
+
+function Page({ route: where, list, usb, access, agents, recordings, onlyStop }: PageParts) {
   return (
     <>
       {where.page === "devices" && <DevicesPage list={list} usb={usb} access={access} agents={agents} />}
       {where.page === "recordings" && <RecordingsPage desk={recordings} list={list} />}
-      {where.page === "service" && <ServicePage key={`${where.device}/${where.service}`} route={where} list={list} />}
+      {where.page === "service" && (
+        <ServicePage key={`${where.device}/${where.service}`} route={where} list={list} onlyStop={onlyStop} />
+      )}
       {where.page === "unknown" && <UnknownPage address={where.address} />}
     </>
   );

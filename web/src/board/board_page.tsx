@@ -33,12 +33,20 @@ import { Keeper } from "./keeper";
 import { findRoom, inOrder, nudge, put, settle } from "./layout";
 import { PanelFrame } from "./panel_frame";
 import { presetFor } from "./presets";
-import { StopButton } from "./stop";
+import { StopButton, useSafe } from "./stop";
 import "../styles/board.css";
 
 type ServiceRoute = Route & { page: "service" };
 
-export default function BoardPage({ link, route, list }: { link: Link; route: ServiceRoute; list: DeviceList }) {
+export interface BoardPageProps {
+  link: Link;
+  route: ServiceRoute;
+  list: DeviceList;
+  /** Nobody is signed in any more. */
+  onlyStop: boolean;
+}
+
+export default function BoardPage({ link, route, list, onlyStop }: BoardPageProps) {
   const path = route.path.map(formatStep).join(".");
   const key = boardKey(route);
   const { object, reach, last, failure } = useObject(link, "", path, list);
@@ -55,17 +63,27 @@ export default function BoardPage({ link, route, list }: { link: Link; route: Se
   const [arranging, setArranging] = useState(false);
   const silent = usePulse(object, useShared(list, route.device));
   const services = useServices(list);
+  const safe = useSafe(route, list);
   if (!board) {
     return (
       <div class="board-page">
         <div class="board-bar">
-          <StopButton object={reach} stop={null} place={route} list={list} />
+          <StopButton object={reach} stop={null} place={route} safe={safe} />
         </div>
         {failure === null ? <Waiting /> : <Failure text={failure} />}
       </div>
     );
   }
   const stop = preset?.stop ?? board.stop; // a file may say how to stop what is not known, and nothing else
+  if (onlyStop) {
+    return (
+      <div class="board-page">
+        <div class="board-bar">
+          <StopButton object={reach} stop={stop} place={route} safe={safe} />
+        </div>
+      </div>
+    );
+  }
   const setPanels = (panels: readonly Panel[]): void => setBoard({ ...board, panels });
   const add = (kind: PanelKind): void => {
     const { w, h } = KINDS[kind];
@@ -78,7 +96,7 @@ export default function BoardPage({ link, route, list }: { link: Link; route: Se
   return (
     <div class="board-page" data-kept={isKept}>
       <div class="board-bar">
-        <StopButton object={reach} stop={stop} place={route} list={list} />
+        <StopButton object={reach} stop={stop} place={route} safe={safe} />
         {silent !== null && (
           <p class="failure board-silent" role="alert">
             {t("The device has not answered for {0}.", oldness(silent))}

@@ -6,6 +6,7 @@ import { t } from "../app/language";
 import type { DeviceList } from "../gateway/devices";
 import { devicesOf } from "../gateway/devices";
 import { makeSafe, safeOf } from "../gateway/safe";
+import { isSignedOut, session } from "../gateway/session";
 import { isEscape, tellStop } from "../robot/control";
 import { explain } from "../robot/remote";
 import type { Remote } from "../robot/remote";
@@ -26,8 +27,7 @@ type State =
  * By a call where it is known how and there is a connection, else by what the gateway does when a lease ends; nothing where neither
  * is known.
  */
-export function StopButton({ object, stop, place, list }: StopButtonProps) {
-  const safe = useSafe(place, list);
+export function StopButton({ object, stop, place, safe }: StopButtonProps) {
   if (!stop && safe.length === 0) return null;
   const send: Send = (failed) => {
     if (stop && object) return stopDevice(object, stop, failed);
@@ -49,11 +49,17 @@ export async function stopWithout(
   { device, service }: StopButtonProps["place"],
   safe: readonly string[],
 ): Promise<string> {
-  if (safe.length === 0) throw new Error(t("not connected: nothing was sent"));
+  if (safe.length === 0) throw new Error(withSignIn(t("not connected: nothing was sent")));
   const at = performance.now();
-  await makeSafe(device, service);
+  await makeSafe(device, service).catch((error: unknown) => {
+    throw new Error(withSignIn(explain(error)), { cause: error });
+  });
   const took = (performance.now() - at).toFixed(0);
   return t("passed on by the gateway after {0} ms, {1}; the device's answer is not known", took, clockTime(Date.now()));
+}
+
+function withSignIn(why: string): string {
+  return isSignedOut(session.who.value) ? t("{0}. Sign in, then press Stop again.", why) : why;
 }
 
 export interface StopButtonProps {
@@ -61,13 +67,21 @@ export interface StopButtonProps {
   object: Remote | null;
   stop: StopCall | null;
   place: { device: string; service: string };
-  list: DeviceList;
+  /** As useSafe() has it. */
+  safe: readonly string[];
 }
 
-/** What the gateway does to make a service safe; empty where it has no leases of it. */
-export function useSafe({ device, service }: StopButtonProps["place"], list: DeviceList): string[] {
-  const known = devicesOf(useStore(list.state))?.find(({ name }) => name === device);
-  return safeOf(known?.safe ?? [], service);
+/**
+ * What the gateway does to make a service safe; empty where it has no leases of it. Also after a sign-in has ended, and with it the
+ * list of devices: a stop is still to be tried.
+ */
+export function useSafe({ device, service }: StopButtonProps["place"], list: DeviceList): readonly string[] {
+  const devices = devicesOf(useStore(list.state));
+  const place = `${device}/${service}`;
+  const last = useRef<{ place: string; safe: readonly string[] }>({ place, safe: [] });
+  const known = devices?.find(({ name }) => name === device);
+  if (devices || last.current.place !== place) last.current = { place, safe: safeOf(known?.safe ?? [], service) };
+  return last.current.safe;
 }
 
 /** `failed` hears of what fails later. With words where it was not the device that answered: how it went. */

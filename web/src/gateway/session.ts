@@ -67,7 +67,7 @@ export class Session {
   async fetch(path: string, init: RequestInit = {}): Promise<Response> {
     await this.#known;
     const who = this.who.value;
-    const isOfBrowser = who !== null && !(who.login && who.user === null);
+    const isOfBrowser = who !== null && !isSignedOut(who);
     const response = await fetch(address(path), ofPage(init, isOfBrowser));
     if (response.status === 401) void this.#look();
     return response;
@@ -118,7 +118,12 @@ export const session = new Session();
 
 /** Whether there is nothing to see without signing in. */
 export function mustSignIn(who: Who | null): boolean {
-  return who !== null && who.login && who.user === null && who.roles.length === 0;
+  return isSignedOut(who) && who?.roles.length === 0;
+}
+
+/** Whether the gateway wants to know who the page is, and does not. */
+export function isSignedOut(who: Who | null): boolean {
+  return who !== null && who.login && who.user === null;
 }
 
 export function readWho(answer: unknown): Who {

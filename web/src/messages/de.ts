@@ -148,6 +148,7 @@ const german: Readonly<Record<string, string>> = {
   "no value yet": "noch kein Wert",
   "not connected": "nicht verbunden",
   "not connected: nothing was sent": "nicht verbunden: nichts wurde gesendet",
+  "{0}. Sign in, then press Stop again.": "{0}. Anmelden, dann noch einmal Stopp drücken.",
   "object, such as Webcams[0]": "Objekt, etwa Webcams[0]",
   "passed on by the gateway after {0} ms, {1}; the device's answer is not known":
     "vom Gateway weitergegeben nach {0} ms, {1}; was das Gerät antwortet, ist nicht bekannt",

@@ -8,7 +8,8 @@ import { formatRoute, formatStep } from "../app/router";
 import type { PathStep, Route, View } from "../app/router";
 import { recallBoard } from "../board/board";
 import { hasPreset, stopFor } from "../board/presets";
-import { StopButton } from "../board/stop";
+import type { BoardPageProps } from "../board/board_page";
+import { StopButton, useSafe } from "../board/stop";
 import { useStore } from "../app/store";
 import { devicesOf } from "../gateway/devices";
 import type { DeviceList } from "../gateway/devices";
@@ -26,7 +27,14 @@ import { RobotPage } from "./robot_page";
 
 type ServiceRoute = Route & { page: "service" };
 
-export function ServicePage({ route, list }: { route: ServiceRoute; list: DeviceList }) {
+export interface ServicePageProps {
+  route: ServiceRoute;
+  list: DeviceList;
+  /** Nobody is signed in any more: the connection is kept, and of the page its stop. */
+  onlyStop: boolean;
+}
+
+export function ServicePage({ route, list, onlyStop }: ServicePageProps) {
   const { device, service, path, view } = route;
   const isMissing = useMissing(device, list);
   const link = useLink(device, service, list, !isMissing);
@@ -34,21 +42,24 @@ export function ServicePage({ route, list }: { route: ServiceRoute; list: Device
   const drives = robot && path.length === 0;
   const first = useFirstView(link, route, drives);
   const shown = view === "auto" || (view === "drive" && !drives) ? first : view;
+  const isDriven = shown === "drive";
   return (
-    <div class={`page ${shown === "members" ? "page-narrow" : "page-wide"}`}>
+    <div class={`page ${shown === "members" || onlyStop ? "page-narrow" : "page-wide"}`}>
       <div class="service-head">
         <h1 class="place-name">{device}</h1>
         {link && <LinkStrip link={link} list={list} device={device} service={service} />}
-        {link && <Views route={route} shown={shown} first={first} drives={drives} />}
+        {link && !onlyStop && <Views route={route} shown={shown} first={first} drives={drives} />}
       </div>
-      {link && shown === "members" && <HeadStop link={link} route={route} list={list} />}
+      {link && (
+        <HeadStop link={link} route={route} list={list} isShown={shown === "members" || (onlyStop && isDriven)} />
+      )}
       {drives && link && (
-        <div hidden={shown !== "drive"}>
-          <RobotPage link={link} list={list} device={device} service={service} shown={shown === "drive"} />
+        <div hidden={!isDriven || onlyStop}>
+          <RobotPage link={link} list={list} device={device} service={service} shown={isDriven && !onlyStop} />
         </div>
       )}
-      {link && shown === "board" && <LoadedBoard link={link} route={route} list={list} />}
-      {link && shown === "members" && <MembersPage link={link} route={route} path={path} />}
+      {link && shown === "board" && <LoadedBoard link={link} route={route} list={list} onlyStop={onlyStop} />}
+      {link && shown === "members" && !onlyStop && <MembersPage link={link} route={route} path={path} />}
       {isMissing && (
         <p class="empty">
           {t("The gateway has no device of this name. If one comes, it opens here by itself.")}{" "}
@@ -80,13 +91,23 @@ function Views({ route, shown, first, drives }: { route: ServiceRoute; shown: Vi
   );
 }
 
+interface HeadStopProps {
+  link: Link;
+  route: ServiceRoute;
+  list: DeviceList;
+  /** What stops the device is learned meanwhile, too: there may be no connection when it is wanted. */
+  isShown: boolean;
+}
+
 /** Of the object that is shown, else of the service. A board and the demo robot have their own. */
-function HeadStop({ link, route, list }: { link: Link; route: ServiceRoute; list: DeviceList }) {
+function HeadStop({ link, route, list, isShown }: HeadStopProps) {
   const shown = useObject(link, "", route.path.map(formatStep).join("."), list);
   const root = useObject(link, "", "", list);
   const [own, service] = [useStop(shown.last), useStop(root.last)];
-  if (own) return <StopButton object={shown.reach} stop={own} place={route} list={list} />;
-  return <StopButton object={root.reach} stop={service} place={route} list={list} />;
+  const safe = useSafe(route, list);
+  if (!isShown) return null;
+  if (own) return <StopButton object={shown.reach} stop={own} place={route} safe={safe} />;
+  return <StopButton object={root.reach} stop={service} place={route} safe={safe} />;
 }
 
 function useStop(object: Remote | null): StopCall | null {
@@ -115,8 +136,8 @@ function useFirstView(link: Link | null, route: ServiceRoute, drives: boolean): 
 }
 
 /** The board's code, once a board is looked at. */
-function LoadedBoard(props: { link: Link; route: ServiceRoute; list: DeviceList }) {
-  const [Shown, setShown] = useState<ComponentType<typeof props> | null>(null);
+function LoadedBoard(props: BoardPageProps) {
+  const [Shown, setShown] = useState<ComponentType<BoardPageProps> | null>(null);
   useEffect(() => {
     import("../board/board_page").then(
       ({ default: shown }) => setShown(() => shown),

@@ -17,7 +17,7 @@ export function SignInPage({ session, done }: { session: Session; done: () => vo
   const who = useStore(session.who);
   const first = useRef<HTMLInputElement>(null);
   const second = useRef<HTMLInputElement>(null);
-  useEffect(() => first.current?.focus(), []);
+  useEffect(() => first.current?.focus({ preventScroll: true }), []);
 
   const signIn = async (as: string, shown: string): Promise<void> => {
     setBusy(true);
