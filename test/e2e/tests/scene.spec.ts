@@ -89,6 +89,45 @@ test("it is looked at from other sides, by buttons and by dragging", async ({ pa
   ).toPass();
 });
 
+test("on a touch screen one finger scrolls the page past the picture, two turn it", async ({ browser }) => {
+  const context = await browser.newContext({ viewport: { width: 412, height: 700 }, hasTouch: true, isMobile: true });
+  const page = await context.newPage();
+  await page.goto(`${robot.url}#/devices/peer/robot`);
+  await expect(panel(page).getByText("2 frames")).toBeVisible();
+  const canvas = panel(page).locator("canvas");
+  await canvas.evaluate((element) => element.scrollIntoView({ block: "center" }));
+  const scrolled = () => page.evaluate(() => scrollY);
+  const fingers = await context.newCDPSession(page);
+  const touch = (type: string, touchPoints: { x: number; y: number; id: number }[] = []) =>
+    fingers.send("Input.dispatchTouchEvent", { type: type as "touchStart", touchPoints });
+  const middle = async () => {
+    const box = await canvas.boundingBox();
+    if (!box) throw new Error("the canvas has no place on the page");
+    return { x: box.x + box.width / 2, y: box.y + box.height / 2 };
+  };
+
+  const picture = await canvas.screenshot();
+  const { x, y } = await middle();
+  const before = await scrolled();
+  await touch("touchStart", [{ x, y, id: 0 }]);
+  for (let up = 10; up <= 100; up += 10) await touch("touchMove", [{ x, y: y - up, id: 0 }]);
+  await touch("touchEnd");
+  await expect.poll(scrolled).toBeGreaterThan(before + 50);
+  await canvas.evaluate((element) => element.scrollIntoView({ block: "center" }));
+  expect((await canvas.screenshot()).equals(picture)).toBe(true);
+
+  const still = await scrolled();
+  const at = await middle();
+  const pair = (by: number) => [-30, 30].map((aside, id) => ({ x: at.x + aside + by, y: at.y - by, id }));
+  await touch("touchStart", pair(0).slice(0, 1));
+  await touch("touchStart", pair(0));
+  for (let by = 10; by <= 60; by += 10) await touch("touchMove", pair(by));
+  await touch("touchEnd");
+  await expect(async () => expect((await canvas.screenshot()).equals(picture)).toBe(false)).toPass();
+  expect(await scrolled()).toBe(still);
+  await context.close();
+});
+
 test("a browser without 3-D pictures says so, and has the numbers", async ({ page }) => {
   await page.addInitScript(() => {
     const { getContext } = HTMLCanvasElement.prototype;

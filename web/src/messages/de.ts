@@ -105,6 +105,7 @@ const german: Readonly<Record<string, string>> = {
   "{0} frames": "{0} Bezugssysteme",
   "{0} in space": "{0} im Raum",
   "3-D": "3D",
+  "Two fingers turn and zoom.": "Zwei Finger drehen und zoomen.",
   "From above": "Von oben",
   "From the front": "Von vorn",
   "From the side": "Von der Seite",

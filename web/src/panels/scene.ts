@@ -19,6 +19,7 @@ import {
   Quaternion,
   Scene,
   SphereGeometry,
+  TOUCH,
   Vector3,
   WebGLRenderer,
 } from "three";
@@ -72,6 +73,11 @@ export class Picture {
     this.#scene.add(new HemisphereLight(0xffffff, 0x8899aa, 1.8), sun, this.#chains, this.#frames, this.#cloud);
     this.#camera.up.set(0, 0, 1); // as robots have it
     this.#controls = new OrbitControls(this.#camera, canvas);
+    // One finger scrolls the page, as over a map: a panel may fill the screen of a phone.
+    this.#controls.touches = { ONE: null, TWO: TOUCH.DOLLY_ROTATE };
+    canvas.style.touchAction = "pan-x pan-y"; // OrbitControls has set "none"
+    canvas.addEventListener("touchstart", keepPair, { passive: false });
+    canvas.addEventListener("touchmove", keepPair, { passive: false });
     this.#controls.addEventListener("change", this.#redraw);
     this.#resized = new ResizeObserver(() => this.#resize());
     this.#resized.observe(canvas);
@@ -128,6 +134,8 @@ export class Picture {
     cancelAnimationFrame(this.#frame);
     this.#frame = -1; // nothing is drawn any more
     this.#resized.disconnect();
+    this.canvas.removeEventListener("touchstart", keepPair);
+    this.canvas.removeEventListener("touchmove", keepPair);
     this.#controls.dispose();
     this.#floor?.dispose();
     for (const axes of this.#frames.children) (axes as AxesHelper).dispose();
@@ -214,4 +222,9 @@ export class Picture {
       this.#renderer.render(this.#scene, this.#camera);
     });
   };
+}
+
+/** Two fingers turn and zoom the picture, and not the page as well. */
+function keepPair(event: TouchEvent): void {
+  if (event.touches.length > 1 && event.cancelable) event.preventDefault();
 }

@@ -103,6 +103,7 @@ export default function ScenePanel({ object, members, settings, change }: PanelP
         role="img"
         aria-label={t("{0} in space", name)}
       />
+      <p class="note two-fingers">{t("Two fingers turn and zoom.")}</p>
       {points && <p class="note">{t("{0} points", formatNumber(points.length / 3))}</p>}
       <details class="frames">
         <summary>{told.length === 1 ? t("1 frame") : t("{0} frames", told.length)}</summary>
