@@ -101,6 +101,47 @@ test("a board goes by its address, and as a file, to another browser", async ({ 
   await third.context().close();
 });
 
+test("a removed panel and a replaced board come back by Undo, until the next change", async ({ page, lab }) => {
+  await openBoard(page, lab.url);
+  await addPanel(page, "notes");
+  const notes = page.locator('[data-panel="notes"]');
+  const text = notes.getByRole("textbox", { name: "Notes", exact: true });
+  const place = () => notes.evaluate((element) => [element.style.gridColumn, element.style.gridRow]);
+  await text.fill("call Vera at 12");
+  const before = await place();
+  const undo = page.getByRole("button", { name: "Undo" });
+  await notes.getByRole("button", { name: "Remove Notes" }).click();
+  await expect(notes).toHaveCount(0);
+  await expect(page.getByRole("status").filter({ hasText: "Removed: Notes" })).toBeVisible();
+  await expect(undo).toBeFocused();
+  await expect(undo).toBeInViewport({ ratio: 1 });
+  await page.keyboard.press("Enter");
+  await expect(text).toHaveValue("call Vera at 12");
+  expect(await place()).toEqual(before);
+  await expect(undo).toBeHidden();
+
+  await page.getByRole("button", { name: "As at first" }).click();
+  await expect(notes).toHaveCount(0);
+  await undo.click();
+  await expect(text).toHaveValue("call Vera at 12");
+  await page.getByLabel("Board file").setInputFiles({
+    name: "empty.json",
+    mimeType: "application/json",
+    buffer: Buffer.from('{"board":1,"panels":[]}'),
+  });
+  await expect(page.locator(".board-panel")).toHaveCount(0);
+  await undo.click();
+  await expect(text).toHaveValue("call Vera at 12");
+  await expect(page.locator('[data-kept="true"]')).toBeVisible();
+  await page.reload();
+  await expect(text).toHaveValue("call Vera at 12");
+
+  await page.getByRole("button", { name: "As at first" }).click();
+  await addPanel(page, "locks");
+  await expect(page.locator('[data-panel="locks"]')).toBeVisible();
+  await expect(undo).toBeHidden();
+});
+
 test("a frozen device is seen within a second, and its values say how old they are", async ({ page, lab }) => {
   await openBoard(page, lab.url);
   await expect(page.locator('[data-panel="plot"] .freshness').first()).toContainText("a second");
@@ -196,6 +237,7 @@ test("the stop reaches a device that the gateway takes for offline, and one with
   await expect(page.locator('[data-stop="passed"]')).toBeVisible();
   await page.route("**/Create?lease=take*", (route) => route.fulfill({ status: 503, json: { detail: "offline" } }));
   await page.getByRole("link", { name: "Drive" }).click();
+  await expect(page.getByRole("region", { name: "Drive" })).toBeVisible();
   await page.keyboard.press("Escape");
   await expect(page.getByRole("region", { name: "Drive" })).toContainText("NOT STOPPED: offline");
 });

@@ -31,9 +31,10 @@ import type { Board, Panel, PanelKind } from "./board";
 import { Guard } from "./guard";
 import { Keeper } from "./keeper";
 import { findRoom, inOrder, nudge, put, settle } from "./layout";
-import { PanelFrame } from "./panel_frame";
+import { nameOf, PanelFrame } from "./panel_frame";
 import { presetFor } from "./presets";
 import { StopButton, useSafe } from "./stop";
+import { UndoBar, useUndo } from "./undo";
 import "../styles/board.css";
 
 type ServiceRoute = Route & { page: "service" };
@@ -59,7 +60,9 @@ export default function BoardPage({ link, route, list, onlyStop }: BoardPageProp
       scope: scopeOf(last.type),
     });
   }, [last?.type]);
-  const { board, isKept, trouble, setBoard, setTrouble } = useBoard(key, route, preset);
+  const { board, isKept, trouble, setBoard: writeDown, setTrouble } = useBoard(key, route, preset);
+  const undo = useUndo(`${key} ${route.board ?? ""}`);
+  const grid = useRef<HTMLDivElement>(null);
   const [arranging, setArranging] = useState(false);
   const silent = usePulse(object, useShared(list, route.device));
   const services = useServices(list);
@@ -84,6 +87,21 @@ export default function BoardPage({ link, route, list, onlyStop }: BoardPageProp
       </div>
     );
   }
+  const setBoard = (next: Board): void => {
+    if (sameBoard(board, next)) return;
+    undo.forget();
+    writeDown(next);
+  };
+  const replace = (words: string, next: Board): void => {
+    undo.lose(words, board);
+    writeDown(next, next === preset);
+    setTrouble(null);
+  };
+  const putBack = (before: Board): void => {
+    undo.forget();
+    writeDown(before, before === preset);
+    grid.current?.focus({ preventScroll: true });
+  };
   const setPanels = (panels: readonly Panel[]): void => setBoard({ ...board, panels });
   const add = (kind: PanelKind): void => {
     const { w, h } = KINDS[kind];
@@ -108,13 +126,13 @@ export default function BoardPage({ link, route, list, onlyStop }: BoardPageProp
           arranging={arranging}
           setArranging={setArranging}
           add={add}
-          take={(next) => (setBoard(next), setTrouble(null))}
-          reset={() => preset && setBoard(preset, true)}
+          take={(next) => replace(t("The board is that of the file."), next)}
+          reset={() => preset && replace(t("The board is as at first."), preset)}
           fail={setTrouble}
         />
       </div>
       <Failure text={trouble ?? failure} />
-      <div class="board">
+      <div ref={grid} class="board" tabIndex={-1}>
         {inOrder(board.panels).map((panel) => (
           <Guard key={panel.id}>
             <PanelFrame
@@ -127,12 +145,16 @@ export default function BoardPage({ link, route, list, onlyStop }: BoardPageProp
               move={(place) => setPanels(put(board.panels, panel.id, place))}
               step={(dx, dy) => setPanels(nudge(board.panels, panel.id, dx, dy))}
               update={(change) => update(panel.id, change)}
-              remove={() => setPanels(settle(board.panels.filter(({ id }) => id !== panel.id)))}
+              remove={() => {
+                const panels = settle(board.panels.filter(({ id }) => id !== panel.id));
+                replace(t("Removed: {0}", nameOf(panel)), { ...board, panels });
+              }}
             />
           </Guard>
         ))}
       </div>
       {board.panels.length === 0 && <p class="empty">{t("This board is empty. Add a panel above.")}</p>}
+      <UndoBar lost={undo.lost} undo={putBack} />
     </div>
   );
 }
