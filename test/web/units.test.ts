@@ -34,3 +34,11 @@ it.each([
   ["Speed (max)", ""],
   ["Set in the configuration", ""],
 ])("by its documentation, %s", (documentation, expected) => expect(unit("x", documentation)).toBe(expected));
+
+test("of a value without fields, by its member", () => {
+  const of = (name: string, documentation: string, path = "") =>
+    unitOf("double", path, fields(), "com.example.units", { name, documentation });
+  expect(of("distance", "Distance travelled, in mm; backwards counts down.")).toBe("mm");
+  expect(of("joint_rad", "", "[2]")).toBe("rad");
+  expect(of("count", "")).toBe("");
+});

@@ -3,6 +3,7 @@ import { readFileSync } from "node:fs";
 import type { Page, WebSocketRoute } from "@playwright/test";
 import { expect, test } from "../lab_test";
 import { addPanel } from "../board";
+import { Program, rrgate, startGateway, webRoot } from "../processes";
 
 const panel = (page: Page, name: string) => page.getByRole("group", { name, exact: true });
 
@@ -99,6 +100,52 @@ test("a board goes by its address, and as a file, to another browser", async ({ 
     '/panels/0/kind is "oven", expected one of plot',
   );
   await third.context().close();
+});
+
+test("a plot shows several members, in the address and after a reload", async ({ page, lab }) => {
+  await openBoard(page, lab.url);
+  await page.getByRole("button", { name: "As at first" }).click();
+  await addPanel(page, "plot");
+  const plot = page.locator('[data-panel="plot"]').last();
+  await plot.getByLabel("Member").selectOption("DistanceTraveled");
+  const canvas = plot.getByRole("img");
+  await expect(canvas).toHaveAccessibleName("Plot of DistanceTraveled");
+  await plot.getByLabel("Add to the plot").selectOption("state");
+  await plot.getByText(/^Series: /).click();
+  for (const name of ["state.y", "state.velocity", "state.heading"])
+    await plot.getByRole("checkbox", { name }).uncheck();
+  await expect(canvas).toHaveAccessibleName("Plot of DistanceTraveled, state.x");
+  const legend = plot.locator(".u-legend");
+  await expect(legend).toHaveText(/^Time0\.00 sDistanceTraveled-?\d+state\.x-?\d/);
+  const saved = page.waitForEvent("download");
+  await plot.getByRole("button", { name: "CSV" }).click();
+  const download = await saved;
+  expect(download.suggestedFilename()).toBe("DistanceTraveled-state.csv");
+  expect(readFileSync(await download.path(), "utf8")).toMatch(/^time_s,DistanceTraveled,state\.x\n[^]*,,-?\d/);
+
+  await expect(page.locator('[data-kept="true"]')).toBeVisible();
+  await page.reload();
+  await expect(canvas).toHaveAccessibleName("Plot of DistanceTraveled, state.x");
+  await expect(page.getByRole("group", { name: "DistanceTraveled, state" })).toBeVisible();
+  await plot.getByRole("button", { name: "Take state off the plot" }).click();
+  await expect(canvas).toHaveAccessibleName("Plot of DistanceTraveled");
+});
+
+test("the axis of a plot has the unit that all its series have", async ({ page }) => {
+  const demo = new Program(rrgate, ["demo", "microassembly", "--port", "0", "--no-browser"]);
+  demo.start();
+  const [cameras = ""] = await demo.waitForOutput(/rr\+tcp:\S+service=Cameras/);
+  const gateway = await startGateway("cameras", cameras, webRoot);
+  try {
+    const panels = [{ kind: "plot", x: 0, y: 0, w: 6, h: 8, settings: { member: "focus", paths: ["[0]", "[1]"] } }];
+    const board = Buffer.from(JSON.stringify({ board: 1, panels })).toString("base64url");
+    await page.goto(`${gateway.url}#/devices/cameras/Cameras?view=board&board=${board}`);
+    const plot = page.getByRole("img", { name: "Plot of [0] [mm], [1] [mm]" });
+    await expect(plot).toHaveAttribute("data-unit", "mm");
+  } finally {
+    await gateway.program.kill("SIGTERM");
+    await demo.kill("SIGTERM");
+  }
 });
 
 test("a removed panel and a replaced board come back by Undo, until the next change", async ({ page, lab }) => {

@@ -9,6 +9,7 @@ import { useDefinitions } from "../live/definitions";
 import { useObject } from "../live/links";
 import { KINDS, textIn } from "../panels/panel";
 import type { PanelProps } from "../panels/panel";
+import { sourcesOf } from "../panels/plot_sources";
 import type { Link } from "../robot/link";
 import { Failure } from "../ui/failure";
 import { scopeOf } from "../values/definitions";
@@ -149,7 +150,12 @@ export function PanelFrame({
 
 export function nameOf(panel: Panel): string {
   if (panel.title !== "") return t(panel.title); // titles of presets are known
-  const member = textIn(panel.settings, "member");
+  const member =
+    panel.kind === "plot"
+      ? sourcesOf(panel.settings, "")
+          .map((each) => each.member)
+          .join(", ")
+      : textIn(panel.settings, "member");
   return member === "" ? t(KINDS[panel.kind].title) : member;
 }
 

@@ -62,6 +62,8 @@ const german: Readonly<Record<string, string>> = {
   "Picture of {0}": "Bild von {0}",
   Pipe: "Pipe",
   Plot: "Kurven",
+  "Add to the plot": "Zu den Kurven hinzufügen",
+  "Take {0} off the plot": "{0} von den Kurven nehmen",
   "Plot of {0}": "Kurven von {0}",
   Position: "Stelle",
   Rate: "Rate",

@@ -1,4 +1,4 @@
-// Numbers over time: any of wires, properties and pipes, by their path; pause, zoom, cursor, and a file of what is shown.
+// Numbers over time: any of some wires, properties and pipes, by their path; pause, zoom, cursor, and a file of what is shown.
 // Layer: web/panels. Drawn by uPlot.
 
 import { useCallback, useEffect, useMemo, useRef, useState } from "preact/hooks";
@@ -10,60 +10,105 @@ import { readPalette } from "../chart/palette";
 import { drawInTurn, leaveTurn } from "../chart/turns";
 import type { FeedKind } from "../live/feed";
 import { useEach, useFeed } from "../live/use_feed";
-import type { Remote } from "../robot/remote";
+import type { Member, Remote } from "../robot/remote";
 import { unitOf } from "../values/units";
 import { numberPaths, numberReader } from "../values/paths";
 import { saveFile } from "../ui/save_file";
-import { membersFor, numberIn, textIn, textsIn } from "./panel";
+import { membersFor, numberIn } from "./panel";
 import type { PanelProps } from "./panel";
 import { feedKindOf, Freshness, MemberSelect } from "./parts";
-import { lonely, Trace, toCsv } from "./trace";
+import { MOST_SOURCES, sharedUnit, sourcesOf, withSources } from "./plot_sources";
+import type { PlotSource } from "./plot_sources";
+import { lonely, measuredAt, Trace, toCsv } from "./trace";
 
 const DRAW_MS = 100;
 const AT_FIRST = 4;
 const WINDOWS = [10, 30, 120, 600];
 
+/** A member of the plot, and what is known of it. */
+interface Source {
+  name: string;
+  kind: FeedKind | null;
+  available: readonly string[];
+  paths: readonly string[];
+  /** Its first column of the trace. */
+  from: number;
+}
+
+/** The numbers that a member was found to have, by which object. */
+type Found = Readonly<Record<string, { object: Remote | null; paths: readonly string[] }>>;
+
 export default function PlotPanel(props: PanelProps) {
   const { object, members, settings, change, definitions, scope } = props;
   const choices = membersFor("plot", members);
-  const name = textIn(settings, "member") || choices[0]?.name || "";
-  const member = choices.find((each) => each.name === name);
   const seconds = numberIn(settings, "seconds", 30, 1, 3600);
-  const kind = feedKindOf(member);
-  const [first, setFirst] = useState<{ of: string; object: Remote | null; paths: readonly string[] }>(NOTHING);
-  const available = first.of === name ? first.paths : NOTHING.paths;
-  const chosen = textsIn(settings, "paths");
-  const paths = chosen.length > 0 ? chosen : preferred(available).slice(0, AT_FIRST);
-  const key = JSON.stringify([name, paths]);
-  const trace = useMemo(() => new Trace(paths.length), [key]);
-  const readers = useMemo(() => paths.map(numberReader), [key]);
-  const [paused, setPaused] = useState(false);
-  useEach(object, kind, name, (value, now, isAfterGap) => {
-    if (first.of !== name || first.object !== object) setFirst({ of: name, object, paths: numberPaths(value) });
-    if (isAfterGap) trace.breakOff();
-    trace.push(
-      now,
-      readers.map((read) => read(value)),
-    );
+  const [found, setFound] = useState<Found>({});
+  const chosen = sourcesOf(settings, choices[0]?.name ?? "");
+  let columns = 0;
+  const sources: Source[] = chosen.map(({ member: name, paths: wanted }) => {
+    const available = (Object.hasOwn(found, name) && found[name]?.paths) || [];
+    const paths = wanted.length > 0 ? wanted : preferred(available).slice(0, AT_FIRST);
+    const from = columns;
+    columns += paths.length;
+    return { name, kind: feedKindOf(choices.find((each) => each.name === name)), available, paths, from };
   });
-  const type = member?.type ?? "";
-  const label = useCallback(
-    (path: string): string => {
-      const unit = unitOf(type, path, definitions, scope);
-      const shown = path === "" ? name : path;
-      return unit === "" ? shown : `${shown} [${unit}]`;
+  const key = JSON.stringify(sources.map(({ name, paths }) => [name, paths]));
+  const trace = useMemo(() => new Trace(columns, sources.length), [key]);
+  const [paused, setPaused] = useState(false);
+  const isOne = sources.length === 1;
+  const unit = useCallback(
+    (name: string, path: string): string => {
+      const member = members.find((each) => each.name === name);
+      return unitOf(member?.type ?? "", path, definitions, scope, member);
     },
-    [name, type, definitions, scope],
+    [members, definitions, scope],
   );
-  const labels = useMemo(() => paths.map(label), [key, label]);
-  const save = (): void =>
-    saveFile(`${name}.csv`, "text/csv", toCsv(["time_s", ...paths.map((path) => path || name)], trace));
-  const pick = (path: string, on: boolean): void =>
-    change({ ...settings, member: name, paths: on ? [...paths, path] : paths.filter((each) => each !== path) });
+  const label = useCallback(
+    (name: string, path: string): string => {
+      const shown = isOne ? path || name : pathIn(name, path);
+      const said = unit(name, path);
+      return said === "" ? shown : `${shown} [${said}]`;
+    },
+    [isOne, unit],
+  );
+  const series = sources.flatMap(({ name, paths }) => paths.map((path) => ({ name, path })));
+  const labels = useMemo(() => series.map(({ name, path }) => label(name, path)), [key, label]);
+  const shared = useMemo(() => sharedUnit(series.map(({ name, path }) => unit(name, path))), [key, unit]);
+  const set = (next: readonly PlotSource[]): void => change(withSources(settings, next));
+  const save = (): void => {
+    const head = series.map(({ name, path }) => (isOne ? path || name : pathIn(name, path)));
+    saveFile(`${sources.map(({ name }) => name).join("-")}.csv`, "text/csv", toCsv(["time_s", ...head], trace));
+  };
+  const pick = (source: Source, path: string, on: boolean): void => {
+    const paths = on ? [...source.paths, path] : source.paths.filter((each) => each !== path);
+    set(chosen.map((each) => (each.member === source.name ? { member: source.name, paths } : each)));
+  };
+  const left = choices.filter((each) => !sources.some(({ name }) => name === each.name));
   return (
     <div class="plot-panel">
       <div class="panel-tools">
-        <MemberSelect members={choices} chosen={name} choose={(next) => change({ seconds, member: next })} />
+        {isOne && (
+          <MemberSelect
+            members={choices}
+            chosen={sources[0]?.name ?? ""}
+            choose={(member) => set([{ member, paths: [] }])}
+          />
+        )}
+        {!isOne &&
+          sources.map(({ name }) => (
+            <button
+              key={name}
+              class="button button-quiet"
+              type="button"
+              aria-label={t("Take {0} off the plot", name)}
+              onClick={() => set(chosen.filter(({ member }) => member !== name))}
+            >
+              {name} <span aria-hidden="true">×</span>
+            </button>
+          ))}
+        {left.length > 0 && sources.length < MOST_SOURCES && (
+          <AddSelect members={left} add={(member) => set([...chosen, { member, paths: [] }])} />
+        )}
         <label>
           <span class="unseen">{t("Time shown")}</span>
           <select
@@ -85,51 +130,121 @@ export default function PlotPanel(props: PanelProps) {
           CSV
         </button>
       </div>
-      <Canvas key={key} trace={trace} labels={labels} seconds={seconds} paused={paused || object === null} />
+      <Canvas
+        key={`${key} ${shared}`}
+        trace={trace}
+        labels={labels}
+        unit={shared}
+        seconds={seconds}
+        paused={paused || object === null}
+      />
       <div class="panel-foot">
-        <FreshnessOf object={object} kind={kind} name={name} />
-        <SeriesChoice available={available} chosen={paths} label={label} pick={pick} />
+        {sources.map((source) => (
+          <Follow
+            key={source.name}
+            object={object}
+            source={source}
+            trace={trace}
+            isNamed={!isOne}
+            find={(paths) => {
+              if (Object.hasOwn(found, source.name) && found[source.name]?.object === object) return;
+              setFound((old) => ({ ...old, [source.name]: { object, paths: paths() } }));
+            }}
+          />
+        ))}
+        <SeriesChoice sources={sources} label={label} pick={pick} />
       </div>
     </div>
   );
 }
 
-const NOTHING = { of: "", object: null, paths: [] };
+function AddSelect({ members, add }: { members: readonly Member[]; add: (name: string) => void }) {
+  return (
+    <label class="plot-add">
+      <span class="unseen">{t("Add to the plot")}</span>
+      <select
+        class="field"
+        value=""
+        onChange={(event) => {
+          add(event.currentTarget.value);
+          event.currentTarget.value = "";
+        }}
+      >
+        <option value="">{t("Add")}</option>
+        {members.map(({ name, kind }) => (
+          <option key={name} value={name}>
+            {name} ({t(kind)})
+          </option>
+        ))}
+      </select>
+    </label>
+  );
+}
 
-/** Apart, since it alone changes ten times a second. */
-function FreshnessOf({ object, kind, name }: { object: Remote | null; kind: FeedKind | null; name: string }) {
-  return <Freshness look={useFeed(object, kind, name)} isLive={object !== null} />;
+interface FollowProps {
+  object: Remote | null;
+  source: Source;
+  trace: Trace;
+  /** Beside others: it says which it is. */
+  isNamed: boolean;
+  find: (paths: () => readonly string[]) => void;
+}
+
+/** Writes what comes from a member into the trace, and says how fresh it is. Apart, since that changes ten times a second. */
+function Follow({ object, source, trace, isNamed, find }: FollowProps) {
+  const { name, kind, paths, from } = source;
+  const readers = useMemo(() => paths.map(numberReader), [JSON.stringify(paths)]);
+  useEach(object, kind, name, (value, now, isAfterGap) => {
+    find(() => numberPaths(value));
+    if (readers.length === 0) return;
+    if (isAfterGap) trace.breakOff(from, readers.length);
+    const numbers = readers.map((read) => read(value));
+    trace.push(now, numbers, from, readers.length);
+  });
+  return (
+    <>
+      {isNamed && <span class="note">{name}</span>}
+      <Freshness look={useFeed(object, kind, name)} isLive={object !== null} />
+    </>
+  );
 }
 
 interface SeriesChoiceProps {
-  available: readonly string[];
-  chosen: readonly string[];
-  label: (path: string) => string;
-  pick: (path: string, on: boolean) => void;
+  sources: readonly Source[];
+  label: (name: string, path: string) => string;
+  pick: (source: Source, path: string, on: boolean) => void;
 }
 
-function SeriesChoice({ available, chosen, label, pick }: SeriesChoiceProps) {
+function SeriesChoice({ sources, label, pick }: SeriesChoiceProps) {
   const [isOpen, setOpen] = useState(false);
+  const count = sources.reduce((sum, { paths }) => sum + paths.length, 0);
   return (
     <details class="series-choice" onToggle={(event) => setOpen(event.currentTarget.open)}>
-      <summary>{t("Series: {0}", chosen.length)}</summary>
+      <summary>{t("Series: {0}", count)}</summary>
       <ul>
         {isOpen &&
-          [...new Set([...available, ...chosen])].map((path) => (
-            <li key={path}>
-              <label>
-                <input
-                  type="checkbox"
-                  checked={chosen.includes(path)}
-                  onChange={(event) => pick(path, event.currentTarget.checked)}
-                />{" "}
-                {label(path)}
-              </label>
-            </li>
-          ))}
+          sources.flatMap((source) =>
+            [...new Set([...source.available, ...source.paths])].map((path) => (
+              <li key={`${source.name} ${path}`}>
+                <label>
+                  <input
+                    type="checkbox"
+                    checked={source.paths.includes(path)}
+                    onChange={(event) => pick(source, path, event.currentTarget.checked)}
+                  />{" "}
+                  {label(source.name, path)}
+                </label>
+              </li>
+            )),
+          )}
       </ul>
     </details>
   );
+}
+
+/** `state.x`, `joints[2]`, `speed`. */
+function pathIn(name: string, path: string): string {
+  return path === "" || path.startsWith("[") ? `${name}${path}` : `${name}.${path}`;
 }
 
 /** Clocks and counters tell little as lines. */
@@ -141,11 +256,13 @@ function preferred(paths: readonly string[]): readonly string[] {
 interface CanvasProps {
   trace: Trace;
   labels: readonly string[];
+  /** Of all series; "" where they differ. */
+  unit: string;
   seconds: number;
   paused: boolean;
 }
 
-function Canvas({ trace, labels, seconds, paused }: CanvasProps) {
+function Canvas({ trace, labels, unit, seconds, paused }: CanvasProps) {
   const place = useRef<HTMLDivElement>(null);
   const latest = useRef({ seconds, paused });
   latest.current = { seconds, paused };
@@ -155,7 +272,7 @@ function Canvas({ trace, labels, seconds, paused }: CanvasProps) {
     let isZoomed = false;
     const zoomed = (): void => void (isZoomed = true);
     const zoomOut = (): void => void (isZoomed = false);
-    let plot = makePlot(box, labels, zoomed);
+    let plot = makePlot(box, labels, unit, zoomed);
     let [drawn, isInView] = ["", true];
     const draw = (): void => {
       if (latest.current.paused || document.hidden || !isInView) return;
@@ -166,7 +283,8 @@ function Canvas({ trace, labels, seconds, paused }: CanvasProps) {
       const data = trace.window(latest.current.seconds) as uPlot.AlignedData;
       plot.setData(data, !isZoomed);
       if (isZoomed) plot.redraw();
-      if (!isPointedAt && data[0].length > 0) plot.setLegend({ idx: data[0].length - 1 }); // the newest values
+      const end = data[0].length - 1;
+      if (!isPointedAt && end >= 0) plot.setLegend({ idxs: data.map((column) => measuredAt(column, end)) }); // the newest
     };
     const fit = new ResizeObserver(() => plot.setSize(sizeOf(box, plot)));
     fit.observe(box);
@@ -175,7 +293,7 @@ function Canvas({ trace, labels, seconds, paused }: CanvasProps) {
     look.observe(box);
     const unwatch = onColoursChanged(() => {
       plot.destroy();
-      plot = makePlot(box, labels, zoomed);
+      plot = makePlot(box, labels, unit, zoomed);
       isZoomed = false;
       drawn = "";
       plot.setData(trace.window(latest.current.seconds) as uPlot.AlignedData);
@@ -192,10 +310,12 @@ function Canvas({ trace, labels, seconds, paused }: CanvasProps) {
       plot.destroy();
     };
   }, [trace]);
-  return <div ref={place} class="plot-canvas" role="img" aria-label={t("Plot of {0}", labels.join(", "))} />;
+  return (
+    <div ref={place} class="plot-canvas" role="img" aria-label={t("Plot of {0}", labels.join(", "))} data-unit={unit} />
+  );
 }
 
-function makePlot(box: HTMLElement, labels: readonly string[], zoomed: () => void): uPlot {
+function makePlot(box: HTMLElement, labels: readonly string[], unit: string, zoomed: () => void): uPlot {
   const palette = readPalette(box);
   const axis = { stroke: palette.inkSoft, grid: { stroke: palette.line, width: 1 }, ticks: { stroke: palette.line } };
   const plot = new uPlot(
@@ -207,11 +327,14 @@ function makePlot(box: HTMLElement, labels: readonly string[], zoomed: () => voi
         y: { range: (_, low, high) => (low === high ? [low - 1, high + 1] : uPlot.rangeNum(low, high, 0.1, true)) },
       },
       hooks: { setSelect: [({ select }) => void ((select.width > 0 || select.height > 0) && zoomed())] },
-      cursor: { drag: { x: true, y: true, uni: 20 } },
+      cursor: {
+        drag: { x: true, y: true, uni: 20 },
+        dataIdx: (plot, series, index) => measuredAt(plot.data[series] ?? [], index),
+      },
       legend: { live: true },
       axes: [
         { ...axis, values: (_, ticks) => ticks.map((s) => `${s} s`) },
-        { ...axis, size: 56 },
+        { ...axis, size: 56, ...(unit !== "" && { label: unit, labelSize: 18, labelFont: "12px sans-serif" }) },
       ],
       series: [
         { label: t("Time"), value: (_, s) => (s === null ? "–" : `${s.toFixed(2)} s`) },
@@ -224,7 +347,8 @@ function makePlot(box: HTMLElement, labels: readonly string[], zoomed: () => voi
             show: (plot: uPlot) => plot.data[0].length < 3, // where there is no line yet
             filter: (plot: uPlot, at: number) => lonely(plot.data[at] ?? []),
           },
-          value: (_: uPlot, value: number | null) => (value === null ? "–" : String(Number(value.toPrecision(6)))),
+          value: (_: uPlot, value: number | null | undefined) =>
+            typeof value === "number" ? String(Number(value.toPrecision(6))) : "–",
         })),
       ],
     },

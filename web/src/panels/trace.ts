@@ -3,31 +3,43 @@
 
 const MOST = 20_000;
 
+/** null: no number. undefined: not measured at this time, when another one was. */
+type Cell = number | null | undefined;
+
 export class Trace {
   #times: number[] = [];
-  readonly #columns: (number | null)[][];
+  readonly #columns: Cell[][];
+  readonly #most: number;
 
-  constructor(columns: number) {
+  /** `sources`: how many are measured at times of their own. */
+  constructor(columns: number, sources = 1) {
     this.#columns = Array.from({ length: columns }, () => []);
+    this.#most = MOST * Math.max(1, sources);
   }
 
   #pushed = 0;
 
-  /** `now`: milliseconds of a clock that only grows. What is no finite number is null. */
-  push(now: number, values: readonly (number | undefined)[]): void {
+  /**
+   * `now`: milliseconds of a clock that only grows. What is no finite number is null. `from`, `count`: the columns that were
+   * measured.
+   */
+  push(now: number, values: readonly (number | undefined)[], from = 0, count = this.#columns.length): void {
     this.#pushed++;
     this.#times.push(now);
-    this.#columns.forEach((column, i) => column.push(finite(values[i])));
-    if (this.#times.length < MOST * 1.25) return;
-    const over = this.#times.length - MOST;
+    this.#columns.forEach((column, i) => {
+      const isMeasured = i >= from && i < from + count;
+      column.push(isMeasured ? finite(values[i - from]) : undefined);
+    });
+    if (this.#times.length < this.#most * 1.25) return;
+    const over = this.#times.length - this.#most;
     this.#times.splice(0, over);
     for (const column of this.#columns) column.splice(0, over);
   }
 
-  /** What comes next was not measured right after what came last: a row of nulls at its time. */
-  breakOff(): void {
+  /** What comes next was not measured right after what came last: nulls at its time. */
+  breakOff(from = 0, count = this.#columns.length): void {
     const end = this.#times.at(-1);
-    if (end !== undefined) this.push(end, []);
+    if (end !== undefined) this.push(end, [], from, count);
   }
 
   /** How often something was pushed: the same number, the same window. */
@@ -36,7 +48,7 @@ export class Trace {
   }
 
   /** The newest `seconds`: times in seconds before the last (0), then the values. */
-  window(seconds: number): (number | null)[][] {
+  window(seconds: number): Cell[][] {
     const end = this.#times[this.#times.length - 1] ?? 0;
     const from = lowerBound(this.#times, end - seconds * 1000);
     return [
@@ -58,11 +70,33 @@ function finite(value: number | undefined): number | null {
 }
 
 /** Where a number stands between two that are none: a line has no length there. null: nowhere. */
-export function lonely(column: ArrayLike<number | null | undefined>): number[] | null {
+export function lonely(column: ArrayLike<Cell>): number[] | null {
   const found: number[] = [];
-  const isThere = (i: number): boolean => column[i] !== null && column[i] !== undefined;
-  for (let i = 0; i < column.length; i++) if (isThere(i) && !isThere(i - 1) && !isThere(i + 1)) found.push(i);
+  let [last, isAlone] = [-1, false]; // the number before, and whether it has none before it
+  const end = (): void => void (last >= 0 && isAlone && found.push(last));
+  for (let i = 0; i < column.length; i++) {
+    const cell = column[i];
+    if (cell === undefined) continue;
+    if (cell === null) {
+      end();
+      last = -1;
+    } else {
+      isAlone = last < 0;
+      last = i;
+    }
+  }
+  end();
   return found.length > 0 ? found : null;
+}
+
+/** Where the newest measured cell is, at or before `index`; the next one after it where there is none. */
+export function measuredAt(column: ArrayLike<Cell>, index: number): number {
+  let at = index;
+  while (at >= 0 && column[at] === undefined) at--;
+  if (at >= 0) return at;
+  at = index;
+  while (at < column.length && column[at] === undefined) at++;
+  return at < column.length ? at : index;
 }
 
 export function toCsv(head: readonly string[], trace: Trace): string {

@@ -27,10 +27,16 @@ const ENDINGS: readonly (readonly [ending: RegExp, unit: string])[] = [
 const UNIT =
   /^(?:%|°C?|rad(?:ians?)?|deg(?:rees?)?|rpm|min|h|K|px|bar|l|[µnmckMG]?(?:m|s|g|V|A|N|Nm|Hz|W|Wh|Ah|Pa|J|T|lx))(?:\/(?:s[²2]?|s\^2|min|h|m[²2³3]?|l))?[²³]?$/;
 
+/** What has the numbers: a member, which tells the unit where no field does. */
+interface Source {
+  name: string;
+  documentation: string;
+}
+
 /** "" where nothing tells. `path`: as in paths.ts. */
-export function unitOf(type: string, path: string, definitions: Definitions, scope: string): string {
+export function unitOf(type: string, path: string, definitions: Definitions, scope: string, of?: Source): string {
   const names = path.split(/[.[]/).filter((step) => /^[A-Za-z_]/.test(step));
-  let [base, within, documentation] = [type, scope, ""];
+  let [base, within, documentation] = [type, scope, names.length === 0 ? (of?.documentation ?? "") : ""];
   for (const name of names) {
     const struct = definitions.struct(parseType(base || "void").base, within);
     const field = struct?.fields.find((each) => each.name === name);
@@ -41,6 +47,6 @@ export function unitOf(type: string, path: string, definitions: Definitions, sco
     const said = bracketed ?? named ?? "";
     if (UNIT.test(said)) return said;
   }
-  const last = (names[names.length - 1] ?? "").toLowerCase();
+  const last = (names[names.length - 1] ?? of?.name ?? "").toLowerCase();
   return ENDINGS.find(([ending]) => ending.test(last))?.[1] ?? "";
 }
