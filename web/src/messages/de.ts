@@ -42,6 +42,18 @@ const german: Readonly<Record<string, string>> = {
   Lock: "Sperre",
   "Lock for this page": "Für diese Seite sperren",
   "Lock for this user": "Für diesen Benutzer sperren",
+  "Asking the gateway who has leases and locks.": "Das Gateway wird gefragt, wer Steuerrechte und Sperren hat.",
+  "The gateway does not tell who has leases and locks: {0}":
+    "Das Gateway sagt nicht, wer Steuerrechte und Sperren hat: {0}",
+  "The gateway knows of no lease or lock of it. Those of relayed devices pass it unseen.":
+    "Das Gateway weiß von keinem Steuerrecht und keiner Sperre dafür. Solche von durchgereichten Geräten sieht es nicht.",
+  "Leases and locks": "Steuerrechte und Sperren",
+  "somebody who is not signed in": "jemand, der nicht angemeldet ist",
+  "{0}: {1} has the lease, until {2} s after its last renewal":
+    "{0}: {1} hat das Steuerrecht, bis {2} s nach der letzten Erneuerung",
+  "{0}: locked for all clients of {1}": "{0}: gesperrt für alle Clients von {1}",
+  "{0}: locked for one client of {1}": "{0}: gesperrt für einen Client von {1}",
+  "{0}: a monitor lock of {1}": "{0}: eine Monitorsperre von {1}",
   "Locked by this page since {0}.": "Von dieser Seite gesperrt seit {0}.",
   Member: "Mitglied",
   Memory: "Speicher",

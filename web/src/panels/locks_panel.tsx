@@ -1,8 +1,11 @@
-// Keeps others from changing an object while one works on it.
+// Keeps others from changing an object while one works on it, and shows who has its leases and locks.
 // Layer: web/panels. Source: sessions spec, object locks.
 
 import { t } from "../app/language";
 import { Store, useStore } from "../app/store";
+import { isUsb } from "../gateway/usb_devices";
+import { useHolders } from "../live/holders";
+import type { Holder } from "../live/holders";
 import { useAction } from "../members/row";
 import type { Remote } from "../robot/remote";
 import { Failure } from "../ui/failure";
@@ -22,7 +25,7 @@ function heldOf(object: Remote): Held {
   return found;
 }
 
-export default function LocksPanel({ object }: PanelProps) {
+export default function LocksPanel({ object, place }: PanelProps) {
   const lock = object ? heldOf(object) : none;
   const since = useStore(lock);
   const asking = useAction();
@@ -59,6 +62,44 @@ export default function LocksPanel({ object }: PanelProps) {
         )}
       </div>
       <Failure text={asking.failure} />
+      {!isUsb(place.device) && <HoldersList place={place} />}
     </div>
   );
+}
+
+function HoldersList({ place }: Pick<PanelProps, "place">) {
+  const { found, failure } = useHolders(place);
+  if (!found)
+    return (
+      <p class="note">
+        {failure === null
+          ? t("Asking the gateway who has leases and locks.")
+          : t("The gateway does not tell who has leases and locks: {0}", failure)}
+      </p>
+    );
+  if (found.length === 0)
+    return (
+      <p class="note">{t("The gateway knows of no lease or lock of it. Those of relayed devices pass it unseen.")}</p>
+    );
+  return (
+    <ul class="holders" aria-label={t("Leases and locks")}>
+      {found.map((holder, i) => (
+        <li key={i}>{wordsOf(holder)}</li>
+      ))}
+    </ul>
+  );
+}
+
+function wordsOf({ what, path, user, deadmanMs }: Holder): string {
+  const who = user === "" ? t("somebody who is not signed in") : user;
+  switch (what) {
+    case "lease":
+      return t("{0}: {1} has the lease, until {2} s after its last renewal", path, who, deadmanMs / 1000);
+    case "user":
+      return t("{0}: locked for all clients of {1}", path, who);
+    case "client":
+      return t("{0}: locked for one client of {1}", path, who);
+    case "monitor":
+      return t("{0}: a monitor lock of {1}", path, who);
+  }
 }

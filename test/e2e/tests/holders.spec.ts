@@ -1,0 +1,45 @@
+// Who has leases and locks of an object, in the Lock panel of a page that has none.
+import { expect, test } from "@playwright/test";
+import { addPanel } from "../board";
+import { GuardedLab, password } from "../guarded_lab";
+import { startTestService, webRoot } from "../processes";
+
+test("a lease of somebody else is shown while it lasts", async ({ page }) => {
+  const leases = { safe: [{ property: "interop.p_double", value: 0 }], takeover: ["*"] };
+  const lab = await startTestService(webRoot, (url) => ({ devices: [{ name: "big", url, mode: "shared", leases }] }));
+  try {
+    await page.goto(`${lab.url}#/devices/big/interop?view=board`);
+    await addPanel(page, "locks");
+    const panel = page.locator('[data-panel="locks"]');
+    await expect(panel).toContainText("The gateway knows of no lease or lock of it");
+    const object = `${lab.url}api/v1/devices/big/interop`;
+    const taken = await page.request.post(`${object}?lease=acquire&deadman=30000`);
+    const { lease } = (await taken.json()) as { lease: string };
+    await expect(panel.getByRole("list", { name: "Leases and locks" })).toHaveText(
+      "interop: somebody who is not signed in has the lease, until 30 s after its last renewal",
+    );
+    await page.request.post(`${object}?lease=release`, { headers: { ["Rrgate-Lease"]: lease } });
+    await expect(panel).toContainText("The gateway knows of no lease or lock of it");
+  } finally {
+    await lab.stop();
+  }
+});
+
+test("a lease has the name of who has it", async ({ page }) => {
+  const lab = await GuardedLab.start(webRoot, { device: { mode: "shared", leases: { takeover: ["*"] } } });
+  try {
+    const headers = { Authorization: `Bearer ${lab.token}` };
+    const robot = `${lab.url}api/v1/devices/create/Create`;
+    expect((await fetch(`${robot}?lease=acquire&deadman=60000`, { method: "POST", headers })).ok).toBe(true);
+    await page.goto(`${lab.url}#/devices/create/Create?view=board`);
+    await page.getByLabel("Name").fill("root");
+    await page.getByLabel("Password or token").fill(password);
+    await page.keyboard.press("Enter");
+    await addPanel(page, "locks");
+    await expect(page.getByRole("list", { name: "Leases and locks" })).toHaveText(
+      "Create: page has the lease, until 60 s after its last renewal",
+    );
+  } finally {
+    await lab.stop();
+  }
+});

@@ -1,0 +1,92 @@
+// Who holds leases and locks of an object, as the gateway's own service tells it: also where this page holds none.
+// Layer: web/live. Source: robdef/org.rrgate.gateway.robdef.
+
+import { useEffect, useState } from "preact/hooks";
+import { Store, useStore } from "../app/store";
+import { isRecord, text } from "../gateway/fields";
+import { session } from "../gateway/session";
+import { Link, openIn } from "../robot/link";
+import type { LinkState } from "../robot/link";
+import { useFeed } from "./use_feed";
+
+export interface Holder {
+  what: "lease" | "user" | "client" | "monitor";
+  /** With the service's name: "Create.axes". */
+  path: string;
+  /** "": somebody who has not logged in. */
+  user: string;
+  /** Of a lease: it ends so long after its last renewal. 0: of a lock. */
+  deadmanMs: number;
+}
+
+export interface Holders {
+  /** null: not known. */
+  found: readonly Holder[] | null;
+  /** Why not. */
+  failure: string | null;
+}
+
+const nowhere = new Store<LinkState>({ kind: "connecting" });
+
+/** Of the object, of those above it, which hold for it, too, and of those below it. */
+export function useHolders({ device, service, object }: { device: string; service: string; object: string }): Holders {
+  const [link, setLink] = useState<Link | null>(null);
+  useEffect(() => {
+    const opened = openGateway();
+    setLink(opened.link);
+    return opened.close;
+  }, []);
+  const state = useStore(link?.state ?? nowhere);
+  const gateway = openIn(state);
+  const leases = useFeed(gateway, "property", "leases");
+  const locks = useFeed(gateway, "property", "locks");
+  const failure = state.kind === "lost" ? state.reason : (leases.failure ?? locks.failure);
+  if (!gateway || failure !== null || leases.value === undefined || locks.value === undefined)
+    return { found: null, failure };
+  const own = object === "" ? service : `${service}.${object}`;
+  const found = readHolders(leases.value, locks.value, device).filter(({ path }) => isAbout(path, own));
+  return { found, failure: null };
+}
+
+export function readHolders(leases: unknown, locks: unknown, device: string): Holder[] {
+  const of = (list: unknown): Record<string, unknown>[] =>
+    (Array.isArray(list) ? list.filter(isRecord) : []).filter((each) => each["device"] === device);
+  const held = of(leases).filter((each) => each["held"] === true);
+  const base = (each: Record<string, unknown>) => ({ path: text(each["path"]), user: text(each["user"]) });
+  return [
+    ...held.map((each) => ({ ...base(each), what: "lease" as const, deadmanMs: Number(each["deadman"]) })),
+    ...of(locks).map((each) => ({ ...base(each), what: kindOf(each["kind"]), deadmanMs: 0 })),
+  ];
+}
+
+/** Whether it is the object, or one above or below it. */
+export function isAbout(path: string, own: string): boolean {
+  return path === own || own.startsWith(`${path}.`) || path.startsWith(`${own}.`);
+}
+
+function kindOf(kind: unknown): Holder["what"] {
+  return kind === "client" || kind === "monitor" ? kind : "user";
+}
+
+let opened: { link: Link; users: number } | null = null;
+
+/** One connection, however many panels look. */
+function openGateway(): { link: Link; close: () => void } {
+  opened ??= { link: new Link(() => session.withTicket(gatewayUrl())), users: 0 };
+  const mine = opened;
+  mine.users++;
+  const close = (): void => {
+    if (--mine.users > 0) return;
+    mine.link.dispose();
+    if (opened === mine) opened = null;
+  };
+  return { link: mine.link, close };
+}
+
+function gatewayUrl(base: string = document.baseURI): string {
+  const url = new URL("gateway", base);
+  url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
+  url.search = "service=gateway";
+  url.hash = "";
+  return url.href;
+}
