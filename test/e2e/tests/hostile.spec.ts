@@ -34,6 +34,25 @@ test("every panel shows a hostile service, and runs nothing of it", async ({ pag
     await addPanel(page, kind);
     await expect(of(kind).locator(".panel-body")).not.toBeEmpty();
   }
+  await addPanel(page, "scene");
+  await of("scene").getByLabel("Member").selectOption("constructor");
+  await expect(of("scene").locator("canvas")).toHaveAccessibleName("constructor in space");
+  await expect(of("scene").locator("[data-stale]")).toHaveText(/a second|no regular values/);
+  await of("scene").getByText("0 frames").click();
+  await addPanel(page, "teleop");
+  await of("teleop").getByLabel("Member").selectOption("toString");
+  await expect(of("teleop").locator(".panel-body")).toContainText("toString");
+  await of("teleop").getByLabel("Member").selectOption("constructor");
+  await expect(of("teleop").locator(".panel-body")).toContainText("constructor");
+  await addPanel(page, "notes");
+  await of("notes").getByRole("textbox", { name: "Notes", exact: true }).fill(html);
+  await of("notes").getByLabel("Name of Notes").fill(html);
+  await expect(page.getByRole("group", { name: html, exact: true })).toBeVisible();
+  await page.getByRole("button", { name: "Done" }).click();
+  await expect(page.locator('[data-kept="true"]')).toBeVisible();
+  await page.reload();
+  await expect(page.getByRole("heading", { name: html })).toBeVisible();
+  await expect(of("notes").getByRole("textbox")).toHaveValue(html);
   await of("locks").getByRole("button", { name: "Lock for this page" }).click();
   await expect(of("locks")).toContainText(/Locked by this page since|RobotRaconteur/);
   await expect(page.locator("main img")).toHaveCount(0);
