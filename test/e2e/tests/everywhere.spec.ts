@@ -3,7 +3,10 @@ import { readFileSync } from "node:fs";
 import path from "node:path";
 import type { Page } from "@playwright/test";
 import { expect, test } from "../lab_test";
-import { repositoryRoot } from "../processes";
+import { GuardedLab, password } from "../guarded_lab";
+import { PANEL_KINDS } from "../../../web/src/board/board";
+import { startPeer } from "../peers";
+import { repositoryRoot, startTestService, webRoot } from "../processes";
 
 const axe = readFileSync(path.join(repositoryRoot, "web/node_modules/axe-core/axe.min.js"), "utf8");
 
@@ -49,6 +52,91 @@ for (const colorScheme of ["light", "dark"] as const) {
       }
     });
   }
+}
+
+for (const colorScheme of ["light", "dark"] as const) {
+  test(`no panel has a barrier that axe finds, whatever its kind: ${colorScheme}`, async ({ page }) => {
+    test.slow(); // a page for each kind
+    const all = await startTestService(webRoot, (url) => ({ devices: [{ name: "big", url }] }));
+    const robot = await startPeer("test/interop/peers/standard_robot.py", "robot");
+    try {
+      await page.emulateMedia({ colorScheme, reducedMotion: "reduce" });
+      for (const kind of PANEL_KINDS) {
+        const place = kind === "robot" ? `${robot.url}#/devices/peer/robot` : `${all.url}#/devices/big/interop`;
+        const board = { board: 1, panels: [{ kind, x: 0, y: 0, w: 6, h: 12 }] };
+        const packed = Buffer.from(JSON.stringify(board)).toString("base64url");
+        await page.goto(`${place}?view=board&board=${packed}`);
+        await page.reload();
+        await expect(page.locator('[data-link="online"]')).toBeVisible();
+        const content = page.locator(`[data-panel="${kind}"] .panel-body > :is(div, textarea)`);
+        await expect(content.first()).toBeVisible();
+        expect(await violations(page), kind).toEqual([]);
+        await page.getByRole("button", { name: "Arrange" }).click();
+        await page.getByRole("button", { name: /^Remove / }).click();
+        await expect(page.getByRole("button", { name: "Undo" })).toBeVisible();
+        expect(await violations(page), `${kind}, removed`).toEqual([]);
+      }
+    } finally {
+      await Promise.all([all.stop(), robot.stop()]);
+    }
+  });
+}
+
+test("neither the sign-in, the account, a list without devices nor the offline page has a barrier that axe finds", async ({
+  page,
+  context,
+}) => {
+  const guarded = await GuardedLab.start(webRoot);
+  try {
+    await page.route("**/api/v1/devices", (route) => route.fulfill({ json: { devices: [] } }));
+    for (const colorScheme of ["light", "dark"] as const) {
+      await page.emulateMedia({ colorScheme, reducedMotion: "reduce" });
+      await context.clearCookies();
+      await page.goto(guarded.url);
+      await page.reload();
+      await expect(page.getByRole("form", { name: "Sign in" })).toBeVisible();
+      expect(await violations(page), "sign-in").toEqual([]);
+      await page.getByLabel("Name").fill("root");
+      await page.getByLabel("Password or token").fill(password);
+      await page.keyboard.press("Enter");
+      await expect(page.getByRole("group", { name: "You" })).toContainText("root admin");
+      await expect(page.locator(".empty").first()).toBeVisible();
+      expect(await violations(page), "no devices, signed in").toEqual([]);
+      await page.goto(`${guarded.url}#/recordings`);
+      await expect(page.getByRole("heading", { name: "Recordings" })).toBeVisible();
+      expect(await violations(page), "recordings").toEqual([]);
+      await page.goto(`${guarded.url}offline.html`);
+      await expect(page.getByRole("heading", { name: "The gateway cannot be reached" })).toBeVisible();
+      expect(await violations(page), "offline").toEqual([]);
+    }
+  } finally {
+    await guarded.stop();
+  }
+});
+
+for (const [width, height] of [
+  [1920, 1080],
+  [3840, 2160],
+] as const) {
+  test(`nothing is wider than a wall screen: ${width} × ${height}`, async ({ page, lab }) => {
+    await page.setViewportSize({ width, height });
+    for (const address of [
+      "#/",
+      "#/recordings",
+      "#/devices/create/Create",
+      "#/devices/create/Create?view=board",
+      "#/devices/create/Create?view=members",
+    ]) {
+      await page.goto(`${lab.url}${address}`);
+      await expect(page.getByRole("main")).toBeVisible();
+      if (address.endsWith("board")) await expect(page.locator(".board-panel").first()).toBeVisible();
+      if (address.includes("devices")) await expect(page.locator('[data-link="online"]')).toBeVisible();
+      const tooWide = await page.evaluate(
+        () => document.documentElement.scrollWidth - document.documentElement.clientWidth,
+      );
+      expect(tooWide, address).toBeLessThanOrEqual(0);
+    }
+  });
 }
 
 for (const [size, viewport] of Object.entries({
