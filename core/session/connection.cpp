@@ -345,9 +345,9 @@ EncodeOptions Connection::encode_options() const {
 
 Result<> Connection::note_sent(Now now) {
   if (queue_.held() > options_.max_queued_bytes)
-    return closed_by(make_error(ErrorCode::connection_error,
-                                "the peer reads too slowly: " + std::to_string(queue_.held()) + " bytes are waiting, " +
-                                    std::to_string(options_.max_queued_bytes) + " are allowed"));
+    return closed_by(make_error(ErrorCode::connection_error, "the peer reads too slowly: more than " +
+                                                                 std::to_string(options_.max_queued_bytes) +
+                                                                 " bytes wait for the stream"));
   ++stats_.messages_sent;
   last_sent_ = now.steady;
   return {};

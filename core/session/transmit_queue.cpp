@@ -6,7 +6,8 @@ namespace rr {
 
 namespace {
 constexpr std::size_t max_spare_messages = 16;
-}
+constexpr std::size_t max_slices = 32;
+}  // namespace
 
 TransmitQueue::Encoded TransmitQueue::take_spare() {
   if (spare_.empty()) return std::make_unique<EncodedMessage>();
@@ -31,6 +32,7 @@ Result<> TransmitQueue::push(SharedMessage& message, const EncodeOptions& option
 
 void TransmitQueue::insert(Encoded encoded, bool is_urgent) {
   size_ += encoded->size();
+  held_ += encoded->size() + message_bytes;
   if (!is_urgent) {
     messages_.push_back(std::move(encoded));
     return;
@@ -40,7 +42,7 @@ void TransmitQueue::insert(Encoded encoded, bool is_urgent) {
   urgent_end_ = place + 1;
 }
 
-std::span<const ByteSpan> TransmitQueue::slices(std::size_t max_slices) {
+std::span<const ByteSpan> TransmitQueue::slices() {
   slices_.clear();
   in_flight_ = 0;
   std::size_t skip = front_consumed_;
@@ -73,6 +75,7 @@ void TransmitQueue::consume(std::size_t bytes) {
 
 void TransmitQueue::pop_front() {
   auto& front = messages_[first_];
+  held_ -= front->size() + message_bytes;
   front->clear();
   if (spare_.size() < max_spare_messages) spare_.push_back(std::move(front));
   front.reset();
@@ -83,12 +86,6 @@ void TransmitQueue::pop_front() {
   messages_.erase(messages_.begin(), messages_.begin() + static_cast<std::ptrdiff_t>(first_));
   first_ = 0;
   if (messages_.empty()) clear_kept(messages_);
-}
-
-void TransmitQueue::clear() {
-  messages_.clear();
-  slices_.clear();
-  first_ = size_ = front_consumed_ = in_flight_ = urgent_end_ = 0;
 }
 
 }  // namespace rr

@@ -20,18 +20,16 @@ class TransmitQueue {
   Result<> push(const Message& message, const EncodeOptions& options, bool is_urgent = false);
   Result<> push(SharedMessage& message, const EncodeOptions& options, bool is_urgent = false);
 
-  bool empty() const { return size_ == 0; }
   /// Bytes not yet consumed.
   std::size_t size() const { return size_; }
   /// Those, and what the messages themselves take: the larger part of many small ones.
-  std::size_t held() const { return size_ + (messages_.size() - first_) * message_bytes; }
+  std::size_t held() const { return held_; }
 
-  /// Up to `max_slices` slices to write next, in order. They stay valid until consume() or clear().
-  std::span<const ByteSpan> slices(std::size_t max_slices = 32);
+  /// What to write next, in order, 32 slices at most. They stay valid until consume().
+  std::span<const ByteSpan> slices();
 
   /// `bytes` of the slices handed out were written.
   void consume(std::size_t bytes);
-  void clear();
 
  private:
   using Encoded = std::unique_ptr<EncodedMessage>;
@@ -48,6 +46,7 @@ class TransmitQueue {
   std::vector<Encoded> spare_;  ///< buffers to reuse
   std::vector<ByteSpan> slices_;
   std::size_t size_ = 0;
+  std::size_t held_ = 0;
   std::size_t front_consumed_ = 0;  ///< bytes of the first message that are written already
   std::size_t in_flight_ = 0;       ///< messages, from the first one, whose slices were handed out
   std::size_t urgent_end_ = 0;      ///< messages, from the first one, up to the last urgent one: they keep their order

@@ -19,7 +19,7 @@ Result<> GatherWriter::finish(const Message& message) {
   close_slice();
   if (overflowed_ || at_ != out_.scratch_.size() || out_.size_ != message_size_) {
     out_.clear();
-    return make_error(ErrorCode::internal_error, "encode: the size computed for the message was not met");
+    return make_error(ErrorCode::internal_error, "encode: the message has another size than computed");
   }
   if (out_.slices_.size() > 1) out_.owners_ = message.owners();
   return {};

@@ -67,7 +67,7 @@ Result<std::uint32_t> ClientSession::send_pipe_packet(std::string_view path, std
   if (queued_bytes() >= options_.max_pipe_queued_bytes)
     return make_error(ErrorCode::out_of_system_resource,
                       "pipe " + quote(member) + ": " + std::to_string(queued_bytes()) +
-                          " bytes wait for the stream already; send again when they are fewer");
+                          " bytes wait for the stream; send again when they are fewer");
   connection_.begin_message(outgoing_);
   begin_pipe_packets(outgoing_, pipe->first.path, pipe->first.member, state.is_unreliable());
   const auto number = state.take_number();

@@ -117,7 +117,7 @@ Result<std::uint32_t> ServiceSession::send_numbered(PipeId id, Now now, Send&& s
   if (queued_bytes() >= options_.max_pipe_queued_bytes)
     return make_error(ErrorCode::out_of_system_resource,
                       "pipe '" + member.name + "': " + std::to_string(queued_bytes()) +
-                          " bytes wait for the stream already; send again when they are fewer");
+                          " bytes wait for the stream; send again when they are fewer");
   const auto number = state.take_number();
   const Result<> sent = send(*pipe, number);
   if (sent) {
