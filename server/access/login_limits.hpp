@@ -1,6 +1,7 @@
 // How often one may guess a password. Layer: server/access.
 #pragma once
 
+#include <chrono>
 #include <string>
 
 #include "core/session/service/authenticator.hpp"
@@ -35,6 +36,11 @@ class LoginLimits {
     sites_.at(site_name(network), max_failures_of_site, max_judged_of_site).handle_failure(now);
     networks_.at(network).handle_failure(now);
     users_.at(key(user, network), max_failures_of_user).handle_failure(now);
+    failed_.at(network) = now.steady;
+  }
+  bool has_failed_lately(const std::string& network, rr::Now now) {
+    const auto* failed = failed_.find(network);
+    return failed && now.steady < *failed + failure_memory;
   }
 
  private:
@@ -42,12 +48,14 @@ class LoginLimits {
   static constexpr std::size_t max_failures_of_site = 600;  ///< likewise
   static constexpr std::size_t max_judged_of_site = 640;
   static constexpr std::size_t max_kept = 10'000;
+  static constexpr std::chrono::minutes failure_memory{1};
 
   static std::string key(const std::string& user, const std::string& network) { return network + ' ' + user; }
 
   BoundedTable<std::string, rr::LoginLimit> sites_{max_kept};
   BoundedTable<std::string, rr::LoginLimit> networks_{max_kept};
   BoundedTable<std::string, rr::LoginLimit> users_{max_kept};
+  BoundedTable<std::string, rr::TimePoint> failed_{max_kept};  ///< the last time, by network
 };
 
 }  // namespace rrgate

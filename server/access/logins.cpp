@@ -1,5 +1,6 @@
 #include "server/access/logins.hpp"
 
+#include <algorithm>
 #include <boost/asio/post.hpp>
 #include <boost/asio/use_awaitable.hpp>
 
@@ -84,11 +85,22 @@ rr::awaitable<Logins::Judged> Logins::judge(rr::LoginAttempt attempt, ClientOrig
       token);
 }
 
+/// A network that has not failed lately, so that a flood of wrong passwords keeps its own senders waiting. Of four
+/// turns one is the others' too: somebody may have mistyped.
+std::deque<std::string>::iterator Logins::next_turn() {
+  if (turns_taken_++ % 4 == 3) return turns_.begin();
+  const auto now = steady_clock_now();
+  const auto found = std::find_if(turns_.begin(), turns_.end(),
+                                  [&](const std::string& each) { return !limits_.has_failed_lately(each, now); });
+  return found != turns_.end() ? found : turns_.begin();
+}
+
 void Logins::judge_next() {
   if (is_judging_ || turns_.empty()) return;
   is_judging_ = true;
-  const auto network = std::move(turns_.front());
-  turns_.pop_front();
+  const auto turn = next_turn();
+  const auto network = std::move(*turn);
+  turns_.erase(turn);
   const auto found = waiting_.find(network);
   auto job = std::move(found->second.front());
   found->second.pop_front();

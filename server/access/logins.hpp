@@ -23,8 +23,8 @@ struct DeviceLogin {
   ClientOrigin from;
 };
 
-/// For the gateway's thread, whichever way a login comes. Networks take turns: one that floods the gateway with
-/// passwords keeps its own clients waiting.
+/// For the gateway's thread, whichever way a login comes. Networks take turns, those first that have not failed
+/// lately: whoever floods the gateway with passwords, be it from many addresses, keeps his own clients waiting.
 class Logins {
  public:
   using Judged = rr::Result<rr::AuthenticatedUser>;
@@ -64,6 +64,7 @@ class Logins {
     std::chrono::steady_clock::time_point ends;
   };
 
+  std::deque<std::string>::iterator next_turn();
   void judge_next();
   void finish(const Job& job, const Judged& result);
   void record(const rr::LoginAttempt& attempt, const ClientOrigin& from, const Judged& result);
@@ -77,6 +78,7 @@ class Logins {
   Users known_in_;                                  ///< the users file that known_ is of
   std::map<std::string, std::deque<Job>> waiting_;  ///< by network
   std::deque<std::string> turns_;                   ///< networks that have something waiting
+  std::size_t turns_taken_ = 0;
   bool is_judging_ = false;
   std::shared_ptr<const char> life_ = std::make_shared<const char>('\0');
   boost::asio::thread_pool judge_{1};  ///< hashing a password takes as long as a hundred requests
