@@ -33,6 +33,13 @@ bool fits_all(const std::vector<std::string>& patterns) {
   return patterns.empty() || std::any_of(patterns.begin(), patterns.end(), is_stars);
 }
 
+/// Whether a member of gateway_device tells of devices, or of their clients.
+bool tells_of_devices(std::string_view member) {
+  constexpr std::string_view others[] = {"",           "version",     "uptime",       "acquire_lease",
+                                         "take_lease", "renew_lease", "release_lease"};
+  return std::find(std::begin(others), std::end(others), member) == std::end(others);
+}
+
 bool is_command(Verb verb) {
   return verb == Verb::write || verb == Verb::call || verb == Verb::lock;
 }
@@ -92,6 +99,8 @@ std::optional<Verb> parse_verb(std::string_view text) {
 }
 
 rr::Result<> AccessRules::check(const Identity& who, const AccessRequest& what) const {
+  if (what.device == gateway_device && tells_of_devices(what.member) && !sees_all(who))
+    return denied(who, describe(what) + ", which tells of all devices: no rule gives something of all devices");
   if (is_agent(who) && is_command(what.verb)) {
     if (terms(who, what)) return {};
     return denied(who, describe(what) + ": no rule with \"agent\" gives it");
@@ -131,6 +140,14 @@ rr::Result<> AccessRules::check_whole_device(const Identity& who, std::string_vi
   return denied(who, "do everything to " + (device.empty() ? "a device" : "device " + rr::quote(device)) +
                          ", which a connection needs that passes through the gateway unread; with \"mode\": \"shared\" "
                          "of the device rights hold for each member");
+}
+
+bool AccessRules::sees_all(const Identity& who) const {
+  if (may_all(who)) return true;
+  return std::any_of(rules_.begin(), rules_.end(), [&](const AccessRule& rule) {
+    return std::any_of(rule.may.begin(), rule.may.end(), is_device_verb) && is_for(rule, who) &&
+           fits_all(rule.devices) && fits_all(rule.services) && fits_all(rule.paths);
+  });
 }
 
 bool AccessRules::sees_any(const Identity& who) const {

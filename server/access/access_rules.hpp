@@ -35,6 +35,9 @@ inline Verb verb_to_connect(const rr::MemberDefinition& member) {
   return member.direction() == rr::MemberDirection::writeonly ? Verb::write : Verb::subscribe;
 }
 
+/// The gateway's own service, as a device. It does not know who reads it.
+inline constexpr std::string_view gateway_device = "gateway";
+
 /// What somebody wants. Borrowed for the call.
 struct AccessRequest {
   std::string_view device = {};   ///< its name in the gateway; empty for the gateway itself
@@ -72,8 +75,9 @@ class AccessRules {
       : rules_(std::move(rules)), needs_login_(needs_login || !rules_.empty()) {}
 
   /// Whoever may do anything within a device, a service or an object may read it as such: also to what is below the
-  /// object, since it is on the way there.
-  /// Errors   permission_denied: a sentence that says who may not do what, for the client.
+  /// object, since it is on the way there. Members of gateway_device that tell of devices are for those who may do
+  /// something with everything of all devices. Errors   permission_denied: a sentence that says who may not do what,
+  /// for the client.
   [[nodiscard]] rr::Result<> check(const Identity& who, const AccessRequest& what) const;
   /// On which terms an agent may write or call something: those of all rules that give it together. nullopt: it may
   /// not, or is no agent.
@@ -85,6 +89,8 @@ class AccessRules {
   /// may do something to.
   bool sees(const Identity& who, std::string_view device, std::optional<std::string_view> service = {},
             std::optional<std::string_view> path = {}) const;
+  /// Whether there is nothing of any device that is hidden from somebody.
+  bool sees_all(const Identity& who) const;
   /// Whether there is any device at all that somebody may do something to.
   bool sees_any(const Identity& who) const;
 

@@ -9,6 +9,7 @@
 
 #include "node/service/node.hpp"
 #include "node/service/service.hpp"
+#include "server/access/access_rules.hpp"
 #include "server/upstream/device.hpp"
 
 namespace rrgate {
@@ -19,7 +20,7 @@ class GatewayState;
 /// gateway, with all that holds for those.
 class GatewayService {
  public:
-  static constexpr std::string_view name = "gateway";
+  static constexpr std::string_view name = gateway_device;
 
   /// Both outlive it.
   GatewayService(boost::asio::io_context& io, GatewayState& gateway);

@@ -305,6 +305,33 @@ TEST_CASE("rights: a device is seen by those who may do something with it, and b
   CHECK_FALSE(rules.sees(oper, "arm1", "Arm", "Arm.tool"));
 }
 
+TEST_CASE("rights: what the gateway's own service tells of all devices is for those who see all of them") {
+  const AccessRules rules(
+      {{.roles = {"partner"}, .devices = {"gateway", "arm1"}, .may = {Verb::read, Verb::call, Verb::subscribe}},
+       {.roles = {"viewer"}, .devices = {"gateway", "*"}, .may = {Verb::read, Verb::subscribe}},
+       {.roles = {"guide"}, .devices = {"*"}, .paths = {"Arm"}, .may = {Verb::read}}},
+      true);
+  const auto may = [&](const char* role, const char* member, Verb verb = Verb::read) {
+    return rules
+        .check(who("somebody", {role}),
+               {.device = "gateway", .service = "gateway", .path = "gateway", .member = member, .verb = verb})
+        .has_value();
+  };
+  for (const char* member : {"devices", "subscriptions", "locks", "leases"}) {
+    CHECK(may("viewer", member));
+    CHECK_FALSE(may("partner", member));
+    CHECK_FALSE(may("guide", member));
+  }
+  CHECK_FALSE(may("partner", "find_device", Verb::call));
+  for (const char* member : {"statistics", "device_changed", "device_removed", "lease_changed"}) {
+    CHECK(may("viewer", member, Verb::subscribe));
+    CHECK_FALSE(may("partner", member, Verb::subscribe));
+  }
+  CHECK(may("partner", "version"));
+  CHECK(may("partner", "acquire_lease", Verb::call));
+  CHECK(AccessRules().check(who("", {}), {.device = "gateway", .member = "devices"}).has_value());
+}
+
 TEST_CASE("rights to record are to whole services") {
   const auto alice = who("alice", {"operator"});
   const auto allows = [&](AccessRule rule, std::string_view device, std::string_view service) {
