@@ -11,7 +11,7 @@ import pytest
 def test_nothing_is_lost_or_doubled_while_everything_breaks(tmp_path, seed):
     site = chaos.Site(tmp_path)
     try:
-        chaos.play(site, random.Random(seed), 20)
+        chaos.play(site, random.Random(seed), 60)
     finally:
         site.close()
     assert site.findings.broken == []
