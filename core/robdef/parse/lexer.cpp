@@ -54,8 +54,7 @@ void LogicalLine::drop_last() {
 LineReader::LineReader(std::string_view text, Reporter& reporter) : text_(text), reporter_(&reporter) {
   if (!text_.starts_with(byte_order_mark)) return;
   text_.remove_prefix(byte_order_mark.size());
-  reporter_->warning("interop", {1, 1, 1, 2},
-                     "the text begins with a byte order mark, which existing peers refuse");
+  reporter_->warning("interop", {1, 1, 1, 2}, "the text begins with a byte order mark, which existing peers refuse");
 }
 
 const LogicalLine* LineReader::peek() {

@@ -11,6 +11,7 @@ export interface PlotSource {
 }
 
 export const MOST_SOURCES = 16;
+const OWN = ["member", "paths", "more"];
 
 /** `usual`: the member of a plot that names none. */
 export function sourcesOf(settings: Settings, usual: string): PlotSource[] {
@@ -26,7 +27,7 @@ export function sourcesOf(settings: Settings, usual: string): PlotSource[] {
 
 /** The settings with these, and all else as it is. */
 export function withSources(settings: Settings, sources: readonly PlotSource[]): Settings {
-  const { member: _, paths: __, more: ___, ...rest } = settings;
+  const rest = Object.fromEntries(Object.entries(settings).filter(([name]) => !OWN.includes(name)));
   const [first, ...more] = sources.map(({ member, paths }) => ({ member, ...(paths.length > 0 && { paths }) }));
   return { ...rest, ...first, ...(more.length > 0 && { more }) };
 }
