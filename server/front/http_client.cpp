@@ -348,9 +348,9 @@ rr::awaitable<std::optional<Continuation>> serve_request(GatewayState& gateway, 
   if (!admitted.refusal) admitted.refusal = require_tls(gateway, request);
   if (!admitted.refusal && !is_refused && is_guarded(request) && !is_awaited_page(gateway, request)) {
     const auto urgent = find_urgent(gateway, request);
-    const AccessRequest wanted{.device = urgent.device, .service = urgent.service};
-    admitted =
-        co_await gateway.http_access().admit(request, connection, config, urgent.device.empty() ? nullptr : &wanted);
+    AccessRequest wanted;
+    if (urgent) wanted = {.device = urgent->device, .service = urgent->service, .verb = urgent->verb};
+    admitted = co_await gateway.http_access().admit(request, connection, config, urgent ? &wanted : nullptr);
     if (admitted.refusal) gateway.reject(rejection_of(admitted.refusal->status));
   }
   auto memory = gateway.memory().charge(network_name(request.arrival.address));

@@ -70,11 +70,13 @@ namespace {
 std::uint32_t number_of_file(std::string_view file, std::string& name) {
   if (!file.ends_with(extension)) return 0;
   file.remove_suffix(extension.size());
-  const auto dash = file.rfind("Z-");
-  name = file.substr(0, dash == std::string_view::npos ? file.size() : dash + 1);
-  if (dash == std::string_view::npos) return 1;
+  name = file;
+  if (parse_recording_name(name)) return 1;
+  const auto dash = file.rfind('-');
+  if (dash == std::string_view::npos) return 0;
+  name = file.substr(0, dash);
   std::uint32_t number = 0;
-  for (const char c : file.substr(dash + 2)) {
+  for (const char c : file.substr(dash + 1)) {
     if (c < '0' || c > '9' || number > 100'000'000) return 0;
     number = number * 10 + static_cast<std::uint32_t>(c - '0');
   }

@@ -305,6 +305,17 @@ def test_a_refusal_by_rate_is_in_the_audit_log(node, tmp_path):
         ("mcp", "agent", "interop", "refused")}
 
 
+def test_no_rate_holds_up_whoever_stops_all_agents(node, tmp_path):
+    config, agent, admin = with_tokens(tmp_path)
+    made = Site(tmp_path, node, rates={"client": {"per_second": 1}}, **config)
+    try:
+        assert 429 in [ask(made.port, "GET", "/api/v1/devices", headers=admin).status for _ in range(5)]
+        assert ask(made.port, "POST", "/api/v1/agents/stop", {"minutes": 0}, agent).status == 429
+        assert ask(made.port, "POST", "/api/v1/agents/stop", {"minutes": 0}, admin).status == 200
+    finally:
+        made.stop()
+
+
 def test_agents_are_told_whose_tokens_are_believed(node, tmp_path):
     make_web_certificates(tmp_path / "id")
     server = issuers.IssuerServer(tmp_path / "id" / "localhost.pem", tmp_path / "id" / "localhost.key")

@@ -44,6 +44,16 @@ def test_a_device_is_recorded_by_the_gateways_own_session(create, begin_gateway,
     assert ask(gateway.port, "GET", f"{API}/{ended['files'][0]['name']}").status == 404
 
 
+def test_a_device_whose_name_looks_like_the_end_of_a_time_is_recorded_too(create, begin_gateway):
+    gateway = begin_gateway(create, devices=[{"name": name, "url": create, "mode": "shared"} for name in ("create", "AZ-1")])
+    recording = begin(gateway, device="AZ-1")
+    wait_for(lambda: look(gateway, recording), lambda seen: seen["messages"] > 5)
+    ended = stop(gateway, recording)
+    assert [file["name"] for file in ended["files"]] == [recording["name"] + ".mcap"] and messages(gateway, ended)
+    assert ask(gateway.port, "DELETE", f"{API}/{recording['name']}").status == 204
+    assert not list((gateway.file.parent / "recordings").iterdir())
+
+
 def test_only_what_is_wanted_is_recorded_and_ends_by_itself(create, begin_gateway):
     gateway = begin_gateway(create)
     recording = begin(gateway, members=["state"], seconds=1)

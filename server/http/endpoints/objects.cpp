@@ -112,7 +112,7 @@ std::optional<Response> refuse_device(GatewayState& gateway, const Request& requ
   }
   if (!gateway.devices().find(device)) return no_such_device(device);
   pass = gateway.http_access().enter_device(device, gateway.config().rates);
-  if (pass || !find_urgent(gateway, request).device.empty()) return std::nullopt;
+  if (pass || find_urgent(gateway, request)) return std::nullopt;
   gateway.reject(Rejection::rate);
   gateway.access().record_too_much(request.identity, &asked, "too many requests to the device");
   return HttpAccess::too_much("to device " + rr::quote(device));
@@ -350,14 +350,15 @@ rr::awaitable<void> answer(GatewayState& gateway, ResponseWriter& writer, std::s
 
 }  // namespace
 
-UrgentCommand find_urgent(GatewayState& gateway, const Request& request) {
+std::optional<UrgentCommand> find_urgent(GatewayState& gateway, const Request& request) {
   const auto method = request.message.method();
   const auto path = request.path();
+  if (method == http::verb::post && path == "/api/v1/agents/stop") return UrgentCommand{.verb = Verb::admin};
   if ((method != http::verb::post && method != http::verb::put) || !path.starts_with(objects_prefix)) return {};
   const auto segments = split_path(path.substr(objects_prefix.size()));
   const auto* device = segments && segments->size() > 2 ? gateway.devices().find(segments->front()) : nullptr;
-  return device && is_urgent_member(*device, *segments) ? UrgentCommand{(*segments)[0], (*segments)[1]}
-                                                        : UrgentCommand();
+  if (!device || !is_urgent_member(*device, *segments)) return {};
+  return UrgentCommand{(*segments)[0], (*segments)[1]};
 }
 
 Handler objects_endpoint(GatewayState& gateway) {

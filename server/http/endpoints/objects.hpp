@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -15,12 +16,14 @@ inline constexpr std::array<std::string_view, 5> device_resources = {"subscripti
                                                                      "thing-description.json", "types.d.ts"};
 
 /// "DEVICE", "DEVICE/SERVICE" and what is below, for all methods.
-/// Whether a request commands a member of a device that is urgent (LeaseConfig::is_urgent()), and of which service.
+/// A request that no rate holds up, as long as somebody may `verb` the service: it commands a member of a device that
+/// is urgent (LeaseConfig::is_urgent()), or stops all agents.
 struct UrgentCommand {
-  std::string device = {};  ///< empty: it does not
+  std::string device = {};
   std::string service = {};
+  Verb verb = Verb::read;
 };
-UrgentCommand find_urgent(GatewayState& gateway, const Request& request);
+std::optional<UrgentCommand> find_urgent(GatewayState& gateway, const Request& request);
 
 Handler objects_endpoint(GatewayState& gateway);
 
