@@ -22,7 +22,7 @@ test("reads properties, calls functions and follows wires of the robot", async (
 });
 
 test("opens an object behind a reference, and shows the service's own error for a wrong one", async ({ page, lab }) => {
-  await page.goto(`${lab.url}#/devices/webcams/Webcam`);
+  await page.goto(`${lab.url}#/devices/webcams/Webcam?view=members`);
   await page.getByLabel("Index of Webcams").fill("0");
   await page.getByRole("button", { name: "Open Webcams" }).click();
   await expect(page.getByText("experimental.createwebcam2.Webcam", { exact: true })).toBeVisible();
