@@ -58,6 +58,11 @@ bool gives(const AccessRule& rule, Verb verb) {
   return std::find(rule.may.begin(), rule.may.end(), verb) != rule.may.end();
 }
 
+/// Of devices.
+bool gives_something(const AccessRule& rule, const Identity& who) {
+  return std::any_of(rule.may.begin(), rule.may.end(), is_device_verb) && is_for(rule, who);
+}
+
 bool fits(const AccessRule& rule, const AccessRequest& what) {
   return fits(rule.devices, what.device) && fits(rule.services, what.service) && fits(rule.paths, what.path) &&
          fits(rule.members, what.member);
@@ -145,16 +150,13 @@ rr::Result<> AccessRules::check_whole_device(const Identity& who, std::string_vi
 bool AccessRules::sees_all(const Identity& who) const {
   if (may_all(who)) return true;
   return std::any_of(rules_.begin(), rules_.end(), [&](const AccessRule& rule) {
-    return std::any_of(rule.may.begin(), rule.may.end(), is_device_verb) && is_for(rule, who) &&
-           fits_all(rule.devices) && fits_all(rule.services) && fits_all(rule.paths);
+    return gives_something(rule, who) && fits_all(rule.devices) && fits_all(rule.services) && fits_all(rule.paths);
   });
 }
 
 bool AccessRules::sees_any(const Identity& who) const {
   if (may_all(who)) return true;
-  return std::any_of(rules_.begin(), rules_.end(), [&](const AccessRule& rule) {
-    return std::any_of(rule.may.begin(), rule.may.end(), is_device_verb) && is_for(rule, who);
-  });
+  return std::any_of(rules_.begin(), rules_.end(), [&](const AccessRule& rule) { return gives_something(rule, who); });
 }
 
 bool AccessRules::sees(const Identity& who, std::string_view device, std::optional<std::string_view> service,
@@ -162,8 +164,7 @@ bool AccessRules::sees(const Identity& who, std::string_view device, std::option
   if (may_all(who)) return true;
   if (!path) path = service;  // its root object: all others are below
   return std::any_of(rules_.begin(), rules_.end(), [&](const AccessRule& rule) {
-    return std::any_of(rule.may.begin(), rule.may.end(), is_device_verb) && is_for(rule, who) &&
-           fits(rule.devices, device) && (!service || fits(rule.services, *service)) &&
+    return gives_something(rule, who) && fits(rule.devices, device) && (!service || fits(rule.services, *service)) &&
            (!path || leads_to(rule.paths, *path));
   });
 }

@@ -41,7 +41,7 @@ void add_check(Commands& commands) {
   add_files(app, options);
   add_folders(app, options);
   add_compat(app, options);
-  add_json_flag(app, options.is_json, "Print each error and warning as one line of JSON");
+  app.add_flag("--json", options.is_json, "Print each error and warning as one line of JSON");
 }
 
 }  // namespace rrgate

@@ -81,7 +81,7 @@ void add_check_config(Commands& commands) {
   app.add_option("FILE", options.file, "Configuration")->required()->option_text(" ");
   app.add_option("--as-service", options.service_user, "Also report files that this user can't read or write")
       ->option_text("USER");
-  add_json_flag(app, options.is_json, "Print errors and warnings as one line of JSON");
+  app.add_flag("--json", options.is_json, "Print errors and warnings as one line of JSON");
 }
 
 }  // namespace rrgate

@@ -60,10 +60,6 @@ int Commands::run(std::vector<std::string> words) {
   return chosen_();
 }
 
-CLI::Option* add_json_flag(CLI::App& app, bool& is_json, const std::string& summary) {
-  return app.add_flag("--json", is_json, summary);
-}
-
 void print_json_line(const nlohmann::ordered_json& json) {
   // Names of files may be no UTF-8.
   std::cout << json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << std::endl;

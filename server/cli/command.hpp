@@ -57,8 +57,6 @@ class Commands {
 /// All commands of rrgate.
 int run_command_line(std::vector<std::string> words);
 
-/// Flag --json of a command that has an answer of its own.
-CLI::Option* add_json_flag(CLI::App& app, bool& is_json, const std::string& summary);
 /// One line on standard output, at once: whoever reads a pipe sees each as it comes.
 void print_json_line(const nlohmann::ordered_json& json);
 

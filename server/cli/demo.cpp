@@ -433,7 +433,7 @@ void add_demo(Commands& commands) {
       ->excludes(cameras)
       ->option_text("PATH");
   app.add_flag("--no-browser", options.is_without_browser, "Do not open the page in a browser");
-  add_json_flag(app, options.is_json, "Print the address, or with --list each system, as one line of JSON");
+  app.add_flag("--json", options.is_json, "Print the address, or with --list each system, as one line of JSON");
 }
 
 }  // namespace rrgate

@@ -85,7 +85,7 @@ void add_health(Commands& commands) {
       ->capture_default_str()
       ->option_text("[127.0.0.1:8080]");
   app.add_flag("--ready", options.asks_ready, "Ask whether it accepts clients");
-  add_json_flag(app, options.is_json, "Print the answer as one line of JSON");
+  app.add_flag("--json", options.is_json, "Print the answer as one line of JSON");
 }
 
 }  // namespace rrgate

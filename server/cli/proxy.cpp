@@ -49,7 +49,7 @@ void add_proxy(Commands& commands) {
       ->capture_default_str()
       ->option_text("N [8080]");
   app.add_flag("--relay", options.is_relay, "Give each client its own session with the device");
-  add_json_flag(app, options.is_json, "Print the address as one line of JSON");
+  app.add_flag("--json", options.is_json, "Print the address as one line of JSON");
 }
 
 }  // namespace rrgate

@@ -83,7 +83,7 @@ void add_replay(Commands& commands) {
   app.add_option("--listen", options.listen, "Address of the first node; others use the next ports")
       ->option_text("URL [rr+tcp://127.0.0.1:0]");
   app.add_flag("--keep-ids", options.keeps_ids, "Use the recorded NodeIDs; the recorded nodes must not run");
-  add_json_flag(app, options.is_json, "Print each URL as one line of JSON");
+  app.add_flag("--json", options.is_json, "Print each URL as one line of JSON");
 }
 
 }  // namespace rrgate

@@ -15,7 +15,6 @@ namespace rrgate {
 inline constexpr std::array<std::string_view, 5> device_resources = {"subscriptions", "openapi.json", "asyncapi.json",
                                                                      "thing-description.json", "types.d.ts"};
 
-/// "DEVICE", "DEVICE/SERVICE" and what is below, for all methods.
 /// A request that no rate holds up, as long as somebody may `verb` the service: it commands a member of a device that
 /// is urgent (LeaseConfig::is_urgent()), or stops all agents.
 struct UrgentCommand {
@@ -25,6 +24,7 @@ struct UrgentCommand {
 };
 std::optional<UrgentCommand> find_urgent(GatewayState& gateway, const Request& request);
 
+/// "DEVICE", "DEVICE/SERVICE" and what is below, for all methods.
 Handler objects_endpoint(GatewayState& gateway);
 
 }  // namespace rrgate
