@@ -127,8 +127,13 @@ function stateOf(state: unknown): DeviceState {
 }
 
 /** Where a service of a device is reached through the gateway that served this page. */
-export function relayUrl(device: string, service: string, base: string = document.baseURI): string {
-  const url = new URL(`devices/${encodeURIComponent(device)}`, base);
+export function relayUrl(device: string, service: string, base?: string): string {
+  return socketUrl(`devices/${encodeURIComponent(device)}`, service, base);
+}
+
+/** Where a service at a path of that gateway is reached. */
+export function socketUrl(path: string, service: string, base: string = document.baseURI): string {
+  const url = new URL(path, base);
   url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
   url.search = new URLSearchParams({ service }).toString();
   url.hash = "";

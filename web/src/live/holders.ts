@@ -3,6 +3,7 @@
 
 import { useEffect, useState } from "preact/hooks";
 import { Store, useStore } from "../app/store";
+import { socketUrl } from "../gateway/devices";
 import { isRecord, text } from "../gateway/fields";
 import { session } from "../gateway/session";
 import { Link, openIn } from "../robot/link";
@@ -72,7 +73,7 @@ let opened: { link: Link; users: number } | null = null;
 
 /** One connection, however many panels look. */
 function openGateway(): { link: Link; close: () => void } {
-  opened ??= { link: new Link(() => session.withTicket(gatewayUrl())), users: 0 };
+  opened ??= { link: new Link(() => session.withTicket(socketUrl("gateway", "gateway"))), users: 0 };
   const mine = opened;
   mine.users++;
   const close = (): void => {
@@ -81,12 +82,4 @@ function openGateway(): { link: Link; close: () => void } {
     if (opened === mine) opened = null;
   };
   return { link: mine.link, close };
-}
-
-function gatewayUrl(base: string = document.baseURI): string {
-  const url = new URL("gateway", base);
-  url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
-  url.search = "service=gateway";
-  url.hash = "";
-  return url.href;
 }

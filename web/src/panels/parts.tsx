@@ -24,13 +24,21 @@ export function MemberSelect({
         {!members.some(({ name }) => name === chosen) && (
           <option value={chosen}>{chosen === "" ? t("Choose a member") : chosen}</option>
         )}
-        {members.map(({ name, kind }) => (
-          <option key={name} value={name}>
-            {name} ({t(kind)})
-          </option>
-        ))}
+        <MemberOptions members={members} />
       </select>
     </label>
+  );
+}
+
+export function MemberOptions({ members }: { members: readonly Member[] }) {
+  return (
+    <>
+      {members.map(({ name, kind }) => (
+        <option key={name} value={name}>
+          {name} ({t(kind)})
+        </option>
+      ))}
+    </>
   );
 }
 

@@ -16,7 +16,7 @@ import { numberPaths, numberReader } from "../values/paths";
 import { saveFile } from "../ui/save_file";
 import { membersFor, numberIn } from "./panel";
 import type { PanelProps } from "./panel";
-import { feedKindOf, Freshness, MemberSelect } from "./parts";
+import { feedKindOf, Freshness, MemberOptions, MemberSelect } from "./parts";
 import { MOST_SOURCES, sharedUnit, sourcesOf, withSources } from "./plot_sources";
 import type { PlotSource } from "./plot_sources";
 import { lonely, measuredAt, Trace, toCsv } from "./trace";
@@ -171,11 +171,7 @@ function AddSelect({ members, add }: { members: readonly Member[]; add: (name: s
         }}
       >
         <option value="">{t("Add")}</option>
-        {members.map(({ name, kind }) => (
-          <option key={name} value={name}>
-            {name} ({t(kind)})
-          </option>
-        ))}
+        <MemberOptions members={members} />
       </select>
     </label>
   );
