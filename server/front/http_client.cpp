@@ -1,5 +1,7 @@
 #include "server/front/http_client.hpp"
 
+#include <functional>
+
 #include "node/http/foreign_page.hpp"
 #include "node/http/request_reader.hpp"
 #include "node/http/upgrade.hpp"
@@ -303,6 +305,17 @@ bool makes_work(const Request& request) {
   return is_guarded(request) && request.path() != "/metrics";
 }
 
+/// Who goes through with a request though it be too much; empty: nobody.
+std::function<bool(const Identity&)> who_passes(GatewayState& gateway, const Request& request) {
+  const auto& rules = gateway.access().state().rules;
+  if (may_stop_something(request)) return [&rules](const Identity& who) { return rules.sees_any(who); };
+  auto urgent = find_urgent(gateway, request);
+  if (!urgent) return {};
+  return [&rules, urgent = std::move(*urgent)](const Identity& who) {
+    return rules.check(who, {.device = urgent.device, .service = urgent.service, .verb = urgent.verb}).has_value();
+  };
+}
+
 void note_unreadable(GatewayState& gateway, const Connection& connection, const ReadFailure& failure) {
   if (failure.status == 0) return;  // the client is gone
   gateway.reject(Rejection::bad_request);
@@ -347,10 +360,7 @@ rr::awaitable<std::optional<Continuation>> serve_request(GatewayState& gateway, 
   admitted.refusal = refuse_page(gateway, request);
   if (!admitted.refusal) admitted.refusal = require_tls(gateway, request);
   if (!admitted.refusal && !is_refused && is_guarded(request) && !is_awaited_page(gateway, request)) {
-    const auto urgent = find_urgent(gateway, request);
-    AccessRequest wanted;
-    if (urgent) wanted = {.device = urgent->device, .service = urgent->service, .verb = urgent->verb};
-    admitted = co_await gateway.http_access().admit(request, connection, config, urgent ? &wanted : nullptr);
+    admitted = co_await gateway.http_access().admit(request, connection, config, who_passes(gateway, request));
     if (admitted.refusal) gateway.reject(rejection_of(admitted.refusal->status));
   }
   auto memory = gateway.memory().charge(network_name(request.arrival.address));

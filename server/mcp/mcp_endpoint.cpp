@@ -19,6 +19,9 @@ namespace {
 /// Of a message; values that are larger go by REST.
 constexpr std::size_t largest_message = large_json_bytes;
 
+/// Of a message that stops something, if too much was asked for. Others cost no more than this.
+constexpr std::size_t largest_stop = 4 * 1024;
+
 /// Revisions that begin with "initialize", oldest first, and the one of which each request stands by itself.
 constexpr std::array<std::string_view, 3> handshake_revisions{"2025-03-26", "2025-06-18", "2025-11-25"};
 constexpr std::string_view newest_revision = "2026-07-28";
@@ -464,11 +467,28 @@ rr::awaitable<void> answer_stream(GatewayState& gateway, ResponseWriter& writer)
   co_await reply.end();
 }
 
+/// Refuses what is too much and does not stop anything.
+std::optional<Response> refuse_too_much(GatewayState& gateway, const Request& request) {
+  if (request.too_much.empty()) return std::nullopt;
+  const auto json = rr::read_json(request.message.body());
+  const auto is = [](const rr::Json& of, const char* key, std::string_view text) {
+    const auto found = of.is_object() ? of.find(key) : of.end();
+    return found != of.end() && *found == text;
+  };
+  if (json && is(*json, "method", "notifications/cancelled")) return std::nullopt;
+  if (json && is(*json, "method", "tools/call") && json->contains("params") && is((*json)["params"], "name", "stop"))
+    return std::nullopt;
+  gateway.reject(Rejection::rate);
+  return gateway.http_access().refuse_too_much(request.identity, nullptr, request.too_much);
+}
+
 rr::awaitable<void> answer_mcp(GatewayState& gateway, ResponseWriter& writer) {
-  auto refused = refuse_agent(gateway, writer.request());
-  if (!refused) refused = co_await writer.read_body(largest_message);
+  const auto& request = writer.request();
+  auto refused = refuse_agent(gateway, request);
+  if (!refused) refused = co_await writer.read_body(request.too_much.empty() ? largest_message : largest_stop);
+  if (!refused) refused = refuse_too_much(gateway, request);
   auto room = writer.memory().sibling();
-  if (!refused && !room.resize(rr::memory_of_json(writer.request().message.body()))) refused = no_memory_response();
+  if (!refused && !room.resize(rr::memory_of_json(request.message.body()))) refused = no_memory_response();
   if (refused) {
     co_await writer.send(*refused);
     co_return;
@@ -489,6 +509,11 @@ rr::awaitable<void> end_session(GatewayState& gateway, ResponseWriter& writer) {
 }
 
 }  // namespace
+
+bool may_stop_something(const Request& request) {
+  const auto method = request.message.method();
+  return request.path() == mcp_path && (method == http::verb::post || method == http::verb::delete_);
+}
 
 Handler mcp_endpoint(GatewayState& gateway) {
   return [&gateway](const Request&, std::string_view) {

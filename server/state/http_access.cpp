@@ -164,25 +164,25 @@ Response HttpAccess::refusal(const Request& request, const rr::Error& error) con
   return response;
 }
 
-Response HttpAccess::too_much(std::string_view what) {
-  auto response = problem_response(429, "too many requests " + std::string(what) + "; try again in a second");
+Response HttpAccess::refuse_too_much(const Identity& who, const AccessRequest* what, const std::string& of) {
+  const auto why = "too many requests " + of;
+  access_.record_too_much(who, what, why);
+  auto response = problem_response(429, why + "; try again in a second");
   response.set("Retry-After", "1");
   return response;
 }
 
 rr::awaitable<HttpAccess::Admitted> HttpAccess::admit(Request& request, const Connection& connection,
-                                                      const Config& config, const AccessRequest* urgent) {
+                                                      const Config& config,
+                                                      std::function<bool(const Identity&)> passes) {
   Admitted out;
-  const auto refuse = [&](const std::string& of) {
-    out.refusal = too_much(of);
-    access_.record_too_much(request.identity, nullptr, "too many requests " + of);
-  };
   const auto network = network_name(request.arrival.address);
   const auto& of_client = config.rates.client;
   out.client = clients_.enter(network, of_client.per_second, of_client.at_once, std::chrono::steady_clock::now());
-  if (!out.client && !urgent) {
+  if (!out.client) request.too_much = "from " + network;
+  if (!out.client && !passes) {
     request.identity.client = request.arrival.peer;
-    refuse("from " + network);
+    out.refusal = refuse_too_much(request.identity, nullptr, request.too_much);
     co_return out;
   }
   const auto& of_user = config.rates.user;
@@ -192,15 +192,16 @@ rr::awaitable<HttpAccess::Admitted> HttpAccess::admit(Request& request, const Co
     co_return out;
   }
   request.identity = std::move(*identity);
-  const bool passes = urgent && access_.state().rules.check(request.identity, *urgent);
-  if (!out.client && !passes) refuse("from " + network);
-  if (!request.identity.is_proven() || out.refusal) co_return out;
-  if (!request.identity.sign_in.empty())
+  if (request.identity.is_proven() && !request.identity.sign_in.empty())
     if (const auto next = access_.sign_ins().extend(sign_in_cookie(request), std::chrono::system_clock::now()))
       out.cookie = format_sign_in_cookie(request.arrival, *next);
-  out.user = users_.enter(request.identity.subject().key(), of_user.per_second, of_user.at_once,
-                          std::chrono::steady_clock::now());
-  if (!out.user && !passes) refuse("of " + rr::quote(request.identity.name));
+  if (request.identity.is_proven())
+    out.user = users_.enter(request.identity.subject().key(), of_user.per_second, of_user.at_once,
+                            std::chrono::steady_clock::now());
+  if (request.identity.is_proven() && !out.user && request.too_much.empty())
+    request.too_much = "of " + rr::quote(request.identity.name);
+  if (!request.too_much.empty() && !(passes && passes(request.identity)))
+    out.refusal = refuse_too_much(request.identity, nullptr, request.too_much);
   co_return out;
 }
 

@@ -3,6 +3,7 @@
 
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/thread_pool.hpp>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -50,12 +51,13 @@ class HttpAccess {
     std::optional<Response> refusal = {};
     std::string cookie = {};  ///< to go on with, for Set-Cookie; empty: the one that was shown, or none
   };
-  /// Finds out who sends a request, which is noted in it, and whether he asks for too much.
-  /// `urgent`  what it does to a device though it be too much, if he has any right there; null: not so.
+  /// Finds out who sends a request, and whether he asks for too much; both are noted in it.
+  /// `passes`  whether it goes through though it be too much, by who sends it; empty: for nobody.
   rr::awaitable<Admitted> admit(Request& request, const Connection& connection, const Config& config,
-                                const AccessRequest* urgent);
+                                std::function<bool(const Identity&)> passes);
   std::optional<RateGate::Pass> enter_device(const std::string& device, const Rates& rates);
-  static Response too_much(std::string_view what);
+  /// Refuses it, which is recorded. `of`  as in Request::too_much.
+  Response refuse_too_much(const Identity& who, const AccessRequest* what, const std::string& of);
   struct Passes {
     std::optional<RateGate::Pass> client = {};
     std::optional<RateGate::Pass> user = {};

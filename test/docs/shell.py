@@ -1,5 +1,6 @@
 """A shell as a reader has it: in a folder with what the pages name, with the programs on its path, and with a network of its
 own, so that commands run as they stand, on the ports that they name."""
+import json
 import os
 import pathlib
 import re
@@ -9,10 +10,12 @@ import subprocess
 import sys
 import sysconfig
 import threading
+import time
 
 from processes import BUILD, ROOT
 
 DEADLINE = 30.0  # seconds for one command
+FIRST_ANSWERS = 3.0  # seconds that the devices of a gateway have to answer it; a reader types no faster
 
 # What goes on until it is ended, and the port by which others reach it.
 SERVERS = {r"rrgate demo --port 8081\b": 8081, r"(build/release/server/)?rrgate (demo|serve|proxy)\b": 8080, r"\S+/python examples/thermostat/device\.py": 52230,
@@ -58,7 +61,20 @@ class Shell:
         is_up = f"(exec 3<>/dev/tcp/127.0.0.1/{port}) 2>/dev/null"
         _, late = self._ask(f"for i in $(seq 200); do {is_up} && break; sleep 0.05; done; {is_up}")
         assert late == 0, f"{command}: nobody listens on port {port}\n{log.read_text()}"
+        self._await_devices(port)
         return "", code
+
+    def _await_devices(self, port):
+        deadline = time.monotonic() + FIRST_ANSWERS
+        while time.monotonic() < deadline:
+            said, _ = self._ask(f"curl -s --max-time 1 http://127.0.0.1:{port}/readyz")
+            try:
+                ready = json.loads(said)
+            except ValueError:
+                return  # no gateway, or one that speaks TLS
+            if ready["devices"] == ready["devices_online"]:
+                return
+            time.sleep(0.05)
 
     def _ask(self, command):
         self._bash.stdin.write(f"{command}\nprintf '\\n<<%d>>\\n' $?\n")

@@ -316,6 +316,29 @@ def test_no_rate_holds_up_whoever_stops_all_agents(node, tmp_path):
         made.stop()
 
 
+def test_no_rate_holds_up_an_agent_that_stops_something(node, tmp_path):
+    config, agent, _ = with_tokens(tmp_path)
+    for of in ("client", "user"):
+        made = Site(tmp_path, node, rates={of: {"per_second": 1}}, **config)
+        try:
+            session = {"Mcp-Session-Id": message(made.port, agent, "initialize", 1).headers["Mcp-Session-Id"], **agent}
+            devices = {"name": "devices", "arguments": {}}
+            assert 429 in [message(made.port, session, "tools/call", 2, **devices).status for _ in range(5)]
+            stop = {"name": "stop", "arguments": {"device": "interop", "path": "plain"}}
+            stopped = message(made.port, session, "tools/call", 3, **stop)
+            assert stopped.status == 200 and not stopped.json["result"]["isError"]
+            assert message(made.port, session, "notifications/cancelled", requestId=2).status == 202
+            assert message(made.port, session, "tools/call", 4, **devices).status == 429
+            # Whoever may do nothing, or asks for more than a stop takes, is stopped by the rate as everybody.
+            large = {**stop, "arguments": {**stop["arguments"], "why": "x" * 5000}}
+            assert message(made.port, session, "tools/call", 5, **large).status == 413
+            assert of == "user" or message(made.port, {}, "tools/call", 6, **stop).status == 429
+            assert ask(made.port, "DELETE", "/mcp", headers=session).status == 204
+            assert ask(made.port, "GET", "/api/v1/devices", headers=agent).status == 429
+        finally:
+            made.stop()
+
+
 def test_agents_are_told_whose_tokens_are_believed(node, tmp_path):
     make_web_certificates(tmp_path / "id")
     server = issuers.IssuerServer(tmp_path / "id" / "localhost.pem", tmp_path / "id" / "localhost.key")

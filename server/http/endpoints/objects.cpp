@@ -114,8 +114,7 @@ std::optional<Response> refuse_device(GatewayState& gateway, const Request& requ
   pass = gateway.http_access().enter_device(device, gateway.config().rates);
   if (pass || find_urgent(gateway, request)) return std::nullopt;
   gateway.reject(Rejection::rate);
-  gateway.access().record_too_much(request.identity, &asked, "too many requests to the device");
-  return HttpAccess::too_much("to device " + rr::quote(device));
+  return gateway.http_access().refuse_too_much(request.identity, &asked, "to the device");
 }
 
 constexpr std::string_view definition_suffix = ".robdef";
