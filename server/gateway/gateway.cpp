@@ -34,10 +34,19 @@ constexpr std::chrono::milliseconds closing_look_period{10};
 /// How often the files of certificates, CAs, users and rights are looked at.
 constexpr std::chrono::milliseconds files_watch_period{500};
 
+/// What only changes when the clock is set.
+std::chrono::nanoseconds ahead_of_steady_clock() {
+  return std::chrono::system_clock::now().time_since_epoch() - std::chrono::steady_clock::now().time_since_epoch();
+}
+
 }  // namespace
 
 Gateway::Gateway(asio::io_context& io, Config config)
-    : GatewayState(io, std::move(config)), io_(io), files_watch_(io), drained_(io) {
+    : GatewayState(io, std::move(config)),
+      io_(io),
+      clock_ahead_(ahead_of_steady_clock()),
+      files_watch_(io),
+      drained_(io) {
   router_ = make_routes(*this);
 }
 
@@ -53,7 +62,7 @@ rr::Result<Gateway::Listener> Gateway::open(const rr::HostPort& address, std::ve
 
 void Gateway::serve(Listener listener) {
   listener.socket->start([this](asio::ip::tcp::socket socket) { accept(std::move(socket)); },
-                         [](const std::string& problem) { log(LogLevel::error, problem, {}); });
+                         [this](const std::string& problem) { note_unaccepted(problem); });
   listeners_.push_back(std::move(listener));
 }
 
@@ -103,7 +112,7 @@ rr::Result<std::vector<rr::HostPort>> Gateway::start(const std::vector<int>& soc
   for (const auto& acceptor : adopted_) {
     auto accepting = rr::accept_all(
         acceptor, [this](asio::ip::tcp::socket socket) { accept(std::move(socket)); },
-        [](const std::string& problem) { log(LogLevel::error, problem, {}); });
+        [this](const std::string& problem) { note_unaccepted(problem); });
     asio::co_spawn(io_, std::move(accepting), asio::detached);
   }
   devices_.start();
@@ -153,11 +162,21 @@ void Gateway::tell_of_nodes() {
   });
 }
 
+/// Says if somebody sets the clock of the machine: logins, tickets and the audit log go by it.
+void Gateway::watch_clock() {
+  const auto ahead = ahead_of_steady_clock();
+  const auto by = std::chrono::duration_cast<std::chrono::seconds>(ahead - std::exchange(clock_ahead_, ahead));
+  if (by.count() == 0) return;
+  ++metrics_.clock_jumps;
+  log(LogLevel::warning, "the clock was set", {{"by_seconds", by.count()}});
+}
+
 rr::awaitable<void> Gateway::watch_files() {
   while (!is_stopping_) {
     files_watch_.expires_after(files_watch_period);
     co_await files_watch_.async_wait(asio::as_tuple(asio::use_awaitable));
     if (is_stopping_) break;
+    watch_clock();
     access_.reload(false);
     access_.tend_audit();
     tend_log();
@@ -257,6 +276,11 @@ void Gateway::reload_files() {
   if (web_tls_) web_tls_->reload();
   devices_.reload_tls(true);
   if (found_) found_->reload_tls(true);
+}
+
+void Gateway::note_unaccepted(const std::string& problem) {
+  ++metrics_.unaccepted;
+  log_refusal(LogLevel::error, "connection waits", "those that could not be accepted", {{"error", problem}});
 }
 
 void Gateway::accept(asio::ip::tcp::socket socket) {

@@ -52,10 +52,12 @@ class Gateway : public GatewayState {
   void serve(Listener listener);
   rr::Result<> adopt(int socket, std::vector<rr::HostPort>& bound);
   void accept(boost::asio::ip::tcp::socket socket);
+  void note_unaccepted(const std::string& problem);
   void serve(std::unique_ptr<rr::ByteStream> stream, const boost::asio::ip::tcp::endpoint& peer,
              const boost::asio::ip::tcp::endpoint& local, Admission::Ticket ticket);
   rr::awaitable<void> drain();
   rr::awaitable<void> watch_files();
+  void watch_clock();
   /// Ends what goes on for clients whose proof was revoked or has expired.
   void end_those_not_good();
   void close_listeners();
@@ -71,6 +73,7 @@ class Gateway : public GatewayState {
   bool ends_at_once_ = false;
   std::function<void()> on_stop_;
   std::function<void()> on_stopped_;
+  std::chrono::nanoseconds clock_ahead_;  ///< the wall clock, of the steady one
   boost::asio::steady_timer files_watch_;
   boost::asio::steady_timer drained_;  ///< cancelled when a connection ends while stopping
 };

@@ -36,12 +36,14 @@ inline constexpr std::array<std::string_view, 14> rejection_names = {"too_many",
 
 struct Metrics {
   std::uint64_t connections = 0;  ///< accepted
+  std::uint64_t unaccepted = 0;   ///< times that none could be accepted: no descriptors left, or no memory
   std::uint64_t requests = 0;     ///< HTTP requests that were read
   std::array<std::uint64_t, rejection_names.size()> rejected{};
   std::array<std::uint64_t, 5> responses{};  ///< of HTTP, by status: 1xx to 5xx
   rr::AgeHistogram request_ages;             ///< of whole requests until their responses, streams and images left out
   std::uint64_t reloads = 0;
   std::uint64_t failed_reloads = 0;
+  std::uint64_t clock_jumps = 0;  ///< times that somebody set the clock of the machine
 
   void respond(unsigned status) {
     if (status >= 100 && status < 600) ++responses[status / 100 - 1];

@@ -1,12 +1,13 @@
-"""Chaos around a gateway, by a seed: devices, the gateway and clients are killed, stopped and started again, lines are cut, stalled
-and slowed, descriptors run out, the disk of the audit log fills, nobody reads the log, and the clock is set back. Clients work all
-the while, and what must hold is judged:
+"""Chaos around a gateway, by a seed: devices, the gateway, the nginx before it and clients are killed, stopped and started again,
+lines are cut, stalled and slowed, descriptors run out, the disk of the audit log fills, nobody reads the log, and the clock is set
+back and forth. Clients work all the while, and what must hold is judged:
 
     chaos.py --minutes N [--seed S]
 
 No packet of a pipe is lost or comes twice within a session, no event either; no call runs twice, and what was answered has run; a
-lock is held by one; who is inside, at a device that no fault is for, is answered within two seconds; when the faults have ended, wires have the last value, and the gateway's memory and descriptors are what they
-were. Ends with 1 where something did not hold. The seed makes the order of faults and their lengths.
+lock is held by one; who is inside, at a device that no fault is for, is answered within two seconds; when the faults have ended, wires
+have the last value, each value of a wire is accounted for with each of its followers, and the gateway's memory and descriptors are
+what they were. Ends with 1 where something did not hold. The seed makes the order of faults and their lengths.
 """
 import argparse
 import collections
@@ -30,6 +31,7 @@ from directions import PEERS
 from gateways import RRGATE, read_metrics
 from http_api import ask, fetch
 from processes import Background, free_port
+from reverse_proxies import ReverseProxy
 from shared_sites import start_service
 
 ROUND = 60.0  # seconds of faults, behind which everything is judged
@@ -126,6 +128,29 @@ class Device:
         self.process.process.wait()
 
 
+class Proxy:
+    """An nginx before the gateway, by way of the sample configuration."""
+
+    def __init__(self, folder, gateway):
+        self._folder, self._gateway = folder, gateway
+        self.start()
+
+    def start(self):
+        self._nginx = ReverseProxy("nginx", "nginx.conf", self._folder, self._gateway.port)
+
+    @property
+    def port(self):
+        return self._nginx.root
+
+    @property
+    def pid(self):
+        return self._nginx.pid
+
+    def kill(self):
+        os.killpg(self.pid, signal.SIGKILL)
+        self._nginx.stop()
+
+
 class Gateway:
     """With its log on a pipe, which somebody reads unless he is told to rest."""
 
@@ -139,6 +164,7 @@ class Gateway:
         self._file = folder / "gateway.json"
         self._file.write_text(json.dumps({
             "listen": [f"127.0.0.1:{self.port}"], "devices": devices, "audit": {"file": str(self.audit)},
+            "trusted_proxies": ["127.0.0.1"],
             "retry": {"min_ms": 50, "max_ms": 500}, "timeouts": {"unused_session_ms": 1000}, "log": {"level": "debug"},
         }))
         self._reading = threading.Event()
@@ -224,7 +250,9 @@ class Site:
         self.gateway = Gateway(folder, [
             {"name": "shared", "url": through, "mode": "shared", "login": {"username": "gateway", "password": "secret"}},
             {"name": "relayed", "url": through}, {"name": "ours", "url": url, "mode": "shared"}], self.clock)
-        self.front = Line(lambda: self.gateway.port)
+        self.proxy = Proxy(folder, self.gateway)
+        self.front = Line(lambda: self.proxy.port)
+        self.native = Line(lambda: self.gateway.port)
         self.clients = []
         self.is_recovering = True  # until a gateway that has come back has answered
         self.away = None  # when the gateway was away last: (since, until), None for until: it is
@@ -261,7 +289,7 @@ class Site:
 
     def begin(self):
         wait_until(self.is_online, "all devices are online")
-        native = f"rr+tcp://127.0.0.1:{self.front.port}/?nodename=%s&service=chaos"
+        native = f"rr+tcp://127.0.0.1:{self.native.port}/?nodename=%s&service=chaos"
         websocket = f"rr+ws://127.0.0.1:{self.front.port}/devices/%s?service=chaos"
         self.programs = [Program("native", self, native % "shared"), Program("websocket", self, websocket % "shared"),
                          Program("relayed", self, websocket % "relayed")]
@@ -307,6 +335,7 @@ class Site:
             wait_until(lambda: set(values().values()) == {value}, "wires have the last value")
         except AssertionError as error:
             self.findings.break_("wires", f"{error}, {value} or newer: {values()}")
+        self.judge_ledger()
         count = self.findings.counts.get("answers inside", 0)
         try:
             wait_until(lambda: self.findings.counts.get("answers inside", 0) > count, "who is inside is answered")
@@ -326,11 +355,31 @@ class Site:
         if used > 1_000_000:  # events are kept
             self.findings.break_("budget", f"{used} bytes are still in use")
 
+    def judge_ledger(self, values=20):
+        """Each value of the wire was delivered to each of its followers, replaced by a newer one, or lost; the ledger knows which."""
+        followers = sum(isinstance(client, Watcher) or client.name in ("native", "websocket") for client in self.clients)
+
+        def accounted():
+            metrics = self.gateway.metrics()
+            return sum(metrics[f'rrgate_subscription_{fate}_total{{device="shared",kind="wire"}}']
+                       for fate in ("delivered", "conflated", "dropped"))
+        begin = accounted()
+        for _ in range(values):
+            wait_until(lambda: self.publish(self.tokens.next()), "the device answers")
+        try:
+            wait_until(lambda: accounted() - begin >= values * followers, "the ledger has all values")
+            time.sleep(0.2)
+            if accounted() - begin != values * followers:
+                raise AssertionError("the ledger has more than all")
+        except AssertionError as error:
+            self.findings.break_("ledger", f"{error}: {accounted() - begin} of {values} values for {followers} followers")
+
     def close(self):
         self.end()
         code = self.gateway.stop()
-        for line in (self.front, self.line):
+        for line in (self.front, self.native, self.line):
             line.close()
+        self.proxy.kill()
         self.device.process.stop()
         self.ours.stop()
         if code != 0:
@@ -355,45 +404,48 @@ def killed(part):
 def stopped(process):
     @contextlib.contextmanager
     def fault(site, dice):
-        pid = process(site, dice).pid
-        os.kill(pid, signal.SIGSTOP)
+        group = process(site, dice).pid
+        os.killpg(group, signal.SIGSTOP)
         try:
             yield
         finally:
-            os.kill(pid, signal.SIGCONT)
+            os.killpg(group, signal.SIGCONT)
     return fault
 
 
 def cut(line):
     @contextlib.contextmanager
     def fault(site, dice):
-        line(site).cut(dice)
+        one = line(site, dice)
+        one.cut(dice)
         yield
-        line(site).cut(dice)
+        one.cut(dice)
     return fault
 
 
 def stalled(line):
     @contextlib.contextmanager
     def fault(site, dice):
-        line(site).stall()
+        one = line(site, dice)
+        one.stall()
         try:
             yield
             if dice.random() < 0.5:
-                line(site).cut(dice)
+                one.cut(dice)
         finally:
-            line(site).flow()
+            one.flow()
     return fault
 
 
 def slowed(line):
     @contextlib.contextmanager
     def fault(site, dice):
-        line(site).pause = dice.uniform(0.001, 0.05)
+        one = line(site, dice)
+        one.pause = dice.uniform(0.001, 0.05)
         try:
             yield
         finally:
-            line(site).flow()
+            one.flow()
     return fault
 
 
@@ -427,8 +479,8 @@ def log_unread(site, dice):
 
 
 @contextlib.contextmanager
-def clock_set_back(site, dice):
-    site.clock.write_text(f"-{dice.randrange(2, 7200)}s")
+def clock_set(site, dice):
+    site.clock.write_text(f"{dice.choice('+-')}{dice.randrange(2, 7200)}s")
     try:
         yield
     finally:
@@ -442,16 +494,18 @@ FAULTS = {
     "client stopped": stopped(lambda site, dice: dice.choice(site.programs).process.process),
     "gateway killed": killed(lambda site, dice: site.gateway),
     "gateway stopped": stopped(lambda site, dice: site.gateway.process),
-    "line to the device cut": cut(lambda site: site.line),
-    "line to the device stalled": stalled(lambda site: site.line),
-    "line to the device slowed": slowed(lambda site: site.line),
-    "line to clients cut": cut(lambda site: site.front),
-    "line to clients stalled": stalled(lambda site: site.front),
-    "line to clients slowed": slowed(lambda site: site.front),
+    "proxy killed": killed(lambda site, dice: site.proxy),
+    "proxy stopped": stopped(lambda site, dice: site.proxy),
+    "line to the device cut": cut(lambda site, dice: site.line),
+    "line to the device stalled": stalled(lambda site, dice: site.line),
+    "line to the device slowed": slowed(lambda site, dice: site.line),
+    "line to clients cut": cut(lambda site, dice: dice.choice((site.front, site.native))),
+    "line to clients stalled": stalled(lambda site, dice: dice.choice((site.front, site.native))),
+    "line to clients slowed": slowed(lambda site, dice: dice.choice((site.front, site.native))),
     "descriptors out": descriptors_out,
     "disk full": disk_full,
     "log unread": log_unread,
-    "clock set back": clock_set_back,
+    "clock set": clock_set,
 }
 
 
@@ -459,7 +513,7 @@ def possible_faults():
     """(those that this machine can have, why not the others)"""
     if FAKETIME.exists():
         return list(FAULTS), ""
-    return [name for name in FAULTS if name != "clock set back"], "no fault 'clock set back': there is no libfaketime (package faketime)"
+    return [name for name in FAULTS if name != "clock set"], "no fault 'clock set': there is no libfaketime (package faketime)"
 
 
 def play(site, dice, seconds, say=print):

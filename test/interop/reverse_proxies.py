@@ -113,6 +113,11 @@ class ReverseProxy:
             number = {"nginx": signal.SIGHUP, "haproxy": signal.SIGUSR2, "httpd": signal.SIGUSR1}[self.name]
             self._process.process.send_signal(number)
 
+    @property
+    def pid(self):
+        """Of the first of its processes, and of their group."""
+        return self._process.process.pid
+
     def description(self):
         return self._process.description()
 

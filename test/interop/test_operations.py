@@ -1,5 +1,8 @@
 """The gateway as a service: metrics, configuration read anew, what a service manager gives and hears, stopping."""
+import http.client
 import json
+import os
+import resource
 import signal
 import socket
 import subprocess
@@ -8,8 +11,9 @@ import time
 
 import pytest
 
+from chaos import FAKETIME
 from clients import run_and_check
-from gateways import RRGATE, Gateway, running
+from gateways import RRGATE, Gateway, read_metrics, running
 from http_api import BASE, Stream, fetch, is_alive, open_websocket
 from processes import free_port
 from scenarios import SCENARIO
@@ -294,3 +298,43 @@ def test_health(device, tmp_path):
         assert ask(address) == ask("--ready", address) == (0, f"{address}: HTTP/1.0 200 OK\n")
     assert ask(address) == (1, f"{address}: no answer\n")
     assert ask("nowhere")[0] == 2
+
+
+def test_clients_wait_while_there_are_no_descriptors(device, tmp_path):
+    with running(tmp_path, {"devices": [{"name": "interop", "url": device}]}) as gateway:
+        inside, pid = gateway.session(), gateway.process.process.pid
+        kept = http.client.HTTPConnection("127.0.0.1", gateway.port)
+        kept.request("GET", "/healthz")
+        kept.getresponse().read()
+        open_now = len(os.listdir(f"/proc/{pid}/fd"))
+        resource.prlimit(pid, resource.RLIMIT_NOFILE, (open_now, 4096))
+        with socket.create_connection(("127.0.0.1", gateway.port)) as late:
+            late.sendall(b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+            assert "Too many open files" in gateway.wait_for("connection waits")["error"]
+            kept.request("GET", "/metrics")
+            metrics = read_metrics(kept.getresponse().read().decode())
+            assert metrics["rrgate_unaccepted_total"] >= 1
+            assert metrics["process_open_fds"] == metrics["process_max_fds"] == open_now
+            assert is_alive(inside)
+            time.sleep(2)  # ten attempts
+            assert len(gateway.events("connection waits")) <= 5
+            resource.prlimit(pid, resource.RLIMIT_NOFILE, (4096, 4096))
+            late.settimeout(5)
+            assert late.recv(100).startswith(b"HTTP/1.1 200")
+        kept.close()
+
+
+@pytest.mark.parametrize("jump", [-3600, 7200])
+def test_a_clock_that_is_set_is_told_of(device, tmp_path, jump):
+    clock = tmp_path / "clock"
+    clock.write_text("+0")
+    environment = {"LD_PRELOAD": str(FAKETIME), "FAKETIME_TIMESTAMP_FILE": str(clock), "FAKETIME_DONT_FAKE_MONOTONIC": "1",
+                   "FAKETIME_CACHE_DURATION": "1"}
+    assert FAKETIME.exists()
+    with running(tmp_path, {"devices": [{"name": "interop", "url": device}]}, environment) as gateway:
+        inside = gateway.session()
+        assert gateway.metrics()["rrgate_clock_jumps_total"] == 0
+        clock.write_text(f"{jump:+d}")
+        assert abs(gateway.wait_for("the clock was set")["by_seconds"] - jump) <= 1
+        assert gateway.metrics()["rrgate_clock_jumps_total"] == 1
+        assert is_alive(inside)

@@ -12,7 +12,7 @@ namespace rr {
 namespace {
 
 constexpr std::size_t max_fetched_definitions = 1024;
-constexpr std::size_t max_fetched_bytes = 64u * 1024 * 1024;
+constexpr std::size_t max_fetched_bytes = 8u * 1024 * 1024;  // a byte may become forty
 
 std::string read_text(const Message& message, const MessageEntry& entry, std::string_view name) {
   const auto* element = message.elements_of(entry).find(name);
@@ -30,10 +30,11 @@ std::vector<std::string> read_texts(const Message& message, const MessageEntry& 
 }  // namespace
 
 void ClientSession::Fetch::add(std::string text) {
+  bytes += text.size();
+  if (bytes > max_fetched_bytes) return;  // advance_fetch() says so
   const auto parsed = parse_service_definition(text, RobdefMode::compat);
   names.insert(parsed.definition.name);
   for (const auto& import : parsed.definition.imports) wanted.insert(import.name);
-  bytes += text.size();
   texts.push_back(std::move(text));
 }
 
@@ -173,6 +174,10 @@ RequestId ClientSession::get_attributes(Now now) {
 
 /// Asks for the next definition that is missing, one at a time, or goes on when there is none.
 void ClientSession::advance_fetch(Fetch fetch, Now now) {
+  if (fetch.bytes > max_fetched_bytes)
+    return fail_fetch(fetch, make_error(ErrorCode::service_definition_error,
+                                        "the definitions have " + std::to_string(fetch.bytes) + " bytes, expected " +
+                                            std::to_string(max_fetched_bytes) + " at most"));
   const auto missing = std::find_if(fetch.wanted.begin(), fetch.wanted.end(), [&](const std::string& name) {
     return !fetch.names.contains(name) && !types_.find_service(name);
   });
@@ -180,10 +185,10 @@ void ClientSession::advance_fetch(Fetch fetch, Now now) {
   if (!fetch.asked.insert(*missing).second)
     return fail_fetch(fetch, make_error(ErrorCode::service_definition_error,
                                         "the node answered with another definition than " + quote(*missing)));
-  if (fetch.asked.size() > max_fetched_definitions || fetch.bytes > max_fetched_bytes)
-    return fail_fetch(fetch, make_error(ErrorCode::service_definition_error,
-                                        "the definitions import more than " + std::to_string(max_fetched_definitions) +
-                                            " others, or 64 MiB"));
+  if (fetch.asked.size() > max_fetched_definitions)
+    return fail_fetch(
+        fetch, make_error(ErrorCode::service_definition_error,
+                          "the definitions import more than " + std::to_string(max_fetched_definitions) + " others"));
   const auto id = begin_request(EntryType::get_service_desc, options_.service, {});
   outgoing_.add_text("ServiceType", *missing);
   outgoing_.add_text("clientversion", protocol_level);

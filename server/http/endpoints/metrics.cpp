@@ -1,5 +1,6 @@
 #include "server/http/endpoints/metrics.hpp"
 
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <ctime>
@@ -155,12 +156,18 @@ std::uint64_t resident_bytes() {
   return resident * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
 }
 
+std::uint64_t most_files() {
+  rlimit files{};
+  return ::getrlimit(RLIMIT_NOFILE, &files) == 0 ? files.rlim_cur : 0;
+}
+
 std::uint64_t open_files() {
   std::error_code error;
   std::uint64_t count = 0;
   for (auto it = std::filesystem::directory_iterator("/proc/self/fd", error);
        !error && it != std::filesystem::directory_iterator(); it.increment(error))
     ++count;
+  if (error == std::errc::too_many_files_open) return most_files();  // the count takes one
   return count;
 }
 
@@ -192,6 +199,9 @@ Handler metrics_endpoint(GatewayState& gateway) {
     out.sample(1, "version=\"" + std::string(version) + "\"");
     out.single("rrgate_connections", "gauge", "Open connections of all kinds.", gateway.admission().open());
     out.single("rrgate_connections_total", "counter", "Connections that were accepted.", metrics.connections);
+    out.single("rrgate_unaccepted_total", "counter",
+               "Times that connections had to wait: there were no file descriptors left, or no memory.",
+               metrics.unaccepted);
     out.single("rrgate_http_requests_total", "counter", "HTTP requests, upgrades to WebSockets among them.",
                metrics.requests);
     out.family("rrgate_http_responses_total", "counter", "Responses of HTTP by status, 101 for WebSockets among them.");
@@ -214,6 +224,8 @@ Handler metrics_endpoint(GatewayState& gateway) {
     const auto devices = look_at(gateway);
     write_devices(out, devices);
     write_ledgers(out, devices, gateway.shared());
+    out.single("rrgate_clock_jumps_total", "counter",
+               "Times that the clock of the machine was set by a second or more.", metrics.clock_jumps);
     out.family("rrgate_config_reloads_total", "counter", "Times that the configuration was read anew.");
     out.sample(metrics.reloads, "result=\"ok\"");
     out.sample(metrics.failed_reloads, "result=\"failed\"");
@@ -221,6 +233,7 @@ Handler metrics_endpoint(GatewayState& gateway) {
     out.time_sample(cpu_microseconds());
     out.single("process_resident_memory_bytes", "gauge", "Memory in use.", resident_bytes());
     out.single("process_open_fds", "gauge", "Open file descriptors.", open_files());
+    out.single("process_max_fds", "gauge", "File descriptors that may be open.", most_files());
     auto response = text_response(200, "text/plain; version=0.0.4; charset=utf-8", out.take());
     response.set("Cache-Control", "no-store");
     return response;

@@ -75,8 +75,8 @@ struct Sessions : Loopback {
     };
     while (take(*client, *service, requests) || take(*service, *client, answers)) {
     }
-    while (client->poll_event()) {
-    }
+    while (const auto event = client->poll_event())
+      if (const auto* closed = std::get_if<SessionClosed>(&*event)) why_closed = closed->reason.message;
   }
 
   void find_finger() {
@@ -92,6 +92,7 @@ struct Sessions : Loopback {
 
   std::string requests;
   std::string answers;
+  std::string why_closed;
 };
 
 const Known none_yet{std::in_place};
@@ -306,4 +307,20 @@ TEST_CASE("a login that takes its time does not cost what the client has") {
   sessions.exchange();
   CHECK(sessions.client->state() == ClientState::connected);
   CHECK_FALSE(sessions.has_sent("object Hand"));
+}
+
+TEST_CASE("definitions that would take more memory than a service needs are refused before they are read") {
+  const std::string padding(8u * 1024 * 1024, '#');
+  Sessions sessions({parts + padding + "\n", hand(), fingers});
+  for (const bool is_combined : {true, false}) {
+    Features features;
+    features.v4 = is_combined;
+    CHECK_FALSE(sessions.open(none_yet, features));
+    CHECK(sessions.why_closed.find("bytes, expected 8388608 at most") != std::string::npos);
+  }
+  Sessions others({parts, hand(), fingers + padding + "\n"});
+  REQUIRE(others.open(none_yet));
+  others.find_finger();
+  CHECK(others.client->object_type("hand.finger") == nullptr);
+  CHECK(others.client->state() == ClientState::connected);
 }
