@@ -44,7 +44,7 @@ class ServiceLocks : public std::enable_shared_from_this<ServiceLocks> {
   void add(const UpstreamClient& client, Upstream& upstream);
   /// Gives back what it holds. `left`  is called once the device has it back, maybe at once.
   void remove(const UpstreamClient& client, std::function<void()> left = nullptr);
-  /// `done`  is called exactly once, unless the client is removed before.
+  /// `done`  is called exactly once; with invalid_operation where the client is removed before.
   void handle_wanted(const UpstreamClient& client, const rr::LockWanted& wanted,
                      std::function<void(const rr::Result<>&)> done);
   /// Whether the client may use a member now. Errors   those of LockTable::check() and LeaseTable::check().
@@ -98,6 +98,7 @@ class ServiceLocks : public std::enable_shared_from_this<ServiceLocks> {
   std::map<std::pair<LockClient, rr::LockRequestId>, std::function<void(const rr::Result<>&)>> requests_;
   std::map<LockClient, std::function<void()>> leaving_;
   LockClient last_client_ = 0;
+  bool is_settling_ = false;
   boost::asio::steady_timer timeout_;
 };
 

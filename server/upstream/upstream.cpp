@@ -66,6 +66,7 @@ void Upstream::add(UpstreamClient& client) {
 }
 
 void Upstream::change_user(UpstreamClient& client) {
+  if (!has(client)) return;  // it is leaving, and nobody would take it off again
   locks_->remove(client);
   locks_->add(client, *this);
 }
@@ -203,7 +204,9 @@ void Upstream::watch_object(const std::string& path, const rr::EntityDefinition&
 
 /// After the device has come back: what clients had found there, they have found again, or it is gone.
 void Upstream::look_up_again() {
-  const auto known = objects_;
+  auto known = objects_;
+  for (const auto& [key, wire] : wires_) known.insert(key.first);  // also where it was lost while it was looked for
+  for (const auto& [number, pipe] : pipes_) known.insert(pipe.path);
   for (const auto& path : known) {
     find_object(path, [weak = weak_from_this(), path](const rr::Result<rr::Value>& found) {
       const auto self = weak.lock();
@@ -254,6 +257,7 @@ void Upstream::request(UpstreamClient& client, const rr::Called& called, Complet
   if (!ends_generator(called))
     if (const auto allowed = locks_->check(client, path, *called.member, use_of(called.kind)); !allowed)
       return done(allowed.error());
+  if (!connection_) return done(lost_error());      // a lease that has ended meanwhile had something sent
   if (!connection_->session().object_type(path)) {  // another session of this service has found it
     return find_object(path, [weak = weak_from_this(), &client, life = client.life(), called,
                               done](const rr::Result<rr::Value>& found) {
@@ -309,6 +313,14 @@ void Upstream::make_safe(const SafeRequest& request, Completion done) {
     (void)connection_->send_wire(request.path, request.member, request.values.front());
   else
     wire->second->out_value = OutValue{nullptr, request.values.front()};
+}
+
+void Upstream::forget_commands(std::string_view path) {
+  for (const auto& [key, wire] : wires_) {
+    if (!rr::is_within(key.first, path) || locks_->is_urgent(key.first, wire->member)) continue;
+    wire->out_value.reset();
+    if (connection_) connection_->drop_waiting_value(key.first, key.second);
+  }
 }
 
 void Upstream::send_safe(const SafeRequest& request, Completion done) {

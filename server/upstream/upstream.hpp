@@ -173,6 +173,9 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
   void ask_for_lock(rr::LockCommand command, const std::string& path, std::chrono::milliseconds timeout,
                     Completion done);
 
+  /// Drops what clients have sent to wires at and below a path and the device has not been sent yet: they command no
+  /// more. What passes all locks and leases stays.
+  void forget_commands(std::string_view path);
   /// Sent past whatever waits, and once more behind it where something waits.
   void make_safe(const SafeRequest& request, Completion done);
 
@@ -233,6 +236,7 @@ class Upstream : public std::enable_shared_from_this<Upstream> {
     std::optional<Outgoing> outgoing;   ///< while hand_out() is at it
     std::uint64_t count = 0;            ///< values that have come
     std::optional<OutValue> out_value;  ///< the newest that could not be sent yet
+    bool is_attaching = false;
     bool is_attached = false;
     bool is_due = false;  ///< hand_out() is due
   };

@@ -259,7 +259,7 @@ void Upstream::lost(const rr::Error& reason) {
   loss_ = reason;
   generators_.clear();
   for (const auto& [key, wire] : wires_) {
-    wire->is_attached = false;
+    wire->is_attached = wire->is_attaching = false;
     wire->newest.reset();  // no value of before is one of now
     wire->outgoing.reset();
     for (auto& follower : wire->followers) follower.count = wire->count;

@@ -20,12 +20,14 @@ namespace rrgate::test {
 
 class UpstreamBench {
  public:
-  explicit UpstreamBench(const std::shared_ptr<rr::Service>& service) : node(io, "test.device") {
+  explicit UpstreamBench(const std::shared_ptr<rr::Service>& service, LeaseConfig leases = {})
+      : node(io, "test.device") {
     node.add(service);
     const auto port = node.listen("rr+tcp://127.0.0.1:0");
     DeviceConfig made;
     made.name = "device";
     made.mode = DeviceMode::shared;
+    made.leases = std::move(leases);
     made.url = rr::parse_url("rr+tcp://127.0.0.1:" + std::to_string(port) + "/?service=" + service->name()).value();
     device = std::make_shared<Device>(io.get_executor(), std::move(made), config);
     upstream = std::make_shared<Upstream>(device, service->name(), UpstreamLogin{});
@@ -104,11 +106,15 @@ class HearingClient final : public UpstreamClient {
 
   std::function<void(rr::EventPacket&)> on_event;
   std::function<void(rr::WirePacket&)> on_wire;
+  std::function<void()> on_lease_ended;
   std::vector<std::string> heard;  ///< "wire NAME joined", "released PATH", ...
 
  private:
   std::weak_ptr<const void> life() const override { return life_; }
   std::shared_ptr<Upstream> upstream_in_use() const override { return upstream_; }
+  void lease_ended(const std::string&, const std::string&) const override {
+    if (on_lease_ended) on_lease_ended();
+  }
   bool may_answer(const std::string&, const rr::MemberDefinition&) const override { return false; }
   void receive_event(rr::EventPacket& packet) override {
     if (on_event) on_event(packet);
