@@ -81,6 +81,23 @@ void ServiceLocks::handle_wanted(const UpstreamClient& client, const rr::LockWan
   settle();
 }
 
+void ServiceLocks::review(const UpstreamClient& client, const std::function<bool(const std::string&)>& may_lock) {
+  const auto known = clients_.find(&client);
+  if (known == clients_.end()) return;
+  const auto id = known->second;
+  for (const auto& path : table_.paths_of(id))
+    if (!may_lock(path)) table_.handle_right_lost(id, path, steady_now());
+  for (const auto& lease : leases_.held())
+    if (lease.holder == id && !may_lock(lease.path))
+      leases_.handle_lost(lease.path, "its holder has no right to it any more");
+  settle();
+}
+
+bool ServiceLocks::has_at(const UpstreamClient& client, std::string_view path) const {
+  const auto known = clients_.find(&client);
+  return known != clients_.end() && (table_.has_at(known->second, path) || leases_.has_at(known->second, path));
+}
+
 rr::Result<> ServiceLocks::check(const UpstreamClient& client, std::string_view path,
                                  const rr::MemberDefinition& member, MemberUse use) {
   const bool is_leased = use == MemberUse::command && device_.config().leases.is_offered;
@@ -136,6 +153,7 @@ rr::Result<> ServiceLocks::handle_lease(const UpstreamClient& client, LockClient
                             "this client has none of the roles that may take a lease over (\"takeover\")");
     if (auto fits = safe_->check(canonical_lock_path(wanted.path)); !fits) return fits;
     if (auto allowed = table_.check(id, wanted.path, false, now); !allowed) return allowed;
+    if (auto allowed = table_.check_below(id, wanted.path); !allowed) return allowed;
     result = leases_.acquire(id, client.lock_user(), wanted.path, wanted.timeout, takes_over, now);
   }
   end_leases();

@@ -23,6 +23,8 @@ object Bench
     event struck(int32 number)
     wire double level [readonly]
     wire double wish [writeonly]
+    property int32 number
+    callback int32 ask()
     function int32{generator} count()
     function void wait()
     function void take(uint8[] bytes)
@@ -38,6 +40,8 @@ struct Counting {
   std::shared_ptr<rr::Service> service = rr::Service::from_text({definition}, "bench", "Bench");
   std::optional<rr::Reply<void>> waiting;  ///< whoever called wait()
   std::vector<std::string> commands;       ///< calls of stop(), and values of "wish"
+  std::int32_t number = 1;
+  int reads = 0;  ///< of the number
 
   Counting() {
     service->generator(
@@ -47,6 +51,12 @@ struct Counting {
     service->root().objref("parts", [](std::string_view) { return std::shared_ptr<rr::Object>(); });
     service->function("wait", [this](rr::Reply<void> reply) { waiting = std::move(reply); });
     service->function("take", [](const std::vector<std::uint8_t>&) {});
+    service->property("number")
+        .get([this] {
+          ++reads;
+          return number;
+        })
+        .set([this](std::int32_t value) { number = value; });
     service->function("stop", [this] { commands.emplace_back("stop"); });
     service->on_wire("wish", [this](double value) { commands.push_back(std::to_string(value)); });
   }
@@ -463,4 +473,144 @@ TEST_CASE("a wire of an object that is looked for is connected for those who are
   REQUIRE(bench.run_until([&] { return client.heard.size() == 1; }));
   bench.find("bench");
   CHECK(client.heard == std::vector<std::string>{"wire level joined"});
+}
+
+TEST_CASE("a client that has left asks the device for nothing") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  bench.open();
+  HearingClient client(bench.upstream);
+  bench.upstream->remove(client);
+  const auto asked = bench.ask(client, rr::CallKind::function, "bench", "stop");
+  REQUIRE(bench.run_until([&] { return asked->has_value(); }));
+  REQUIRE_FALSE((**asked).has_value());
+  CHECK((*asked)->error().code == rr::ErrorCode::operation_cancelled);
+  bench.find("bench");
+  CHECK(device.commands.empty());
+}
+
+TEST_CASE("no lease is given above an object that another client has locked") {
+  Counting device;
+  const auto part = device.service->make_object("Part");
+  device.service->root().objref("parts", [&](std::string_view) { return part; });
+  LeaseConfig leases;
+  leases.is_offered = true;
+  UpstreamBench bench(device.service, leases);
+  bench.open();
+  REQUIRE(bench.find("bench.parts[1]").has_value());
+  HearingClient first(bench.upstream);
+  HearingClient second(bench.upstream);
+  rr::LockRequestId last = 0;
+  const auto ask = [&](HearingClient& client, rr::LockCommand command, const std::string& path) {
+    std::optional<rr::ErrorCode> answer;
+    rr::LockWanted wanted;
+    wanted.id = ++last;
+    wanted.command = command;
+    wanted.path = path;
+    wanted.timeout = 1000ms;
+    bench.upstream->lock(client, wanted, [&](const rr::Result<>& result) {
+      answer = result ? rr::ErrorCode::none : result.error().code;
+    });
+    REQUIRE(bench.run_until([&] { return answer.has_value(); }));
+    return *answer;
+  };
+  CHECK(ask(first, rr::LockCommand::enter_monitor, "bench.parts[1]") == rr::ErrorCode::none);
+  CHECK(ask(second, rr::LockCommand::acquire_lease, "bench") == rr::ErrorCode::object_locked_error);
+  CHECK(ask(first, rr::LockCommand::acquire_lease, "bench") == rr::ErrorCode::none);
+}
+
+TEST_CASE("a session that rests is ended behind the answer of what makes the device safe") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  bench.upstream->rest_unused(50ms);
+  bench.upstream->keep_open({10s, 10s, 10s});
+  REQUIRE(bench.wait_for(bench.upstream->opened()).has_value());
+  bool is_gone = false;
+  device.service->on_client_gone([&](rr::ClientId) { is_gone = true; });
+  bench.upstream->make_safe({SafeAction::Kind::call, "bench", "wait", {}}, ignore_result);
+  REQUIRE(bench.run_until([&] { return bench.upstream->is_resting() && device.waiting.has_value(); }));
+  bool has_passed = false;
+  boost::asio::steady_timer while_it_waits(bench.io, 100ms);
+  while_it_waits.async_wait([&](const auto&) { has_passed = true; });
+  REQUIRE(bench.run_until([&] { return has_passed; }));
+  CHECK_FALSE(is_gone);
+  (*device.waiting)();
+  CHECK(bench.run_until([&] { return is_gone; }));
+}
+
+TEST_CASE("reads are shared, but whoever reads behind a command hears what has come of it") {
+  Counting device;
+  UpstreamBench bench(device.service);
+  auto config = bench.device->config();
+  config.shares_reads = true;
+  bench.device->become(config, bench.config);
+  bench.open();
+  HearingClient client(bench.upstream);
+  HearingClient other(bench.upstream);
+  const auto read = [&](HearingClient& by) { return bench.ask(by, rr::CallKind::property_get, "bench", "number"); };
+  const auto first = read(client);
+  const auto second = read(other);
+  const auto written =
+      bench.ask(client, rr::CallKind::property_set, "bench", "number", 0, {rr::Value(std::int32_t{2})});
+  const auto third = read(client);
+  const auto fourth = read(other);
+  REQUIRE(bench.run_until([&] { return fourth->has_value() && third->has_value() && written->has_value(); }));
+  const auto value_of = [](const auto& asked) { return asked->value()->template to<std::int32_t>().value(); };
+  CHECK(value_of(first) == 1);
+  CHECK(value_of(second) == 1);
+  CHECK(value_of(third) == 2);
+  CHECK(value_of(fourth) == 2);
+  CHECK(device.reads == 2);
+}
+
+TEST_CASE("a client that is gone is not asked with all others, and the device has its answer") {
+  Counting device;
+  rr::ClientId session = 0;
+  device.service->on_client_connected([&](rr::ClientId id) { session = id; });
+  UpstreamBench bench(device.service);
+  auto config = bench.device->config();
+  config.callbacks = {{"bench.ask", CallbackPolicy::all}};
+  bench.device->become(config, bench.config);
+  bench.open();
+  HearingClient first(bench.upstream);
+  std::optional<HearingClient> second(std::in_place, bench.upstream);
+  int asked = 0;
+  second->on_callback = [&](const auto&) { ++asked; };
+  first.on_callback = [&](const auto& answer) {
+    second.reset();
+    answer(rr::make_error(rr::ErrorCode::operation_failed, "not this one"));
+  };
+  std::optional<rr::Result<rr::Value>> heard;
+  device.service->call_callback(session, "ask", {}, [&](rr::Result<rr::Value> answer) { heard = std::move(answer); });
+  CHECK(bench.run_until([&] { return heard.has_value(); }));
+  CHECK(asked == 0);
+  CHECK((heard && !*heard));
+}
+
+TEST_CASE("a device that was away when a lease ended is made safe when it is back, though nobody uses it any more") {
+  Counting device;
+  LeaseConfig leases;
+  leases.is_offered = true;
+  leases.safe = {{SafeAction::Kind::call, "bench", "stop", "[]"}};
+  UpstreamBench bench(device.service, leases);
+  bench.open();
+  std::optional<HearingClient> holder(std::in_place, bench.upstream);
+  std::optional<bool> is_held;
+  rr::LockWanted wanted;
+  wanted.command = rr::LockCommand::acquire_lease;
+  wanted.path = "bench";
+  wanted.timeout = 10s;
+  bench.upstream->lock(*holder, wanted, [&](const rr::Result<>& result) { is_held = result.has_value(); });
+  REQUIRE(bench.run_until([&] { return is_held.has_value(); }));
+  REQUIRE(*is_held);
+  bench.upstream->connection()->close(rr::make_error(rr::ErrorCode::connection_error, "the line was cut"));
+  REQUIRE(bench.run_until([&] { return !bench.upstream->is_open(); }));
+  holder.reset();
+  bench.upstream->close();
+  const std::weak_ptr<Upstream> before = std::exchange(bench.upstream, nullptr);
+  REQUIRE(bench.run_until([&] { return before.expired(); }));
+  CHECK(device.commands.empty());
+  bench.upstream = std::make_shared<Upstream>(bench.device, "bench", UpstreamLogin{});
+  bench.open();
+  CHECK(bench.run_until([&] { return !device.commands.empty(); }));
 }
