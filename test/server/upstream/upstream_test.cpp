@@ -371,6 +371,7 @@ TEST_CASE("what makes safe is known however an index is spelled, and so are rule
 
 TEST_CASE("a client that goes on as another user hears what has become of what it waits for") {
   Counting device;
+  device.service->root().allow_monitor();
   UpstreamBench bench(device.service);
   bench.open();
   HearingClient first(bench.upstream);
@@ -492,6 +493,7 @@ TEST_CASE("a client that has left asks the device for nothing") {
 TEST_CASE("no lease is given above an object that another client has locked") {
   Counting device;
   const auto part = device.service->make_object("Part");
+  part->allow_monitor();
   device.service->root().objref("parts", [&](std::string_view) { return part; });
   LeaseConfig leases;
   leases.is_offered = true;

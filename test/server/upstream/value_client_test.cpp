@@ -117,7 +117,8 @@ TEST_CASE("a login that is judged for a device that has been replaced is given u
   auto& bench = rack.bench;
   boost::asio::ip::tcp::acceptor silent(bench.io, {boost::asio::ip::address_v4::loopback(), 0});
   auto config = bench.device->config();
-  config.url = rr::parse_url("rr+tcp://127.0.0.1:" + std::to_string(silent.local_endpoint().port()) + "/").value();
+  config.url =
+      rr::parse_url("rr+tcp://127.0.0.1:" + std::to_string(silent.local_endpoint().port()) + "/?service=rack").value();
   const auto before = std::make_shared<Device>(bench.io.get_executor(), config, bench.config);
   ValueClients clients(bench.io.get_executor(), MemoryBudget(1'000'000).charge(""));
   const SessionKey key{"rack", "alice", "secret"};
