@@ -11,6 +11,7 @@
 #include "server/mcp/mcp_describe.hpp"
 #include "server/mcp/mcp_recordings.hpp"
 #include "server/mcp/mcp_tools.hpp"
+#include "server/recordings/recordings.hpp"
 
 namespace rrgate {
 
@@ -252,20 +253,24 @@ rr::OrderedJson discover() {
           {"instructions", instructions}};
 }
 
-rr::OrderedJson list_resources(GatewayState& gateway, const Identity& who, const std::string& cursor) {
+rr::OrderedJson listed_resource(const std::string& uri, const std::string& name) {
+  return {{"uri", uri}, {"name", name}, {"mimeType", "application/json"}};
+}
+
+rr::awaitable<rr::OrderedJson> list_resources(GatewayState& gateway, const Identity& who, std::string cursor) {
+  const auto recordings = co_await gateway.recordings().list(gateway.access().state_ptr(), who);
   const auto devices = devices_for_agent(gateway, who);
-  const auto recordings = recordings_for_agent(gateway, who);
   const auto page = page_of(devices.size() + recordings.size(), cursor);
   auto out = rr::OrderedJson::object();
   auto& resources = rr::add_key(out, "resources") = rr::OrderedJson::array();
   for (auto i = page.first; i < page.last; ++i) {
     const bool is_device = i < devices.size();
-    const auto& name = is_device ? devices[i]->config().name : recordings[i - devices.size()];
+    const auto& name = is_device ? devices[i]->config().name : recordings[i - devices.size()].name;
     const auto uri = std::string(is_device ? device_scheme : recording_scheme) + name;
-    resources.push_back({{"uri", uri}, {"name", name}, {"mimeType", "application/json"}});
+    resources.push_back(listed_resource(uri, name));
   }
   if (!page.next.empty()) rr::add_key(out, "nextCursor") = page.next;
-  return out;
+  co_return out;
 }
 
 rr::OrderedJson resource_templates() {
@@ -343,7 +348,10 @@ rr::awaitable<rr::OrderedJson> result_of(GatewayState& gateway, McpReply& reply,
     page_of(0, message.text("cursor"));  // all tools are one page
     co_return McpTools::list();
   }
-  if (method == "resources/list") co_return list_resources(gateway, who, message.text("cursor"));
+  if (method == "resources/list") {
+    auto cursor = message.text("cursor");
+    co_return co_await list_resources(gateway, who, std::move(cursor));
+  }
   if (method == "resources/templates/list") co_return resource_templates();
   McpTools tools(gateway, reply);
   if (method == "resources/read") {
