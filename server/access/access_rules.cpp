@@ -159,6 +159,12 @@ bool AccessRules::sees_any(const Identity& who) const {
   return std::any_of(rules_.begin(), rules_.end(), [&](const AccessRule& rule) { return gives_something(rule, who); });
 }
 
+bool AccessRules::gives_any(const Identity& who, Verb verb) const {
+  if (may_all(who)) return true;
+  return std::any_of(rules_.begin(), rules_.end(),
+                     [&](const AccessRule& rule) { return gives(rule, verb) && is_for(rule, who); });
+}
+
 bool AccessRules::sees(const Identity& who, std::string_view device, std::optional<std::string_view> service,
                        std::optional<std::string_view> path) const {
   if (may_all(who)) return true;

@@ -93,6 +93,8 @@ class AccessRules {
   bool sees_all(const Identity& who) const;
   /// Whether there is any device at all that somebody may do something to.
   bool sees_any(const Identity& who) const;
+  /// Whether there may be something that somebody may do this to.
+  bool gives_any(const Identity& who, Verb verb) const;
 
   bool is_open() const { return !needs_login_; }
   bool has_rules() const { return !rules_.empty(); }

@@ -24,7 +24,10 @@ constexpr std::size_t largest_body = 8 * 1024;
 rr::awaitable<void> answer_with_body(Handler handler, ResponseWriter& writer, std::string rest) {
   auto response = co_await writer.read_body(largest_body);
   if (!response) response = handler(writer.request(), rest);
-  co_await writer.send(*response);
+  if (response->answer_later)
+    co_await response->answer_later(writer);
+  else
+    co_await writer.send(*response);
 }
 
 /// For handlers that look at the body.

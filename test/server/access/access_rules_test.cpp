@@ -174,6 +174,9 @@ TEST_CASE("rights: without rules those may everything who have proven who they a
   CHECK(AccessRules().sees_any(Identity{}));
   CHECK(rules.sees_any(who("alice", {})));
   CHECK_FALSE(rules.sees_any(Identity{}));
+  CHECK(AccessRules().gives_any(Identity{}, Verb::record));
+  CHECK(rules.gives_any(who("alice", {}), Verb::record));
+  CHECK_FALSE(rules.gives_any(Identity{}, Verb::record));
 }
 
 TEST_CASE("agents: what moves a device is given by rules for agents alone, and those give nothing by any other face") {
@@ -295,6 +298,10 @@ TEST_CASE("rights: a device is seen by those who may do something with it, and b
   CHECK(rules.sees_any(viewer));
   CHECK_FALSE(rules.sees_any(watcher));
   CHECK_FALSE(rules.sees_any(who("stranger", {})));
+  CHECK(rules.gives_any(viewer, Verb::read));
+  CHECK_FALSE(rules.gives_any(viewer, Verb::call));
+  CHECK(rules.gives_any(watcher, Verb::metrics));
+  CHECK_FALSE(rules.gives_any(who("stranger", {}), Verb::read));
   CHECK(rules.sees(viewer, "arm1", "Arm"));
   CHECK_FALSE(rules.sees(viewer, "arm1", "Create"));
   CHECK_FALSE(rules.sees(viewer, "create", "Arm"));

@@ -1,4 +1,4 @@
-// Work that takes long, beside the gateway's thread. Layer: server/state.
+// Work that takes long, beside the gateway's thread. Layer: server/limits.
 #pragma once
 
 #include <boost/asio/co_spawn.hpp>
