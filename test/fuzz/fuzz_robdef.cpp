@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/robdef/robdef.hpp"
+#include "test/fuzz/memory_bound.hpp"
 #include "test/support/is_equal.hpp"
 
 namespace {
@@ -60,6 +61,7 @@ bool check_set(std::string_view text, rr::RobdefMode mode) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const rr::fuzz::MemoryBound bound(size);
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   const bool is_strict = check_set(text, rr::RobdefMode::strict);
   const bool is_compat = check_set(text, rr::RobdefMode::compat);
