@@ -17,6 +17,8 @@ void require(bool claim) {
   if (!claim) std::abort();
 }
 
+constexpr std::size_t most_definitions = 256;  // no service imports more: 10 s for an input would be few
+
 bool has_errors(const std::vector<rr::Diagnostic>& diagnostics) {
   for (const auto& diagnostic : diagnostics) {
     require(!diagnostic.message.empty() && !diagnostic.code.empty());
@@ -44,7 +46,7 @@ bool check_set(std::string_view text, rr::RobdefMode mode) {
     auto result = rr::parse_service_definition(text.substr(0, end), mode);
     is_good = !has_errors(result.diagnostics) && is_good;
     set.push_back(&definitions.emplace_back(std::move(result.definition)));
-    if (end == std::string_view::npos) break;
+    if (end == std::string_view::npos || definitions.size() == most_definitions) break;
     text.remove_prefix(end + 1);
   }
   // Broken definitions must be harmless, too.
