@@ -2,6 +2,7 @@
 
 #include "server/http/endpoints/access.hpp"
 #include "server/http/endpoints/agents.hpp"
+#include "server/http/endpoints/audit.hpp"
 #include "server/http/endpoints/dashboard.hpp"
 #include "server/http/endpoints/devices.hpp"
 #include "server/http/endpoints/discovery.hpp"
@@ -62,6 +63,7 @@ std::vector<Route> list_routes(GatewayState& gateway) {
       {post, "/api/v1/recordings/*", with_body(stop_recording_endpoint(gateway))},
       {delete_, "/api/v1/recordings/*", delete_recording_endpoint(gateway)},
       {get, "/api/v1/access", who_endpoint(gateway)},
+      {get, "/api/v1/audit", audit_endpoint(gateway)},
       {post, "/api/v1/session", sign_in_endpoint(gateway)},
       {delete_, "/api/v1/session", sign_out_endpoint(gateway)},
       {post, "/api/v1/tickets", tickets_endpoint(gateway)},

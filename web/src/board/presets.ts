@@ -9,7 +9,7 @@ import type { Definitions } from "../values/definitions";
 import { isNumeric, parseType } from "../values/type_text";
 import { makeId } from "./board";
 import type { Board, Panel, PanelKind, Settings } from "./board";
-import { settle } from "./layout";
+import { COLUMNS, settle } from "./layout";
 
 export interface Described {
   type: string;
@@ -215,11 +215,11 @@ function standardOf(type: string, definitions: Definitions) {
 
 export function presetFor(object: Described): Board {
   const standard = standardOf(object.type, object.definitions);
-  if (!standard) return { panels: settle(byMembers(object)), stop: stopFor(object) };
+  if (!standard) return { panels: settle(byMembers(object)), columns: COLUMNS, stop: stopFor(object) };
   const panels = standard.panels
     .filter(([, , , , , settings, , place]) => place !== undefined || isThere(settings, object.members))
     .map((spec) => makePanel(spec));
-  return { panels: settle(panels), stop: stopFor(object) };
+  return { panels: settle(panels), columns: COLUMNS, stop: stopFor(object) };
 }
 
 const STOPS = /^(halt|stop|e_?stop|emergency_stop|abort)$/i;

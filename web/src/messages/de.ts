@@ -457,6 +457,24 @@ const german: Readonly<Record<string, string>> = {
     "seit {0}, zuletzt gehört vor {1}; gelesen: {2}, Befehle: {3}",
   "Last commands of {0}": "Letzte Befehle von {0}",
   failed: "gescheitert",
+  "What you may do": "Was Sie dürfen",
+  "You may use no device.": "Sie dürfen kein Gerät benutzen.",
+  "Everything: {0}": "Alles: {0}",
+  "Some of it: {0}": "Teile davon: {0}",
+  "The gateway": "Das Gateway",
+  "Known by: {0}.": "Bekannt durch: {0}.",
+  "Good until {0}.": "Gültig bis {0}.",
+  "What users did": "Was Benutzer taten",
+  User: "Benutzer",
+  Device: "Gerät",
+  Event: "Ereignis",
+  Show: "Zeigen",
+  "The gateway keeps no audit log: its configuration names no file for one.":
+    "Das Gateway führt kein Protokoll: Seine Konfiguration nennt keine Datei dafür.",
+  "Nothing is recorded of that.": "Davon ist nichts verzeichnet.",
+  "Nothing of that is among the newest records.": "Davon ist nichts unter den neuesten Einträgen.",
+  "All that is recorded, the newest first.": "Alles, was verzeichnet ist, das Neueste zuerst.",
+  "The newest records; there are older ones.": "Die neuesten Einträge; es gibt ältere.",
 };
 
 export default german;

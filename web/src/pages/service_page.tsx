@@ -43,8 +43,9 @@ export function ServicePage({ route, list, onlyStop }: ServicePageProps) {
   const first = useFirstView(link, route, drives);
   const shown = view === "auto" || (view === "drive" && !drives) ? first : view;
   const isDriven = shown === "drive";
+  const width = shown === "members" || onlyStop ? "page-narrow" : `page-wide ${shown === "board" ? "page-wall" : ""}`;
   return (
-    <div class={`page ${shown === "members" || onlyStop ? "page-narrow" : "page-wide"}`}>
+    <div class={`page ${width}`}>
       <div class="service-head">
         <h1 class="place-name">{device}</h1>
         {link && <LinkStrip link={link} list={list} device={device} service={service} />}
