@@ -7,14 +7,16 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
 
+from clients import run_program
 from command_line import run
-from paper_service import running_service
+from paper_service import QUIET, running_service
 from processes import BUILD, ROOT, Background, start_gateway
-from serial_robot import Robot, wait_for
+from serial_scenarios import Robot, wait_for
 
 EXAMPLE = ROOT / "examples" / "create-minimal"
 DEMO = BUILD / "examples/demo"
@@ -117,10 +119,18 @@ def test_the_gateway_stops_the_robot_of_a_client_that_dies(tmp_path):
     assert told[4:6] == [words(DRIVE), words(STOP)]
 
 
-@pytest.mark.parametrize("client", [client for client in CLIENTS if client != "py"])  # the reference refuses the definition
-def test_the_examples_own_service(client, tmp_path):
+SERVICES = {"cpp": [DEMO / "rrgate-create-serial"], "py": [sys.executable, EXAMPLE / "create_serial.py"]}
+
+
+def start_service(language, robot, folder):
+    return Background([*SERVICES[language], robot.device, "0", *(QUIET if language == "py" else [])], folder / "service.log")
+
+
+@pytest.mark.parametrize("client, language", [(client, language) for client in CLIENTS for language in SERVICES
+                                              if (client, language) != ("py", "cpp")])  # the reference refuses the definition
+def test_the_examples_own_service(client, language, tmp_path):
     robot = Robot()
-    service = Background([DEMO / "rrgate-create-serial", robot.device, "0"], tmp_path / "service.log")
+    service = start_service(language, robot, tmp_path)
     try:
         with started(client, service.next_line(), tmp_path) as process:
             while process.poll() is None:
@@ -131,6 +141,33 @@ def test_the_examples_own_service(client, tmp_path):
         assert set(packets) == {"packet 19: 7 0 19 0 5 20 0 0 18 0"}
         wait_for(lambda: robot.commands[3:] == told_by(client))
     finally:
+        service.stop()
+        robot.unplug()
+
+
+@pytest.mark.parametrize("language", SERVICES)
+def test_who_drives_is_asked_for_a_song(language, tmp_path):
+    robot = Robot()
+    service = start_service(language, robot, tmp_path)
+    pressed = threading.Event()
+
+    def press():
+        while not pressed.wait(0.02):
+            robot.say(robot.packet(buttons=int([137, 0, 100, 3, 232] in robot.commands)))
+
+    presser = threading.Thread(target=press, daemon=True)
+    presser.start()
+    try:
+        done = run_program([BUILD / "test/interop/cpp/rr-test-client", service.next_line()], [
+            {"answer": "play_callback", "value": {"uint8[]": [69, 16, 60, 16, 69]}},
+            {"call": "Drive", "args": [{"int16": 100}, {"int16": 1000}]},
+            {"asked": "play_callback", "count": 1}])
+        assert done["results"][-1]["value"] == {"list": [[0, 0]]}
+        wait_for(lambda: [141, 0] in robot.commands)
+        assert [command for command in robot.commands if command[0] in (140, 141)] == [[140, 0, 2, 69, 16, 60, 16], [141, 0]]
+    finally:
+        pressed.set()
+        presser.join()
         service.stop()
         robot.unplug()
 
