@@ -174,5 +174,33 @@ class CreateMinimal(SerialScenarios, unittest.TestCase):
     RRGATE = RRGATE
 
 
+class MoreRobots(unittest.TestCase):
+    def demo(self, name):
+        gateway = Program(self, RRGATE, "demo", name, "--port", 0)
+        self.addCleanup(gateway.process.terminate)
+        return gateway.url("rrgate demo: http://127") + "devices/"
+
+    def test_the_robot_on_a_simulated_line_drives_until_a_wall(self):
+        url = self.demo("create-minimal") + "create?service=Create"
+        self.assertIn("experimental.create.Create", rrgate("info", url))
+        rrgate("call", url, "StartStreaming")
+        watch = Program(self, RRGATE, "watch", url, "Bump", "--count", 1)
+        rrgate("call", url, "Drive", "500", "32767")
+        wait_for(lambda: get(url, "DistanceTraveled") > 100)
+        self.assertEqual(watch.process.wait(DEADLINE), 0)
+        self.assertTrue(1900 < get(url, "DistanceTraveled") <= 2000)
+        self.assertEqual((get(url, "Bumpers"), get(url, "AngleTraveled")), (3, 0))
+        rrgate("call", url, "Drive", "-100", "1")
+        wait_for(lambda: get(url, "AngleTraveled") < -20)
+
+    def test_each_robot_of_the_fleet_drives_by_itself(self):
+        devices = self.demo("fleet")
+        urls = [f"{devices}robot-{number}?service=Create" for number in range(1, 7)]
+        for url in urls[::2]:
+            rrgate("call", url, "Drive", "100", "32767")
+        wait_for(lambda: all(get(url, "DistanceTraveled") > 20 for url in urls[::2]))
+        self.assertEqual([get(url, "DistanceTraveled") for url in urls[1::2]], [0, 0, 0])
+
+
 if __name__ == "__main__":
     unittest.main()
