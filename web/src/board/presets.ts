@@ -162,6 +162,18 @@ const STANDARD: Readonly<Record<string, Preset>> = {
       ["table", 8, 16, 4, 4, { member: "parts" }],
     ],
   },
+  // Of `rrgate demo conference-room`, whose lights and sensors are other devices.
+  ["experimental.conference_room.Controller"]: {
+    stop: null,
+    panels: [
+      ["form", 0, 0, 4, 9, { members: ["target", "gain", "on"] }, "Target"],
+      ["plot", 4, 0, 8, 9, { member: "mean" }, "Mean of the sensors"],
+      ["plot", 4, 9, 8, 7, { member: "error" }, "Error"],
+      ["table", 0, 9, 4, 7, { member: "shown" }, "Lights", "lights/Lights"],
+      ["table", 0, 16, 6, 8, { member: "readings" }, "Northern sensors", "sensors-north/Sensors"],
+      ["table", 6, 16, 6, 8, { member: "readings" }, "Southern sensors", "sensors-south/Sensors"],
+    ],
+  },
   // Of `rrgate demo baxter`: its arms, cameras and grippers are other services of the device.
   ["experimental.baxter.Base"]: {
     stop: { call: "halt", args: [] },
