@@ -16,6 +16,8 @@ export interface Described {
   members: readonly Member[];
   definitions: Definitions;
   scope: string;
+  /** Those of the gateway, by name: a board begins without panels of others. Left out: not known. */
+  devices?: readonly string[] | undefined;
 }
 
 /** `place`: whose members, as those of a Panel: "device/service object". */
@@ -229,7 +231,9 @@ export function presetFor(object: Described): Board {
   const standard = standardOf(object.type, object.definitions);
   if (!standard) return { panels: settle(byMembers(object)), stop: stopFor(object) };
   const panels = standard.panels
-    .filter(([, , , , , settings, , place]) => place !== undefined || isThere(settings, object.members))
+    .filter(([, , , , , settings, , place]) =>
+      place === undefined ? isThere(settings, object.members) : isOfDevices(place, object.devices),
+    )
     .map((spec) => makePanel(spec));
   return { panels: settle(panels), stop: stopFor(object) };
 }
@@ -309,6 +313,11 @@ function hasNumbers(member: Member, object: Described): boolean {
 function isThere(settings: Settings | undefined, members: readonly Member[]): boolean {
   const named = settings?.["member"] ?? (settings?.["members"] as readonly string[] | undefined)?.[0];
   return named === undefined || members.some(({ name }) => name === named);
+}
+
+function isOfDevices(place: string, devices: readonly string[] | undefined): boolean {
+  const device = place.split("/", 1)[0] ?? "";
+  return devices === undefined || place.startsWith(" ") || devices.includes(device);
 }
 
 function makePanel([kind, x, y, w, h, settings = {}, title = "", place = ""]: Spec): Panel {
