@@ -26,9 +26,9 @@ const show = (target) => {
   }
 };
 controller.onConnected(async (object) => {
-  status.textContent = "connected";
   show(await object.target.get());
   form.elements.on.checked = await object.on.get();
+  status.textContent = "connected";
 });
 controller.onLost((reason) => (status.textContent = `the controller is away: ${reason.message}`));
 
