@@ -78,6 +78,11 @@ export class Program {
   get output(): string {
     return this.#output;
   }
+
+  /** undefined: it does not run. */
+  get pid(): number | undefined {
+    return this.#child?.pid;
+  }
 }
 
 /** A gateway of its own to one device; `more`: of its configuration. */

@@ -357,6 +357,29 @@ describe("a board", () => {
     expect(recallBoard("x", { getItem: () => JSON.stringify(writeBoard(board)) })?.stop?.call).toBe("halt");
   });
 
+  test("begins without panels of devices that the gateway does not have", () => {
+    const drive: Member = {
+      name: "Drive",
+      kind: "function",
+      type: "void",
+      parameters: [],
+      modifiers: [],
+      documentation: "",
+    };
+    const robot = {
+      type: "experimental.simulatedcreate.SimulatedCreate",
+      members: [drive, { ...drive, name: "FrameStream", kind: "pipe" as const, type: "WebcamImage" }],
+      definitions: new Definitions([]),
+      scope: "experimental.simulatedcreate",
+    };
+    const kinds = (devices?: string[]) => presetFor({ ...robot, devices }).panels.map(({ kind }) => kind);
+    expect(kinds()).toContain("image");
+    expect(kinds(["create", "webcams"])).toContain("image");
+    expect(kinds(["robot-1", "robot-2"])).not.toContain("image");
+    const cameras = { ...robot, type: "experimental.createwebcam2.WebcamHost", devices: ["eyes"] };
+    expect(presetFor(cameras).panels.map(({ kind }) => kind)).toEqual(["image", "image"]); // of the service itself
+  });
+
   test("starts from the type where it is known, else from the members", () => {
     const member = (name: string, kind: Member["kind"], type: string): Member => ({
       name,

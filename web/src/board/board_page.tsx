@@ -58,6 +58,7 @@ export default function BoardPage({ link, route, list, onlyStop }: BoardPageProp
       members: last.members,
       definitions: new Definitions(last.definitions),
       scope: scopeOf(last.type),
+      devices: devicesOf(list.state.value)?.map(({ name }) => name),
     });
   }, [last?.type]);
   const { board, isKept, trouble, setBoard: writeDown, setTrouble } = useBoard(key, route, preset);

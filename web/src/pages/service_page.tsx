@@ -23,6 +23,7 @@ import { isCreate } from "../robot/robot_model";
 import { Definitions, scopeOf } from "../values/definitions";
 import { LinkStrip } from "../ui/link_strip";
 import { ObjectView } from "./object_view";
+import { ReplayBar } from "./replay_bar";
 import { RobotPage } from "./robot_page";
 
 type ServiceRoute = Route & { page: "service" };
@@ -61,6 +62,7 @@ export function ServicePage({ route, list, onlyStop }: ServicePageProps) {
       )}
       {link && shown === "board" && <LoadedBoard link={link} route={route} list={list} onlyStop={onlyStop} />}
       {link && shown === "members" && !onlyStop && <MembersPage link={link} route={route} path={path} />}
+      {link && !onlyStop && <ReplayBar link={link} device={device} list={list} />}
       {isMissing && (
         <p class="empty">
           {t("The gateway has no device of this name. If one comes, it opens here by itself.")}{" "}
