@@ -390,6 +390,8 @@ TEST_CASE("a path is remembered while a client uses it; where there is no room, 
 
   SECTION("a path that is released makes room for one") {
     for (const auto& spelling : hosted.forget_path(slot(7))) pair.service->release_path(spelling, pair.now);
+    pair.pump();
+    pair.next_client<PathReleased>();
     CHECK(find(slot(room)));
     CHECK_FALSE(find(slot(room + 1)));
   }
